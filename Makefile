@@ -3,7 +3,8 @@ PYTHON ?= python3
 LOWEST_PYTHON ?= python3.11
 VENV := .venv
 BIN := $(VENV)/bin
-PARALLEL := -n logical --maxprocesses 4 --dist loadfile
+# Files in their order: the slow ones (accuracy, browser) first, so that no worker is left with one at the end.
+PARALLEL := -n logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 FAST := tests/golden tests/paper tests/properties $(wildcard tests/unit/test_*.py) \
   $(addprefix tests/unit/,advice association diagnostics estimation interchange)
 
@@ -44,9 +45,9 @@ check: dev  ## Check style, types, layers, frame names, spelling.
 	$(BIN)/pytest -q tests/architecture
 	@$(BIN)/python .ci/installed_size
 
-test: dev  ## Run all tests, including those in the browser.
+test: dev  ## Run all tests, including those in the browser; those of the architecture belong to make check.
 	@$(BIN)/python tests/find_browser.py --install
-	$(BIN)/pytest $(PARALLEL)
+	$(BIN)/pytest $(PARALLEL) --ignore tests/architecture
 
 test-fast: dev  ## Run the core's tests, in under a minute of processor time.
 	$(BIN)/pytest -q -m "not slow and not real" $(FAST)

@@ -109,14 +109,15 @@ def changed_options(options: CalibrationOptions, changes: Sequence[OptionChange]
     Raises:
         OptionError: an option is unknown or out of range.
     """
+    groups: dict[str, dict[str, Any]] = {"": {}}
     for change in changes:
         if change.path not in option_fields():
             raise _unknown(change.path)
         group, _, name = change.path.rpartition(".")
-        named: dict[str, Any] = {name: change.value}
-        if group:
-            named = {group: replace(getattr(options, group), **named)}
-        options = replace(options, **named)
+        groups.setdefault(group, {})[name] = change.value
+    ungrouped = groups.pop("")
+    changed = {group: replace(getattr(options, group), **values) for group, values in groups.items()}
+    options = replace(options, **ungrouped, **changed)
     return checked_options(options)
 
 

@@ -65,10 +65,19 @@ def other_camera(found: ImportedCalibration, camera: Camera | None) -> tuple[Che
         return ()
     lenses = lenses_of(found, dataclasses.replace(found, camera=camera), None)
     lens = lenses.difference if lenses else None
-    if lens is None or lens.same:
+    if lens is None or lens.same or _was_refined_from(found, camera):
         return ()
     message = f"the recording states other intrinsics than the calibration: {lens.text}"
     return (CheckResult("warning", "other-lens", message, "the residuals are through the calibration's own"),)
+
+
+def _was_refined_from(found: ImportedCalibration, camera: Camera) -> bool:
+    """Return whether a calibration's intrinsics are refined ones, and a recording states those they were refined from."""
+    given = found.file.calibration.given_camera if found.file is not None else None
+    if given is None:
+        return False
+    lenses = lenses_of(dataclasses.replace(found, camera=given), dataclasses.replace(found, camera=camera), None)
+    return lenses is not None and lenses.difference is not None and lenses.difference.same
 
 
 def with_recording(

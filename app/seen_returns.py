@@ -24,6 +24,7 @@ _SAMPLE_HALF_WINDOW_S = 1e-3
 _MOST, _BEYOND = 0.98, 1.1
 _NEAREST_M, _SLOWEST_MPS = 2.0, 1.0
 _STILL_MPS = 0.3
+_NONE: Indices = np.zeros(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,21 +49,20 @@ class SeenReturns:
 
     def near(self, time: TimeNs) -> Indices:
         """Return the rows of the seen returns of the scan nearest to a time; none if none is near."""
-        if not len(self.scans):
-            return np.zeros(0, dtype=np.int64)
-        nearest = self.scans.nearest(time)
-        if abs(int(self.scans.times_ns[nearest]) - time) > _NEAREST_WITHIN_S * NS_PER_S:
-            return np.zeros(0, dtype=np.int64)
-        return self._rows(nearest, nearest + 1)
+        nearest = self._nearest(time)
+        return _NONE if nearest is None else self._rows(nearest, nearest + 1)
 
     def trail(self, time: TimeNs, scans: int) -> Indices:
         """Return the rows of the seen returns of so many scans before the one nearest to a time, that one left out."""
+        nearest = self._nearest(time)
+        return _NONE if nearest is None else self._rows(max(0, nearest - scans), nearest)
+
+    def _nearest(self, time: TimeNs) -> int | None:
+        """Return the scan nearest to a time; None if none is near."""
         if not len(self.scans):
-            return np.zeros(0, dtype=np.int64)
+            return None
         nearest = self.scans.nearest(time)
-        if abs(int(self.scans.times_ns[nearest]) - time) > _NEAREST_WITHIN_S * NS_PER_S:
-            return np.zeros(0, dtype=np.int64)
-        return self._rows(max(0, nearest - scans), nearest)
+        return nearest if abs(int(self.scans.times_ns[nearest]) - time) <= _NEAREST_WITHIN_S * NS_PER_S else None
 
     def _rows(self, first_scan: int, end_scan: int) -> Indices:
         first, end = (int(self.scans.first_return[scan]) for scan in (first_scan, end_scan))

@@ -27,6 +27,7 @@ class _Request:
     clicks: tuple[ReflectorClick, ...]
     options: CalibrationOptions
     when_done: Callable[[Solved], None]
+    camera: Camera | None
 
 
 class SolverWorker:
@@ -40,6 +41,7 @@ class SolverWorker:
         self._newest_revision = -1
         self._closed = False
         self._latest: Calibration | None = None
+        self._latest_camera: Camera | None = None
         self._executor = ThreadPoolExecutor(max_workers=1, thread_name_prefix="solver")
 
     def request(
@@ -48,6 +50,7 @@ class SolverWorker:
         clicks: Sequence[ReflectorClick],
         options: CalibrationOptions,
         when_done: Callable[[Solved], None],
+        camera: Camera | None = None,
     ) -> None:
         """Solve this revision and drop older requests; returns immediately, and does nothing after `close`.
 
@@ -58,8 +61,9 @@ class SolverWorker:
             clicks: of this revision.
             options: of this revision.
             when_done: called with each answer, without any lock held; not called when a newer request came in time.
+            camera: other intrinsics than the recording was opened with; None for those.
         """
-        request = _Request(revision, tuple(clicks), options, when_done)
+        request = _Request(revision, tuple(clicks), options, when_done, camera or self._camera)
         with self._lock:
             if self._closed or revision <= self._newest_revision:
                 return
@@ -77,14 +81,16 @@ class SolverWorker:
     def _answer(self, request: _Request) -> Solved | None:
         if request.revision != self._newest_revision:
             return None
-        steps = solve_in_steps(self._recording, request.clicks, self._camera, request.options, previous=self._latest)
+        latest = self._latest if self._latest_camera is request.camera else None
+        steps = solve_in_steps(self._recording, request.clicks, request.camera, request.options, previous=latest)
         for outcome in steps:
             if not (isinstance(outcome, Calibration) and outcome.checking):
                 break
             if request.revision != self._newest_revision:
                 return None
             request.when_done(Solved(request.revision, outcome))
-        self._latest = outcome if isinstance(outcome, Calibration) else self._latest
+        if isinstance(outcome, Calibration):
+            self._latest, self._latest_camera = outcome, request.camera
         checked: tuple[PairResult, ...] = ()
         if isinstance(outcome, Unsolvable) and self._reference is not None:
             checked = check_clicks(self._recording, request.clicks, self._reference, request.options)

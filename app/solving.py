@@ -33,7 +33,7 @@ from calib_core.measurements import Candidate, Pair, RadarScans, ReflectorClick,
 from calib_core.option_checks import checked_options
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording, about_assumptions
-from calib_core.results import Calibration, InputFile, PairResult
+from calib_core.results import Calibration, InputFile, PairResult, UnconfirmedClicks
 
 __all__ = [
     "RadarSource",
@@ -51,6 +51,9 @@ __all__ = [
 
 _MOST_CANDIDATES = 50
 """As many as the option allows."""
+
+_KEPT_WARNINGS = ("assumed", "nobody-confirmed")
+"""What solving the same pairs again cannot change."""
 
 _log = logging.getLogger(__name__)
 
@@ -109,8 +112,8 @@ def solve_in_steps(
         yield Unsolvable(
             "no-camera",
             "the camera intrinsics are missing: the recording contains none that can be used",
-            "calibrate the camera with OpenCV, Kalibr or ROS camera_calibration, then drop its file on the page, or start "
-            "again with --camera FILE",
+            "calibrate the lens from a board in a recording (tab Lens, or cocalib intrinsics), or drop a camera file on the "
+            "page, or start again with --camera FILE",
         )
         return
     times = sorted({click.image_time for click in clicks})
@@ -251,7 +254,8 @@ def camera_for(recording: Recording, camera_file: CameraFile | None) -> Camera |
     if (camera.width_px, camera.height_px) != (picture.width_px, picture.height_px):
         raise InputError(
             f"{camera_file.source}: calibrated for {camera.width_px} x {camera.height_px} px, but the frames have "
-            f"{picture.width_px} x {picture.height_px} px; give the intrinsics of these frames"
+            f"{picture.width_px} x {picture.height_px} px; give the intrinsics of these frames, or "
+            "--rescale-camera if they are the calibrated ones resized"
         )
     return camera
 
@@ -269,6 +273,7 @@ def calibration_text(
     recording: Recording,
     confirmed: Sequence[str] = (),
     camera_file: CameraFile | None = None,
+    unconfirmed: UnconfirmedClicks | None = None,
 ) -> str:
     """Write a calibration-1 file; the page and the command line give the same bytes for the same clicks.
 
@@ -277,13 +282,14 @@ def calibration_text(
         recording: what it was solved from; assumptions about it that nobody has confirmed become warnings of the file.
         confirmed: texts of the assumptions that were confirmed after the recording was opened.
         camera_file: the file whose intrinsics were used; None for the recording's own.
+        unconfirmed: clicks that nobody confirmed.
     """
     assumed = [
         (one.assumption, one.confirmed or one.assumption.words in confirmed) for one in recording.stated_assumptions
     ]
-    unconfirmed = about_assumptions([assumption for assumption, sure in assumed if not sure])
-    if unconfirmed:
-        calibration = dataclasses.replace(calibration, warnings=(*calibration.warnings, *unconfirmed))
+    unsure = about_assumptions([assumption for assumption, sure in assumed if not sure])
+    if unsure:
+        calibration = dataclasses.replace(calibration, warnings=(*calibration.warnings, *unsure))
     provenance = Provenance(
         inputs=(*recording.fingerprint(), *([] if camera_file is None else [_input_file(camera_file)])),
         radar_topic=recording.radar_topic,
@@ -298,6 +304,7 @@ def calibration_text(
         version=version(),
         column_map=recording.column_map,
         assumptions=tuple(AssumptionNote(assumption.words, sure) for assumption, sure in assumed),
+        unconfirmed=unconfirmed,
     )
     return interchange_text(calibration, _frame_names(recording), provenance)
 
@@ -333,7 +340,7 @@ def calibration_text_of_pairs(calibration: Calibration, text: str, name: str) ->
     if names_schema(text, CALIBRATION_SCHEMA):
         file = read_calibration(text, name)
         provenance = dataclasses.replace(file.provenance, inputs=(origin,), version=version())
-        assumed = tuple(warning for warning in file.calibration.warnings if warning.code == "assumed")
-        calibration = dataclasses.replace(calibration, warnings=(*calibration.warnings, *assumed))
+        kept = tuple(warning for warning in file.calibration.warnings if warning.code in _KEPT_WARNINGS)
+        calibration = dataclasses.replace(calibration, warnings=(*calibration.warnings, *kept))
         return interchange_text(calibration, file.frames, provenance)
     return interchange_text(calibration, provenance=Provenance(inputs=(origin,), version=version()))

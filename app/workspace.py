@@ -3,7 +3,7 @@
 import threading
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol, TypeAlias
 
@@ -14,6 +14,7 @@ from app.hypothesis_sheet import OpenMeaning
 from app.session import (
     AssumedReading,
     BoxTrack,
+    ChosenIntrinsics,
     ClicksImported,
     History,
     RecordingFacts,
@@ -35,13 +36,22 @@ from calib_core.camera import Camera
 from calib_core.detections import Boxes
 from calib_core.errors import InputError
 from calib_core.input_files import name_text
-from calib_core.interchange import CameraFile, read_clicks, write_clicks
+from calib_core.interchange import CameraFile, camera_info_text, read_clicks, write_clicks
 from calib_core.measurements import NS_PER_S, ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording, assumption_hint
 from calib_core.results import Calibration, DataWarning
 
-__all__ = ["Journal", "Judged", "Solver", "Subscriber", "Workspace", "open_workspace", "recording_facts"]
+__all__ = [
+    "GivenIntrinsics",
+    "Journal",
+    "Judged",
+    "Solver",
+    "Subscriber",
+    "Workspace",
+    "open_workspace",
+    "recording_facts",
+]
 
 Subscriber: TypeAlias = Callable[[View], None]
 Judged: TypeAlias = tuple[tuple[CarriedTrack, ...], Calibration | None]
@@ -81,11 +91,30 @@ class Solver(Protocol):
         clicks: Sequence[ReflectorClick],
         options: CalibrationOptions,
         when_done: Callable[[Solved], None],
+        camera: Camera | None = None,
     ) -> None:
-        """Solve this revision and drop older requests; must not block. A larger revision is a newer one."""
+        """Solve this revision and drop older requests; must not block. A larger revision is a newer one.
+
+        Without a camera, it is solved with the intrinsics that the recording was opened with.
+        """
 
     def close(self) -> None:
         """Stop: no answer comes after this returns."""
+
+
+@dataclass(frozen=True, slots=True)
+class GivenIntrinsics:
+    """The intrinsics that a recording was opened with.
+
+    Attributes:
+        camera: None if there are none.
+        file: that they come from; None for the recording's own.
+        about: where they come from, in words; "" if there are none.
+    """
+
+    camera: Camera | None = None
+    file: CameraFile | None = None
+    about: str = ""
 
 
 class Workspace:
@@ -98,16 +127,11 @@ class Workspace:
         facts: the recording's frames.
         restored: what was found in the session's folder at the start.
         reference: a calibration to show until the clicks give a new one; None if there is none.
-        camera: the intrinsics to solve with; None if there are none.
-        camera_file: the file that they come from; None for the recording's own.
-        intrinsics: where they come from, in words; "" if there are none.
+        given: the intrinsics that the recording was opened with.
         acc: what the boxes say about the calibration, as last judged.
         open_meaning: a calibration that does not state what its numbers mean, for a person to pick; None if there is none.
     """
 
-    camera: Camera | None = None
-    camera_file: CameraFile | None = None
-    intrinsics: str = ""
     open_meaning: OpenMeaning | None = None
     acc: AccPanel = AccPanel()
 
@@ -118,10 +142,13 @@ class Workspace:
         journal: Journal,
         solver: Solver,
         reference: Reference | None = None,
+        given: GivenIntrinsics | None = None,
     ) -> None:
         self.facts = facts
         self.restored = restored
         self.reference = reference
+        self.given = given or GivenIntrinsics()
+        self._chosen: tuple[ChosenIntrinsics, Camera] | None = None
         self._history = restored.history
         self._placements: tuple[Placement, ...] | None = None
         self._followed: Mapping[Start, Followed] = {}
@@ -150,6 +177,35 @@ class Workspace:
     def view(self) -> View:
         """The current View."""
         return self._view_of(self._history)
+
+    @property
+    def camera(self) -> Camera | None:
+        """The intrinsics to solve with: those chosen in the session, else those it was opened with; None if there are none."""
+        return self._chosen_camera(self.session) or self.given.camera
+
+    @property
+    def camera_file(self) -> CameraFile | None:
+        """The file that they come from; None for the recording's own."""
+        chosen = self._chosen_camera(self.session)
+        if chosen is None:
+            return self.given.file
+        return CameraFile("camera.yaml", camera_info_text(chosen, "camera").encode())
+
+    @property
+    def intrinsics(self) -> str:
+        """Where they come from, in words; "" if there are none."""
+        chosen = self.session.intrinsics
+        return self.given.about if chosen is None else chosen.about
+
+    def _chosen_camera(self, session: Session) -> Camera | None:
+        """Return the camera chosen in a session, the same object each time; None if none was."""
+        chosen = session.intrinsics
+        if chosen is None:
+            return None
+        kept = self._chosen
+        if kept is None or kept[0] != chosen:
+            kept = self._chosen = (chosen, chosen.camera)
+        return kept[1]
 
     def _view_of(self, history: History) -> View:
         carried = self._carried_of(history.present)
@@ -306,7 +362,8 @@ class Workspace:
     def _ask_for_answer(self, session: Session) -> None:
         """Request a solve without holding the lock: the answer may come at once; older requests never replace newer ones."""
         if session.needs_solving:
-            self._solver.request(session.revision, session.clicks, session.options, self.dispatch)
+            camera = self._chosen_camera(session)
+            self._solver.request(session.revision, session.clicks, session.options, self.dispatch, camera)
 
     def _notify(self) -> None:
         """Send pending Views to their subscribers, one thread at a time and in order."""
@@ -384,10 +441,8 @@ def open_workspace(
         return Workspace(facts, Restored(session_folder, History()), nothing, SolverWorker(recording, None))
     session_file = open_session_file(session_folder, facts, warnings)
     solver = SolverWorker(recording, camera, reference.calibration if reference else None)
-    workspace = Workspace(facts, session_file.restored, session_file, solver, reference)
-    workspace.camera, workspace.camera_file = camera, camera_file
-    workspace.intrinsics = intrinsics or _source_of(camera, camera_file, recording)
-    return workspace
+    given = GivenIntrinsics(camera, camera_file, intrinsics or _source_of(camera, camera_file, recording))
+    return Workspace(facts, session_file.restored, session_file, solver, reference, given)
 
 
 def _source_of(camera: Camera | None, camera_file: CameraFile | None, recording: Recording) -> str:

@@ -24,6 +24,7 @@ from calib_core.estimation.covariance import PoseCovariance, pose_covariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.influential_pairs import average_over_influential_pairs, find_influential_pairs
 from calib_core.estimation.leave_one_out import LeaveOneOut, leave_one_out
+from calib_core.estimation.lens_prior import useless_covariance
 from calib_core.estimation.measurement_model import PairMeasurements, pair_measurements
 from calib_core.estimation.pair_results import excluded_pair_results, fit_metrics, used_pair_results
 from calib_core.estimation.posterior.beyond_the_fit import look_beyond
@@ -191,7 +192,7 @@ def solve_again(calibration: Calibration, options: CalibrationOptions | None = N
 
     Args:
         calibration: solved here, or read from a calibration-1 file.
-        options: None takes the calibration's own.
+        options: None takes the calibration's own. Refined intrinsics are taken as they were before.
 
     Raises:
         InputError: the calibration does not contain the candidates of its pairs.
@@ -208,7 +209,7 @@ def solve_again(calibration: Calibration, options: CalibrationOptions | None = N
     if options.method != "paper":
         kept = [_with_noise(pair, options) for pair in kept]
     excluded = frozenset(pair.id for pair in calibration.pairs if pair.excluded)
-    outcome = calibrate_pairs(kept, calibration.camera, options, excluded)
+    outcome = calibrate_pairs(kept, calibration.given_camera or calibration.camera, options, excluded)
     if isinstance(outcome, Unsolvable):
         return replace(outcome, unpaired=calibration.unpaired)
     clock_warnings = [warning for warning in calibration.warnings if warning.code in CLOCK_CODES]
@@ -260,6 +261,10 @@ def _steps(task: _Task, *, previous: Calibration | None, preview: bool) -> Itera
     if len(task.clicked) < MIN_PAIRS:
         untouched = sum(pair.id in task.excluded and pair.mark == "untouched" for pair in task.shown)
         yield unsolved.too_few(len(task.clicked), len(task.excluded) - untouched, len(task.unpaired), untouched)
+        return
+    useless = useless_covariance(task.camera, refining=task.options.refining.intrinsics)
+    if useless is not None:
+        yield useless
         return
     groups = placement_groups(task.clicked, task.options)
     if len(groups) < MIN_PAIRS:
@@ -348,13 +353,14 @@ def _described(
     refined, uncertainty = solution.refined, solution.uncertainty
     used = [group.pair for group in groups]
     results = used_pair_results(used, refined, solution.left_out) | excluded_pair_results(
-        task.shown, task.excluded, refined, task.camera, task.options
+        task.shown, task.excluded, refined, refined.measurements.camera, task.options
     )
+    camera = refined.measurements.errors.camera_known_to(uncertainty.lens)
     metrics = fit_metrics(measurements, refined, solution.left_out)
     calibration = Calibration(
         camera_from_radar=refined.camera_from_radar,
         covariance=uncertainty.covariance,
-        camera=task.camera,
+        camera=camera or task.camera,
         metrics=replace(metrics, picture_sigma_px=picture_sigma_px(refined, uncertainty)),
         pairs=tuple(results[pair.id] for pair in task.shown if pair.id in results),
         unpaired=task.unpaired,
@@ -364,6 +370,7 @@ def _described(
         covariance_quantile=uncertainty.quantile,
         radar_errors=refined.measurements.errors.radar,
         systematic_errors=uncertainty.systematic_errors,
+        given_camera=task.camera if camera is not None else None,
     )
     return replace(calibration, pairs=click_results(calibration, groups, task.shown))
 

@@ -3,7 +3,7 @@
 Camera frame: x right, y down, z forward. Pixel (0, 0) is the centre of the top-left pixel, as in OpenCV.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
@@ -13,13 +13,57 @@ from calib_core.geometry import RigidTransform, rotation_jacobian
 from calib_core.lens_models.lens_model import LensModel
 from calib_core.lens_models.registry import LENS_MODELS
 
-__all__ = ["CAMERA_MODELS", "Camera", "CameraModel"]
+__all__ = ["CAMERA_MODELS", "Camera", "CameraCovariance", "CameraModel"]
 
 CAMERA_MODELS: tuple[str, ...] = tuple(LENS_MODELS)
 if TYPE_CHECKING:
     CameraModel: TypeAlias = str
 else:  # the command line, our files and their schemas accept what is registered
     CameraModel = Literal[CAMERA_MODELS]
+
+
+_MATRIX_NAMES = ("fx_px", "fy_px", "cx_px", "cy_px")
+_MATRIX_PLACES = ([0, 1, 0, 1], [0, 1, 2, 2])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraCovariance:
+    """How well the intrinsics are known.
+
+    Attributes:
+        order: (p,) names of parameters, out of `Camera.parameter_names`; one that is not among them is taken to be exact.
+        matrix: (p, p) their covariance, in the units of their names; coefficients have none.
+    """
+
+    order: tuple[str, ...]
+    matrix: np.ndarray
+
+    def __post_init__(self) -> None:
+        count = len(self.order)
+        object.__setattr__(self, "order", tuple(self.order))
+        object.__setattr__(self, "matrix", frozen_array(self.matrix, (count, count)))
+        if len(set(self.order)) != count:
+            raise ValueError("the covariance of the intrinsics names a parameter twice")
+        spread = np.sqrt(np.maximum(np.diag(self.matrix), 0.0))
+        scale = np.outer(spread, spread)
+        scale[scale == 0.0] = 1.0
+        if (
+            not np.all(np.isfinite(self.matrix))
+            or np.abs((self.matrix - self.matrix.T) / scale).max(initial=0.0) > 1e-6
+        ):
+            raise ValueError("the covariance of the intrinsics must be finite and symmetric")
+        if (
+            np.linalg.eigvalsh(self.matrix / scale).min(initial=0.0) < -1e-9
+            or np.diag(self.matrix).min(initial=0.0) < 0
+        ):
+            raise ValueError("the covariance of the intrinsics must not be negative in any direction")
+
+    def sigma(self, name: str) -> float:
+        """Return the standard deviation of a parameter; 0 for one that is exact."""
+        return float(self.matrix[row, row] ** 0.5) if (row := self._row(name)) is not None else 0.0
+
+    def _row(self, name: str) -> int | None:
+        return self.order.index(name) if name in self.order else None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,6 +77,7 @@ class Camera:
         height_px: rows of the image.
         matrix_px: (3, 3) K, with focal lengths and principal point [px].
         distortion: (k,) coefficients in the lens model's order.
+        covariance: how well all this is known; None if nobody said.
     """
 
     model: CameraModel
@@ -40,6 +85,7 @@ class Camera:
     height_px: int
     matrix_px: Matrix33
     distortion: Values = field(default_factory=lambda: np.zeros(0))
+    covariance: CameraCovariance | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "matrix_px", frozen_array(self.matrix_px, (3, 3)))
@@ -55,6 +101,11 @@ class Camera:
             raise ValueError("the camera matrix and the distortion must be finite")
         if self.matrix_px[0, 0] <= 0 or self.matrix_px[1, 1] <= 0:
             raise ValueError("the focal lengths must be positive (a zero camera matrix means not calibrated)")
+        strange = set(self.covariance.order if self.covariance else ()) - set(self.parameter_names)
+        if strange:
+            known = ", ".join(self.parameter_names)
+            named = ", ".join(sorted(strange))
+            raise ValueError(f"the covariance names {named}, which {self.model} does not have; it has {known}")
 
     @property
     def lens(self) -> LensModel:
@@ -65,6 +116,33 @@ class Camera:
     def is_distorted(self) -> bool:
         """Whether the matrix alone does not give the projection: a coefficient is not zero, or the lens is a fisheye."""
         return not self.lens.is_perspective or bool(self.distortion.any())
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """The intrinsics by name: focal lengths and principal point [px], then the coefficients."""
+        return (*_MATRIX_NAMES, *self.lens.coefficients[: len(self.distortion)])
+
+    @property
+    def parameters(self) -> Values:
+        """The values of `parameter_names`: (4 + k,)."""
+        return np.concatenate([self.matrix_px[_MATRIX_PLACES], self.distortion])
+
+    def with_parameters(self, values: Values, covariance: CameraCovariance | None = None) -> "Camera":
+        """Return the camera with other values of `parameter_names` (4 + k,); skew stays."""
+        matrix = self.matrix_px.copy()
+        matrix[_MATRIX_PLACES] = values[:4]
+        return replace(self, matrix_px=matrix, distortion=np.asarray(values[4:]), covariance=covariance)
+
+    def parameter_planes(self, points_camera_m: np.ndarray) -> np.ndarray:
+        """Return d pixel / d parameter (..., 4 + k, 2, n) of points (..., 3, n), in the order of `parameter_names`."""
+        plane, _ = self.lens.project(points_camera_m, self.distortion)
+        count = len(self.distortion)
+        slopes = np.zeros((*points_camera_m.shape[:-2], 4 + count, 2, points_camera_m.shape[-1]))
+        slopes[..., 0, 0, :], slopes[..., 1, 1, :] = plane[..., 0, :], plane[..., 1, :]
+        slopes[..., 2, 0, :] = slopes[..., 3, 1, :] = 1.0
+        bends = self.lens.coefficient_jacobian(points_camera_m, self.distortion)[..., :count, :, :]
+        slopes[..., 4:, :, :] = self.matrix_px[:2, :2] @ bends
+        return slopes
 
     def project(self, points_camera_m: Points3) -> Points2:
         """Project points [m] to pixels [px], through the lens. Points behind a pinhole become NaN.
@@ -132,6 +210,31 @@ class Camera:
         matrix = self.matrix_px.copy()
         matrix[:2, :2] *= factor
         matrix[:2, 2] = (matrix[:2, 2] + 0.5) * factor - 0.5
+        size_px = round(self.width_px * factor), round(self.height_px * factor)
         return Camera(
-            self.model, round(self.width_px * factor), round(self.height_px * factor), matrix, self.distortion
+            self.model, *size_px, matrix, self.distortion, self._rescaled_covariance(np.array([factor, factor]))
         )
+
+    def windowed(self, offset_px: tuple[int, int], size_px: tuple[int, int], binning: tuple[int, int]) -> "Camera":
+        """Return the camera for a part of the picture whose pixels are binned (REP 104): the full sensor's column u becomes
+        (u - offset + 1/2) / binning - 1/2, which keeps pixel centres at integers.
+
+        Args:
+            offset_px: left column and upper row of the part.
+            size_px: its width and height before binning.
+            binning: pixels along a row and along a column that become one.
+        """
+        by = np.array(binning, dtype=np.float64)
+        matrix = self.matrix_px.copy()
+        matrix[:2, :2] /= by[:, None]
+        matrix[:2, 2] = (self.matrix_px[:2, 2] - offset_px + 0.5) / by - 0.5
+        width, height = int(size_px[0] // by[0]), int(size_px[1] // by[1])
+        return Camera(self.model, width, height, matrix, self.distortion, self._rescaled_covariance(1.0 / by))
+
+    def _rescaled_covariance(self, factors: Values) -> CameraCovariance | None:
+        """Return the covariance for a picture whose columns and rows are so many times as many (2,)."""
+        if self.covariance is None:
+            return None
+        by_name = dict(zip(_MATRIX_NAMES, np.tile(factors, 2).tolist(), strict=True))
+        gain = np.array([by_name.get(name, 1.0) for name in self.covariance.order])
+        return CameraCovariance(self.covariance.order, self.covariance.matrix * np.outer(gain, gain))

@@ -17,6 +17,8 @@ class ErrorWords:
         remedy: what would reduce its part in the uncertainty.
         remedy_with_tape: the same if the camera position is measured already; "" if it is no different.
         family: label and text of errors along several axes together; empty if it stands alone.
+        named_in_family: whether the largest of a family is named with it.
+        stated: where its standard deviation before any pair comes from, after the number.
     """
 
     label: str
@@ -26,6 +28,8 @@ class ErrorWords:
     remedy: str
     remedy_with_tape: str = ""
     family: tuple[str, ...] = ()
+    named_in_family: bool = False
+    stated: str = "assumed"
 
 
 _PERCENT = (100.0, "%")
@@ -41,6 +45,9 @@ _APEX = (
 _PRINCIPAL_POINT = (
     "a camera calibration that determines the principal point well, and its sigma among the options, would reduce it"
 )
+_REFINED_CENTRE = ("principal point", "the principal point")
+_CALIBRATED_LENS = ("lens", "the lens, as far as its calibration knows it")
+_BOARD = "a camera calibration with more views of the board, over the whole picture, would reduce it"
 _LENS = "a better camera calibration, and its sigma among the options, would reduce it"
 
 ERROR_WORDS: dict[str, ErrorWords] = {
@@ -115,11 +122,34 @@ ERROR_WORDS: dict[str, ErrorWords] = {
         family=_CLICKED,
     ),
     "focal_length": ErrorWords("focal length", "the focal length", *_PERCENT, _LENS),
+    "principal_right_px": ErrorWords(
+        "principal point, right", "the principal point's column", 1.0, "px", _BOARD, family=_REFINED_CENTRE
+    ),
+    "principal_down_px": ErrorWords(
+        "principal point, down", "the principal point's row", 1.0, "px", _BOARD, family=_REFINED_CENTRE
+    ),
     "distortion": ErrorWords("distortion (k1)", "the lens distortion", 1.0, "", _LENS),
 }
-"""By the name of the error."""
+"""By the name of the error; those of a lens with a covariance are made by `error_words`."""
+
+_LENS_NAMES = {
+    "fx_px": ("focal length fx", "the focal length fx"),
+    "fy_px": ("focal length fy", "the focal length fy"),
+    "cx_px": ("principal point, right", "the principal point's column"),
+    "cy_px": ("principal point, down", "the principal point's row"),
+}
 
 
 def error_words(name: str) -> ErrorWords:
     """Return how an error is shown; one of a later version by its name."""
-    return ERROR_WORDS.get(name) or ErrorWords(name, name, 1.0, "", "more placements may reduce it")
+    known = ERROR_WORDS.get(name)
+    if known is not None:
+        return known
+    if not name.startswith("lens_"):
+        return ErrorWords(name, name, 1.0, "", "more placements may reduce it")
+    parameter = name.removeprefix("lens_")
+    label, text = _LENS_NAMES.get(parameter, (f"distortion {parameter}", f"the lens distortion ({parameter})"))
+    unit = "px" if parameter.endswith("_px") else ""
+    return ErrorWords(
+        label, text, 1.0, unit, _BOARD, family=_CALIBRATED_LENS, named_in_family=True, stated="by its calibration"
+    )

@@ -9,8 +9,10 @@ import numpy as np
 from calib_core.arrays import Matrix33, Matrix66, Points3, Vector3, frozen_array
 
 __all__ = [
+    "OPTICAL_FROM_LINK",
     "RigidTransform",
     "euler_from_rotation",
+    "larger_eigenvalues",
     "matrix_from_quaternion_wxyz",
     "quaternion_wxyz_from_matrix",
     "rotation_angle_rad",
@@ -20,6 +22,9 @@ __all__ = [
     "rotation_log",
     "skew",
 ]
+
+OPTICAL_FROM_LINK = frozen_array(np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]), (3, 3))
+"""Rotation from body axes (x forward, y left, z up) to a camera's optical axes (x right, y down, z forward)."""
 
 _SMALL_ANGLE_RAD = 1e-6
 _ROTATION_TOLERANCE = 1e-6
@@ -239,3 +244,9 @@ def rotation_jacobian(turned_m: np.ndarray, d_point: np.ndarray, out: np.ndarray
     out[..., 0, :, :] = y * c - z * b
     out[..., 1, :, :] = z * a - x * c
     out[..., 2, :, :] = x * b - y * a
+
+
+def larger_eigenvalues(matrices: np.ndarray) -> np.ndarray:
+    """Return the larger eigenvalue (n,) of symmetric matrices (n, 2, 2); NaN stays NaN."""
+    first, second = matrices[:, 0, 0], matrices[:, 1, 1]
+    return np.asarray(0.5 * (first + second) + np.hypot(0.5 * (first - second), matrices[:, 0, 1]))

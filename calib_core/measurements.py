@@ -23,7 +23,6 @@ __all__ = [
     "TimeNs",
     "Unpaired",
     "Unsolvable",
-    "joined_alternatives",
     "time_from_parts",
     "time_parts",
 ]
@@ -214,7 +213,23 @@ class RadarScans:
             doppler_mps=np.concatenate([scan.doppler_mps for scan in ordered]),
             snr_db=np.concatenate([scan.snr_db for scan in ordered]),
             sigma_polar=np.concatenate([scan.sigma_polar for scan in ordered]),
-            alternative_of=joined_alternatives(ordered),
+            alternative_of=_joined_alternatives(ordered),
+        )
+
+    @classmethod
+    def joined(cls, pieces: "Sequence[RadarScans]") -> "RadarScans":
+        """Concatenate scans; the pieces must be in order of time."""
+        if len(pieces) < 2:
+            return pieces[0] if pieces else cls()
+        counts = np.concatenate([np.diff(piece.first_return) for piece in pieces])
+        return cls(
+            times_ns=np.concatenate([piece.times_ns for piece in pieces]),
+            first_return=np.concatenate([[0], np.cumsum(counts)]),
+            points_radar_m=np.concatenate([piece.points_radar_m for piece in pieces]),
+            doppler_mps=np.concatenate([piece.doppler_mps for piece in pieces]),
+            snr_db=np.concatenate([piece.snr_db for piece in pieces]),
+            sigma_polar=np.concatenate([piece.sigma_polar for piece in pieces]),
+            alternative_of=_joined_alternatives(pieces),
         )
 
     def scan(self, index: int) -> RadarScan:
@@ -274,7 +289,7 @@ class RadarScans:
         return np.repeat(np.arange(len(self), dtype=np.int64), np.diff(self.first_return))
 
 
-def joined_alternatives(pieces: "Sequence[RadarScan | RadarScans]") -> Indices | None:
+def _joined_alternatives(pieces: "Sequence[RadarScan | RadarScans]") -> Indices | None:
     """Concatenate the alternatives of scans; None if no return has any."""
     given = [piece.alternative_of for piece in pieces]
     if all(own is None for own in given):

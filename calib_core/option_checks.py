@@ -71,7 +71,28 @@ def checked_options(options: CalibrationOptions) -> CalibrationOptions:
             f"option gating.min_range_m: {options.gating.min_range_m:g} m is not below "
             f"gating.max_range_m, {options.gating.max_range_m:g} m; make it smaller"
         )
+    if options.refining.intrinsics:
+        _check_refining(options)
     return options
+
+
+def _check_refining(options: CalibrationOptions) -> None:
+    """Refuse to refine the intrinsics where they cannot be.
+
+    Raises:
+        OptionError: the method takes them as they are, or every standard deviation is 0.
+    """
+    if options.method != "default":
+        raise OptionError(
+            f"option refining.intrinsics: the method {options.method} takes the intrinsics as they are and cannot refine "
+            "them; use the method default, or turn refining off"
+        )
+    refining = options.refining
+    if not (refining.focal_length_sigma or refining.principal_point_sigma_px or refining.distortion_sigma):
+        raise OptionError(
+            "option refining.intrinsics: every standard deviation of refining is 0, so there is nothing to refine; state "
+            "how far off the focal length, the principal point or the distortion may be"
+        )
 
 
 _WANTED: Mapping[str, tuple[type, str]] = {
@@ -127,6 +148,7 @@ def _ranges() -> Iterator[tuple[str, tuple[float, float]]]:
                 yield f"{leaf.path}.{part.name}", (part.metadata["low"], part.metadata["high"])
 
 
+@cache
 def kind_of(leaf: OptionField) -> OptionKind:
     """Return what kind of value an option takes."""
     if typing.get_origin(leaf.type) is Literal:

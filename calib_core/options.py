@@ -16,6 +16,7 @@ __all__ = [
     "NoiseOptions",
     "PaperOptions",
     "RadarOptions",
+    "RefiningOptions",
     "ReflectorOptions",
     "SolvingOptions",
     "option",
@@ -133,6 +134,30 @@ class LensOptions:
     )
     distortion_sigma: float = option(
         0.005, "Standard deviation of the first radial distortion coefficient.", low=0.0, high=1.0
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class RefiningOptions:
+    """Estimate the intrinsics with the pose; the sigmas say how far off they may be if they come without a covariance."""
+
+    intrinsics: bool = option(
+        False, "Estimate focal length, principal point and first radial distortion coefficient together with the pose."
+    )
+    focal_length_sigma: float = option(
+        0.03,
+        "Standard deviation of the focal length to be refined, as a share (0.03 is 3 %); fx and fy keep their ratio.",
+        low=0.0,
+        high=0.5,
+    )
+    principal_point_sigma_px: float = option(
+        10.0,
+        "Standard deviation of the principal point to be refined, per axis [px of a picture 1920 px wide; scaled to the width].",
+        low=0.0,
+        high=1000.0,
+    )
+    distortion_sigma: float = option(
+        0.01, "Standard deviation of the first radial distortion coefficient to be refined.", low=0.0, high=1.0
     )
 
 
@@ -261,11 +286,12 @@ class CalibrationOptions:
     paper: PaperOptions = field(default_factory=PaperOptions)
     mounting: MountingOptions = field(default_factory=MountingOptions)
     board: BoardOptions = field(default_factory=BoardOptions)
+    refining: RefiningOptions = field(default_factory=RefiningOptions)
 
 
 def without_systematic_errors(options: CalibrationOptions) -> CalibrationOptions:
-    """Return the options of exact instruments: every prior of a systematic error 0."""
+    """Return the options of exact instruments: every prior of a systematic error 0, and no intrinsics to refine."""
     radar = RadarOptions(**{one.name: 0.0 for one in fields(RadarOptions)})
     lens = LensOptions(**{one.name: 0.0 for one in fields(LensOptions)})
     reflector = ReflectorOptions(**{one.name: 0.0 for one in fields(ReflectorOptions)})
-    return replace(options, radar=radar, lens=lens, reflector=reflector)
+    return replace(options, radar=radar, lens=lens, reflector=reflector, refining=RefiningOptions())

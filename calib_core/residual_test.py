@@ -58,7 +58,8 @@ def residual_test(pairs: Sequence[Pair], calibration: Calibration) -> ResidualTe
     """
     corrected = [_corrected(pair, calibration.radar_errors) for pair in pairs]
     options = without_systematic_errors(calibration.options)  # their part is in the pose's covariance
-    measurements = pair_measurements(corrected, calibration.camera, options).scaled(calibration.noise_scale)
+    camera = replace(calibration.camera, covariance=None)
+    measurements = pair_measurements(corrected, camera, options).scaled(calibration.noise_scale)
     rows, model = associate(measurements, calibration.camera_from_radar)
     points_radar_m = np.array([one.position_radar_m for pair in corrected for one in pair.candidates])[rows]
     residuals_px = calibration.camera.project(calibration.camera_from_radar @ points_radar_m) - measurements.pixels_px

@@ -1,6 +1,6 @@
 """The result of a calibration: the pose, its uncertainty, metrics, warnings, and each pair's residual."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
@@ -24,6 +24,7 @@ __all__ = [
     "NextPlacement",
     "PairResult",
     "SystematicErrorResult",
+    "UnconfirmedClicks",
 ]
 
 
@@ -40,6 +41,19 @@ class DataWarning:
     code: str
     message: str
     hint: str
+
+
+@dataclass(frozen=True, slots=True)
+class UnconfirmedClicks:
+    """Clicks that were placed automatically and that nobody confirmed.
+
+    Attributes:
+        ids: of these clicks.
+        confidence: that they are right, 0 to 1, as it was judged when they were placed.
+    """
+
+    ids: tuple[str, ...]
+    confidence: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,7 +192,7 @@ class Calibration:
     Attributes:
         camera_from_radar: the pose.
         covariance: (6, 6) of the error (dt, dtheta) [m, rad], t = t_hat + dt, R = Exp(dtheta) R_hat; NaN where unknown.
-        camera: the intrinsics it was solved with.
+        camera: the intrinsics it was solved with; if they were refined, the refined ones with their covariance.
         metrics: the figures.
         pairs: in order of image time, excluded ones included.
         unpaired: clicks without a radar position.
@@ -193,6 +207,7 @@ class Calibration:
         radar_errors: the radar's systematic errors, estimated with the pose.
         systematic_errors: every error that the pairs share, and its part in the uncertainty.
         checking: whether this is a preview: its warnings and advice are those of the previous answer.
+        given_camera: the intrinsics before they were refined; None if they were not.
     """
 
     camera_from_radar: RigidTransform
@@ -212,6 +227,7 @@ class Calibration:
     radar_errors: RadarErrors = field(default_factory=RadarErrors)
     systematic_errors: tuple[SystematicErrorResult, ...] = ()
     checking: bool = False
+    given_camera: Camera | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "covariance", frozen_array(self.covariance, (6, 6)))
@@ -241,6 +257,12 @@ class Calibration:
     def pixel_sigma(self, points_radar_m: Points3) -> Points2:
         """Return the standard deviations (n, 2) [px] of column and row where true radar points (n, 3) [m] project."""
         return np.sqrt(np.diagonal(self.pixel_covariance(points_radar_m), axis1=1, axis2=2))
+
+    @property
+    def prior_camera(self) -> Camera:
+        """The camera, as well known as it was before any pair: to weigh these pairs, or others, with it once more."""
+        given = self.given_camera
+        return self.camera if given is None else replace(self.camera, covariance=given.covariance)
 
     @property
     def sees_elevation(self) -> bool:

@@ -16,6 +16,7 @@ __all__ = [
     "SystematicErrorResult",
     "dominance_text",
     "dominant_errors",
+    "is_beyond_its_prior",
     "is_determined",
     "knowledge_text",
     "rescaled",
@@ -23,6 +24,7 @@ __all__ = [
 
 _DOMINANT_SHARE = 1.0 / 3.0
 _UNDETERMINED = 0.97  # of the prior's sigma: the pairs say nothing
+_BEYOND = 3.0  # standard deviations of the prior
 _WOULD_REDUCE = " would reduce it"
 _SHARES = (
     (0.9, "nearly all"),
@@ -135,19 +137,21 @@ def _dominant(
     rotation_deg = float(np.rad2deg(np.sqrt(np.trace(covariance[3:, 3:]))))
     parts = []
     if position_share:
-        parts.append(f"{_share_text(position_share)} of the variance of the position ({position_cm:.2g} cm)")
+        parts.append(f"{_share_text(position_share)} of the variance of the position ({_two_digits(position_cm)} cm)")
     if rotation_share:
-        parts.append(f"{_share_text(rotation_share)} of that of the rotation ({rotation_deg:.2g} deg)")
+        parts.append(f"{_share_text(rotation_share)} of that of the rotation ({_two_digits(rotation_deg)} deg)")
     if not position_share:
         parts = [parts[0].replace("that of", "the variance of")]
     label, name = words.family or (words.label, words.text)
+    if words.named_in_family:
+        label, name = f"{label}, {words.label}", f"{name}, above all {words.text}"
     come = "come" if len(parts) > 1 else "comes"
     remedy = (words.remedy_with_tape if measured else "") or words.remedy
     whole = f"{remedy[:1].upper()}{remedy[1:].removesuffix(_WOULD_REDUCE)}"
     return DominantError(
         position_share=position_share,
         rotation_share=rotation_share,
-        label=f"{label} {_value_text(largest) if is_determined(largest) else known.partition(' assumed')[0]}",
+        label=f"{label} {_value_text(largest) if is_determined(largest) else known.partition(f' {words.stated}')[0]}",
         sentence=f"{' and '.join(parts)} {come} from {name}: {known}; {remedy}",
         action=f"{whole} would help most: {parts[0]} comes from {name}",
     )
@@ -168,18 +172,27 @@ def _share_text(share: float) -> str:
     return next(words for least, words in _SHARES if share >= least)
 
 
+def _two_digits(value: float) -> str:
+    return f"{value:.2g}" if value < 99.5 else f"{value:.0f}"
+
+
 def knowledge_text(error: SystematicErrorResult) -> str:
     """Say what is known of an error: "+1.2 ± 0.9 %, ± 2 % before any pair", or that the pairs do not determine it."""
     words = error_words(error.name)
-    prior = f"± {words.factor * error.prior_sigma:.2g} {words.unit}".rstrip()
-    if not is_determined(error):
-        return f"{prior} assumed, the pairs do not determine it"
+    prior = f"± {_two_digits(words.factor * error.prior_sigma)} {words.unit}".rstrip()
+    if not is_determined(error) and not is_beyond_its_prior(error):
+        return f"{prior} {words.stated}, the pairs do not determine it"
     return f"{_value_text(error)}, {prior} before any pair"
 
 
 def is_determined(error: SystematicErrorResult) -> bool:
     """Return whether the pairs say anything about an error."""
     return error.sigma <= _UNDETERMINED * error.prior_sigma
+
+
+def is_beyond_its_prior(error: SystematicErrorResult) -> bool:
+    """Whether an error was estimated so large that what was stated of it before any pair cannot be right."""
+    return error.estimated and 0.0 < _BEYOND * error.prior_sigma < abs(error.value)
 
 
 def _value_text(error: SystematicErrorResult) -> str:

@@ -16,13 +16,16 @@ import { loadClicks } from "./importing.js";
 import { placement } from "./keys.js";
 import { toggleLayer } from "./layers.js";
 import { showTab } from "./layout.js";
+import { saveCamera } from "./lens.js";
 import { goLive } from "./live.js";
 import { magnify, stretchContrast } from "./loupe.js";
 import { nextWorst } from "./pairs.js";
 import { togglePalette } from "./palette.js";
+import { acceptProposal, nextPlace, nextProposal, openProposals, previousProposal, rejectProposal, shownOffer, toggleProposals } from "./proposals.js";
 import { chooseRecording } from "./opening.js";
 import { fit, zoomBy } from "./picture.js";
 import { goTo, pause, play, step } from "./player.js";
+import { toggleRectified, withoutRectified } from "./rectified.js";
 import { enlargeReview } from "./review.js";
 import { snap, withoutSnappable } from "./snapping.js";
 import { lookFrom, setCamera, toggleHidden, toggleLarge } from "./space.js";
@@ -34,6 +37,7 @@ import { clickIn, clicks, selectedClick, state } from "./state.js";
  * @property {string} group Heading in the help.
  * @property {string} words What it does, in the imperative.
  * @property {string[]} [keys] Keys that run it, such as "Ctrl+Shift+Z"; the first one is shown.
+ * @property {string[]} [shows] Keys in the help, if another action has them and decides by what is on screen.
  * @property {string} [help] The line of the help, where neighbouring actions share one.
  * @property {string} [also] Other words by which someone may look for it.
  * @property {() => unknown} run
@@ -50,6 +54,7 @@ const withSelected = () => withPictures() || (selectedClick() ? "" : "No pair is
 const withResiduals = () => withPictures() || (clicks().some((click) => click.residual_px !== null) ? "" : "There is no calibration yet");
 const undoable = () => withPictures() || (state.view?.can_undo ? "" : "There is nothing to undo");
 const redoable = () => withPictures() || (state.view?.can_redo ? "" : "There is nothing to redo");
+const withProposal = () => withPictures() || (shownOffer() ? "" : openProposals().length ? "No proposal is on screen: N goes to one" : "There is no proposal to decide");
 const withBoxes = () => withPictures() || (boxing.on ? "" : "Open the tab Evaluate first (A)");
 const withBox = () => withPictures() || withoutBox();
 const following = () => (state.following && !["complete", "ended"].includes(state.following.state) ? "" : "The recording is complete: no new frames come");
@@ -79,13 +84,13 @@ export const ACTIONS = [
   { id: "ten-forward", group: "Time", words: "Ten frames forward", keys: ["Shift+ArrowRight"], also: "next jump skip", run: () => step(10), ...TENS },
   { id: "first-frame", group: "Time", words: "Go to the first frame", keys: ["Home"], also: "start beginning", run: () => goTo(0), ...ENDS },
   { id: "last-frame", group: "Time", words: "Go to the last frame", keys: ["End"], also: "finish newest", run: () => goTo(state.seconds.length - 1), ...ENDS },
-  { id: "next-placement", group: "Time", words: "Next placement", keys: ["N"], also: "reflector position forward", run: () => placement(1), ...PLACES },
-  { id: "previous-placement", group: "Time", words: "Previous placement", keys: ["P"], also: "reflector position back", run: () => placement(-1), ...PLACES },
+  { id: "next-placement", group: "Time", words: "Next placement", keys: ["N"], also: "reflector position forward proposal", run: () => nextProposal() || placement(1), ...PLACES },
+  { id: "previous-placement", group: "Time", words: "Previous placement", keys: ["P"], also: "reflector position back", run: () => previousProposal() || placement(-1), ...PLACES },
   { id: "live", group: "Time", words: "Show the newest frame as it comes", also: "live follow recording now", run: goLive, when: following },
 
-  { id: "place-mark", group: "Mark", words: "Show the keyboard's cross, then set the mark there", keys: ["Enter"], also: "click place add", run: () => (boxing.on ? newBox() : enterCross()), when: withPictures },
+  { id: "place-mark", group: "Mark", words: "Show the keyboard's cross, then set the mark there", keys: ["Enter"], also: "click place add", run: () => (boxing.on ? newBox() : shownOffer() && !state.cross ? acceptProposal() : enterCross()), when: withPictures },
   { id: "cross", group: "Mark", words: "Keyboard's cross: 1 to 9 zoom into a field, arrows move it, Backspace zooms out, Esc ends", keys: ["G"], also: "grid nine fields marking without mouse", run: toggleCross, when: withPictures },
-  { id: "next-candidate", group: "Mark", words: "Take the return that fits better, or the next one", keys: ["C"], also: "candidate choose radar association", run: nextCandidate, when: () => withPictures() || withoutCandidates() },
+  { id: "next-candidate", group: "Mark", words: "Take the return that fits better, or the next one", keys: ["C"], also: "candidate choose radar association", run: () => (shownOffer() ? nextPlace() : nextCandidate()), when: () => withPictures() || (shownOffer() ? "" : withoutCandidates()) },
   { id: "free-candidate", group: "Mark", words: "Leave the choice of the return to the program", keys: ["Shift+C"], also: "candidate automatic unchoose", run: () => choose(-1), when: () => withPictures() || (selectedClick()?.chosen ? "" : "No return was chosen for this mark") },
   { id: "snap", group: "Mark", words: "Snap the mark, or the keyboard's cross, to the reflector's apex", keys: ["S"], also: "corner magnet refine subpixel image", run: snap, when: withSnappable },
   { id: "mark-left", words: "Move the mark left by 0.1 px", keys: ["Alt+ArrowLeft"], run: nudge(-0.1, 0), ...FINE },
@@ -100,8 +105,14 @@ export const ACTIONS = [
   { id: "undo", group: "Mark", words: "Undo", keys: ["Ctrl+Z"], also: "back revert take back", run: () => turnBack("undo"), when: undoable },
   { id: "redo", group: "Mark", words: "Redo", keys: ["Ctrl+Shift+Z", "Ctrl+Y"], also: "again repeat", run: () => turnBack("redo"), when: redoable },
 
+  { id: "next-proposal", group: "Proposal on screen", words: "Go to the next proposal, zoomed; P goes back", shows: ["N"], also: "reflector found suggestion", run: nextProposal, when: () => withPictures() || (openProposals().length ? "" : "There is no proposal to decide") },
+  { id: "accept-proposal", group: "Proposal on screen", words: "Accept the place that the picture shows", shows: ["Enter"], also: "confirm yes", run: acceptProposal, when: withProposal },
+  { id: "next-place", group: "Proposal on screen", words: "Take the next place where the reflector may stand", shows: ["C"], also: "candidate other", run: nextPlace, when: withProposal },
+  { id: "reject-proposal", group: "Proposal on screen", words: "It is not the reflector: dismiss the placement", shows: ["X"], also: "no wrong", run: rejectProposal, when: withProposal },
+  { id: "proposals", group: "Proposal on screen", words: "Propose where the reflector stood, or do not", keys: ["O"], also: "automatic find suggest off on switch", run: toggleProposals, when: withPictures },
+
   { id: "worst", group: "Pairs", words: "Next worst pair", keys: ["J"], also: "outlier residual largest wrong bad", run: nextWorst, when: withResiduals },
-  { id: "exclude", group: "Pairs", words: "Exclude the pair, or include it again; without a mark, dismiss the placement", keys: ["X"], also: "leave out use ignore disable spurious", run: () => (clickIn(state.cursor) ? toggleExcluded() : dismissHere()), when: () => withPictures() || (clickIn(state.cursor) ? withSelected() : withoutPlacement()) },
+  { id: "exclude", group: "Pairs", words: "Exclude the pair, or include it again; without a mark, dismiss the placement", keys: ["X"], also: "leave out use ignore disable spurious", run: () => (shownOffer() ? rejectProposal() : clickIn(state.cursor) ? toggleExcluded() : dismissHere()), when: () => withPictures() || (shownOffer() ? "" : clickIn(state.cursor) ? withSelected() : withoutPlacement()) },
 
   { id: "evaluate", group: "Boxes", words: "Draw boxes and judge the calibration by them, or go back to the clicks", keys: ["A"], also: "tab evaluate annotate acc accuracy bounding people cars moving", run: toggleEvaluate, when: withPictures },
   { id: "next-box", group: "Boxes", words: "Select the next box in this frame", keys: ["Q"], also: "object cycle", run: nextBox, when: withBoxes },
@@ -125,6 +136,7 @@ export const ACTIONS = [
   { id: "show-ellipses", words: "Show or hide the 95 % ellipses", keys: ["3"], also: "overlay layer uncertainty covariance", run: () => toggleLayer("ellipses"), ...OVERLAY },
   { id: "show-predictions", words: "Show or hide the expected positions", keys: ["4"], also: "overlay layer predicted guess next placement", run: () => toggleLayer("predictions"), ...OVERLAY },
   { id: "show-uncertainty", words: "Show or hide the uncertainty in the picture", keys: ["5"], also: "overlay layer contours map 95 % lines", run: toggleContours, ...OVERLAY },
+  { id: "rectify", group: "Picture", words: "Show the picture rectified, or as taken; drag lines along straight edges", keys: ["U"], also: "undistort distortion lens straight ruler grid intrinsics", run: toggleRectified, when: () => withPictures() || (boxing.on ? "Leave the tab Evaluate first" : withoutRectified()) },
   { id: "loupe-more", group: "Picture", words: "Loupe: magnify more", keys: ["]"], help: "Loupe: 4 to 16 times", also: "zoom magnifier larger", run: () => magnify(1), when: withPictures },
   { id: "loupe-less", group: "Picture", words: "Loupe: magnify less", keys: ["["], help: "Loupe: 4 to 16 times", also: "zoom magnifier smaller", run: () => magnify(-1), when: withPictures },
   { id: "loupe-contrast", group: "Picture", words: "Loupe: stretch the contrast, or not", keys: ["L"], also: "magnifier brightness enhance dark", run: stretchContrast, when: withPictures },
@@ -140,11 +152,13 @@ export const ACTIONS = [
   { id: "tab-pose", group: "Panel", words: "Show the pose", also: "tab transform extrinsics rotation translation errors advice", run: () => showTab("tab-pose"), when: withPictures },
   { id: "tab-review", group: "Panel", words: "Show the review", also: "tab plots residuals histogram influence compare solutions a b", run: () => showTab("tab-review"), when: withPictures },
   { id: "enlarge-review", group: "Panel", words: "Enlarge the review, or give the 3D view its place back", also: "tab plots large column", run: enlargeReview, when: withPictures },
+  { id: "tab-lens", group: "Panel", words: "Show the lens: intrinsics, and calibrating them from a board", also: "tab camera intrinsics checkerboard charuco aprilgrid calibrate focal length distortion", run: () => showTab("tab-lens"), when: withPictures },
   { id: "tab-options", group: "Panel", words: "Show the options", also: "tab settings parameters method", run: () => showTab("tab-options"), when: withPictures },
   { id: "theme", group: "Panel", words: "Light or dark theme", also: "colours colors bright night mode", run: press("theme") },
 
   { id: "export", group: "File", words: "Export the calibration or the clicks", keys: ["E"], also: "save download write file json yaml urdf tf format", run: openExport, when: withPictures },
   { id: "recording", group: "File", words: "Choose another recording, other topics, intrinsics or session", also: "open file folder recent camera radar topic intrinsics", run: chooseRecording },
+  { id: "save-camera", group: "File", words: "Save the intrinsics in use as camera.yaml", also: "export download camera_info lens", run: () => saveCamera(true), when: () => withPictures() || (state.lens?.intrinsics ? "" : "There are no intrinsics yet") },
   { id: "load-clicks", group: "File", words: "Load clicks from a file", also: "import open clicks.json", run: loadClicks, when: withPictures },
 
   { id: "palette", group: "Help", words: "Search for an action, placement, pair or option", keys: ["Ctrl+K"], also: "command palette find go to", run: togglePalette },

@@ -12,6 +12,7 @@ import { marks, redraw, zoomBy } from "./picture.js";
 import { send } from "./socket.js";
 import { clickIn, clicks, clicksIn, emit, on, select, selectedClick, stampOf, state } from "./state.js";
 import { pause } from "./player.js";
+import { dragRuler, dropRuler, pressRuler, refusesMarks } from "./rectified.js";
 import { toast } from "./notices.js";
 
 /** A press that moves farther than this is a drag [CSS px]. */
@@ -25,6 +26,8 @@ const REST = 250;
 let press = null;
 /** Whether the press is about a box. */
 let boxed = false;
+/** Whether it draws a line along an edge of the rectified picture. */
+let ruling = false;
 /** @type {{click: import("./messages.js").ClickRow, u: number, v: number, timer: number}|null} */
 let nudge = null;
 /** The frame of a new mark that is to be selected, and the marks that it had before. @type {{index: number, known: Set<string>}|null} */
@@ -38,7 +41,7 @@ export function startClicking() {
   marks.addEventListener("pointerup", released);
   marks.addEventListener("pointercancel", () => {
     press = null;
-    boxed = false;
+    boxed = ruling = false;
     cancelBox();
   });
   marks.addEventListener("pointerleave", () => hover(null));
@@ -67,9 +70,15 @@ function pressed(event) {
     marks.setPointerCapture(event.pointerId);
     return /** @type {HTMLElement} */ (marks.parentElement).focus({ preventScroll: true });
   }
+  ruling = state.rectified && event.button === 0 && !event.shiftKey;
+  if (ruling) {
+    pressRuler(x, y);
+    marks.setPointerCapture(event.pointerId);
+    return /** @type {HTMLElement} */ (marks.parentElement).focus({ preventScroll: true });
+  }
   const [u, v] = toImage(x, y);
-  const mark = boxing.on ? null : event.button === 0 ? markNear(x, y) : null;
-  const candidate = event.button === 0 && !mark && !boxing.on && !state.playing ? candidateNear(x, y) : -1;
+  const mark = boxing.on || state.rectified ? null : event.button === 0 ? markNear(x, y) : null;
+  const candidate = event.button === 0 && !mark && !boxing.on && !state.rectified && !state.playing ? candidateNear(x, y) : -1;
   press = { x, y, lastX: x, lastY: y, u, v, moved: false, mark, candidate, pointer: event.button };
   marks.setPointerCapture(event.pointerId);
   /** @type {HTMLElement} */ (marks.parentElement).focus({ preventScroll: true });
@@ -77,7 +86,7 @@ function pressed(event) {
 
 /** The mark of this frame under the pointer, the nearest of several. @param {number} x @param {number} y @param {number} [reach] CSS px @returns {import("./messages.js").ClickRow|null} */
 export function markNear(x, y, reach = REACH) {
-  if (state.playing) return null;
+  if (state.playing || state.rectified) return null;
   const away = (/** @type {import("./messages.js").ClickRow} */ click) => {
     const [cx, cy] = toCss(click.u_px, click.v_px);
     return Math.hypot(cx - x, cy - y);
@@ -90,6 +99,7 @@ export function markNear(x, y, reach = REACH) {
 function moved(event) {
   const [x, y] = inBox(event);
   if (boxed) return dragBox(x, y);
+  if (ruling) return dragRuler(x, y);
   if (boxing.on && !press) return void (marks.style.cursor = cursorOver(x, y));
   marks.style.cursor = "";
   const [u, v] = toImage(x, y);
@@ -116,6 +126,10 @@ function released(event) {
   if (boxed) {
     boxed = false;
     return dropBox();
+  }
+  if (ruling) {
+    ruling = false;
+    return dropRuler();
   }
   const done = press;
   press = null;
@@ -144,6 +158,7 @@ function hover(point) {
 export async function place(u, v, { mark = "clicked", sigma_px = null } = {}) {
   if (!state.shown) return;
   if (state.playing) return pause();
+  if (refusesMarks()) return;
   flushNudge();
   leaveCross();
   const index = state.shown.index;
@@ -178,6 +193,7 @@ function dragMark(click, u, v) {
  * @param {import("./messages.js").ClickRow} click @param {number} u @param {number} v @param {{mark?: import("./messages.js").ClickRow["mark"], sigma_px?: number|null}} [how] by hand, unless said otherwise
  */
 export async function moveTo(click, u, v, { mark = "moved", sigma_px = null } = {}) {
+  if (refusesMarks()) return;
   const [inU, inV] = clamped(u, v);
   draft(click.id, { u: inU, v: inV });
   await settle(click.id, { type: "click_moved", id: click.id, pixel_px: [inU, inV], mark, sigma_px });
@@ -207,7 +223,7 @@ async function settle(key, message) {
 /** Move the click of this frame a little. @param {number} du @param {number} dv image px @returns {boolean} */
 export function nudgeBy(du, dv) {
   const click = nudge?.click ?? clickIn(state.shown?.index ?? -1);
-  if (!click || !click.id || state.playing) return false;
+  if (!click || !click.id || state.playing || refusesMarks()) return false;
   const from = nudge ?? { u: click.u_px, v: click.v_px, timer: 0 };
   clearTimeout(from.timer);
   const [u, v] = clamped(from.u + du, from.v + dv);

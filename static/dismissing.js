@@ -14,14 +14,15 @@ function placementHere() {
 /** Why there is nothing to dismiss; "" if there is. */
 export const withoutPlacement = () => (placementHere() ? "" : "No pair is selected, and there is no placement without a click here");
 
+/** The message that dismisses a placement. @param {import("./messages.js").PlacementRow} placement */
+export const dismiss = (placement) => ({ type: "placement_dismissed", time: stampOf(placement.frame), position_m: placement.position_radar_m, dismissed: true });
+
 /** Dismiss the placement of this frame, or offer it again. */
 export async function dismissHere() {
   const placement = placementHere();
   if (!placement) return;
   const before = dismissalOf(placement);
-  const message = before
-    ? { type: "placement_dismissed", time: before.time, position_m: before.position_m, dismissed: false }
-    : { type: "placement_dismissed", time: stampOf(placement.frame), position_m: placement.position_radar_m, dismissed: true };
+  const message = before ? { type: "placement_dismissed", time: before.time, position_m: before.position_m, dismissed: false } : dismiss(placement);
   const refusal = await send(message);
   if (refusal) toast(refusal);
 }

@@ -2,12 +2,13 @@
 /** The tab "Evaluate": while it is open, boxes are drawn on the picture; it lists them and says what they say about the calibration. */
 
 import { accSection, drawAcc } from "./acc.js";
-import { ask, content } from "./asking.js";
 import { boxing, colourOf, selectBox, selectedBox, selectedTrack, shownBoxes } from "./boxes.js";
 import { hideHere, newBox, removeBox, setEdge, setLabel } from "./boxing.js";
 import { showTab } from "./layout.js";
 import { make, toast } from "./notices.js";
 import { goTo } from "./player.js";
+import { setRectified } from "./rectified.js";
+import { saveFile } from "./saving.js";
 import { send, tell } from "./socket.js";
 import { emit, on, state } from "./state.js";
 
@@ -66,6 +67,7 @@ function follow() {
   const open = !page.hidden && !state.looking;
   if (open === boxing.on) return;
   boxing.on = open;
+  if (open) setRectified(false);
   document.body.classList.toggle("boxing", open);
   emit("boxes");
 }
@@ -147,14 +149,8 @@ async function takeBoxes(given) {
 
 /** Download all boxes. */
 export async function downloadBoxes() {
-  const { answer, reason } = await ask("api/boxes.json");
-  const file = answer && (await content(answer.blob()));
-  if (!file) return toast(reason || "The boxes did not arrive.", "Try again.");
-  const url = URL.createObjectURL(file);
-  const anchor = make("a", "", []);
-  [anchor.href, anchor.download] = [url, "boxes.json"];
-  anchor.click();
-  setTimeout(() => URL.revokeObjectURL(url), 10_000);
+  const unsaved = await saveFile("api/boxes.json", "boxes.json");
+  if (unsaved) toast(unsaved.reason, "Try again.");
 }
 
 /** Put the focus into the class. */

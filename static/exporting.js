@@ -8,6 +8,7 @@ import { beforeSaving, checkPoint, lines, numbers } from "./export_parts.js";
 import { frameDrawing } from "./frames.js";
 import { importer } from "./importing.js";
 import { icon, make } from "./notices.js";
+import { saveFile } from "./saving.js";
 import { on, state } from "./state.js";
 
 /** @typedef {import("./export_list.js").Format} Format */
@@ -253,14 +254,9 @@ async function copyText() {
 /** Download the file under the name in the field; if the server refuses, show why. */
 async function download() {
   if (save.disabled) return;
-  const { answer, reason, isLost } = await ask(PLAIN[kept.format] ?? address("export"));
-  const file = answer && (await content(answer.blob()));
-  if (!file) return drawReason(reason || BROKE_OFF, isLost || !reason);
-  const url = URL.createObjectURL(file);
-  const anchor = make("a", "", []);
-  [anchor.href, anchor.download] = [url, fileName.value.trim() || String(fileName.dataset.suggested)];
-  anchor.click();
-  setTimeout(() => URL.revokeObjectURL(url), 10_000);
+  const name = fileName.value.trim() || String(fileName.dataset.suggested);
+  const unsaved = await saveFile(PLAIN[kept.format] ?? address("export"), name);
+  if (unsaved) drawReason(unsaved.reason, unsaved.isLost);
 }
 
 /** @param {Partial<typeof kept>} change */

@@ -28,7 +28,7 @@ function pressed(event) {
   if (!action && !(inside && event.key.startsWith("Arrow"))) return;
   event.preventDefault();
   event.stopImmediatePropagation();
-  if (action) act(action);
+  if (action && !(event.repeat && action.id === "place-mark")) act(action); // a key held down sets one mark
 }
 
 /** Whether the key belongs to a field, a button, a row or a dialog. @param {KeyboardEvent} event */

@@ -3,6 +3,7 @@
 
 import { ink, residualColour, themeColour } from "./colours.js";
 import { drawGaps, drawRuler, pixelsPerSecond, RULER, text } from "./ruler.js";
+import { confidences } from "./proposals.js";
 import { clicks, isLookedAt, state } from "./state.js";
 
 export const lanes = { left: 74, right: 14, gap: 4, bottom: 5 };
@@ -59,7 +60,8 @@ export function drawLanes(pen, width, height, axis, pointer) {
   pen.fillStyle = themeColour("line-strong");
   pen.fillRect(lanes.left, boxes.clicks.bottom, width - lanes.left - lanes.right, 1);
   drawGaps(pen, height, axis);
-  for (const placement of state.placements) drawPlacement(pen, placement, boxes.placements, axis);
+  const sure = confidences();
+  state.placements.forEach((placement, index) => drawPlacement(pen, placement, sure.get(index) ?? 0, boxes.placements, axis));
   for (const click of clicks()) drawStem(pen, click, axis.toX(state.seconds[click.frame]), boxes.clicks);
   if (pointer !== null && pointer >= lanes.left) {
     pen.fillStyle = themeColour("line-strong");
@@ -100,9 +102,10 @@ const apart = (a, b) => Math.hypot(...a.map((value, axis) => value - b[axis]));
 
 /**
  * Clicked = solid, not clicked = hollow and dashed, dismissed = a line with a cross.
- * @param {Ink} pen @param {import("./messages.js").PlacementRow} placement @param {{top: number, bottom: number}} box @param {Axis} axis
+ * With a proposal: a bar at the lower edge, the longer the surer it is.
+ * @param {Ink} pen @param {import("./messages.js").PlacementRow} placement @param {number} sure 0 to 1 @param {{top: number, bottom: number}} box @param {Axis} axis
  */
-function drawPlacement(pen, placement, { top, bottom }, axis) {
+function drawPlacement(pen, placement, sure, { top, bottom }, axis) {
   if (placement.end_s < axis.from_s || placement.start_s > axis.to_s) return;
   const here = state.seconds[state.cursor];
   const left = axis.toX(placement.start_s);
@@ -122,6 +125,10 @@ function drawPlacement(pen, placement, { top, bottom }, axis) {
   pen.setLineDash(fate === "open" ? [3, 3] : []);
   pen.stroke();
   pen.setLineDash([]);
+  if (sure) {
+    pen.fillStyle = themeColour("accent");
+    pen.fillRect(left + 1, bottom - 3, Math.max(2, (wide - 2) * sure), 3);
+  }
   if (wide < 15 || height < 9) return;
   pen.font = `600 ${text.px - 0.5}px ${getComputedStyle(document.body).fontFamily}`;
   [pen.textAlign, pen.textBaseline] = ["center", "middle"];

@@ -2,6 +2,7 @@
 /** The overlays of the frame, each with a chip and a key. */
 
 import { make } from "./notices.js";
+import { toggleRectified, withoutRectified } from "./rectified.js";
 import { emit, on, state } from "./state.js";
 
 /** @typedef {keyof typeof state.layers} Layer */
@@ -22,7 +23,11 @@ export function startLayers() {
     chip.onclick = () => toggleLayer(layer);
     group.append(chip);
   });
-  on(["layers"], draw);
+  const rectify = make("button", "chip", [make("kbd", "", "U"), "Rectified"]);
+  rectify.dataset.layer = "rectified";
+  rectify.onclick = toggleRectified;
+  group.append(rectify);
+  on(["layers", "lens"], draw);
   draw();
 }
 
@@ -34,6 +39,11 @@ export function toggleLayer(layer) {
 
 function draw() {
   for (const chip of /** @type {NodeListOf<HTMLElement>} */ (group.querySelectorAll("button[data-layer]"))) {
-    chip.setAttribute("aria-pressed", String(state.layers[/** @type {Layer} */ (chip.dataset.layer)]));
+    const layer = chip.dataset.layer;
+    chip.setAttribute("aria-pressed", String(layer === "rectified" ? state.rectified : state.layers[/** @type {Layer} */ (layer)]));
+    if (layer !== "rectified") continue;
+    const why = withoutRectified();
+    chip.hidden = why !== "";
+    chip.dataset.hint = "The picture without the lens's distortion, with a grid: straight edges must be straight. Drag a line along one to compare. (U)";
   }
 }

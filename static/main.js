@@ -20,6 +20,8 @@ import { listen } from "./keys.js";
 import { activity } from "./lanes.js";
 import { startLayers } from "./layers.js";
 import { startLayout } from "./layout.js";
+import { startLens, takeLens, takeResult } from "./lens.js";
+import { startLensResult } from "./lens_result.js";
 import { startLive, takeFollowing, takeFrames } from "./live.js";
 import { startLooking } from "./looking.js";
 import { startLoupe } from "./loupe.js";
@@ -32,12 +34,14 @@ import { startPalette } from "./palette.js";
 import { startPicture } from "./picture.js";
 import { startPictureChanges } from "./picture_changes.js";
 import { frameFailed, goTo, receiveFrame, requestAgain, tellCursor } from "./player.js";
+import { justMoved, shownOffer, startProposals, takeProposals } from "./proposals.js";
+import { startRectified } from "./rectified.js";
 import { plots, startReview, takePair, takeReview } from "./review.js";
 import { startRoving } from "./roving.js";
 import { startScatter } from "./scatter.js";
 import { connect, tell, unconfirmed } from "./socket.js";
 import { startSpace, takeSpace } from "./space.js";
-import { clickIn, clicks, clicksIn, emit, on, select, selectedClick, state } from "./state.js";
+import { clickIn, clicks, clicksIn, emit, on, select, selectedClick, stampOf, state } from "./state.js";
 import { startStatus } from "./status.js";
 import { startGuide } from "./steps.js";
 import { takeSnapped } from "./snapping.js";
@@ -101,6 +105,9 @@ const readers = {
   pair_review: takePair,
   compared: takeCompared,
   uncertainty: takeUncertainty,
+  lens: takeLens,
+  proposals: takeProposals,
+  lens_result: takeResult,
   snapped: takeSnapped,
   error(message) {
     toast(message.message, message.hint);
@@ -152,6 +159,7 @@ startTips();
 startStatus();
 startPicture();
 startLayers();
+startProposals();
 startLoupe();
 startLive();
 startClicking();
@@ -169,6 +177,9 @@ startReview();
 startCompare();
 startContours();
 startEvaluating();
+startLens();
+startLensResult();
+startRectified();
 startOptions();
 startExporting();
 startGuide();
@@ -197,5 +208,5 @@ startSpace();
 
 /** Exposed for the browser tests. */
 Object.assign(window, {
-  __cocalib: { state, viewport, zoom, toCss, toImage, onImage, clicks, clickIn, clicksIn, goTo, unconfirmed, follower, plots, boxing },
+  __cocalib: { state, viewport, zoom, toCss, toImage, onImage, clicks, clickIn, clicksIn, goTo, unconfirmed, follower, plots, boxing, shownOffer, justMoved, stampOf },
 });

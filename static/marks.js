@@ -11,6 +11,9 @@ import { drawCompared } from "./compare.js";
 import { drawContours } from "./contours.js";
 import { drawCross } from "./cross.js";
 import { toCss, toDevice, viewport, zoom } from "./geometry.js";
+import { drawLensMarks } from "./lens_result.js";
+import { drawProposal } from "./proposal_marks.js";
+import { drawRectified } from "./rectified.js";
 import { clicks, clicksIn, isOffered, placementsAt, state } from "./state.js";
 
 /** @typedef {CanvasRenderingContext2D} Ink */
@@ -25,7 +28,9 @@ const CLOSE_ZOOM = 2;
 export function drawMarks(pen) {
   const index = state.shown?.index ?? -1;
   const overlay = state.overlay?.index === index ? state.overlay : null;
+  if (state.rectified || state.shown?.rectified) return drawRectified(pen);
   if (boxing.on) return drawEvaluated(pen, overlay);
+  drawLensMarks(pen);
   drawContours(pen);
   if (state.layers.returns && overlay?.returns) drawReturns(pen, overlay.returns);
   if (state.layers.predictions && overlay) for (const [u, v, range] of overlay.guesses) if (isOpen(index, range)) drawGuess(pen, u, v);
@@ -34,6 +39,7 @@ export function drawMarks(pen) {
   if (state.layers.others) for (const click of here) if (click.frame !== index) drawOther(pen, click);
   for (const click of clicksIn(index)) drawClick(pen, click);
   drawCandidates(pen);
+  drawProposal(pen);
   drawCross(pen);
   drawCompared(pen);
   drawBoxes(pen);
@@ -174,7 +180,7 @@ function drawReprojection(pen, click, x, y, closeUp) {
  * Stroke a path with a dark edge below it, so that it is visible on any picture.
  * @param {Ink} pen @param {string} colour @param {number} width CSS px @param {() => void} path @param {number[]} [dashes] @param {number} [edge] CSS px
  */
-function outlined(pen, colour, width, path, dashes = [], edge = 2) {
+export function outlined(pen, colour, width, path, dashes = [], edge = 2) {
   pen.setLineDash(dashes);
   pen.beginPath();
   path();
@@ -188,7 +194,7 @@ function outlined(pen, colour, width, path, dashes = [], edge = 2) {
 }
 
 /** @param {Ink} pen @param {number} x @param {number} y @param {number} arm @param {number} gap */
-function cross(pen, x, y, arm, gap) {
+export function cross(pen, x, y, arm, gap) {
   for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
     pen.moveTo(x + dx * gap, y + dy * gap);
     pen.lineTo(x + dx * arm, y + dy * arm);

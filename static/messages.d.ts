@@ -140,6 +140,14 @@ export interface BoardOptions {
   registration: "rigid" | "linear";
 }
 
+/** Estimate the intrinsics with the pose; the sigmas say how far off they may be if they come without a covariance. */
+export interface RefiningOptions {
+  intrinsics: boolean;
+  focal_length_sigma: number;
+  principal_point_sigma_px: number;
+  distortion_sigma: number;
+}
+
 /** All options of a calibration. */
 export interface CalibrationOptions {
   method: "default" | "paper" | "pmm" | "ccm";
@@ -153,6 +161,7 @@ export interface CalibrationOptions {
   paper: PaperOptions;
   mounting: MountingOptions;
   board: BoardOptions;
+  refining: RefiningOptions;
 }
 
 /** Where to put the reflector next. */
@@ -696,6 +705,147 @@ export interface Uncertainty {
   maps: ContourMap[];
 }
 
+/** One of the intrinsics. */
+export interface LensParameter {
+  name: string;
+  value: string;
+  unit: string;
+}
+
+/** A camera's intrinsics, as a table. */
+export interface LensCamera {
+  about: string;
+  model: string;
+  size: string;
+  field: string;
+  parameters: LensParameter[];
+  known: boolean;
+}
+
+/** How many views there are of a kind. */
+export interface LensTally {
+  name: string;
+  count: number;
+}
+
+/** Which parts of the picture the board has been in, and how. */
+export interface LensCoverage {
+  columns: number;
+  rows: number;
+  counts: number[];
+  share: number;
+  tilts: LensTally[];
+  distances: LensTally[];
+  missing: string[];
+}
+
+/** The intrinsics in use, and how far a calibration of the lens is. */
+export interface LensState {
+  type: "lens";
+  intrinsics: LensCamera | null;
+  chosen: boolean;
+  pictures: number;
+  stage: "idle" | "searching" | "calibrating" | "cancelled" | "failed" | "done";
+  searched: number;
+  total: number;
+  views: number;
+  left_out: number;
+  doing: string;
+  problem: string;
+  hint: string;
+  can_resume: boolean;
+  coverage: LensCoverage | null;
+  result: number;
+  in_use: boolean;
+}
+
+/** A view of the board that was used. */
+export interface LensViewRow {
+  frame: number;
+  name: string;
+  rms_px: number;
+  held_out_rms_px: number;
+}
+
+/** A picture that was not used. */
+export interface LensLeftOut {
+  frame: number;
+  name: string;
+  reason: string;
+}
+
+/** A lens model that was tried. */
+export interface LensTrial {
+  model: string;
+  rms_px: number;
+  held_out_rms_px: number;
+  note: string;
+  chosen: boolean;
+}
+
+/** Values over the picture. */
+export interface LensGrid {
+  columns: number;
+  rows: number;
+  values: number[];
+}
+
+/** A calibrated lens. */
+export interface LensResult {
+  type: "lens_result";
+  number: number;
+  camera: LensCamera;
+  board: string;
+  choice: string;
+  rms_px: number;
+  held_out_rms_px: number;
+  views: LensViewRow[];
+  left_out: LensLeftOut[];
+  trials: LensTrial[];
+  warnings: DataWarning[];
+  residuals: [number, number, number, number][];
+  pattern: string;
+  uncertainty: LensGrid | null;
+  unseen: string;
+}
+
+/** A place in the picture where the reflector may stand. */
+export interface ProposalPlace {
+  u_px: number;
+  v_px: number;
+  sigma_px: number;
+}
+
+/** Where the reflector probably stands in the pictures of a placement. */
+export interface ProposalRow {
+  placement: number;
+  frame: number;
+  image_time: Stamp;
+  width_px: number;
+  confidence: number;
+  reason: string;
+  places: ProposalPlace[];
+}
+
+/** A placement without a proposal. */
+export interface UnproposedRow {
+  placement: number;
+  reason: string;
+}
+
+/** The proposals as far as they can be made, and how far they are. */
+export interface ProposalNews {
+  type: "proposals";
+  on: boolean;
+  stage: "off" | "looking" | "comparing" | "ready" | "failed";
+  done: number;
+  count: number;
+  problem: string;
+  hint: string;
+  rows: ProposalRow[];
+  unproposed: UnproposedRow[];
+}
+
 /** Progress of a long operation. */
 export interface Progress {
   type: "progress";
@@ -735,6 +885,7 @@ export interface FrameHeader {
   height_px: number;
   scale: number;
   format: "jpeg" | "png";
+  rectified: boolean;
 }
 
 /** A time. */
@@ -820,6 +971,24 @@ export interface OptionsChangedForm {
 /** All clicks deleted. */
 export interface ClearedForm {
   type: "cleared";
+  request?: number;
+}
+
+/** A camera, and where it comes from. */
+export interface IntrinsicsForm {
+  about: string;
+  model: string;
+  size_px: [number, number];
+  matrix_px: [[number, number, number], [number, number, number], [number, number, number]];
+  distortion?: number[];
+  order?: string[];
+  covariance?: number[][];
+}
+
+/** Intrinsics chosen for the session; null goes back to those that it was opened with. */
+export interface IntrinsicsChosenForm {
+  type: "intrinsics_chosen";
+  intrinsics: IntrinsicsForm | null;
   request?: number;
 }
 
@@ -956,7 +1125,7 @@ export interface FrameForm {
   index: number;
   request: number;
   playing?: boolean;
-  size?: "full" | "half";
+  size?: "full" | "half" | "rectified";
 }
 
 /** Another frame is shown. */
@@ -1015,6 +1184,37 @@ export interface CompareForm {
 /** The contours of the uncertainty in the picture are requested. */
 export interface UncertaintyForm {
   type: "uncertainty";
+  request?: number;
+}
+
+/** Look for a board in the recording and calibrate the lens; a cancelled search for the same board goes on. */
+export interface LensCalibrate {
+  type: "lens_calibrate";
+  kind: "checkerboard" | "charuco" | "aprilgrid";
+  size: string;
+  square_mm: number;
+  marker_mm?: number;
+  dictionary?: string;
+  model?: "auto" | "pinhole" | "plumb_bob" | "rational_polynomial" | "equidistant";
+  request?: number;
+}
+
+/** Stop looking for the board; what was found so far is kept. */
+export interface LensCancel {
+  type: "lens_cancel";
+  request?: number;
+}
+
+/** Solve with the calibrated lens from now on; a step of the session that can be undone. */
+export interface LensUse {
+  type: "lens_use";
+  request?: number;
+}
+
+/** Proposals are wanted, or not wanted any more. */
+export interface ProposingSwitch {
+  type: "propose";
+  on: boolean;
   request?: number;
 }
 
@@ -1104,6 +1304,9 @@ export type FromServer =
   | PairReview
   | Compared
   | Uncertainty
+  | LensState
+  | LensResult
+  | ProposalNews
   | Progress
   | Snapped
   | Problem
@@ -1119,6 +1322,7 @@ export type FromPage =
   | WarningsAcknowledgedForm
   | OptionsChangedForm
   | ClearedForm
+  | IntrinsicsChosenForm
   | ClicksImportedForm
   | ColumnsMappedForm
   | AssumptionsConfirmedForm
@@ -1141,6 +1345,10 @@ export type FromPage =
   | PairReviewForm
   | CompareForm
   | UncertaintyForm
+  | LensCalibrate
+  | LensCancel
+  | LensUse
+  | ProposingSwitch
   | SnapForm
   | StopFollowingForm
   | LoadBoxesForm

@@ -5,6 +5,7 @@
  */
 
 import { drawIntrinsics, drawOthers, drawSession, drawTopics } from "./opening_parts.js";
+import { showTab } from "./layout.js";
 import { make, toast } from "./notices.js";
 import { send, tell, unconfirmed } from "./socket.js";
 import { on, state } from "./state.js";
@@ -32,7 +33,7 @@ export function startOpening() {
   strip.id = "intrinsics-strip";
   strip.hidden = true;
   pane.append(strip);
-  on(["recording"], drawStrip);
+  on(["recording", "lens"], drawStrip);
   on(["opening", "recording"], () => {
     document.body.classList.remove("asking");
     busy = false;
@@ -243,7 +244,9 @@ function askIntrinsics() {
   input.onchange = () => input.files?.[0] && give(input.files[0]);
   const pick = make("button", "chip", "Choose file…");
   pick.onclick = () => input.click();
+  const calibrate = make("button", "chip", "Calibrate…");
+  calibrate.onclick = () => showTab("tab-lens");
   const others = make("button", "chip", "More…");
   others.onclick = chooseRecording;
-  strip.replaceChildren(make("span", "", [make("strong", "", "No camera intrinsics. "), "Click already; the pose comes once you drop the camera file here."]), pick, others, input);
+  strip.replaceChildren(make("span", "", [make("strong", "", "No camera intrinsics. "), "Click already; the pose comes once the lens is calibrated or its file is dropped here."]), calibrate, pick, others, input);
 }

@@ -16,7 +16,7 @@ const FIRST = [
 /** Options that a method ignores. @type {Record<string, (path: string) => boolean>} */
 const IDLE = {
   default: (path) => /^(paper|mounting|board)\./.test(path),
-  paper: (path) => /^(noise|solving|gating|radar|lens|reflector|mounting|board)\./.test(path) || (path.startsWith("locating.") && path !== "locating.max_time_gap_s"),
+  paper: (path) => /^(noise|solving|gating|radar|lens|reflector|refining|mounting|board)\./.test(path) || (path.startsWith("locating.") && path !== "locating.max_time_gap_s"),
 };
 /** Labels that are clearer than the option's own name. @type {Record<string, string>} */
 const LABELS = {
@@ -39,6 +39,10 @@ const LABELS = {
   "lens.focal_length_sigma": "Focal length (0.003 = 0.3 %)",
   "lens.principal_point_sigma_px": "Principal point",
   "lens.distortion_sigma": "Distortion (k1)",
+  "refining.intrinsics": "Refine the intrinsics with the pose",
+  "refining.focal_length_sigma": "Focal length (0.03 = 3 %)",
+  "refining.principal_point_sigma_px": "Principal point",
+  "refining.distortion_sigma": "Distortion (k1)",
   "reflector.offset_sigma_m": "Clicked point to phase centre",
   "reflector.click_offset_sigma_px": "One person's clicks",
   "solving.sensors_above_placements": "Sensors above the placements",
@@ -47,6 +51,7 @@ const LABELS = {
 const HEADINGS = {
   radar: "Radar: errors that all pairs share, ± before any pair",
   lens: "Lens: errors of the intrinsics, ±",
+  refining: "Refining the intrinsics: how far off they may be, ±, if they come without a covariance",
   reflector: "Reflector: what all clicks are off by, ±",
 };
 /** Those to choose from here; the paper's baselines are chosen on the command line. @type {Record<string, string>} */

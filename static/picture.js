@@ -24,7 +24,7 @@ export function startPicture() {
     takeSize();
     redraw();
   });
-  on(["view", "overlay", "selected", "layers", "hover", "placements", "theme", "candidates", "cross", "boxes"], redrawMarks);
+  on(["view", "overlay", "selected", "layers", "hover", "placements", "theme", "candidates", "cross", "boxes", "lens", "proposals"], redrawMarks);
   on(["theme"], redraw);
   measure();
 }

@@ -111,11 +111,12 @@ export function nearestIndex(time) {
 /** @param {number} index */
 function request(index) {
   newest = requestNumber();
-  const sent = tell({ type: "frame", index, request: newest, playing: state.playing, size: state.playing ? "half" : "full" });
+  const size = state.rectified ? "rectified" : state.playing ? "half" : "full";
+  const sent = tell({ type: "frame", index, request: newest, playing: state.playing, size });
   if (sent) coming.push(newest);
 }
 
-/** Request the current frame again after a reconnection. */
+/** Request the current frame again: after a reconnection, or rectified in another way. */
 export function requestAgain() {
   coming = [];
   kept.clear();
@@ -132,6 +133,7 @@ export async function receiveFrame(header, data) {
   const stale = header.request < newest && !moving;
   if (stale) return;
   const shown = { index: header.index, ...(await decoded(header, data)) };
+  if (shown.rectified !== state.rectified) return shown.bitmap.close();
   keep(shown);
   const wanted = state.playing || state.live ? header.index > (state.shown?.index ?? -1) || header.request === newest : header.index === state.cursor;
   if (wanted) show(shown);
@@ -149,7 +151,7 @@ async function receivePreview(header, data) {
 async function decoded(header, data) {
   const blob = new Blob([data], { type: `image/${header.format}` });
   const bitmap = await createImageBitmap(blob, { colorSpaceConversion: "none", premultiplyAlpha: "none" });
-  return { bitmap, scale: header.scale, width: header.width_px, height: header.height_px };
+  return { bitmap, scale: header.scale, width: header.width_px, height: header.height_px, rectified: header.rectified };
 }
 
 /** Note that a frame could not be read. @param {number|null} request */

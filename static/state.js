@@ -3,8 +3,8 @@
 
 /** @typedef {import("./messages.js").View} View */
 /** @typedef {import("./messages.js").ClickRow} Click */
-/** A decoded frame. @typedef {{index: number, bitmap: ImageBitmap, scale: number, width: number, height: number}} Shown */
-/** @typedef {"opening"|"recording"|"view"|"progress"|"placements"|"overlay"|"look"|"radar_map"|"shown"|"selected"|"layers"|"connection"|"playing"|"cursor"|"hover"|"theme"|"box"|"grown"|"following"|"candidates"|"cross"|"boxes"} Topic */
+/** A decoded frame. @typedef {{index: number, bitmap: ImageBitmap, scale: number, width: number, height: number, rectified: boolean}} Shown */
+/** @typedef {"opening"|"recording"|"view"|"progress"|"placements"|"overlay"|"look"|"radar_map"|"shown"|"selected"|"layers"|"connection"|"playing"|"cursor"|"hover"|"theme"|"box"|"grown"|"following"|"candidates"|"cross"|"boxes"|"lens"|"proposals"} Topic */
 
 export const state = {
   /** While the recording is being opened. @type {import("./messages.js").Opening|null} */ opening: null,
@@ -34,6 +34,9 @@ export const state = {
   /** Seconds of each frame from the first one. @type {Float64Array} */ seconds: new Float64Array(0),
   /** Marks as the user left them, until the server's view has them: by the click's id, or a name for one that is new. @type {Map<string, Draft>} */ local: new Map(),
   /** The returns that may belong to the selected click. @type {import("./messages.js").PairCandidates|null} */ candidates: null,
+  /** Where the reflector probably stood, and how far finding that is. @type {import("./messages.js").ProposalNews|null} */ proposals: null,
+  /** The intrinsics in use, and how far a calibration of the lens is. @type {import("./messages.js").LensState|null} */ lens: null,
+  /** Whether frames are shown without distortion. */ rectified: false,
   /** The cross of the keyboard, while it is used. @type {import("./cross.js").Cross|null} */ cross: null,
 };
 

@@ -1,9 +1,11 @@
 // @ts-check
 /** What to do next: three steps while there is no calibration, one line on the frame, and the same text in the status line. */
 
+import { act, actionNamed } from "./actions.js";
 import { boxing } from "./boxes.js";
 import { boxAdvice } from "./evaluating.js";
 import { make } from "./notices.js";
+import { proposalWords, unproposedReason } from "./proposals.js";
 import { clickIn, clicks, clicksIn, isClicked, isDismissed, isOffered, on, placementAt, placementsAt, rangeApart, state } from "./state.js";
 
 const guide = /** @type {HTMLElement} */ (document.getElementById("guide"));
@@ -12,10 +14,10 @@ const FEWEST = 4;
 /** The point to click: a corner reflector's echo seems to come from there. */
 const CENTRE = "the inner corner, where its three sheets meet";
 
-/** Text with keys in between. @typedef {(string|{key: string})[]} Words */
+/** Text with keys in between; a key with an action is a button. @typedef {(string|{key: string, action?: string})[]} Words */
 
 export function startGuide() {
-  on(["opening", "shown", "view", "placements", "playing", "overlay", "candidates", "cross", "selected", "boxes"], drawGuide);
+  on(["opening", "shown", "view", "placements", "playing", "overlay", "candidates", "cross", "selected", "boxes", "layers", "proposals"], drawGuide);
 }
 
 /** Three steps to the first calibration. */
@@ -52,13 +54,24 @@ function placesMarked() {
 /** @param {string} name */
 const key = (name) => make("span", "key", name);
 
+/** A key that can be clicked; the focus stays where it is. @param {string} name @param {string} action */
+function keyButton(name, action) {
+  const button = make("button", "key", name);
+  button.setAttribute("aria-label", actionNamed(action).words);
+  button.onmousedown = (event) => event.preventDefault();
+  button.onclick = () => act(actionNamed(action));
+  return button;
+}
+
 function drawGuide() {
   if (state.looking) return; // looking.js says what is there
   const words = state.shown ? (state.playing ? null : advice(state.shown.index)) : opening();
   guide.hidden = !words;
   if (!words) return;
   guide.classList.toggle("act", words.act);
-  guide.replaceChildren(...words.text.map((word) => (typeof word === "string" ? word : key(word.key))));
+  guide.classList.toggle("long", words.long === true);
+  if (guide.textContent === words.text.map((word) => (typeof word === "string" ? word : word.key)).join("")) return; // said once
+  guide.replaceChildren(...words.text.map((word) => (typeof word === "string" ? word : word.action ? keyButton(word.key, word.action) : key(word.key))));
 }
 
 /** What to show before there is a frame. @returns {{text: Words, act: boolean}|null} */
@@ -67,18 +80,23 @@ function opening() {
   return now && !now.problem ? { text: [state.preview ? "Preview: you can click once the recording is open" : now.doing], act: false } : null;
 }
 
-/** @param {number} index @returns {{text: Words, act: boolean}|null} */
+/** @param {number} index @returns {{text: Words, act: boolean, long?: boolean}|null} `long` takes two lines */
 function advice(index) {
+  if (state.rectified) return { text: ["Rectified: straight edges must be straight. Drag a line along one to compare. ", { key: "U" }, ": as taken"], act: false };
   if (boxing.on) return boxAdvice();
   const placement = placementAt(index);
   const here = clickIn(index);
   if (state.cross) return atCross(state.cross);
+  const offer = proposalWords();
+  if (offer) return { text: offer, act: true, long: true };
   if (here) return afterClick(here);
   if (placement && isDismissed(placement)) return { text: ["This placement is dismissed. ", { key: "X" }, " offers it again"], act: false };
   if (placement && isOffered(placement)) {
     const number = state.placements.indexOf(placement) + 1;
     const several = placementsAt(index).length > 1 ? ` (one of ${placementsAt(index).length} at this time)` : "";
-    return { text: [`Placement ${number} of ${state.placements.length}, ${placement.range_m.toFixed(1)} m away${several}: click the reflector's inner corner, where its three sheets meet. No reflector here: `, { key: "X" }], act: true };
+    const why = unproposedReason(number - 1);
+    const silent = why ? ` Not proposed: ${why}.` : "";
+    return { text: [`Placement ${number} of ${state.placements.length}, ${placement.range_m.toFixed(1)} m away${several}: click the reflector's inner corner, where its three sheets meet. No reflector here: `, { key: "X" }, silent], act: true, long: silent !== "" };
   }
   const next = nextAction();
   return next ? { text: next, act: false } : null;

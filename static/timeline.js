@@ -32,7 +32,7 @@ export function startTimeline() {
     showAll();
   });
   on(["grown"], extend);
-  on(["view", "placements", "shown", "selected", "cursor", "theme"], redraw);
+  on(["view", "placements", "shown", "selected", "cursor", "theme", "proposals"], redraw);
   canvas.addEventListener("pointerdown", pressed);
   canvas.addEventListener("pointermove", moved);
   canvas.addEventListener("pointerup", released);

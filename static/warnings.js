@@ -1,9 +1,11 @@
 // @ts-check
 /** The warnings: one line each, the gravest first; one unfolds to its whole message and what to do about it. */
 
+import { showTab } from "./layout.js";
 import { openMeanings } from "./meanings.js";
 import { icon, make, toast } from "./notices.js";
 import { send } from "./socket.js";
+import { state } from "./state.js";
 
 /** @typedef {import("./messages.js").WarningRow} WarningRow */
 /** @typedef {import("./messages.js").AssumptionRow} AssumptionRow */
@@ -14,6 +16,8 @@ const openCodes = new Set(["unsolvable", "no-camera", "assumed", "calibration-am
 const NOT_TO_ACKNOWLEDGE = ["unsolvable", "no-camera"];
 /** What leaves open what a calibration means: a person picks. */
 const TO_PICK = ["calibration-ambiguous", "calibration-picked"];
+/** What speaks of the lens. */
+const OF_THE_LENS = ["intrinsics-suspected", "lens-or-radar-scale"];
 let drawn = "";
 
 /**
@@ -52,6 +56,11 @@ function row(warning, kind, read) {
     const pick = make("button", "pick", "Pick a meaning…");
     pick.onclick = openMeanings;
     inside.push(pick);
+  }
+  if (OF_THE_LENS.includes(warning.code) || (warning.code === "unsolvable" && state.lens && !state.lens.intrinsics)) {
+    const open = make("button", "pick", "Open the tab Lens");
+    open.onclick = () => showTab("tab-lens");
+    inside.push(open);
   }
   if (!NOT_TO_ACKNOWLEDGE.includes(warning.code)) {
     const button = make("button", "acknowledge", read ? "Show again" : "Acknowledge");

@@ -1,6 +1,7 @@
 """Settings and fixtures for all tests."""
 
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -15,9 +16,20 @@ ROOT = Path(__file__).resolve().parent.parent
 
 os.environ["COCALIB_CACHE"] = "off"  # tests must not write to the user's cache folder
 
+# Tests and the programs that they start, some hundreds, keep the byte code of our modules, which git ignores: compiling them
+# anew each time would take half of such a program's time, and a quarter of a minute of each worker's.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
+
 # As in the program itself: our matrices are small, and threads within one product only cost time. NumPy must not be loaded
 # yet; jaxtyping's plugin, which would load it, is switched off in pyproject.toml.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """Start one worker more than there are processors: a test that drives a browser waits for half of its time."""
+    return (os.cpu_count() or 1) + 1
 
 
 @pytest.fixture(scope="session")

@@ -44,7 +44,7 @@ class ServedProcess:
 
 @contextmanager
 def served_process(*arguments: object, state: Path) -> Iterator[ServedProcess]:
-    """Start the command, and wait for its link; it is ended with the `with` block.
+    """Start the command without proposals, and wait for its link; it is ended with the `with` block.
 
     Args:
         arguments: those after `cocalib open`.
@@ -53,7 +53,17 @@ def served_process(*arguments: object, state: Path) -> Iterator[ServedProcess]:
     program = (
         "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\nfrom app.__main__ import main\nmain()"
     )
-    command = [sys.executable, "-c", program, "open", *map(str, arguments), "--no-browser", "--port", "0"]
+    command = [
+        sys.executable,
+        "-c",
+        program,
+        "open",
+        *map(str, arguments),
+        "--no-browser",
+        "--no-proposals",
+        "--port",
+        "0",
+    ]
     process = subprocess.Popen(
         command,
         stdout=subprocess.PIPE,

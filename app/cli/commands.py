@@ -64,6 +64,16 @@ COMMANDS: Mapping[str, Command] = {
             "Show what a recording contains: files, topics, types, rates, stamps, overlap, camera, warnings.",
         ),
         Command(
+            "intrinsics",
+            "app.cli.intrinsics.command:Intrinsics",
+            "Calibrate a camera's lens from pictures of a board, or convert a file with intrinsics.",
+        ),
+        Command(
+            "propose",
+            "app.cli.proposing.command:Propose",
+            "Find where the reflector probably stands in the pictures, for a person or a script to confirm.",
+        ),
+        Command(
             "solve",
             "app.cli.solve:Solve",
             "Compute a calibration from a recording and its clicks, or from a file of pairs.",

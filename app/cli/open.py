@@ -28,7 +28,9 @@ class Open:
     """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several are read as one recording.
     Without one, it is chosen in the page."""
     camera: File = None
-    """Intrinsics to use if the recording has none, or instead of its own: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
+    """Intrinsics to use if the recording has none, or instead of its own: any format that `cocalib intrinsics` writes."""
+    rescale_camera: Switch = False
+    """With --camera: scale its intrinsics to the recorded pictures, if these are the calibrated ones resized."""
     calibration: File = None
     """A calibration to show, in any format: drawn until the clicks give a new one, then compared with it."""
     clicks: File = None
@@ -59,7 +61,7 @@ class Open:
         choice = Choice(
             paths,
             topics=self.topics,
-            camera_file=None if self.camera is None else CameraFile.read(self.camera),
+            camera_file=None if self.camera is None else CameraFile.read(self.camera, rescale=self.rescale_camera),
             calibration_file=self.calibration,
             clicks=None if self.clicks is None else GivenClicks(read_text(self.clicks), str(self.clicks)),
             options=self.measured.over(self.options),

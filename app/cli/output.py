@@ -30,11 +30,16 @@ __all__ = [
 _MAX_TEXT_BYTES = 64 * 1024 * 1024
 
 
-def explain_unsolvable(outcome: "Unsolvable") -> int:
-    """Print to stderr why there is no calibration, what would help, and which clicks are unpaired; return 1."""
+def explain_unsolvable(outcome: "Unsolvable", *, what: str = "no calibration") -> int:
+    """Print to stderr why there is no calibration, what would help, and which clicks are unpaired; return 1.
+
+    Args:
+        outcome: of the solver, or of the search for proposals.
+        what: is missing.
+    """
     from app.view import sentence
 
-    print(f"cocalib: no calibration: {sentence(outcome.reason)} {sentence(outcome.hint)}", file=sys.stderr)
+    print(f"cocalib: {what}: {sentence(outcome.reason)} {sentence(outcome.hint)}", file=sys.stderr)
     for click in outcome.unpaired:
         print(f"  click {click.id}: {sentence(click.reason)} {sentence(click.hint)}", file=sys.stderr)
     return 1
@@ -88,6 +93,7 @@ def required_camera(recording: "Recording", camera_file: "CameraFile | None") ->
             f"{recording.paths[0].name}: no intrinsics for {recording.image_topic}: {found}; "
             "give them with --camera FILE (ROS camera_info YAML, OpenCV YAML or XML, Kalibr camchain, JSON)"
             + (f", such as --camera {near}" if near else "")
+            + "; or calibrate the lens from pictures of a board: cocalib intrinsics --help"
         )
     return camera
 

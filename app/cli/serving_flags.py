@@ -29,6 +29,8 @@ class ServingFlags:
     """Serve on a Unix socket that only you can reach, for shared robots; the ssh command that forwards it is printed."""
     no_browser: Switch = False
     """Print the link, do not open a browser."""
+    no_proposals: Switch = False
+    """Do not look in the pictures for where the reflector stood; the page can still ask for it."""
     on_problem: Annotated[Literal["auto", "ask", "exit"], called()] = "auto"
     """What to do if the recording cannot be opened: ask in the page, or exit with code 2; auto asks, but exits with
     --no-browser if the output is no terminal, as in scripts."""
@@ -54,6 +56,12 @@ class ServingFlags:
         require_token(self.token, reachable=not is_loopback(self.host))
         return Link(
             ServerOptions(
-                self.host, self.port, self.token, no_browser=self.no_browser, socket=self.socket, session=session
+                self.host,
+                self.port,
+                self.token,
+                no_browser=self.no_browser,
+                socket=self.socket,
+                session=session,
+                proposes=not self.no_proposals,
             )
         )

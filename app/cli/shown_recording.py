@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
 import tyro
 
-from app.cli.flags import File, called
+from app.cli.flags import File, Switch, called
 from app.cli.output import progress_bar, read_text, told_clicks_at_frames
 from app.cli.recording_flags import TopicFlags
 from calib_core.errors import InputError
@@ -27,6 +27,8 @@ class ShownFlags:
     """Calibration to project the returns with, in any format that export writes."""
     camera: File = None
     """Intrinsics to use if the calibration has none, or instead of the recording's: camera_info YAML, OpenCV, Kalibr, JSON."""
+    rescale_camera: Switch = False
+    """With --camera: scale its intrinsics to the recorded pictures, if these are the calibrated ones resized."""
     clicks: File = None
     """Clicks in this recording (cocalib/clicks-1 JSON); by default those in the calibration, if they are of this recording."""
     boxes: Annotated[str | None, called("FILE_OR_TOPIC")] = None
@@ -64,7 +66,7 @@ def shown_recording(paths: Sequence[Path], topics: TopicFlags, files: ShownFlags
         raise InputError("RECORDING is missing; name one or more files or folders")
     if files.calibration is None:
         raise InputError("--calibration FILE is missing: the calibration that the returns are projected with")
-    camera_file = None if files.camera is None else CameraFile.read(files.camera)
+    camera_file = None if files.camera is None else CameraFile.read(files.camera, rescale=files.rescale_camera)
     with open_recording(tuple(paths), topics) as recording:
         camera = camera_for(recording, camera_file)
         calibration = calibration_of(read_any_file(files.calibration), str(files.calibration), camera)

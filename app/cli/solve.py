@@ -2,37 +2,32 @@
 
 import dataclasses
 import sys
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Self
 
-import numpy as np
 import tyro
 
-from app.cli.flags import File
-from app.cli.output import (
-    explain_unsolvable,
-    read_text,
-    required_camera,
-    seconds_text,
-    told_clicks_at_frames,
-    write_whole,
-)
+from app.cli.flags import File, Switch
+from app.cli.output import explain_unsolvable, read_text, required_camera, write_whole
 from app.cli.recording_flags import CameraPosition, MeasuredCamera, Options, Recordings, TopicFlags, Topics
 from app.terminal import print_exactly
 from app.view import summary_lines
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.input_files import name_text
-from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
+from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
 
 if TYPE_CHECKING:
+    from app.automatic_solving import PlacedClicks
+    from calib_core.interchange.own.clicks_json import ClicksFile
     from calib_core.recordings import Recording
 
 __all__ = ["Solve"]
+
+_REFLECTOR_M = 0.24
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,18 +35,29 @@ class Solve:
     """Compute a calibration from a recording and its clicks, or from a file of pairs.
 
     The same clicks give the same file as the page's download, byte for byte.
+    Exit code 1: no calibration; 3: there is one, but nobody confirmed its clicks, and it is weak.
     """
 
     recording: Recordings = ()
     """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several are read as one recording."""
     clicks: File = None
     """Clicks in this recording (cocalib/clicks-1 JSON)."""
+    auto: Switch = False
+    """Click without a person where pictures and radar agree; with --clicks, only placements without a click."""
+    clicks_out: File = None
+    """With --auto: write the clicks to this file (cocalib/clicks-1 JSON), to look at on the page."""
+    reflector_m: float = _REFLECTOR_M
+    """With --auto: width of the reflector as the camera sees it [m]."""
     pairs: File = None
     """Instead of a recording: radar positions and pixels (cocalib/pairs-1 JSON), or a calibration to solve again."""
     camera: File = None
-    """Intrinsics to use if the recording has none, or instead of its own: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
+    """Intrinsics to use if the recording has none, or instead of its own: any format that `cocalib intrinsics` writes."""
+    rescale_camera: Switch = False
+    """With --camera: scale its intrinsics to the recorded pictures, if these are the calibrated ones resized."""
     out: File = None
     """Output file (cocalib/calibration-1 JSON); stdout if omitted."""
+    refine_intrinsics: Switch = False
+    """Estimate focal length, principal point and k1 with the pose; their covariance or the refining options say how sure."""
     measured: CameraPosition = field(default_factory=MeasuredCamera)
     topics: Topics = field(default_factory=TopicFlags)
     options: Options = field(default_factory=CalibrationOptions)
@@ -75,8 +81,12 @@ class Solve:
 
     def run(self) -> int:
         """Solve, write the calibration, print its summary; return the exit code."""
-        if self.pairs is not None and (self.recording or self.clicks):
-            raise InputError("solve takes either a recording with --clicks, or --pairs, not both")
+        if self.pairs is not None and (self.recording or self.clicks or self.auto):
+            raise InputError("solve takes either a recording with --clicks or --auto, or --pairs, not both")
+        if not self.auto and (self.clicks_out is not None or self.reflector_m != _REFLECTOR_M):
+            raise InputError("--clicks-out and --reflector-m apply with --auto only; add it")
+        if self.auto and self.options.method == "ccm":
+            raise InputError("--method ccm takes clicks on the corners of a checkerboard, and --auto finds a reflector")
         if self.pairs is not None and (self.camera or self.topics != TopicFlags()):
             raise InputError(
                 "--camera and the options of a recording do not apply to --pairs, which brings its own camera"
@@ -84,81 +94,128 @@ class Solve:
         if self.pairs is not None:
             return self._solve_pairs(self.pairs)
         if not self.recording:
-            raise InputError("solve needs a recording and --clicks CLICKS.json, or --pairs PAIRS.json")
-        if self.clicks is None:
-            raise InputError("solve needs the clicks of this recording: --clicks CLICKS.json (the page exports them)")
-        return self._solve_recording(self.clicks)
+            raise InputError("solve needs a recording and --clicks CLICKS.json or --auto, or --pairs PAIRS.json")
+        if self.clicks is None and not self.auto:
+            raise InputError(
+                "solve needs the clicks of this recording: --clicks CLICKS.json (the page exports them), or --auto to do "
+                "without a person"
+            )
+        return self._solve_recording()
 
-    def _solve_recording(self, clicks_path: Path) -> int:
-        from app.solving import calibration_text, solve_clicks
-        from calib_core.interchange import CameraFile, read_clicks
+    def _all_options(self) -> CalibrationOptions:
+        """Return the options with what has a flag of its own."""
+        options = self.measured.over(self.options)
+        if not self.refine_intrinsics:
+            return options
+        return dataclasses.replace(options, refining=dataclasses.replace(options.refining, intrinsics=True))
+
+    def _solve_recording(self) -> int:
+        from app.automatic_solving import solve_placed_clicks
+        from app.cli.recorded_clicks import require_confirmed
+        from app.solving import calibration_text
+        from calib_core.interchange import CameraFile
         from calib_core.recordings import open_recording
 
-        camera_file = None if self.camera is None else CameraFile.read(self.camera)
-        clicks = read_clicks(read_text(clicks_path), source=str(clicks_path))
+        self._require_folders()
+        camera_file = None if self.camera is None else CameraFile.read(self.camera, rescale=self.rescale_camera)
+        options = self._all_options()
+        file = self._clicks_file()
         with open_recording(self.recording, self.topics) as recording:
-            _require_confirmed(recording)
+            require_confirmed(recording)
             if recording.radar_choice:
                 print(f"radar: {recording.radar_choice}", file=sys.stderr)
             camera = required_camera(recording, camera_file)
-            _require_inside(clicks, recording, camera, source=clicks_path)
-            clicks = told_clicks_at_frames(clicks, recording, source=str(clicks_path))
-            outcome = solve_clicks(recording, clicks, camera, self.measured.over(self.options))
+            placed = self._placed(file, recording, camera, options)
+            if isinstance(placed, Unsolvable):
+                return explain_unsolvable(placed)
+            outcome = solve_placed_clicks(recording, placed, camera, options)
             if isinstance(outcome, Unsolvable):
                 return explain_unsolvable(outcome)
-            return self._deliver(outcome, calibration_text(outcome, recording, camera_file=camera_file))
+            self._write_clicks(placed, recording)
+            text = calibration_text(outcome, recording, camera_file=camera_file, unconfirmed=placed.unconfirmed)
+            return self._deliver(outcome, text)
+
+    def _require_folders(self) -> None:
+        """Refuse output files that cannot be written, before a search that takes long.
+
+        Raises:
+            InputError: a folder is missing.
+        """
+        for path in (self.out, self.clicks_out):
+            if self.auto and path is not None and not path.absolute().parent.is_dir():
+                raise InputError(f"{path}: the folder {path.parent} does not exist; create it first")
+
+    def _clicks_file(self) -> "ClicksFile":
+        from app.cli.recorded_clicks import file_of_clicks
+        from calib_core.interchange.own.clicks_json import ClicksFile
+
+        return ClicksFile(()) if self.clicks is None else file_of_clicks(self.clicks)
+
+    def _placed(
+        self, file: "ClicksFile", recording: "Recording", camera: Camera, options: CalibrationOptions
+    ) -> "PlacedClicks | Unsolvable":
+        """Return the clicks to solve with: those of the file, and with --auto the ones that are placed automatically."""
+        from app.automatic_solving import PlacedClicks, place_clicks
+        from app.cli.proposing.flags import checked_reflector_m, shown_progress
+        from app.cli.recorded_clicks import recorded_clicks
+
+        clicks = file.clicks
+        if self.clicks is not None:
+            clicks = recorded_clicks(clicks, recording, camera, source=self.clicks)
+        if not self.auto:
+            return PlacedClicks(clicks, file.unconfirmed)
+        if file.unconfirmed is not None:
+            raise InputError(
+                f"{self.clicks}: nobody confirmed {len(file.unconfirmed.ids)} of its clicks; with --auto give only clicks that a "
+                "person placed"
+            )
+        reflector_m = checked_reflector_m(self.reflector_m)
+        with shown_progress() as progress:
+            placed = place_clicks(
+                recording, camera, options, confirmed=clicks, reflector_m=reflector_m, progress=progress
+            )
+        if not isinstance(placed, Unsolvable):
+            print(f"automatic: {_placed_words(placed)}", file=sys.stderr)
+        return placed
+
+    def _write_clicks(self, placed: "PlacedClicks", recording: "Recording") -> None:
+        if self.clicks_out is None:
+            return
+        from calib_core.interchange.own.clicks_json import write_clicks
+
+        text = write_clicks(placed.clicks, radar_topics=recording.radar_topics, unconfirmed=placed.unconfirmed)
+        write_whole(self.clicks_out, text)
+        print(f"clicks written to {self.clicks_out}", file=sys.stderr)
 
     def _solve_pairs(self, path: Path) -> int:
         from app.solving import calibration_text_of_pairs, solve_pairs
 
         text = read_text(path) if self.pairs_text is None else self.pairs_text
-        outcome = solve_pairs(text, source=str(path), options=self.measured.over(self.options))
+        outcome = solve_pairs(text, source=str(path), options=self._all_options())
         if isinstance(outcome, Unsolvable):
             return explain_unsolvable(outcome)
         return self._deliver(outcome, calibration_text_of_pairs(outcome, text, name=name_text(path.name)))
 
     def _deliver(self, calibration: Calibration, text: str) -> int:
+        from app.automatic_solving import is_doubtful
+
+        code = 3 if is_doubtful(calibration) else 0
         if self.out is None:
             print_exactly(text)
-            return 0
+            return code
         write_whole(self.out, text)
         print("\n".join([*summary_lines(calibration), f"written to {self.out}"]))
-        return 0
+        return code
 
 
-def _require_confirmed(recording: "Recording") -> None:
-    """Refuse a recording whose units, signs or meanings are assumed.
+def _placed_words(placed: "PlacedClicks") -> str:
+    """Say how many clicks were placed, and how sure they are."""
+    if placed.unconfirmed is None:
+        return placed.words
+    from calib_core.diagnostics.confirmation import probability_text
 
-    Raises:
-        InputError: there is an unconfirmed assumption; all are named.
-    """
-    if recording.assumptions:
-        named = "; ".join(f"{one.topic}: {one.text} (confirm: {one.confirm})" for one in recording.assumptions)
-        raise InputError(
-            f"{recording.name}: the recording does not state everything that is needed: {named}; "
-            "state what is right, or confirm all of it with --confirm-assumptions"
-        )
-
-
-def _require_inside(clicks: Sequence[ReflectorClick], recording: "Recording", camera: Camera, *, source: Path) -> None:
-    """Refuse clicks that cannot belong to this recording.
-
-    Raises:
-        InputError: a click is outside the recording or the image; the first one is named.
-    """
-    from app.session.click_stamps import half_interval_ns
-
-    first, last = int(recording.image_times[0]), int(recording.image_times[-1])
-    half_ns = half_interval_ns(recording.image_times)
-    for click in clicks:
-        if not first - half_ns <= click.image_time <= last + half_ns:
-            raise InputError(
-                f"{source}: click {click.id} at {seconds_text(click.image_time)} is outside the recording, "
-                f"whose frames run from {seconds_text(TimeNs(first))} to {seconds_text(TimeNs(last))}; "
-                "give the clicks of this recording"
-            )
-        if not camera.in_image(np.array([[click.u_px, click.v_px]]))[0]:
-            raise InputError(
-                f"{source}: click {click.id} at ({click.u_px:g}, {click.v_px:g}) px is outside the image of "
-                f"{camera.width_px} x {camera.height_px} px; give the clicks of this recording"
-            )
+    count = len(placed.unconfirmed.ids)
+    return (
+        f"{count} {'click' if count == 1 else 'clicks'} placed that nobody confirmed (confidence "
+        f"{probability_text(placed.unconfirmed.confidence)}): {placed.words}"
+    )

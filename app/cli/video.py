@@ -68,13 +68,21 @@ class Video:
         return 0
 
     def _write_overlay(self) -> int:
-        from app.overlay_video import OverlayOptions, require_encoder, write_overlay
+        from app.overlay_video import OverlayOptions, write_overlay
         from calib_core.input_files import name_text
+        from calib_core.recordings import video_format
 
         if not 0 <= self.trail <= _MOST_TRAIL_SCANS:
             raise InputError(f"--trail {self.trail}: give a number of scans from 0 to {_MOST_TRAIL_SCANS}")
-        require_encoder(self.out)
-        shown = ShownFlags(self.calibration, self.camera, self.clicks, self.boxes, self.against, self.colour)
+        video_format(self.out)
+        shown = ShownFlags(
+            calibration=self.calibration,
+            camera=self.camera,
+            clicks=self.clicks,
+            boxes=self.boxes,
+            against=self.against,
+            colour=self.colour,
+        )
         titles = tuple(name_text(path.name) for path in (self.calibration, self.against) if path is not None)
         with shown_recording(self.recording, self.topics, shown) as view, progress_bar("drawing frames") as progress:
             written = write_overlay(view, self.out, OverlayOptions(titles, self.trail), progress=progress)

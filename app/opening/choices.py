@@ -27,7 +27,7 @@ def choices_of(choice: Choice, opened: Opened) -> OpeningChoices:
         radar_topic=choice.topics.radar_topic,
         image_topic=choice.topics.image_topic,
         intrinsics=workspace.intrinsics,
-        intrinsics_file=workspace.camera_file is not None,
+        intrinsics_file=workspace.given.file is not None,
         session=session_offer(choice, workspace.facts, folder),
     )
 

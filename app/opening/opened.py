@@ -13,7 +13,7 @@ import calib_core.recordings as recordings
 from app.opening.choice import Choice, ChoicePart, GivenClicks, UnusablePartError, part_of_choice
 from app.opening.reference import about_calibration, camera_in, meaning_of, reference_from
 from app.opening.sessions import fitting_clicks, session_folder
-from app.session import AssumptionsConfirmed, ClicksImported, ColumnsMapped, OptionsChanged
+from app.session import AssumptionsConfirmed, ClicksImported, ColumnsMapped, IntrinsicsChosen, OptionsChanged
 from app.session.click_stamps import ClicksAtFrames, clicks_at_frames
 from app.session.file import recording_session_folder, remembered_map
 from app.solving import camera_for
@@ -22,7 +22,7 @@ from app.workspace import Workspace, open_workspace, recording_facts
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.input_files import name_text
-from calib_core.interchange import read_clicks
+from calib_core.interchange.own.clicks_json import read_clicks_file
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording, RecordingOptions
 
@@ -79,6 +79,7 @@ def open_choice(choice: Choice, stack: ExitStack, tell: Callable[[str], None]) -
     _remember(workspace, recording)
     for warning in workspace.restored.warnings:
         print(f"{sentence(warning.message)} {sentence(warning.hint)}")
+    _prefer_given_intrinsics(workspace, choice)
     if choice.options is not None and choice.options != CalibrationOptions():
         workspace.dispatch(OptionsChanged(choice.options))
     if choice.clicks is not None and clicks is not None:
@@ -188,7 +189,7 @@ def _clicks_at_frames(recording: Recording, given: GivenClicks | None) -> Clicks
     """
     if given is None:
         return None
-    clicks = read_clicks(given.text, source=given.source)
+    clicks = read_clicks_file(given.text, source=given.source).clicks
     return clicks_at_frames(clicks, recording.image_times, source=given.source)
 
 
@@ -199,6 +200,12 @@ def _import_clicks(workspace: Workspace, given: GivenClicks, found: ClicksAtFram
         return
     for line in found.moved:
         print(f"note: {line}", file=sys.stderr)
+    unconfirmed = read_clicks_file(given.text, source=given.source).unconfirmed
+    if unconfirmed is not None:
+        print(
+            f"note: {given.source}: nobody confirmed {len(unconfirmed.ids)} of these clicks: look at each",
+            file=sys.stderr,
+        )
     workspace.dispatch(ClicksImported(found.clicks))
 
 
@@ -207,6 +214,13 @@ def _close(workspace: Workspace, kind: type[BaseException] | None, *_: object) -
     closed = workspace.close()
     if kind is not None and closed.fault:
         print(f"cocalib: {closed.note}", file=sys.stderr)
+
+
+def _prefer_given_intrinsics(workspace: Workspace, choice: Choice) -> None:
+    """Solve with a file that the user gives, also in a session that had intrinsics of its own."""
+    if choice.camera_file is not None and workspace.session.intrinsics is not None:
+        print(f"Using {choice.camera_file.source} instead of the session's own intrinsics; undo goes back to them")
+        workspace.dispatch(IntrinsicsChosen(None))
 
 
 def _remember(workspace: Workspace, recording: Recording) -> None:

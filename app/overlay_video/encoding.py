@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +11,10 @@ import numpy as np
 
 from calib_core.errors import InputError
 from calib_core.measurements import NS_PER_S, TimeNs
+from calib_core.recordings import video_format
 
-__all__ = ["Encoder", "encoding", "require_encoder"]
+__all__ = ["Encoder", "encoding"]
 
-_FORMATS = {".mp4": "mp4", ".mov": "mov", ".mkv": "matroska"}
 _CODECS = {
     "libx264": ("H.264", {"preset": "veryfast", "crf": "21"}),
     "libopenh264": ("H.264", {}),
@@ -26,20 +25,6 @@ _CODECS = {
 _TICKS_PER_S = 60_000
 """MPEG-4 allows at most 65535."""
 _BT709, _LIMITED_RANGE = 1, 1
-
-
-def require_encoder(path: Path) -> str:
-    """Return the name of the container format for a path, if it can be written.
-
-    Raises:
-        InputError: PyAV is missing, or the suffix is not supported.
-    """
-    form = _FORMATS.get(path.suffix.lower())
-    if form is None:
-        raise InputError(f"{path}: unsupported video format; use {', '.join(_FORMATS)}")
-    if find_spec("av") is None:
-        raise InputError("writing a video needs PyAV, which is not installed: pip install 'cocalib[video]'")
-    return form
 
 
 @dataclass(slots=True)
@@ -89,7 +74,7 @@ def encoding(path: Path, size_px: tuple[int, int], frames_per_s: float) -> Itera
     Raises:
         InputError: PyAV is missing or has no codec, or the suffix is not supported.
     """
-    form = require_encoder(path)
+    form = video_format(path)
     import av
 
     name = next((name for name in _CODECS if _can_write(name)), None)

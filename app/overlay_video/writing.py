@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from app.overlay_video.encoding import encoding, require_encoder
+from app.overlay_video.encoding import encoding
 from app.overlay_video.panels import Panels
 from app.recorded_view import RecordedView
 from app.seen_returns import frame_blocks
 from app.whole_file import whole_path
 from calib_core.errors import InputError, MessageError, RecordingError
 from calib_core.measurements import NS_PER_S, TimeNs
+from calib_core.recordings import LeftOut, video_format
 
 __all__ = ["OverlayOptions", "WrittenOverlay", "write_overlay"]
 
@@ -55,13 +56,6 @@ class WrittenOverlay:
     fault: str = ""
 
 
-@dataclass(slots=True)
-class _Skipped:
-    other_size: int = 0
-    unreadable: int = 0
-    fault: str = ""
-
-
 def write_overlay(
     view: RecordedView,
     path: Path,
@@ -81,7 +75,7 @@ def write_overlay(
         InputError: PyAV is missing, the suffix is not supported, or the file cannot be written.
         RecordingError: no frame can be read.
     """
-    require_encoder(path)
+    video_format(path)
     try:
         with whole_path(path) as part:
             return _write(view, part, options, progress)
@@ -97,7 +91,7 @@ def _write(
     panels = Panels(view, options.titles, trail_scans=options.trail_scans, size_px=size_px)
     duration_s = float(times[-1] - times[0]) / NS_PER_S
     rate = (len(times) - 1) / duration_s if duration_s > 0 else 1.0
-    skipped, count, last = _Skipped(), 0, TimeNs(int(times[0]))
+    skipped, count, last = LeftOut(), 0, TimeNs(int(times[0]))
     with encoding(path, panels.video_size_px, rate) as encoder:
         for time, picture in _pictures(view, panels, skipped, size_px, options, progress):
             encoder.add(panels.compose(picture, time), time)
@@ -117,7 +111,7 @@ def _write(
 def _pictures(
     view: RecordedView,
     panels: Panels,
-    skipped: _Skipped,
+    skipped: LeftOut,
     size_px: tuple[int, int],
     options: OverlayOptions,
     progress: Callable[[int, int], None] | None,

@@ -1,9 +1,8 @@
 """The report: one HTML file without scripts, fonts or links, the same bytes for the same inputs."""
 
 import base64
-from functools import cache
-from pathlib import Path
 
+from app.report.html_file import html_file
 from app.report.markup import Child, Markup, tag
 from app.report.residual_rows import rows_at_clicks, rows_of_pairs
 from app.report.sections.acc import acc
@@ -20,7 +19,6 @@ from calib_core.results import Calibration
 
 __all__ = ["report_html"]
 
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 _PICTURE_WIDTH = 320.0
 
 
@@ -34,15 +32,7 @@ def report_html(subject: ReportSubject) -> str:
         tag("main", *_sections(subject)),
         tag("footer", _foot()),
     )
-    head = tag(
-        "head",
-        tag("meta", charset="utf-8"),
-        tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
-        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        tag("title", title),
-        Markup(f"<style>{_style()}</style>"),
-    )
-    return f"<!DOCTYPE html>\n{tag('html', head, body, lang='en', xmlns='http://www.w3.org/1999/xhtml').text}\n"
+    return html_file(title, body)
 
 
 def _sections(subject: ReportSubject) -> list[Child]:
@@ -102,11 +92,6 @@ def _definitions(subject: ReportSubject) -> Markup | None:
         f'<image id="picture" width="{_PICTURE_WIDTH:g}" height="{height:.2f}" preserveAspectRatio="none" href="{data}"/>'
     )
     return tag("svg", tag("defs", frame), class_="definitions", aria_hidden="true", xmlns="http://www.w3.org/2000/svg")
-
-
-@cache
-def _style() -> str:
-    return Path(__file__).with_name("report.css").read_text(encoding="utf-8")
 
 
 def _foot() -> str:

@@ -5,6 +5,7 @@ Nothing here deals with files, threads or screens.
 
 from app.session.applying import EventError, apply
 from app.session.box_tracks import BoxEdges, BoxKeyframe, BoxTrack
+from app.session.chosen_intrinsics import ChosenIntrinsics
 from app.session.events import (
     AssumptionsConfirmed,
     BoxDrawn,
@@ -22,6 +23,7 @@ from app.session.events import (
     ClicksImported,
     ColumnsMapped,
     Event,
+    IntrinsicsChosen,
     OptionsChanged,
     OptionsEdited,
     PlacementDismissed,
@@ -49,6 +51,7 @@ __all__ = [
     "BoxRemoved",
     "BoxTrack",
     "BoxesLoaded",
+    "ChosenIntrinsics",
     "Cleared",
     "ClickExcluded",
     "ClickMoved",
@@ -60,6 +63,7 @@ __all__ = [
     "Event",
     "EventError",
     "History",
+    "IntrinsicsChosen",
     "OptionsChanged",
     "OptionsEdited",
     "Outcome",

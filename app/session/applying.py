@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 from app.option_changes import changed_options
 from app.session.box_applying import BoxEvent, apply_to_boxes
-from app.session.event_checks import EventError, require_frame, require_pixel
+from app.session.event_checks import EventError, require_camera, require_frame, require_pixel
 from app.session.events import (
     AssumptionsConfirmed,
     Cleared,
@@ -18,6 +18,7 @@ from app.session.events import (
     ClicksImported,
     ColumnsMapped,
     Event,
+    IntrinsicsChosen,
     OptionsChanged,
     OptionsEdited,
     PlacementDismissed,
@@ -53,7 +54,7 @@ def apply(session: Session, event: Event, facts: RecordingFacts) -> Session:
         aside = _aside(event, session, facts)
         return session if aside == session else aside
     changed = _changed(event, session, facts)
-    if changed.clicks == session.clicks and changed.options == session.options:
+    if (changed.clicks, changed.options, changed.intrinsics) == (session.clicks, session.options, session.intrinsics):
         return session
     return replace(changed, revision=session.revision + 1)
 
@@ -167,6 +168,13 @@ def _options_changed(event: OptionsChanged, session: Session, facts: RecordingFa
 @_changed.register
 def _options_edited(event: OptionsEdited, session: Session, facts: RecordingFacts) -> Session:
     return replace(session, options=changed_options(session.options, event.changes))
+
+
+@_changed.register
+def _intrinsics_chosen(event: IntrinsicsChosen, session: Session, facts: RecordingFacts) -> Session:
+    if event.intrinsics is not None:
+        require_camera(event.intrinsics, facts)
+    return replace(session, intrinsics=event.intrinsics)
 
 
 @_changed.register

@@ -2,12 +2,13 @@
 
 import math
 
+from app.session.chosen_intrinsics import ChosenIntrinsics
 from app.session.click_stamps import nearest_frame
 from app.session.state import RecordingFacts
 from calib_core.errors import CalibrationError
 from calib_core.measurements import TimeNs, time_parts
 
-__all__ = ["EventError", "require_frame", "require_pixel", "seconds"]
+__all__ = ["EventError", "require_camera", "require_frame", "require_pixel", "seconds"]
 
 
 class EventError(CalibrationError):
@@ -45,6 +46,23 @@ def require_pixel(u_px: float, v_px: float, facts: RecordingFacts) -> None:
     if not (math.isfinite(u_px) and math.isfinite(v_px) and facts.has_pixel(u_px, v_px)):
         raise EventError(
             f"({u_px:.1f}, {v_px:.1f}) px is outside the frame of {facts.width_px} x {facts.height_px} px; click inside it"
+        )
+
+
+def require_camera(intrinsics: ChosenIntrinsics, facts: RecordingFacts) -> None:
+    """Check that intrinsics are a camera's, for frames of this size.
+
+    Raises:
+        EventError: they are not.
+    """
+    try:
+        camera = intrinsics.camera
+    except ValueError as error:
+        raise EventError(f"the intrinsics cannot be used: {error}; calibrate the lens again") from None
+    if (camera.width_px, camera.height_px) != (facts.width_px, facts.height_px):
+        raise EventError(
+            f"the intrinsics are for pictures of {camera.width_px} x {camera.height_px} px, but the frames have "
+            f"{facts.width_px} x {facts.height_px}; calibrate with pictures of that size"
         )
 
 

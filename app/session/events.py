@@ -5,6 +5,7 @@ from typing import TypeAlias
 
 from app.option_changes import OptionChange
 from app.session.box_tracks import BoxEdges, BoxTrack
+from app.session.chosen_intrinsics import ChosenIntrinsics
 from app.session.state import Outcome
 from calib_core.measurements import ChosenReturn, Mark, ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions
@@ -27,6 +28,7 @@ __all__ = [
     "ClicksImported",
     "ColumnsMapped",
     "Event",
+    "IntrinsicsChosen",
     "OptionsChanged",
     "OptionsEdited",
     "PlacementDismissed",
@@ -225,6 +227,13 @@ class ColumnsMapped:
 
 
 @dataclass(frozen=True, slots=True)
+class IntrinsicsChosen:
+    """Intrinsics were chosen for the session; None goes back to those that it was opened with."""
+
+    intrinsics: ChosenIntrinsics | None
+
+
+@dataclass(frozen=True, slots=True)
 class AssumptionsConfirmed:
     """The user confirmed assumptions about the recording, by their texts. Not undone with clicks."""
 
@@ -267,6 +276,7 @@ Event: TypeAlias = (
     | OptionsEdited
     | Cleared
     | ClicksImported
+    | IntrinsicsChosen
     | BoxDrawn
     | BoxMoved
     | BoxHidden

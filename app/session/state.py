@@ -6,6 +6,7 @@ from typing import TypeAlias
 import numpy as np
 
 from app.session.box_tracks import BoxTrack
+from app.session.chosen_intrinsics import ChosenIntrinsics
 from calib_core.arrays import Indices, TimesNs, frozen_array
 from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions
@@ -118,6 +119,7 @@ class Session:
         acknowledged: codes of the warnings that the user has read.
         boxes: around moving objects, one track per object, in the order in which they were drawn.
         empty_frames: stamps of the frames that a file of boxes says are without any, ascending.
+        intrinsics: chosen for this session; None to use those that it was opened with.
         next_box: number of the next track's id ("b7"); it only increases.
     """
 
@@ -135,6 +137,7 @@ class Session:
     boxes: tuple[BoxTrack, ...] = ()
     empty_frames: tuple[TimeNs, ...] = ()
     next_box: int = 1
+    intrinsics: ChosenIntrinsics | None = None
 
     @property
     def is_solved(self) -> bool:

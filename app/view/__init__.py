@@ -7,6 +7,7 @@ from app.view.following import FollowState, Pace, advice_words, pace_words
 from app.view.model import Advice, ClickRow, ClickState, Ellipse, Figure, Level, Stage, View
 from app.view.reference import Reference, shown_calibration
 from app.view.summary import summary_lines
+from app.view.verdict_row import is_dismissed
 from app.view.wording import sentence, warning_in_sentences
 
 __all__ = [
@@ -26,6 +27,7 @@ __all__ = [
     "View",
     "advice_words",
     "click_candidates",
+    "is_dismissed",
     "pace_words",
     "pair_of_click",
     "sentence",

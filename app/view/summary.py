@@ -5,7 +5,7 @@ from dataclasses import replace
 from app.view.figures import assumed_figures, metric_figures, pose_figures
 from app.view.model import Figure
 from app.view.number_format import plain
-from app.view.systematic_errors import uncertainty_sentences
+from app.view.systematic_errors import refined_sentences, uncertainty_sentences
 from app.view.wording import sentence
 from calib_core.diagnostics.consequence import by_consequence
 from calib_core.results import Calibration
@@ -33,6 +33,7 @@ def summary_lines(calibration: Calibration) -> tuple[str, ...]:
         parts = ", ".join(f"{figure.label} {figure.value} {figure.unit}" for figure in assumed)
         lines.insert(len(pose), f"assumed, because this radar measures no elevation: {parts}")
     lines += [f"uncertainty: {line}" for line in uncertainty_sentences(calibration)]
+    lines += [f"intrinsics: {line}" for line in refined_sentences(calibration)]
     lines += [
         f"disagrees: {pair.id}: {plain(pair.distance_px)} px from its radar position"
         for pair in calibration.pairs

@@ -9,7 +9,7 @@ from calib_core.error_words import error_words
 from calib_core.results import Calibration, SystematicErrorResult
 from calib_core.systematic_errors import is_determined
 
-__all__ = ["systematic_errors", "uncertainty_sentences"]
+__all__ = ["refined_sentences", "systematic_errors", "uncertainty_sentences"]
 
 _SHOWN_SHARE = 0.03
 _DOMINANT_SHARE = 1.0 / 3.0
@@ -20,13 +20,35 @@ def uncertainty_sentences(calibration: Calibration) -> tuple[str, ...]:
     return tuple(sentence(one.sentence) for one in calibration.dominant_errors())
 
 
+def refined_sentences(calibration: Calibration) -> tuple[str, ...]:
+    """Say by how much refining changed the intrinsics; empty if they were not refined."""
+    lens = ("lens_", "principal_", "focal_length", "distortion")
+    refined = [
+        one
+        for one in calibration.systematic_errors
+        if one.estimated
+        and one.name.startswith(lens)
+        and (is_determined(one) or abs(one.value) >= one.prior_sigma > 0.0)
+    ]
+    if calibration.given_camera is None:
+        return ()
+    parts = []
+    for one in refined:
+        words = error_words(one.name)
+        amount = with_sigma(words.factor * one.value, words.factor * one.sigma)
+        parts.append(f"{words.label} by {amount} {words.unit}".rstrip())
+    changed = "; ".join(parts) or "the pairs say nothing about them"
+    return (sentence(f"the intrinsics were refined with the pose: {changed}"),)
+
+
 def systematic_errors(calibration: Calibration) -> SystematicErrorTable:
     """Return the table: errors that the pairs determine or that matter, the largest share first."""
     groups = sorted(_groups(calibration.errors_of_firm), key=_largest_share, reverse=True)
     shown = [group for group in groups if _largest_share(group) >= _SHOWN_SHARE or is_determined(group[0])]
     rest = len(groups) - len(shown)
     note = f"{rest} more: the pairs do not determine them, and each has less than 3 % of the variance." if rest else ""
-    return SystematicErrorTable(tuple(map(_row, shown)), note, uncertainty_sentences(calibration))
+    sentences = (*uncertainty_sentences(calibration), *refined_sentences(calibration))
+    return SystematicErrorTable(tuple(map(_row, shown)), note, sentences)
 
 
 def _groups(errors: Sequence[SystematicErrorResult]) -> list[list[SystematicErrorResult]]:

@@ -14,7 +14,7 @@ from calib_core.measurements import Unsolvable
 from calib_core.results import Calibration
 from calib_core.verdict import ALL_CLICKED, DONE, Verdict, verdict_on
 
-__all__ = ["placements_left", "shown_verdict", "verdict_row"]
+__all__ = ["is_dismissed", "placements_left", "shown_verdict", "verdict_row"]
 
 _SAME_M = 0.5
 _OF_PAIRS = ("doubtful-pair", "agreeing-outliers", "many-outliers")
@@ -30,10 +30,11 @@ def placements_left(session: Session, placements: Sequence[Placement] | None) ->
         return None
     times = [click.image_time for click in session.clicks if click.counts or click.excluded]
     clicked = (any(one.start <= time <= one.end for time in times) for one in placements)
-    return sum(not (done or _is_dismissed(one, session)) for one, done in zip(placements, clicked, strict=True))
+    return sum(not (done or is_dismissed(one, session)) for one, done in zip(placements, clicked, strict=True))
 
 
-def _is_dismissed(placement: Placement, session: Session) -> bool:
+def is_dismissed(placement: Placement, session: Session) -> bool:
+    """Return whether the user said that a placement is not the reflector."""
     at = [one for one in session.dismissed if placement.start <= one.time <= placement.end]
     return any(float(np.linalg.norm(placement.position_radar_m - one.position_m)) < _SAME_M for one in at)
 

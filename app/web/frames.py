@@ -5,22 +5,25 @@ from collections import OrderedDict
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
 
+from app.web.rectified_frames import FrameRectifier
+from calib_core.camera import Camera
 from calib_core.recordings import Recording
 
 __all__ = ["Frame", "FrameStore", "Size"]
 
-Size = Literal["full", "half", "thumbnail"]
+Size = Literal["full", "half", "thumbnail", "rectified"]
 
 HALF_ABOVE_PX = 2_500_000
 """Pictures with more pixels than this are sent at half size while playing [px]."""
 THUMBNAIL_WIDTH_PX = 480
 BUDGET_BYTES = 16 << 20
 """Enough for the frames read ahead and those just shown: the recording's file, which the system caches, has all the others."""
-_PROXY_QUALITY, _THUMBNAIL_QUALITY = 85, 80
+_PROXY_QUALITY, _THUMBNAIL_QUALITY, _RECTIFIED_QUALITY = 85, 80, 92
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +50,15 @@ class Frame:
 class FrameStore:
     """Frames by index and size, cached by last use; concurrent requests share one read. Runs on one event loop."""
 
-    def __init__(self, source: Recording, count: int, executor: Executor, *, budget_bytes: int = BUDGET_BYTES) -> None:
+    def __init__(
+        self,
+        source: Recording,
+        count: int,
+        executor: Executor,
+        *,
+        budget_bytes: int = BUDGET_BYTES,
+        camera: Callable[[], Camera | None] = lambda: None,
+    ) -> None:
         self._source = source
         self._count = count
         self._executor = executor
@@ -56,6 +67,9 @@ class FrameStore:
         self._kept_bytes = 0
         self._coming: dict[tuple[int, Size], asyncio.Task[Frame]] = {}
         self._closed = False
+        self._camera = camera
+        self._rectified_with: Camera | None = None
+        self._rectifier = FrameRectifier()
 
     def __len__(self) -> int:
         return self._count
@@ -79,6 +93,8 @@ class FrameStore:
             raise IndexError("the server is stopping")
         if not 0 <= index < self._count:
             raise IndexError(f"frame {index} of {self._count}")
+        if size == "rectified":
+            self._forget_others(self._camera())
         key = (index, size)
         if key in self._kept:
             self._kept.move_to_end(key)
@@ -108,12 +124,32 @@ class FrameStore:
 
     async def _make(self, key: tuple[int, Size]) -> Frame:
         index, size = key
+        make = partial(self._rectified, self._camera()) if size == "rectified" else partial(_MAKERS[size], self._source)
         try:
-            frame = await asyncio.get_running_loop().run_in_executor(self._executor, _MAKERS[size], self._source, index)
+            frame = await asyncio.get_running_loop().run_in_executor(self._executor, make, index)
         finally:
             self._coming.pop(key, None)
         self._keep(key, frame)
         return frame
+
+    def _rectified(self, camera: Camera | None, index: int) -> Frame:
+        """Make a rectified frame.
+
+        Raises:
+            InputError: there are no intrinsics, or they cannot rectify it.
+        """
+        full = _full(self._source, index)
+        return _encoded(full, self._rectifier.rectified(_decoded(full.data, 1), camera), 1.0, _RECTIFIED_QUALITY)
+
+    def _forget_others(self, camera: Camera | None) -> None:
+        """Forget the frames that were rectified with another camera."""
+        if camera is self._rectified_with:
+            return
+        self._rectified_with = camera
+        for table in (self._kept, self._coming):
+            for key in [key for key in table if key[1] == "rectified"]:
+                dropped = table.pop(key)
+                self._kept_bytes -= len(dropped.data) if isinstance(dropped, Frame) else 0
 
     def _keep(self, key: tuple[int, Size], frame: Frame) -> None:
         self._kept[key] = frame
@@ -180,4 +216,4 @@ def _encoded(full: Frame, pixels: np.ndarray, scale: float, quality: int) -> Fra
     return Frame(full.index, data.tobytes(), "jpeg", full.width_px, full.height_px, scale)
 
 
-_MAKERS: dict[Size, Callable[[Recording, int], Frame]] = {"full": _full, "half": _half, "thumbnail": _thumbnail}
+_MAKERS: dict[str, Callable[[Recording, int], Frame]] = {"full": _full, "half": _half, "thumbnail": _thumbnail}

@@ -29,6 +29,7 @@ from benchmarks.accuracy.defects import (
     several_topics,
     shared_errors,
     two_reflectors,
+    wrong_lens,
 )
 from benchmarks.accuracy.fresh_seeds import fresh_seeds, last_fresh_seeds
 from benchmarks.accuracy.keeping import Keeper, digest_of_sources
@@ -49,6 +50,7 @@ TABLES: dict[str, tuple[Row, ...]] = {
     "verdict": verdicts.ROWS,
     "shared": shared_errors.ROWS,
     "clean": shared_errors.CLEAN_ROWS,
+    "lens": wrong_lens.ROWS,
     "flat": flat_radars.ROWS,
     "adversarial": adversarial.ROWS,
     "mirrored": mirrored.ROWS,
@@ -67,6 +69,7 @@ _SECTIONS: dict[str, tuple[Callable[[Kept], Section], ...]] = {
     "verdict": (verdicts.section,),
     "shared": (shared_errors.section,),
     "clean": (shared_errors.clean_section,),
+    "lens": (wrong_lens.section,),
     "adversarial": (adversarial.section,),
     "wolf": (crying_wolf.section,),
     "flat": (flat_radars.section,),

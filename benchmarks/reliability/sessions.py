@@ -97,10 +97,12 @@ def _flipped(made: Made, folder: Path, bits: "range | list[int]", *, name: str, 
 def _outcome(folder: Path, journal: bytes, snapshot: bytes | None, confirmed: History) -> str:
     """Return what an opening makes of two files."""
     folder.mkdir(exist_ok=True)
-    (folder / JOURNAL).write_bytes(journal)
-    (folder / SNAPSHOT).unlink(missing_ok=True)
-    if snapshot is not None:
-        (folder / SNAPSHOT).write_bytes(snapshot)
+    for name, data in ((JOURNAL, journal), (SNAPSHOT, snapshot)):
+        (folder / name).unlink(
+            missing_ok=True
+        )  # a file that is cut and written again is flushed to the disk, which takes long
+        if data is not None:
+            (folder / name).write_bytes(data)
     guarded = GuardedFolder(folder)
     try:
         found = read_contents(guarded, FACTS)

@@ -5,6 +5,7 @@ import tempfile
 from pathlib import Path
 
 from app.resources import sample_folder
+from benchmarks.speed.board_search import measure_board_search
 from benchmarks.speed.channel import measure_channel
 from benchmarks.speed.paging import measure_page
 from benchmarks.speed.recordings import measure_recordings
@@ -26,6 +27,7 @@ def main() -> int:
             measure_serving(Path(scratch)),
             measure_channel(),
             measure_solving(),
+            measure_board_search(),
             measure_starting(sample_folder() / "rooftop"),
             measure_recordings(Path(scratch), large=large),
             measure_showing(Path(scratch)),

@@ -78,9 +78,10 @@ class _Design:
 
 def _design(used: Sequence[Pair], calibration: Calibration) -> _Design:
     """Invert the information of the used pairs and of all priors, with the estimated noise."""
-    pose, camera = calibration.camera_from_radar, calibration.camera
+    pose, camera = calibration.camera_from_radar, calibration.prior_camera
     measurements = pair_measurements(used, camera, calibration.options).scaled(calibration.noise_scale)
-    errors = SystematicErrors((*measurements.errors.estimated, *measurements.errors.widening))
+    shared = measurements.errors
+    errors = SystematicErrors((*shared.estimated, *shared.widening), lens=shared.lens)
     planes = MeasurementPlanes(
         measurements.pixels_px.T,
         measurements.sigma_px,

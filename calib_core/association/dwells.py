@@ -12,6 +12,7 @@ from calib_core.arrays import Flags, Indices, Points3, TimesNs, Values, Vector3
 from calib_core.association.alternatives import first_rows, return_keys
 from calib_core.association.cluster_scale import cluster_scale
 from calib_core.association.clustering import CLUSTER_SCALE
+from calib_core.association.dwell_ends import firm_span
 from calib_core.association.gating import static_returns
 from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 from calib_core.options import GatingOptions
@@ -234,8 +235,21 @@ def _span(grid: _Grid, members: Indices, within_s: float) -> tuple[int, int] | N
     return int(shown[first]), int(shown[last])
 
 
+def _without_hands(grid: _Grid, members: Indices, span: tuple[int, int]) -> tuple[int, int]:
+    """Leave out the scans at both ends of a span in which the reflector was held."""
+    strongest_db = np.full(span[1] - span[0] + 1, -np.inf)
+    rows = members[
+        (grid.scan[members] >= span[0]) & (grid.scan[members] <= span[1]) & np.isfinite(grid.snr_db[members])
+    ]
+    np.maximum.at(strongest_db, grid.scan[rows] - span[0], grid.snr_db[rows])
+    strongest_db[np.isinf(strongest_db)] = np.nan
+    firm = firm_span(grid.times_s[span[0] : span[1] + 1], strongest_db)
+    return span[0] + firm.first, span[0] + firm.last
+
+
 def _checked_dwell(grid: _Grid, members: Indices, span: tuple[int, int]) -> Dwell | None:
     """Measure the presence inside and outside a dwell's span; None if the dwell is clutter or chance."""
+    span = _without_hands(grid, members, span)
     shown = np.unique(grid.scan[members])
     inside = (shown >= span[0]) & (shown <= span[1])
     presence = float(inside.sum()) / (span[1] - span[0] + 1)

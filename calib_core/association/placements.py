@@ -6,7 +6,7 @@ what is much weaker is the person waiting next to it. Two reflectors that stand 
 and are moved in turn. The timeline shows the placements, and the N and P keys step through them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +17,10 @@ from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 from calib_core.options import GatingOptions
 from calib_core.radar import direction_cosines
 
-__all__ = ["Placement", "find_placements"]
+__all__ = ["MOST_STATIC_RETURNS", "Placement", "find_placements", "in_stretches"]
+
+MOST_STATIC_RETURNS = 1_000_000
+"""Limit of one stretch: more than an hour of 25 static returns in each of 10 scans a second; searching it takes about 200 MB."""
 
 _SHORTEST_OVERLAP_S = 0.5
 _WEAKER_DB = 10.0  # below the typical placement: a person standing still, or a door that moved
@@ -70,6 +73,21 @@ def find_placements(scans: RadarScans, options: GatingOptions, *, min_dwell_s: f
     kept = [_likeliest(dwell, dwells) for dwell in (*strong, *_at_once(dwells, strong, typical_db))]
     all_of_them = _without_breaks(kept)
     return _good([_placement(dwell, typical_db) for dwell in sorted(all_of_them, key=lambda dwell: dwell.start)])
+
+
+def in_stretches(static: Iterable[RadarScans]) -> Iterator[RadarScans]:
+    """Join the windows of a recording to search them together; in several pieces if there are too many returns.
+
+    Args:
+        static: the static returns of each window, in order of time.
+    """
+    pieces: list[RadarScans] = []
+    for window in static:
+        pieces.append(window)
+        if sum(len(piece.points_radar_m) for piece in pieces) > MOST_STATIC_RETURNS:
+            yield RadarScans.joined(pieces)
+            pieces = []
+    yield RadarScans.joined(pieces)
 
 
 def _one_at_a_time(dwells: Sequence[Dwell]) -> list[Dwell]:

@@ -7,21 +7,18 @@ import numpy as np
 from calib_core.arrays import Matrix33
 from calib_core.baselines.judging import judged
 from calib_core.camera import Camera
-from calib_core.geometry import RigidTransform, rotation_from_euler
+from calib_core.geometry import OPTICAL_FROM_LINK, RigidTransform, rotation_from_euler
 from calib_core.measurements import Pair, Unpaired, Unsolvable
 from calib_core.options import CalibrationOptions, MountingOptions
 from calib_core.results import Calibration
 
 __all__ = ["calibrate_by_mounting", "mounting_rotation"]
 
-_OPTICAL_FROM_FORWARD = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
-"""Of a camera that looks in the radar's direction: right, down, forward in (forward, left, up)."""
-
 
 def mounting_rotation(options: MountingOptions) -> Matrix33:
     """Return the rotation of camera_from_radar of a camera that is mounted at these angles."""
     angles = np.deg2rad([options.roll_deg, options.pitch_deg, options.yaw_deg])
-    return np.asarray(_OPTICAL_FROM_FORWARD @ rotation_from_euler(*angles).T)
+    return np.asarray(OPTICAL_FROM_LINK @ rotation_from_euler(*angles).T)
 
 
 def calibrate_by_mounting(

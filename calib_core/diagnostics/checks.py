@@ -12,6 +12,7 @@ from calib_core.diagnostics.intrinsics import intrinsics
 from calib_core.diagnostics.pairs import ambiguous_candidates, contradicted_pairs, decisive_pair, listed
 from calib_core.diagnostics.pose import camera_position, two_poses
 from calib_core.diagnostics.posterior import agreeing_outliers, pivotal_pair, possible_poses
+from calib_core.diagnostics.refined_lens import lens_or_scale, refined_too_far
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.diagnostics.systematic import angle_scale, clicks_off_centre
 from calib_core.plausibility import PIXELS_SUSPECTED, implausible_input
@@ -42,7 +43,8 @@ def warnings_of(fit: SolvedFit) -> tuple[DataWarning, ...]:
         _flat_radar,
         _many_outliers,
         _few_inliers,
-        intrinsics,
+        _wrong_lens,
+        lens_or_scale,
         angle_scale,
         clicks_off_centre,
         _noise_excess,
@@ -64,6 +66,11 @@ def warnings_of(fit: SolvedFit) -> tuple[DataWarning, ...]:
 def _other_poses(fit: SolvedFit) -> list[DataWarning]:
     """Warn of a second pose, found from other starts or among the samples of the posterior."""
     return two_poses(fit) or possible_poses(fit)
+
+
+def _wrong_lens(fit: SolvedFit) -> list[DataWarning]:
+    """Warn of given intrinsics that the residuals contradict, or that refining had to change beyond belief."""
+    return intrinsics(fit) or refined_too_far(fit)
 
 
 def _flat_radar(fit: SolvedFit) -> list[DataWarning]:
@@ -113,13 +120,18 @@ def _noise_excess(fit: SolvedFit) -> list[DataWarning]:
 def _smooth_angle_errors(fit: SolvedFit) -> list[DataWarning]:
     if fit.uncertainty.growth < _NOTABLE_GROWTH or fit.measurements.flat:
         return []
+    lens = ""
+    if fit.measurements.camera.covariance is not None and not fit.options.refining.intrinsics:
+        lens = (
+            "a lens as uncertain as its covariance says can look the same: first refine the intrinsics with the pose; "
+        )
     return [
         DataWarning(
             "smooth-angle-errors",
             "neighbouring placements have similar residuals: the radar's angles are off by an amount that changes slowly with "
             f"direction; this makes the stated rotation uncertainty {fit.uncertainty.growth:.1f} times larger",
-            "more placements will not average this out: correct the radar's angles by radar_angle_map of the calibration, or "
-            "calibrate the radar; the stated uncertainty includes the error",
+            f"{lens}more placements will not average this out: correct the radar's angles by radar_angle_map of the calibration, "
+            "or calibrate the radar; the stated uncertainty includes the error",
         )
     ]
 

@@ -44,9 +44,11 @@ _CODES: dict[Consequence, tuple[str, ...]] = {
         "uncertain-association",
         "smooth-angle-errors",
         "angle-scale",
+        "lens-or-radar-scale",
         "clicks-off-centre",
         "handedness-assumed",
         "beside-board",
+        "nobody-confirmed",
     ),
 }
 """The codes of each consequence, the gravest first."""

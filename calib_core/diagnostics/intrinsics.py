@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Values
+from calib_core.arrays import Flags, Values
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.estimation.prior_rows import prior_rows
 from calib_core.results import DataWarning
@@ -38,22 +38,29 @@ class LensError:
     Attributes:
         amount: to be added to the given value; a share of the focal length, or a radial coefficient.
         sigma: its standard deviation.
-        chance: probability of an amount as large if the intrinsics were right (p-value).
+        chance: probability of an amount as large if the intrinsics were as right as their covariance says (p-value).
+        allowed: standard deviation of the amount that this covariance alone would make; 0 if they have none.
     """
 
     amount: float
     sigma: float
     chance: float
+    allowed: float = 0.0
 
 
 def intrinsics(fit: SolvedFit) -> list[DataWarning]:
-    """Warn of the focal length or the distortion, whichever explains more of the residuals."""
+    """Warn of the focal length or the distortion, whichever explains more of the residuals.
+
+    The given intrinsics are tested, not refined ones; who refines those that come without a covariance expects them wrong.
+    """
     if fit.inliers.sum() < _LEAST_PAIRS or fit.measurements.flat:
+        return []
+    if fit.options.refining.intrinsics and fit.measurements.camera.covariance is None:
         return []
     focal, radial = lens_errors(fit)
     if min(focal.chance, radial.chance) >= _LEVEL:
         return []
-    what = _focal_text(focal) if focal.chance <= radial.chance else _radial_text(fit, radial)
+    what = _focal_text(fit, focal) if focal.chance <= radial.chance else _radial_text(fit, radial)
     return [
         DataWarning(
             "intrinsics-suspected",
@@ -64,11 +71,17 @@ def intrinsics(fit: SolvedFit) -> list[DataWarning]:
     ]
 
 
-def _focal_text(focal: LensError) -> str:
+def _focal_text(fit: SolvedFit, focal: LensError) -> str:
     return (
         f"residuals grow with the distance from the picture's centre: the given focal length seems "
         f"{100 * abs(focal.amount):.1f} ± {100 * focal.sigma:.1f} % too {'short' if focal.amount > 0 else 'long'}"
+        f"{_said(fit, 100 * focal.allowed, '%')}"
     )
+
+
+def _said(fit: SolvedFit, sigma: float, unit: str) -> str:
+    """Say how far off the intrinsics' own covariance lets it be, if they have one."""
+    return f"; its calibration said ± {sigma:.2g} {unit}" if fit.measurements.camera.covariance is not None else ""
 
 
 def _radial_text(fit: SolvedFit, radial: LensError) -> str:
@@ -78,25 +91,59 @@ def _radial_text(fit: SolvedFit, radial: LensError) -> str:
     return (
         "residuals grow with the cube of the distance from the picture's centre: the given lens distortion seems off by "
         f"{abs(radial.amount) * reach_px:.0f} ± {radial.sigma * reach_px:.0f} px at the outermost click"
+        f"{_said(fit, radial.allowed * reach_px, 'px')}"
     )
 
 
 def lens_errors(fit: SolvedFit) -> tuple[LensError, LensError]:
-    """Estimate the errors of the focal length and of the radial distortion, each as if the other were right."""
+    """Estimate the errors of the given focal length and radial distortion, each as if the other were right."""
     refined = fit.refined
     offset_px, share = _offsets(fit)
     root = np.sqrt(refined.weights)[:, None]
+    jacobian, residual, lens = _as_if_given(fit)
     prior_residual, prior_jacobian = prior_rows(refined.measurements, refined.camera_from_radar)
+    kept = _not_of_lens(fit)
+    prior_residual, prior_jacobian = prior_residual[kept[3:]], prior_jacobian[kept[3:]][:, kept]
     moves_px = np.stack([offset_px, offset_px * share[:, None]], axis=2)
     gains = ((refined.model.whitening @ moves_px) * root[:, :, None]).reshape(-1, 2)
     unknowns = prior_jacobian.shape[1]
-    fitted = np.concatenate([(refined.model.jacobian * root[:, :, None]).reshape(-1, unknowns), prior_jacobian])
-    residual = np.concatenate([(refined.model.residual * root).reshape(-1), prior_residual])
+    fitted = np.concatenate([(jacobian * root[:, :, None]).reshape(-1, unknowns), prior_jacobian])
+    residual = np.concatenate([(residual * root).reshape(-1), prior_residual])
     explained, _ = np.linalg.qr(fitted)
     gains = np.concatenate([gains, np.zeros((len(prior_residual), 2))])
     gains = gains - explained @ (explained.T @ gains)
-    focal, radial = (_lens_error(gain, residual, refined.degrees_of_freedom) for gain in gains.T)
+    moves = np.zeros((len(gains), lens.shape[2]))
+    moves[: 2 * len(lens)] = (lens * root[:, :, None]).reshape(2 * len(lens), -1)
+    focal, radial = (_lens_error(gain, residual, moves, refined.degrees_of_freedom) for gain in gains.T)
     return focal, radial
+
+
+def _not_of_lens(fit: SolvedFit) -> Flags:
+    """Return which unknowns (6 + k,) are not errors of refined intrinsics."""
+    errors = fit.refined.measurements.errors
+    kept = np.ones(6 + len(errors), dtype=np.bool_)
+    kept[6 + errors.refined.start : 6 + errors.refined.stop] = False
+    return kept
+
+
+def _as_if_given(fit: SolvedFit) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return Jacobian (n, 2, u) and residual (n, 2) of the fit with the given intrinsics, whitened, and what the lens may do.
+
+    The last (n, 2, r) is how a standard deviation along each axis of the intrinsics' covariance moves the clicks.
+    """
+    refined = fit.refined
+    measurements, errors = refined.measurements, refined.measurements.errors
+    kept, jacobian = _not_of_lens(fit), refined.model.jacobian
+    if not kept.all():
+        lens = jacobian[:, :, ~kept]
+        return jacobian[:, :, kept], refined.model.residual + lens @ errors.values[errors.refined], lens
+    along = [one for one in errors.widening if one.of_lens]
+    if not along:
+        return jacobian, refined.model.residual, np.zeros((*jacobian.shape[:2], 0))
+    planes = measurements.measured(refined.rows)
+    columns = planes.columns(measurements.camera, refined.camera_from_radar, along, refined.polar)
+    lens = refined.model.whitening @ np.nan_to_num(columns).transpose(2, 1, 0)
+    return jacobian, refined.model.residual, np.asarray(lens)
 
 
 def _offsets(fit: SolvedFit) -> tuple[np.ndarray, Values]:
@@ -106,8 +153,8 @@ def _offsets(fit: SolvedFit) -> tuple[np.ndarray, Values]:
     return offset_px, np.asarray(((offset_px / matrix_px[[0, 1], [0, 1]]) ** 2).sum(axis=1))
 
 
-def _lens_error(gain: Values, residual: Values, degrees_of_freedom: float) -> LensError:
-    """Evaluate equation (8); with the noise known, nu is infinite."""
+def _lens_error(gain: Values, residual: Values, lens: np.ndarray, degrees_of_freedom: float) -> LensError:
+    """Evaluate equation (8); with the noise known, nu is infinite. What the lens may do (n, r) is added to the variance."""
     information = float(gain @ gain)
     if information <= 0.0:
         return LensError(0.0, float("inf"), 1.0)
@@ -116,7 +163,9 @@ def _lens_error(gain: Values, residual: Values, degrees_of_freedom: float) -> Le
     if degrees_of_freedom > 2.0:
         left = max(degrees_of_freedom - squared, _LEAST_REDUNDANCY * degrees_of_freedom)
         shrink = left / (degrees_of_freedom - 1.0)
-    return LensError(amount, float(np.sqrt(shrink / information)), _chance(squared / shrink, degrees_of_freedom))
+    own, allowed = shrink / information, float((((gain @ lens) / information) ** 2).sum())
+    tested = squared / shrink if not allowed else amount**2 / (own + allowed)
+    return LensError(amount, float(np.sqrt(own)), _chance(tested, degrees_of_freedom), float(np.sqrt(allowed)))
 
 
 def _chance(squared: float, degrees_of_freedom: float) -> float:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.arrays import Values, frozen_array
-from calib_core.geometry import RigidTransform
+from calib_core.geometry import RigidTransform, larger_eigenvalues
 from calib_core.results import Calibration
 
 __all__ = ["MAP_DISTANCES_M", "UncertaintyMap", "pixel_quantile", "uncertainty_map"]
@@ -68,7 +68,7 @@ def uncertainty_map(calibration: Calibration, distance_m: float, *, columns: int
     radar_from_camera: RigidTransform = calibration.camera_from_radar.inverse()
     covariances_px2 = calibration.pixel_covariance(radar_from_camera @ points_camera_m[seen])
     quantile = pixel_quantile(calibration.covariance_quantile)
-    semi_major_px[seen] = np.sqrt(quantile * _largest_eigenvalues(covariances_px2))
+    semi_major_px[seen] = np.sqrt(quantile * larger_eigenvalues(covariances_px2))
     return UncertaintyMap(distance_m, columns_px, rows_px, semi_major_px.reshape(rows, columns))
 
 
@@ -90,9 +90,3 @@ def pixel_quantile(covariance_quantile: float) -> float:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if 6.0 * fdtri(6.0, np.exp(middle), 0.95) > covariance_quantile else (low, middle)
     return max(_CHI2_95_2D, 2.0 * float(fdtri(2.0, np.exp(high), 0.95)))
-
-
-def _largest_eigenvalues(covariances_px2: np.ndarray) -> Values:
-    """Return the larger eigenvalue (n,) of symmetric matrices (n, 2, 2); NaN stays NaN."""
-    first, second = covariances_px2[:, 0, 0], covariances_px2[:, 1, 1]
-    return np.asarray(0.5 * (first + second) + np.hypot(0.5 * (first - second), covariances_px2[:, 0, 1]))

@@ -8,8 +8,9 @@ from calib_core.arrays import Matrix66, Values
 from calib_core.estimation.correlated_angle_errors import pose_spread
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.gnc import normal_equations
+from calib_core.estimation.lens_prior import LensPrior, shared_out
 from calib_core.estimation.prior_rows import prior_rows
-from calib_core.estimation.systematic_errors import SystematicError
+from calib_core.estimation.systematic_errors import SystematicErrors
 from calib_core.options import RadarOptions
 from calib_core.radar_axes import mounting_moves
 from calib_core.results import SystematicErrorResult
@@ -31,6 +32,7 @@ class PoseCovariance:
         condition: condition number of the information of the pairs alone, after scaling each unknown.
         growth: factor by which smooth angle errors of the radar widen the rotation's standard deviation; 1 without them.
         systematic_errors: what each of them contributes.
+        lens: (r, r) covariance of refined intrinsics along the axes of their prior; None if they were not refined.
     """
 
     covariance: Matrix66
@@ -39,6 +41,7 @@ class PoseCovariance:
     condition: float
     growth: float
     systematic_errors: tuple[SystematicErrorResult, ...] = ()
+    lens: np.ndarray | None = None
 
     @property
     def pose_information(self) -> Matrix66:
@@ -71,8 +74,8 @@ def pose_covariance(
     spread = pose_spread(refined, plain) if smooth else None
     covariance = independent if spread is None else _widened(independent, plain, spread)
     growth = float(np.sqrt(np.trace(covariance[3:6, 3:6]) / np.trace(independent[3:6, 3:6])))
-    wide, found = _shared_errors(refined, plain, covariance)
-    pose = covariance[:6, :6] + wide
+    shared = _shared_errors(refined, plain, covariance)
+    pose = covariance[:6, :6] + shared.pose
     if refined.measurements.flat:
         moves = mounting_moves(refined.camera_from_radar, refined.placements_z_m, radar or RadarOptions())
         pose = pose + moves @ moves.T
@@ -84,7 +87,8 @@ def pose_covariance(
         quantile=_quantile(refined.degrees_of_freedom, min(max(from_pairs, 0.0), 1.0)),
         condition=_scaled_condition(plain - prior_information),
         growth=growth,
-        systematic_errors=tuple(_result(one, pose) for one in found),
+        systematic_errors=tuple(_result(one, pose) for one in shared.found),
+        lens=shared.lens,
     )
 
 
@@ -92,17 +96,25 @@ def pose_covariance(
 class _Found:
     """What is known of one error: its value, the standard deviation of that, and the variance (6,) it gives the pose."""
 
-    error: SystematicError
+    name: str
+    prior_sigma: float
     value: float
     sigma: float
     estimated: bool
     variance: Values
 
 
-def _shared_errors(
-    refined: ErrorsInVariablesFit, plain: np.ndarray, covariance: np.ndarray
-) -> tuple[Matrix66, list[_Found]]:
-    """Return what the widening errors add to the pose's covariance (6, 6), and what is known of every error.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Shared:
+    """What the widening errors add to the pose's covariance (6, 6), every error, and the covariance of a refined lens."""
+
+    pose: Matrix66
+    found: list[_Found]
+    lens: np.ndarray | None = None
+
+
+def _shared_errors(refined: ErrorsInVariablesFit, plain: np.ndarray, covariance: np.ndarray) -> _Shared:
+    """Return what the errors that all pairs share do to the pose.
 
     An estimated error's part of the variance is what knowing it exactly would save: with C the covariance, C_pe C_ee^-1 C_ep.
     """
@@ -110,33 +122,95 @@ def _shared_errors(
     variances = np.diag(covariance)[6:]
     found = [
         _Found(
-            error, float(errors.values[k]), float(variances[k] ** 0.5), True, covariance[:6, 6 + k] ** 2 / variances[k]
+            error.name,
+            error.sigma,
+            float(errors.values[k]),
+            float(variances[k] ** 0.5),
+            True,
+            covariance[:6, 6 + k] ** 2 / variances[k],
         )
         for k, error in enumerate(errors.estimated)
+        if not error.of_lens
     ]
     if not errors.widening:
-        return np.zeros((6, 6)), found
+        return _with_refined_lens(_Shared(np.zeros((6, 6)), found), errors, covariance, np.zeros((len(plain), 0)))
     planes = measurements.measured(refined.rows)
     columns = planes.columns(measurements.camera, refined.camera_from_radar, errors.widening, refined.polar)
     columns = np.where(np.isfinite(columns), columns, 0.0)  # of a position that the camera does not see
     whitened = refined.model.whitening @ columns.transpose(2, 1, 0)  # (n, 2, e)
     jacobian, weights = refined.model.jacobian, refined.weights[:, None, None]
     mixed = (np.swapaxes(jacobian, 1, 2) @ (weights * whitened)).sum(axis=0)
-    moves = -np.linalg.solve(plain, mixed)[:6] * np.array([one.sigma for one in errors.widening])
-    values, sigmas = _suggested(refined, whitened, mixed, plain)
-    found += [_Found(error, values[k], sigmas[k], False, moves[:, k] ** 2) for k, error in enumerate(errors.widening)]
-    return np.asarray(moves @ moves.T), found
+    sigma = np.array([one.sigma for one in errors.widening])
+    solved = np.linalg.solve(plain, mixed)
+    moves = -solved[:6] * sigma
+    values, sigmas = _suggested(refined, whitened, mixed, solved)
+    found += [
+        _Found(error.name, error.sigma, values[k], sigmas[k], False, moves[:, k] ** 2)
+        for k, error in enumerate(errors.widening)
+        if not error.of_lens
+    ]
+    lens = np.array([error.of_lens for error in errors.widening])
+    if lens.any():
+        known = _suggested_lens(refined, whitened[:, :, lens], mixed[:, lens], solved[:, lens])
+        found += _of_lens(errors.lens, *known, moves[:, lens], np.eye(int(lens.sum())), estimated=False)
+    return _with_refined_lens(_Shared(np.asarray(moves @ moves.T), found), errors, covariance, solved * sigma)
+
+
+def _with_refined_lens(
+    shared: _Shared, errors: SystematicErrors, covariance: np.ndarray, widening: np.ndarray
+) -> _Shared:
+    """Add what is known of refined intrinsics; `widening` (6 + k, e) is how much the widening errors move all unknowns."""
+    places = errors.refined
+    if places.start == places.stop:
+        return shared
+    rows = slice(6 + places.start, 6 + places.stop)
+    own = covariance[rows, rows]
+    lens = own + widening[rows] @ widening[rows].T
+    found = _of_lens(errors.lens, errors.values[places], lens, covariance[:6, rows], own, estimated=True)
+    return _Shared(shared.pose, shared.found + found, lens)
+
+
+def _of_lens(
+    prior: LensPrior | None,
+    values: Values,
+    covariance: np.ndarray,
+    mixed: np.ndarray,
+    own: np.ndarray,
+    *,
+    estimated: bool,
+) -> list[_Found]:
+    """Say by name what is known of the lens along the r axes of its prior.
+
+    Args:
+        prior: of the lens.
+        values: (r,).
+        covariance: (r, r) of the values.
+        mixed: (6, r) covariance of pose and lens.
+        own: (r, r) the covariance of the lens that belongs to it.
+        estimated: whether it was estimated with the pose.
+    """
+    if prior is None:
+        return []
+    axes, priors = prior.axes, prior.sigma
+    amounts = axes @ values
+    sigmas = np.sqrt(((axes @ covariance) * axes).sum(axis=1))
+    variances = shared_out(mixed @ axes.T, axes @ own @ axes.T)
+    return [
+        _Found(name, float(priors[k]), float(amounts[k]), float(sigmas[k]), estimated, variances[:, k])
+        for k, name in enumerate(prior.names)
+        if priors[k] > 0.0
+    ]
 
 
 def _suggested(
-    refined: ErrorsInVariablesFit, whitened: np.ndarray, mixed: np.ndarray, plain: np.ndarray
+    refined: ErrorsInVariablesFit, whitened: np.ndarray, mixed: np.ndarray, solved: np.ndarray
 ) -> tuple[list[float], list[float]]:
     """Estimate each widening error alone, by one step from the optimum: values and standard deviations, priors included."""
     values, sigmas = [], []
     weighted = whitened * refined.weights[:, None, None]
     squares = (weighted * whitened).sum(axis=(0, 1))
     pulls = (weighted * refined.model.residual[:, :, None]).sum(axis=(0, 1))
-    taken = (mixed * np.linalg.solve(plain, mixed)).sum(axis=0)
+    taken = (mixed * solved).sum(axis=0)
     for k, error in enumerate(refined.measurements.errors.widening):
         information = max(float(squares[k] - taken[k]), 0.0) + error.sigma**-2.0
         values.append(float(pulls[k]) / information)
@@ -144,13 +218,23 @@ def _suggested(
     return values, sigmas
 
 
+def _suggested_lens(
+    refined: ErrorsInVariablesFit, whitened: np.ndarray, mixed: np.ndarray, solved: np.ndarray
+) -> tuple[Values, np.ndarray]:
+    """Estimate the lens along all r axes of its prior together, likewise: values (r,) and their covariance (r, r)."""
+    weighted = (whitened * refined.weights[:, None, None]).reshape(-1, whitened.shape[2])
+    information = weighted.T @ whitened.reshape(weighted.shape) - mixed.T @ solved + np.eye(whitened.shape[2])
+    known = np.linalg.inv(information)
+    return known @ (weighted.T @ refined.model.residual.reshape(-1)), known
+
+
 def _result(found: _Found, pose: Matrix66) -> SystematicErrorResult:
     position, rotation = float(np.trace(pose[:3, :3])), float(np.trace(pose[3:, 3:]))
     return SystematicErrorResult(
-        name=found.error.name,
+        name=found.name,
         value=found.value,
         sigma=found.sigma,
-        prior_sigma=found.error.sigma,
+        prior_sigma=found.prior_sigma,
         estimated=found.estimated,
         position_share=float(found.variance[:3].sum()) / position,
         rotation_share=float(found.variance[3:].sum()) / rotation,

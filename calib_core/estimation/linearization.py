@@ -12,13 +12,14 @@ drop out (the Schur complement of the joint problem):
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calib_core.arrays import Indices, Points2, Points3, Values
 from calib_core.camera import Camera
-from calib_core.estimation.systematic_errors import NO_ERRORS, Sensitivity, SystematicError, SystematicErrors
+from calib_core.estimation.error_kinds import Sensitivity, SystematicError
+from calib_core.estimation.systematic_errors import NO_ERRORS, SystematicErrors
 from calib_core.geometry import RigidTransform, rotation_jacobian
 from calib_core.radar import position_planes
 
@@ -58,7 +59,8 @@ class MeasurementPlanes:
         """
         true_polar = self.polar if at_polar is None else at_polar
         turned_m, d_polar = _turned(rotations, true_polar)
-        projected_px, d_point = camera.project_planes(turned_m + (translations_m + self.errors.offset_m)[..., None])
+        seen_m = turned_m + (translations_m + self.errors.offset_m)[..., None]
+        projected_px, d_point = camera.project_planes(seen_m)
         # residual, d pixel / d (dt, dtheta), d pixel / d errors, d pixel / d polar, stacked
         rows = np.empty((*rotations.shape[:-2], 10 + len(self.errors), *self.pixels_px.shape))
         np.subtract(self.pixels_px, projected_px, out=rows[..., 0, :, :])
@@ -68,6 +70,7 @@ class MeasurementPlanes:
         np.einsum("...irn,...ikn->...krn", d_point, d_polar, out=to_polar)
         if self.errors.estimated:
             at = _sensitivity(camera, true_polar, projected_px, d_point, to_polar)
+            at = _with_lens(at, camera, seen_m, self.errors.estimated)
             for k, error in enumerate(self.errors.estimated):
                 rows[..., 7 + k, :, :] = error.column(at)
         if at_polar is not None:
@@ -84,9 +87,11 @@ class MeasurementPlanes:
         """Return d pixel / d error (k, 2, n), not whitened, of errors that are no unknowns of the fit."""
         true_polar = self.polar if at_polar is None else at_polar
         turned_m, d_polar = _turned(pose.rotation, true_polar)
-        projected_px, d_point = camera.project_planes(turned_m + (pose.translation_m + self.errors.offset_m)[:, None])
+        seen_m = turned_m + (pose.translation_m + self.errors.offset_m)[:, None]
+        projected_px, d_point = camera.project_planes(seen_m)
         to_polar = np.einsum("irn,ikn->krn", d_point, d_polar)
         at = _sensitivity(camera, true_polar, projected_px, d_point, to_polar)
+        at = _with_lens(at, camera, seen_m, errors)
         return np.array([error.column(at) for error in errors]).reshape(len(errors), *self.pixels_px.shape)
 
 
@@ -196,6 +201,15 @@ def _sensitivity(
 ) -> Sensitivity:
     matrix_px = camera.matrix_px
     return Sensitivity(polar, d_point, to_polar, projected_px - matrix_px[:2, 2:], float(matrix_px[0, 0]))
+
+
+def _with_lens(
+    at: Sensitivity, camera: Camera, points_camera_m: np.ndarray, errors: Sequence[SystematicError]
+) -> Sensitivity:
+    """Add the derivatives by the camera's parameters, if an error asks for them."""
+    if not any(error.of_lens for error in errors):
+        return at
+    return replace(at, d_parameter=camera.parameter_planes(points_camera_m))
 
 
 def _whitened(rows: np.ndarray, sigma_px: Values, sigma_polar: np.ndarray) -> Linearization:

@@ -187,15 +187,31 @@ class PairMeasurements:
         return replace(self, reported=self.reported * left_right, prior=prior)
 
     def with_errors(self, values: Values) -> "PairMeasurements":
-        """Take the systematic errors to have these values (k,)."""
-        return replace(self, errors=self.errors.at(values)) if len(self.errors) else self
+        """Take the systematic errors to have these values (k,), and refined intrinsics to be those that follow."""
+        if not len(self.errors):
+            return self
+        errors = self.errors.at(values)
+        camera = errors.camera
+        if camera is None:
+            return replace(self, errors=errors)
+        return replace(self, errors=errors, camera=camera, rays=camera.rays(self.pixels_px))
 
     def without_errors(self) -> "PairMeasurements":
         """Treat systematic errors as independent noise of the same size: enough to find the pose and the inliers."""
         if not len(self.errors):
             return self
         spread = self.errors.spread(self.reported.T).T
-        return replace(self, sigma_polar=np.hypot(self.sigma_polar, spread), errors=NO_ERRORS)
+        blurred = self if self.errors.camera is None else self._blurred_by_lens()
+        return replace(blurred, sigma_polar=np.hypot(self.sigma_polar, spread), errors=NO_ERRORS)
+
+    def _blurred_by_lens(self) -> "PairMeasurements":
+        """Add to each click's noise what the lens may be off by there; what is the same everywhere is a rotation."""
+        if self.errors.lens is None:
+            return self
+        by_parameter = np.nan_to_num(self.camera.parameter_planes(self.rays.T))
+        moves = np.einsum("pr,pcn->rcn", self.errors.lens.along_axes, by_parameter)
+        moves -= moves.mean(axis=-1, keepdims=True)
+        return replace(self, sigma_px=np.sqrt(self.sigma_px**2 + (moves**2).sum(axis=0).mean(axis=0)))
 
     def scaled(self, noise_scale: Sequence[float] | Values) -> "PairMeasurements":
         """Multiply the assumed sigmas of (click, range, azimuth, elevation)."""

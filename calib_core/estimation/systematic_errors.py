@@ -9,67 +9,39 @@ d pi / d point for the reflector's offset d, and by the derivative of the lens f
 pose, as one more unknown with its prior, where it bends the whole pose (a scale of the angles); the small ones only *widen*
 the covariance, by B Sigma B^T with B = -H^-1 J^T W A.
 
+The intrinsics' own covariance, if they have one, replaces the default errors of the lens (`lens_prior`). If the intrinsics are
+to be refined, the errors of the lens are estimated, and the model is linearized through the camera at their present values.
+
 The derivative belongs at the estimated true position mu: at the measured one it is correlated with the noise, and a scale
 comes out too large. A new error is one more entry of `systematic_errors`.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calib_core.arrays import Values, Vector3, frozen_array
 from calib_core.camera import Camera
+from calib_core.estimation.error_kinds import (
+    SystematicError,
+    along_lens_axis,
+    click_offset,
+    focal_length,
+    radial_distortion,
+    range_bias,
+    reflector_offset,
+    scale,
+    squared_height,
+)
+from calib_core.estimation.lens_prior import PRIOR_WIDTH_PX, LensPrior, lens_prior
 from calib_core.options import CalibrationOptions, RadarOptions
 from calib_core.radar import RadarErrors
 
-__all__ = ["NO_ERRORS", "Sensitivity", "SystematicError", "SystematicErrors", "systematic_errors"]
+__all__ = ["NO_ERRORS", "SystematicErrors", "systematic_errors"]
 
-_RADAR_ERRORS = {one.name for one in fields(RadarErrors)}
 _EXACT = RadarErrors()
 _NONE = 1e-30  # a standard deviation up to this counts as 0; the square of its reciprocal must stay finite
 _SMALL = 1e-4  # standard deviations over which a derivative is taken
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Sensitivity:
-    """The derivatives of the pixels of n pairs at one pose or many, before whitening.
-
-    Attributes:
-        polar: (3, n) true positions: range [m], azimuth, elevation [rad].
-        d_point: (..., 3, 2, n) d pixel / d point in the camera frame [px/m].
-        d_polar: (..., 3, 2, n) d pixel / d polar.
-        offset_px: (..., 2, n) projections, from the principal point.
-        focal_px: of the camera.
-    """
-
-    polar: np.ndarray
-    d_point: np.ndarray
-    d_polar: np.ndarray
-    offset_px: np.ndarray
-    focal_px: float
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SystematicError:
-    """One error that all pairs share; `error_words` says what it is called.
-
-    Attributes:
-        name: key in files, with its unit; a scale without one.
-        sigma: standard deviation of its prior.
-        column: d pixel / d error (..., 2, n).
-        axis: of the camera along which it shifts the reflector; None for other errors.
-    """
-
-    name: str
-    sigma: float
-    column: Callable[[Sensitivity], np.ndarray]
-    axis: int | None = None
-
-    @property
-    def of_radar(self) -> bool:
-        """Whether it is one of `RadarErrors`, and so can be taken out of reported positions."""
-        return self.name in _RADAR_ERRORS
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,11 +52,13 @@ class SystematicErrors:
         estimated: unknowns of the fit.
         widening: errors that only widen the covariance.
         values: (k,) of the estimated ones; 0 is no error.
+        lens: whose axes the errors of the lens are; None if the default ones are assumed.
     """
 
     estimated: tuple[SystematicError, ...] = ()
     widening: tuple[SystematicError, ...] = ()
     values: Values = None  # type: ignore[assignment]
+    lens: LensPrior | None = None
 
     def __post_init__(self) -> None:
         values = np.zeros(len(self.estimated)) if self.values is None else self.values
@@ -116,6 +90,26 @@ class SystematicErrors:
     def squared(self) -> float:
         """Squared distance of the values from their priors, in standard deviations."""
         return float(((self.values / self.sigma) ** 2).sum()) if len(self) else 0.0
+
+    @property
+    def refined(self) -> slice:
+        """The places of the lens's errors among the estimated ones; empty if the intrinsics are not refined."""
+        places = [k for k, one in enumerate(self.estimated) if one.of_lens]
+        return slice(places[0], places[-1] + 1) if places else slice(0, 0)
+
+    @property
+    def camera(self) -> Camera | None:
+        """The refined intrinsics at the present values; None if they are not refined."""
+        return self.camera_known_to(None)
+
+    def camera_known_to(self, covariance: np.ndarray | None) -> Camera | None:
+        """Return the same with the covariance (r, r) of their errors along the axes of the prior."""
+        if self.lens is None:
+            return None
+        places = self.refined
+        if places.start == places.stop:
+            return None
+        return self.lens.camera_at(self.values[places], covariance)
 
     def at(self, values: Values) -> "SystematicErrors":
         """Return the same errors with other values."""
@@ -165,22 +159,26 @@ def systematic_errors(options: CalibrationOptions, camera: Camera, *, flat: bool
         flat: whether the radar does not measure elevation.
     """
     taped = options.solving.camera_position is not None
-    estimated = [_scale("azimuth_scale", _azimuth_scale_sigma(options.radar, flat=flat), 1)]
+    lens = lens_prior(options, camera)
+    estimated = [scale("azimuth_scale", _azimuth_scale_sigma(options.radar, flat=flat), 1)]
     if flat:
-        estimated.append(_squared_height(options.radar.height_sigma_m))
+        estimated.append(squared_height(options.radar.height_sigma_m))
     else:
-        estimated.append(_scale("elevation_scale", options.radar.elevation_scale_sigma, 2))
-    estimated.append(_range_bias(options.radar.range_bias_sigma_m))
-    reflector = [_reflector(axis, name, options.reflector.offset_sigma_m) for axis, name in enumerate(_AXES)]
+        estimated.append(scale("elevation_scale", options.radar.elevation_scale_sigma, 2))
+    estimated.append(range_bias(options.radar.range_bias_sigma_m))
+    reflector = [reflector_offset(axis, name, options.reflector.offset_sigma_m) for axis, name in enumerate(_AXES)]
     widening = [
-        _scale("range_scale", options.radar.range_scale_sigma, 0),
-        *(_click(row, name, _click_sigma_px(options, camera)) for row, name in enumerate(_AXES[:2])),
-        _focal(options.lens.focal_length_sigma),
-        _radial(options.lens.distortion_sigma),
+        scale("range_scale", options.radar.range_scale_sigma, 0),
+        *(click_offset(row, name, _click_sigma_px(options, camera, lens)) for row, name in enumerate(_AXES[:2])),
+        *_default_lens(options, camera, lens),
     ]
     (estimated if taped else widening).extend(reflector)
+    if lens is not None:
+        (estimated if options.refining.intrinsics else widening).extend(_lens(lens))
     return SystematicErrors(
-        tuple(one for one in estimated if one.sigma > _NONE), tuple(one for one in widening if one.sigma > _NONE)
+        tuple(one for one in estimated if one.sigma > _NONE),
+        tuple(one for one in widening if one.sigma > _NONE),
+        lens=lens,
     )
 
 
@@ -192,62 +190,27 @@ def _azimuth_scale_sigma(radar: RadarOptions, *, flat: bool) -> float:
     return float(np.hypot(radar.azimuth_scale_sigma, tilted))
 
 
-_PRIOR_WIDTH_PX = 1920.0  # of the picture that the prior of the principal point is stated for
 _AXES = ("right", "down", "forward")
 
 
-def _click_sigma_px(options: CalibrationOptions, camera: Camera) -> float:
-    """Return the standard deviation of what clicks and principal point together are off by; no pair tells them apart."""
-    principal_point_px = options.lens.principal_point_sigma_px * camera.width_px / _PRIOR_WIDTH_PX
+def _click_sigma_px(options: CalibrationOptions, camera: Camera, lens: LensPrior | None) -> float:
+    """Return the standard deviation of what clicks and principal point together are off by; no pair tells them apart.
+
+    A lens with a prior of its own brings its principal point along.
+    """
+    if lens is not None:
+        return options.reflector.click_offset_sigma_px
+    principal_point_px = options.lens.principal_point_sigma_px * camera.width_px / PRIOR_WIDTH_PX
     return float(np.hypot(options.reflector.click_offset_sigma_px, principal_point_px))
 
 
-def _scale(name: str, sigma: float, coordinate: int) -> SystematicError:
-    def column(at: Sensitivity) -> np.ndarray:
-        return np.asarray(at.d_polar[..., coordinate, :, :] * -at.polar[coordinate])
-
-    return SystematicError(name, sigma, column)
-
-
-def _range_bias(sigma_m: float) -> SystematicError:
-    def column(at: Sensitivity) -> np.ndarray:
-        return -at.d_polar[..., 0, :, :]
-
-    return SystematicError("range_bias_m", sigma_m, column)
+def _default_lens(options: CalibrationOptions, camera: Camera, lens: LensPrior | None) -> list[SystematicError]:
+    """Return the errors of a lens of which nobody said how well it is known; a refined pinhole has no distortion of its own."""
+    if lens is None:
+        return [focal_length(options.lens.focal_length_sigma), radial_distortion(options.lens.distortion_sigma)]
+    refined_pinhole = camera.covariance is None and not len(camera.distortion)
+    return [radial_distortion(options.lens.distortion_sigma)] if refined_pinhole else []
 
 
-def _squared_height(sigma_m: float) -> SystematicError:
-    """Height h of the placements above or below a radar without elevation: the range along its plane is sqrt(r^2 - h^2)."""
-
-    def column(at: Sensitivity) -> np.ndarray:
-        return np.asarray(at.d_polar[..., 0, :, :] / (-2.0 * at.polar[0]))
-
-    return SystematicError("squared_height_m2", sigma_m**2, column)
-
-
-def _reflector(axis: int, name: str, sigma_m: float) -> SystematicError:
-    def column(at: Sensitivity) -> np.ndarray:
-        return np.asarray(at.d_point[..., axis, :, :])
-
-    return SystematicError(f"reflector_{name}_m", sigma_m, column, axis=axis)
-
-
-def _click(row: int, name: str, sigma_px: float) -> SystematicError:
-    def column(at: Sensitivity) -> np.ndarray:
-        shift = np.zeros_like(at.offset_px)
-        shift[..., row, :] = 1.0
-        return shift
-
-    return SystematicError(f"click_{name}_px", sigma_px, column)
-
-
-def _focal(sigma: float) -> SystematicError:
-    return SystematicError("focal_length", sigma, lambda at: at.offset_px)
-
-
-def _radial(sigma: float) -> SystematicError:
-    def column(at: Sensitivity) -> np.ndarray:
-        squared = (at.offset_px**2).sum(axis=-2, keepdims=True) / at.focal_px**2
-        return np.asarray(at.offset_px * squared)
-
-    return SystematicError("distortion", sigma, column)
+def _lens(prior: LensPrior) -> list[SystematicError]:
+    return [along_lens_axis(k, axis) for k, axis in enumerate(prior.along_axes.T)]

@@ -8,7 +8,9 @@ from calib_core.interchange.calibration_file import (
     Provenance,
     choose_check_point,
 )
-from calib_core.interchange.cameras.files import CameraFile, camera_info_text, read_camera, read_camera_file
+from calib_core.interchange.cameras.files import CameraFile, read_camera, read_camera_file
+from calib_core.interchange.cameras.formats.ros import camera_info_text
+from calib_core.interchange.cameras.written import CAMERA_FORMATS, camera_content
 from calib_core.interchange.check.agreement import AgreementLimits, Criterion, Judgement
 from calib_core.interchange.check.comparison import Comparison, compare
 from calib_core.interchange.check.explanation import CheckResult
@@ -52,6 +54,7 @@ from calib_core.interchange.trees.reading import TreeFile, joined_tree
 
 __all__ = [
     "CALIBRATION_SCHEMA",
+    "CAMERA_FORMATS",
     "CAMERA_ONLY",
     "FORMATS",
     "Adoption",
@@ -93,6 +96,7 @@ __all__ = [
     "calibration_in_tree",
     "calibration_sha256",
     "calibration_text",
+    "camera_content",
     "camera_info_text",
     "check",
     "check_json",

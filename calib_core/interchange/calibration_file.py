@@ -6,7 +6,7 @@ import numpy as np
 
 from calib_core.errors import InputError
 from calib_core.interchange.evidence import Evidence
-from calib_core.results import Calibration, CheckPoint, InputFile, PairResult
+from calib_core.results import Calibration, CheckPoint, InputFile, PairResult, UnconfirmedClicks
 from calib_core.verdict import Verdict
 
 __all__ = [
@@ -101,6 +101,7 @@ class Provenance:
         version: the version of this program.
         column_map: which columns of the radar the user gave, each in the syntax of --map.
         assumptions: what the files do not state and reading them takes for granted.
+        unconfirmed: the clicks that were placed automatically and that nobody confirmed; None if there are none.
     """
 
     inputs: tuple[InputFile, ...] = ()
@@ -116,6 +117,7 @@ class Provenance:
     radar_choice: str = ""
     column_map: tuple[str, ...] = ()
     assumptions: tuple[AssumptionNote, ...] = ()
+    unconfirmed: UnconfirmedClicks | None = None
 
 
 @dataclass(frozen=True, slots=True)

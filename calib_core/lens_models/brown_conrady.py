@@ -19,6 +19,34 @@ def _unproject(plane: Points2, distortion: Values) -> Points3:
     return unproject_distorted(plane, _padded(distortion), _distort)
 
 
+def _coefficient_jacobian(points: np.ndarray, distortion: Values) -> np.ndarray:
+    """Differentiate the image plane with respect to the eight coefficients: (..., 8, 2, n)."""
+    k1, k2, _, _, k3, k4, k5, k6 = _padded(distortion)
+    with np.errstate(all="ignore"):
+        inverse_z = np.where(points[..., 2, :] > 0, 1.0 / points[..., 2, :], np.nan)
+    x, y = points[..., 0, :] * inverse_z, points[..., 1, :] * inverse_z
+    r2, xy2 = x * x + y * y, 2.0 * x * y
+    bottom = 1.0 + r2 * (k4 + r2 * (k5 + r2 * k6))
+    radial = (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))) / bottom
+    slopes = np.empty((*points.shape[:-2], 8, 2, points.shape[-1]))
+    for row, component in enumerate((x, y)):
+        for power, (above, below) in enumerate(((0, 5), (1, 6), (4, 7)), start=1):
+            slopes[..., above, row, :] = component * r2**power / bottom
+            slopes[..., below, row, :] = -radial * slopes[..., above, row, :]
+    slopes[..., 2, 0, :] = slopes[..., 3, 1, :] = xy2
+    slopes[..., 2, 1, :] = r2 + 2.0 * y * y
+    slopes[..., 3, 0, :] = r2 + 2.0 * x * x
+    return slopes
+
+
+def _coefficient_jacobian_without(points: np.ndarray, _distortion: Values) -> np.ndarray:
+    return np.empty((*points.shape[:-2], 0, 2, points.shape[-1]))
+
+
+def _coefficient_jacobian_of_five(points: np.ndarray, distortion: Values) -> np.ndarray:
+    return _coefficient_jacobian(points, distortion)[..., :5, :, :]
+
+
 def _padded(distortion: Values) -> list[float]:
     return [*distortion.tolist(), *[0.0] * (8 - len(distortion))]
 
@@ -52,6 +80,7 @@ PINHOLE = LensModel(
     counts=(0,),
     project=_project,
     unproject=_unproject,
+    coefficient_jacobian=_coefficient_jacobian_without,
     is_perspective=True,
     opencv="projectPoints",
     typical=TypicalLens(),
@@ -71,6 +100,7 @@ PLUMB_BOB = LensModel(
     counts=(4, 5),
     project=_project,
     unproject=_unproject,
+    coefficient_jacobian=_coefficient_jacobian_of_five,
     is_perspective=True,
     opencv="projectPoints",
     typical=TypicalLens((-0.17, 0.032, 0.0006, -0.0004, 0.0)),
@@ -82,7 +112,7 @@ PLUMB_BOB = LensModel(
         NameElsewhere("colmap", "FULL_OPENCV", 8),
         NameElsewhere("foxglove", "plumb_bob", 5),
     ),
-    names_in_files=("plumb_bob", "radtan"),
+    names_in_files=("plumb_bob", "radtan", "brown_conrady"),
     names_in_messages=("plumb_bob", "radtan", "brown_conrady", ""),
 )
 
@@ -92,6 +122,7 @@ RATIONAL_POLYNOMIAL = LensModel(
     counts=(8,),
     project=_project,
     unproject=_unproject,
+    coefficient_jacobian=_coefficient_jacobian,
     is_perspective=True,
     opencv="projectPoints",
     typical=TypicalLens((0.62, 0.21, 0.0005, -0.0003, 0.012, 0.79, 0.33, 0.045)),

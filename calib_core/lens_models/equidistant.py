@@ -44,6 +44,16 @@ def _project(points: np.ndarray, k: Values) -> tuple[np.ndarray, np.ndarray]:
     return np.stack([scale * x, scale * y], axis=-2), jacobian
 
 
+def _coefficient_jacobian(points: np.ndarray, _k: Values) -> np.ndarray:
+    """Differentiate the image plane with respect to the four coefficients: (..., 4, 2, n)."""
+    x, y, z = points[..., 0, :], points[..., 1, :], points[..., 2, :]
+    a = np.hypot(x, y)
+    theta = np.arctan2(a, z)
+    direction = np.stack([x, y], axis=-2) / np.where(a > 0, a, 1.0)[..., None, :]
+    powers = np.stack([theta**3, theta**5, theta**7, theta**9], axis=-2)
+    return np.asarray(powers[..., :, None, :] * direction[..., None, :, :])
+
+
 def _unproject(plane: Points2, k: Values) -> Points3:
     """Invert OpenCV's fisheye model by Newton's method on the angle."""
     distorted = np.linalg.norm(plane, axis=1)
@@ -74,6 +84,7 @@ EQUIDISTANT = LensModel(
     counts=(4,),
     project=_project,
     unproject=_unproject,
+    coefficient_jacobian=_coefficient_jacobian,
     is_perspective=False,
     opencv="fisheye.projectPoints",
     typical=TypicalLens((-0.012, 0.006, -0.004, 0.0009), field_of_view_deg=110.0, radius_at=_angle),

@@ -8,7 +8,7 @@ import numpy as np
 
 from calib_core.arrays import Points2, Points3, Values
 
-__all__ = ["Elsewhere", "LensModel", "NameElsewhere", "Project", "TypicalLens", "Unproject"]
+__all__ = ["CoefficientJacobian", "Elsewhere", "LensModel", "NameElsewhere", "Project", "TypicalLens", "Unproject"]
 
 Elsewhere: TypeAlias = Literal["camera_info", "kalibr", "opencv", "colmap", "foxglove"]
 """Formats with their own names for lens models; `camera_info` is ROS's message and its YAML file."""
@@ -19,6 +19,11 @@ Project: TypeAlias = Callable[[np.ndarray, Values], tuple[np.ndarray, np.ndarray
 
 Unproject: TypeAlias = Callable[[Points2, Values], Points3]
 """Maps the image plane (n, 2) and coefficients to unit rays (n, 3) in the camera frame. NaN where there is none."""
+
+
+CoefficientJacobian: TypeAlias = Callable[[np.ndarray, Values], np.ndarray]
+"""Maps points (..., 3, n) in the camera frame and coefficients to d plane / d coefficient (..., k, 2, n), for all k
+coefficients that the lens model names; those that a camera leaves out are zero."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +70,7 @@ class LensModel:
         counts: how many of them a camera may have, in ascending order; fewer means that the last ones are zero.
         project: from points to the image plane, with the Jacobian.
         unproject: from the image plane to rays.
+        coefficient_jacobian: the derivative of the image plane with respect to the coefficients.
         is_perspective: whether it is a pinhole, which keeps straight lines straight, when all coefficients are zero.
         opencv: the function of OpenCV that projects through it, if there is one. cv2.projectPoints distinguishes
             its models by the number of coefficients; so do we if a file names none.
@@ -80,6 +86,7 @@ class LensModel:
     counts: tuple[int, ...]
     project: Project
     unproject: Unproject
+    coefficient_jacobian: CoefficientJacobian
     is_perspective: bool
     opencv: Literal["projectPoints", "fisheye.projectPoints"] | None = None
     typical: TypicalLens

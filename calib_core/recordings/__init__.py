@@ -16,7 +16,7 @@ from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis
 from calib_core.recordings.topics import TopicSummary
 from calib_core.recordings.verification import Verification, verify_recording
 from calib_core.recordings.verification_text import verification_text
-from calib_core.recordings.video_writing import WrittenVideo, write_video
+from calib_core.recordings.video_writing import LeftOut, WrittenVideo, video_format, write_video
 
 __all__ = [
     "AwaitedRecording",
@@ -25,6 +25,7 @@ __all__ = [
     "FollowedRecording",
     "FrameTransform",
     "Growth",
+    "LeftOut",
     "Recording",
     "RecordingOptions",
     "RecordingSummary",
@@ -46,5 +47,6 @@ __all__ = [
     "size_of_pictures_beside",
     "verification_text",
     "verify_recording",
+    "video_format",
     "write_video",
 ]

@@ -11,7 +11,7 @@ from calib_core.measurements import TimeNs
 from calib_core.recordings.camera.images import EncodedImage
 from calib_core.recordings.recording import Recording
 
-__all__ = ["WrittenVideo", "write_video"]
+__all__ = ["LeftOut", "WrittenVideo", "video_format", "write_video"]
 
 _FORMATS = {".mp4": "mp4", ".mov": "mov", ".mkv": "matroska"}
 _TICK_NS = 1000
@@ -40,10 +40,26 @@ class WrittenVideo:
 
 
 @dataclass(slots=True)
-class _LeftOut:
+class LeftOut:
+    """What is left out of a video while it is written; the fields are those of WrittenVideo."""
+
     other_size: int = 0
     unreadable: int = 0
     fault: str = ""
+
+
+def video_format(path: Path) -> str:
+    """Return the name of the container format for a path, if it can be written.
+
+    Raises:
+        InputError: PyAV is missing, or the suffix is not supported.
+    """
+    form = _FORMATS.get(path.suffix.lower())
+    if form is None:
+        raise InputError(f"{path}: unsupported video format; use {', '.join(_FORMATS)}")
+    if find_spec("av") is None:
+        raise InputError("writing a video needs PyAV, which is not installed: pip install 'cocalib[video]'")
+    return form
 
 
 def write_video(
@@ -60,11 +76,7 @@ def write_video(
         InputError: PyAV is missing, the suffix is not supported, or the file cannot be written.
         RecordingError: no frame can be read.
     """
-    form = _FORMATS.get(path.suffix.lower())
-    if form is None:
-        raise InputError(f"{path}: unsupported video format; use {', '.join(_FORMATS)}")
-    if find_spec("av") is None:
-        raise InputError("writing a video needs PyAV, which is not installed: pip install 'cocalib[video]'")
+    form = video_format(path)
     part = path.with_name(f".{path.name}.part")
     try:
         written = _write(recording, part, form, progress)
@@ -80,7 +92,7 @@ def write_video(
 def _write(recording: Recording, path: Path, form: str, progress: Callable[[int, int], None] | None) -> WrittenVideo:
     import av
 
-    left_out = _LeftOut()
+    left_out = LeftOut()
     frames = _frames(recording, left_out, progress)
     first = next(frames, None)
     if first is None:
@@ -108,7 +120,7 @@ def _write(recording: Recording, path: Path, form: str, progress: Callable[[int,
 
 
 def _frames(
-    recording: Recording, left_out: _LeftOut, progress: Callable[[int, int], None] | None
+    recording: Recording, left_out: LeftOut, progress: Callable[[int, int], None] | None
 ) -> Iterator[tuple[TimeNs, EncodedImage]]:
     """Yield the readable frames that have the size of the first one, as JPEG."""
     size: tuple[int, int] | None = None

@@ -15,6 +15,7 @@ from calib_core.synthetic.options import (
     SimulationOptions,
     Surroundings,
     Traffic,
+    WavedBoard,
 )
 from calib_core.synthetic.pairs.simulated import (
     AISLE,
@@ -65,6 +66,7 @@ __all__ = [
     "Surroundings",
     "SystematicErrors",
     "Traffic",
+    "WavedBoard",
     "draw_systematic_errors",
     "random_rig",
     "simulate",

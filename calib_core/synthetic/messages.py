@@ -73,8 +73,9 @@ def camera_messages(
     """
     options = recording.options
     for frame in recording.frames() if frames is None else frames:
-        info = CameraInfoMessage(frame.time, CAMERA_FRAME, recording.stage.published_camera)
-        yield RecordedMessage(CAMERA_INFO_TOPIC, frame.receive_time, info)
+        if options.intrinsics.published:
+            info = CameraInfoMessage(frame.time, CAMERA_FRAME, recording.stage.published_camera)
+            yield RecordedMessage(CAMERA_INFO_TOPIC, frame.receive_time, info)
         if options.raw_images:
             raw = ImageMessage(frame.time, CAMERA_FRAME, frame.pixels)
             yield RecordedMessage(RAW_IMAGE_TOPIC, frame.receive_time, raw)

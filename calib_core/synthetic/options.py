@@ -19,16 +19,19 @@ __all__ = [
     "RadarDefects",
     "RadarMessage",
     "RadarName",
+    "ReflectorDesign",
     "ReportedElevation",
     "SceneName",
     "SecondAzimuth",
     "SimulationOptions",
     "Surroundings",
     "Traffic",
+    "WavedBoard",
 ]
 
 SceneName = Literal["rooftop", "field", "aisle", "checkerboard", "open-rooftop", "open-yard", "road"]
 Clutter = Literal["none", "scene", "heavy"]
+ReflectorDesign = Literal["triangular", "square"]
 Container = Literal["ros1", "mcap", "db3", "csv", "jsonl"]
 
 
@@ -82,10 +85,22 @@ class Traffic:
 class IntrinsicsErrors:
     """How the published intrinsics differ from those of the pictures."""
 
+    published: bool = option(True, "Record the intrinsics; otherwise the recording says nothing about the lens.")
     focal_length_scale: float = option(1.0, "Published focal length over the true one.", low=0.5, high=2.0)
     principal_point_px: tuple[float, float] = option(
         (0.0, 0.0), "How far right and down of the true one the published principal point is [px]."
     )
+
+
+@dataclass(frozen=True, slots=True)
+class WavedBoard:
+    """The checkerboard that the person waves before the camera at the start, to calibrate its lens with."""
+
+    duration_s: float = option(0.0, "How long it is waved; 0 for no board [s].", low=0.0, high=600.0)
+    columns: int = option(9, "Inner corners along its rows.", low=3, high=40)
+    rows: int = option(6, "Inner corners along its columns.", low=3, high=40)
+    square_mm: float = option(22.14, "Side of a square [mm].", low=1.0, high=1000.0)
+    bend_mm: float = option(0.0, "How far its middle stands behind its left and right side [mm].", low=-50.0, high=50.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,11 +173,17 @@ class SimulationOptions:
     )
     clicking: Clicking = option(Clicking(), "How the example clicks are made.")
     traffic: Traffic = option(Traffic(), "Who moves in front of the sensors to be judged.")
+    waved_board: WavedBoard = option(WavedBoard(), "The checkerboard that is waved before the camera at the start.")
     reflector_edge_m: float = option(
         0.16,
         "Length of the edges that meet at the reflector's apex [m]; its echo grows with the fourth power.",
         low=0.05,
         high=1.0,
+    )
+    reflector_design: ReflectorDesign = option(
+        "triangular",
+        "Look of the reflector, not its echo: three triangles on an orange block or a dark tripod; or three dull squares, "
+        "one edge down, on a white pole.",
     )
     board_corners: int = option(
         0, "Number of further placements, in front of inner corners of the checkerboard.", low=0, high=40
@@ -183,6 +204,9 @@ class SimulationOptions:
         _require(roomy, "scene", self.scene, "another one: the aisle has no room for parked cars or a fence")
         _check_ranges(self)
         _check_traffic(self)
+        waved = self.waved_board.duration_s > 0.0
+        _require(not (waved and self.islands), "islands", True, "False where a board is waved before the placements")
+        _require(not waved or self.standing_places > 0, "placements", 0, "at least 1 after a board is waved")
 
     @property
     def standing_places(self) -> int:

@@ -46,9 +46,10 @@ def write_plain_files(
     for frame in frames:
         name = f"img_{_date(frame.time):%Y-%m-%d_%H-%M-%S-%f}.jpg"
         (pictures / name).write_bytes(frame.jpeg(recording.options.jpeg_quality))
-    camera = folder / "camera.yaml"
-    camera.write_text(camera_info_text(recording.stage.published_camera, "camera"), encoding="utf-8")
-    written = [pictures, camera]
+    written = [pictures]
+    if recording.options.intrinsics.published:
+        written.append(folder / "camera.yaml")
+        written[1].write_text(camera_info_text(recording.stage.published_camera, "camera"), encoding="utf-8")
     for antenna in recording.stage.antennas:
         path = folder / f"radar{'_' if antenna.name else ''}{antenna.name}.{radar}"
         lines = _table(recording, antenna) if radar == "csv" else _objects(recording, antenna)

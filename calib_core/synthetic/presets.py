@@ -10,6 +10,7 @@ from calib_core.synthetic.options import (
     SimulationOptions,
     Surroundings,
     Traffic,
+    WavedBoard,
 )
 from calib_core.synthetic.rig import RigOptions
 
@@ -61,6 +62,7 @@ PresetName: TypeAlias = Literal[
     "robot",
     "cars-near",
     "cars-far",
+    "intrinsics",
 ]
 
 _LEVEL = RigOptions(radar_height_m=0.5, radar_tilt_deg=0.0)
@@ -206,6 +208,15 @@ PRESETS: Mapping[PresetName, SimulationOptions] = {
         placements=0,
         defects=_ROAD_RADAR,
         traffic=Traffic(cars=4, nearest_m=20.0, farthest_m=60.0),
+    ),
+    "intrinsics": SimulationOptions(
+        placements=12,
+        dwell_s=4.0,
+        width_px=640,
+        height_px=400,
+        jpeg_quality=92,
+        intrinsics=IntrinsicsErrors(published=False),
+        waved_board=WavedBoard(duration_s=24.0),
     ),
 }
 """The presets by name; what one does not name has its default."""

@@ -93,11 +93,15 @@ class SimulatedRecording:
             limit: number of frames from the start; None for all.
         """
         stage, options = self.stage, self.options
-        renderer = FrameRenderer.of(stage.scene, stage.rig, options.surroundings, options.reflector_edge_m)
+        renderer = FrameRenderer.of(
+            stage.scene, stage.rig, options.surroundings, options.reflector_edge_m, options.reflector_design
+        )
         rng = child_rng(options, 11)
         for i, moment_s in enumerate(stage.frame_times.moment_s[:limit]):
             moment = stage.story.at(float(moment_s))
-            pixels = renderer.render(moment, person=options.person, noise_grey=options.sensor_noise_grey, rng=rng)
+            board = stage.waving.at(float(moment_s)) if stage.waving else None
+            noise_grey = options.sensor_noise_grey
+            pixels = renderer.render(moment, person=options.person, board=board, noise_grey=noise_grey, rng=rng)
             header, receive = int(stage.frame_times.header_ns[i]), int(stage.frame_times.receive_ns[i])
             yield SimulatedFrame(TimeNs(header), TimeNs(receive), pixels)
 

@@ -40,6 +40,8 @@ def truth_text(recording: SimulatedRecording) -> str:
     defects = recording.options.defects
     if defects.azimuth_bias_deg or defects.elevation_bias_deg or defects.z_offset_m:
         document["camera_from_reported"] = _transform(recording.stage.camera_from_reported)
+    if recording.stage.waving is not None:
+        document["board"] = _board(recording)
     if recording.options.clicking != Clicking():
         document["clicks"] = [
             {"id": one.click.id, "placement": one.placement_id, "faults": list(one.faults)} for one in recording.clicked
@@ -69,6 +71,14 @@ def _camera(camera: Camera) -> dict[str, Any]:
         "matrix_px": camera.matrix_px.tolist(),
         "distortion": camera.distortion.tolist(),
     }
+
+
+def _board(recording: SimulatedRecording) -> dict[str, Any]:
+    """Return the board that is waved at the start, and when."""
+    board = recording.options.waved_board
+    start, end = recording.stage.recorded_span(0.0, board.duration_s)
+    size = {"columns": board.columns, "rows": board.rows, "square_m": board.square_mm / 1e3}
+    return {"kind": "checkerboard", **size, "start": _time(start), "end": _time(end)}
 
 
 def _text(document: dict[str, Any]) -> str:

@@ -66,9 +66,11 @@ class NoApex:
 
     Attributes:
         reason: what was seen instead.
+        several: it was several corners; a shorter reach may leave one.
     """
 
     reason: str
+    several: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,7 +131,7 @@ def find_apex(
     best, *others = inside
     apart_px = max((float(np.hypot(*(one.pixel_px - best.pixel_px))) for one in _rivals(best, others)), default=0.0)
     if apart_px > 0.0:
-        return NoApex(f"two corners of three sheets, {apart_px:.0f} px apart, fit equally well")
+        return NoApex(f"two corners of three sheets, {apart_px:.0f} px apart, fit equally well", several=True)
     radius_px = best.factor * best.fit.radius_px
     if size_px is not None and radius_px > size_px:
         return NoApex(f"the corner reaches {radius_px:.0f} px far, beyond a reflector of {size_px:.0f} px")

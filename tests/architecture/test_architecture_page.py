@@ -19,6 +19,12 @@ def structure(project_root: Path) -> ModuleType:
 
 
 @pytest.fixture(scope="module")
+def graph(structure: ModuleType, project_root: Path) -> dict[str, set[str]]:
+    """Return which modules each module imports."""
+    return structure.imports(project_root)
+
+
+@pytest.fixture(scope="module")
 def page(project_root: Path) -> str:
     return (project_root / "ARCHITECTURE.md").read_text(encoding="utf-8")
 
@@ -28,16 +34,16 @@ def test_the_drawing_matches_the_contracts(structure: ModuleType, page: str, pro
     assert drawing.splitlines() == list(structure.drawn(project_root)), "python .ci/structure.py draw"
 
 
-def test_every_folder_with_rooms_has_a_contract(structure: ModuleType, project_root: Path) -> None:
-    graph = structure.imports(project_root)
+def test_every_folder_with_rooms_has_a_contract(
+    structure: ModuleType, graph: dict[str, set[str]], project_root: Path
+) -> None:
     folders = {name.rpartition(".")[0] for name in graph} - {""}
     rooms = {folder: structure.between_rooms(graph, folder) for folder in folders}
     drawn = {line for line in structure.drawn(project_root) if not line.startswith(" ")}
     assert {folder for folder, inside in rooms.items() if any(inside.values())} - drawn == set()
 
 
-def test_rooms_have_no_circular_imports(structure: ModuleType, project_root: Path) -> None:
-    graph = structure.imports(project_root)
+def test_rooms_have_no_circular_imports(structure: ModuleType, graph: dict[str, set[str]]) -> None:
     for folder in {name.rpartition(".")[0] for name in graph} - {""}:
         structure.floors(structure.between_rooms(graph, folder))
     with pytest.raises(ValueError, match="circular imports among a, b"):

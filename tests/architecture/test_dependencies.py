@@ -5,6 +5,7 @@ import importlib.metadata
 import re
 import sys
 import tomllib
+from collections import defaultdict
 from pathlib import Path
 
 import pytest
@@ -33,10 +34,18 @@ def imported_modules(root: Path) -> dict[str, set[str]]:
     return found
 
 
-def distributions_of(module: str) -> set[str]:
-    """Return the normalised names of the installed distributions that contain a top-level module."""
-    names = importlib.metadata.packages_distributions().get(module, [])
-    return {re.sub(r"[-_.]+", "-", name).lower() for name in names}
+@pytest.fixture(scope="module")
+def modules(project_root: Path) -> dict[str, set[str]]:
+    return imported_modules(project_root)
+
+
+@pytest.fixture(scope="module")
+def distributions() -> defaultdict[str, set[str]]:
+    """Return the normalised names of the installed distributions that contain a top-level module, by the module."""
+    installed = importlib.metadata.packages_distributions().items()
+    return defaultdict(
+        set, {module: {re.sub(r"[-_.]+", "-", name).lower() for name in names} for module, names in installed}
+    )
 
 
 @pytest.fixture(scope="module")
@@ -47,18 +56,20 @@ def declared(project_root: Path) -> set[str]:
     return {re.split(r"[^\w-]", line)[0].lower() for line in lines}
 
 
-def test_every_module_that_is_imported_comes_with_a_declared_dependency(project_root: Path, declared: set[str]) -> None:
-    modules = imported_modules(project_root)
+def test_every_module_that_is_imported_comes_with_a_declared_dependency(
+    modules: dict[str, set[str]], distributions: defaultdict[str, set[str]], declared: set[str]
+) -> None:
     assert {"numpy", "cv2", "lz4", "backports"} <= set(modules)
     undeclared = {
-        module: sorted(files) for module, files in modules.items() if distributions_of(module).isdisjoint(declared)
+        module: sorted(files) for module, files in modules.items() if distributions[module].isdisjoint(declared)
     }
     assert undeclared == {}, "declare the dependencies of these modules in pyproject.toml, or do not import them"
 
 
-def test_every_declared_dependency_is_imported(project_root: Path, declared: set[str]) -> None:
-    modules = imported_modules(project_root)
-    imported = {name for module in modules for name in distributions_of(module)}
+def test_every_declared_dependency_is_imported(
+    modules: dict[str, set[str]], distributions: defaultdict[str, set[str]], declared: set[str]
+) -> None:
+    imported = {name for module in modules for name in distributions[module]}
     assert declared - imported == set(AWAITED), "remove unused dependencies from pyproject.toml"
 
 

@@ -60,24 +60,27 @@ def unknown_names(text: str, *, prose: set[str]) -> list[str]:
     return found
 
 
-def modules(root: Path) -> list[Path]:
-    return sorted(path for package in ("app", "calib_core") for path in (root / package).rglob("*.py"))
+@pytest.fixture(scope="module")
+def texts(project_root: Path) -> dict[str, list[str]]:
+    """Return the strings of every module."""
+    modules = sorted(path for package in ("app", "calib_core") for path in (project_root / package).rglob("*.py"))
+    return {str(path.relative_to(project_root)): [*literals(path)] for path in modules}
 
 
-def test_every_command_that_the_program_names_exists(project_root: Path) -> None:
+def test_every_command_that_the_program_names_exists(texts: dict[str, list[str]]) -> None:
     unknown = {
-        str(path.relative_to(project_root)): names
-        for path in modules(project_root)
-        if (names := [each for text in literals(path) for each in unknown_names(text, prose=PROSE)])
+        path: names
+        for path, strings in texts.items()
+        if (names := [each for text in strings for each in unknown_names(text, prose=PROSE)])
     }
     assert unknown == {}
 
 
-def test_every_option_that_the_program_names_exists(project_root: Path) -> None:
+def test_every_option_that_the_program_names_exists(texts: dict[str, list[str]]) -> None:
     unknown = {
-        str(path.relative_to(project_root)): names
-        for path in modules(project_root)
-        if (names := {flag for text in literals(path) for flag in _FLAG.findall(text)} - ANY_FLAG - OTHER_PROGRAMS)
+        path: names
+        for path, strings in texts.items()
+        if (names := {flag for text in strings for flag in _FLAG.findall(text)} - ANY_FLAG - OTHER_PROGRAMS)
     }
     assert unknown == {}
 
@@ -98,7 +101,7 @@ def test_the_pages_name_commands_that_exist(page: str, project_root: Path) -> No
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("or find them with cocalib intrinsics", ["cocalib intrinsics"]),
+        ("or find them with cocalib mount", ["cocalib mount"]),
         ("check it: cocalib open RECORDING --calibration FILE, and click", []),
         ("cocalib open RECORDING --calibrations FILE", ["cocalib open --calibrations"]),
         ("a calibration that cocalib wrote", []),

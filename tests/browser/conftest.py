@@ -27,13 +27,18 @@ def playwright_driver() -> Iterator[Playwright]:
         yield driver
 
 
+@pytest.fixture(scope="session")
+def browser_path() -> Path:
+    return find_browser()
+
+
 @pytest.fixture(scope="module")
-def launch(playwright_driver: Playwright) -> Iterator[Callable[..., Browser]]:
+def launch(playwright_driver: Playwright, browser_path: Path) -> Iterator[Callable[..., Browser]]:
     """Start browsers with extra flags; all are closed at the end."""
-    path, running = find_browser(), []
+    running: list[Browser] = []
 
     def start_browser(*flags: str) -> Browser:
-        browser = playwright_driver.chromium.launch(executable_path=str(path), args=[*FLAGS, *flags])
+        browser = playwright_driver.chromium.launch(executable_path=str(browser_path), args=[*FLAGS, *flags])
         running.append(browser)
         return browser
 

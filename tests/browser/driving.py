@@ -5,6 +5,8 @@ import re
 import time
 from typing import Any
 
+import cv2
+import numpy as np
 from playwright.sync_api import Page
 
 __all__ = ["FLAGS", "Driver"]
@@ -138,6 +140,12 @@ class Driver:
     def text(self, selector: str) -> str:
         """Return the text of an element."""
         return self.page.inner_text(selector)
+
+    def pixels(self, selector: str) -> np.ndarray:
+        """Return a screenshot of an element: (h, w, 3) BGR."""
+        picture = cv2.imdecode(np.frombuffer(self.page.locator(selector).screenshot(), np.uint8), cv2.IMREAD_COLOR)
+        assert picture is not None
+        return np.asarray(picture)
 
     def zoom_to(self, u: float, v: float, factor: float) -> None:
         """Turn the wheel over an image point until there are this many screen pixels per image pixel."""

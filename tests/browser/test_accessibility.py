@@ -22,6 +22,7 @@ def page(open_page: Callable[..., Driver], server: RunningServer) -> Driver:
     return open_page(server.url, reduced_motion="reduce")
 
 
+@pytest.mark.no_3d_view
 def test_axe_finds_nothing_in_any_state_of_the_page(page: Driver, truth: Any) -> None:
     found: dict[str, list[str]] = {}
     user = page.page
@@ -76,6 +77,7 @@ def test_axe_finds_nothing_in_any_state_of_the_page(page: Driver, truth: Any) ->
     assert {state: words for state, words in found.items() if words} == {}
 
 
+@pytest.mark.no_3d_view
 def test_axe_finds_nothing_while_a_recording_is_opened(sample: Recording, open_page: Callable[..., Driver]) -> None:
     note = Opening("long.bag", "Opening long.bag (5.1 GB): reading its index and times…")
     with Service(ServerOptions(port=0, token="test", no_browser=True), note, lambda: None, let_in_after_s=0) as service:
@@ -86,6 +88,7 @@ def test_axe_finds_nothing_while_a_recording_is_opened(sample: Recording, open_p
         assert violations(page) == []
 
 
+@pytest.mark.no_3d_view
 def test_axe_finds_nothing_without_pictures_and_keys_reach_each_placement(
     open_page: Callable[..., Driver], radar_only_server: RunningServer
 ) -> None:
@@ -101,6 +104,7 @@ def test_axe_finds_nothing_without_pictures_and_keys_reach_each_placement(
     page.until("document.getElementById('picture-words').textContent.includes('Placement 3 of')")
 
 
+@pytest.mark.no_3d_view
 def test_the_picture_and_its_marks_are_told_in_words(page: Driver, truth: Any) -> None:
     page.click_sample(truth, 5)
     words = page.page.locator("#picture-words")
@@ -153,6 +157,7 @@ def test_tab_reaches_every_control_in_order_and_is_never_caught(page: Driver, tr
     assert page.value("window.reached.filter((element) => element.matches('tr')).length") == 1, "one stop per table"
 
 
+@pytest.mark.no_3d_view
 def test_arrows_go_through_the_pairs_and_the_figures(page: Driver, truth: Any) -> None:
     page.click_sample(truth, 5)
     user = page.page

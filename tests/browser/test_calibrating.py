@@ -11,7 +11,7 @@ import pytest
 from app.web.port.server import RunningServer
 from tests.browser.driving import Driver
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
 NUDGES = """["ArrowRight", "ArrowRight", "ArrowUp"].forEach((key) =>
     document.body.dispatchEvent(new KeyboardEvent("keydown", { key, altKey: true, bubbles: true })))"""
@@ -138,15 +138,6 @@ def test_playing_shows_frame_after_frame_and_space_stops_it(page: Driver) -> Non
     page.press(" ")
     assert not page.value("__cocalib.state.playing")
     page.until("__cocalib.state.shown.index === __cocalib.state.cursor")
-
-
-def test_keys_work_while_the_3d_view_has_the_focus(page: Driver) -> None:
-    space = page.page.frame_locator("#space-view").locator("canvas").last
-    space.wait_for(state="attached")
-    space.click(position={"x": 60, "y": 120})
-    assert page.value("document.activeElement.id") == "space-view"
-    page.press("ArrowRight", "ArrowRight")
-    page.until("__cocalib.state.shown.index === 2")
 
 
 def test_the_method_and_its_options_can_be_changed_and_reset(page: Driver, truth: Any) -> None:

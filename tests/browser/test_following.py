@@ -11,7 +11,7 @@ from calib_core.recordings import AwaitedRecording, FollowedRecording, open_reco
 from tests.browser.driving import Driver
 from tests.growing_recording import SampleWriter
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
 _DWELL_END_S = 21.0
 

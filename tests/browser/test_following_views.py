@@ -16,7 +16,7 @@ from app.workspace import Workspace
 from calib_core.measurements import Stamp
 from tests.browser.driving import Driver
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
 _STEPS = 300
 

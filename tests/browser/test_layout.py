@@ -1,23 +1,14 @@
-"""The page as a user finds it: what it says first, its layout, what the 3D view shows, and what it remembers."""
+"""The page as a user finds it: what it says first, its layout, and what it remembers."""
 
 from collections.abc import Callable
 from typing import Any
 
-import cv2
-import numpy as np
 import pytest
 
 from app.web.port.server import RunningServer
 from tests.browser.driving import Driver
 
-pytestmark = pytest.mark.browser
-
-
-def pixels(page: Driver, selector: str) -> np.ndarray:
-    """Return a screenshot of an element: (h, w, 3) BGR."""
-    picture = cv2.imdecode(np.frombuffer(page.page.locator(selector).screenshot(), np.uint8), cv2.IMREAD_COLOR)
-    assert picture is not None
-    return np.asarray(picture)
+pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
 
 def test_a_new_user_is_told_what_to_do_and_led_to_the_first_click(page: Driver) -> None:
@@ -37,21 +28,6 @@ def test_a_new_user_is_told_what_to_do_and_led_to_the_first_click(page: Driver) 
     assert page.page.locator(".pairs .row").count() == 1
 
 
-def test_the_3d_view_shows_the_scene_and_none_of_visers_own_panels(page: Driver) -> None:
-    space = page.page.frame_locator("#space-view")
-    space.locator("canvas").last.wait_for(state="attached")
-    page.press("n")
-    for _ in range(100):
-        blue, green, red = (pixels(page, "#space-view")[..., channel].astype(int) for channel in range(3))
-        sky = (blue > 150) & (blue > red + 15)
-        if sky.sum() > 200 and (green > red + 60).sum() > 20:
-            break  # the picture on the frustum, and the radar's y axis
-    else:
-        pytest.fail("the 3D view stayed empty")
-    for panel in (".mantine-Paper-root", ".mantine-Notifications-root"):
-        assert all(not part.is_visible() for part in space.locator(panel).all())
-
-
 def test_dividers_and_theme_are_remembered(page: Driver) -> None:
     before = page.value("__cocalib.viewport.width")
     bar = page.page.locator("#divider-x").bounding_box()
@@ -67,7 +43,7 @@ def test_dividers_and_theme_are_remembered(page: Driver) -> None:
     page.until("__cocalib.state.shown")
     assert page.value("__cocalib.viewport.width") == narrow
     assert page.value("document.documentElement.dataset.theme") == "light"
-    assert pixels(page, "#bar").mean() > 200
+    assert page.pixels("#bar").mean() > 200
 
 
 SIZES = (

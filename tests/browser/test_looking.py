@@ -11,7 +11,7 @@ from app.workspace import open_workspace
 from calib_core.recordings import open_recording
 from tests.browser.driving import Driver
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
 
 @pytest.fixture

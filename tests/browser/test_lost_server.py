@@ -9,7 +9,7 @@ from playwright.sync_api import Route, expect
 
 from tests.browser.driving import Driver
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 DIALOG = "#export-dialog"
 GONE = "The server is not responding. Your clicks are safe"
 

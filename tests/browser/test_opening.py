@@ -93,6 +93,7 @@ def test_the_first_picture_is_there_and_nothing_can_be_done_to_it_until_the_reco
         page.page.frame_locator("#space-view").locator("canvas").last.wait_for(state="attached")
 
 
+@pytest.mark.no_3d_view
 def test_why_it_cannot_be_opened_stays_on_the_page(
     sample: Recording, open_early: Callable[[RunningServer], Driver]
 ) -> None:
@@ -107,6 +108,7 @@ def test_why_it_cannot_be_opened_stays_on_the_page(
     page.forget_lost_connections()
 
 
+@pytest.mark.no_3d_view
 def test_a_page_that_comes_back_to_a_recording_still_being_opened_loses_no_click(
     sample: Recording, workspace: Workspace, server: RunningServer, page: Driver, tmp_path: Path
 ) -> None:

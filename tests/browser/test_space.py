@@ -188,13 +188,39 @@ def test_without_pictures_returns_and_placements_can_be_picked_too(
     page.until("__cocalib.state.cursor > 0 && __cocalibSpace.frameShown() === __cocalib.state.cursor")
 
 
-def test_before_a_pose_the_camera_view_says_why_there_are_no_returns(page: Driver) -> None:
+def test_the_3d_view_shows_the_scene_and_says_before_a_pose_why_there_are_no_returns(page: Driver) -> None:
+    scene_without_visers_own_panels(page)
+    keys_while_it_has_the_focus(page)
     page.page.click("#space-camera")
     page.until("document.querySelector('.space-readout').textContent.startsWith('No pose yet')")
     page.page.click("#space-camera")
     page.until("document.querySelector('.space-readout').textContent === ''")
 
 
+def scene_without_visers_own_panels(page: Driver) -> None:
+    space = page.page.frame_locator("#space-view")
+    space.locator("canvas").last.wait_for(state="attached")
+    page.press("n")
+    for _ in range(100):
+        blue, green, red = (page.pixels("#space-view")[..., channel].astype(int) for channel in range(3))
+        sky = (blue > 150) & (blue > red + 15)
+        if sky.sum() > 200 and (green > red + 60).sum() > 20:
+            break  # the picture on the frustum, and the radar's y axis
+    else:
+        pytest.fail("the 3D view stayed empty")
+    for panel in (".mantine-Paper-root", ".mantine-Notifications-root"):
+        assert all(not part.is_visible() for part in space.locator(panel).all())
+
+
+def keys_while_it_has_the_focus(page: Driver) -> None:
+    page.go_to(0)
+    page.page.frame_locator("#space-view").locator("canvas").last.click(position={"x": 60, "y": 120})
+    assert page.value("document.activeElement.id") == "space-view"
+    page.press("ArrowRight", "ArrowRight")
+    page.until("__cocalib.state.shown.index === 2")
+
+
+@pytest.mark.no_3d_view
 def test_the_mathematics_of_picking_and_of_range_numbers(page: Driver) -> None:
     found = page.page.evaluate(PICKING)
     assert found["nearest"] == "placement"

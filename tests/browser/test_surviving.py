@@ -95,6 +95,7 @@ def test_killing_the_server_loses_no_click_and_the_page_reconnects_by_itself(
     page.forget_lost_connections()
 
 
+@pytest.mark.no_3d_view
 def test_names_in_a_recording_are_text_and_never_run(open_page: Callable[..., Driver], tmp_path: Path) -> None:
     hostile = '<img src=x onerror="window.hit=1"><script>window.hit=1</script>'
     recording = PictureRecording(grey_pictures(3), image_topic=hostile, radar_topic=f"radar{hostile}")
@@ -114,6 +115,7 @@ def test_names_in_a_recording_are_text_and_never_run(open_page: Callable[..., Dr
         workspace.close()
 
 
+@pytest.mark.no_3d_view
 def test_large_frames_play_at_half_size_and_stand_at_full_size(
     open_page: Callable[..., Driver], tmp_path: Path
 ) -> None:

@@ -92,6 +92,7 @@ def test_sensors_that_never_recorded_together_are_reported(refused: Callable[...
 def test_missing_intrinsics_are_asked_for(refused: Callable[..., str], made: MadeRecording) -> None:
     line = refused(made(with_camera_info=False))
     assert "no intrinsics" in line
+    assert "cocalib intrinsics" in line
     assert "--camera" in line
 
 

@@ -93,6 +93,32 @@ def test_solve_takes_pairs_by_either_method(
     assert document["metrics"]["aed_px"] < 0.01
 
 
+def test_solve_refines_the_intrinsics_and_solves_its_file_again(
+    cocalib: Cocalib, pairs_file: Callable[..., Path], tmp_path: Path
+) -> None:
+    out, again, plain = (tmp_path / name for name in ("refined.json", "again.json", "plain.json"))
+    answer = cocalib("solve", "--pairs", pairs_file(), "--out", out, "--refine-intrinsics")
+    assert answer.code == 0, answer.err
+    assert "intrinsics: The intrinsics were refined with the pose: " in answer.out
+    document = json.loads(out.read_text())
+    assert document["options"]["refining"]["intrinsics"] is True
+    assert document["given_camera"]["matrix_px"] != document["camera"]["matrix_px"]
+    assert document["camera"]["covariance"]["order"][:2] == ["fx_px", "fy_px"]
+    assert cocalib("solve", "--pairs", out, "--out", again).code == 0
+    assert json.loads(again.read_text()) | {"provenance": 0} == document | {"provenance": 0}
+    assert cocalib("solve", "--pairs", out, "--out", plain, "--refining.intrinsics", "False").code == 0
+    assert json.loads(plain.read_text())["camera"] == document["given_camera"]
+    assert cocalib("check", again, "--of", out).code == 0
+
+
+def test_a_method_that_takes_the_intrinsics_as_they_are_refuses_to_refine_them(
+    cocalib: Cocalib, pairs_file: Callable[..., Path]
+) -> None:
+    answer = cocalib("solve", "--pairs", pairs_file(), "--method", "paper", "--refine-intrinsics")
+    assert answer.code == 2
+    assert "the method paper takes the intrinsics as they are" in answer.err
+
+
 def test_solve_takes_the_pose_of_the_mounting(
     cocalib: Cocalib, made: Callable[..., Path], clicks_file: Path, tmp_path: Path
 ) -> None:

@@ -1,5 +1,6 @@
 """`cocalib open` on recordings that lack a sensor: what is served, what is refused, and what is said."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -74,3 +75,13 @@ def test_intrinsics_next_to_the_recording_are_named(tmp_path: Path, capsys: pyte
     clicks = tmp_path / "clicks.json"
     assert run(["solve", str(tmp_path / "recording_csv"), "--clicks", str(clicks), "--confirm-assumptions"]) == 2
     assert f"such as --camera {tmp_path / 'recording_csv' / 'camera.yaml'}" in capsys.readouterr().err
+
+
+def test_clicks_that_nobody_confirmed_are_opened_with_a_note(
+    served: list[Workspace], made: Callable[..., Path], clicks_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    document = json.loads(clicks_file.read_text())
+    clicks_file.write_text(json.dumps({**document, "unconfirmed": {"clicks": ["c1", "c4"], "confidence": 0.97}}))
+    assert run(["open", str(made()), "--clicks", str(clicks_file), "--no-browser"]) == 0
+    assert f"note: {clicks_file}: nobody confirmed 2 of these clicks: look at each" in capsys.readouterr().err
+    assert len(served[0].session.clicks) == len(document["clicks"])

@@ -1,6 +1,7 @@
 """Which lines of our own code an input reaches, by the interpreter's own tracing."""
 
 import sys
+from opcode import opmap
 from pathlib import Path
 from types import CodeType, FrameType, TracebackType
 from typing import Any, Self
@@ -19,6 +20,7 @@ class ReachedLines:
     def __init__(self, prefixes: tuple[str, ...] = OURS) -> None:
         self.seen: set[tuple[str, int]] = set()
         self._prefixes = prefixes
+        self._traced: dict[int, tuple[CodeType, set[int], Any]] = {}
         self._new = 0
 
     def __enter__(self) -> Self:
@@ -62,9 +64,26 @@ class ReachedLines:
             return sys.monitoring.DISABLE  # a line counts once; the next new one is still reported
 
     def _entered(self, frame: FrameType, event: str, argument: Any) -> Any:
-        return self._traced if frame.f_code.co_filename.startswith(self._prefixes) else None
+        code = frame.f_code
+        known = self._traced.get(id(code))  # a code object's own hash would take as long as what is saved here
+        if known is None:
+            left = _lines_of(code) if code.co_filename.startswith(self._prefixes) else set()
+            known = self._traced[id(code)] = (code, left, self._tracer(code.co_filename, left))
+        return known[2] if known[1] else None
 
-    def _traced(self, frame: FrameType, event: str, argument: Any) -> Any:
-        if event == "line":
-            self._reached(frame.f_code.co_filename, frame.f_lineno)
-        return self._traced
+    def _tracer(self, file: str, left: set[int]) -> Any:
+        """Return what is called for every line of a function while some of its lines have not been reached."""
+
+        def trace(frame: FrameType, event: str, argument: Any) -> Any:
+            if frame.f_lineno in left and event == "line":
+                left.discard(frame.f_lineno)
+                self._reached(file, frame.f_lineno)
+            return trace
+
+        return trace
+
+
+def _lines_of(code: CodeType) -> set[int]:
+    """Return the lines of a function that are traced: not those of its beginning, up to RESUME."""
+    body = 2 + 2 * code.co_code[::2].index(opmap["RESUME"])
+    return {line for _, end, line in code.co_lines() if line is not None and end > body}

@@ -28,6 +28,7 @@ from calib_core.interchange import (
 )
 from calib_core.interchange.hypotheses.ranking import hypotheses_of
 from calib_core.interchange.hypotheses.reading import as_imported, read_unstated
+from calib_core.interchange.own.board_views_json import read_board_views
 from calib_core.measurements import TimeNs
 from calib_core.recordings import Recording, describe, first_picture, inspect_recording
 from calib_core.recordings.column_map import parse_column_map
@@ -208,7 +209,7 @@ def _unstated_files(_folder: Path) -> list[bytes]:
 
 def _own(data: bytes, _folder: Path) -> None:
     text = data.decode("utf-8", "surrogateescape")
-    for read in (read_clicks, read_pairs, read_calibration, read_camera):
+    for read in (read_clicks, read_pairs, read_calibration, read_camera, read_board_views):
         _swallow(lambda read=read: read(text, "input"))
 
 
@@ -216,7 +217,14 @@ def _own_files(_folder: Path) -> list[bytes]:
     text = (GOLDEN / "calibration-1.json").read_text(encoding="utf-8")
     camera = read_calibration(text).calibration.camera
     yaml = camera_info_text(camera, "camera")
-    return [text.encode(), yaml.encode(), _PAIRS, _CLICKS, b"%YAML:1.0\nM1: !!opencv-matrix\n   rows: 3\n   cols: 3\n"]
+    return [
+        text.encode(),
+        yaml.encode(),
+        _PAIRS,
+        _CLICKS,
+        _VIEWS,
+        b"%YAML:1.0\nM1: !!opencv-matrix\n   rows: 3\n   cols: 3\n",
+    ]
 
 
 def _session(data: bytes, folder: Path) -> None:
@@ -288,6 +296,11 @@ _PAIRS = (
     b'"pairs":[{"id":"p1","radar_m":[5,1,-0.5],"pixel_px":[212.9,239.4],"alternatives_radar_m":[[5,2,0]],"sigma_px":2}]}'
 )
 _CLICKS = b'{"schema":"cocalib/clicks-1","clicks":[{"id":"c1","image_time":{"sec":1700000000,"nanosec":5},"pixel_px":[1.5,2]}]}'
+_VIEWS = (
+    b'{"schema":"cocalib/board-views-1","board":{"kind":"checkerboard","columns":9,"rows":6,"square_m":0.025},'
+    b'"source":{"name":"a","pictures":3,"sha256":"' + 64 * b"0" + b'"},"complete":false,"searched":[[0,1]],'
+    b'"views":[{"index":0,"name":"a1","size_px":[640,480],"corner_ids":[0,5],"pixels_px":[[1.5,2],[3,4]],"blur_px":1.0}]}'
+)
 _REQUESTS = (b"/?token=x\nHost: 127.0.0.1:8080", b"/ws/a\nHost: localhost\nUpgrade: websocket\nOrigin: http://x")
 _TYPED = (b"x=posX:m", b"forward,right,up,degrees", b"2024-05-01T12:00:00.25+02:00", b"img_1715938951.208764")
 _CSV = (

@@ -12,7 +12,7 @@ from tests.fuzz.mutation import mutated
 from tests.fuzz.reached_lines import ReachedLines
 from tests.fuzz.targets import TARGETS
 
-ROUNDS = 150
+ROUNDS = 100
 
 
 @pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.name)

@@ -124,7 +124,7 @@ class HeldSolver:
     def __init__(self) -> None:
         self.requests: list[tuple[int, Unsolvable, Callable[[Solved], None]]] = []
 
-    def request(self, revision: int, clicks, options, when_done) -> None:
+    def request(self, revision: int, clicks, options, when_done, camera=None) -> None:
         self.requests.append((revision, answer_to(clicks, options), when_done))
 
     def answer(self, index: int) -> None:

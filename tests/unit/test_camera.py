@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from calib_core.camera import CAMERA_MODELS, Camera, CameraModel
+from calib_core.camera import CAMERA_MODELS, Camera, CameraCovariance, CameraModel
 from calib_core.synthetic import typical_camera
 
 MATRIX_PX = np.array([[500.0, 0.0, 319.5], [0.0, 510.0, 239.5], [0.0, 0.0, 1.0]])
@@ -104,3 +104,42 @@ def test_half_the_picture_keeps_the_centres_of_pixels_in_place() -> None:
 def test_an_invalid_camera_is_refused_with_a_reason(arguments: tuple[object, ...], reason: str) -> None:
     with pytest.raises(ValueError, match=reason):
         Camera(*arguments)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("model", CAMERA_MODELS)
+def test_pixels_move_with_the_intrinsics_as_their_derivative_says(model: CameraModel) -> None:
+    camera = typical_camera(model)
+    points = np.random.default_rng(1).uniform([-0.6, -0.6, 1.0], [0.6, 0.6, 2.0], (20, 3))
+    slopes = camera.parameter_planes(points.T)
+    for row, value in enumerate(camera.parameters):
+        step = 1e-6 * max(1.0, abs(value)) * np.eye(len(camera.parameters))[row]
+        ahead, behind = (camera.with_parameters(camera.parameters + way * step).project(points) for way in (1.0, -1.0))
+        np.testing.assert_allclose(slopes[row].T, (ahead - behind) / (2.0 * step[row]), rtol=1e-4, atol=1e-3)
+
+
+def test_the_covariance_of_the_intrinsics_is_scaled_with_the_picture() -> None:
+    camera = typical_camera("plumb_bob")
+    known = CameraCovariance(("fx_px", "k1"), np.array([[4.0, 0.1], [0.1, 0.01]]))
+    half = camera.with_parameters(camera.parameters, known).scaled(0.5)
+    assert half.covariance is not None
+    assert half.covariance.sigma("fx_px") == 1.0
+    assert half.covariance.sigma("k1") == pytest.approx(0.1)
+    assert half.covariance.sigma("cx_px") == 0.0
+    np.testing.assert_allclose(half.covariance.matrix[0, 1], 0.05)
+
+
+@pytest.mark.parametrize(
+    ("order", "matrix", "words"),
+    [
+        (("fx_px", "fx_px"), np.eye(2), "twice"),
+        (("fx_px",), np.array([[np.nan]]), "finite"),
+        (("fx_px", "fy_px"), np.array([[1.0, 0.5], [0.0, 1.0]]), "symmetric"),
+        (("fx_px", "fy_px"), np.array([[1.0, 2.0], [2.0, 1.0]]), "negative"),
+        (("fx_px",), np.array([[-1.0]]), "negative"),
+        (("k6",), np.eye(1), "k6, which plumb_bob does not have; it has fx_px, fy_px, cx_px, cy_px, k1"),
+    ],
+)
+def test_a_covariance_that_cannot_be_is_refused(order: tuple[str, ...], matrix: np.ndarray, words: str) -> None:
+    camera = typical_camera("plumb_bob")
+    with pytest.raises(ValueError, match=words):
+        camera.with_parameters(camera.parameters, CameraCovariance(order, matrix))

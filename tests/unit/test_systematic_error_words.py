@@ -48,6 +48,17 @@ def test_errors_along_several_axes_count_together() -> None:
     assert "± 5.4 px assumed, the pairs do not determine it" in rotation.sentence
 
 
+def test_the_parameter_of_a_lens_with_a_covariance_is_named() -> None:
+    fx = replace(AZIMUTH, name="lens_fx_px", value=-11.0, sigma=30.0, prior_sigma=140.0)
+    cx = replace(fx, name="lens_cx_px", position_share=0.2)
+    (found,) = dominant_errors([cx, fx], 100.0 * COVARIANCE, measured=False)
+    assert (
+        "position (90 cm) comes from the lens, as far as its calibration knows it, above all the focal length fx: "
+        "-11 ± 30 px, ± 140 px before any pair"
+    ) in found.sentence
+    assert found.label == "lens, focal length fx -11 ± 30 px"
+
+
 def test_one_error_behind_both_is_named_once() -> None:
     (found,) = dominant_errors([replace(AZIMUTH, rotation_share=0.95)], COVARIANCE, measured=False)
     assert (

@@ -7,6 +7,7 @@ from typing import Any
 from app.report.markup import Markup, scrolled, tag
 from app.report.subject import ReportSubject
 from app.view.wording import sentence
+from calib_core.camera import Camera
 from calib_core.options import CalibrationOptions
 from calib_core.results import InputFile
 
@@ -17,6 +18,7 @@ _RESTS_ON = {
     "clicked": "clicks: solved from pairs of radar positions and clicked pixels",
     "imported_proven": "an import whose meaning a check point, pairs or another calibration proved",
     "imported_assumed": "an import whose meaning is assumed",
+    "automatic": "clicks that were placed automatically and that nobody confirmed",
 }
 
 
@@ -89,7 +91,9 @@ def _facts(subject: ReportSubject) -> Iterator[tuple[str, str]]:
         )
         yield from (("assumed" if not one.confirmed else "confirmed", sentence(one.text)) for one in made.assumptions)
     if subject.calibration is not None:
-        yield "lens", _lens(subject)
+        yield "lens", _lens(subject.calibration.camera)
+        if subject.calibration.given_camera is not None:
+            yield "lens before it was refined", _lens(subject.calibration.given_camera)
     if subject.recording is not None:
         yield from ((f"recording, {what}", topic) for what, topic in subject.recording.topics)
 
@@ -102,9 +106,7 @@ def _topic(name: str | None, clock: str | None) -> str | None:
     return f"{name}, by {clock} stamps" if name and clock else name
 
 
-def _lens(subject: ReportSubject) -> str:
-    assert subject.calibration is not None
-    camera = subject.calibration.camera
+def _lens(camera: Camera) -> str:
     k = camera.matrix_px
     coefficients = ", ".join(f"{value:.6g}" for value in camera.distortion.tolist())
     distortion = f", distortion {coefficients}" if coefficients else ""

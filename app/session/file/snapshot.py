@@ -15,9 +15,11 @@ from app.session import (
     AssumptionsConfirmed,
     BoxesLoaded,
     BoxTrack,
+    ChosenIntrinsics,
     ClicksImported,
     ColumnsMapped,
     DismissedPlacement,
+    IntrinsicsChosen,
     OptionsChanged,
     PlacementDismissed,
     Session,
@@ -30,6 +32,7 @@ from app.session.file.errors import SessionFileError
 from app.session.file.form_parts import StampForm
 from app.session.file.guarded_folder import GuardedFolder
 from app.session.file.identity import RecordingForm
+from app.session.file.intrinsics_json import IntrinsicsForm, form_of_intrinsics, intrinsics_from_form
 from app.session.file.journal_reading import SCHEMA, SCHEMA_1
 from app.session.file.step_json import ClickForm, PlacementDismissedForm, click_from_form, form_of_click
 from calib_core.errors import CalibrationError
@@ -57,6 +60,7 @@ class _Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     acknowledged: tuple[str, ...] = ()
     boxes: tuple[BoxTrackForm, ...] = ()
     empty_frames: tuple[StampForm, ...] = ()
+    intrinsics: IntrinsicsForm | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +81,7 @@ class FoundSnapshot:
         acknowledged: the codes of the warnings that were read.
         boxes: around moving objects.
         empty_frames: frames that a file of boxes says are without any.
+        intrinsics: those that were chosen for the session.
     """
 
     recording: RecordingForm
@@ -92,6 +97,7 @@ class FoundSnapshot:
     acknowledged: tuple[str, ...] = ()
     boxes: tuple[BoxTrack, ...] = ()
     empty_frames: tuple[TimeNs, ...] = ()
+    intrinsics: ChosenIntrinsics | None = None
 
     @property
     def steps(self) -> tuple[Step, ...]:
@@ -102,7 +108,8 @@ class FoundSnapshot:
         dismissals = (PlacementDismissed(one.time, one.position_m) for one in self.dismissed)
         has_boxes = self.boxes or self.empty_frames
         loaded = (BoxesLoaded(self.boxes, self.empty_frames),) if has_boxes else ()
-        return (*reading, OptionsChanged(self.options), ClicksImported(self.clicks), *dismissals, *loaded)
+        chosen = (IntrinsicsChosen(self.intrinsics),) if self.intrinsics else ()
+        return (*reading, *chosen, OptionsChanged(self.options), ClicksImported(self.clicks), *dismissals, *loaded)
 
     def agrees_with(self, sums: Sequence[str]) -> bool:
         """Return whether the journal's lines are those of the snapshot, as far as both have them."""
@@ -143,6 +150,7 @@ def write_snapshot(
         acknowledged=session.acknowledged,
         boxes=tuple(map(form_of_track, session.boxes)),
         empty_frames=tuple(StampForm.of(Stamp.of(time)) for time in session.empty_frames),
+        intrinsics=form_of_intrinsics(session.intrinsics),
     )
     folder.replace(SNAPSHOT, line_bytes(sealed(msgspec.json.encode(snapshot))) + b"\n")
 
@@ -179,6 +187,7 @@ def read_snapshot(data: bytes, place: str) -> FoundSnapshot:
             acknowledged=snapshot.acknowledged,
             boxes=tuple(map(track_from_form, snapshot.boxes)),
             empty_frames=tuple(form.stamp.time for form in snapshot.empty_frames),
+            intrinsics=intrinsics_from_form(snapshot.intrinsics),
             sum=found.sum or sealed(data).sum,
         )
     except SessionFileError:

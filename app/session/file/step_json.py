@@ -16,6 +16,7 @@ from app.session import (
     ClickRemoved,
     ClicksImported,
     ColumnsMapped,
+    IntrinsicsChosen,
     OptionsChanged,
     PlacementDismissed,
     Redo,
@@ -26,6 +27,7 @@ from app.session import (
 )
 from app.session.file import box_json as boxes
 from app.session.file.form_parts import StampForm, StepPart
+from app.session.file.intrinsics_json import IntrinsicsChosenForm, chosen_from_form, form_of_chosen
 from calib_core.measurements import ChosenReturn, Mark, ReflectorClick, Stamp
 
 __all__ = [
@@ -39,6 +41,7 @@ __all__ = [
     "ClickRemovedForm",
     "ClicksImportedForm",
     "ColumnsMappedForm",
+    "IntrinsicsChosenForm",
     "OptionsChangedForm",
     "PixelForm",
     "PlacementDismissedForm",
@@ -184,6 +187,7 @@ StepForm: TypeAlias = (
     | WarningsAcknowledgedForm
     | OptionsChangedForm
     | ClearedForm
+    | IntrinsicsChosenForm
     | ClicksImportedForm
     | ColumnsMappedForm
     | AssumptionsConfirmedForm
@@ -255,6 +259,10 @@ for _event, _form_of in boxes.FORM_OF:
 
 for _form, _event_of in boxes.EVENT_OF:
     step_from_form.register(_form)(_event_of)
+
+
+form_of_step.register(IntrinsicsChosen)(form_of_chosen)
+step_from_form.register(IntrinsicsChosenForm)(chosen_from_form)
 
 
 @form_of_step.register

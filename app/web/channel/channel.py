@@ -30,8 +30,10 @@ from app.web.messages import (
     Hello,
     ImportWanted,
     Incoming,
+    LensRequest,
     OpeningCommand,
     Problem,
+    ProposingSwitch,
     ReviewRequest,
     SnapWanted,
     ViewpointWanted,
@@ -73,7 +75,7 @@ class Channel:
         self._frames = NewestWins(self._send_frame, self._report)
         self._overlay = NewestWins(self._send_overlay, self._report)
         self._space = NewestWins(self._draw_space, self._report)
-        self._review = ReviewDesk(hub.workspace, hub.recording, hub.camera, self.outbox, self._report)
+        self._review = ReviewDesk(hub.workspace, hub.recording, lambda: hub.camera, self.outbox, self._report)
         self._space_feed = SpaceFeed(hub)
         self._candidates = NewestWins(self._send_candidates, self._report)
         self._forward = True
@@ -161,13 +163,22 @@ class Channel:
         elif isinstance(command, ViewpointWanted):
             if self.scene is not None:
                 self.scene.look_from(command.viewpoint)
-        elif isinstance(command, FollowingStopped):
-            self._hub.box_following.stop()
+        elif isinstance(command, FollowingStopped | ProposingSwitch):
+            self._switch(command)
         elif isinstance(command, SnapWanted):
             hub = self._hub
             self.outbox.put(encode(await snapped(command, hub.moments, hub.frames, hub.executor)))
+        elif isinstance(command, LensRequest):
+            await self._hub.lens.obey(command)
         else:
             await self._change(command)
+
+    def _switch(self, command: FollowingStopped | ProposingSwitch) -> None:
+        """Start or stop what goes on in the background."""
+        if isinstance(command, ProposingSwitch):
+            self._hub.proposing.switch(command)
+        else:
+            self._hub.box_following.stop()
 
     def _give(self, command: FrameWanted | Hello | ViewWanted | ReviewRequest) -> None:
         """Hand over what a newer request of the same kind supersedes."""
@@ -228,7 +239,8 @@ class Channel:
                 encode(Problem(f"Frame {wanted.index + 1} cannot be shown: {error}", request=wanted.request))
             )
             return
-        header = FrameHeader(frame.index, wanted.request, frame.width_px, frame.height_px, frame.scale, frame.format)
+        shape = (frame.width_px, frame.height_px, frame.scale, frame.format, size == "rectified")
+        header = FrameHeader(frame.index, wanted.request, *shape)
         self.outbox.put(encode_frame(header, frame.data), kind="frame")
         self._prefetch(wanted)
 

@@ -14,9 +14,11 @@ from app.view import AccPanel, View, warning_in_sentences
 from app.web.channel.box_following import BoxFollowing
 from app.web.channel.box_judging import BoxJudging
 from app.web.channel.desk import ClosedDesk, Desk
+from app.web.channel.lens import LensDesk
 from app.web.channel.live_edge import LiveEdge
 from app.web.channel.outbox import Outbox
 from app.web.channel.picture_changes import PictureChanges, changes_of
+from app.web.channel.proposing import ProposingDesk
 from app.web.channel.radar_survey import Survey, survey_of
 from app.web.channel.view_feed import ViewFeed
 from app.web.frames import FrameStore
@@ -32,6 +34,7 @@ from app.web.messages import (
 )
 from app.web.radar_sight import RadarSight
 from app.workspace import Workspace
+from calib_core.camera import Camera
 from calib_core.errors import CalibrationError
 from calib_core.measurements import Stamp, TimeNs
 from calib_core.recordings import FollowedRecording, Recording, TopicSummary, clock_lines
@@ -73,16 +76,16 @@ class Hub:
         *,
         desk: Desk | None = None,
         opening: int = 1,
+        proposes: bool = False,
     ) -> None:
         self.desk: Desk = desk or ClosedDesk()
         self._opening = opening
         self.workspace = workspace
         self.recording = recording
         self.executor = executor
-        self.frames = FrameStore(recording, len(recording.image_times), executor)
+        self.frames = FrameStore(recording, len(recording.image_times), executor, camera=lambda: workspace.camera)
         self.radar = RadarSight(recording)
         self.moments = workspace.facts.moments
-        self.camera = workspace.camera
         self.survey: Survey | None = None
         self.picture_changes = PictureChanges()
         self.tabs: set[Tab] = set()
@@ -92,14 +95,18 @@ class Hub:
             workspace, recording, executor, lambda progress: self.broadcast(progress, "progress")
         )
         self.box_judging = BoxJudging(workspace, recording, executor, lambda: self.box_following.is_busy)
+        self.lens = LensDesk(workspace, recording, self.broadcast)
+        self.proposing = ProposingDesk(workspace, recording, self.broadcast, on=proposes)
         self._searching: asyncio.Task[None] | None = None
         self._edge = (
-            LiveEdge(self, workspace, recording, self.camera) if isinstance(recording, FollowedRecording) else None
+            LiveEdge(self, workspace, recording, workspace.camera) if isinstance(recording, FollowedRecording) else None
         )
 
     async def start(self) -> None:
         """Subscribe to the workspace, and start searching the radar."""
         loop = asyncio.get_running_loop()
+        self.lens.start()
+        self.proposing.start()
         self._end_subscription = self.workspace.subscribe(
             lambda view: None if loop.is_closed() else _soon(loop, partial(self._take, view))
         )
@@ -111,9 +118,16 @@ class Hub:
         if self._searching is not None:
             self._searching.cancel()
             await asyncio.gather(self._searching, return_exceptions=True)
+        await self.lens.close()
+        await self.proposing.close()
         await self.box_following.close()
         await self.box_judging.close()
         await self.frames.close()
+
+    @property
+    def camera(self) -> Camera | None:
+        """The intrinsics in use; None if there are none."""
+        return self.workspace.camera
 
     @property
     def view(self) -> View:
@@ -125,6 +139,8 @@ class Hub:
         outbox = tab.outbox
         outbox.put(encode(self._recording_note()), kind="recording")
         tab.show()
+        self.lens.greet(outbox)
+        self.proposing.greet(outbox)
         if self.survey is not None:
             for kind, message in self._found(self.survey):
                 outbox.put(encode(message), kind=kind)
@@ -140,6 +156,7 @@ class Hub:
     def concluded(self) -> None:
         """Show what is known of the recording now that it is complete: its warnings, and how its sensors are read."""
         self.broadcast(self._recording_note(), "recording")
+        self.proposing.follow()
 
     def surveyed(self, survey: Survey) -> None:
         """Show what the radar alone says, as far as it is known."""
@@ -147,6 +164,7 @@ class Hub:
         self.workspace.show_placements(survey.placements)
         for kind, message in self._found(survey):
             self.broadcast(message, kind)
+        self.proposing.surveyed(survey.placements)
         if before is None:
             self.broadcast(Progress(_SEARCHING, 1, 1), "progress")
 
@@ -161,6 +179,8 @@ class Hub:
         self.feed.take(view)
         self.box_following.follow()
         self.box_judging.judge()
+        self.lens.follow()
+        self.proposing.follow()
         for tab in self.tabs:
             tab.show()
             tab.show_boxes()
@@ -186,6 +206,7 @@ class Hub:
             self.broadcast(message, kind)
         for tab in self.tabs:
             tab.refresh()
+        self.proposing.surveyed(self.survey.placements if self.survey else ())
         if self.workspace.facts.has_pictures:
             with error_boundary("comparing the pictures", _log.error):
                 await changes_of(self.recording, self.moments, self.executor, self._compared, self._is_playing)

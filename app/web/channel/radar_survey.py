@@ -10,18 +10,14 @@ from app.web.channel.radar_map import RadarMapSum
 from app.web.messages import PlacementRow, Placements, RadarMap
 from calib_core.arrays import TimesNs
 from calib_core.association.gating import static_returns
-from calib_core.association.placements import Placement, find_placements
+from calib_core.association.placements import MOST_STATIC_RETURNS, Placement, find_placements, in_stretches
 from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 from calib_core.options import GatingOptions
 from calib_core.radar import polar_from_cartesian
-from calib_core.recordings.radar.scan_blocks import join_scans
 
 __all__ = ["Activity", "GrowingSurvey", "Survey", "placements_at", "survey_of"]
 
 _MOST_SLICES = 8000
-_MOST_STATIC_RETURNS = 1_000_000
-"""Limit of one stretch: more than an hour of 25 static returns in each of 10 scans a second; searching it takes about 200 MB."""
-
 _AT_RANGE_M = 1.0
 _OWN_RETURNS_M, _OWN_SHARE = 0.5, 0.1
 """Returns this far from a placement belong to it [m], and this share of its range more: angles scatter."""
@@ -74,7 +70,7 @@ def survey_of(windows: Iterable[RadarScans], moments: TimesNs, options: GatingOp
     activity, cells = _ActivitySum(moments), RadarMapSum(options)
     seen = [
         (placement, row)
-        for stretch in _stretches(map(activity.note, windows), options, cells)
+        for stretch in in_stretches(_static(map(activity.note, windows), options, cells))
         if _length_s(stretch.times_ns) >= SHORTEST_S  # searching a few dense clouds in vain would take minutes
         for placement in find_placements(stretch, options, min_dwell_s=SHORTEST_S)
         if (row := _row(placement, moments, stretch)) is not None
@@ -110,7 +106,7 @@ class GrowingSurvey:
             return
         static = static_returns(scans, self._options)
         self._cells.add(static)
-        self._static = join_scans([self._static, static])
+        self._static = RadarScans.joined([self._static, static])
         self._times.append(scans.times_ns)
         self._counts.append(np.diff(scans.first_return))
 
@@ -123,7 +119,7 @@ class GrowingSurvey:
         found = find_placements(self._static, self._options, min_dwell_s=SHORTEST_S)
         new = [(one, row) for one in found if (row := _row(one, moments, self._static)) is not None]
         seen = [*self._settled, *new]
-        if len(self._static.points_radar_m) > _MOST_STATIC_RETURNS:
+        if len(self._static.points_radar_m) > MOST_STATIC_RETURNS:
             self._settled, self._static = seen, RadarScans()
         activity = _ActivitySum(moments)
         if self._times:
@@ -140,16 +136,12 @@ def _survey(
     return Survey(tuple(pair[0] for pair in seen), rows, activity.total(), cells.total(), message)
 
 
-def _stretches(windows: Iterable[RadarScans], options: GatingOptions, cells: RadarMapSum) -> Iterator[RadarScans]:
-    """Yield the static returns of a recording, in several pieces if there are too many; put them on the map."""
-    pieces: list[RadarScans] = []
+def _static(windows: Iterable[RadarScans], options: GatingOptions, cells: RadarMapSum) -> Iterator[RadarScans]:
+    """Yield the static returns of each window, and put them on the map."""
     for window in windows:
-        pieces.append(static_returns(window, options))
-        cells.add(pieces[-1])
-        if sum(len(piece.points_radar_m) for piece in pieces) > _MOST_STATIC_RETURNS:
-            yield join_scans(pieces)
-            pieces = []
-    yield join_scans(pieces)
+        static = static_returns(window, options)
+        cells.add(static)
+        yield static
 
 
 def _length_s(times_ns: TimesNs) -> float:

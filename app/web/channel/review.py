@@ -63,7 +63,7 @@ class ReviewDesk:
         self,
         workspace: Workspace,
         recording: RadarSource,
-        camera: Camera | None,
+        camera: Callable[[], Camera | None],
         outbox: Outbox,
         report: Callable[[str], None],
     ) -> None:
@@ -171,7 +171,7 @@ class ReviewDesk:
         return solution_of(label, self._solved(replace(session, clicks=others), session.options))
 
     def _solved(self, session: Session, options: CalibrationOptions) -> Calibration:
-        outcome = solve_clicks(self._recording, session.clicks, self._camera, options)
+        outcome = solve_clicks(self._recording, session.clicks, self._camera(), options)
         if isinstance(outcome, Unsolvable):
             raise InputError(f"{outcome.reason}; {outcome.hint}")
         return outcome
@@ -188,12 +188,13 @@ class ReviewDesk:
         if self._read is not None and self._read[0] is request:
             return self._read[1]
         name = request.file_name or "the file"
-        if self._camera is None:
+        camera = self._camera()
+        if camera is None:
             raise InputError(f"{name}: drawing a calibration needs intrinsics; start again with --camera FILE")
         try:
             data = base64.b64decode(request.file_base64, validate=True)
         except binascii.Error as error:
             raise InputError(f"{name}: was not sent as base64: {error}") from None
         found = read_clear(data, name)
-        self._read = request, Solution(name, found, adopted_calibration(found, name, camera=self._camera))
+        self._read = request, Solution(name, found, adopted_calibration(found, name, camera=camera))
         return self._read[1]

@@ -24,6 +24,22 @@ from app.web.messages.incoming import (
     parse,
     request_of,
 )
+from app.web.messages.lens_messages import (
+    LensCalibrate,
+    LensCamera,
+    LensCancel,
+    LensCoverage,
+    LensGrid,
+    LensLeftOut,
+    LensParameter,
+    LensRequest,
+    LensResult,
+    LensState,
+    LensTally,
+    LensTrial,
+    LensUse,
+    LensViewRow,
+)
 from app.web.messages.opening_messages import (
     MAX_CAMERA_FILE_BYTES,
     ChoicesWanted,
@@ -61,6 +77,13 @@ from app.web.messages.outgoing import (
     encode,
     encode_frame,
 )
+from app.web.messages.proposal_messages import (
+    ProposalNews,
+    ProposalPlace,
+    ProposalRow,
+    ProposingSwitch,
+    UnproposedRow,
+)
 from app.web.messages.radar_messages import PlacementRow, Placements, RadarLook, RadarMap, RadarReturn
 from app.web.messages.review_messages import ReviewRequest, Uncertainty
 from app.web.messages.space_messages import (
@@ -97,6 +120,20 @@ __all__ = [
     "ImportWanted",
     "Incoming",
     "IntrinsicsChoice",
+    "LensCalibrate",
+    "LensCamera",
+    "LensCancel",
+    "LensCoverage",
+    "LensGrid",
+    "LensLeftOut",
+    "LensParameter",
+    "LensRequest",
+    "LensResult",
+    "LensState",
+    "LensTally",
+    "LensTrial",
+    "LensUse",
+    "LensViewRow",
     "OpenWith",
     "Opening",
     "OpeningChoices",
@@ -110,6 +147,10 @@ __all__ = [
     "Placements",
     "Problem",
     "Progress",
+    "ProposalNews",
+    "ProposalPlace",
+    "ProposalRow",
+    "ProposingSwitch",
     "RadarLook",
     "RadarMap",
     "RadarReturn",
@@ -134,6 +175,7 @@ __all__ = [
     "StampColumns",
     "TopicRow",
     "Uncertainty",
+    "UnproposedRow",
     "ViewChange",
     "ViewWanted",
     "Viewpoint",

@@ -13,7 +13,9 @@ from msgspec import Meta
 from app.option_changes import changes_from_tree
 from app.session import ClickPlaced, OptionsEdited, Step
 from app.session.file import step_json as forms
+from app.web.messages.lens_messages import LensRequest
 from app.web.messages.opening_messages import ChoicesWanted, FolderWanted, OpeningCommand, OpenWith, RecentForgotten
+from app.web.messages.proposal_messages import ProposingSwitch
 from app.web.messages.review_messages import ReviewRequest
 from calib_core.errors import InputError
 from calib_core.measurements import TimeNs
@@ -64,13 +66,13 @@ class FrameWanted:
         index: of the frame.
         request: echoed in the picture's header; a newer request of the same page supersedes this one.
         playing: frames follow one another quickly.
-        size: "half" is enough while playing.
+        size: "half" is enough while playing; "rectified" is the whole picture without distortion.
     """
 
     index: int
     request: int
     playing: bool = False
-    size: Literal["full", "half"] = "full"
+    size: Literal["full", "half", "rectified"] = "full"
 
 
 ReturnColour: TypeAlias = Literal["speed", "range", "doppler", "amplitude", "height"]
@@ -170,6 +172,8 @@ Command: TypeAlias = (
     | ViewpointWanted
     | ImportWanted
     | ReviewRequest
+    | LensRequest
+    | ProposingSwitch
     | SnapWanted
     | FollowingStopped
     | BoxesWanted
@@ -207,7 +211,7 @@ class FrameForm(_Form, frozen=True, tag="frame"):
     index: FrameIndex
     request: RequestNumber
     playing: bool = False
-    size: Literal["full", "half"] = "full"
+    size: Literal["full", "half", "rectified"] = "full"
 
 
 class CursorForm(_Form, frozen=True, tag="cursor"):
@@ -265,6 +269,8 @@ MessageForm: TypeAlias = (
     | ViewpointForm
     | ImportForm
     | ReviewRequest
+    | LensRequest
+    | ProposingSwitch
     | SnapForm
     | StopFollowingForm
     | LoadBoxesForm
@@ -383,6 +389,16 @@ def _viewpoint(form: ViewpointForm) -> Command:
 
 @_command.register
 def _review(form: ReviewRequest) -> Command:
+    return form
+
+
+@_command.register
+def _lens(form: LensRequest) -> Command:
+    return form
+
+
+@_command.register
+def _propose(form: ProposingSwitch) -> Command:
     return form
 
 

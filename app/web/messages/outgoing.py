@@ -13,7 +13,9 @@ from app.view.review import Review
 from app.view.review_pair import PairReview
 from app.view.review_solutions import Compared
 from app.web.messages.box_messages import FrameBoxes
+from app.web.messages.lens_messages import LensResult, LensState
 from app.web.messages.opening_messages import FolderListing, OpeningChoices
+from app.web.messages.proposal_messages import ProposalNews
 from app.web.messages.radar_messages import Placements, RadarLook, RadarMap
 from app.web.messages.review_messages import Uncertainty
 from app.web.messages.space_messages import SpaceLook
@@ -290,6 +292,7 @@ class FrameHeader:
         height_px: rows of the recorded frame.
         scale: size of this picture relative to the recorded one.
         format: of the bytes.
+        rectified: whether it is shown without distortion.
     """
 
     index: int
@@ -298,6 +301,7 @@ class FrameHeader:
     height_px: int
     scale: float
     format: Literal["jpeg", "png"]
+    rectified: bool = False
 
 
 Outgoing: TypeAlias = (
@@ -320,6 +324,9 @@ Outgoing: TypeAlias = (
     | PairReview
     | Compared
     | Uncertainty
+    | LensState
+    | LensResult
+    | ProposalNews
     | Progress
     | Snapped
     | Problem
@@ -346,6 +353,9 @@ TYPES: Mapping[type, str] = {
     PairReview: "pair_review",
     Compared: "compared",
     Uncertainty: "uncertainty",
+    LensState: "lens",
+    LensResult: "lens_result",
+    ProposalNews: "proposals",
     Progress: "progress",
     Snapped: "snapped",
     Problem: "error",

@@ -35,6 +35,7 @@ class ServerOptions:
         more_hosts: further host names that requests may use.
         socket: serve on this Unix socket instead of a port.
         session: what is served, such as the session's folder: cookies and tickets are for it only.
+        proposes: whether to propose where the reflector stood without being asked.
     """
 
     host: str = "127.0.0.1"
@@ -44,6 +45,7 @@ class ServerOptions:
     more_hosts: tuple[str, ...] = ()
     socket: Path | None = None
     session: str = ""
+    proposes: bool = False
 
 
 class Link:

@@ -18,6 +18,7 @@ from app.session import Session
 from app.solving import calibration_text
 from app.view import sentence
 from app.web.channel.export_preview import NoPreview, export_preview, exported, format_rows
+from app.web.channel.lens import LensDesk
 from app.web.channel.open_meaning import drawn_meaning, meaning_rows
 from app.web.channel.picture_changes import PictureChanges
 from app.web.channel.radar_survey import Survey
@@ -65,16 +66,19 @@ _LANDING = (
     b'<p><a href="/">Open the page</a>'
 )
 _PAGE = "index.html"
+_INDEX = re.compile(r"[0-9]{1,9}")
 _VISER_PAGE = re.compile(r"/viser/[0-9a-z]{1,40}/")
 
 
 class Surveyor(Protocol):
-    """Provides the radar survey once it is complete, and how much the pictures change as far as it is known."""
+    """Provides the radar survey once it is complete, how much the pictures change, and the lens, as far as they are known."""
 
     @property
     def survey(self) -> Survey | None: ...
     @property
     def picture_changes(self) -> PictureChanges: ...
+    @property
+    def lens(self) -> LensDesk: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,6 +186,8 @@ class _Downloads:
             "/api/boxes.json": self._boxes,
             "/api/formats.json": _formats,
             "/api/activity.json": self._activity,
+            "/api/camera.yaml": self._camera,
+            "/api/board_corners.json": self._board_corners,
             "/api/picture_changes.json": self._picture_changes,
             "/api/check_point_picture": self._check_point_picture,
             "/api/meanings.json": self._meanings,
@@ -246,6 +252,19 @@ class _Downloads:
 
     def _boxes(self, _query: str) -> Reply:
         return _download(boxes_text(self._workspace.boxes).encode(), "boxes.json")
+
+    def _camera(self, query: str) -> Reply:
+        """Return the calibrated lens, or with the query "in_use" the intrinsics that the session is solved with."""
+        try:
+            return _download(self._hub.lens.camera_yaml(calibrated=query != "in_use").encode(), "camera.yaml")
+        except CalibrationError as error:
+            return refusal(409, sentence(str(error)))
+
+    def _board_corners(self, query: str) -> Reply:
+        """Return the corners that were found in the frame whose index is the query."""
+        if not _INDEX.fullmatch(query):
+            return refusal(400, "Name the frame by its index.")
+        return json_reply(msgspec.json.encode(self._hub.lens.corners(int(query))))
 
     def _activity(self, _query: str) -> Reply:
         survey = self._hub.survey

@@ -77,7 +77,14 @@ class RunningServer:
     def admit(self, workspace: Workspace, recording: Recording) -> None:
         """Serve this recording from now on, also to the pages that are waiting."""
         self._openings += 1
-        hub = Hub(workspace, recording, self._executor, desk=self._desk, opening=self._openings)
+        hub = Hub(
+            workspace,
+            recording,
+            self._executor,
+            desk=self._desk,
+            opening=self._openings,
+            proposes=self._link.options.proposes,
+        )
 
         async def open_up() -> None:
             await hub.start()

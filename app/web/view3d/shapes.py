@@ -8,7 +8,7 @@ import numpy as np
 from app.colours import Colour
 from calib_core.arrays import Points3
 from calib_core.camera import Camera
-from calib_core.geometry import RigidTransform
+from calib_core.geometry import OPTICAL_FROM_LINK, RigidTransform
 from calib_core.options import NoiseOptions
 from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar
 from calib_core.results import Calibration, PairResult
@@ -137,7 +137,7 @@ def next_place(places_radar_m: Points3, *, radius_m: float = 0.5, dashes: int = 
 
 def nominal_camera_from_radar() -> RigidTransform:
     """Return the pose of a camera at the radar's position that looks along its x axis, for use without a calibration."""
-    return RigidTransform(np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]), np.zeros(3))
+    return RigidTransform(OPTICAL_FROM_LINK, np.zeros(3))
 
 
 def vertical_field_of_view_rad(camera: Camera) -> float:

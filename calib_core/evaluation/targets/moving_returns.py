@@ -8,7 +8,7 @@ import numpy as np
 
 from calib_core.arrays import Flags, Indices, Values, frozen_array
 from calib_core.evaluation.targets.ego_motion import LEAST_RETURNS, cell_weights, ego_velocity
-from calib_core.measurements import RadarScans, joined_alternatives
+from calib_core.measurements import RadarScans
 from calib_core.options import option
 from calib_core.results import DataWarning
 
@@ -112,7 +112,7 @@ def moving_returns(windows: Iterable[RadarScans], options: TargetOptions) -> Mov
     for window in windows:
         pieces.append(_sifted(window, options, offset))
         offset += len(window.points_radar_m)
-    scans = _joined([piece.scans for piece in pieces])
+    scans = RadarScans.joined([piece.scans for piece in pieces])
     rows = np.concatenate([np.zeros(0, dtype=np.int64), *(piece.rows for piece in pieces)])
     searched = sum(piece.searched for piece in pieces)
     if sum(piece.unknown for piece in pieces) > _UNKNOWN_SHARE * searched:
@@ -167,23 +167,6 @@ def _usable(scans: RadarScans, options: TargetOptions) -> Flags:
         first = np.unique(keys, axis=0, return_index=True)[1] if len(keys) else np.zeros(0, dtype=np.int64)
         usable[np.delete(numbered, first)] = False
     return np.asarray(usable)
-
-
-def _joined(pieces: list[RadarScans]) -> RadarScans:
-    if len(pieces) == 1:
-        return pieces[0]
-    if not pieces:
-        return RadarScans()
-    ends = np.concatenate([np.diff(piece.first_return) for piece in pieces])
-    return RadarScans(
-        times_ns=np.concatenate([piece.times_ns for piece in pieces]),
-        first_return=np.concatenate([[0], np.cumsum(ends)]),
-        points_radar_m=np.concatenate([piece.points_radar_m for piece in pieces]),
-        doppler_mps=np.concatenate([piece.doppler_mps for piece in pieces]),
-        snr_db=np.concatenate([piece.snr_db for piece in pieces]),
-        sigma_polar=np.concatenate([piece.sigma_polar for piece in pieces]),
-        alternative_of=joined_alternatives(pieces),
-    )
 
 
 def _without_doppler(options: TargetOptions) -> tuple[DataWarning, ...]:

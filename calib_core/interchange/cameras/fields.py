@@ -2,20 +2,21 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from calib_core.camera import Camera
+from calib_core.camera import CameraCovariance
 from calib_core.errors import InputError
+from calib_core.interchange.cameras.camera_format import FoundCamera, PictureWindow, found_or_refused
+from calib_core.interchange.cameras.numbers import floats
 from calib_core.interchange.own.camera_document import camera_of
 from calib_core.interchange.own.documents import CameraDocument
 from calib_core.interchange.syntax.strict_json import checked
-from calib_core.lens_models.naming import lenses_named, opencv_lens
 from calib_core.lens_models.registry import LENS_MODELS
 
-__all__ = ["FoundCamera", "find_cameras", "floats", "lens_model_named"]
+__all__ = ["find_cameras", "lens_model_named"]
 
 _MATRIX_KEYS = {  # key of the camera matrix -> keys of the distortion
     "camera_matrix": ("distortion_coefficients", "dist_coeffs", "distortion_coeffs", "dist_coeff"),
@@ -25,53 +26,8 @@ _MATRIX_KEYS = {  # key of the camera matrix -> keys of the distortion
     "K": ("D",),
     "k": ("d",),
 }
-_LARGEST = 1e9
 _WIDTH_KEYS = ("image_width", "image_Width", "width", "width_px")
 _HEIGHT_KEYS = ("image_height", "image_Height", "height", "height_px")
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FoundCamera:
-    """What a file says about one camera, before any check.
-
-    Attributes:
-        name: its key in the file.
-        model: our name for its lens model; "" if the file implies it by the number of coefficients.
-        matrix_px: (9,) row-major.
-        distortion: the coefficients, as many as the file has.
-        size_px: width and height; None if the file does not state them.
-    """
-
-    name: str
-    model: str
-    matrix_px: tuple[float, ...]
-    distortion: tuple[float, ...]
-    size_px: tuple[int, int] | None
-
-    def camera(self, *, image_size_px: tuple[int, int] | None, source: str) -> Camera:
-        """Return the camera.
-
-        Raises:
-            InputError: the image size is missing, or a parameter is invalid.
-        """
-        size = self.size_px or image_size_px
-        if size is None:
-            raise InputError(
-                f"{source}: {self.name}: the image size is missing; add image_width and image_height to the file"
-            )
-        model, distortion = self.lens(source=source)
-        try:
-            return Camera(model, *size, np.reshape(self.matrix_px, (3, 3)), np.array(distortion))
-        except ValueError as error:
-            raise InputError(f"{source}: {self.name}: {error}; correct it or calibrate the camera again") from None
-
-    def lens(self, *, source: str) -> tuple[str, tuple[float, ...]]:
-        """Return the lens model and its coefficients.
-
-        Raises:
-            InputError: the model does not take that number of coefficients.
-        """
-        return _lens(self.model, self.distortion, source=source, name=self.name)
 
 
 def find_cameras(content: Mapping[str, Any], *, source: str) -> tuple[FoundCamera, ...]:
@@ -85,10 +41,12 @@ def find_cameras(content: Mapping[str, Any], *, source: str) -> tuple[FoundCamer
         return (ours,)
     kalibr = [key for key, value in content.items() if isinstance(value, Mapping) and "intrinsics" in value]
     if kalibr:
-        return tuple(_kalibr_camera(key, content[key], source=source) for key in kalibr)
+        return tuple(found_or_refused(key, partial(_kalibr_camera, key, content[key], source=source)) for key in kalibr)
     for matrix_key, distortion_keys in _MATRIX_KEYS.items():
         if matrix_key in content:
             return (_flat_camera(content, matrix_key, distortion_keys, source=source),)
+    if {"fx", "fy"} <= set(content):
+        return (_named_numbers(content, source=source),)
     if isinstance(content.get("CameraCalibration"), Mapping):
         return find_cameras(content["CameraCalibration"], source=source)
     numbered = [match for key in content if (match := re.fullmatch(r"(?:M|K|cameraMatrix)(\d)", str(key)))]
@@ -111,6 +69,7 @@ def _our_camera(content: Mapping[str, Any], *, source: str) -> FoundCamera | Non
         matrix_px=tuple(camera.matrix_px.ravel().tolist()),
         distortion=tuple(camera.distortion.tolist()),
         size_px=(camera.width_px, camera.height_px),
+        covariance=camera.covariance,
     )
 
 
@@ -122,12 +81,38 @@ def _flat_camera(
     model = str(content.get("distortion_model") or content.get("model") or "")
     if str(content.get("fisheye_model", "0")).lower() in ("1", "true"):
         model = "fisheye"
-    _refuse_crop(content, source=source)
     return FoundCamera(
         name=matrix_key,
         model=lens_model_named(model, source=source),
         matrix_px=_matrix(content[matrix_key], source=source, place=matrix_key),
         distortion=floats(distortion, source=source, place=distortion_keys[0]),
+        size_px=_size(content, source=source),
+        covariance=_covariance(content, source=source),
+        window=_window(content, source=source),
+    )
+
+
+def _named_numbers(content: Mapping[str, Any], *, source: str) -> FoundCamera:
+    """Read fx, fy and the principal point under their own names, as cameras' software writes them."""
+    centre = [next((content[key] for key in keys if key in content), None) for keys in (("cx", "ppx"), ("cy", "ppy"))]
+    fx, fy, cx, cy = floats([content["fx"], content["fy"], *centre], source=source, place="fx, fy, cx (ppx), cy (ppy)")
+    given = next((content[key] for key in ("coeffs", "distortion", "D", "dist_coeffs") if key in content), None)
+    if given is None:
+        named = [content.get(key, 0.0) for key in ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")]
+        given = named[: 8 if any(named[5:]) else 5] if "k1" in content else ()
+    distortion = floats(given, source=source, place="coeffs")
+    model = str(content.get("model") or content.get("distortion_model") or "").removeprefix("distortion.").lower()
+    if "inverse" in model and any(distortion):
+        raise InputError(
+            f"{source}: the lens model {model!r} maps from distorted to ideal points, which no other tool does; "
+            "calibrate the camera with a board"
+        )
+    plain = "inverse" in model or model in ("none", "") or not any(distortion)
+    return FoundCamera(
+        name="camera",
+        model="" if plain else lens_model_named(model, source=source),
+        matrix_px=(fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0),
+        distortion=distortion if any(distortion) else (),
         size_px=_size(content, source=source),
     )
 
@@ -154,14 +139,39 @@ def _kalibr_camera(key: str, block: Mapping[str, Any], *, source: str) -> FoundC
     )
 
 
-def _refuse_crop(content: Mapping[str, Any], *, source: str) -> None:
-    """Refuse a camera matrix that does not belong to the recorded picture (REP-104)."""
-    roi = content.get("roi")
-    cropped = isinstance(roi, Mapping) and any(roi.get(key) for key in ("x_offset", "y_offset"))
-    if cropped or any(content.get(key) not in (None, 0, 1) for key in ("binning_x", "binning_y")):
-        raise InputError(
-            f"{source}: binning or a region of interest is set; give the intrinsics of the recorded picture"
-        )
+def _window(content: Mapping[str, Any], *, source: str) -> PictureWindow | None:
+    """Return the part of the sensor that was published, for K of the full one (REP 104); None for all of it."""
+    roi = content.get("roi") if isinstance(content.get("roi"), Mapping) else {}
+    numbers = [_count(roi, key, source=source) for key in ("x_offset", "y_offset", "width", "height")]
+    binning = tuple(max(1, _count(content, key, source=source)) for key in ("binning_x", "binning_y"))
+    x, y, width, height = numbers
+    if bool(width) != bool(height):
+        raise InputError(f"{source}: roi: width {width} and height {height}: state both, or 0 for the whole picture")
+    if not any(numbers) and binning == (1, 1):
+        return None
+    return PictureWindow((x, y), (width, height) if width else None, (binning[0], binning[1]))
+
+
+def _count(content: Any, key: str, *, source: str) -> int:
+    (number,) = floats([content.get(key) or 0], source=source, place=key)
+    if number < 0 or number != int(number):
+        raise InputError(f"{source}: {key}: {number:g} is not a number of pixels; correct it")
+    return int(number)
+
+
+def _covariance(content: Mapping[str, Any], *, source: str) -> CameraCovariance | None:
+    """Read the covariance of the intrinsics from the keys that we add to ROS YAML."""
+    order = content.get("camera_covariance_order")
+    if order is None:
+        return None
+    names = tuple(str(name) for name in order) if isinstance(order, list) else ()
+    numbers = floats(
+        content.get("camera_covariance", ()), source=source, place="camera_covariance", length=len(names) ** 2
+    )
+    try:
+        return CameraCovariance(names, np.reshape(numbers, (len(names), len(names))))
+    except ValueError as error:
+        raise InputError(f"{source}: camera_covariance: {error}; leave it out or correct it") from None
 
 
 def lens_model_named(name: str, *, source: str) -> str:
@@ -178,23 +188,6 @@ def lens_model_named(name: str, *, source: str) -> str:
     return models[name.lower()]
 
 
-def _lens(model: str, distortion: tuple[float, ...], *, source: str, name: str) -> tuple[str, tuple[float, ...]]:
-    """Determine model and coefficients: an unnamed model follows from their number as in OpenCV; surplus zeros are dropped."""
-    lens = LENS_MODELS[model] if model else opencv_lens(len(distortion))
-    if not distortion:  # ROS also calls a pinhole plumb_bob
-        lens = next((bare for bare in lenses_named("camera_info", lens.name) if 0 in bare.counts), lens)
-    longest = lens.counts[-1]
-    if len(distortion) > longest and not any(distortion[longest:]):
-        distortion = distortion[:longest]
-    if len(distortion) not in lens.counts:
-        wanted = " or ".join(map(str, lens.counts))
-        raise InputError(
-            f"{source}: {name}: {lens.name} takes {wanted} distortion coefficients, found {len(distortion)} "
-            "(thin prism and tilt are not supported); calibrate the camera with that model"
-        )
-    return lens.name, distortion
-
-
 def _size(content: Mapping[str, Any], *, source: str) -> tuple[int, int] | None:
     width = next((content[key] for key in _WIDTH_KEYS if content.get(key)), None)
     height = next((content[key] for key in _HEIGHT_KEYS if content.get(key)), None)
@@ -206,30 +199,3 @@ def _size(content: Mapping[str, Any], *, source: str) -> tuple[int, int] | None:
 
 def _matrix(value: Any, *, source: str, place: str) -> tuple[float, ...]:
     return floats(value, source=source, place=place, length=9)
-
-
-def floats(value: Any, *, source: str, place: str, length: int | None = None) -> tuple[float, ...]:
-    """Return the finite numbers in a list, a list of rows, or an OpenCV or ROS matrix, row by row.
-
-    Raises:
-        InputError: an entry is not a finite number, or there are too few or too many.
-    """
-    if isinstance(value, Mapping):
-        value = value.get("data", ())
-    flat: list[float] = []
-    for item in value if isinstance(value, list | tuple) else [value]:
-        for number in item if isinstance(item, list | tuple) else [item]:
-            flat.append(_number(number, source=source, place=place))
-    if length is not None and len(flat) != length:
-        raise InputError(f"{source}: {place}: expected {length} numbers, found {len(flat)}; correct it")
-    return tuple(flat)
-
-
-def _number(value: Any, *, source: str, place: str) -> float:
-    try:
-        number = float("nan") if isinstance(value, bool) else float(value)
-    except (TypeError, ValueError, OverflowError):
-        number = float("nan")
-    if not abs(number) <= _LARGEST:
-        raise InputError(f"{source}: {place}: {str(value)[:60]!r} is not a valid number; correct it")
-    return number

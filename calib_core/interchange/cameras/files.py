@@ -1,33 +1,32 @@
-"""Read a camera from the file formats in common use, and write ROS camera_info YAML."""
+"""Read a camera from the file formats in common use."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.input_files import file_text, read_input
-from calib_core.interchange.cameras.fields import FoundCamera, find_cameras
+from calib_core.interchange.cameras.camera_format import FoundCamera
+from calib_core.interchange.cameras.fields import find_cameras
+from calib_core.interchange.cameras.written import CAMERA_FORMATS
 from calib_core.interchange.syntax.opencv_xml import load_opencv_xml
 from calib_core.interchange.syntax.strict_json import json_object
-from calib_core.interchange.syntax.yaml_text import load_yaml, numbers_text, quoted
-from calib_core.lens_models.naming import written_lens
+from calib_core.interchange.syntax.yaml_text import load_yaml
 
-__all__ = ["CameraFile", "camera_info_text", "read_camera", "read_camera_file"]
+__all__ = ["CameraFile", "read_camera", "read_camera_file"]
 
 _MAX_BYTES = 512 * 1024 * 1024
 _LOOKED_FOR = (
     "looked for camera_matrix and image_width (ROS, OpenCV), cam0 with intrinsics (Kalibr), K and D (CameraInfo), "
-    "model and matrix_px (cocalib)"
+    "fx and fy, lensmodel (mrcal), lines of COLMAP or KITTI, model and matrix_px (cocalib)"
 )
 
 
 def read_camera(
     text: str, source: str = "camera", *, name: str | None = None, image_size_px: tuple[int, int] | None = None
 ) -> Camera:
-    """Read a camera from ROS camera_info YAML, OpenCV FileStorage YAML or XML, Kalibr camchain, or our own JSON.
+    """Read a camera from a file of any format in `written.CAMERA_FORMATS`, recognized by its content.
 
     Args:
         text: the file's content.
@@ -38,11 +37,7 @@ def read_camera(
     Raises:
         InputError: no camera, or an invalid one; the message says what was looked for, what was found and what to do.
     """
-    content = _load(text, source=source)
-    cameras = find_cameras(content, source=source) if isinstance(content, dict) else ()
-    if not cameras:
-        found = ", ".join(map(str, list(content)[:12])) if isinstance(content, dict) else type(content).__name__
-        raise InputError(f"{source}: no camera in it: {_LOOKED_FOR}; found {found or 'nothing'}")
+    cameras = _own_syntax(text, source=source) or _keyed(text, source=source)
     return _chosen(cameras, name, source=source).camera(image_size_px=image_size_px, source=source)
 
 
@@ -54,15 +49,21 @@ class CameraFile:
         source: its path or name, for error messages.
         data: its content.
         name: which of its cameras; None if it has one.
+        rescale: whether to scale it to pictures that are the calibrated ones resized.
     """
 
     source: str
     data: bytes
     name: str | None = None
+    rescale: bool = False
 
     @classmethod
-    def read(cls, path: str | Path) -> "CameraFile":
+    def read(cls, path: str | Path, *, rescale: bool = False) -> "CameraFile":
         """Read a file; "file.yml#cam1" selects one of its cameras.
+
+        Args:
+            path: of the file.
+            rescale: whether to scale the camera to pictures that are the calibrated ones resized.
 
         Raises:
             InputError: it cannot be read.
@@ -72,7 +73,7 @@ class CameraFile:
             head, _, name = str(path).rpartition("#")
             file = Path(head)
         try:
-            return cls(str(file), read_input(file, max_bytes=_MAX_BYTES, is_what="a camera file"), name)
+            return cls(str(file), read_input(file, max_bytes=_MAX_BYTES, is_what="a camera file"), name, rescale)
         except OSError as error:
             raise InputError(f"{file}: cannot be read ({error.strerror or error}); check the path") from None
 
@@ -85,11 +86,32 @@ class CameraFile:
         Raises:
             InputError: there is no camera in it.
         """
-        try:
-            text = file_text(self.data)
-        except UnicodeDecodeError:
-            raise InputError(f"{self.source}: not a text file; {_LOOKED_FOR}") from None
-        return read_camera(text, self.source, name=self.name, image_size_px=image_size_px)
+        binary = _own_syntax(self.data, source=self.source)
+        if binary:
+            found = _chosen(binary, self.name, source=self.source)
+            camera = found.camera(image_size_px=image_size_px, source=self.source)
+        else:
+            try:
+                text = file_text(self.data)
+            except UnicodeDecodeError:
+                raise InputError(f"{self.source}: not a text file; {_LOOKED_FOR}") from None
+            camera = read_camera(text, self.source, name=self.name, image_size_px=image_size_px)
+        return self._rescaled(camera, image_size_px) if self.rescale and image_size_px else camera
+
+    def _rescaled(self, camera: Camera, size_px: tuple[int, int]) -> Camera:
+        """Return the camera for pictures of another size, if they can be the same ones, resized.
+
+        Raises:
+            InputError: their aspect ratio differs.
+        """
+        width, height = size_px
+        if abs(camera.width_px * height - camera.height_px * width) > max(camera.width_px, camera.height_px):
+            raise InputError(
+                f"{self.source}: calibrated for {camera.width_px} x {camera.height_px} px; pictures of {width} x {height} px are "
+                "not the same ones resized (another aspect ratio): calibrate the camera at this size"
+            )
+        scaled = camera.scaled(width / camera.width_px)
+        return replace(scaled, width_px=width, height_px=height)
 
 
 def read_camera_file(path: str | Path, *, image_size_px: tuple[int, int] | None = None) -> Camera:
@@ -101,32 +123,26 @@ def read_camera_file(path: str | Path, *, image_size_px: tuple[int, int] | None 
     return CameraFile.read(path).camera(image_size_px=image_size_px)
 
 
-def camera_info_text(camera: Camera, name: str = "camera") -> str:
-    """Write ROS camera_info YAML (as camera_calibration does), which image pipelines and `--camera` read.
+def _own_syntax(content: str | bytes, *, source: str) -> tuple[FoundCamera, ...]:
+    """Return the cameras in a file of a format with a syntax of its own; none if it is of no such format."""
+    for one in CAMERA_FORMATS.values():
+        if one.own_syntax is not None and one.own_syntax.recognizes(content):
+            return one.own_syntax.read(content, source)
+    return ()
+
+
+def _keyed(text: str, *, source: str) -> tuple[FoundCamera, ...]:
+    """Return the cameras in a JSON, YAML or XML file by its keys.
 
     Raises:
-        InputError: ROS has no name for this lens.
+        InputError: there are none.
     """
-    lens = written_lens(camera.lens, camera.distortion, "camera_info")
-    projection = np.hstack([camera.matrix_px, np.zeros((3, 1))])
-    return "\n".join(
-        [
-            f"image_width: {camera.width_px}",
-            f"image_height: {camera.height_px}",
-            f"camera_name: {quoted(name)}",
-            *_ros_matrix("camera_matrix", camera.matrix_px),
-            f"distortion_model: {lens.name}",
-            *_ros_matrix("distortion_coefficients", np.array([lens.coefficients])),
-            *_ros_matrix("rectification_matrix", np.eye(3)),
-            *_ros_matrix("projection_matrix", projection),
-            "",
-        ]
-    )
-
-
-def _ros_matrix(key: str, matrix: np.ndarray) -> list[str]:
-    rows, columns = matrix.shape
-    return [f"{key}:", f"  rows: {rows}", f"  cols: {columns}", f"  data: [{numbers_text(matrix.ravel())}]"]
+    content = _load(text, source=source)
+    cameras = find_cameras(content, source=source) if isinstance(content, dict) else ()
+    if not cameras:
+        found = ", ".join(map(str, list(content)[:12])) if isinstance(content, dict) else type(content).__name__
+        raise InputError(f"{source}: no camera in it: {_LOOKED_FOR}; found {found or 'nothing'}")
+    return cameras
 
 
 def _load(text: str, *, source: str) -> Any:

@@ -4,19 +4,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.geometry import quaternion_wxyz_from_matrix
 from calib_core.interchange.calibration_file import CalibrationFile
-from calib_core.interchange.cameras.fields import floats
+from calib_core.interchange.cameras.formats.colmap import colmap_camera_line, found_colmap_camera
+from calib_core.interchange.cameras.numbers import floats
 from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.formats.statement import hash_comment, stated_frames, statement, with_statement
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose
-from calib_core.interchange.own.camera_document import refuse_skew
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import numbers_text
 from calib_core.interchange.syntax.zip_archives import pack
-from calib_core.lens_models.naming import lenses_named, names_in, written_lens
 
 __all__ = ["COLMAP"]
 
@@ -24,7 +22,6 @@ _NOTES = (
     "unpack it into a folder: cameras.txt, images.txt and points3D.txt; the world frame is the radar frame; "
     "COLMAP puts the centre of the top-left pixel at (0.5, 0.5), so the principal point is half a pixel larger",
 )
-_HALF_PIXEL = 0.5
 _WORLD = "the file does not say what its world frame is; taken to be the radar's (x forward, y left, z up), in metres"
 
 
@@ -35,26 +32,17 @@ def _write(file: CalibrationFile) -> bytes:
         InputError: COLMAP has no model for this camera.
     """
     calibration = file.calibration
-    name, parameters = _colmap_camera(calibration.camera)
+    camera_line = colmap_camera_line(calibration.camera)
     pose = calibration.camera_from_radar
     numbers = (*quaternion_wxyz_from_matrix(pose.rotation), *pose.translation_m)
     comment = hash_comment(statement(file, "QW QX QY QZ TX TY TZ carry radar points into the camera"))
-    size = f"{calibration.camera.width_px} {calibration.camera.height_px}"
     image = "".join("_" if character.isspace() else character for character in file.frames.camera)
     texts = {
-        "cameras.txt": f"{comment}# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n1 {name} {size} {numbers_text(parameters, ' ')}\n",
+        "cameras.txt": f"{comment}# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n{camera_line}",
         "images.txt": f"{comment}# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME\n1 {numbers_text(numbers, ' ')} 1 {image}\n\n",
         "points3D.txt": comment,
     }
     return pack({name: text.encode() for name, text in texts.items()})
-
-
-def _colmap_camera(camera: Camera) -> tuple[str, list[float]]:
-    k = camera.matrix_px
-    refuse_skew(camera, "COLMAP's models have")
-    lens = written_lens(camera.lens, camera.distortion, "colmap")
-    pinhole = [k[0, 0], k[1, 1], k[0, 2] + _HALF_PIXEL, k[1, 2] + _HALF_PIXEL]
-    return lens.name, [*pinhole, *lens.coefficients]
 
 
 def _recognizes(content: Content) -> bool:
@@ -93,7 +81,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     found = ImportedCalibration(
         "colmap",
         WrittenPose("quaternion_wxyz", np.array(numbers[:4]), np.array(numbers[4:]), "camera_from_radar"),
-        camera=_camera(camera, source=source),
+        camera=found_colmap_camera(camera, source=source).camera(image_size_px=None, source=source),
         assumptions=() if stated_frames(text) else (_WORLD,),
     )
     return with_statement(found, text).checked(source)
@@ -102,27 +90,6 @@ def _read(content: Content, source: str) -> ImportedCalibration:
 def _first_line(text: str) -> list[str]:
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     return lines[0].split() if lines else []
-
-
-def _camera(words: list[str], *, source: str) -> Camera:
-    name = words[1] if len(words) > 1 else ""
-    lenses = lenses_named("colmap", name)
-    if not lenses:
-        known = ", ".join(names_in("colmap"))
-        raise InputError(f"{source}: cameras.txt: the model {name!r} is not supported; known: {known}")
-    width, height, *parameters = floats(words[2:], source=source, place="cameras.txt")
-    if len(parameters) < 4:
-        raise InputError(f"{source}: cameras.txt: expected at least 4 parameters, found {len(parameters)}; correct it")
-    fx, fy, cx, cy = parameters[:4]
-    matrix = np.array([[fx, 0.0, cx - _HALF_PIXEL], [0.0, fy, cy - _HALF_PIXEL], [0.0, 0.0, 1.0]])
-    distortion = parameters[4:]
-    lens = next((lens for lens in lenses if not any(distortion[lens.counts[-1] :])), lenses[-1])
-    if not any(distortion[lens.counts[-1] :]):
-        distortion = distortion[: lens.counts[-1]]
-    try:
-        return Camera(lens.name, int(width), int(height), matrix, np.array(distortion))
-    except ValueError as error:
-        raise InputError(f"{source}: cameras.txt: {error}; correct it") from None
 
 
 COLMAP = Format(

@@ -6,21 +6,18 @@ import numpy as np
 
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile
-from calib_core.interchange.cameras.fields import find_cameras, floats
+from calib_core.interchange.cameras.fields import find_cameras
+from calib_core.interchange.cameras.formats.kalibr import kalibr_camera_text
+from calib_core.interchange.cameras.numbers import floats
 from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.formats.statement import hash_comment, stated_check_point, stated_frames, statement
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose
-from calib_core.interchange.own.camera_document import refuse_skew
 from calib_core.interchange.rotations import upper_rows
 from calib_core.interchange.syntax.content import Content
-from calib_core.interchange.syntax.yaml_text import numbers_text, quoted
-from calib_core.lens_models.naming import WrittenLens, written_lens
+from calib_core.interchange.syntax.yaml_text import numbers_text
 
 __all__ = ["KALIBR"]
 
-_NO_DISTORTION = "none"
-_NO_DISTORTION_AS_LOADED = WrittenLens("radtan", (0.0, 0.0, 0.0, 0.0))
-"""Kalibr names the model "none", but its reader makes no pinhole camera of it."""
 _NOTES = ("T_cam_radar is our own key; Kalibr has none for radars",)
 
 
@@ -31,23 +28,13 @@ def _write(file: CalibrationFile) -> str:
         InputError: Kalibr has no model for this lens.
     """
     calibration = file.calibration
-    camera = calibration.camera
-    refuse_skew(camera, "Kalibr's pinhole model has")
-    lens = written_lens(camera.lens, camera.distortion, "kalibr")
-    if lens.name == _NO_DISTORTION:
-        lens = _NO_DISTORTION_AS_LOADED
-    k = camera.matrix_px
     rows = "".join(f"  - [{numbers_text(row)}]\n" for row in calibration.camera_from_radar.as_matrix())
     meaning = (
         "T_cam_radar carries radar points into the camera (our key, after Kalibr's T_cam_imu); rows of a 4x4 matrix"
     )
     return (
         hash_comment(statement(file, meaning))
-        + "cam0:\n  cam_overlaps: []\n  camera_model: pinhole\n"
-        + f"  intrinsics: [{numbers_text((k[0, 0], k[1, 1], k[0, 2], k[1, 2]))}]\n"
-        + f"  distortion_model: {lens.name}\n  distortion_coeffs: [{numbers_text(lens.coefficients)}]\n"
-        + f"  resolution: [{camera.width_px}, {camera.height_px}]\n"
-        + f"  rostopic: {quoted(file.provenance.image_topic or '')}\n"
+        + kalibr_camera_text(calibration.camera, image_topic=file.provenance.image_topic or "")
         + f"  T_cam_radar:\n{rows}"
     )
 

@@ -8,7 +8,9 @@ import numpy as np
 from calib_core.errors import InputError
 from calib_core.geometry import rotation_exp, rotation_log
 from calib_core.interchange.calibration_file import EQUATION, CalibrationFile, FrameNames
-from calib_core.interchange.cameras.fields import find_cameras, floats
+from calib_core.interchange.cameras.fields import find_cameras
+from calib_core.interchange.cameras.formats.opencv import file_storage_matrix
+from calib_core.interchange.cameras.numbers import floats
 from calib_core.interchange.evidence import stated_evidence
 from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.formats.statement import hash_comment, stated_check_point, stated_frames, statement
@@ -16,7 +18,7 @@ from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoin
 from calib_core.interchange.own.calibration_json import calibration_sha256
 from calib_core.interchange.own.camera_document import refuse_skew
 from calib_core.interchange.syntax.content import Content
-from calib_core.interchange.syntax.yaml_text import numbers_text, quoted
+from calib_core.interchange.syntax.yaml_text import quoted
 from calib_core.lens_models.naming import written_lens
 
 __all__ = ["OPENCV"]
@@ -58,14 +60,8 @@ def _write(file: CalibrationFile) -> str:
         + f"evidence: {quoted(file.rests_on)}\ncalibration_sha256: {quoted(calibration_sha256(file))}\n"
         + f"image_width: {camera.width_px}\nimage_height: {camera.height_px}\n"
         + f"distortion_model: {quoted(lens.name)}\nprojection_function: {quoted(function)}\n"
-        + "".join(_matrix(key, matrix) for key, matrix in matrices)
+        + "".join(file_storage_matrix(key, matrix) for key, matrix in matrices)
     )
-
-
-def _matrix(key: str, matrix: np.ndarray) -> str:
-    rows, columns = matrix.shape
-    data = numbers_text(matrix.ravel())
-    return f"{key}: !!opencv-matrix\n   rows: {rows}\n   cols: {columns}\n   dt: d\n   data: [ {data} ]\n"
 
 
 def _recognizes(content: Content) -> bool:

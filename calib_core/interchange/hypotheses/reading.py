@@ -7,7 +7,8 @@ import numpy as np
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.interchange.cameras.fields import FoundCamera, find_cameras
+from calib_core.interchange.cameras.camera_format import FoundCamera
+from calib_core.interchange.cameras.fields import find_cameras
 from calib_core.interchange.formats.arrays.mat import MATLAB
 from calib_core.interchange.formats.arrays.npz import NUMPY
 from calib_core.interchange.formats.arrays.text_matrix import MATRIX
@@ -118,7 +119,7 @@ def _camera_in(values: object, source: str) -> FoundCamera | None:
         cameras = find_cameras(values, source=source)
     except InputError:  # a key like a camera's with something else in it; the pose does not depend on it
         return None
-    return cameras[0] if len(cameras) == 1 else None
+    return cameras[0] if len(cameras) == 1 and not cameras[0].refused else None
 
 
 def picked(hypotheses: tuple[Hypothesis, ...], wanted: str, source: str) -> Hypothesis:

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import msgspec
 import numpy as np
 
+from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.input_files import encodable
@@ -37,7 +38,7 @@ from calib_core.interchange.syntax.content import decoded
 from calib_core.interchange.syntax.json_text import json_text
 from calib_core.interchange.syntax.strict_json import json_object, parse_document
 from calib_core.measurements import ReflectorClick, Unpaired
-from calib_core.options import BoardOptions, MountingOptions
+from calib_core.options import BoardOptions, MountingOptions, RefiningOptions
 from calib_core.radar import RadarErrors
 from calib_core.results import Calibration, CheckPoint, DataWarning, Metrics
 from calib_core.verdict import Verdict, verdict_on
@@ -98,7 +99,7 @@ def calibration_file(
         check_point=choose_check_point(stamped),
         provenance=provenance or Provenance(),
         verdict=verdict_on(stamped, unconfirmed=unconfirmed),
-        evidence="clicked",
+        evidence="automatic" if provenance is not None and provenance.unconfirmed is not None else "clicked",
     )
 
 
@@ -135,6 +136,7 @@ def write_calibration(file: CalibrationFile) -> str:
         unpaired=[documents.UnpairedDocument(u.id, u.code, u.reason, u.hint) for u in calibration.unpaired],
         pairs=[solved_pair_document(pair) for pair in calibration.pairs],
         camera=camera_document(calibration.camera),
+        given_camera=camera_document(calibration.given_camera) if calibration.given_camera is not None else None,
         options=calibration.options,
         provenance=provenance_document(file.provenance),
     )
@@ -145,12 +147,13 @@ def write_calibration(file: CalibrationFile) -> str:
         if not pair["candidates"]:
             for key in SOLVED_FROM_KEYS:
                 del pair[key]
-    for group, unset in (("mounting", MountingOptions()), ("board", BoardOptions())):
+    for group, unset in (("mounting", MountingOptions()), ("board", BoardOptions()), ("refining", RefiningOptions())):
         if getattr(calibration.options, group) == unset:
             del content["options"][group]
     absent = set() if calibration.angle_map is not None else {"radar_angle_map"}
     absent |= {"verdict"} if file.verdict is None else set()
     absent |= {"evidence"} if file.evidence is None else set()
+    absent |= {"given_camera"} if calibration.given_camera is None else set()
     if not calibration.systematic_errors and calibration.radar_errors == RadarErrors():
         absent |= {"radar_errors", "systematic_errors"}
     known = encodable({key: content[key] for key in _KEY_ORDER if key not in absent})
@@ -171,7 +174,7 @@ _KEY_ORDER = (
         "covariance",
     ),
     *("covariance_convention", "covariance_quantile", "metrics", "noise_scale", "radar_errors", "systematic_errors"),
-    *("radar_angle_map", "paper", "warnings", "unpaired", "pairs", "camera", "options", "provenance"),
+    *("radar_angle_map", "paper", "warnings", "unpaired", "pairs", "camera", "given_camera", "options", "provenance"),
 )
 
 
@@ -216,6 +219,7 @@ def calibration_file_of(
         camera_from_radar=camera_from_radar,
         covariance=np.array(document.covariance or np.full((6, 6), np.nan)),
         camera=camera_of(document.camera, source=source),
+        given_camera=_given_camera(document, source=source),
         metrics=_metrics(document.metrics),
         pairs=tuple(solved_pair_of(pair, source=source, place=f"pairs[{i}]") for i, pair in enumerate(document.pairs)),
         unpaired=tuple(Unpaired(u.id, u.code, u.reason, u.hint) for u in document.unpaired),
@@ -241,6 +245,12 @@ def calibration_file_of(
         verdict=_verdict_of(document.verdict),
         evidence=document.evidence,
     )
+
+
+def _given_camera(document: documents.CalibrationDocument, *, source: str) -> Camera | None:
+    """Return the intrinsics before they were refined, if they were."""
+    given = document.given_camera
+    return None if given is None else camera_of(given, source=source, place="given_camera")
 
 
 def _verdict_document(verdict: Verdict | None) -> documents.VerdictDocument | None:

@@ -2,9 +2,12 @@
 
 from typing import Any
 
-from calib_core.camera import Camera
+import numpy as np
+from msgspec import UNSET, UnsetType
+
+from calib_core.camera import Camera, CameraCovariance
 from calib_core.errors import InputError
-from calib_core.interchange.own.documents import CameraDocument
+from calib_core.interchange.own.documents import CameraCovarianceDocument, CameraDocument
 
 __all__ = ["camera_document", "camera_of", "refuse_skew"]
 
@@ -26,7 +29,9 @@ def refuse_skew(camera: Camera, whose: str) -> None:
 def camera_document(camera: Camera) -> CameraDocument:
     """Return the document of a camera."""
     matrix: Any = tuple(tuple(row) for row in camera.matrix_px.tolist())
-    return CameraDocument(camera.model, camera.width_px, camera.height_px, matrix, camera.distortion.tolist())
+    size_px = camera.width_px, camera.height_px
+    covariance = _covariance_document(camera.covariance)
+    return CameraDocument(camera.model, *size_px, matrix, camera.distortion.tolist(), covariance)
 
 
 def camera_of(document: CameraDocument, *, source: str, place: str = "camera") -> Camera:
@@ -42,6 +47,25 @@ def camera_of(document: CameraDocument, *, source: str, place: str = "camera") -
             document.height_px,
             document.matrix_px,  # type: ignore[arg-type]
             document.distortion,  # type: ignore[arg-type]
+            _covariance_of(document.covariance),
         )
     except ValueError as error:
         raise InputError(f"{source}: {place}: {error}; correct it or calibrate the camera again") from None
+
+
+def _covariance_document(covariance: CameraCovariance | None) -> CameraCovarianceDocument | UnsetType:
+    if covariance is None:
+        return UNSET
+    return CameraCovarianceDocument(list(covariance.order), covariance.matrix.tolist())
+
+
+def _covariance_of(document: CameraCovarianceDocument | UnsetType) -> CameraCovariance | None:
+    """Return the covariance in a document; raises ValueError if it cannot be one."""
+    if isinstance(document, UnsetType):
+        return None
+    count = len(document.order)
+    if [len(row) for row in document.matrix] != [count] * count:
+        raise ValueError(
+            f"the covariance of the intrinsics names {count} parameters, its matrix needs as many rows and columns"
+        )
+    return CameraCovariance(tuple(document.order), np.array(document.matrix, dtype=np.float64).reshape(count, count))

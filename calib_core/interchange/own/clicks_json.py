@@ -1,6 +1,7 @@
 """Write and read clicks-1, the file of a session's clicks."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import msgspec
 from msgspec import UNSET
@@ -8,11 +9,26 @@ from msgspec import UNSET
 from calib_core.errors import InputError
 from calib_core.interchange.own.documents import CLICKS_SCHEMA, ClickDocument, ClicksDocument, TimeDocument
 from calib_core.interchange.own.return_document import chosen_of, return_document
+from calib_core.interchange.own.unconfirmed_document import unconfirmed_document, unconfirmed_of
 from calib_core.interchange.syntax.json_text import json_text
 from calib_core.interchange.syntax.strict_json import parse_document
 from calib_core.measurements import ReflectorClick, time_from_parts, time_parts
+from calib_core.results import UnconfirmedClicks
 
-__all__ = ["read_clicks", "refuse_repeated_ids", "write_clicks"]
+__all__ = ["ClicksFile", "read_clicks", "read_clicks_file", "refuse_repeated_ids", "write_clicks"]
+
+
+@dataclass(frozen=True, slots=True)
+class ClicksFile:
+    """The content of a clicks-1 file.
+
+    Attributes:
+        clicks: sorted by time.
+        unconfirmed: those of them that nobody confirmed; None if a person placed or confirmed all.
+    """
+
+    clicks: tuple[ReflectorClick, ...]
+    unconfirmed: UnconfirmedClicks | None = None
 
 
 def read_clicks(text: str, source: str = "clicks") -> tuple[ReflectorClick, ...]:
@@ -25,9 +41,22 @@ def read_clicks(text: str, source: str = "clicks") -> tuple[ReflectorClick, ...]
     Raises:
         InputError: invalid content; the message names the file, the place and what to do.
     """
+    return read_clicks_file(text, source).clicks
+
+
+def read_clicks_file(text: str, source: str = "clicks") -> ClicksFile:
+    """Read clicks-1 text with what it says of its clicks.
+
+    Args:
+        text: the file's content.
+        source: the name of the file in error messages.
+
+    Raises:
+        InputError: invalid content; the message names the file, the place and what to do.
+    """
     document = parse_document(text, ClicksDocument, source=source)
     refuse_repeated_ids([click.id for click in document.clicks], source=source, place="clicks")
-    return tuple(
+    clicks = tuple(
         sorted(
             ReflectorClick(
                 image_time=time_from_parts(click.image_time.sec, click.image_time.nanosec),
@@ -42,14 +71,21 @@ def read_clicks(text: str, source: str = "clicks") -> tuple[ReflectorClick, ...]
             for click in document.clicks
         )
     )
+    return ClicksFile(clicks, unconfirmed_of(document.unconfirmed, [click.id for click in clicks]))
 
 
-def write_clicks(clicks: Iterable[ReflectorClick], *, radar_topics: Sequence[str] = ()) -> str:
+def write_clicks(
+    clicks: Iterable[ReflectorClick],
+    *,
+    radar_topics: Sequence[str] = (),
+    unconfirmed: UnconfirmedClicks | None = None,
+) -> str:
     """Write clicks as clicks-1 text, sorted by time; the same clicks give the same bytes.
 
     Args:
         clicks: in any order.
         radar_topics: of the radar they were made with; written only if there are several, for whoever reads the file.
+        unconfirmed: those that nobody confirmed.
     """
     documents = [
         ClickDocument(
@@ -64,7 +100,11 @@ def write_clicks(clicks: Iterable[ReflectorClick], *, radar_topics: Sequence[str
         for click in sorted(clicks, key=lambda click: (click.image_time, click.id))
     ]
     topics = list(radar_topics) if len(radar_topics) > 1 else UNSET
-    return json_text(msgspec.to_builtins(ClicksDocument(CLICKS_SCHEMA, documents, radar_topics=topics)))
+    return json_text(
+        msgspec.to_builtins(
+            ClicksDocument(CLICKS_SCHEMA, documents, radar_topics=topics, unconfirmed=unconfirmed_document(unconfirmed))
+        )
+    )
 
 
 def refuse_repeated_ids(ids: Sequence[str], *, source: str, place: str) -> None:

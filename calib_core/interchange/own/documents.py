@@ -102,12 +102,27 @@ class ClickDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_defaul
     chosen: ReturnDocument | None = None
 
 
+class UnconfirmedDocument(Struct, frozen=True, forbid_unknown_fields=True):
+    """The ids of clicks that were placed automatically and that nobody confirmed, and the confidence that they are right."""
+
+    clicks: list[Name]
+    confidence: Annotated[float, Meta(ge=0.0, le=1.0)]
+
+
 class ClicksDocument(Struct, frozen=True, forbid_unknown_fields=True):
     """Clicks on recorded frames, identified by the frames' stamps."""
 
     schema: Literal["cocalib/clicks-1"]
     clicks: list[ClickDocument]
     radar_topics: list[str] | UnsetType = UNSET
+    unconfirmed: UnconfirmedDocument | UnsetType = UNSET
+
+
+class CameraCovarianceDocument(Struct, frozen=True, forbid_unknown_fields=True):
+    """Covariance of the intrinsics: the parameters it is of, and its rows; a parameter that it does not name is exact."""
+
+    order: list[str]
+    matrix: list[list[Measured]]
 
 
 class CameraDocument(Struct, frozen=True, forbid_unknown_fields=True):
@@ -118,6 +133,7 @@ class CameraDocument(Struct, frozen=True, forbid_unknown_fields=True):
     height_px: Annotated[int, Meta(ge=1)]
     matrix_px: Matrix33
     distortion: list[Measured] = []
+    covariance: CameraCovarianceDocument | UnsetType = UNSET
 
 
 class RadarDocument(Struct, frozen=True, forbid_unknown_fields=True):
@@ -313,6 +329,7 @@ class ProvenanceDocument(Struct, frozen=True):
     version: str | None = None
     column_map: list[str] | UnsetType = UNSET
     assumptions: list[AssumptionDocument] | UnsetType = UNSET
+    unconfirmed: UnconfirmedDocument | UnsetType = UNSET
 
 
 class NoiseScaleDocument(Struct, frozen=True):
@@ -396,6 +413,7 @@ class CalibrationDocument(Struct, frozen=True):
     warnings: list[WarningDocument] = []
     unpaired: list[UnpairedDocument] = []
     pairs: list[SolvedPairDocument] = []
+    given_camera: CameraDocument | None = None
     options: CalibrationOptions = field(default_factory=CalibrationOptions)
     provenance: ProvenanceDocument = field(default_factory=ProvenanceDocument)
 

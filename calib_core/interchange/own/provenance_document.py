@@ -4,6 +4,7 @@ from msgspec import UNSET, UnsetType
 
 from calib_core.interchange.calibration_file import AssumptionNote, Provenance
 from calib_core.interchange.own import documents
+from calib_core.interchange.own.unconfirmed_document import unconfirmed_document, unconfirmed_of
 from calib_core.results import InputFile
 
 __all__ = ["provenance_document", "provenance_of"]
@@ -26,6 +27,7 @@ def provenance_document(provenance: Provenance) -> documents.ProvenanceDocument:
         version=provenance.version,
         column_map=list(provenance.column_map) or UNSET,
         assumptions=[documents.AssumptionDocument(one.text, one.confirmed) for one in provenance.assumptions] or UNSET,
+        unconfirmed=unconfirmed_document(provenance.unconfirmed),
     )
 
 
@@ -45,6 +47,7 @@ def provenance_of(document: documents.ProvenanceDocument) -> Provenance:
         version=document.version,
         column_map=tuple(document.column_map or ()),
         assumptions=tuple(AssumptionNote(one.text, one.confirmed) for one in document.assumptions or ()),
+        unconfirmed=unconfirmed_of(document.unconfirmed),
     )
 
 

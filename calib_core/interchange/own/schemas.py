@@ -15,6 +15,13 @@ from calib_core.interchange.own.documents import (
     ClicksDocument,
     PairsDocument,
 )
+from calib_core.interchange.own.lens_documents import (
+    BOARD_VIEWS_SCHEMA,
+    INTRINSICS_SCHEMA,
+    BoardViewsDocument,
+    IntrinsicsDocument,
+)
+from calib_core.interchange.own.proposal_documents import PROPOSALS_SCHEMA, ProposalsDocument
 from calib_core.interchange.syntax.json_text import json_text
 
 __all__ = ["schema_texts", "write_schemas"]
@@ -25,6 +32,9 @@ _DOCUMENTS: dict[str, Any] = {
     CALIBRATION_SCHEMA: CalibrationDocument,
     BOXES_SCHEMA: BoxesDocument,
     LABELS_SCHEMA: LabelsDocument,
+    BOARD_VIEWS_SCHEMA: BoardViewsDocument,
+    INTRINSICS_SCHEMA: IntrinsicsDocument,
+    PROPOSALS_SCHEMA: ProposalsDocument,
 }
 
 

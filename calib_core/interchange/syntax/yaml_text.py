@@ -19,6 +19,7 @@ __all__ = [
 ]
 
 _MAX_CHARACTERS = 2 * 1024 * 1024
+_MAX_DEPTH = 100
 _OPENCV_TAG = "tag:yaml.org,2002:opencv-matrix"
 
 
@@ -42,14 +43,28 @@ def load_yaml_documents(text: str, *, source: str) -> tuple[Any, ...]:
     if len(text) > _MAX_CHARACTERS:
         raise InputError(f"{source}: {len(text):,} characters is too large for a calibration; is it the right file?")
     from ruamel.yaml import YAML
+    from ruamel.yaml.composer import Composer
     from ruamel.yaml.constructor import SafeConstructor
+
+    class ShallowComposer(Composer):
+        """The composer, which gives up at a depth that no calibration has: its effort grows with the square of it."""
+
+        levels = 0
+
+        def compose_node(self, parent: Any, index: Any) -> Any:
+            self.levels += 1
+            if self.levels > _MAX_DEPTH:
+                raise RecursionError
+            node = super().compose_node(parent, index)
+            self.levels -= 1
+            return node
 
     class Constructor(SafeConstructor):
         """The safe constructor with OpenCV's matrix tag."""
 
     Constructor.add_constructor(_OPENCV_TAG, lambda self, node: self.construct_mapping(node, deep=True))
     loader = YAML(typ="safe", pure=True)
-    loader.Constructor = Constructor
+    loader.Composer, loader.Constructor = ShallowComposer, Constructor
     # OpenCV before 5 writes "%YAML:1.0", which is not a YAML directive, and may omit the "---" after it.
     plain = re.sub(r"\A\ufeff?%YAML[: ][\d.]+[^\n]*\n(---[^\n]*\n)?", "", text)
     with refuse_bad_yaml(text, plain, source=source):

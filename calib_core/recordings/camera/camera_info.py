@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Matrix33
 from calib_core.camera import Camera, CameraModel
 from calib_core.lens_models.naming import lenses_of_opencv, names_in, opencv_lens
 from calib_core.lens_models.registry import LENS_MODELS
@@ -34,8 +33,7 @@ def is_camera_info(definition: Definition) -> bool:
 def camera_from_info(message: Message, *, topic: str, rectified: bool = False) -> CameraReading:
     """Build the camera, for the pixels of the image as it was published.
 
-    Region of interest and binning are applied to K: column u of the full sensor becomes
-    (u - x_offset + 1/2) / binning - 1/2, which keeps pixel centres at integers.
+    Region of interest and binning are applied to K.
 
     Args:
         message: a decoded CameraInfo.
@@ -54,12 +52,13 @@ def camera_from_info(message: Message, *, topic: str, rectified: bool = False) -
     model = _model(model_name, distortion)
     if isinstance(model, str):
         return _none(topic, "camera-model", model)
-    matrix, width, height = _published(message, matrix)
-    if width < 1 or height < 1:
-        return _none(topic, "camera-size", f"gives an image size of {width} x {height} pixels")
+    offset_px, size_px, binning = _window(message)
+    if size_px[0] < binning[0] or size_px[1] < binning[1]:
+        return _none(topic, "camera-size", f"gives an image size of {size_px[0]} x {size_px[1]} pixels")
     name, coefficients = model
     try:
-        return CameraReading(Camera(name, width, height, matrix, coefficients))
+        camera = Camera(name, *size_px, matrix, coefficients)
+        return CameraReading(camera.windowed(offset_px, size_px, binning))
     except ValueError as error:
         return _none(topic, "camera-model", f"cannot be used: {error}")
 
@@ -105,16 +104,10 @@ def _listed(words: Sequence[str], conjunction: str) -> str:
     return f"{', '.join(first)} {conjunction} {last}" if first else last
 
 
-def _published(message: Message, matrix: Matrix33) -> tuple[Matrix33, int, int]:
-    """Convert K and size of the full sensor to those of the published image."""
-    width, height = message.whole("width"), message.whole("height")
-    binning = np.array([max(message.whole("binning_x"), 1), max(message.whole("binning_y"), 1)], dtype=np.float64)
-    offset = np.zeros(2)
+def _window(message: Message) -> tuple[tuple[int, int], tuple[int, int], tuple[int, int]]:
+    """Return offset, size and binning of the part of the full sensor that was published."""
+    binning = max(message.whole("binning_x"), 1), max(message.whole("binning_y"), 1)
     roi = message.message("roi")
     if roi.whole("width") and roi.whole("height"):
-        offset = np.array([roi.whole("x_offset"), roi.whole("y_offset")], dtype=np.float64)
-        width, height = roi.whole("width"), roi.whole("height")
-    adjusted = matrix.copy()
-    adjusted[:2, :2] /= binning[:, None]
-    adjusted[:2, 2] = (matrix[:2, 2] - offset + 0.5) / binning - 0.5
-    return adjusted, int(width // binning[0]), int(height // binning[1])
+        return (roi.whole("x_offset"), roi.whole("y_offset")), (roi.whole("width"), roi.whole("height")), binning
+    return (0, 0), (message.whole("width"), message.whole("height")), binning

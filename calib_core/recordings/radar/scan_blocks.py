@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from calib_core.arrays import TimesNs
-from calib_core.measurements import NS_PER_S, RadarScans, TimeNs, joined_alternatives
+from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 
-__all__ = ["ScanBlocks", "join_scans"]
+__all__ = ["ScanBlocks"]
 
 _BLOCK_SCANS = 128
 _CACHED_RETURNS = 1_000_000
@@ -55,7 +55,7 @@ class ScanBlocks(ABC):
             wanted[np.searchsorted(self.times_ns, int(time) + half, side="right")] -= 1
         inside = np.concatenate([[False], np.cumsum(wanted)[:-1] > 0, [False]])
         edges = np.flatnonzero(np.diff(inside.astype(np.int8)))
-        return join_scans([self._between(int(a), int(b)) for a, b in edges.reshape(-1, 2)])
+        return RadarScans.joined([self._between(int(a), int(b)) for a, b in edges.reshape(-1, 2)])
 
     def _between(self, first: int, last: int) -> RadarScans:
         """Return the scans first to last - 1."""
@@ -63,7 +63,7 @@ class ScanBlocks(ABC):
         for number in range(first // _BLOCK_SCANS, -(-last // _BLOCK_SCANS)):
             block, base = self._block(number), number * _BLOCK_SCANS
             pieces.append(_cut(block, max(first - base, 0), min(last - base, len(block))))
-        return join_scans(pieces)
+        return RadarScans.joined(pieces)
 
     def _block(self, number: int) -> RadarScans:
         with self._lock:
@@ -106,20 +106,4 @@ def _cut(scans: RadarScans, first: int, last: int) -> RadarScans:
         snr_db=scans.snr_db[low:high],
         sigma_polar=scans.sigma_polar[low:high],
         alternative_of=None if scans.alternative_of is None else scans.alternative_of[low:high],
-    )
-
-
-def join_scans(pieces: Sequence[RadarScans]) -> RadarScans:
-    """Concatenate scans; the pieces must be in time order."""
-    if len(pieces) < 2:
-        return pieces[0] if pieces else RadarScans()
-    counts = np.concatenate([np.diff(piece.first_return) for piece in pieces])
-    return RadarScans(
-        times_ns=np.concatenate([piece.times_ns for piece in pieces]),
-        first_return=np.concatenate([[0], np.cumsum(counts)]),
-        points_radar_m=np.concatenate([piece.points_radar_m for piece in pieces]),
-        doppler_mps=np.concatenate([piece.doppler_mps for piece in pieces]),
-        snr_db=np.concatenate([piece.snr_db for piece in pieces]),
-        sigma_polar=np.concatenate([piece.sigma_polar for piece in pieces]),
-        alternative_of=joined_alternatives(pieces),
     )

@@ -2,21 +2,23 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from calib_core.arrays import Vector3
-from calib_core.synthetic.options import Surroundings
+from calib_core.synthetic.options import ReflectorDesign, Surroundings
 from calib_core.synthetic.rendering.carts import cart_facets
+from calib_core.synthetic.rendering.facets import Facet
 from calib_core.synthetic.rendering.light import display, sun_direction
 from calib_core.synthetic.rendering.people import Window, draw_limbs, shade_ground
 from calib_core.synthetic.rendering.reflector import (
-    Facet,
     on_block,
     reflector_facets,
     shadow_limbs,
     stand_limbs,
 )
+from calib_core.synthetic.rendering.square_reflector import pole_limbs, square_facets
 from calib_core.synthetic.rendering.still import Still, trace_still
 from calib_core.synthetic.rendering.vehicles import vehicle_facets, vehicle_shadow
 from calib_core.synthetic.rig import Rig
@@ -25,6 +27,9 @@ from calib_core.synthetic.scene.scenes import USUAL_EDGE_M, Scene
 from calib_core.synthetic.scene.story import Moment
 from calib_core.synthetic.scene.surroundings import cart_position
 from calib_core.synthetic.scene.vehicles import VehicleState
+
+if TYPE_CHECKING:  # boards need what calibrates a lens, which is slow to import
+    from calib_core.synthetic.boards import MovingBoard
 
 __all__ = ["FrameRenderer"]
 
@@ -56,22 +61,35 @@ class FrameRenderer:
     towards: Vector3
     surroundings: Surroundings = _NOTHING_ELSE
     edge_m: float = USUAL_EDGE_M
+    design: ReflectorDesign = "triangular"
 
     @classmethod
     def of(
-        cls, scene: Scene, rig: Rig, surroundings: Surroundings = _NOTHING_ELSE, edge_m: float = USUAL_EDGE_M
+        cls,
+        scene: Scene,
+        rig: Rig,
+        surroundings: Surroundings = _NOTHING_ELSE,
+        edge_m: float = USUAL_EDGE_M,
+        design: ReflectorDesign = "triangular",
     ) -> "FrameRenderer":
         """Trace the backdrop, which takes some seconds, and return a renderer."""
-        return cls(scene, rig, trace_still(scene, rig), sun_direction(scene), surroundings, edge_m)
+        return cls(scene, rig, trace_still(scene, rig), sun_direction(scene), surroundings, edge_m, design)
 
     def render(
-        self, moment: Moment, *, person: bool = True, noise_grey: float = 0.0, rng: np.random.Generator | None = None
+        self,
+        moment: Moment,
+        *,
+        person: bool = True,
+        board: "MovingBoard | None" = None,
+        noise_grey: float = 0.0,
+        rng: np.random.Generator | None = None,
     ) -> np.ndarray:
         """Render one frame: (h, w, 3) uint8, blue first.
 
         Args:
             moment: where person and reflector are.
             person: whether to draw the person.
+            board: that is waved before everything else.
             noise_grey: standard deviation of the sensor's noise [grey levels].
             rng: random generator of that noise.
         """
@@ -84,6 +102,10 @@ class FrameRenderer:
                 self._shade(levels, limbs)
         for thing in sorted(things, key=lambda thing: -thing.distance_m):
             thing.draw(levels)
+        if board is not None:
+            from calib_core.synthetic.boards import draw_board
+
+            draw_board(levels, board, blur_px=board.film.blur_px)
         if noise_grey > 0.0 and rng is not None:
             levels += noise_grey * rng.standard_normal(levels.shape, dtype=np.float32)
         return cv2.cvtColor(np.clip(levels + 0.5, 0.0, 255.0).astype(np.uint8), cv2.COLOR_RGB2BGR)
@@ -125,6 +147,8 @@ class FrameRenderer:
         )
 
     def _reflector(self, moment: Moment) -> _Thing:
+        if self.design == "square":
+            return self._square_reflector(moment)
         raised = not on_block(moment.next_height_m)
         stand = stand_limbs(moment.reflector_m, at_rest=moment.resting is not None) if raised else ()
 
@@ -134,6 +158,18 @@ class FrameRenderer:
 
         distance = float(np.linalg.norm(moment.reflector_m - self.still.eye_m))
         return _Thing(distance, draw, ((*shadow_limbs(moment.reflector_m, moment.facing_rad, self.edge_m), *stand),))
+
+    def _square_reflector(self, moment: Moment) -> _Thing:
+        apex_m, facing_rad = moment.reflector_m, moment.facing_rad
+        pole = pole_limbs(apex_m, facing_rad, self.edge_m, at_rest=moment.resting is not None)
+        facets = square_facets(apex_m, facing_rad, eye_m=self.still.eye_m, edge_m=self.edge_m)
+        distance = float(np.linalg.norm(apex_m - self.still.eye_m))
+
+        def draw(levels: np.ndarray) -> None:
+            self._draw_limbs(levels, pole)
+            self._draw_facets(levels, facets, distance)
+
+        return _Thing(distance, draw, ((*shadow_limbs(apex_m, facing_rad, self.edge_m), *pole),))
 
     def _cart(self, apex_m: Vector3) -> _Thing:
         place = cart_position(apex_m, self.surroundings)

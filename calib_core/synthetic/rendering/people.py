@@ -23,6 +23,7 @@ _ALBEDO: dict[Surface, tuple[float, float, float]] = {
     "stripe": (0.85, 0.85, 0.80),
 }
 _CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+_FAR_PX = 1e6
 _PENUMBRA = 0.035
 """How fast a shadow's edge softens with the distance to the object that casts it."""
 
@@ -40,8 +41,9 @@ class Window:
         """Return the window around pixels (n, 2); None if it is outside the picture or they are not in front."""
         if not np.all(np.isfinite(pixels_px)):
             return None
-        low = np.floor(pixels_px.min(axis=0) - margin_px).astype(int)
-        high = np.ceil(pixels_px.max(axis=0) + margin_px + 1).astype(int)
+        bounded = np.clip(pixels_px, -_FAR_PX, _FAR_PX)  # next to the plane of the lens, pixels are beyond any integer
+        low = np.floor(bounded.min(axis=0) - margin_px).astype(int)
+        high = np.ceil(bounded.max(axis=0) + margin_px + 1).astype(int)
         low, high = np.maximum(low, 0), np.minimum(high, [camera.width_px, camera.height_px])
         if np.any(high <= low):
             return None

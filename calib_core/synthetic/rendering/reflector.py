@@ -4,16 +4,15 @@ Three square-cut facets meet at the apex. The apex is the phase centre: every pa
 path to the apex and back. It is the point to click, and the reflector's position in truth.json.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from calib_core.arrays import Points3, Vector3
+from calib_core.arrays import Vector3
+from calib_core.synthetic.rendering.facets import Facet, subdivided
 from calib_core.synthetic.rendering.light import lit
 from calib_core.synthetic.scene.person import Capsule
 from calib_core.synthetic.scene.scenes import USUAL_EDGE_M, Scene
 
-__all__ = ["Facet", "apex_edges", "on_block", "reflector_facets", "shadow_limbs", "stand_limbs"]
+__all__ = ["apex_edges", "on_block", "reflector_facets", "shadow_limbs", "stand_limbs"]
 
 _BASE_HALF_M = 0.095
 _GROUND_STAND_M = 0.35
@@ -22,20 +21,6 @@ _ORANGE = np.array([0.92, 0.23, 0.02], dtype=np.float32)
 _RIM = np.array([0.95, 0.96, 0.97], dtype=np.float32)
 _FACET_LEVEL = (0.62, 1.0, 0.36)
 """How bright the lower, the left and the right facet are: polished sheets show sky, sun and ground."""
-_STEPS = 6
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Facet:
-    """A flat polygon with one colour.
-
-    Attributes:
-        corners_m: (n, 3) in the world, outline subdivided so that lens distortion can bend it.
-        colour: (3,) linear.
-    """
-
-    corners_m: Points3
-    colour: np.ndarray
 
 
 def apex_edges(facing_rad: float, elevation_rad: float) -> np.ndarray:
@@ -48,13 +33,6 @@ def apex_edges(facing_rad: float, elevation_rad: float) -> np.ndarray:
     turns = np.deg2rad([0.0, 120.0, 240.0])
     around = np.cos(turns)[:, None] * up - np.sin(turns)[:, None] * right
     return axis / np.sqrt(3.0) + np.sqrt(2.0 / 3.0) * around
-
-
-def _subdivided(corners: np.ndarray) -> np.ndarray:
-    """Insert points between the corners of an outline."""
-    shares = np.arange(_STEPS)[:, None] / _STEPS
-    following = np.roll(corners, -1, axis=0)
-    return np.concatenate([a + shares * (b - a) for a, b in zip(corners, following, strict=True)])
 
 
 def reflector_facets(
@@ -92,14 +70,14 @@ def _sheet(apex: Vector3, one: Vector3, two: Vector3, level: float, eye: Vector3
     """Build a triangular sheet with a gradient from apex to rim and a bright cut edge."""
     inside = np.cross(one, two)
     if float(inside @ (eye - apex)) < 0.0:  # seen from behind: the painted back
-        return [Facet(_subdivided(apex + np.array([np.zeros(3), one, two])), 0.22 * _ALUMINIUM)]
+        return [Facet(subdivided(apex + np.array([np.zeros(3), one, two])), 0.22 * _ALUMINIUM)]
     facets = []
     for share in np.linspace(1.0, 0.14, 9):  # nested triangles: darker into the corner
         gradient = 0.70 + 0.30 * share
         corners = apex + share * np.array([np.zeros(3), one, two])
-        facets.append(Facet(_subdivided(corners), level * gradient * _ALUMINIUM))
+        facets.append(Facet(subdivided(corners), level * gradient * _ALUMINIUM))
     rim = apex + np.array([one, two, 0.955 * two, 0.955 * one])
-    return [*facets, Facet(_subdivided(rim), (0.35 + 0.65 * level) * _RIM)]
+    return [*facets, Facet(subdivided(rim), (0.35 + 0.65 * level) * _RIM)]
 
 
 def _base(
@@ -126,11 +104,11 @@ def _base(
         if float(normal @ (eye - corners.mean(axis=0))) <= 0.0:
             continue
         light = lit(scene, normal[None], np.array([max(0.0, float(normal @ towards))]))[0]
-        facets.append(Facet(_subdivided(corners), _ORANGE * light))
+        facets.append(Facet(subdivided(corners), _ORANGE * light))
         if abs(normal[2]) < 0.5:  # a white band for visibility
             band = corners.copy()
             band[:, 2] = [bottom + 0.045, bottom + 0.045, bottom + 0.075, bottom + 0.075]
-            facets.append(Facet(_subdivided(band), np.array([0.85, 0.85, 0.83]) * light))
+            facets.append(Facet(subdivided(band), np.array([0.85, 0.85, 0.83]) * light))
     return facets
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 
 from calib_core.arrays import Vector3
+from calib_core.synthetic.rendering.facets import Facet
 from calib_core.synthetic.rendering.light import lit
-from calib_core.synthetic.rendering.reflector import Facet
 from calib_core.synthetic.scene.person import Capsule
 from calib_core.synthetic.scene.scenes import Scene
 from calib_core.synthetic.scene.vehicles import Colour, Part, VehicleState, vehicle_parts

@@ -1,6 +1,7 @@
 """Everything decided before the sensors measure: scene, sensors, story, stamps."""
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,6 +23,9 @@ from calib_core.synthetic.scene.story import Story, tell_story
 from calib_core.synthetic.scene.surroundings import Flicker, draw_flickers, furnished, in_sight
 from calib_core.synthetic.scene.traffic import draw_movers
 from calib_core.synthetic.timeline import Islands, SensorTimes, draw_islands, draw_times
+
+if TYPE_CHECKING:  # boards need what calibrates a lens, which is slow to import
+    from calib_core.synthetic.scene.board_waving import BoardWaving
 
 __all__ = ["Stage", "child_rng", "set_stage"]
 
@@ -49,6 +53,7 @@ class Stage:
         reflector_bias: (n, 3) the constant error of each placement: range [m], sines of azimuth and elevation.
         ghosts: for each placement the static reflection that comes and goes with it, or None.
         flickers: static targets that the radar sees at times.
+        waving: of a board before the camera at the start; None for none.
     """
 
     options: SimulationOptions
@@ -63,6 +68,7 @@ class Stage:
     reflector_bias: Points3
     ghosts: tuple[Scatterer | None, ...]
     flickers: tuple[Flicker, ...] = ()
+    waving: "BoardWaving | None" = None
 
     @property
     def profile(self) -> RadarProfile:
@@ -129,9 +135,22 @@ def set_stage(options: SimulationOptions) -> Stage:
     ghosts = tuple(_ghost(rng, resting.position_m, options.surroundings.ghost_share) for resting in story.restings)
     clutter = _clutter(child_rng(options, 6), scene, options)
     clutter_bias = child_rng(options, 7).standard_normal((len(clutter), 3)) * bias_sigma
+    waving = _waving(camera, options)
     flickers = draw_flickers(child_rng(options, 18), options.surroundings.flickering_targets, scene)
     return Stage(
-        options, scene, rig, story, frame_times, antennas, islands, clutter, clutter_bias, bias, ghosts, flickers
+        options,
+        scene,
+        rig,
+        story,
+        frame_times,
+        antennas,
+        islands,
+        clutter,
+        clutter_bias,
+        bias,
+        ghosts,
+        flickers,
+        waving,
     )
 
 
@@ -144,6 +163,7 @@ def _story(positions_m: Points3, scene: Scene, options: SimulationOptions) -> St
             narrow=scene.narrow,
             reflectors=options.reflectors,
             leaves=options.person_leaves,
+            waving_s=options.waved_board.duration_s,
         )
     else:
         story = Story((), options.traffic.duration_s, (), np.zeros(0))
@@ -159,6 +179,14 @@ def _story(positions_m: Points3, scene: Scene, options: SimulationOptions) -> St
         max_range_m=0.8 * scene.layout.max_range_m,
     )
     return replace(story, passers_by=passers_by)
+
+
+def _waving(camera: Camera, options: SimulationOptions) -> "BoardWaving | None":
+    if not options.waved_board.duration_s:
+        return None
+    from calib_core.synthetic.scene.board_waving import draw_waving
+
+    return draw_waving(child_rng(options, 21), camera, options.waved_board)
 
 
 def _frame_times(story: Story, islands: Islands | None, options: SimulationOptions) -> SensorTimes:

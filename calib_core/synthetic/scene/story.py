@@ -21,6 +21,12 @@ _LEAD_IN_S = 0.6
 _TURNING_S = 0.5
 _BEHIND_M = 0.52
 """How far behind the reflector, seen from the radar, the person stands to put it down."""
+_WAVING_M = np.array([0.95, 0.0])
+"""Where the person stands who waves a board."""
+_PAST_MAST_M = np.array([1.1, 1.0])
+"""Where the person goes round the sensors."""
+_BEHIND_SENSORS_M = np.array([-1.4, 0.9, 0.19])
+"""Where the reflector waits meanwhile."""
 _NOBODY = PersonState(-3.0, 0.0, 0.0)
 
 
@@ -80,6 +86,8 @@ class Story:
     _ends_s: Values
     passers_by: tuple[PasserBy, ...] = ()
     movers: tuple[Mover, ...] = ()
+    lead_s: float = 0.0
+    """How long the person waves a board, before the reflector is fetched from behind the sensors."""
 
     def at(self, time_s: float) -> Moment:
         """Return the person and the reflectors at a time."""
@@ -87,6 +95,8 @@ class Story:
         if not self.restings:
             return Moment(_NOBODY, np.zeros(3), 0.0, None, 0.0, traffic=traffic)
         moment = self._moment(time_s)
+        if time_s < self.lead_s:
+            moment = replace(moment, reflector_m=_BEHIND_SENSORS_M, resting=None)
         if traffic:
             moment = replace(moment, traffic=traffic)
         resting = [one for one in self.restings if one.start_s <= time_s < one.end_s and one is not moment.resting]
@@ -175,6 +185,7 @@ def tell_story(
     start_m: tuple[float, float] = (2.6, -1.2),
     reflectors: int = 1,
     leaves: bool = False,
+    waving_s: float = 0.0,
 ) -> Story:
     """Let a person carry the reflector to each position, always to the nearest one next.
 
@@ -186,8 +197,10 @@ def tell_story(
         start_m: where the person comes from, and where further reflectors wait.
         reflectors: how many, carried in turn; the last ones stay until the end.
         leaves: the person walks behind the sensors for that time instead of stepping aside.
+        waving_s: how long the person waves a board before that; the reflector is fetched from behind the sensors then.
     """
-    script = Script(np.array(start_m))
+    script = _waved_script(waving_s) if waving_s else Script(np.array(start_m))
+    lead_s = script.time_s
     restings: list[Resting] = []
     stands: list[Vector2] = []
     for index, chosen in enumerate(_in_order(positions_m, script.place_m)):
@@ -216,7 +229,16 @@ def tell_story(
     duration_s = script.time_s + _LEAD_IN_S
     restings = [replace(resting, end_s=min(resting.end_s, duration_s)) for resting in restings]
     ends_s = np.array([leg.end_s for leg in script.legs])
-    return Story(tuple(restings), duration_s, tuple(script.legs), ends_s)
+    return Story(tuple(restings), duration_s, tuple(script.legs), ends_s, lead_s=lead_s)
+
+
+def _waved_script(waving_s: float) -> Script:
+    """Begin with a person who waves a board and then goes for the reflector."""
+    script = Script(_WAVING_M)
+    script.stay("stand", waving_s, carrying=True, placement=-1, facing_m=np.zeros(2))
+    script.walk(_PAST_MAST_M, carrying=True)
+    script.walk(_BEHIND_SENSORS_M[:2], carrying=True)
+    return script
 
 
 def _aside(rng: np.random.Generator, behind: Vector2, away: Vector2, narrow: bool) -> Vector2:

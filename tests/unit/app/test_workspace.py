@@ -53,7 +53,7 @@ class HeldSolver:
         self.revisions: list[int] = []
         self.closed = False
 
-    def request(self, revision: int, clicks, options, when_done: Callable[[Solved], None]) -> None:
+    def request(self, revision: int, clicks, options, when_done: Callable[[Solved], None], camera=None) -> None:
         self.revisions.append(revision)
         self.when_done = when_done
 
@@ -151,7 +151,7 @@ def test_a_restored_session_is_solved_at_once(journal: ListJournal, solver: Held
 
 def test_an_answer_that_comes_within_the_request_does_not_deadlock(journal: ListJournal) -> None:
     class Immediate(HeldSolver):
-        def request(self, revision: int, clicks, options, when_done: Callable[[Solved], None]) -> None:
+        def request(self, revision: int, clicks, options, when_done: Callable[[Solved], None], camera=None) -> None:
             when_done(Solved(revision, NO_ANSWER))
 
     workspace = Workspace(FACTS, Restored(Path("nowhere"), History()), journal, Immediate())

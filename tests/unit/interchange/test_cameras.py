@@ -140,7 +140,8 @@ def test_the_lens_model_follows_from_name_and_number_of_coefficients(model, coef
         (ROS.replace("image_width: 640\n", ""), "the image size is missing; add image_width and image_height"),
         (ROS.replace("plumb_bob", "omni"), "the lens model 'omni' is not supported; known: none, pinhole"),
         (ROS.replace(COEFFICIENTS, "1, 2, 3"), "plumb_bob takes 4 or 5 distortion coefficients, found 3"),
-        (ROS + "binning_x: 2\n", "binning or a region of interest is set"),
+        (ROS + "binning_x: -2\n", "binning_x: -2 is not a number of pixels"),
+        (ROS + "roi: {width: 100}\n", "roi: width 100 and height 0: state both"),
         (KALIBR.replace("pinhole", "omni"), "cam0.camera_model: 'omni' is not supported"),
         (KALIBR.replace("501.5, ", ""), "cam0.intrinsics: expected 4 numbers, found 3"),
         (json.dumps({**OURS, "distortions": []}), "distortions: unknown key; did you mean distortion?"),
@@ -211,3 +212,11 @@ def test_opencv_s_own_sample_intrinsics_are_read(shared_data: Path):
     assert left.matrix_px[0, 0] == 5.3591573396163199e02
     assert stereo.matrix_px[0, 2] == 3.3455744527912015e02
     assert stereo.distortion[0] == -1.6916358306948096e-01
+
+
+def test_binning_and_region_of_interest_of_a_file_are_those_of_the_recorded_picture() -> None:
+    full = read_camera(ROS)
+    part = read_camera(ROS + "binning_x: 2\nbinning_y: 2\nroi: {x_offset: 40, y_offset: 20, width: 320, height: 240}\n")
+    assert (part.width_px, part.height_px) == (160, 120)
+    points = np.array([[0.1, -0.05, 1.0], [-0.2, 0.1, 1.5]])
+    np.testing.assert_allclose(part.project(points), (full.project(points) - [40.0, 20.0] + 0.5) / 2.0 - 0.5)

@@ -45,9 +45,9 @@ def test_each_camera_model_becomes_the_smallest_lens_that_fits_it(read, model, c
 @pytest.mark.parametrize(
     ("model", "coefficients", "words"),
     [
-        ("OPENCV", (0.1,) * 6, "plumb_bob takes 4 or 5 distortion coefficients, got 6"),
-        ("PINHOLE", (0.1,), "pinhole takes 0 distortion coefficients, got 1"),
-        ("FULL_OPENCV", (0.1,) * 7, "rational_polynomial takes 8 distortion coefficients, got 7"),
+        ("OPENCV", (0.1,) * 6, "plumb_bob takes 4 or 5 distortion coefficients, found 6"),
+        ("PINHOLE", (0.1,), "pinhole takes 0 distortion coefficients, found 1"),
+        ("FULL_OPENCV", (0.1,) * 7, "rational_polynomial takes 8 distortion coefficients, found 7"),
         ("THIN_PRISM_FISHEYE", (), "not supported; known: PINHOLE, OPENCV, FULL_OPENCV, OPENCV_FISHEYE"),
     ],
 )

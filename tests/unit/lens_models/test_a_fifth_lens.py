@@ -34,12 +34,22 @@ def distort(x, y, k):
     return (x * scale, y * scale), (scale + 2.0 * x * x * slope, 2.0 * x * y * slope, scale + 2.0 * y * y * slope)
 
 
+def coefficient_jacobian(points, k):
+    """Differentiate distort with respect to k: with q the root, d scale / d k is 4 r^2 / (q (1 + q)^2)."""
+    x, y = points[..., 0, :] / points[..., 2, :], points[..., 1, :] / points[..., 2, :]
+    r2 = x * x + y * y
+    root = np.sqrt(1.0 - 4.0 * k[0] * r2)
+    slope = 4.0 * r2 / (root * (1.0 + root) ** 2)
+    return np.stack([x * slope, y * slope], axis=-2)[..., None, :, :]
+
+
 DIVISION = LensModel(
     name="division",
     coefficients=("k",),
     counts=(1,),
     project=lambda points, distortion: project_distorted(points, distortion.tolist(), distort),
     unproject=lambda plane, distortion: unproject_distorted(plane, distortion.tolist(), distort),
+    coefficient_jacobian=coefficient_jacobian,
     is_perspective=True,
     typical=TypicalLens((-0.2,)),
     names_elsewhere=(NameElsewhere("camera_info", "division", 1), NameElsewhere("colmap", "DIVISION", 1)),
@@ -76,6 +86,13 @@ def test_it_projects_with_the_slope_of_its_projection(camera: Camera) -> None:
     undistorted = Camera("division", camera.width_px, camera.height_px, camera.matrix_px, np.zeros(1)).project(points)
     assert np.abs(pixels - undistorted).max() > 5.0
     assert camera.is_distorted
+
+
+def test_its_pixels_move_with_its_coefficient(camera: Camera) -> None:
+    points, step = points_ahead(), 1e-6 * np.eye(5)[4]
+    moved = [camera.with_parameters(camera.parameters + way * step).project(points) for way in (1.0, -1.0)]
+    slopes = camera.parameter_planes(points.T)
+    np.testing.assert_allclose(slopes[4].T, (moved[0] - moved[1]) / 2e-6, atol=1e-4)
 
 
 def test_a_point_lies_on_the_ray_of_its_pixel(camera: Camera) -> None:

@@ -121,8 +121,8 @@ def test_stamps_rise_and_the_two_sensors_are_not_synchronised(session: Simulated
     assert not set(frames.header_ns.tolist()) & set(scans.header_ns.tolist())
 
 
-def test_a_clock_offset_moves_the_radars_stamps_by_that_amount() -> None:
-    plain, ahead = simulate_scans(SHORT), simulate_scans(replace(SHORT, clock_offset_s=0.25))
+def test_a_clock_offset_moves_the_radars_stamps_by_that_amount(session: SimulatedScans) -> None:
+    plain, ahead = session, simulate_scans(replace(SHORT, clock_offset_s=0.25))
     assert set((ahead.scans.times_ns - plain.scans.times_ns).tolist()) <= {
         NS_PER_S // 4 - 1,
         NS_PER_S // 4,

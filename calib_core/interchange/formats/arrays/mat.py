@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from calib_core.interchange.calibration_file import EQUATION, CalibrationFile
+from calib_core.interchange.cameras.formats.matlab import ONE_BASED, dated_nothing
 from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.formats.arrays.named_arrays import from_arrays
 from calib_core.interchange.formats.statement import STATEMENT_KEY, statement
@@ -20,8 +21,6 @@ _NOTES = (
     "cameraIntrinsicsFromOpenCV(camera.K, camera.Distortion, camera.ImageSize), which counts pixels from 0 as camera.K does; "
     "camera.PrincipalPoint counts from 1 as cameraIntrinsics does; neither function is for the equidistant model",
 )
-_MAT_TEXT_BYTES = 116
-_ONE_BASED = 1.0
 
 
 def _write(file: CalibrationFile) -> bytes:
@@ -39,7 +38,7 @@ def _write(file: CalibrationFile) -> bytes:
         },
         "camera": {
             "FocalLength": np.array([[camera.matrix_px[0, 0], camera.matrix_px[1, 1]]]),
-            "PrincipalPoint": camera.matrix_px[None, :2, 2] + _ONE_BASED,
+            "PrincipalPoint": camera.matrix_px[None, :2, 2] + ONE_BASED,
             "ImageSize": np.array([[float(camera.height_px), float(camera.width_px)]]),
             "Skew": float(camera.matrix_px[0, 1]),
             "Model": camera.model,
@@ -57,8 +56,7 @@ def _write(file: CalibrationFile) -> bytes:
     content[STATEMENT_KEY] = "\n".join(statement(file, meaning))
     buffer = io.BytesIO()
     savemat(buffer, content, long_field_names=True, oned_as="row")  # type: ignore[arg-type]
-    title = f"MATLAB 5.0 MAT-file, cocalib, {EQUATION}".ljust(_MAT_TEXT_BYTES).encode()
-    return title[:_MAT_TEXT_BYTES] + buffer.getvalue()[_MAT_TEXT_BYTES:]  # SciPy writes today's date there
+    return dated_nothing(buffer.getvalue(), f"cocalib, {EQUATION}")
 
 
 def _recognizes(content: Content) -> bool:

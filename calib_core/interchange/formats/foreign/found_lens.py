@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from calib_core.interchange.cameras.fields import FoundCamera
+from calib_core.interchange.cameras.camera_format import FoundCamera
 from calib_core.interchange.imported import ImportedCalibration
 
 __all__ = ["pinhole_matrix", "with_camera"]

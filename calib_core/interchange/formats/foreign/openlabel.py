@@ -9,7 +9,8 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
-from calib_core.interchange.cameras.fields import FoundCamera, floats
+from calib_core.interchange.cameras.camera_format import FoundCamera
+from calib_core.interchange.cameras.numbers import floats
 from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.formats.foreign.found_lens import with_camera
 from calib_core.interchange.formats.foreign.pose_parts import direction_by_facing, rigid, rigid_matrix

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from calib_core.arrays import Matrix33
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
-from calib_core.interchange.cameras.fields import floats
+from calib_core.interchange.cameras.numbers import floats
 from calib_core.interchange.imported import (
     Direction,
     Form,

@@ -7,7 +7,7 @@ from importlib.resources import files
 
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile
-from calib_core.interchange.cameras.files import camera_info_text
+from calib_core.interchange.cameras.formats.ros import camera_info_text
 from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.formats.pack.correction_files import correction_files
 from calib_core.interchange.formats.pack.manifest import MANIFEST, manifest_text, verify

@@ -37,6 +37,7 @@ _EVIDENCE: dict[Evidence, str] = {
     "clicked": "solved from clicks on a reflector",
     "imported_proven": "read from another tool's file, whose meaning a check point, pairs or another calibration proved",
     "imported_assumed": "read from another tool's file, whose meaning was assumed; check it on a recording before you use it",
+    "automatic": "solved from clicks that were placed automatically and that nobody confirmed; look at them before you use it",
 }
 
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from calib_core.errors import InputError
-from calib_core.interchange.cameras.fields import floats
+from calib_core.interchange.cameras.numbers import floats
 from calib_core.interchange.imported import WrittenPose
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_places import PlacedValue, placed_yaml

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from calib_core.interchange.cameras.fields import floats
+from calib_core.interchange.cameras.numbers import floats
 from calib_core.interchange.imported import WrittenPose
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.xml_places import PlacedElement, placed_xml

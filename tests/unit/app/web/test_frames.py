@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 
 from app.web.frames import FrameStore
+from calib_core.camera import Camera
+from calib_core.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -207,3 +209,35 @@ def test_a_closed_store_leaves_nothing_pending_and_starts_nothing(executor: Thre
 
     asyncio.run(ask())
     assert 6 not in pictures.read
+
+
+def test_a_rectified_frame_is_made_with_the_intrinsics_of_the_moment_and_not_kept_for_others(
+    executor: ThreadPoolExecutor,
+) -> None:
+    def camera(k1: float) -> Camera:
+        matrix = np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]])
+        return Camera("plumb_bob", 640, 480, matrix, np.array([k1, 0, 0, 0]))
+
+    cameras: list[Camera | None] = [camera(-0.2), camera(0.1), None]
+
+    async def run() -> None:
+        store = FrameStore(Pictures(640, 480), 10, executor, camera=lambda: cameras[0])
+        first = await store.get(0, "rectified")
+        assert (await store.get(0, "rectified")).data is first.data
+        assert first.data != (await store.get(0)).data
+        cameras.pop(0)
+        other = await store.get(0, "rectified")
+        assert other.data != first.data
+        cameras.pop(0)
+        with pytest.raises(InputError, match="no intrinsics to rectify"):
+            await store.get(0, "rectified")
+        assert store.kept_bytes == len((await store.get(0)).data), "what was rectified with other intrinsics is gone"
+
+    asyncio.run(run())
+
+
+def test_intrinsics_of_another_size_rectify_nothing(executor: ThreadPoolExecutor) -> None:
+    small = Camera("pinhole", 64, 48, np.array([[50.0, 0, 32], [0, 50, 24], [0, 0, 1]]))
+    store = FrameStore(Pictures(640, 480), 10, executor, camera=lambda: small)
+    with pytest.raises(InputError, match="64 x 48 px, and the picture has 640 x 480"):
+        asyncio.run(store.get(0, "rectified"))

@@ -41,6 +41,7 @@ from app.web.messages import (
     OverlayReturn,
     Problem,
     Progress,
+    ProposingSwitch,
     RecordingNote,
     SensorNote,
     SessionNote,
@@ -79,6 +80,7 @@ FACTS = RecordingFacts("drive", 1_700_000_000_123_456_789 + 100_000_000 * np.ara
         ('{"type":"redo"}', Redo()),
         ('{"type":"cursor","index":7}', CursorMoved(7)),
         ('{"type":"viewpoint","viewpoint":"above"}', ViewpointWanted("above")),
+        ('{"type":"propose","on":false}', ProposingSwitch(on=False)),
         ('{"type":"import_clicks","text":"{}","name":"a.json"}', ImportWanted("{}", "a.json")),
     ],
 )
@@ -276,6 +278,7 @@ def test_a_picture_travels_with_its_header_before_its_bytes() -> None:
         "height_px": 480,
         "scale": 0.5,
         "format": "jpeg",
+        "rectified": False,
     }
     assert message[4 + length :] == b"\xff\xd8picture"
 

@@ -156,7 +156,7 @@ def test_a_survey_in_windows_and_in_stretches_finds_the_same(monkeypatch: pytest
     windows = [scans.between(TimeNs(int(s * 1e9)), TimeNs(int((s + 1) * 1e9) - 1)) for s in range(10)]
     assert survey_of(windows, image_times, GatingOptions()).rows == whole.rows
     assert survey_of(windows, image_times, GatingOptions()).activity == whole.activity
-    monkeypatch.setattr("app.web.channel.radar_survey._MOST_STATIC_RETURNS", 128)  # 9 s of 10
+    monkeypatch.setattr("calib_core.association.placements.MOST_STATIC_RETURNS", 128)  # 9 s of 10
     in_stretches = survey_of(windows, image_times, GatingOptions())
     assert [row.frame for row in in_stretches.rows] == [row.frame for row in whole.rows]
     assert in_stretches.activity == whole.activity

@@ -51,7 +51,7 @@ def answers(session: Session, *requests: ReviewRequest, camera: Any = None) -> l
 
     async def ask() -> list[Any]:
         outbox, sent, reports = Outbox(), [], []
-        desk = ReviewDesk(FakeWorkspace(History(session)), EmptyRecording(), camera, outbox, reports.append)
+        desk = ReviewDesk(FakeWorkspace(History(session)), EmptyRecording(), lambda: camera, outbox, reports.append)
 
         async def take(message: str | bytes) -> None:
             sent.append(json.loads(message))

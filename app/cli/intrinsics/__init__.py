@@ -1,0 +1,1 @@
+"""`cocalib intrinsics`: calibrate a lens, and convert files with intrinsics."""

@@ -1,0 +1,1 @@
+"""`cocalib propose`, and what `cocalib solve --auto` shares with it."""

@@ -1,0 +1,15 @@
+"""Find where the reflector stood in a recording, for the command line and the page."""
+
+from app.proposing.finding import REFLECTOR_M, RecordedFrames, find_proposals, proposed_again
+from app.proposing.job import ProposingJob, ProposingSnapshot, ProposingStage, ProposingWish
+
+__all__ = [
+    "REFLECTOR_M",
+    "ProposingJob",
+    "ProposingSnapshot",
+    "ProposingStage",
+    "ProposingWish",
+    "RecordedFrames",
+    "find_proposals",
+    "proposed_again",
+]

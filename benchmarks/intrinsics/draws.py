@@ -1,0 +1,133 @@
+"""What the rows draw: lenses, boards, ways of filming, and pictures."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calib_core.camera import Camera, CameraModel
+from calib_core.geometry import RigidTransform
+from calib_core.intrinsics import Board
+from calib_core.measurements import TimeNs
+from calib_core.synthetic import typical_camera
+from calib_core.synthetic.boards import (
+    BoardFilm,
+    BoardShape,
+    CornerErrors,
+    Waving,
+    render_board,
+    true_corners,
+    waved_poses,
+)
+
+__all__ = ["BOARDS", "CHECKERBOARD", "FILMS", "LENSES", "Pictures", "Series", "drawn_camera", "drawn_series", "moved"]
+
+LENSES: tuple[CameraModel, ...] = ("pinhole", "plumb_bob", "rational_polynomial", "equidistant")
+CHECKERBOARD = Board("checkerboard", 9, 6, 0.02214)
+BOARDS: Mapping[str, Board] = {
+    "checkerboard 9 x 6": CHECKERBOARD,
+    "ChArUco 10 x 7": Board("charuco", 10, 7, 0.0225, 0.0168, "DICT_5X5_100"),
+    "AprilGrid 6 x 4": Board("aprilgrid", 6, 4, 0.03, 0.009, "DICT_APRILTAG_36h11"),
+}
+_USUAL = BoardFilm(blur_px=0.7, noise_grey=2.0)
+FILMS: Mapping[str, BoardFilm] = {
+    "clean": BoardFilm(),
+    "blur and noise": _USUAL,
+    "bent board": replace(_USUAL, shape=BoardShape(bend_m=(0.0015, 0.0007))),
+    "changing light": replace(_USUAL, gradient=(0.35, -0.2), vignetting=0.4),
+    "rolling shutter": replace(_USUAL, rolling_shutter_s=0.02),
+}
+_HELD = Waving()
+_DRIFT = CornerErrors(speed_mps=0.03, turning_radps=0.08)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pictures:
+    """Pictures in memory, as a search takes them."""
+
+    pixels: tuple[np.ndarray, ...]
+    names: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.pixels)
+
+    def name(self, index: int, /) -> str:
+        """Return a picture's name."""
+        return self.names[index]
+
+    def time_ns(self, index: int, /) -> TimeNs | None:
+        """Return None: they have no times."""
+        del index
+
+    def picture(self, index: int, /) -> np.ndarray:
+        """Return its pixels."""
+        return self.pixels[index]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Series:
+    """Pictures of one board through one lens, with the truth.
+
+    Attributes:
+        camera: the true lens.
+        board: as stated.
+        pictures: for the search.
+        corners_px: the true corners of each picture, by id.
+    """
+
+    camera: Camera
+    board: Board
+    pictures: Pictures
+    corners_px: tuple[np.ndarray, ...]
+
+
+def drawn_camera(rng: np.random.Generator, model: CameraModel, *, width_px: int = 1280, height_px: int = 720) -> Camera:
+    """Draw a lens: focal length, principal point and distortion about the usual ones."""
+    usual = typical_camera(model, width_px=width_px, height_px=height_px)
+    matrix = usual.matrix_px.copy()
+    matrix[[0, 1], [0, 1]] *= rng.uniform(0.9, 1.2)
+    matrix[:2, 2] += rng.uniform(-0.02, 0.02, 2) * width_px
+    return replace(usual, matrix_px=matrix, distortion=usual.distortion * rng.uniform(0.7, 1.2))
+
+
+def moved(rng: np.random.Generator, film: BoardFilm, errors: CornerErrors = _DRIFT) -> BoardFilm:
+    """Return the film with a board that does not quite stand still, if its rows are exposed one after the other."""
+    if not film.rolling_shutter_s:
+        return film
+    x, y, z = (errors.speed_mps * rng.standard_normal(3)).tolist()
+    a, b, c = (errors.turning_radps * rng.standard_normal(3)).tolist()
+    return replace(film, velocity_mps=(x, y, z), turning_radps=(a, b, c))
+
+
+def changed_light(rng: np.random.Generator, film: BoardFilm) -> BoardFilm:
+    """Return the film with another exposure and direction of the light, if the light changes."""
+    if not film.vignetting:
+        return film
+    across, down = (rng.uniform(-1.0, 1.0, 2) * 0.4).tolist()
+    return replace(film, exposure=float(rng.uniform(0.5, 1.15)), gradient=(across, down))
+
+
+def drawn_series(
+    seed: Sequence[int],
+    model: CameraModel,
+    film: BoardFilm,
+    *,
+    board: Board = CHECKERBOARD,
+    views: int = 20,
+    held: Waving = _HELD,
+) -> Series:
+    """Draw and render a board before a lens."""
+    rng = np.random.default_rng(list(seed))
+    camera = drawn_camera(rng, model)
+    poses = waved_poses(rng, board, camera, views, held)
+    films = [changed_light(rng, moved(rng, film)) for _ in poses]
+    pixels = [
+        render_board(board, camera, pose, one, seed=int(rng.integers(1 << 31)))
+        for pose, one in zip(poses, films, strict=True)
+    ]
+    true = tuple(_true(board, camera, pose, one) for pose, one in zip(poses, films, strict=True))
+    return Series(camera, board, Pictures(tuple(pixels), tuple(f"view {i + 1}" for i in range(views))), true)
+
+
+def _true(board: Board, camera: Camera, pose: RigidTransform, film: BoardFilm) -> np.ndarray:
+    return np.asarray(true_corners(board, camera, pose, film))

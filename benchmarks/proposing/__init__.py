@@ -1,0 +1,1 @@
+"""How well the machine proposes where the reflector stands in the pictures, on recordings that nobody chose."""

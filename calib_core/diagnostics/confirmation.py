@@ -1,0 +1,28 @@
+"""Whether a person has confirmed the clicks that a pose rests on."""
+
+from calib_core.results import DataWarning, UnconfirmedClicks
+
+__all__ = ["nobody_confirmed", "probability_text"]
+
+_NEARLY_SURE = 0.995
+
+
+def probability_text(probability: float) -> str:
+    """Write a probability with two digits; one that would round to 1 as "> 0.99"."""
+    return "> 0.99" if probability >= _NEARLY_SURE else f"{probability:.2f}"
+
+
+def nobody_confirmed(unconfirmed: UnconfirmedClicks, count: int) -> DataWarning:
+    """Warn that clicks were placed automatically.
+
+    Args:
+        unconfirmed: which, and how sure they are.
+        count: of all clicks that were used.
+    """
+    placed = len(unconfirmed.ids)
+    of_all = f"all {count} clicks were" if placed == count else f"{placed} of {count} clicks were"
+    return DataWarning(
+        "nobody-confirmed",
+        f"{of_all} placed automatically (confidence {probability_text(unconfirmed.confidence)}), and nobody confirmed them",
+        "look at each of them on the page: open the recording with the clicks that solve --auto --clicks-out wrote",
+    )

@@ -1,0 +1,139 @@
+"""A format for the intrinsics of a camera, and what a reader finds in a file."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.camera import Camera, CameraCovariance
+from calib_core.errors import InputError
+from calib_core.lens_models.naming import lenses_named, opencv_lens
+from calib_core.lens_models.registry import LENS_MODELS
+
+__all__ = ["CameraFormat", "FoundCamera", "OwnSyntax", "PictureWindow", "found_or_refused"]
+
+
+@dataclass(frozen=True, slots=True)
+class PictureWindow:
+    """The part of the sensor that was published, and how it was binned (REP 104).
+
+    Attributes:
+        offset_px: left column and upper row of the region of interest, on the full sensor.
+        size_px: its width and height on the full sensor; None for all of it.
+        binning: pixels of the sensor along a row and a column that make one of the picture.
+    """
+
+    offset_px: tuple[int, int] = (0, 0)
+    size_px: tuple[int, int] | None = None
+    binning: tuple[int, int] = (1, 1)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FoundCamera:
+    """What a file says about one camera, before any check.
+
+    Attributes:
+        name: its key in the file.
+        model: our name for its lens model; "" if the file implies it by the number of coefficients.
+        matrix_px: (9,) row-major.
+        distortion: the coefficients, as many as the file has.
+        size_px: width and height; None if the file does not state them.
+        covariance: of the parameters; None if the file does not state it.
+        window: the part of the picture that was recorded; None for all of it.
+        refused: why this camera cannot be used, if others of the file may be; "" if it can.
+    """
+
+    name: str
+    model: str
+    matrix_px: tuple[float, ...]
+    distortion: tuple[float, ...]
+    size_px: tuple[int, int] | None
+    covariance: CameraCovariance | None = None
+    window: PictureWindow | None = None
+    refused: str = ""
+
+    def camera(self, *, image_size_px: tuple[int, int] | None, source: str) -> Camera:
+        """Return the camera, for the pictures as they were recorded.
+
+        Raises:
+            InputError: the camera is refused, the image size is missing, or a parameter is invalid.
+        """
+        if self.refused:
+            raise InputError(self.refused)
+        size = self.size_px or image_size_px
+        if size is None:
+            raise InputError(
+                f"{source}: {self.name}: the image size is missing; add image_width and image_height to the file"
+            )
+        model, distortion = self.lens(source=source)
+        matrix = np.reshape(self.matrix_px, (3, 3))
+        try:
+            camera = Camera(model, *size, matrix, np.array(distortion), self.covariance)
+            if self.window is None:
+                return camera
+            return camera.windowed(self.window.offset_px, self.window.size_px or size, self.window.binning)
+        except ValueError as error:
+            raise InputError(f"{source}: {self.name}: {error}; correct it or calibrate the camera again") from None
+
+    def lens(self, *, source: str) -> tuple[str, tuple[float, ...]]:
+        """Return the lens model and its coefficients: an unnamed model follows from their number as in OpenCV.
+
+        Raises:
+            InputError: the camera is refused, or the model does not take that number of coefficients.
+        """
+        if self.refused:
+            raise InputError(self.refused)
+        distortion = self.distortion
+        lens = LENS_MODELS[self.model] if self.model else opencv_lens(len(distortion))
+        if not distortion:  # ROS also calls a pinhole plumb_bob
+            lens = next((bare for bare in lenses_named("camera_info", lens.name) if 0 in bare.counts), lens)
+        longest = lens.counts[-1]
+        if len(distortion) > longest and not any(distortion[longest:]):
+            distortion = distortion[:longest]
+        if len(distortion) not in lens.counts:
+            wanted = " or ".join(map(str, lens.counts))
+            raise InputError(
+                f"{source}: {self.name}: {lens.name} takes {wanted} distortion coefficients, found {len(distortion)} "
+                "(thin prism and tilt are not supported); calibrate the camera with that model"
+            )
+        return lens.name, distortion
+
+
+def found_or_refused(name: str, read: Callable[[], FoundCamera]) -> FoundCamera:
+    """Read one of a file's cameras; one that cannot be read is refused when it is chosen, and does not hide the others."""
+    try:
+        return read()
+    except InputError as error:
+        return FoundCamera(name, "", (0.0,) * 9, (), None, refused=str(error))
+
+
+@dataclass(frozen=True, slots=True)
+class OwnSyntax:
+    """How a format is read whose files are neither JSON nor YAML nor OpenCV's XML.
+
+    Attributes:
+        recognizes: whether a file's text, or its bytes if it is none, is of this format.
+        read: the cameras in it, in file order; raises InputError.
+    """
+
+    recognizes: Callable[[str | bytes], bool]
+    read: Callable[[str | bytes, str], tuple[FoundCamera, ...]]
+
+
+@dataclass(frozen=True, slots=True)
+class CameraFormat:
+    """A format for the intrinsics of a camera.
+
+    Attributes:
+        name: as typed after --to.
+        title: what it is, for lists.
+        suffix: usual for its files.
+        write: the file's content for a camera and its name; raises InputError for a camera that the format cannot store.
+        own_syntax: how it is read if its syntax is its own; None if its keys say it.
+    """
+
+    name: str
+    title: str
+    suffix: str
+    write: Callable[[Camera, str], str | bytes]
+    own_syntax: OwnSyntax | None = None

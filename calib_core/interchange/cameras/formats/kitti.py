@@ -1,0 +1,72 @@
+"""KITTI's calib_cam_to_cam.txt: K, D and size of each camera, and its rectified picture."""
+
+import re
+
+from calib_core.camera import Camera
+from calib_core.errors import InputError
+from calib_core.interchange.cameras.camera_format import CameraFormat, FoundCamera, OwnSyntax
+from calib_core.interchange.cameras.numbers import floats
+from calib_core.interchange.own.camera_document import refuse_skew
+from calib_core.interchange.syntax.yaml_text import numbers_text
+from calib_core.lens_models.naming import written_lens
+
+__all__ = ["KITTI_CAMERAS_FILE"]
+
+_KEY = re.compile(r"^(K|D|S|P_rect|S_rect|R_rect|R|T|P)_?(\d{1,2}):\s*(.*)$")
+
+
+def _keyed(content: str | bytes) -> dict[str, dict[str, str]]:
+    """Return the values of each camera by its number and their keys."""
+    cameras: dict[str, dict[str, str]] = {}
+    for line in content.splitlines() if isinstance(content, str) else []:
+        if match := _KEY.match(line.strip()):
+            cameras.setdefault(match[2], {})[match[1]] = match[3]
+    return cameras
+
+
+def _recognizes(content: str | bytes) -> bool:
+    return any({"K", "D"} <= set(values) or "P_rect" in values for values in _keyed(content).values())
+
+
+def _read(content: str | bytes, source: str) -> tuple[FoundCamera, ...]:
+    found = []
+    for number, values in _keyed(content).items():
+        if {"K", "D"} <= set(values):
+            matrix = _numbers(values, "K", number, source, 9)
+            distortion = _numbers(values, "D", number, source)
+            found.append(FoundCamera(number, "", matrix, distortion, _size(values, "S", number, source)))
+        if "P_rect" in values:
+            p = _numbers(values, "P_rect", number, source, 12)
+            matrix = (*p[0:3], *p[4:7], *p[8:11])
+            found.append(FoundCamera(f"rect_{number}", "pinhole", matrix, (), _size(values, "S_rect", number, source)))
+    return tuple(found)
+
+
+def _numbers(
+    values: dict[str, str], key: str, number: str, source: str, length: int | None = None
+) -> tuple[float, ...]:
+    return floats(values[key].split(), source=source, place=f"{key}_{number}", length=length)
+
+
+def _size(values: dict[str, str], key: str, number: str, source: str) -> tuple[int, int] | None:
+    if key not in values:
+        return None
+    width, height = _numbers(values, key, number, source, 2)
+    return int(width), int(height)
+
+
+def _write(camera: Camera, _name: str) -> str:
+    refuse_skew(camera, "KITTI's cameras have")
+    lens = written_lens(camera.lens, camera.distortion, "camera_info")
+    if lens.name != "plumb_bob" or len(lens.coefficients) != 5:
+        raise InputError(f"KITTI's files have no {camera.model} lens; write ros, kalibr, opencv, colmap or json")
+    return (
+        "corner_dist: 0.0\n"
+        f"S_00: {numbers_text((float(camera.width_px), float(camera.height_px)), ' ')}\n"
+        f"K_00: {numbers_text(camera.matrix_px.ravel(), ' ')}\n"
+        f"D_00: {numbers_text(lens.coefficients, ' ')}\n"
+        "R_00: 1.0 0.0 0.0 0.0 1.0 0.0 0.0 0.0 1.0\nT_00: 0.0 0.0 0.0\n"
+    )
+
+
+KITTI_CAMERAS_FILE = CameraFormat("kitti", "KITTI calib_cam_to_cam.txt", ".txt", _write, OwnSyntax(_recognizes, _read))

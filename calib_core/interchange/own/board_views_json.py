@@ -1,0 +1,208 @@
+"""Write and read board-views-1: what a search for a board has found, so that it is not done again."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import msgspec
+import numpy as np
+
+from calib_core.errors import InputError
+from calib_core.interchange.own.lens_documents import (
+    BOARD_VIEWS_SCHEMA,
+    BoardDocument,
+    BoardViewDocument,
+    BoardViewsDocument,
+    LeftOutDocument,
+    SourceDocument,
+)
+from calib_core.interchange.own.numbers import finite_or_none, nan_if_none
+from calib_core.interchange.syntax.json_text import json_text
+from calib_core.interchange.syntax.strict_json import parse_document
+from calib_core.intrinsics import Board, BoardCorners, LeftOutPicture
+from calib_core.measurements import TimeNs
+
+__all__ = [
+    "BoardViews",
+    "PictureSource",
+    "board_document",
+    "left_out_documents",
+    "read_board_views",
+    "runs_of",
+    "source_document",
+    "write_board_views",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class PictureSource:
+    """Where pictures come from.
+
+    Attributes:
+        name: what messages call it.
+        pictures: how many there are.
+        sha256: by which it is known again.
+    """
+
+    name: str
+    pictures: int
+    sha256: str
+
+
+@dataclass(frozen=True, slots=True)
+class BoardViews:
+    """What a search has found so far.
+
+    Attributes:
+        board: what was looked for.
+        source: where.
+        views: in which the board was found.
+        searched: first and last number of runs of pictures that need not be looked at again.
+        complete: whether the search came to its end.
+    """
+
+    board: Board
+    source: PictureSource
+    views: tuple[BoardCorners, ...]
+    searched: tuple[tuple[int, int], ...] = ()
+    complete: bool = False
+
+    def searched_indices(self) -> tuple[int, ...]:
+        """Return the numbers of the pictures that need not be looked at again, ascending."""
+        flags = np.zeros(self.source.pictures, dtype=bool)
+        for first, last in self.searched:
+            flags[first : last + 1] = True
+        flags[[view.index for view in self.views]] = True
+        return tuple(np.flatnonzero(flags).tolist())
+
+    def require_same(self, board: Board, source: PictureSource, *, file: str) -> None:
+        """Refuse views of another board or of other pictures.
+
+        Raises:
+            InputError: they are.
+        """
+        if self.board != board:
+            raise InputError(
+                f"{file}: views of a {_said(self.board)}, but the board is a {_said(board)}; "
+                "give that board, or name another file"
+            )
+        if self.source.sha256 != source.sha256 or self.source.pictures != source.pictures:
+            raise InputError(
+                f"{file}: views in {self.source.name} ({self.source.pictures} pictures), not in {source.name} as it is now "
+                f"({source.pictures} pictures); give the same pictures, or name another file"
+            )
+
+
+def _said(board: Board) -> str:
+    parts = [f"{board.text} with {1e3 * board.square_m:g} mm"]
+    if board.marker_m:
+        parts.append(f"{1e3 * board.marker_m:g} mm")
+    return ", ".join([*parts, *([board.dictionary] if board.dictionary else [])])
+
+
+def write_board_views(found: BoardViews) -> str:
+    """Write board-views-1 text; the same views give the same bytes."""
+    document = BoardViewsDocument(
+        BOARD_VIEWS_SCHEMA,
+        board_document(found.board),
+        source_document(found.source),
+        found.complete,
+        list(found.searched),
+        [_view_document(view) for view in found.views],
+    )
+    return json_text(msgspec.to_builtins(document))
+
+
+def read_board_views(text: str, source: str = "views") -> BoardViews:
+    """Read board-views-1 text.
+
+    Args:
+        text: the file's content.
+        source: the name of the file in error messages.
+
+    Raises:
+        InputError: invalid content; the message names the file, the place and what to do.
+    """
+    document = parse_document(text, BoardViewsDocument, source=source)
+    board = Board(**msgspec.structs.asdict(document.board))
+    pictures = document.source.pictures
+    for place, (first, last) in enumerate(document.searched):
+        if not first <= last < pictures:
+            raise InputError(f"{source}: searched[{place}]: {first} to {last} of {pictures} pictures; search again")
+    views = tuple(
+        _view(view, board, pictures, source=source, place=f"views[{place}]")
+        for place, view in enumerate(document.views)
+    )
+    if len({view.index for view in views}) < len(views):
+        raise InputError(f"{source}: views: two are of the same picture; search again")
+    return BoardViews(
+        board,
+        PictureSource(document.source.name, pictures, document.source.sha256),
+        views,
+        tuple(document.searched),
+        document.complete,
+    )
+
+
+def board_document(board: Board) -> BoardDocument:
+    """Return the document of a board."""
+    return BoardDocument(board.kind, board.columns, board.rows, board.square_m, board.marker_m, board.dictionary)
+
+
+def source_document(source: PictureSource) -> SourceDocument:
+    """Return the document of a source of pictures."""
+    return SourceDocument(source.name[:200] or "pictures", source.pictures, source.sha256)
+
+
+def left_out_documents(left_out: Iterable[LeftOutPicture]) -> list[LeftOutDocument]:
+    """Return the documents of pictures that are not used."""
+    return [LeftOutDocument(one.index, one.name[:200], one.reason) for one in left_out]
+
+
+def _view_document(view: BoardCorners) -> BoardViewDocument:
+    return BoardViewDocument(
+        view.index,
+        view.name[:200],
+        view.size_px,
+        view.corner_ids.tolist(),
+        [tuple(pixel) for pixel in view.pixels_px.tolist()],
+        time_ns=view.time_ns,
+        blur_px=finite_or_none(view.blur_px),
+    )
+
+
+def _view(document: BoardViewDocument, board: Board, pictures: int, *, source: str, place: str) -> BoardCorners:
+    """Return a view.
+
+    Raises:
+        InputError: it cannot be one of this board in these pictures.
+    """
+    ids, count = np.array(document.corner_ids), len(board.corners_m)
+    if len(ids) != len(document.pixels_px) or not np.all(np.diff(ids) > 0) or ids[-1] >= count:
+        raise InputError(
+            f"{source}: {place}: corner_ids must ascend, be below {count} and as many as pixels_px; search again"
+        )
+    if document.index >= pictures:
+        raise InputError(f"{source}: {place}.index: {document.index} of {pictures} pictures; search again")
+    pixels = np.array(document.pixels_px)
+    if np.any(pixels < -1.0) or np.any(pixels > document.size_px):
+        raise InputError(f"{source}: {place}.pixels_px: a corner is outside its picture; search again")
+    return BoardCorners(
+        document.index,
+        document.name,
+        None if document.time_ns is None else TimeNs(document.time_ns),
+        document.size_px,
+        ids,
+        pixels,
+        nan_if_none(document.blur_px),
+    )
+
+
+def runs_of(numbers: Iterable[int]) -> tuple[tuple[int, int], ...]:
+    """Return the first and last of runs of numbers without a gap."""
+    runs: list[tuple[int, int]] = []
+    for number in sorted(numbers):
+        if runs and runs[-1][1] == number - 1:
+            runs[-1] = (runs[-1][0], number)
+        else:
+            runs.append((number, number))
+    return tuple(runs)

@@ -1,0 +1,152 @@
+"""Write intrinsics-1: a calibrated lens with all that is known about it, for programs."""
+
+import msgspec
+import numpy as np
+
+from calib_core.arrays import Values
+from calib_core.camera import Camera
+from calib_core.interchange.own.board_views_json import (
+    PictureSource,
+    board_document,
+    left_out_documents,
+    source_document,
+)
+from calib_core.interchange.own.camera_document import camera_document
+from calib_core.interchange.own.documents import WarningDocument
+from calib_core.interchange.own.lens_documents import (
+    INTRINSICS_SCHEMA,
+    CoverageDocument,
+    IntrinsicsDocument,
+    LensParameterDocument,
+    LensPoseDocument,
+    LensViewDocument,
+    ModelTrialDocument,
+    ResidualFieldDocument,
+    UncertaintyDocument,
+)
+from calib_core.interchange.own.numbers import finite_or_none
+from calib_core.interchange.syntax.json_text import json_text
+from calib_core.intrinsics import (
+    MODEL_ERRORS_UNSEEN,
+    CalibratedLens,
+    LensView,
+    projection_uncertainty,
+    residual_field,
+    split_difference,
+)
+from calib_core.intrinsics.searching.coverage import Coverage
+from calib_core.measurements import Unsolvable
+
+__all__ = ["write_intrinsics"]
+
+
+def write_intrinsics(
+    lens: CalibratedLens,
+    source: PictureSource,
+    *,
+    searched: int,
+    field_of_view_deg: tuple[float, float],
+    coverage: Coverage | None = None,
+) -> str:
+    """Write intrinsics-1 text; the same lens gives the same bytes.
+
+    Args:
+        lens: with its views.
+        source: of the pictures.
+        searched: how many of them were looked at.
+        field_of_view_deg: along the middle row and the middle column [deg].
+        coverage: of the used views.
+    """
+    halves = split_difference(lens)
+    document = IntrinsicsDocument(
+        schema=INTRINSICS_SCHEMA,
+        camera=camera_document(lens.camera),
+        board=board_document(lens.board),
+        source=source_document(source),
+        parameters=_parameters(lens.camera),
+        field_of_view_deg=(finite_or_none(field_of_view_deg[0]), finite_or_none(field_of_view_deg[1])),
+        rms_px=finite_or_none(lens.rms_px),
+        held_out_rms_px=finite_or_none(lens.held_out_rms_px),
+        choice=lens.choice,
+        models=_models(lens),
+        searched=searched,
+        views=[_view(view) for view in lens.views],
+        left_out=left_out_documents(lens.left_out),
+        projection_uncertainty=_uncertainty(lens),
+        residual_field=_field(lens),
+        coverage=None if coverage is None else _coverage(coverage),
+        halves_apart=halves.reason if isinstance(halves, Unsolvable) else halves.sentence,
+        warnings=[WarningDocument(one.code, one.message, one.hint) for one in lens.warnings],
+        board_shape_m=[(x, y, z) for x, y, z in lens.board_shape_m.tolist()],
+    )
+    return json_text(msgspec.to_builtins(document))
+
+
+def _parameters(camera: Camera) -> list[LensParameterDocument]:
+    known = camera.covariance
+    return [
+        LensParameterDocument(name, value, None if known is None else known.sigma(name))
+        for name, value in zip(camera.parameter_names, camera.parameters.tolist(), strict=True)
+    ]
+
+
+def _models(lens: CalibratedLens) -> list[ModelTrialDocument]:
+    return [
+        ModelTrialDocument(
+            one.model,
+            finite_or_none(one.rms_px),
+            finite_or_none(one.held_out_rms_px),
+            finite_or_none(one.worse_by),
+            finite_or_none(one.standard_error),
+            one.fault,
+        )
+        for one in lens.trials
+    ]
+
+
+def _view(view: LensView) -> LensViewDocument:
+    corners = view.corners
+    pose = view.camera_from_board
+    return LensViewDocument(
+        corners.index,
+        corners.name,
+        len(corners.corner_ids),
+        int(view.used.sum()),
+        finite_or_none(view.rms_px),
+        finite_or_none(view.held_out_rms_px),
+        finite_or_none(corners.blur_px),
+        LensPoseDocument(pose.rotation.tolist(), pose.translation_m.tolist()),
+    )
+
+
+def _uncertainty(lens: CalibratedLens) -> UncertaintyDocument:
+    grid = projection_uncertainty(lens)
+    sigmas = [_numbers(row) for row in grid.sigma_px]
+    return UncertaintyDocument(grid.x_px.tolist(), grid.y_px.tolist(), sigmas, MODEL_ERRORS_UNSEEN)
+
+
+def _field(lens: CalibratedLens) -> ResidualFieldDocument:
+    found = residual_field(lens)
+    return ResidualFieldDocument(
+        found.x_px.tolist(),
+        found.y_px.tolist(),
+        [[(finite_or_none(u), finite_or_none(v)) for u, v in row] for row in found.means_px],
+        [_numbers(row) for row in found.errors_px],
+        found.counts.tolist(),
+        finite_or_none(found.systematic_px),
+        found.sentence,
+    )
+
+
+def _coverage(coverage: Coverage) -> CoverageDocument:
+    return CoverageDocument(
+        coverage.counts.tolist(),
+        coverage.share,
+        dict(coverage.tilts),
+        dict(coverage.distances),
+        list(coverage.missing),
+    )
+
+
+def _numbers(row: Values) -> list[float | None]:
+    return [finite_or_none(value) for value in np.asarray(row)]

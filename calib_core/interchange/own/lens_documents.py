@@ -1,0 +1,185 @@
+"""The keys of two more of our files: views of a board that a search has found, and a lens calibrated from such views."""
+
+from typing import Annotated, Final, Literal
+
+import msgspec
+from msgspec import Meta, Struct
+
+from calib_core.interchange.own.documents import CameraDocument, Count, Measured, Name, Pixel, Positive, WarningDocument
+from calib_core.intrinsics import BoardKind
+
+__all__ = [
+    "BOARD_VIEWS_SCHEMA",
+    "INTRINSICS_SCHEMA",
+    "BoardDocument",
+    "BoardViewDocument",
+    "BoardViewsDocument",
+    "CoverageDocument",
+    "IntrinsicsDocument",
+    "LeftOutDocument",
+    "LensParameterDocument",
+    "LensPoseDocument",
+    "LensViewDocument",
+    "ModelTrialDocument",
+    "ResidualFieldDocument",
+    "SourceDocument",
+    "UncertaintyDocument",
+]
+
+BOARD_VIEWS_SCHEMA: Final = "cocalib/board-views-1"
+INTRINSICS_SCHEMA: Final = "cocalib/intrinsics-1"
+
+_Side = Annotated[int, Meta(ge=1, le=1_000_000)]
+_Number = Annotated[int, Meta(ge=0, le=1_000_000_000)]
+_Text = Annotated[str, Meta(max_length=10_000)]
+
+
+class BoardDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """A calibration board: columns and rows as on the command line, lengths in metres."""
+
+    kind: BoardKind
+    columns: Annotated[int, Meta(ge=1, le=1000)]
+    rows: Annotated[int, Meta(ge=1, le=1000)]
+    square_m: Positive
+    marker_m: Annotated[float, Meta(ge=0.0, le=1e9)] = 0.0
+    dictionary: Annotated[str, Meta(max_length=200)] = ""
+
+
+class SourceDocument(Struct, frozen=True, forbid_unknown_fields=True):
+    """Where the pictures come from: what it is called, how many there are, and a hash by which it is known again."""
+
+    name: Name
+    pictures: Count
+    sha256: Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
+
+
+class BoardViewDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """The corners of the board in one picture; (0, 0) is the centre of the top-left pixel."""
+
+    index: _Number
+    name: Name
+    size_px: tuple[_Side, _Side]
+    corner_ids: Annotated[list[_Number], Meta(min_length=1, max_length=100_000)]
+    pixels_px: Annotated[list[Pixel], Meta(max_length=100_000)]
+    time_ns: Annotated[int, Meta(ge=-(2**62), le=2**62)] | None = None
+    blur_px: Annotated[float, Meta(ge=0.0, le=1e9)] | None = None
+
+
+class LeftOutDocument(Struct, frozen=True, forbid_unknown_fields=True):
+    """A picture that is not used, and why."""
+
+    index: _Number
+    name: Name
+    reason: _Text
+
+
+class BoardViewsDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """What a search for a board has found so far; with it the search is resumed, or not done again.
+
+    searched are the first and the last number of runs of pictures that need not be looked at again.
+    """
+
+    schema: Literal["cocalib/board-views-1"]
+    board: BoardDocument
+    source: SourceDocument
+    complete: bool
+    searched: list[tuple[_Number, _Number]]
+    views: list[BoardViewDocument]
+
+
+class LensParameterDocument(Struct, frozen=True):
+    """One of the intrinsics with its standard deviation; null if it is not known."""
+
+    name: str
+    value: float
+    sigma: float | None
+
+
+class LensPoseDocument(Struct, frozen=True):
+    """p_camera = rotation p_board + translation_m; the board's corners have z = 0 unless board_shape_m says otherwise."""
+
+    rotation: list[list[float]]
+    translation_m: list[float]
+
+
+class LensViewDocument(Struct, frozen=True):
+    """A view as the lens explains it: root mean square distances of its corners, used and predicted."""
+
+    index: int
+    name: str
+    corners: int
+    used_corners: int
+    rms_px: float | None
+    held_out_rms_px: float | None
+    blur_px: float | None
+    camera_from_board: LensPoseDocument
+
+
+class ModelTrialDocument(Struct, frozen=True):
+    """A lens model that was tried; worse_by is the mean over views of what it predicts worse than the chosen one."""
+
+    model: str
+    rms_px: float | None
+    held_out_rms_px: float | None
+    worse_by_px2: float | None
+    standard_error_px2: float | None
+    fault: str
+
+
+class UncertaintyDocument(Struct, frozen=True):
+    """Standard deviation of the projection of far points over the picture; null where the lens sees nothing."""
+
+    x_px: list[float]
+    y_px: list[float]
+    sigma_px: list[list[float | None]]
+    sentence: str
+
+
+class ResidualFieldDocument(Struct, frozen=True):
+    """Mean residuals over cells of the picture with their standard errors; null in empty cells."""
+
+    x_px: list[float]
+    y_px: list[float]
+    mean_px: list[list[tuple[float | None, float | None]]]
+    standard_error_px: list[list[float | None]]
+    corners: list[list[int]]
+    systematic_px: float | None
+    sentence: str
+
+
+class CoverageDocument(Struct, frozen=True):
+    """Where the corners are, how the board was turned and how far it was, and what to film next."""
+
+    counts: list[list[int]]
+    share: float
+    tilts: dict[str, int]
+    distances: dict[str, int]
+    missing: list[str]
+
+
+class IntrinsicsDocument(Struct, frozen=True):
+    """A calibrated lens with all that is known about it."""
+
+    schema: Literal["cocalib/intrinsics-1"]
+    camera: CameraDocument
+    board: BoardDocument
+    source: SourceDocument
+    parameters: list[LensParameterDocument]
+    field_of_view_deg: tuple[float | None, float | None]
+    rms_px: float | None
+    held_out_rms_px: float | None
+    choice: str
+    models: list[ModelTrialDocument]
+    searched: int
+    views: list[LensViewDocument]
+    left_out: list[LeftOutDocument]
+    projection_uncertainty: UncertaintyDocument
+    residual_field: ResidualFieldDocument
+    coverage: CoverageDocument | None
+    halves_apart: str
+    warnings: list[WarningDocument]
+    board_shape_m: list[tuple[Measured, Measured, Measured]]
+
+
+for _document in (BoardViewsDocument, IntrinsicsDocument):
+    msgspec.json.Decoder(_document)  # for the reason given in documents.py

@@ -1,0 +1,78 @@
+"""Where pictures of a board come from, and what is found in one."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from calib_core.arrays import Indices, Points2, frozen_array
+from calib_core.measurements import TimeNs
+
+__all__ = ["BoardCorners", "BoardPictures", "LeftOutPicture"]
+
+
+class BoardPictures(Protocol):
+    """Pictures in which a board may be: frames of a recording or a video, or a folder of pictures."""
+
+    def __len__(self) -> int:
+        """Return how many there are."""
+        ...
+
+    def name(self, index: int, /) -> str:
+        """Return what messages call a picture: "left01.jpg", "frame 12 (3.42 s)"."""
+        ...
+
+    def time_ns(self, index: int, /) -> TimeNs | None:
+        """Return when it was taken; None if nothing says."""
+        ...
+
+    def picture(self, index: int, /) -> np.ndarray:
+        """Return its pixels: uint8 (h, w, 3), blue first. Several threads may call it at once.
+
+        Raises:
+            CalibrationError: it cannot be read.
+        """
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BoardCorners:
+    """The corners of a board in a picture.
+
+    Attributes:
+        index: the picture's number in its source.
+        name: what messages call the picture.
+        time_ns: when it was taken; None if nothing says.
+        size_px: width and height of the picture.
+        corner_ids: (n,) which corners of the board were found, ascending.
+        pixels_px: (n, 2) where.
+        blur_px: width of the edges between squares, as the standard deviation of a Gaussian [px]; NaN if not measured.
+    """
+
+    index: int
+    name: str
+    time_ns: TimeNs | None
+    size_px: tuple[int, int]
+    corner_ids: Indices
+    pixels_px: Points2
+    blur_px: float = float("nan")
+
+    def __post_init__(self) -> None:
+        count = len(self.corner_ids)
+        object.__setattr__(self, "corner_ids", frozen_array(self.corner_ids, (count,), dtype=np.int64))
+        object.__setattr__(self, "pixels_px", frozen_array(self.pixels_px, (count, 2)))
+
+
+@dataclass(frozen=True, slots=True)
+class LeftOutPicture:
+    """A picture that is not used.
+
+    Attributes:
+        index: its number in its source.
+        name: what messages call it.
+        reason: why, as a clause: "blurred: edges are 4.1 px wide, those of the others 1.2 px".
+    """
+
+    index: int
+    name: str
+    reason: str

@@ -1,0 +1,264 @@
+"""Calibrate a lens from views of a board (Zhang's method)."""
+
+from collections.abc import Callable, Generator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.arrays import Points3, Values
+from calib_core.camera import Camera, CameraCovariance
+from calib_core.intrinsics.board_pictures import BoardCorners, LeftOutPicture
+from calib_core.intrinsics.calibrated_lens import CalibratedLens, LensView
+from calib_core.intrinsics.lens_warnings import lens_warnings, shape_warnings, skew_warnings, worst_focal_sigma
+from calib_core.intrinsics.options import IntrinsicsOptions
+from calib_core.intrinsics.searching.search_result import BoardSearch
+from calib_core.intrinsics.solving.adjustment import reduced
+from calib_core.intrinsics.solving.bad_views import JudgedViews, judge_views
+from calib_core.intrinsics.solving.board_shape import ShapeTest, try_shapes
+from calib_core.intrinsics.solving.board_warp import FLAT, BoardWarp, possible_warps
+from calib_core.intrinsics.solving.held_out import held_out_squares, view_folds
+from calib_core.intrinsics.solving.lens_covariance import SharedCovariance, shared_covariance
+from calib_core.intrinsics.solving.linearization import LensState, linearize, residuals_of
+from calib_core.intrinsics.solving.model_choice import MODELS, ChosenModel, LensFit, choose_model, fit_model
+from calib_core.intrinsics.solving.robust import typical_sigma
+from calib_core.intrinsics.solving.row_skew import row_skew
+from calib_core.intrinsics.solving.starting import start
+from calib_core.intrinsics.solving.view_stack import ViewStack, stack_views
+from calib_core.measurements import Unsolvable
+
+__all__ = ["calibrate_lens"]
+
+_LEAST_VIEWS = 3
+_LEAST_CORNERS = 6
+_LINE_SHARE = 0.01
+_UNKNOWN_FOCAL = 0.15
+_PARALLEL_DEG = 20.0
+_SAME_DEG = 4.0
+_AS_GOOD = 1.3
+_SHAPE_SHARE = 0.5  # all would cover a bend that stays just unseen twice; none would cover it in 9 of 10 cases
+_FILM = "film the board from at least 10 directions, turned by 30 to 45 deg to the left, right, up and down"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Used:
+    """The views that are used, and what the board is."""
+
+    views: tuple[BoardCorners, ...]
+    stack: ViewStack
+    board_m: Points3
+    options: IntrinsicsOptions
+    left_out: tuple[LeftOutPicture, ...]
+    starts: Mapping[str, LensState]
+
+    def choose(self, warp: BoardWarp) -> ChosenModel | str:
+        """Choose a lens model for the board with a shape."""
+        models = MODELS if self.options.model == "auto" else (self.options.model,)
+        return choose_model(
+            models,
+            self.stack,
+            lambda model: fit_model(
+                model, self.stack, warp=warp, square_pixels=self.options.square_pixels, near=self.starts.get(model)
+            ),
+        )
+
+
+def calibrate_lens(
+    search: BoardSearch,
+    options: IntrinsicsOptions | None = None,
+    *,
+    progress: Callable[[str], None] | None = None,
+    stopped: Callable[[], bool] | None = None,
+) -> CalibratedLens | Unsolvable:
+    """Calibrate a lens from the views that a search has chosen.
+
+    Args:
+        search: with the views.
+        options: of the calibration.
+        progress: called with what is done next.
+        stopped: asked between the parts; once it is true there is no calibration.
+    """
+    steps = _steps(search, options or IntrinsicsOptions())
+    while True:
+        try:
+            step = next(steps)
+        except StopIteration as done:
+            return done.value
+        if progress is not None:
+            progress(step)
+        if stopped is not None and stopped():
+            return Unsolvable("stopped", "the calibration was stopped", "start it again")
+
+
+def _steps(search: BoardSearch, options: IntrinsicsOptions) -> Generator[str, None, CalibratedLens | Unsolvable]:
+    """Calibrate in steps; what each of them does is yielded before it."""
+    yield "comparing the views"
+    used = _used(search, options)
+    if isinstance(used, Unsolvable):
+        return used
+    yield "choosing a lens model"
+    chosen = used.choose(FLAT)
+    if isinstance(chosen, str):
+        hint = _FILM if options.model == "auto" else "choose another lens model, or let it be chosen (auto)"
+        return Unsolvable("no-lens", f"no lens model fits {len(used.views)} views: {chosen}", hint)
+    yield "looking at the shape of the board"
+    shape = try_shapes(chosen.fit, used.stack, possible_warps(used.board_m))
+    modelled = False
+    if len(shape.found) and options.board_shape == "auto":
+        warped = used.choose(shape.found)
+        if isinstance(warped, ChosenModel):
+            chosen, modelled = warped, True
+    yield "leaving out one view after the other"
+    return _calibrated(search, used, chosen, shape, modelled=modelled)
+
+
+def _used(search: BoardSearch, options: IntrinsicsOptions) -> _Used | Unsolvable:
+    """Find the views to use; too few are no calibration."""
+    board_m = search.board.corners_m
+    faults = [_fault(view, board_m, search.size_px) for view in search.views]
+    views = [view for view, fault in zip(search.views, faults, strict=True) if not fault]
+    left_out = [
+        LeftOutPicture(view.index, view.name, fault) for view, fault in zip(search.views, faults, strict=True) if fault
+    ]
+    if len(views) < _LEAST_VIEWS:
+        return _too_few(len(views), left_out)
+    stack = stack_views(views, board_m, search.size_px)
+    starts: dict[str, LensState] = {}
+    if options.robust:
+        states = _starts(stack, options)
+        if not states:
+            return Unsolvable("no-lens", "no focal length of any lens model explains most of the views", _FILM)
+        judged = _judged(views, stack, states, may_be_mirrored=search.board.kind == "checkerboard")
+        reasons = zip(views, judged.reasons, strict=True)
+        left_out += [LeftOutPicture(view.index, view.name, reason) for view, reason in reasons if reason]
+        views = [view for view, reason in zip(views, judged.reasons, strict=True) if not reason]
+        if len(views) < _LEAST_VIEWS:
+            return _too_few(len(views), left_out)
+        stack = judged.stack.of(judged.kept)
+        starts = {state.camera.model: state.of(judged.kept) for state in states}
+    every = sorted((*search.left_out, *left_out), key=lambda picture: picture.index)
+    return _Used(tuple(views), stack, board_m, options, tuple(every), starts)
+
+
+def _fault(view: BoardCorners, board_m: Points3, size_px: tuple[int, int]) -> str:
+    """Say why a view cannot be posed at all; nothing if it can."""
+    if view.size_px != size_px:
+        return f"it has {view.size_px[0]} x {view.size_px[1]} pixels, not {size_px[0]} x {size_px[1]}"
+    if len(view.corner_ids) < _LEAST_CORNERS:
+        return f"only {len(view.corner_ids)} corners of the board; a view needs {_LEAST_CORNERS}"
+    if not np.isfinite(view.pixels_px).all():
+        return "some of its corners are nowhere"
+    for places, where in ((board_m[view.corner_ids, :2], "of the board"), (view.pixels_px, "in the picture")):
+        spread = np.linalg.svd(places - places.mean(axis=0), compute_uv=False)
+        if spread[1] <= _LINE_SHARE * spread[0]:
+            return f"its corners are on one line {where}"
+    return ""
+
+
+def _too_few(count: int, left_out: Sequence[LeftOutPicture]) -> Unsolvable:
+    why = "".join(f"; {picture.name}: {picture.reason}" for picture in left_out[:3])
+    return Unsolvable("few-views", f"{count} usable views of the board, at least {_LEAST_VIEWS} are needed{why}", _FILM)
+
+
+def _starts(stack: ViewStack, options: IntrinsicsOptions) -> list[LensState]:
+    """Fit each lens model robustly to all views, those that are wrong included."""
+    models = MODELS[1:] if options.model == "auto" else (options.model,)
+    return [state for model in models if (state := start(model, stack)) is not None]
+
+
+def _judged(
+    views: Sequence[BoardCorners], stack: ViewStack, states: Sequence[LensState], *, may_be_mirrored: bool
+) -> JudgedViews:
+    """Judge the views by the lens that most corners fit: a lens that is too simple makes good views look bad."""
+    sigmas = [typical_sigma(residuals_of(state, stack), stack) for state in states]
+    fitting = [state for state, sigma in zip(states, sigmas, strict=True) if sigma <= _AS_GOOD * min(sigmas)]
+    judged = (judge_views(views, stack, state, may_be_mirrored=may_be_mirrored) for state in fitting)
+    return max(judged, key=lambda one: int(one.stack.corner_counts.sum()))
+
+
+def _calibrated(
+    search: BoardSearch, used: _Used, chosen: ChosenModel, shape: ShapeTest, *, modelled: bool
+) -> CalibratedLens | Unsolvable:
+    """Put the result together."""
+    fit, stack = chosen.fit, used.stack
+    covariance = shared_covariance(reduced(linearize(fit.state, stack, fit.freedom)))
+    camera = _with_covariance(fit, covariance, np.zeros(0) if modelled else shape.lens_change)
+    if unknown := _unknown_focal(camera, fit):
+        return unknown
+    counts = stack.corner_counts
+    held_out = held_out_squares(fit.state, stack, fit.freedom, view_folds(len(stack), len(stack)))
+    rms_px = float(np.sqrt(np.average(fit.mean_squares, weights=counts)))
+    amounts, sigmas = fit.state.amounts, np.sqrt(np.diag(covariance.matrix)[fit.freedom.lens.shape[1] :])
+    if not modelled:
+        among = [name in shape.found.names for name in possible_warps(used.board_m).names]
+        amounts, sigmas = shape.amounts[among], shape.sigmas[among]
+    said = (
+        *shape_warnings(shape, amounts, sigmas, modelled=modelled),
+        *skew_warnings(row_skew(fit, stack)),
+        *lens_warnings(camera, stack, rms_px),
+    )
+    return CalibratedLens(
+        camera,
+        search.board,
+        fit.freedom.warp.shape_m(used.board_m, fit.state.amounts),
+        _lens_views(used, fit, held_out),
+        used.left_out,
+        rms_px,
+        float(np.sqrt(np.average(held_out, weights=counts))),
+        chosen.trials,
+        chosen.choice,
+        said,
+    )
+
+
+def _with_covariance(fit: LensFit, shared: SharedCovariance, change: Values) -> Camera:
+    """Return the camera with the covariance of its parameters.
+
+    Args:
+        fit: of the lens.
+        shared: covariance of lens and warp.
+        change: (p,) how a shape of the board that the views cannot exclude would change the parameters; or empty.
+    """
+    count = fit.freedom.lens.shape[1]
+    lens = fit.freedom.lens
+    matrix = lens @ shared.matrix[:count, :count] @ lens.T
+    if len(change):
+        matrix = matrix + _SHAPE_SHARE * np.outer(change, change)
+    camera = fit.state.camera
+    return camera.with_parameters(
+        camera.parameters, CameraCovariance(camera.parameter_names, (matrix + matrix.T) / 2.0)
+    )
+
+
+def _unknown_focal(camera: Camera, fit: LensFit) -> Unsolvable | None:
+    """Say that the views leave the focal length open; None if they do not."""
+    normals = fit.state.rotations[:, :, 2]
+    apart_deg = np.degrees(np.arccos(np.clip((normals @ normals.T).min(), -1.0, 1.0)))
+    sigma = worst_focal_sigma(camera)
+    known = f"the focal length, {camera.matrix_px[0, 0]:.0f} px, is known to {100.0 * sigma:.0f} %"
+    if apart_deg < _SAME_DEG or (sigma > _UNKNOWN_FOCAL and apart_deg < _PARALLEL_DEG):
+        reason = f"the board is turned by {apart_deg:.0f} deg at most from view to view; {known}"
+        return Unsolvable("parallel-views", reason, _FILM)
+    if sigma > _UNKNOWN_FOCAL:
+        rms_px = float(np.sqrt(fit.mean_squares.mean()))
+        hint = f"check the board and the lens model ({camera.model}), and {_FILM}"
+        return Unsolvable("unknown-focal-length", f"{known}; the corners fit to {rms_px:.2f} px", hint)
+    return None
+
+
+def _lens_views(used: _Used, fit: LensFit, held_out: Values) -> tuple[LensView, ...]:
+    """Return each view as the camera explains it."""
+    residuals = residuals_of(fit.state, used.stack, fit.freedom.warp)
+    views = []
+    for row, view in enumerate(used.views):
+        count = len(view.corner_ids)
+        views.append(
+            LensView(
+                view,
+                fit.state.pose(row),
+                residuals[row, :, :count].T,
+                used.stack.weights[row, :count] > 0,
+                float(np.sqrt(fit.mean_squares[row])),
+                float(np.sqrt(held_out[row])),
+            )
+        )
+    return tuple(views)

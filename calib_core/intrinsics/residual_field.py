@@ -1,0 +1,139 @@
+"""Residuals of a calibrated lens over the picture, and whether they are more than noise."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.arrays import Points2, Values, frozen_array
+from calib_core.intrinsics.calibrated_lens import CalibratedLens
+
+__all__ = ["ResidualField", "residual_field"]
+
+_COLUMNS, _ROWS = 12, 8
+_SIGMAS = 3.0
+_CORRELATED = 0.3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ResidualField:
+    """Residuals of all used corners, and their means over cells of the picture.
+
+    Attributes:
+        pixels_px: (n, 2) where the corners were found.
+        residuals_px: (n, 2) projected minus found.
+        x_px: (c,) middles of the cells' columns.
+        y_px: (r,) middles of their rows.
+        means_px: (r, c, 2) of the residuals in a cell; NaN in an empty one.
+        errors_px: (r, c) standard error of a mean along either axis, as the views differ; NaN if fewer than two are there.
+        counts: (r, c) corners in a cell.
+        systematic_px: the part that all views share, as a root mean square over the corners; 0 if none shows.
+        systematic: whether that is more than noise.
+        neighbour_correlation: of the residuals of corners that are next to each other on the board; about 0 for noise.
+    """
+
+    pixels_px: Points2
+    residuals_px: Points2
+    x_px: Values
+    y_px: Values
+    means_px: np.ndarray
+    errors_px: np.ndarray
+    counts: np.ndarray
+    systematic_px: float
+    systematic: bool
+    neighbour_correlation: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, shape in (
+            ("pixels_px", (None, 2)),
+            ("residuals_px", (None, 2)),
+            ("x_px", (None,)),
+            ("y_px", (None,)),
+        ):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), shape))
+        object.__setattr__(self, "means_px", frozen_array(self.means_px, (len(self.y_px), len(self.x_px), 2)))
+        object.__setattr__(self, "errors_px", frozen_array(self.errors_px, (len(self.y_px), len(self.x_px))))
+        object.__setattr__(self, "counts", frozen_array(self.counts, (len(self.y_px), len(self.x_px)), dtype=np.int64))
+
+    @property
+    def sentence(self) -> str:
+        """Say whether the residuals are more than noise."""
+        said = []
+        if self.systematic:
+            said.append(f"the views share a pattern of {self.systematic_px:.3f} px over the picture")
+        if self.neighbour_correlation > _CORRELATED:
+            said.append(f"neighbouring corners of a view err alike (correlation {self.neighbour_correlation:.1f})")
+        if not said:
+            return "The residuals show no pattern that is more than noise."
+        return (
+            f"The residuals are more than noise: {' and '.join(said)}; the lens model, the board's shape, motion or blur is "
+            "not described."
+        )
+
+
+def residual_field(lens: CalibratedLens, columns: int = _COLUMNS, rows: int = _ROWS) -> ResidualField:
+    """Return the residuals over the picture.
+
+    Args:
+        lens: with its views.
+        columns: of cells.
+        rows: of cells.
+    """
+    pixels = np.concatenate([view.corners.pixels_px[view.used] for view in lens.views])
+    residuals = np.concatenate([view.residuals_px[view.used] for view in lens.views])
+    owners = np.repeat(np.arange(len(lens.views)), [int(view.used.sum()) for view in lens.views])
+    size = np.array([lens.camera.width_px, lens.camera.height_px])
+    column, row = np.clip(((pixels + 0.5) / size * [columns, rows]).astype(int), 0, [columns - 1, rows - 1]).T
+    sums = np.zeros((len(lens.views), rows, columns, 2))
+    counts = np.zeros((len(lens.views), rows, columns))
+    np.add.at(sums, (owners, row, column), residuals)
+    np.add.at(counts, (owners, row, column), 1.0)
+    total = counts.sum(axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        means = sums.sum(axis=0) / total[:, :, None]
+        apart = sums - counts[:, :, :, None] * means
+        there = (counts > 0).sum(axis=0)
+        errors = np.sqrt(np.square(apart).sum(axis=(0, 3)) / 2.0 * there / (there - 1.0)) / total
+    energy, sigmas = _shared_energy(sums, counts)
+    return ResidualField(
+        pixels,
+        residuals,
+        (np.arange(columns) + 0.5) * size[0] / columns - 0.5,
+        (np.arange(rows) + 0.5) * size[1] / rows - 0.5,
+        means,
+        np.where(there > 1, errors, np.nan),
+        total,
+        float(np.sqrt(max(energy, 0.0))),
+        sigmas > _SIGMAS,
+        _neighbour_correlation(lens),
+    )
+
+
+def _shared_energy(sums: np.ndarray, counts: np.ndarray) -> tuple[float, float]:
+    """Return the mean square [px^2] of what different views have in common in the same cells, and in how many sigmas it shows.
+
+    Products of residuals of two views have a mean of zero if the views share nothing, whatever a view's own errors have in
+    common; their squares then give the variance of the sum.
+
+    Args:
+        sums: (v, r, c, 2) of residuals in each cell.
+        counts: (v, r, c) of corners there.
+    """
+    flat, weights = sums.reshape(len(sums), -1), counts.reshape(len(counts), -1)
+    upper = np.triu_indices(len(sums), 1)
+    products, pairs = (flat @ flat.T)[upper], (weights @ weights.T)[upper]
+    if not pairs.any():
+        return 0.0, 0.0
+    return float(products.sum() / pairs.sum()), float(products.sum() / max(np.sqrt(np.square(products).sum()), 1e-300))
+
+
+def _neighbour_correlation(lens: CalibratedLens) -> float:
+    """Return the correlation of the residuals of corners that are next to each other on the board, within views."""
+    products, squares = 0.0, 0.0
+    for view in lens.views:
+        places_m = lens.board.corners_m[view.corners.corner_ids[view.used]]
+        apart_m = np.linalg.norm(places_m[:, None] - places_m, axis=2)
+        first, second = np.nonzero(np.triu(apart_m < 1.01 * lens.board.square_m, 1))
+        residuals = view.residuals_px[view.used]
+        products += float((residuals[first] * residuals[second]).sum())
+        squares += 0.5 * float((np.square(residuals[first]) + np.square(residuals[second])).sum())
+    return products / squares if squares > 0.0 else 0.0

@@ -1,0 +1,168 @@
+"""A lens with the poses of all views, and how the pixels of all corners follow from them."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from calib_core.arrays import Values, frozen_array
+from calib_core.camera import Camera
+from calib_core.geometry import RigidTransform, rotation_exp, rotation_jacobian
+from calib_core.intrinsics.solving.board_warp import FLAT, BoardWarp
+from calib_core.intrinsics.solving.view_stack import ViewStack
+
+__all__ = ["Freedom", "LensState", "Linearized", "linearize", "residuals_of", "warped"]
+
+_PULLED = {"rational_polynomial": ("k4", "k5", "k6")}
+_PULL_PX2 = 0.01  # one unit costs as much as one corner that is 0.1 px off
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LensState:
+    """What an adjustment estimates.
+
+    Attributes:
+        camera: the lens.
+        rotations: (v, 3, 3) of camera_from_board for each view.
+        translations_m: (v, 3) of the same.
+        amounts: (s,) of the board's warp.
+    """
+
+    camera: Camera
+    rotations: np.ndarray
+    translations_m: np.ndarray
+    amounts: Values = field(default_factory=lambda: np.zeros(0))
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "rotations", frozen_array(self.rotations, (None, 3, 3)))
+        object.__setattr__(self, "translations_m", frozen_array(self.translations_m, (len(self.rotations), 3)))
+        object.__setattr__(self, "amounts", frozen_array(self.amounts, (None,)))
+
+    def of(self, views: np.ndarray) -> "LensState":
+        """Return the state of some of the views, given by numbers or flags (v,)."""
+        return LensState(self.camera, self.rotations[views], self.translations_m[views], self.amounts)
+
+    def pose(self, view: int) -> RigidTransform:
+        """Return camera_from_board of a view."""
+        return RigidTransform(self.rotations[view], self.translations_m[view])
+
+    def moved(self, camera: Camera, poses: np.ndarray, amounts: Values) -> "LensState":
+        """Return the state with another lens and shape, and poses changed by (dt, dtheta) (v, 6)."""
+        rotations = rotation_exp(poses[:, 3:]) @ self.rotations
+        # a rotation up to rounding: one Newton step towards the nearest rotation squares the error
+        rotations = 1.5 * rotations - 0.5 * rotations @ (np.swapaxes(rotations, 1, 2) @ rotations)
+        return LensState(camera, rotations, self.translations_m + poses[:, :3], amounts)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Freedom:
+    """What may change in an adjustment besides the poses.
+
+    Attributes:
+        lens: (p, q) how q free numbers move the parameters of the camera; (p, 0) keeps the lens.
+        warp: how the board may be warped.
+        pull: (p,) weights [px^2] of the squares of the camera's parameters in the cost. Coefficients that views leave
+            nearly free, because others make up for them, stay about as small as those of real lenses; what views
+            determine, they do not move.
+    """
+
+    lens: np.ndarray
+    warp: BoardWarp = FLAT
+    pull: Values = field(default_factory=lambda: np.zeros(0))
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "lens", frozen_array(self.lens, (None, None)))
+        pull = self.pull if len(self.pull) else np.zeros(len(self.lens))
+        object.__setattr__(self, "pull", frozen_array(pull, (len(self.lens),)))
+
+    @classmethod
+    def of(cls, camera: Camera, *, square_pixels: bool = False, warp: BoardWarp = FLAT) -> "Freedom":
+        """Free all parameters of a camera; with square pixels its two focal lengths change together."""
+        free = np.eye(len(camera.parameters))
+        if square_pixels:
+            free = np.delete(free, 1, axis=1)
+            free[1, 0] = 1.0
+        pulled = [_PULL_PX2 if name in _PULLED.get(camera.model, ()) else 0.0 for name in camera.parameter_names]
+        return cls(free, warp, np.array(pulled))
+
+    @classmethod
+    def none(cls, camera: Camera) -> "Freedom":
+        """Keep the camera and the board."""
+        return cls(np.zeros((len(camera.parameters), 0)))
+
+    def pull_cost(self, camera: Camera) -> float:
+        """Return half the weighted squares of the parameters [px^2]."""
+        return 0.5 * float(np.square(camera.parameters) @ self.pull)
+
+    @property
+    def count(self) -> int:
+        """Free numbers besides the poses: of the lens, then of the warp."""
+        return self.lens.shape[1] + len(self.warp)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Linearized:
+    """Residuals and their slopes at a state, each row of a view multiplied by the root of its corner's weight.
+
+    Attributes:
+        residuals: (v, 2 m) projected minus found [px]; all columns first.
+        shared: (v, q, 2 m) their slope with respect to the free numbers of lens and warp.
+        poses: (v, 6, 2 m) with respect to (dt, dtheta) of the view.
+        prior: (q, q) the second derivative of what pulls the free numbers.
+        prior_gradient: (q,) its first.
+    """
+
+    residuals: np.ndarray
+    shared: np.ndarray
+    poses: np.ndarray
+    prior: np.ndarray
+    prior_gradient: Values
+
+
+def warped(stack: ViewStack, warp: BoardWarp, amounts: Values) -> ViewStack:
+    """Return the views of the board as it is warped, in which it counts as stated."""
+    return replace(stack, board_m=_warped(amounts, stack, warp)) if len(warp) else stack
+
+
+def _warped(amounts: Values, stack: ViewStack, warp: BoardWarp) -> np.ndarray:
+    """Return the corners (v, 3, m) on the board as warped, in the board's frame [m]."""
+    if not len(warp):
+        return stack.board_m
+    return np.asarray(stack.board_m + np.tensordot(amounts, warp.displacements_m(stack.corner_ids), axes=([0], [1])))
+
+
+def residuals_of(state: LensState, stack: ViewStack, warp: BoardWarp = FLAT) -> np.ndarray:
+    """Return projected minus found corners: (v, 2, m) [px]; NaN where the lens does not image a corner."""
+    camera_m = state.rotations @ _warped(state.amounts, stack, warp) + state.translations_m[:, :, None]
+    with np.errstate(all="ignore"):
+        return np.asarray(state.camera.project_planes(camera_m)[0] - stack.pixels_px)
+
+
+def linearize(state: LensState, stack: ViewStack, freedom: Freedom) -> Linearized:
+    """Differentiate the residuals of all corners at a state."""
+    views, corners = stack.weights.shape
+    turned_m = state.rotations @ _warped(state.amounts, stack, freedom.warp)
+    camera_m = turned_m + state.translations_m[:, :, None]
+    pixels, d_point = state.camera.project_planes(camera_m)
+    poses = np.empty((views, 6, 2, corners))
+    poses[:, :3] = d_point
+    rotation_jacobian(turned_m, d_point, out=poses[:, 3:])
+    lens_count = freedom.lens.shape[1]
+    shared = np.empty((views, freedom.count, 2, corners))
+    if lens_count:
+        slopes = state.camera.parameter_planes(camera_m).reshape(views, len(freedom.lens), 2 * corners)
+        shared[:, :lens_count] = (freedom.lens.T @ slopes).reshape(views, lens_count, 2, corners)
+    if len(freedom.warp):
+        moved = state.rotations[:, None] @ freedom.warp.displacements_m(stack.corner_ids)
+        shared[:, lens_count:] = np.einsum("vacm,vsam->vscm", d_point, moved)
+    root = np.sqrt(stack.weights)[:, None]
+    prior, gradient = np.zeros((freedom.count, freedom.count)), np.zeros(freedom.count)
+    prior[:lens_count, :lens_count] = freedom.lens.T @ (freedom.pull[:, None] * freedom.lens)
+    gradient[:lens_count] = freedom.lens.T @ (freedom.pull * state.camera.parameters)
+    counted = root > 0.0  # what has no weight may be where the lens does not image it
+    return Linearized(
+        np.where(counted, (pixels - stack.pixels_px) * root, 0.0).reshape(views, -1),
+        np.where(counted[:, None], shared * root[:, None], 0.0).reshape(views, freedom.count, 2 * corners),
+        np.where(counted[:, None], poses * root[:, None], 0.0).reshape(views, 6, -1),
+        prior,
+        gradient,
+    )

@@ -1,0 +1,183 @@
+"""Fit lens models to the same views, and choose the simplest that predicts left-out views as well as any."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.arrays import Values
+from calib_core.intrinsics.calibrated_lens import ModelTrial
+from calib_core.intrinsics.solving.adjustment import adjust, weighted_cost
+from calib_core.intrinsics.solving.board_warp import FLAT, BoardWarp
+from calib_core.intrinsics.solving.held_out import held_out_squares, view_folds
+from calib_core.intrinsics.solving.lens_folds import folds_where_seen
+from calib_core.intrinsics.solving.linearization import Freedom, LensState, residuals_of
+from calib_core.intrinsics.solving.starting import start
+from calib_core.intrinsics.solving.view_stack import ViewStack
+
+__all__ = ["MODELS", "ChosenModel", "LensFit", "choose_model", "fit_model"]
+
+MODELS = ("pinhole", "plumb_bob", "equidistant", "rational_polynomial")
+"""From the simplest to the most flexible."""
+
+_WORDS = {
+    "pinhole": "pinhole without distortion",
+    "plumb_bob": "plumb_bob (5 coefficients)",
+    "equidistant": "equidistant (fisheye, 4 coefficients)",
+    "rational_polynomial": "rational_polynomial (8 coefficients)",
+}
+_FOLDS = 10
+_LEAST_GAIN = 0.02  # of the squared distance
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LensFit:
+    """A lens model fitted to views.
+
+    Attributes:
+        state: lens, poses and shape of the board.
+        freedom: what was estimated besides the poses.
+        mean_squares: (v,) mean squared residual of each view [px^2].
+    """
+
+    state: LensState
+    freedom: Freedom
+    mean_squares: Values
+
+    @property
+    def model(self) -> str:
+        """The lens model's name."""
+        return self.state.camera.model
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ChosenModel:
+    """The lens model to use, and those it was compared with."""
+
+    fit: LensFit
+    trials: tuple[ModelTrial, ...]
+    choice: str
+
+
+def fit_model(
+    model: str, stack: ViewStack, *, warp: BoardWarp = FLAT, square_pixels: bool = False, near: LensState | None = None
+) -> LensFit | str:
+    """Fit a lens model by least squares; a sentence if that is not possible.
+
+    Args:
+        model: its name.
+        stack: the views.
+        warp: how the board may be warped.
+        square_pixels: whether both focal lengths are equal.
+        near: a fit of the same model to start from.
+    """
+    first = near if near is not None else start(model, stack)
+    if first is None:
+        return "no focal length explains the views"
+    freedom = Freedom.of(first.camera, square_pixels=square_pixels, warp=warp)
+    if square_pixels:
+        mean_px = float(first.camera.parameters[:2].mean())
+        camera = first.camera.with_parameters(np.concatenate([[mean_px, mean_px], first.camera.parameters[2:]]))
+        first = LensState(camera, first.rotations, first.translations_m, first.amounts)
+    if not np.isfinite(weighted_cost(residuals_of(first, stack, warp if len(first.amounts) else FLAT), stack)):
+        return "it cannot have seen all corners"
+    state = adjust(first, stack, freedom)
+    fault = folds_where_seen(state.camera, stack)
+    return fault or LensFit(state, freedom, stack.mean_square(residuals_of(state, stack, warp)))
+
+
+def choose_model(
+    models: Sequence[str],
+    stack: ViewStack,
+    fit: Callable[[str], LensFit | str],
+) -> ChosenModel | str:
+    """Choose a lens model by its error in views that it was not calibrated with.
+
+    Args:
+        models: to choose from, the simplest first.
+        stack: the views.
+        fit: returns the fit of a model, or why there is none.
+
+    Returns:
+        The choice; if no model fits, why not.
+    """
+    fits = {model: fit(model) for model in models}
+    folds = view_folds(len(stack), _FOLDS)
+    squares = {
+        model: held_out_squares(one.state, stack, one.freedom, folds)
+        for model, one in fits.items()
+        if isinstance(one, LensFit)
+    }
+    squares = {model: values for model, values in squares.items() if np.isfinite(values).all()}
+    if not squares:
+        return "; ".join(f"{model}: {one}" for model, one in fits.items() if isinstance(one, str)) or "no model fits"
+    chosen = _simplest(squares)
+    trials = tuple(_trial(model, fits[model], stack, squares, chosen) for model in models)
+    best = fits[chosen]
+    assert isinstance(best, LensFit)
+    return ChosenModel(best, trials, _sentence(chosen, trials))
+
+
+def _simplest(squares: dict[str, Values]) -> str:
+    """Return the simplest model that no more flexible one beats by more than the standard error and by 1 % of the distance.
+
+    One that is better in every view is taken too.
+    """
+    names = list(squares)
+    chosen = names[0]
+    for other in names[1:]:
+        gain, error = _paired(squares[chosen], squares[other])
+        always = bool(
+            (squares[chosen] > squares[other]).all()
+        )  # a few views with very different gains have a large error
+        if gain > _LEAST_GAIN * float(squares[chosen].mean()) and (gain > error or always):
+            chosen = other
+    return chosen
+
+
+def _paired(first: Values, second: Values) -> tuple[float, float]:
+    """Return the mean of first minus second over views, and its standard error."""
+    apart = first - second
+    return float(apart.mean()), float(apart.std(ddof=1) / np.sqrt(len(apart)))
+
+
+def _trial(model: str, fit: LensFit | str, stack: ViewStack, squares: dict[str, Values], chosen: str) -> ModelTrial:
+    """Say how a model compares with the chosen one."""
+    if isinstance(fit, str):
+        return ModelTrial(model, float("nan"), float("nan"), fault=fit)
+    counts = stack.corner_counts
+    rms = float(np.sqrt(np.average(fit.mean_squares, weights=counts)))
+    if model not in squares:
+        return ModelTrial(model, rms, float("nan"), fault="it cannot see all corners if some views are left out")
+    held_out = float(np.sqrt(np.average(squares[model], weights=counts)))
+    worse, error = (0.0, 0.0) if model == chosen else _paired(squares[model], squares[chosen])
+    return ModelTrial(model, rms, held_out, worse, error)
+
+
+def _sentence(chosen: str, trials: Sequence[ModelTrial]) -> str:
+    """Say in one sentence which model was chosen and why."""
+    tried = {trial.model: trial for trial in trials if not trial.fault}
+    names = list(tried)
+    said = f"{_WORDS[chosen]}: "
+    if len(names) == 1:
+        faults = "; ".join(f"{trial.model}: {trial.fault}" for trial in trials if trial.fault)
+        return said + (f"the only one that fits ({faults})" if faults else "as told")
+    own = tried[chosen]
+    simpler = [tried[name] for name in names[: names.index(chosen)]]
+    flexible = [tried[name] for name in names[names.index(chosen) + 1 :]]
+    parts = []
+    if simpler:
+        best = min(simpler, key=lambda trial: trial.held_out_rms_px)
+        parts.append(
+            f"it predicts left-out views to {own.held_out_rms_px:.3f} px, {best.model} to {best.held_out_rms_px:.3f} px"
+        )
+    if flexible:
+        best = min(flexible, key=lambda trial: trial.held_out_rms_px)
+        how = (
+            "does not predict them better"
+            if best.worse_by >= 0
+            else "is not better by more than the standard error and 1 %"
+        )
+        begin = "and " if simpler else f"it predicts left-out views to {own.held_out_rms_px:.3f} px, and "
+        parts.append(f"{begin}{best.model} {how} ({best.held_out_rms_px:.3f} px)")
+    return said + ", ".join(parts)

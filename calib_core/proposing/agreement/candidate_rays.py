@@ -1,0 +1,260 @@
+"""Candidate rays: what pictures and radar say of each dwell, as arrays, with the odds before any pose is known."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calib_core.arrays import Flags, Indices, Points2, Points3, Values, frozen_array
+from calib_core.camera import Camera
+from calib_core.estimation.unmeasured_elevation import OWN_SIGMA_RAD, is_flat
+from calib_core.measurements import ReflectorClick
+from calib_core.options import CalibrationOptions
+from calib_core.proposing.dwell_views import DwellView
+from calib_core.proposing.picture_candidates import PictureCandidate
+from calib_core.radar import cartesian_jacobian, polar_from_cartesian
+
+__all__ = ["CandidateRays", "candidate_rays", "weaker_db"]
+
+_NONE = -1.5
+"""Log-odds that no candidate is the reflector, where the strongest one that has no apex counts as 0."""
+_STRENGTH, _APEX = 3.0, 3.0
+"""Log-odds that a candidate gains per natural logarithm of its strength, and where three sheets meet in a point."""
+_ALIKE, _LIKE = 13.0, 0.58
+"""Log-odds that it gains per likeness to the confirmed reflector, above the likeness that says nothing.
+
+They are those of a fit to simulated recordings, a little less sure.
+"""
+_LEAST_MISSING = 0.03
+_CLICK_IS_RIGHT = 0.97
+"""Probability that a confirmed click shows what the radar saw, shared between the dwells that it may belong to."""
+_WEAKER_DB, _WEAKER_STEP_DB = 9.0, 1.5
+"""Echo below the typical one at which a dwell is as likely something else as the reflector, and how fast that changes."""
+_MOST_LOG_ODDS = 30.0
+_LEAST_SIGMA_PX = 1.0
+_REPEATED_PX = 6.0
+"""Candidates of two dwells nearer than this show the same place; what moved does not stay there."""
+_REPEATED_SHARE, _GATHERED_SHARE = 0.3, 0.4
+"""Shares of the wrong candidates that lie where other dwells have one too, and near to where they gather."""
+_GATHERED = 0.05
+"""Width of such a gathering over that of the picture."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CandidateRays:
+    """Dwells and their candidates; dwells with fewer candidates than k are padded with odds 0.
+
+    Attributes:
+        positions_radar_m: (n, 3) where the radar saw each dwell.
+        polar: (n, 3) the same as range [m], azimuth and elevation [rad].
+        slopes: (n, 3, 3) d position / d polar.
+        sigma_polar: (n, 3) standard deviations of the polar coordinates.
+        rays: (n, k, 3) unit rays of the candidates in the camera frame.
+        tangents: (n, k, 2, 3) two directions across each ray.
+        sigma_rad: (n, k) standard deviation of each candidate across its ray.
+        odds: (n, k) probability that the candidate is the reflector, before any pose is known.
+        missing: (n,) probability that none is.
+        density: (n, k) of wrong candidates around the candidate [1 / sr].
+        click: (n, k) row of the confirmed click that the candidate is; -1 for none.
+        is_flat: the radar measures no elevation.
+    """
+
+    positions_radar_m: Points3
+    polar: Points3
+    slopes: np.ndarray
+    sigma_polar: Points3
+    rays: np.ndarray
+    tangents: np.ndarray
+    sigma_rad: Points2
+    odds: Points2
+    missing: Values
+    density: Points2
+    click: Indices
+    is_flat: bool
+
+    def __post_init__(self) -> None:
+        n, k = self.odds.shape
+        for name, shape in (
+            ("positions_radar_m", (n, 3)),
+            ("polar", (n, 3)),
+            ("slopes", (n, 3, 3)),
+            ("sigma_polar", (n, 3)),
+            ("rays", (n, k, 3)),
+            ("tangents", (n, k, 2, 3)),
+            ("sigma_rad", (n, k)),
+            ("odds", (n, k)),
+            ("missing", (n,)),
+            ("density", (n, k)),
+        ):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), shape))
+        object.__setattr__(self, "click", frozen_array(self.click, (n, k), dtype=np.int64))
+
+    def __len__(self) -> int:
+        return len(self.missing)
+
+    def with_radar_of(self, rows: Indices) -> "CandidateRays":
+        """Return the same pictures, with the radar positions of other dwells (n,)."""
+        return replace(
+            self,
+            positions_radar_m=self.positions_radar_m[rows],
+            polar=self.polar[rows],
+            slopes=self.slopes[rows],
+            sigma_polar=self.sigma_polar[rows],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Choice:
+    """One candidate of a dwell: a place in the picture, or a confirmed click."""
+
+    u_px: float
+    v_px: float
+    sigma_px: float
+    odds: float
+    click: int = -1
+
+
+def candidate_rays(
+    views: Sequence[DwellView],
+    camera: Camera,
+    options: CalibrationOptions,
+    *,
+    confirmed: Sequence[ReflectorClick] = (),
+) -> CandidateRays:
+    """Collect the candidates of all dwells, and what is known of them before the dwells are compared.
+
+    Args:
+        views: of all placements; at least one.
+        camera: the intrinsics.
+        options: noise of the radar and of clicks.
+        confirmed: clicks; one that lies within several dwells is a candidate of each.
+    """
+    below_db = weaker_db(views)
+    shared_by = [sum(_within(click, view) for view in views) for click in confirmed]
+    choices = [_choices(view, below_db[i], options, confirmed, shared_by) for i, view in enumerate(views)]
+    most = max(1, max(len(own) for own in choices))
+    padded = [[*own, *[_Choice(0.0, 0.0, 1.0, 0.0)] * (most - len(own))] for own in choices]
+    values = np.array([[(one.u_px, one.v_px, one.sigma_px, one.odds) for one in own] for own in padded])
+    pixels, sigma_px, odds = values[..., :2], values[..., 2], values[..., 3]
+    rays, radians = _rays(pixels.reshape(-1, 2), camera)
+    rays, per_px = rays.reshape(*odds.shape, 3), radians.reshape(odds.shape)
+    seen = np.isfinite(rays).all(axis=-1) & np.isfinite(per_px)
+    rays = np.where(seen[..., None], rays, [0.0, 0.0, 1.0])
+    per_px = np.where(seen, per_px, 1.0)
+    odds = np.where(seen, odds, 0.0)
+    positions = np.array([view.placement.position_radar_m for view in views])
+    polar, flat = polar_from_cartesian(positions), is_flat(positions)
+    return CandidateRays(
+        positions_radar_m=positions,
+        polar=polar,
+        slopes=cartesian_jacobian(polar),
+        sigma_polar=np.tile(_sigma_polar(options, flat=flat), (len(views), 1)),
+        rays=rays,
+        tangents=_tangents(rays),
+        sigma_rad=np.maximum(sigma_px, _LEAST_SIGMA_PX) * per_px,
+        odds=odds,
+        missing=np.maximum(1.0 - odds.sum(axis=1), _LEAST_MISSING),
+        density=_density(pixels, odds, _apart_in_time(views), camera) / per_px**2,
+        click=np.array([[one.click for one in own] for own in padded], dtype=np.int64),
+        is_flat=flat,
+    )
+
+
+def _sigma_polar(options: CalibrationOptions, *, flat: bool) -> Values:
+    noise = options.noise
+    elevation_rad = OWN_SIGMA_RAD if flat else np.deg2rad(noise.sigma_elevation_deg)
+    return np.array([noise.sigma_range_m, np.deg2rad(noise.sigma_azimuth_deg), elevation_rad])
+
+
+def weaker_db(views: Sequence[DwellView]) -> Values:
+    """Return how far each echo, corrected for range, lies below the typical one (n,) [dB]; 0 where unknown."""
+    range_m = np.array([np.linalg.norm(view.placement.position_radar_m) for view in views])
+    echo_db = np.array([view.placement.snr_db for view in views]) + 40.0 * np.log10(np.maximum(range_m, 1e-3))
+    known = np.isfinite(echo_db)
+    if not known.any():
+        return np.zeros(len(views))
+    return np.where(known, np.median(echo_db[known]) - np.where(known, echo_db, 0.0), 0.0)
+
+
+def _choices(
+    view: DwellView,
+    below_db: float,
+    options: CalibrationOptions,
+    confirmed: Sequence[ReflectorClick],
+    shared_by: Sequence[int],
+) -> list[_Choice]:
+    """Return the candidates of a dwell with their odds; a click that can belong to no other dwell is the only one."""
+    clicks = [
+        _Choice(
+            click.u_px,
+            click.v_px,
+            options.noise.sigma_px if click.sigma_px is None else click.sigma_px,
+            _CLICK_IS_RIGHT / shared_by[row],
+            row,
+        )
+        for row, click in enumerate(confirmed)
+        if _within(click, view)
+    ]
+    share = 1.0 / (1.0 + float(np.exp(min((below_db - _WEAKER_DB) / _WEAKER_STEP_DB, _MOST_LOG_ODDS))))
+    if clicks:
+        share *= 1.0 - _CLICK_IS_RIGHT
+    found = [
+        _Choice(float(one.pixel_px[0]), float(one.pixel_px[1]), one.sigma_px, float(share * odds))
+        for one, odds in zip(view.candidates, _odds(view.candidates), strict=True)
+    ]
+    return [*(replace(one, odds=one.odds / len(clicks)) for one in clicks), *found]
+
+
+def _within(click: ReflectorClick, view: DwellView) -> bool:
+    return view.placement.start <= click.image_time <= view.placement.end
+
+
+def _odds(candidates: Sequence[PictureCandidate]) -> Values:
+    """Return how probably each candidate is the reflector, by what the picture shows (k,)."""
+    if not candidates:
+        return np.zeros(0)
+    strength = np.array([max(one.strength, 1e-6) for one in candidates])
+    likeness = np.array([one.likeness for one in candidates])
+    gains = _STRENGTH * np.log(strength / strength.max()) + _APEX * np.array([one.has_apex for one in candidates])
+    gains = np.append(gains + np.where(np.isfinite(likeness), _ALIKE * (likeness - _LIKE), 0.0), _NONE)
+    weight = np.exp(gains - gains.max())
+    return np.asarray(weight[:-1] / weight.sum())
+
+
+def _rays(pixels: Points2, camera: Camera) -> tuple[Points3, Values]:
+    """Return the unit rays (m, 3) of pixels (m, 2), and the angle (m,) of one pixel there [rad]."""
+    rays = camera.rays(pixels)
+    aside = [camera.rays(pixels + step) - rays for step in ([0.5, 0.0], [0.0, 0.5])]
+    return rays, np.asarray(2.0 * np.sqrt(np.linalg.norm(aside[0], axis=1) * np.linalg.norm(aside[1], axis=1)))
+
+
+def _tangents(rays: np.ndarray) -> np.ndarray:
+    """Return two unit vectors (..., 2, 3) across each unit ray (..., 3): about right and down in the picture."""
+    down = np.array([0.0, 1.0, 0.0])
+    right = np.cross(down, rays)
+    length = np.linalg.norm(right, axis=-1, keepdims=True)
+    right = np.where(length > 1e-3, right / np.maximum(length, 1e-3), [1.0, 0.0, 0.0])
+    return np.stack([right, np.cross(rays, right)], axis=-2)
+
+
+def _apart_in_time(views: Sequence[DwellView]) -> Flags:
+    """Return which dwells (n, n) do not overlap: what stands in one is gone in the other."""
+    start = np.array([view.placement.start for view in views], dtype=np.int64)
+    end = np.array([view.placement.end for view in views], dtype=np.int64)
+    return np.asarray((start[:, None] > end) | (start > end[:, None]))
+
+
+def _density(pixels: np.ndarray, odds: Points2, apart: Flags, camera: Camera) -> Points2:
+    """Return how densely wrong candidates lie around each candidate (n, k) [1 / px^2].
+
+    They are spread evenly, gather where dwells are, as in an aisle, and repeat themselves where something flickers.
+    """
+    n, k = odds.shape
+    squared = ((pixels[:, :, None, None] - pixels[None, None]) ** 2).sum(axis=-1)
+    others = (apart[:, None, :, None] & (odds > 0.0)[None, None]).reshape(n, 1, n, k)
+    counted = np.maximum(others.sum(axis=(2, 3)), 1)
+    density = np.full((n, k), (1.0 - _REPEATED_SHARE - _GATHERED_SHARE) / (camera.width_px * camera.height_px))
+    for share, width_px in ((_REPEATED_SHARE, _REPEATED_PX), (_GATHERED_SHARE, _GATHERED * camera.width_px)):
+        kernels = np.exp(-0.5 * squared / width_px**2) / (2.0 * np.pi * width_px**2)
+        density += share * (kernels * others).sum(axis=(2, 3)) / counted
+    return density

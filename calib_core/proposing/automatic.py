@@ -1,0 +1,110 @@
+"""Automatic clicks: the proposals taken as they are, if picture and radar agree far beyond chance; otherwise none."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.camera import Camera
+from calib_core.measurements import ReflectorClick, Unsolvable
+from calib_core.options import CalibrationOptions
+from calib_core.proposing.agreement.apex_evidence import apex_log_odds
+from calib_core.proposing.agreement.candidate_rays import candidate_rays
+from calib_core.proposing.agreement.chance_agreement import chance_score, chance_scores
+from calib_core.proposing.agreement.mounting_prior import mounting_prior
+from calib_core.proposing.agreement.pose_agreement import pose_agreement
+from calib_core.proposing.dwell_views import DwellView
+from calib_core.proposing.proposals import Proposal, Proposals
+
+__all__ = ["LEAST_SCORE", "LEAST_WHOLE_CONFIDENCE", "AutomaticClicks", "automatic_clicks"]
+
+LEAST_WHOLE_CONFIDENCE = 0.9
+"""Below this nothing is clicked."""
+LEAST_SCORE = 25.0
+"""Least score of the pose: logarithm of how much better than chance it explains the candidates.
+
+Set on simulated recordings of development: of 650 pairs of one recording's radar and another's pictures the best reached 22.
+Pairs drawn later with the threshold as it is are not independent of these, as they repeat the same 40 recordings;
+docs/proposals-accuracy.md has those of recordings that nobody had looked at.
+"""
+_MARGIN, _MARGIN_STEP = 2.0, 1.0
+"""Score beyond what chance can reach and beyond the rival at which a pose is as probably right as not, and how fast that
+changes. Of 800 later pairs of the same recordings the best reached -8.8, the worst recording 20."""
+_MOST_CONFIDENCE = 0.99
+"""What some hundred simulated recordings without an error can show at most."""
+_RIVAL_SHARE = 0.25
+"""Share of its score by which a pose must be better than its rival: residuals alone make a difference of a fifth."""
+_LEAST_CLICKS = 6
+_LEAST_CLICK_CONFIDENCE = 0.9
+_LEAST_DWELLS = 5
+
+
+@dataclass(frozen=True, slots=True)
+class AutomaticClicks:
+    """Clicks that nobody confirmed.
+
+    Attributes:
+        clicks: one per placement that is certain enough, in order of time, with mark "snapped".
+        confidence: probability that they are the reflector's, as a whole.
+        words: how this is known, as a sentence.
+    """
+
+    clicks: tuple[ReflectorClick, ...]
+    confidence: float
+    words: str
+
+
+def automatic_clicks(
+    proposals: Proposals, views: Sequence[DwellView], camera: Camera, options: CalibrationOptions
+) -> AutomaticClicks | Unsolvable:
+    """Take the proposals as clicks, if picture and radar agree so well that a person is hardly needed.
+
+    Args:
+        proposals: of these views, with nothing confirmed.
+        views: of all placements.
+        camera: the intrinsics.
+        options: as the proposals were made with.
+    """
+    if len(views) < _LEAST_DWELLS:
+        return _refused(
+            f"the radar shows {_placements(len(views))}, and agreement by chance needs more to be ruled out"
+        )
+    rays = candidate_rays(views, camera, options)
+    prior = mounting_prior(options, is_flat=rays.is_flat)
+    agreement = pose_agreement(rays, prior)
+    if agreement is None:
+        return _refused("picture and radar agree on no mounting; do both belong to the same recording?")
+    if apex_log_odds(views, agreement) < 0.0:
+        return _refused("what stood still shows no reflector's apex in the pictures: it may be a person")
+    chance = max(chance_score(chance_scores(rays, prior)), LEAST_SCORE)
+    rival = agreement.rival_score + _RIVAL_SHARE * agreement.score
+    beyond = agreement.score - max(chance, rival)
+    confidence = _MOST_CONFIDENCE / (1.0 + float(np.exp(-np.clip((beyond - _MARGIN) / _MARGIN_STEP, -50.0, 50.0))))
+    certain = [one for one in proposals.ranked if one.confidence >= _LEAST_CLICK_CONFIDENCE]
+    figures = f"score {agreement.score:.0f}, by chance up to {chance:.0f}, another mounting {agreement.rival_score:.0f}"
+    if confidence < LEAST_WHOLE_CONFIDENCE:
+        other = rival > chance
+        why = "another mounting fits nearly as well" if other else "chance would do nearly as well"
+        return _refused(f"picture and radar agree too little, {why} ({figures}; confidence {confidence:.2f})")
+    if len(certain) < _LEAST_CLICKS:
+        return _refused(
+            f"{len(certain)} of {_placements(len(views))} are certain enough, and {_LEAST_CLICKS} are needed"
+        )
+    clicks = tuple(_click(one, number) for number, one in enumerate(sorted(certain, key=lambda one: one.image_time), 1))
+    words = f"{len(clicks)} of {_placements(len(views))} agree on one mounting ({figures})"
+    return AutomaticClicks(clicks, confidence, words)
+
+
+def _placements(count: int) -> str:
+    return f"{count} placement" + ("" if count == 1 else "s")
+
+
+def _refused(reason: str) -> Unsolvable:
+    return Unsolvable("not-confident", reason, "confirm one or two proposals, or click the reflector in a few frames")
+
+
+def _click(proposal: Proposal, number: int) -> ReflectorClick:
+    u_px, v_px = proposal.pixel_px.tolist()
+    return ReflectorClick(
+        proposal.image_time, f"automatic-{number:02d}", u_px, v_px, sigma_px=proposal.sigma_px, mark="snapped"
+    )

@@ -1,0 +1,222 @@
+"""From dwell views, and what a person confirmed so far, to proposals."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.arrays import Points2, Values
+from calib_core.association.placements import Placement
+from calib_core.camera import Camera
+from calib_core.measurements import ReflectorClick
+from calib_core.options import CalibrationOptions
+from calib_core.proposing.agreement.apex_evidence import apex_log_odds
+from calib_core.proposing.agreement.candidate_rays import CandidateRays, candidate_rays, weaker_db
+from calib_core.proposing.agreement.mounting_prior import MOST_TURNED_RAD, mounting_prior
+from calib_core.proposing.agreement.pose_agreement import PoseAgreement, pose_agreement
+from calib_core.proposing.dwell_views import DwellView
+from calib_core.proposing.proposals import Proposal, Proposals
+
+__all__ = ["LEAST_CONFIDENCE", "proposals_of"]
+
+LEAST_CONFIDENCE = 0.4
+"""What is less probably the reflector is not proposed."""
+_WEAK = 0.8
+"""A proposal of less confidence comes with a reason."""
+_CHANCE_SCORE, _CHANCE_STEP = 20.0, 2.0
+"""Score that a pose needs to be as probable as not, and how fast that changes: the radar of one recording with the pictures
+of another reaches up to 19, whatever the number of dwells; ten placements of one recording reach 54 and more."""
+_TEMPER = 1.6
+"""By how much log-odds were too large in simulated recordings, where dwells share errors that the model does not know."""
+_LIKE_A_CLICK = 0.8
+"""How far a likeness to what a person clicked is trusted without a pose."""
+_MORE_LIKELY = 0.5
+_FEW_DWELLS = 5
+_FAR_SIGMA = 3.5
+_WEAK_ECHO_DB = 6.0
+_SAME_PLACE = 3.0
+"""Standard deviations between two candidates that are one place."""
+_VAGUE_PX = 3.0
+_VAGUE = "its apex is not seen clearly"
+_NO_FRAME = "the camera recorded no frame while it stood there"
+_NO_CHANGE = "nothing of the reflector's size changed in the picture"
+_NO_POSE = f"picture and radar agree on no mounting within {np.degrees(MOST_TURNED_RAD):.0f} deg of the nominal one"
+_NO_APEX = "what stood there shows no reflector's apex; if it is one, click it once"
+_ELSEWHERE = "no place that changed lies where the other placements say"
+_TWO_PLACES = "two places there are about as likely"
+_TAKEN = "the only likely place is another reflector's"
+_FEW = "too few placements to compare with each other"
+_TWO_POSES = "the placements nearly agree on another mounting, too"
+_UNLIKELY = "what changed there does not look like the reflector"
+
+
+def proposals_of(
+    views: Sequence[DwellView],
+    camera: Camera,
+    options: CalibrationOptions,
+    *,
+    confirmed: Sequence[ReflectorClick] = (),
+) -> Proposals:
+    """Rank what the pictures show for each dwell; what is probably wrong is not proposed.
+
+    Args:
+        views: of all placements.
+        camera: the intrinsics.
+        options: of the calibration; nominal mounting and measured camera position are used.
+        confirmed: clicks that a person placed or accepted so far; each covers its dwell.
+    """
+    if not views:
+        return Proposals(())
+    clicks = [click for click in confirmed if click.counts]
+    rays = candidate_rays(views, camera, options, confirmed=clicks)
+    agreement = pose_agreement(rays, mounting_prior(options, is_flat=rays.is_flat))
+    judged = _Judged.of(views, rays, agreement)
+    covered = _covered(rays, judged, len(clicks))
+    ranked: list[Proposal] = []
+    unproposed: list[tuple[Placement, str]] = []
+    for i, view in enumerate(views):
+        if i in covered:
+            continue
+        proposal = judged.proposal(i)
+        if proposal is None:
+            unproposed.append((view.placement, judged.reason(i)))
+        else:
+            ranked.append(proposal)
+    ranked.sort(key=lambda one: (-one.confidence, one.placement.start))
+    if agreement is None:
+        return Proposals(tuple(ranked), tuple(unproposed))
+    return Proposals(
+        tuple(ranked),
+        tuple(unproposed),
+        agreement.camera_from_radar,
+        agreement.agreeing(rays),
+        agreement.agreeing_with_rival(rays),
+        agreement.trials,
+    )
+
+
+def _covered(rays: CandidateRays, judged: "_Judged", clicks: int) -> frozenset[int]:
+    """Return the dwells that the confirmed clicks belong to: each click to the one of its dwells that it suits best."""
+    found = []
+    for row in range(clicks):
+        dwells, which = np.nonzero(rays.click == row)
+        if len(dwells):
+            fits = judged.probability[dwells, which] + 1e-6 * rays.odds[dwells, which]
+            found.append(int(dwells[np.argmax(fits)]))
+    return frozenset(found)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Judged:
+    """The dwells with the probability of each candidate.
+
+    Attributes:
+        views: of all placements.
+        rays: their candidates.
+        agreement: the pose; None if there is none.
+        probability: (n, k) of each candidate, the pose's own probability included.
+        trusted: probability that the pose is right, and that reflectors stood there.
+        reflectors: the second of these alone.
+        taken: (n, k) candidates that show what another dwell of the same time chose.
+        weaker_db: (n,) echo below the typical one.
+    """
+
+    views: Sequence[DwellView]
+    rays: CandidateRays
+    agreement: PoseAgreement | None
+    probability: Points2
+    trusted: float
+    reflectors: float
+    taken: np.ndarray
+    weaker_db: Values
+
+    @classmethod
+    def of(cls, views: Sequence[DwellView], rays: CandidateRays, agreement: PoseAgreement | None) -> "_Judged":
+        """Weigh the candidates by the pose, as far as it is to be trusted, and by the picture alone."""
+        trusted, reflectors, probability = 0.0, 1.0, np.zeros_like(rays.odds)
+        if agreement is not None:
+            above = (agreement.score - _CHANCE_SCORE) / _CHANCE_STEP
+            trusted = agreement.pose_probability * _logistic(above)
+            if not (rays.click >= 0).any():
+                reflectors = _logistic(apex_log_odds(views, agreement))
+                trusted *= reflectors if reflectors >= _MORE_LIKELY else 0.0
+            probability = trusted * agreement.probability
+        if (rays.click >= 0).any():
+            probability = probability + (1.0 - trusted) * _LIKE_A_CLICK * rays.odds * _alike(views, rays)
+        probability = _tempered(probability)
+        taken = _taken(views, rays, probability)
+        sure = np.where(taken, 0.0, probability)
+        return cls(views, rays, agreement, sure, trusted, reflectors, taken, weaker_db(views))
+
+    def proposal(self, i: int) -> Proposal | None:
+        """Propose the most probable candidate of a dwell; None if it is probably wrong."""
+        view, probability = self.views[i], self.probability[i]
+        order = [k for k in np.argsort(-probability, kind="stable").tolist() if self._is_candidate(i, k)]
+        if not order or probability[order[0]] < LEAST_CONFIDENCE:
+            return None
+        first = len(self.rays.click[i][self.rays.click[i] >= 0])
+        candidates = tuple(view.candidates[k - first] for k in order)
+        confidence = float(min(probability[order[0]], 1.0))
+        best = candidates[0]
+        reason = self.reason(i) if confidence < _WEAK else _VAGUE if best.sigma_px > _VAGUE_PX else ""
+        return Proposal(view.placement, view.image_time, best.pixel_px, best.sigma_px, confidence, candidates, reason)
+
+    def _is_candidate(self, i: int, k: int) -> bool:
+        """Return whether a column is one of the view's candidates, not a click or padding."""
+        return bool(self.rays.odds[i, k] > 0.0 and self.rays.click[i, k] < 0)
+
+    def reason(self, i: int) -> str:
+        """Say why a dwell's most probable candidate is not certain, as a clause."""
+        view, odds = self.views[i], self.rays.odds[i]
+        if not view.candidates:
+            return _NO_CHANGE if len(view.frames) else _NO_FRAME
+        if self.taken[i].any() and self.probability[i].max() < LEAST_CONFIDENCE:
+            return _TAKEN
+        if self.weaker_db[i] > _WEAK_ECHO_DB:
+            return f"its echo is {self.weaker_db[i]:.0f} dB weaker than the others': probably not the reflector"
+        if self.reflectors < _MORE_LIKELY:
+            return _NO_APEX
+        if self.agreement is None or self.trusted < _MORE_LIKELY:
+            return _NO_POSE if len(self.rays) >= _FEW_DWELLS else _FEW
+        if self.agreement.off_sigma[i][odds > 0.0].min(initial=np.inf) > _FAR_SIGMA:
+            return _ELSEWHERE
+        ranked = np.sort(self.agreement.probability[i])[::-1]
+        if len(ranked) > 1 and ranked[1] > 0.5 * ranked[0]:
+            return _TWO_PLACES
+        return _TWO_POSES if self.trusted < _WEAK else _UNLIKELY
+
+
+def _logistic(log_odds: float) -> float:
+    return 1.0 / (1.0 + float(np.exp(-np.clip(log_odds, -50.0, 50.0))))
+
+
+def _tempered(probability: Points2) -> Points2:
+    """Return probabilities as they were borne out, nearer to one half."""
+    bounded = np.clip(probability, 1e-12, 1.0 - 1e-6)
+    return np.asarray(np.where(probability > 0.0, 1.0 / (1.0 + (1.0 / bounded - 1.0) ** (1.0 / _TEMPER)), 0.0))
+
+
+def _alike(views: Sequence[DwellView], rays: CandidateRays) -> np.ndarray:
+    """Return which candidates (n, k) were compared with what a person clicked."""
+    alike = np.zeros(rays.odds.shape, dtype=np.bool_)
+    for i, view in enumerate(views):
+        first = int((rays.click[i] >= 0).sum())
+        alike[i, first : first + len(view.candidates)] = [np.isfinite(one.likeness) for one in view.candidates]
+    return alike & (rays.odds > 0.0)
+
+
+def _taken(views: Sequence[DwellView], rays: CandidateRays, probability: Points2) -> np.ndarray:
+    """Return which candidates (n, k) are the place of another dwell at the same time, to which it belongs more probably."""
+    taken = np.zeros(rays.odds.shape, dtype=np.bool_)
+    order = np.argsort(-probability.max(axis=1), kind="stable").tolist()
+    for place, i in enumerate(order):
+        free = np.where(taken[i], 0.0, probability[i])
+        k = int(np.argmax(free))
+        if free[k] < LEAST_CONFIDENCE:
+            continue
+        for j in order[place + 1 :]:
+            one, other = views[i].placement, views[j].placement
+            if one.start < other.end and other.start < one.end:
+                off = np.linalg.norm(rays.rays[j] - rays.rays[i, k], axis=1)
+                taken[j] |= off < _SAME_PLACE * np.hypot(rays.sigma_rad[j], rays.sigma_rad[i, k])
+    return taken

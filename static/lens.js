@@ -1,0 +1,157 @@
+// @ts-check
+/** The tab "Lens": the intrinsics in use, a form that calibrates them from a board in the recording, and the result. */
+
+import { boardForm } from "./lens_board.js";
+import { drawLensResult, lensResult, takeLensResult } from "./lens_result.js";
+import { drawMap, drawProgress, focusCancel, lensProgress, running, startLensProgress } from "./lens_progress.js";
+import { showTab } from "./layout.js";
+import { make, toast } from "./notices.js";
+import { toggleRectified, withoutRectified } from "./rectified.js";
+import { saveFile } from "./saving.js";
+import { send } from "./socket.js";
+import { emit, on, state } from "./state.js";
+
+const page = /** @type {HTMLElement} */ (document.getElementById("page-lens"));
+const present = make("section", "lens-present", []);
+const large = make("button", "second", "⤢");
+const form = boardForm(start);
+let drawn = "";
+/** Whether the tab was opened by itself, since there are no intrinsics. */
+let led = false;
+let busy = false;
+/** Whether a calibration ran since the tab last showed a result. */
+let awaited = false;
+
+export function startLens() {
+  present.setAttribute("aria-label", "Intrinsics in use");
+  startLensProgress(cancelLens);
+  large.dataset.hint = "Give this tab the whole column, or the 3D view its place back.";
+  large.setAttribute("aria-label", "Enlarge");
+  large.onclick = () => {
+    document.body.classList.toggle("review-large");
+    emit("box");
+  };
+  page.append(present, lensProgress, lensResult, form.element);
+  on(["lens", "recording", "layers"], draw);
+  on(["box", "theme"], drawPlots);
+  on(["box"], () => document.body.classList.toggle("lensing", !page.hidden));
+}
+
+/** @param {import("./messages.js").LensState} message */
+export function takeLens(message) {
+  state.lens = message;
+  if (state.recording) state.recording.intrinsics = message.intrinsics?.about ?? "";
+  if (!message.intrinsics && message.pictures && !led) showTab("tab-lens");
+  led = true;
+  emit("lens");
+}
+
+/** @param {import("./messages.js").LensResult} message */
+export function takeResult(message) {
+  takeLensResult(message);
+  emit("lens");
+}
+
+async function start() {
+  const wanted = form.read();
+  if (!wanted || busy) return;
+  busy = true;
+  const refusal = await send({ type: "lens_calibrate", ...wanted });
+  busy = false;
+  form.say(refusal ?? "");
+}
+
+/** Stop looking for the board. */
+export async function cancelLens() {
+  const refusal = await send({ type: "lens_cancel" });
+  if (refusal) toast(refusal);
+}
+
+/** Solve with the calibrated lens. */
+export async function useLens() {
+  const refusal = await send({ type: "lens_use" });
+  if (refusal) toast(refusal);
+}
+
+/** Go back to the intrinsics that the recording was opened with. */
+async function useGiven() {
+  const refusal = await send({ type: "intrinsics_chosen", intrinsics: null });
+  if (refusal) toast(refusal);
+}
+
+/** Download intrinsics. @param {boolean} inUse those in use, else the calibrated ones */
+export async function saveCamera(inUse) {
+  const unsaved = await saveFile(`api/camera.yaml${inUse ? "?in_use" : ""}`, "camera.yaml");
+  if (unsaved) toast(unsaved.reason, "Try again.");
+}
+
+function draw() {
+  const lens = state.lens;
+  if (!lens) return;
+  const [started, cancelled] = [form.element, lensProgress].map((element) => element.contains(document.activeElement));
+  form.element.hidden = running();
+  form.tell(lens, running());
+  const text = JSON.stringify([lens, state.rectified]);
+  if (text === drawn) return;
+  drawn = text;
+  drawPresent(lens);
+  drawProgress(lens);
+  if (started && running()) focusCancel();
+  if (cancelled && !running()) form.focus();
+  drawLensResult();
+  drawPlots();
+  showResult(lens);
+}
+
+/** Bring a result that has just come into sight. @param {import("./messages.js").LensState} lens */
+function showResult(lens) {
+  if (running()) awaited = true;
+  else if (awaited && lens.stage === "done" && !lensResult.hidden) {
+    awaited = false;
+    lensResult.scrollIntoView({ block: "start" });
+  }
+}
+
+/** @param {import("./messages.js").LensState} lens */
+function drawPresent(lens) {
+  const camera = lens.intrinsics;
+  present.hidden = !camera && running();
+  if (!camera) {
+    const words = lens.pictures
+      ? "The lens is not known yet. Calibrate it here from a board in this recording, or drop a camera file on the page. Clicks can be placed already; the pose follows once the lens is known."
+      : "There are no pictures in this recording.";
+    return present.replaceChildren(make("div", "lens-head", [make("h2", "", "No intrinsics"), large]), make("p", "lens-none", words));
+  }
+  const rectify = make("button", "second", state.rectified ? "Picture as taken" : "Rectified picture");
+  rectify.dataset.hint = "Straight edges must be straight in it. (U)";
+  rectify.setAttribute("aria-pressed", String(state.rectified));
+  rectify.disabled = withoutRectified() !== "";
+  rectify.onclick = toggleRectified;
+  const save = make("button", "second", "Save camera.yaml");
+  save.dataset.hint = "These intrinsics as a file: for ROS, or for --camera.";
+  save.onclick = () => saveCamera(true);
+  const back = make("button", "second", "Use the former ones");
+  back.dataset.hint = "Go back to the intrinsics that the recording was opened with. Undo takes that back.";
+  back.onclick = useGiven;
+  present.replaceChildren(
+    make("div", "lens-head", [make("h2", "", "Intrinsics in use"), large]),
+    make("p", "lens-about", [make("strong", "", camera.about), ` · ${camera.model} · ${camera.size} · ${camera.field}`]),
+    parameters(camera),
+    make("p", "lens-note", camera.known ? "" : "How well they are known is not stated."),
+    make("div", "acts", [rectify, save, ...(lens.chosen ? [back] : [])]),
+  );
+}
+
+/** @param {import("./messages.js").LensCamera} camera */
+export function parameters(camera) {
+  return make("dl", "lens-parameters", camera.parameters.map(({ name, value, unit }) => make("div", "", [make("dt", "", name), make("dd", "", [value, unit ? make("span", "unit", ` ${unit}`) : ""])])));
+}
+
+function drawPlots() {
+  if (page.hidden || !state.lens) return;
+  const { imageWidth, imageHeight } = sizeOfPicture();
+  drawMap(imageWidth, imageHeight);
+}
+
+/** The size of the recorded pictures. */
+export const sizeOfPicture = () => ({ imageWidth: state.recording?.width_px ?? 0, imageHeight: state.recording?.height_px ?? 0 });

@@ -1,0 +1,170 @@
+// @ts-check
+/** The result of calibrating the lens: the model and why, how well it fits, every view, what was left out, and plots over the picture. */
+
+import { ask, content } from "./asking.js";
+import { ink, rampColour } from "./colours.js";
+import { toDevice, viewport } from "./geometry.js";
+import { drawResiduals, drawUncertainty, veilEmpty } from "./lens_plots.js";
+import { make } from "./notices.js";
+import { goTo, pause } from "./player.js";
+import { emit, on, state } from "./state.js";
+import { parameters, saveCamera, useLens } from "./lens.js";
+
+/** A corner in the frame: where, its residual, and whether it was used. @typedef {[number, number, number, number, boolean]} Corner */
+export const lensResult = make("section", "lens-result", []);
+const page = /** @type {HTMLElement} */ (document.getElementById("page-lens"));
+const residuals = make("canvas", "", []);
+const uncertainty = make("canvas", "", []);
+const residualWords = make("figcaption", "", "");
+const uncertaintyWords = make("figcaption", "", "");
+/** @type {import("./messages.js").LensResult|null} */
+let result = null;
+/** The corners of the frame on screen. @type {{frame: number, number: number, corners: Corner[]}} */
+let shown = { frame: -1, number: 0, corners: [] };
+let drawn = "";
+/** Residuals of this length have the last colour [px]. */
+const LARGE_PX = 1;
+
+export function startLensResult() {
+  lensResult.setAttribute("aria-label", "Calibrated lens");
+  lensResult.hidden = true;
+  residuals.setAttribute("role", "img");
+  uncertainty.setAttribute("role", "img");
+  on(["shown", "lens", "box"], lookUp);
+  on(["box", "theme"], drawPlots);
+  lensResult.addEventListener("click", (event) => {
+    const row = event.target instanceof Element ? event.target.closest("[data-frame]") : null;
+    if (!(row instanceof HTMLElement)) return;
+    pause();
+    goTo(Number(row.dataset.frame));
+  });
+}
+
+/** @param {import("./messages.js").LensResult} message */
+export function takeLensResult(message) {
+  result = message;
+}
+
+export function drawLensResult() {
+  lensResult.hidden = !result;
+  if (!result) return;
+  const text = JSON.stringify([result.number, state.lens?.in_use]);
+  if (text === drawn) return;
+  drawn = text;
+  const use = make("button", "", state.lens?.in_use ? "In use" : "Use these intrinsics");
+  use.disabled = Boolean(state.lens?.in_use);
+  use.dataset.hint = "The clicks are solved with this lens from now on. Undo takes that back.";
+  use.onclick = useLens;
+  const save = make("button", "second", "Save camera.yaml");
+  save.onclick = () => saveCamera(false);
+  lensResult.replaceChildren(
+    make("h2", "", "Calibrated lens"),
+    make("p", "lens-about", `${result.board} · ${result.camera.model} · ${result.camera.field}`),
+    ...(result.choice ? [make("p", "lens-choice", result.choice)] : []),
+    figures(result),
+    ...result.warnings.map((one) => make("p", "lens-warning", [one.message, make("small", "", ` ${one.hint}`)])),
+    ...(state.lens?.in_use ? [] : [parameters(result.camera)]),
+    make("div", "acts", [use, save]),
+    make("div", "lens-plots", [make("figure", "", [residuals, residualWords]), ...(result.uncertainty ? [make("figure", "", [uncertainty, uncertaintyWords])] : [])]),
+    ...(result.uncertainty ? [make("p", "lens-note", result.unseen)] : []),
+    ...(result.trials.length > 1 ? [trials(result)] : []),
+    views(result),
+    ...(result.left_out.length ? [leftOut(result)] : []),
+  );
+  drawPlots();
+  lookUp();
+}
+
+/** @param {number|null} value */
+const px = (value) => (value === null ? "–" : value.toFixed(3));
+
+/** @param {import("./messages.js").LensResult} found */
+function figures(found) {
+  /** @type {[string, string, string, string][]} */
+  const rows = [
+    ["RMS", px(found.rms_px), "px", "Root mean square distance between found and projected corners."],
+    ["RMS of left-out views", px(found.held_out_rms_px), "px", "The same for each view with the lens calibrated from all others: what to expect of a view that was not used. Much more than the RMS means too few views or a lens model that is too rich."],
+    ["Views", String(found.views.length), "", "Pictures that were used."],
+    ["Left out", String(found.left_out.length), "", "Pictures that were not used; below with the reason."],
+  ];
+  return make("dl", "lens-figures", rows.map(([name, value, unit, hint]) => {
+    const one = make("div", "figure", [make("dt", "", name), make("dd", "", [value, make("span", "unit", unit)])]);
+    one.dataset.hint = hint;
+    one.tabIndex = 0;
+    return one;
+  }));
+}
+
+/** @param {string} caption @param {string[]} heads @param {(string|HTMLElement)[][]} rows @param {(number|null)[]} frames of the rows @param {string} [name] */
+function table(caption, heads, rows, frames, name = "") {
+  const body = rows.map((cells, index) => {
+    const row = make("tr", frames[index] === null ? "" : "row", cells.map((cell) => make("td", "", [cell])));
+    if (frames[index] !== null) row.dataset.frame = String(frames[index]);
+    return row;
+  });
+  return make("details", `lens-table ${name}`.trim(), [make("summary", "", caption), make("table", "", [make("thead", "", [make("tr", "", heads.map((head) => make("th", "", head)))]), make("tbody", "", body)])]);
+}
+
+/** @param {import("./messages.js").LensResult} found */
+function views(found) {
+  return table(`${found.views.length} views, those that fit worst first`, ["Picture", "RMS", "left out"], found.views.map((view) => [frameButton(view.name), px(view.rms_px), px(view.held_out_rms_px)]), found.views.map((view) => view.frame));
+}
+
+/** @param {import("./messages.js").LensResult} found */
+function leftOut(found) {
+  return table(`${found.left_out.length} pictures left out`, ["Picture", "Why"], found.left_out.map((one) => [frameButton(one.name), one.reason]), found.left_out.map((one) => one.frame), "reasons");
+}
+
+/** @param {import("./messages.js").LensResult} found */
+function trials(found) {
+  const rows = found.trials.map((trial) => [make(trial.chosen ? "strong" : "span", "", trial.model), px(trial.rms_px), px(trial.held_out_rms_px), trial.chosen ? "chosen" : trial.note]);
+  return table("Lens models that were tried", ["Model", "RMS", "left out", ""], rows, rows.map(() => null), "trials");
+}
+
+/** @param {string} name */
+const frameButton = (name) => make("button", "lens-frame", name);
+
+function drawPlots() {
+  if (!result || page.hidden) return;
+  const { width_px: wide = 0, height_px: high = 0 } = state.recording ?? {};
+  const times = drawResiduals(residuals, result.residuals, wide, high);
+  residualWords.textContent = `Residuals of the corners, ${times} times enlarged. ${result.pattern}`;
+  residuals.setAttribute("aria-label", residualWords.textContent);
+  if (!result.uncertainty) return;
+  const [low, most] = drawUncertainty(uncertainty, result.uncertainty, wide, high);
+  uncertaintyWords.textContent = `Standard deviation of a projection: ${Number(low.toPrecision(2))} (blue) to ${Number(most.toPrecision(2))} px (red).`;
+  uncertainty.setAttribute("aria-label", uncertaintyWords.textContent);
+}
+
+/** Get the corners of the frame on screen, while the tab is open. */
+async function lookUp() {
+  const frame = state.shown?.index ?? -1;
+  if (page.hidden || !result || (shown.frame === frame && shown.number === result.number)) return;
+  shown = { frame, number: result.number, corners: [] };
+  if (!result.views.some((view) => view.frame === frame)) return emit("hover");
+  const { answer } = await ask(`api/board_corners.json?${frame}`);
+  const found = answer && (await content(answer.json()));
+  if (!found || shown.frame !== frame) return;
+  shown.corners = found;
+  emit("hover");
+}
+
+/** While the tab is open: where the board was not yet, and the corners of this frame. @param {CanvasRenderingContext2D} pen */
+export function drawLensMarks(pen) {
+  if (page.hidden) return;
+  const lens = state.lens;
+  if (lens?.coverage && lens.stage === "searching") veilEmpty(pen, lens.coverage, toDevice, viewport.imageWidth, viewport.imageHeight);
+  if (shown.frame !== state.shown?.index) return;
+  const radius = 3.4 * viewport.ratio;
+  for (const [u, v, du, dv, used] of shown.corners) {
+    const [x, y] = toDevice(u, v);
+    for (const [colour, width] of /** @type {[string, number][]} */ ([[ink.edge, 3], [used ? rampColour(Math.hypot(du, dv) / LARGE_PX) : ink.grey, 1.5]])) {
+      pen.strokeStyle = colour;
+      pen.lineWidth = width * viewport.ratio;
+      pen.beginPath();
+      pen.arc(x, y, radius, 0, 2 * Math.PI);
+      if (!used) pen.moveTo(x - radius, y - radius), pen.lineTo(x + radius, y + radius);
+      pen.stroke();
+    }
+  }
+}

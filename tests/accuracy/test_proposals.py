@@ -1,0 +1,92 @@
+"""A slice of the benchmark of proposals: ten small recordings, and pictures and radar that do not belong together."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.accuracy.rows import Figures
+from benchmarks.proposing.cases import case_of
+from benchmarks.proposing.clicking import after_one_click
+from benchmarks.proposing.drawn import Drawn
+from benchmarks.proposing.left_alone import automatic_figures
+from benchmarks.proposing.pixels import placement_figures, proposal_figures
+from benchmarks.proposing.small import draw_small
+from benchmarks.proposing.tables import limit_95, summed
+from calib_core.measurements import Unsolvable
+from calib_core.options import CalibrationOptions
+from calib_core.proposing import DwellView, dwell_views, proposals_of
+from calib_core.proposing.automatic import automatic_clicks
+
+SEEDS = (540, 541, 542, 546, 547, 548, 549, 552, 553, 554)
+
+
+@pytest.fixture(scope="module")
+def seen() -> list[tuple[Drawn, tuple[DwellView, ...]]]:
+    drawn = [draw_small(seed) for seed in SEEDS]
+    return [(one, dwell_views(one.placements, one.frames, one.recording.camera)) for one in drawn]
+
+
+@pytest.fixture(scope="module")
+def figures(seen: list[tuple[Drawn, tuple[DwellView, ...]]]) -> list[Figures]:
+    found = []
+    for drawn, views in seen:
+        first = proposals_of(views, drawn.recording.camera, CalibrationOptions())
+        after = after_one_click(first, views, drawn)
+        rest, clicked = ((), []) if after is None else (after.proposals.ranked, [after.placement])
+        found.append(
+            placement_figures(drawn)
+            | proposal_figures("without", first.ranked, drawn)
+            | proposal_figures("after", rest, drawn, clicked=clicked)
+            | automatic_figures(first, views, drawn)
+        )
+    return found
+
+
+def test_the_radar_shows_the_placements(figures: list[Figures]) -> None:
+    assert summed(figures, "found") >= 0.9 * summed(figures, "placements")
+
+
+def test_most_proposals_lie_on_the_reflector_and_more_after_one_click(figures: list[Figures]) -> None:
+    placements = summed(figures, "placements")
+    assert summed(figures, "without nowhere") <= 0.1 * summed(figures, "without proposed")
+    assert summed(figures, "after nowhere") <= 0.1 * summed(figures, "after proposed")
+    assert summed(figures, "without right") >= 0.5 * placements
+    assert summed(figures, "after right") >= 0.6 * placements
+
+
+def test_nothing_is_confidently_wrong(figures: list[Figures]) -> None:
+    assert summed(figures, "auto far") == 0
+    assert summed(figures, "auto wrong clicks") <= 0.1 * summed(figures, "auto clicks")
+
+
+def test_pictures_of_one_recording_with_the_radar_of_another_are_refused(
+    seen: list[tuple[Drawn, tuple[DwellView, ...]]],
+) -> None:
+    for (drawn, pictures), (_, radar) in zip(seen, [*seen[1:], seen[0]], strict=True):
+        mixed = [
+            replace(one, placement=replace(one.placement, position_radar_m=other.placement.position_radar_m))
+            for one, other in zip(pictures, radar, strict=False)
+        ]
+        camera, options = drawn.recording.camera, CalibrationOptions()
+        outcome = automatic_clicks(proposals_of(mixed, camera, options), mixed, camera, options)
+        assert isinstance(outcome, Unsolvable), drawn.case.name
+        assert outcome.code == "not-confident"
+
+
+def test_any_24_seeds_have_every_scene_with_both_radars_and_all_clutter() -> None:
+    options = [case_of(seed).options for seed in range(601, 625)]
+    assert len({(one.scene, one.radar, one.clutter) for one in options}) == 24
+    traits = {trait for seed in range(601, 641) for trait in case_of(seed).traits}
+    assert {"light changes", "passers-by", "two reflectors", "tripod"} <= traits
+
+
+def test_no_failure_in_a_hundred_leaves_three_percent() -> None:
+    assert limit_95(0, 100) == "0 of 100, at most 3 % of all at 95 % confidence"
+    assert limit_95(2, 2) == "2 of 2, at most 1e+02 % of all at 95 % confidence"
+
+
+def test_the_same_seed_gives_the_same_case_and_pictures() -> None:
+    one, other = draw_small(541), draw_small(541)
+    assert one.case == other.case
+    np.testing.assert_array_equal(one.frames.image(5), other.frames.image(5))

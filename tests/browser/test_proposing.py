@@ -1,0 +1,185 @@
+"""Confirming instead of clicking: proposals appear while pictures are looked at, and each is decided with a key or a click."""
+
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.web.port.server import RunningServer, ServerOptions, start
+from app.workspace import Workspace
+from calib_core.association.placements import Placement
+from calib_core.camera import Camera
+from calib_core.measurements import NS_PER_S, TimeNs
+from calib_core.proposing import DwellView, FrameSource, PictureCandidate, ViewProgress
+from calib_core.recordings import Recording
+from tests.browser.accessibility import violations
+from tests.browser.driving import Driver
+
+pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
+
+HELD_FROM = 8
+"""Looking at the pictures waits before this placement until the test goes on."""
+UNCERTAIN = 4.0
+"""Standard deviation of a place whose apex is not seen [px]."""
+READY = "__cocalib.state.proposals?.stage === 'ready'"
+ON_SCREEN = "__cocalib.shownOffer() && __cocalib.state.shown.index === __cocalib.state.cursor"
+
+
+class Pictures:
+    """What replaces looking at the pictures: true places among others, found placement by placement as the test allows."""
+
+    def __init__(self, truth: Any) -> None:
+        self.allowed = threading.Event()
+        self.pixels = {
+            one["best_image_time"]["sec"] * NS_PER_S + one["best_image_time"]["nanosec"]: np.array(one["pixel_px"])
+            for one in truth["placements"]
+        }
+
+    def __call__(
+        self, placements: Sequence[Placement], frames: FrameSource, camera: Camera, *, progress: Any, **_: Any
+    ) -> tuple[DwellView, ...]:
+        views: list[DwellView] = []
+        for number, placement in enumerate(placements):
+            if number == HELD_FROM:
+                assert self.allowed.wait(60)
+            views.append(self._view(number, placement, camera))
+            progress(ViewProgress(len(views), len(placements), tuple(views)))
+        return tuple(views)
+
+    def at(self, stamp: dict[str, int]) -> tuple[float, float]:
+        """Return where the reflector is in the dwell of a frame."""
+        time = stamp["sec"] * NS_PER_S + stamp["nanosec"]
+        u_px, v_px = self.pixels[min(self.pixels, key=lambda other: abs(other - time))]
+        return float(u_px), float(v_px)
+
+    def _view(self, number: int, placement: Placement, camera: Camera) -> DwellView:
+        time = next(time for time in self.pixels if placement.start <= time <= placement.end)
+        rng = np.random.default_rng(number)
+        others = rng.uniform([0, 0], [camera.width_px - 1, camera.height_px - 1], (3, 2))
+        places = [PictureCandidate(at, UNCERTAIN, 5.0) for at in others]
+        at_px, strength = self.pixels[time] + rng.normal(0.0, 0.3, 2), 3.0 if number % 7 == 6 else 12.0
+        found = PictureCandidate(at_px, 0.4, strength, has_apex=True)
+        candidates = tuple(sorted([found, *places], key=lambda one: -one.strength))
+        frame = np.array([number])
+        picture = np.zeros((0, 0, 3), np.uint8)
+        return DwellView(placement, frame, TimeNs(time), picture, 1.0, candidates, width_px=20.0)
+
+
+@pytest.fixture
+def pictures(monkeypatch: pytest.MonkeyPatch, truth: Any) -> Iterator[Pictures]:
+    fake = Pictures(truth)
+    monkeypatch.setattr("app.proposing.finding.dwell_views", fake)
+    monkeypatch.setattr("app.proposing.job.looks_of", lambda *_: iter([object()]))
+    monkeypatch.setattr(
+        "app.proposing.job.with_look",
+        lambda views, *_: tuple(
+            replace(view, candidates=tuple(replace(one, likeness=0.5) for one in view.candidates)) for view in views
+        ),
+    )
+    yield fake
+    fake.allowed.set()
+
+
+@pytest.fixture
+def proposing(pictures: Pictures, workspace: Workspace, sample: Recording) -> Iterator[RunningServer]:
+    running = start(workspace, sample, ServerOptions(port=0, token="test", proposes=True))
+    yield running
+    pictures.allowed.set()
+    running.close()
+
+
+def guide(page: Driver) -> str:
+    page.until(ON_SCREEN)
+    page.drawn()
+    return page.text("#guide")
+
+
+def off_px(page: Driver, pictures: Pictures) -> float:
+    """Return how far the proposal on screen is from the reflector."""
+    offer = page.value("__cocalib.shownOffer()")
+    u_px, v_px = pictures.at(offer["row"]["image_time"])
+    return float(np.hypot(offer["place"]["u_px"] - u_px, offer["place"]["v_px"] - v_px))
+
+
+def test_twenty_placements_take_at_most_25_keys_and_clicks(
+    pictures: Pictures, proposing: RunningServer, open_page: Callable[..., Driver]
+) -> None:
+    page = open_page(proposing.url)
+    page.until("__cocalib.state.proposals?.rows.length >= 5")
+    assert "Proposals 8/20" in page.text("#layers")
+    page.press("n")
+    assert guide(page).startswith("Proposal 1 of ")
+    assert page.value("__cocalib.zoom()") > 1.5 * page.value("document.getElementById('marks').clientWidth / 960")
+    page.press("Enter")
+    page.until("__cocalib.state.view.clicks.length === 1")
+    pictures.allowed.set()
+    page.until(READY)
+    first = page.view["clicks"][0]
+    assert (first["mark"], first["sigma_px"]) == ("snapped", pytest.approx(0.4))
+    assert violations(page) == []
+
+    count, accepted = 2, 1
+    while (done := page.value("__cocalib.state.view.clicks.length")) < 20:
+        page.until(f"{READY} && !__cocalib.justMoved() && (({ON_SCREEN}) || !__cocalib.state.proposals.rows.length)")
+        if page.value("__cocalib.shownOffer() === null"):
+            page.press("n")
+            page.until("__cocalib.state.shown.index === __cocalib.state.cursor")
+            assert "Not proposed: " in page.text("#guide")
+            page.click(*pictures.at(page.value("__cocalib.stampOf(__cocalib.state.cursor)")))
+            count += 2
+        elif off_px(page, pictures) < 3.0:
+            assert f"Proposal {done + 1} of " in guide(page)
+            page.page.keyboard.press("Enter")
+            count, accepted = count + 1, accepted + 1
+        else:
+            page.page.keyboard.press("c")
+            count += 1
+        page.until("__cocalib.unconfirmed() === 0")
+    assert count <= 25
+    assert accepted >= 18
+    page.settle()
+    assert page.view["has_calibration"]
+    assert page.value("__cocalib.shownOffer()") is None
+
+
+def test_a_proposal_is_rejected_corrected_and_undone_and_all_of_them_are_switched_off(
+    pictures: Pictures, proposing: RunningServer, open_page: Callable[..., Driver]
+) -> None:
+    pictures.allowed.set()
+    page = open_page(proposing.url)
+    page.until(READY)
+    page.press("n")
+    first = guide(page)
+    placement = page.value("__cocalib.shownOffer().row.placement")
+    page.press("c")
+    assert "place 2 of 4" in guide(page)
+
+    page.press("x")
+    page.until("__cocalib.state.view.dismissed.length === 1")
+    assert guide(page).startswith("Proposal 2 of ")
+    page.press("p")  # what was rejected is not come back to
+    assert page.value("__cocalib.shownOffer()?.row.placement") != placement
+    page.press("Control+z")
+    page.until(f"__cocalib.state.view.dismissed.length === 0 && __cocalib.shownOffer()?.row.placement === {placement}")
+    assert guide(page).split(",")[0] == first.split(",")[0]
+
+    u, v = (page.value(f"__cocalib.shownOffer().place.{axis}") for axis in ("u_px", "v_px"))
+    page.click(u + 2, v + 2)
+    page.until("__cocalib.state.view.clicks.length === 1 && !__cocalib.shownOffer()")
+    corrected = page.view["clicks"][0]
+    assert corrected["mark"] == "clicked"
+    assert np.hypot(corrected["u_px"] - u - 2, corrected["v_px"] - v - 2) < 1
+    page.press("n")
+    assert guide(page).startswith("Proposal 2 of ")
+    page.press("Control+z")
+    page.until("__cocalib.state.view.clicks.length === 0")
+
+    page.press("o")
+    page.until("!__cocalib.state.proposals.on")
+    page.until("!document.getElementById('guide').textContent.includes('Proposal')")
+    page.press("Enter")
+    page.until("__cocalib.state.cross")
+    assert page.view["clicks"] == []

@@ -1,0 +1,257 @@
+"""`cocalib intrinsics` on real pictures of a board, and on input that cannot give a calibration."""
+
+import json
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import cv2
+import jsonschema
+import numpy as np
+import pytest
+
+from app.cli.intrinsics import searching
+from app.intrinsics.picture_files import FilePictures
+from calib_core.camera import Camera
+from calib_core.interchange import CAMERA_FORMATS, camera_content, read_camera_file
+
+Cocalib = Callable[..., Any]
+_BOARD = ("--board", "9x6", "--square-mm", "25")
+
+
+@pytest.fixture
+def left(shared_data: Path) -> list[Path]:
+    return sorted((shared_data / "real_checkerboards").glob("left[01]*.jpg"))
+
+
+@pytest.fixture
+def right(shared_data: Path) -> list[Path]:
+    return sorted((shared_data / "real_checkerboards").glob("right[01]*.jpg"))
+
+
+def flat_board(columns: int, rows: int, square_px: int) -> np.ndarray:
+    """Draw a checkerboard with so many inner corners, square on, on white."""
+    squares = np.indices((rows + 1, columns + 1)).sum(axis=0) % 2
+    return cv2.copyMakeBorder(
+        np.kron(255 * squares, np.ones((square_px, square_px))).astype(np.uint8),
+        *[square_px] * 4,
+        cv2.BORDER_CONSTANT,
+        value=255,
+    )
+
+
+def write_shifted(folder: Path, board: np.ndarray, count: int) -> None:
+    """Write pictures of a board that is moved sideways only, with a little blur and noise."""
+    rng = np.random.default_rng(3)
+    for index in range(count):
+        canvas = np.full((480, 640), 200, dtype=np.uint8)
+        top, across = 20 + 20 * (index % 3), 10 + 30 * index
+        canvas[top : top + board.shape[0], across : across + board.shape[1]] = board
+        noisy = cv2.GaussianBlur(canvas, (0, 0), 0.7) + rng.normal(0.0, 1.0, canvas.shape)
+        cv2.imwrite(str(folder / f"flat{index:02d}.png"), np.clip(noisy, 0, 255).astype(np.uint8))
+
+
+def test_real_pictures_give_a_lens_as_good_as_opencv_s_with_everything_written(
+    cocalib: Cocalib, left: list[Path], tmp_path: Path, project_root: Path
+) -> None:
+    out, report, rectified = tmp_path / "camera.yaml", tmp_path / "lens.html", tmp_path / "rectified"
+    answer = cocalib("intrinsics", *left, *_BOARD, "--json", "--out", out, "--report", report, "--rectified", rectified)
+
+    assert answer.code == 3, answer.err  # these views cover less than half of the picture, and a warning says so
+    said = json.loads(answer.out)
+    schema = json.loads((project_root / "docs/schemas/intrinsics-1.schema.json").read_text())
+    jsonschema.validate(said, schema)
+    assert "little-covered" in [warning["code"] for warning in said["warnings"]]
+    assert said["rms_px"] <= 0.195
+    assert said["rms_px"] < said["held_out_rms_px"] < 0.25
+    assert [view["name"] for view in said["views"]] == [path.name for path in left]
+    assert all(one["sigma"] > 0 for one in said["parameters"])
+    assert said["choice"].startswith(said["camera"]["model"])
+    assert np.allclose(read_camera_file(out).matrix_px, said["camera"]["matrix_px"])
+    assert {child.tag.split("}")[1] for child in ElementTree.fromstring(report.read_text().split("\n", 1)[1])} == {
+        "head",
+        "body",
+    }
+    assert all(name in report.read_text() for name in ("left01.jpg", "0.0", "cannot see what the lens model"))
+    assert len(list(rectified.glob("*.png"))) == len(left)
+
+
+def test_planted_pictures_are_named_and_no_good_one_is_dropped(
+    cocalib: Cocalib, right: list[Path], tmp_path: Path
+) -> None:
+    planted = []
+    for path in right[:3]:
+        planted.append(tmp_path / f"blurred-{path.name}")
+        cv2.imwrite(str(planted[-1]), cv2.GaussianBlur(cv2.imread(str(path)), (0, 0), 2.5))
+    planted.append(tmp_path / "mirrored.png")
+    cv2.imwrite(str(planted[-1]), cv2.imread(str(right[4]))[:, ::-1])
+    planted.append(tmp_path / "another_board.png")
+    canvas = np.full((480, 640), 200, dtype=np.uint8)
+    board = flat_board(7, 5, 40)
+    canvas[40 : 40 + board.shape[0], 60 : 60 + board.shape[1]] = board
+    cv2.imwrite(str(planted[-1]), cv2.GaussianBlur(canvas, (0, 0), 0.8))
+
+    answer = cocalib("intrinsics", *right, *planted, *_BOARD, "--verbose")
+
+    assert "views          13 used, 5 left out, 18 pictures searched" in answer.out
+    left_out = dict(
+        line.removeprefix("left out: ").split(": ", 1)
+        for line in answer.out.splitlines()
+        if line.startswith("left out")
+    )
+    assert set(left_out) == {path.name for path in planted}
+    assert all("blurred" in left_out[path.name] for path in planted[:3])
+    assert "mirror" in left_out["mirrored.png"]
+    assert "7 x 5" in left_out["another_board.png"]
+
+
+def test_a_stopped_search_is_kept_and_resumed_where_it_was(
+    cocalib: Cocalib, left: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[int] = []
+    original = FilePictures.picture
+
+    def counted(pictures: FilePictures, index: int, /) -> np.ndarray:
+        asked.append(index)
+        return original(pictures, index)
+
+    @contextmanager
+    def stopping() -> Iterator[Callable[[object], None]]:
+        def show(progress: Any) -> None:
+            if progress.searched == 4:
+                raise KeyboardInterrupt
+
+        yield show
+
+    views = tmp_path / "views.json"
+    with monkeypatch.context() as patched:
+        patched.setattr(searching, "_shown_progress", stopping)
+        stopped = cocalib("intrinsics", *left[:6], *_BOARD, "--views", views)
+    assert stopped.code == 130
+    assert f"stopped after 4 of 6 pictures, with 4 views of the board; they are kept in {views}" in stopped.err
+    kept = json.loads(views.read_text())
+    assert (kept["schema"], kept["searched"], kept["complete"]) == ("cocalib/board-views-1", [[0, 3]], False)
+
+    monkeypatch.setattr(FilePictures, "picture", counted)
+    resumed = cocalib("intrinsics", *left[:6], *_BOARD, "--views", views, "--model", "plumb_bob")
+    assert resumed.code in (0, 3), resumed.err
+    assert sorted(asked) == [4, 5]
+    assert "6 pictures searched" in resumed.out
+    assert json.loads(views.read_text())["complete"]
+
+    other = cocalib("intrinsics", *left[:5], *_BOARD, "--views", views)
+    assert other.code == 2
+    assert "views in left01.jpg to left06.jpg (6 pictures), not in left01.jpg to left05.jpg" in other.err
+    smaller = cocalib("intrinsics", *left[:6], "--board", "9x6", "--square-mm", "30", "--views", views)
+    assert smaller.code == 2
+    assert "with 25 mm, but the board is a checkerboard of 9 x 6 inner corners with 30 mm" in smaller.err
+
+
+def test_pictures_without_a_board_say_so(cocalib: Cocalib, tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    for index in range(3):
+        cv2.imwrite(str(tmp_path / f"{index}.png"), rng.integers(0, 255, (240, 320), dtype=np.uint8))
+    answer = cocalib("intrinsics", tmp_path, *_BOARD)
+    assert answer.code == 1
+    assert "None of 3 pictures shows a checkerboard of 9 x 6 inner corners. Film the board" in answer.err
+
+
+def test_a_wrong_size_of_the_board_names_the_right_one(cocalib: Cocalib, left: list[Path]) -> None:
+    answer = cocalib("intrinsics", *left[:2], "--board", "8x7", "--square-mm", "25")
+    assert answer.code == 1
+    assert "show 9 x 6 inner corners" in answer.err
+    assert "State 9x6" in answer.err
+    part = cocalib("intrinsics", *left[:2], "--board", "8x6", "--square-mm", "25")  # which may be seen as a part of it
+    assert part.code == 1
+    assert "9 x 6 inner corners" in part.err
+
+
+def test_one_view_is_too_few(cocalib: Cocalib, left: list[Path]) -> None:
+    answer = cocalib("intrinsics", left[0], *_BOARD)
+    assert answer.code == 1
+    assert "1 usable views of the board, at least 3 are needed" in answer.err
+    assert "film the board from at least 10 directions" in answer.err.lower()
+
+
+def test_a_board_that_is_only_shifted_gives_no_focal_length(cocalib: Cocalib, tmp_path: Path) -> None:
+    write_shifted(tmp_path, flat_board(9, 6, 28), 7)
+    answer = cocalib("intrinsics", tmp_path, *_BOARD, "--model", "pinhole")
+    assert answer.code == 1, answer.out
+    assert "focal length" in answer.err
+    assert "turned by 30 to 45 deg" in answer.err
+
+
+def test_pictures_of_different_sizes_are_not_mixed(cocalib: Cocalib, left: list[Path], tmp_path: Path) -> None:
+    for path in left[:2]:
+        cv2.imwrite(str(tmp_path / path.name), cv2.resize(cv2.imread(str(path)), (800, 600)))
+    answer = cocalib("intrinsics", *left[2:5], *(tmp_path / path.name for path in left[:2]), *_BOARD)
+    assert answer.code == 1
+    assert "The pictures have different sizes: 3 of 640 x 480, 2 of 800 x 600 pixels." in answer.err
+
+
+def test_input_that_is_none_is_refused_in_words(
+    cocalib: Cocalib, left: list[Path], made: Callable[..., Path], tmp_path: Path
+) -> None:
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "broken.mp4").write_bytes(b"not a video")
+    recording = made(with_images=False)
+    cases = {
+        ("SOURCE is missing",): (),
+        ("--board 9x6 and --square-mm 25",): (left[0],),
+        ("2 series", "left*.jpg (13)", "right*.jpg (13)"): (left[0].parent, *_BOARD),
+        ("sources of different kinds", "left01.jpg: a picture"): (left[0], recording, *_BOARD),
+        ("no such file or folder",): (tmp_path / "nowhere", *_BOARD),
+        ("nothing has such a name",): (tmp_path / "left*.jpg", *_BOARD),
+        ("not a readable video",): (tmp_path / "broken.mp4", *_BOARD),
+        ("image",): (recording, *_BOARD),
+        ("contains no recording", "folders of pictures"): (tmp_path / "empty", *_BOARD),
+        ("left01.jpg is a picture; --image-topic /camera applies to a recording",): (
+            left[0],
+            *_BOARD,
+            "--image-topic",
+            "/camera",
+        ),
+        ("checkerboard has none",): (left[0], *_BOARD, "--marker-mm", "3"),
+        ("NAME.html",): (left[0], *_BOARD, "--report", tmp_path / "report.pdf"),
+        ("does not exist",): (left[0], *_BOARD, "--out", tmp_path / "no" / "camera.yaml"),
+    }
+    for words, arguments in cases.items():
+        answer = cocalib("intrinsics", *arguments)
+        assert answer.code == 2, (words, answer)
+        assert len(answer.err.splitlines()) == 1, answer.err
+        assert all(word in answer.err for word in words), answer.err
+
+
+def test_every_format_written_by_the_command_is_read_by_it(cocalib: Cocalib, tmp_path: Path) -> None:
+    matrix = np.array([[532.5, 0.0, 340.25], [0.0, 533.5, 233.75], [0.0, 0.0, 1.0]])
+    camera = Camera("plumb_bob", 640, 480, matrix, np.array([-0.28, 0.06, 0.001, -0.0005]))
+    source = tmp_path / "source.json"
+    source.write_text(str(camera_content(camera, "json")))
+    for name, known in CAMERA_FORMATS.items():
+        out = tmp_path / f"{name}{known.suffix}"
+        written = cocalib("intrinsics", source, "--to", name, "--out", out)
+        assert written.code == 0, written.err
+        assert "plumb_bob, pictures of 640 x 480 px" in (shown := cocalib("intrinsics", out)).out, shown
+        assert np.allclose(read_camera_file(out).matrix_px, matrix, rtol=1e-6)
+
+
+def test_a_file_with_intrinsics_is_printed_and_converted(cocalib: Cocalib, shared_data: Path, tmp_path: Path) -> None:
+    source = shared_data / "real_checkerboards" / "left_intrinsics.yml"
+    shown = cocalib("intrinsics", source)
+    assert shown.code == 0
+    assert "plumb_bob, pictures of 640 x 480 px" in shown.out
+    assert "field of view" in shown.out
+    converted = cocalib("intrinsics", source, "--out", tmp_path / "camera.json")
+    assert converted.code == 0
+    assert np.array_equal(read_camera_file(tmp_path / "camera.json").matrix_px, read_camera_file(source).matrix_px)
+    assert cocalib("intrinsics", source, "--rescale", "1280x960", "--out", tmp_path / "twice.json").code == 0
+    twice, once = read_camera_file(tmp_path / "twice.json"), read_camera_file(source)
+    assert (twice.width_px, twice.height_px) == (1280, 960)
+    assert np.isclose(twice.matrix_px[0, 0], 2.0 * once.matrix_px[0, 0])
+    assert "another aspect ratio" in cocalib("intrinsics", source, "--rescale", "1280x720").err
+    assert "did you mean kalibr?" in cocalib("intrinsics", source, "--to", "kalib").err
+    refused = cocalib("intrinsics", source, *_BOARD)
+    assert refused.code == 2
+    assert "is a file with intrinsics" in refused.err

@@ -1,0 +1,290 @@
+"""`cocalib propose` and `cocalib solve --auto`: on a small recording, on the sample, and on what they must refuse."""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, NoReturn
+
+import msgspec
+import numpy as np
+import pytest
+
+import app.proposing.finding
+from app.cli import run
+from calib_core.geometry import rotation_angle_rad
+from calib_core.interchange.own.proposal_documents import ProposalsDocument
+from calib_core.recordings.containers.writing import write_ros2
+from tests.cli.conftest import DWELL_S, START, Made
+
+Cocalib = Callable[..., Any]
+SIZE = ("--reflector-m", "0.4")
+SEEN = Made(reflector_m=0.4, placements=12)
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a recording whose pictures show the reflector."""
+    return write_ros2(tmp_path_factory.mktemp("proposing") / "seen.mcap", SEEN.messages(), container="mcap")
+
+
+def true_pixel_px(image_time: dict[str, int]) -> np.ndarray:
+    """Return where the reflector is in a frame of that recording."""
+    since_s = image_time["sec"] + 1e-9 * image_time["nanosec"] - START / 1e9
+    pixels = SEEN.camera.project(SEEN.camera_from_radar @ SEEN.positions_radar_m)
+    return np.asarray(pixels[int(since_s / DWELL_S)])
+
+
+def off_px(click: dict[str, Any]) -> float:
+    return float(np.linalg.norm(np.array(click["pixel_px"]) - true_pixel_px(click["image_time"])))
+
+
+def names_in(folder: Path) -> list[Path]:
+    return sorted(folder.rglob("*"))
+
+
+def test_what_is_proposed_is_the_reflector_and_becomes_clicks_that_solve(
+    cocalib: Cocalib, recording: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "proposals.json"
+    answer = cocalib("propose", recording, *SIZE, "--out", out)
+    assert answer.code == 0, answer.err
+    head, *rows, summary, written = answer.out.splitlines()
+    assert head.split()[:3] == ["id", "time", "[s]"]
+    assert "nobody has confirmed them yet" in summary
+    assert written == f"written to {out}"
+    assert "looking at the pictures: 11 of 11 placements" in answer.err
+
+    document = json.loads(out.read_text())
+    msgspec.convert(document, ProposalsDocument)
+    assert document["schema"] == "cocalib/proposals-1"
+    assert [row.split()[0] for row in rows] == [one["id"] for one in document["proposals"]]
+    confidences = [one["confidence"] for one in document["proposals"]]
+    assert confidences == sorted(confidences, reverse=True)
+    right = [one["click"] for one in document["proposals"] if off_px(one["click"]) < 5.0]
+    assert len(right) >= 10
+
+    clicks = tmp_path / "clicks.json"
+    clicks.write_text(json.dumps({"schema": "cocalib/clicks-1", "clicks": right}))
+    solved = cocalib("solve", recording, "--clicks", clicks)
+    assert solved.code == 0, solved.err
+    assert "nobody-confirmed" not in [one["code"] for one in json.loads(solved.out)["warnings"]]
+
+
+def test_a_confirmed_click_stays_and_the_others_keep_their_ids(
+    cocalib: Cocalib, recording: Path, tmp_path: Path
+) -> None:
+    third = {"sec": START // 10**9 + 2 * DWELL_S + 2, "nanosec": 0}
+    click = {"id": "p2", "image_time": third, "pixel_px": true_pixel_px(third).tolist()}
+    clicks = tmp_path / "one.json"
+    clicks.write_text(json.dumps({"schema": "cocalib/clicks-1", "clicks": [click]}))
+    answer = cocalib("propose", recording, *SIZE, "--clicks", clicks, "--json")
+    assert answer.code == 0, answer.err
+    document = json.loads(answer.out)
+    assert document["confirmed"] == ["p2"]
+    assert {one["id"] for one in document["proposals"]} == {"p1", *(f"p{number}" for number in range(3, 12))}
+    for one in document["proposals"]:
+        assert one["candidates"][0]["likeness"] is not None
+
+
+@dataclass(frozen=True)
+class Solved:
+    """The files of a recording solved without a person."""
+
+    pose: Path
+    clicks: Path
+
+
+@pytest.fixture(scope="module")
+def solved(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> Solved:
+    """Solve the recording without a person."""
+    folder = tmp_path_factory.mktemp("solved")
+    files = Solved(folder / "pose.json", folder / "clicks.json")
+    typed = ("solve", recording, *SIZE, "--auto", "--out", files.pose, "--clicks-out", files.clicks)
+    assert run([str(argument) for argument in typed]) == 0
+    return files
+
+
+def test_a_calibration_that_nobody_confirmed_says_so_and_comes_again_from_its_clicks(
+    cocalib: Cocalib, recording: Path, solved: Solved, tmp_path: Path
+) -> None:
+    document = json.loads(solved.pose.read_text())
+    pose = document["camera_from_radar"]
+    turned = np.array(pose["rotation"]) @ SEEN.camera_from_radar.rotation.T
+    assert np.rad2deg(rotation_angle_rad(turned)) < 2.0
+    assert "nobody-confirmed" in [one["code"] for one in document["warnings"]]
+    assert document["verdict"]["level"] == "usable"
+    assert document["evidence"] == "automatic"
+    unconfirmed = document["provenance"]["unconfirmed"]
+    assert unconfirmed["clicks"] == [pair["id"] for pair in document["pairs"]]
+    assert 0.5 < unconfirmed["confidence"] <= 1.0
+    assert all(pair["mark"] == "snapped" for pair in document["pairs"])
+
+    again = tmp_path / "again.json"
+    assert cocalib("solve", recording, "--clicks", solved.clicks, "--out", again).code == 0
+    assert again.read_bytes() == solved.pose.read_bytes()
+
+    from_pairs = cocalib("solve", "--pairs", solved.pose)
+    assert "nobody-confirmed" in [one["code"] for one in json.loads(from_pairs.out)["warnings"]]
+    assert json.loads(from_pairs.out)["provenance"]["unconfirmed"] == unconfirmed
+
+
+def test_a_pose_that_unconfirmed_clicks_contradict_is_refused(
+    cocalib: Cocalib, recording: Path, solved: Solved, tmp_path: Path
+) -> None:
+    document = json.loads(solved.clicks.read_text())
+    pixels = [click["pixel_px"] for click in document["clicks"]]
+    for click, pixel_px in zip(document["clicks"], [*pixels[5:], *pixels[:5]], strict=True):
+        click["pixel_px"] = pixel_px
+    mixed, out = tmp_path / "mixed.json", tmp_path / "pose.json"
+    mixed.write_text(json.dumps(document))
+    answer = cocalib("solve", recording, "--clicks", mixed, "--out", out)
+    assert answer.code == 1
+    assert answer.err.startswith("cocalib: no calibration: ")
+    assert not out.exists()
+
+
+def test_a_weak_calibration_that_nobody_confirmed_ends_with_3(
+    cocalib: Cocalib, recording: Path, solved: Solved, tmp_path: Path
+) -> None:
+    document = json.loads(solved.clicks.read_text())
+    document["clicks"] = document["clicks"][::2]
+    few, out = tmp_path / "few.json", tmp_path / "pose.json"
+    few.write_text(json.dumps(document))
+    answer = cocalib("solve", recording, "--clicks", few, "--out", out)
+    assert answer.code == 3, answer.err
+    written = json.loads(out.read_text())
+    assert written["verdict"]["level"] == "weak"
+    assert written["provenance"]["unconfirmed"]["clicks"] == [click["id"] for click in document["clicks"]]
+
+
+def test_clicks_that_nobody_confirmed_are_not_given_as_confirmed(
+    cocalib: Cocalib, recording: Path, solved: Solved
+) -> None:
+    answer = cocalib("solve", recording, *SIZE, "--auto", "--clicks", solved.clicks)
+    assert (answer.code, answer.out) == (2, "")
+    assert f"{solved.clicks}: nobody confirmed 11 of its clicks" in answer.err
+
+
+def test_the_sample_is_solved_without_a_person(cocalib: Cocalib, project_root: Path, tmp_path: Path) -> None:
+    sample, out = project_root / "sample_data" / "rooftop", tmp_path / "pose.json"
+    answer = cocalib("solve", sample / "radar.bag", sample / "camera.bag", "--auto", "--out", out)
+    assert answer.code == 0, answer.err
+    truth = json.loads((sample / "truth.json").read_text())["camera_from_radar"]
+    pose = json.loads(out.read_text())["camera_from_radar"]
+    turned = np.array(pose["rotation"]) @ np.array(truth["rotation"]).T
+    assert np.rad2deg(rotation_angle_rad(turned)) < 1.4
+    assert np.linalg.norm(np.array(pose["translation_m"]) - truth["translation_m"]) < 0.2
+
+
+@dataclass(frozen=True)
+class Reversed(Made):
+    """The pictures of another recording: the placements come in the opposite order."""
+
+    def picture(self, index: int) -> np.ndarray:
+        """Return the picture of the placement as far from the end."""
+        return super().picture(self.placements - 1 - index)
+
+
+@pytest.fixture
+def refused(cocalib: Cocalib, tmp_path: Path) -> Callable[..., str]:
+    """Return a function that expects both commands to refuse, without writing, for the same reason; it returns that."""
+
+    def refuse(*recording: object, code: int) -> str:
+        out = tmp_path / "written.json"
+        before = names_in(tmp_path)
+        proposed = cocalib("propose", *recording, *SIZE, "--out", out)
+        solved = cocalib("solve", *recording, *SIZE, "--auto", "--out", out, "--clicks-out", tmp_path / "clicks.json")
+        for answer in (proposed, solved):
+            assert (answer.code, answer.out) == (code, ""), answer
+            assert "Traceback" not in answer.err
+        assert names_in(tmp_path) == before
+        return str(proposed.err.splitlines()[-1])
+
+    return refuse
+
+
+@pytest.mark.parametrize(
+    ("changes", "code", "words"),
+    [
+        ({"with_radar": False}, 2, "radar"),
+        ({"with_images": False}, 2, "image"),
+        ({"with_camera_info": False}, 2, "no intrinsics for /camera/image/compressed"),
+        ({"placements": 2}, 1, "The radar shows one placement, and at least 3 are needed"),
+        ({}, 1, "None of the 7 placements shows where in the picture the reflector stood"),
+    ],
+    ids=["no radar", "no pictures", "no camera", "one placement", "no reflector in the pictures"],
+)
+def test_what_cannot_be_proposed_is_said(
+    refused: Callable[..., str], made: Callable[..., Path], changes: dict[str, Any], code: int, words: str
+) -> None:
+    assert words in refused(made(**changes), code=code)
+
+
+def test_frames_that_show_no_placement_are_said(refused: Callable[..., str], tmp_path: Path) -> None:
+    early = START + 3 * 10**9
+    messages = (one for one in SEEN.messages() if one.topic != "/camera/image/compressed" or one.receive_time < early)
+    path = write_ros2(tmp_path / "early.mcap", messages, container="mcap")
+    assert "The camera recorded no frame during any of the 11 placements" in refused(path, code=1)
+
+
+def test_the_pictures_of_another_recording_are_refused(cocalib: Cocalib, tmp_path: Path) -> None:
+    radar = replace(SEEN, with_images=False, with_camera_info=False)
+    camera = Reversed(reflector_m=SEEN.reflector_m, placements=SEEN.placements, with_radar=False)
+    paths = [
+        write_ros2(tmp_path / f"{name}.mcap", one.messages(), container="mcap")
+        for name, one in (("radar", radar), ("camera", camera))
+    ]
+    out = tmp_path / "pose.json"
+    answer = cocalib("solve", *paths, *SIZE, "--auto", "--out", out)
+    assert answer.code == 1
+    assert "cocalib: no calibration: " in answer.err
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("command", [("propose",), ("solve", "--auto")], ids=["propose", "solve"])
+def test_an_interrupt_leaves_no_file_and_no_traceback(
+    cocalib: Cocalib, recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: tuple[str, ...]
+) -> None:
+    def interrupted(*_: object, **__: object) -> NoReturn:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(app.proposing.finding, "dwell_views", interrupted)
+    answer = cocalib(*command, recording, "--out", tmp_path / "made.json")
+    assert answer.code == 130
+    assert "Traceback" not in answer.out + answer.err
+    assert names_in(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("propose", "--reflector-m", "24"), "--reflector-m 24: give the width of the reflector"),
+        (("solve", "--auto", "--reflector-m", "nan"), "--reflector-m nan: give the width of the reflector"),
+        (("propose", "--out", "absent/made.json"), "the folder absent does not exist"),
+        (("solve", "--auto", "--clicks-out", "absent/made.json"), "the folder absent does not exist"),
+        (("solve", "--clicks-out", "made.json"), "--clicks-out and --reflector-m apply with --auto only"),
+        (("solve", "--reflector-m", "0.3"), "--clicks-out and --reflector-m apply with --auto only"),
+        (("solve", "--auto", "--pairs", "pairs.json"), "either a recording with --clicks or --auto, or --pairs"),
+        (("solve",), "--auto to do without a person"),
+        (("solve", "--auto", "--method", "ccm"), "--method ccm takes clicks on the corners"),
+    ],
+)
+def test_wrong_usage_is_one_line(
+    cocalib: Cocalib, recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    arguments: tuple[str, ...], words: str,
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    answer = cocalib(*arguments, recording)
+    (line,) = answer.err.splitlines()
+    assert (answer.code, answer.out) == (2, "")
+    assert words in line
+
+
+def test_a_file_of_clicks_of_another_recording_is_refused(cocalib: Cocalib, recording: Path, tmp_path: Path) -> None:
+    clicks = tmp_path / "others.json"
+    click = {"id": "c", "image_time": {"sec": 5, "nanosec": 0}, "pixel_px": [1.0, 1.0]}
+    clicks.write_text(json.dumps({"schema": "cocalib/clicks-1", "clicks": [click]}))
+    answer = cocalib("propose", recording, "--clicks", clicks)
+    assert answer.code == 2
+    assert "is outside the recording" in answer.err

@@ -1,0 +1,60 @@
+"""Pictures of a board come from a recording, a video, a folder or files, in a stable order."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from app.intrinsics import open_pictures
+from app.intrinsics.picture_files import pictures_in
+from calib_core.errors import InputError
+
+
+def grey(value: int) -> np.ndarray:
+    return np.full((48, 64, 3), value, dtype=np.uint8)
+
+
+def test_pictures_of_a_folder_need_no_times_and_are_in_the_order_of_their_numbers(tmp_path: Path) -> None:
+    for number in (10, 2, 1):
+        cv2.imwrite(str(tmp_path / f"shot{number}.png"), grey(number))
+    (tmp_path / "notes.txt").write_text("nothing")
+    with open_pictures([tmp_path]) as pictures:
+        assert [pictures.name(index) for index in range(len(pictures))] == ["shot1.png", "shot2.png", "shot10.png"]
+        assert [pictures.picture(index)[0, 0, 0] for index in range(3)] == [1, 2, 10]
+        assert pictures.time_ns(0) is None
+        before = pictures.digest()
+    cv2.imwrite(str(tmp_path / "shot2.png"), grey(3))
+    with open_pictures(pictures_in(tmp_path)) as pictures:
+        assert pictures.digest() != before
+
+
+def test_a_video_needs_no_start_and_gives_its_frames_in_any_order(tmp_path: Path) -> None:
+    path = tmp_path / "board.avi"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 10.0, (64, 48))
+    for value in range(0, 240, 8):
+        writer.write(grey(value))
+    writer.release()
+    with open_pictures([path]) as pictures:
+        assert len(pictures) == 30
+        order = [0, 2, 1, 3, 29, 5, 4, 20, 0]
+        shown = [float(pictures.picture(index).mean()) / 8.0 for index in order]
+        assert np.allclose(shown, order, atol=0.4)
+        assert pictures.name(20) == "frame 21 (2.00 s)"
+
+
+def test_files_with_equal_names_are_told_apart_by_their_folders(tmp_path: Path) -> None:
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        cv2.imwrite(str(tmp_path / folder / "1.png"), grey(5))
+    with open_pictures([tmp_path / "*" / "1.png"]) as pictures:
+        assert [pictures.name(0), pictures.name(1)] == ["a/1.png", "b/1.png"]
+
+
+def test_a_file_that_is_no_picture_is_an_error_of_its_own(tmp_path: Path) -> None:
+    (tmp_path / "broken.png").write_bytes(b"no picture")
+    cv2.imwrite(str(tmp_path / "good.png"), grey(5))
+    with open_pictures([tmp_path]) as pictures:
+        assert pictures.picture(1).shape == (48, 64, 3)
+        with pytest.raises(InputError, match="not a picture that can be decoded"):
+            pictures.picture(0)

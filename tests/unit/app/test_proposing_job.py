@@ -1,0 +1,180 @@
+"""Proposals in the background: first ones early, anew with each click, stopped and resumed, with errors in words."""
+
+import threading
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from app.proposing import ProposingJob, ProposingSnapshot, ProposingStage, ProposingWish
+from calib_core.errors import RecordingError
+from calib_core.measurements import ReflectorClick, Unsolvable
+from calib_core.options import CalibrationOptions
+from calib_core.proposing import DwellView, ViewProgress
+from tests.drawn_views import draw_views
+
+DRAWN = draw_views(3)
+VIEWS = DRAWN.views
+PLACEMENTS = tuple(view.placement for view in VIEWS)
+OPTIONS = CalibrationOptions()
+WISH = ProposingWish(DRAWN.camera, OPTIONS, PLACEMENTS)
+
+
+class Finding:
+    """What replaces looking at the pictures and carrying a look: it goes on as the test allows, and keeps what it was asked."""
+
+    def __init__(self) -> None:
+        self.allowed = threading.Event()
+        self.found = 0
+        self.carried: list[tuple[int, tuple[str, ...]]] = []
+        self.end: Any = None
+        self.error: Exception | None = None
+
+    def find(
+        self, _recording: object, _camera: object, _options: object, *, progress: Any, stopped: Any, **_: Any
+    ) -> Any:
+        self.found += 1
+        if self.error is not None:
+            raise self.error
+        for done in range(1, 11):
+            progress(ViewProgress(done, len(VIEWS), VIEWS[:done]))
+        assert self.allowed.wait(20)
+        if stopped():
+            return Unsolvable("stopped", "the search was stopped", "start it again")
+        return self.end or (VIEWS, None)
+
+    def look(self, click: ReflectorClick, *_: object) -> Iterator[str]:
+        yield click.id
+
+    def carry(self, views: Sequence[DwellView], looks: Sequence[str], *_: object) -> tuple[DwellView, ...]:
+        self.carried += [(VIEWS.index(view), tuple(looks)) for view in views]
+        return tuple(
+            replace(view, candidates=tuple(replace(one, likeness=0.6) for one in view.candidates)) for view in views
+        )
+
+
+@pytest.fixture
+def finding(monkeypatch: pytest.MonkeyPatch) -> Finding:
+    fake = Finding()
+    monkeypatch.setattr("app.proposing.job.find_proposals", fake.find)
+    monkeypatch.setattr("app.proposing.job.looks_of", fake.look)
+    monkeypatch.setattr("app.proposing.job.with_look", fake.carry)
+    return fake
+
+
+class Watched:
+    """A job with everything that it told."""
+
+    def __init__(self) -> None:
+        self.told = threading.Condition()
+        self.job = ProposingJob(None, self.take)  # type: ignore[arg-type]
+
+    def take(self) -> None:
+        with self.told:
+            self.told.notify_all()
+
+    def until(self, stage: ProposingStage, open_ones: int | None = None) -> ProposingSnapshot:
+        def holds() -> bool:
+            now = self.job.snapshot
+            return now.stage == stage and (open_ones is None or _count(now) == open_ones)
+
+        with self.told:
+            assert self.told.wait_for(holds, timeout=20), (self.job.snapshot.stage, _count(self.job.snapshot))
+        return self.job.snapshot
+
+
+def _count(snapshot: ProposingSnapshot) -> int:
+    return len(snapshot.proposals.ranked) + len(snapshot.proposals.unproposed)
+
+
+@pytest.fixture
+def watched(finding: Finding) -> Iterator[Watched]:
+    made = Watched()
+    yield made
+    finding.allowed.set()
+    made.job.close()
+
+
+def test_first_proposals_come_while_the_pictures_are_looked_at(finding: Finding, watched: Watched) -> None:
+    watched.job.ask(WISH)
+    early = watched.until("looking", 8)
+    assert early.proposals.ranked
+    assert early.count == len(VIEWS)
+    finding.allowed.set()
+    assert len(watched.until("ready", len(VIEWS)).views) == len(VIEWS)
+
+
+def test_a_click_is_carried_to_the_placements_that_are_left(finding: Finding, watched: Watched) -> None:
+    finding.allowed.set()
+    watched.job.ask(WISH)
+    watched.until("ready", len(VIEWS))
+    first = DRAWN.click(4)
+    watched.job.ask(replace(WISH, clicks=(first,)))
+    found = watched.until("ready", len(VIEWS) - 1)
+    assert VIEWS[4].placement not in [one.placement for one in found.proposals.ranked]
+    assert sorted(number for number, _ in finding.carried) == [n for n in range(len(VIEWS)) if n != 4]
+    assert finding.found == 1
+
+    finding.carried.clear()
+    watched.job.ask(WISH)  # the click was undone
+    watched.until("ready", len(VIEWS))
+    assert finding.carried == []
+
+
+def test_the_look_is_taken_from_three_clicks(finding: Finding, watched: Watched) -> None:
+    finding.allowed.set()
+    clicks = tuple(replace(DRAWN.click(n), id=f"c{n + 1}") for n in range(11))
+    watched.job.ask(replace(WISH, clicks=tuple(sorted(clicks))))
+    watched.until("ready", len(VIEWS) - 11)
+    assert {looks for _, looks in finding.carried} == {("c1", "c2", "c3")}
+
+
+def test_a_dismissed_placement_is_not_proposed(finding: Finding, watched: Watched) -> None:
+    finding.allowed.set()
+    watched.job.ask(replace(WISH, dismissed=frozenset({2})))
+    found = watched.until("ready", len(VIEWS) - 1)
+    assert VIEWS[2].placement not in [one.placement for one in found.proposals.ranked]
+
+
+def test_proposing_is_stopped_and_goes_on_without_looking_again(finding: Finding, watched: Watched) -> None:
+    finding.allowed.set()
+    watched.job.ask(WISH)
+    watched.until("ready", len(VIEWS))
+    watched.job.stop()
+    assert watched.until("off", 0).views == ()
+    watched.job.ask(replace(WISH))
+    watched.until("ready", len(VIEWS))
+    assert finding.found == 1
+
+
+def test_with_another_camera_the_pictures_are_looked_at_again(finding: Finding, watched: Watched) -> None:
+    watched.job.ask(WISH)
+    watched.until("looking", 8)
+    watched.job.ask(replace(WISH, camera=draw_views(4).camera))
+    finding.allowed.set()
+    watched.until("ready", len(VIEWS))
+    assert finding.found == 2
+
+
+def test_why_there_are_none_is_said(finding: Finding, watched: Watched) -> None:
+    finding.allowed.set()
+    finding.end = Unsolvable("no-camera", "the camera intrinsics are missing", "calibrate the lens")
+    watched.job.ask(replace(WISH, camera=None))
+    failed = watched.until("failed", 0)
+    assert (failed.problem, failed.hint) == ("the camera intrinsics are missing", "calibrate the lens")
+    finding.error = RecordingError("camera.bag: frame 7 cannot be read")
+    watched.job.ask(replace(WISH))
+    watched.job.stop()
+    watched.job.ask(replace(WISH))
+    with watched.told:
+        assert watched.told.wait_for(lambda: "frame 7" in watched.job.snapshot.problem, timeout=20)
+
+
+def test_nothing_is_asked_of_a_job_that_is_closed(finding: Finding, watched: Watched) -> None:
+    watched.job.ask(WISH)
+    watched.until("looking", 8)
+    finding.allowed.set()
+    watched.job.close()
+    watched.job.ask(replace(WISH))
+    assert finding.found == 1

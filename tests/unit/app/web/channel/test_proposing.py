@@ -1,0 +1,127 @@
+"""The desk of the proposals: what pages are told, why there are none, and how they are switched off and on."""
+
+import asyncio
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.session import PlacementDismissed, RecordingFacts
+from app.session.file import open_session_file
+from app.web.channel.proposing import ProposingDesk
+from app.web.messages import Outgoing, ProposalNews, ProposingSwitch
+from app.workspace import GivenIntrinsics, Workspace
+from calib_core.proposing import ViewProgress
+from tests.drawn_views import draw_views
+
+DRAWN = draw_views(3)
+PLACEMENTS = tuple(view.placement for view in DRAWN.views)
+TIMES = np.array([int(view.image_time) for view in DRAWN.views])
+FACTS = RecordingFacts("a.bag", TIMES, DRAWN.camera.width_px, DRAWN.camera.height_px)
+
+
+class Sensors:
+    """A recording whose pictures nobody looks at."""
+
+    image_times = TIMES
+
+    def __init__(self, scans: int = 3) -> None:
+        self.radar_times = np.arange(scans)
+
+
+class NoSolver:
+    """Solves nothing."""
+
+    def request(self, *_: object) -> None: ...
+    def close(self) -> None: ...
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Any:
+    file = open_session_file(tmp_path / "s", FACTS)
+    made = Workspace(FACTS, file.restored, file, NoSolver(), None, GivenIntrinsics(DRAWN.camera, None, "/camera_info"))
+    yield made
+    made.close()
+
+
+@pytest.fixture(autouse=True)
+def found(monkeypatch: pytest.MonkeyPatch) -> None:
+    def find(*_: object, progress: Any, **__: object) -> Any:
+        progress(ViewProgress(len(PLACEMENTS), len(PLACEMENTS), DRAWN.views))
+        return DRAWN.views, None
+
+    monkeypatch.setattr("app.proposing.job.find_proposals", find)
+
+
+def at_desk(
+    workspace: Workspace, visit: Callable[[ProposingDesk, list[Any]], Any], recording: object = None, *, on: bool = True
+) -> list[Any]:
+    """Run a visit at a desk; return what the pages were told."""
+    told: list[Outgoing] = []
+
+    async def run() -> None:
+        desk = ProposingDesk(workspace, recording or Sensors(), lambda message, _kind: told.append(message), on=on)  # type: ignore[arg-type]
+        desk.start()
+        try:
+            await visit(desk, told)
+        finally:
+            await desk.close()
+
+    asyncio.run(run())
+    return told
+
+
+async def until(told: list[Any], holds: Callable[[ProposalNews], bool]) -> ProposalNews:
+    async with asyncio.timeout(20):
+        while not (told and holds(told[-1])):
+            await asyncio.sleep(0.005)
+    news: ProposalNews = told[-1]
+    return news
+
+
+def test_pages_are_told_the_proposals_with_their_placements_and_frames(workspace: Workspace) -> None:
+    async def visit(desk: ProposingDesk, told: list[Any]) -> None:
+        desk.surveyed(PLACEMENTS)
+        news = await until(told, lambda one: one.stage == "ready")
+        assert (news.on, news.problem) == (True, "")
+        assert len(news.rows) + len(news.unproposed) == len(PLACEMENTS)
+        assert news.rows[0].confidence == max(row.confidence for row in news.rows)
+        for row in news.rows:
+            view = DRAWN.views[row.placement]
+            assert row.frame == row.placement
+            assert row.image_time.time == view.image_time
+            assert (row.places[0].u_px, row.places[0].v_px) in [
+                tuple(round(float(value), 3) for value in one.pixel_px) for one in view.candidates
+            ]
+        gone = news.rows[0].placement
+        position_m = tuple(float(value) for value in PLACEMENTS[gone].position_radar_m)
+        workspace.dispatch(PlacementDismissed(DRAWN.views[gone].image_time, position_m))  # type: ignore[arg-type]
+        desk.follow()
+        await until(told, lambda one: gone not in [row.placement for row in one.rows])
+
+    at_desk(workspace, visit)
+
+
+def test_nothing_is_proposed_until_it_is_switched_on_and_again_once_it_is_off(workspace: Workspace) -> None:
+    async def visit(desk: ProposingDesk, told: list[Any]) -> None:
+        desk.surveyed(PLACEMENTS)
+        desk.switch(ProposingSwitch(on=True))
+        await until(told, lambda one: one.stage == "ready" and bool(one.rows))
+        desk.switch(ProposingSwitch(on=False))
+        off = await until(told, lambda one: not one.on)
+        assert (off.stage, off.rows) == ("off", ())
+
+    at_desk(workspace, visit, on=False)
+
+
+def test_without_radar_scans_it_says_so(workspace: Workspace) -> None:
+    async def visit(desk: ProposingDesk, told: list[Any]) -> None:
+        desk.surveyed(())
+        desk.switch(ProposingSwitch(on=True))
+        news = await until(told, lambda one: one.stage == "failed")
+        assert "no radar scans" in news.problem
+        assert news.hint == "Open the radar's recording, too."
+
+    at_desk(workspace, visit, Sensors(0))

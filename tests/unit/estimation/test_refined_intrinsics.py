@@ -1,0 +1,235 @@
+"""Refined intrinsics: estimated with the pose from what is known of them, and stated as well as they are known."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from app.view.systematic_errors import refined_sentences
+from benchmarks.accuracy.defects.wrong_lens import WrongLens, board_covariance, draw_wrong_lens, measure_wrong_lens
+from calib_core.calibration import calibrate_pairs, preview_pairs, solve_again
+from calib_core.camera import Camera, CameraCovariance
+from calib_core.errors import OptionError
+from calib_core.interchange import calibration_text, read_calibration
+from calib_core.measurements import Pair, Unsolvable
+from calib_core.options import CalibrationOptions, RefiningOptions
+from calib_core.residual_test import residual_test
+from calib_core.results import Calibration
+
+TOLD = WrongLens("focal 2 %", refined=True, scale_told=True, alone=True)
+UNTOLD = WrongLens("focal 2 %", refined=True)
+
+
+def solved(pairs: tuple[Pair, ...], camera: Camera, options: CalibrationOptions) -> Calibration:
+    outcome = calibrate_pairs(pairs, camera, options)
+    assert isinstance(outcome, Calibration), outcome
+    return outcome
+
+
+@cache
+def refined(case: WrongLens = TOLD) -> Calibration:
+    simulated, given = draw_wrong_lens(case, 0)
+    return solved(simulated.pairs, given, case.options)
+
+
+def test_a_focal_error_of_2_percent_comes_below_0_3_percent_where_the_scale_is_told() -> None:
+    trials = [measure_wrong_lens(TOLD, trial) for trial in range(10)]
+    errors = np.array([one["focal"] for one in trials], dtype=np.float64)
+    sigmas = np.array([one["focal_sigma"] for one in trials], dtype=np.float64)
+    assert np.sqrt((errors**2).mean()) < 0.003
+    assert (np.abs(errors) < 3.0 * sigmas).all()
+    assert not any("code lens-or-radar-scale" in one for one in trials)
+
+
+def test_with_the_default_prior_on_the_scale_the_data_cannot_tell_and_sigma_says_so() -> None:
+    trials = [measure_wrong_lens(replace(UNTOLD, lens="refining priors"), trial) for trial in range(7)]
+    assert all("code lens-or-radar-scale" in one for one in trials)
+    errors = np.array([one["focal"] for one in trials], dtype=np.float64)
+    sigmas = np.array([one["focal_sigma"] for one in trials], dtype=np.float64)
+    assert 0.4 < np.sqrt(((errors / sigmas) ** 2).mean()) < 1.6
+    (warning,) = [one for one in refined(UNTOLD).warnings if one.code == "lens-or-radar-scale"]
+    assert warning.message.startswith("lens or radar scale, the data cannot tell")
+    assert "radar.azimuth_scale_sigma" in warning.hint
+
+
+def test_refining_with_a_true_covariance_does_not_make_the_pose_worse() -> None:
+    given, better = (
+        [measure_wrong_lens(WrongLens("covariance", refined=one), trial) for trial in range(5)] for one in (False, True)
+    )
+    for name in ("rotation_rad", "position_m"):
+        before, after = (np.array([one[name] for one in trials], dtype=np.float64) for trials in (given, better))
+        assert np.sqrt((after**2).mean()) < 1.02 * np.sqrt((before**2).mean())
+
+
+def test_the_answer_holds_the_refined_camera_how_well_it_is_known_and_what_it_came_from() -> None:
+    _, given = draw_wrong_lens(TOLD, 0)
+    found = refined()
+    assert found.given_camera is not None
+    np.testing.assert_array_equal(found.given_camera.parameters, given.parameters)
+    assert found.camera.covariance is not None
+    assert found.camera.covariance.order == ("fx_px", "fy_px", "cx_px", "cy_px", "k1")
+    assert 0.0 < found.camera.covariance.sigma("fx_px") < 0.01 * given.matrix_px[0, 0]
+    by_name = {one.name: one for one in found.systematic_errors}
+    focal = by_name["focal_length"]
+    assert found.camera.matrix_px[0, 0] == pytest.approx(given.matrix_px[0, 0] * (1.0 + focal.value))
+    assert focal.estimated
+    assert focal.sigma < focal.prior_sigma == RefiningOptions().focal_length_sigma
+
+
+def test_residuals_are_those_through_the_refined_camera() -> None:
+    found = refined()
+    for pair in found.pairs:
+        np.testing.assert_allclose(pair.projected_px, found.reproject(pair.point_radar_m[None])[0])
+
+
+def test_an_excluded_pair_is_seen_through_the_refined_camera_too() -> None:
+    simulated, given = draw_wrong_lens(TOLD, 0)
+    outcome = calibrate_pairs(simulated.pairs, given, TOLD.options, frozenset({"p3"}))
+    assert isinstance(outcome, Calibration)
+    (one,) = [pair for pair in outcome.pairs if pair.excluded]
+    np.testing.assert_allclose(one.projected_px, outcome.reproject(one.point_radar_m[None])[0])
+
+
+def test_solving_the_file_again_starts_from_the_given_camera_and_gives_the_same_bytes() -> None:
+    text = calibration_text(refined())
+    read = read_calibration(text).calibration
+    assert read.given_camera is not None
+    again = solve_again(read)
+    assert isinstance(again, Calibration)
+    assert calibration_text(again) == text
+
+
+def test_without_refining_the_same_file_is_solved_with_the_given_camera() -> None:
+    read = read_calibration(calibration_text(refined())).calibration
+    plain = solve_again(read, replace(read.options, refining=RefiningOptions()))
+    assert isinstance(plain, Calibration)
+    assert plain.given_camera is None
+    np.testing.assert_array_equal(plain.camera.matrix_px, draw_wrong_lens(TOLD, 0)[1].matrix_px)
+
+
+def test_a_file_says_nothing_of_refining_if_there_was_none() -> None:
+    simulated, given = draw_wrong_lens(replace(TOLD, refined=False), 0)
+    text = calibration_text(solved(simulated.pairs, given, CalibrationOptions()))
+    assert "given_camera" not in text
+    assert "refining" not in text
+
+
+def test_the_preview_refines_as_well() -> None:
+    simulated, given = draw_wrong_lens(TOLD, 0)
+    first = preview_pairs(simulated.pairs, given, TOLD.options)
+    assert isinstance(first, Calibration)
+    assert first.camera.matrix_px[0, 0] == pytest.approx(refined().camera.matrix_px[0, 0], rel=1e-3)
+
+
+def test_other_pairs_are_tested_with_the_refined_camera() -> None:
+    simulated, _ = draw_wrong_lens(TOLD, 0)
+    tested = residual_test(simulated.pairs, refined())
+    assert not tested.misfits.any()
+    np.testing.assert_allclose(tested.distances_px, [pair.distance_px for pair in refined().pairs], rtol=1e-6)
+
+
+def test_where_a_covariance_and_the_pairs_disagree_the_warning_says_by_how_much() -> None:
+    simulated, given = draw_wrong_lens(TOLD, 0)
+    camera = replace(given, covariance=board_covariance(given))
+    for refine in (False, True):
+        options = replace(TOLD.options, refining=RefiningOptions(intrinsics=refine))
+        (message,) = [
+            one.message
+            for one in solved(simulated.pairs, camera, options).warnings
+            if one.code == "intrinsics-suspected"
+        ]
+        assert "focal length seems" in message
+        assert "; its calibration said ± 0." in message
+
+
+def test_a_covariance_wide_enough_for_the_error_is_no_reason_for_a_warning() -> None:
+    simulated, given = draw_wrong_lens(TOLD, 0)
+    camera = replace(given, covariance=board_covariance(given, size=20.0))
+    found = solved(simulated.pairs, camera, replace(TOLD.options, refining=RefiningOptions()))
+    assert "intrinsics-suspected" not in {one.code for one in found.warnings}
+
+
+def with_lens(camera: Camera, *, focal: float = 1.0, k1: float | None = None) -> Camera:
+    values = camera.parameters.copy()
+    values[:2] *= focal
+    values[4] = values[4] if k1 is None else k1
+    return camera.with_parameters(values)
+
+
+@pytest.mark.parametrize("wrong", [{"focal": 1.15}, {"k1": 0.5}])
+def test_a_lens_refined_far_beyond_its_prior_is_not_passed_off_as_known(wrong: dict[str, float]) -> None:
+    simulated, given = draw_wrong_lens(TOLD, 0)
+    found = solved(simulated.pairs, with_lens(given, **wrong), TOLD.options)
+    (warning,) = [one for one in found.warnings if one.code == "intrinsics-suspected"]
+    assert "more than three times what was stated" in warning.message
+    assert "focal length -1" in warning.message
+    assert "signs of the distortion" in warning.hint
+
+
+def test_a_change_that_the_pairs_leave_uncertain_is_stated_all_the_same() -> None:
+    simulated, given = draw_wrong_lens(TOLD, 0)
+    found = solved(simulated.pairs, with_lens(given, k1=0.3), TOLD.options)
+    assert found.camera.matrix_px[0, 0] < 0.95 * given.matrix_px[0, 0]
+    (sentence,) = refined_sentences(found)
+    assert "focal length by -" in sentence
+
+
+def test_a_good_lens_is_refined_without_suspicion() -> None:
+    assert "intrinsics-suspected" not in {one.code for one in refined().warnings}
+
+
+@pytest.mark.parametrize(
+    ("names", "sigma_px", "refine", "words"),
+    [
+        (("fx_px", "fy_px"), 0.0, True, "says that they are exact"),
+        (("fx_px", "fy_px"), 2000.0, True, "± 2000 px"),
+        (("fx_px", "fy_px"), 2000.0, False, "± 2000 px"),
+        (("cx_px", "cy_px"), 3000.0, False, "cx_px"),
+        (("cy_px", "k1"), 3000.0, True, "cy_px"),
+    ],
+)
+def test_a_covariance_that_leaves_nothing_to_refine_or_nothing_known_is_refused(
+    names: tuple[str, ...], sigma_px: float, refine: bool, words: str
+) -> None:
+    simulated, given = draw_wrong_lens(TOLD, 0)
+    camera = replace(given, covariance=CameraCovariance(names, sigma_px**2 * np.eye(2)))
+    options = CalibrationOptions(refining=RefiningOptions(intrinsics=refine))
+    outcome = calibrate_pairs(simulated.pairs, camera, options)
+    assert isinstance(outcome, Unsolvable)
+    assert outcome.code == "useless-lens-covariance"
+    assert words in outcome.reason
+
+
+def test_exact_intrinsics_that_are_not_to_be_refined_are_used() -> None:
+    simulated, given = draw_wrong_lens(TOLD, 0)
+    camera = replace(given, covariance=CameraCovariance(("fx_px", "fy_px"), np.zeros((2, 2))))
+    assert isinstance(calibrate_pairs(simulated.pairs, camera), Calibration)
+
+
+def test_residuals_that_an_uncertain_lens_leaves_are_not_blamed_on_the_radar_alone() -> None:
+    simulated, given = draw_wrong_lens(TOLD, 0)
+    wrong = with_lens(given, k1=0.1)
+    camera = replace(wrong, covariance=CameraCovariance(("fx_px", "fy_px", "k1"), np.diag([1e4, 1e4, 0.4**2])))
+    hints = {}
+    for refine in (False, True):
+        options = replace(TOLD.options, refining=RefiningOptions(intrinsics=refine))
+        found = solved(simulated.pairs, camera, options)
+        hints[refine] = [one.hint for one in found.warnings if one.code == "smooth-angle-errors"]
+    assert [hint.startswith("a lens as uncertain") for hint in hints[False]] == [True]
+    assert not hints[True]
+
+
+@pytest.mark.parametrize("method", ["paper", "pmm", "ccm"])
+def test_other_methods_take_the_intrinsics_as_they_are(method: str) -> None:
+    simulated, given = draw_wrong_lens(TOLD, 0)
+    options = CalibrationOptions(method=method, refining=RefiningOptions(intrinsics=True))  # type: ignore[arg-type]
+    with pytest.raises(OptionError, match=f"the method {method} takes the intrinsics as they are"):
+        calibrate_pairs(simulated.pairs, given, options)
+
+
+def test_nothing_to_refine_is_refused() -> None:
+    simulated, given = draw_wrong_lens(TOLD, 0)
+    options = CalibrationOptions(refining=RefiningOptions(True, 0.0, 0.0, 0.0))
+    with pytest.raises(OptionError, match="nothing to refine"):
+        calibrate_pairs(simulated.pairs, given, options)

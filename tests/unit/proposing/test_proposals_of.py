@@ -1,0 +1,156 @@
+"""Proposals from dwell views drawn at random, with known truth."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from calib_core.geometry import rotation_angle_rad
+from calib_core.options import CalibrationOptions, MountingOptions
+from calib_core.proposing import Proposal, Proposals, proposals_of
+from tests.drawn_views import Drawing, DrawnViews, draw_views, with_pictures_of
+
+OPTIONS = CalibrationOptions()
+
+
+def proposed(drawn: DrawnViews, clicked: tuple[int, ...] = ()) -> Proposals:
+    confirmed = [drawn.click(row) for row in clicked]
+    return proposals_of(drawn.views, drawn.camera, OPTIONS, confirmed=confirmed)
+
+
+def right(drawn: DrawnViews, proposals: Proposals) -> list[bool]:
+    """Return for each proposal whether it shows the reflector."""
+    row_of = {view.placement.start: i for i, view in enumerate(drawn.views)}
+    return [
+        bool(np.linalg.norm(one.pixel_px - drawn.pixels[row_of[one.placement.start]]) < 5.0 * one.sigma_px)
+        for one in proposals.ranked
+    ]
+
+
+@pytest.mark.parametrize(
+    ("drawing", "least_share"),
+    [
+        (Drawing(), 0.9),
+        (Drawing(offset_m=(0.1, 0.4, 0.3)), 0.9),
+        (Drawing(first_share=0.3, listed_share=0.8), 0.7),
+        (Drawing(is_flat=True), 0.85),
+        (Drawing(noise=3.0), 0.85),
+        (Drawing(count=6), 0.85),
+    ],
+    ids=["usual", "far-apart", "hard-to-see", "flat", "coarse", "few"],
+)
+def test_nearly_every_reflector_is_proposed_and_few_proposals_are_wrong(drawing: Drawing, least_share: float) -> None:
+    drawn = [draw_views(seed, drawing) for seed in range(2)]
+    verdicts = [verdict for one in drawn for verdict in right(one, proposed(one))]
+    assert sum(verdicts) >= least_share * 2 * drawing.count
+    assert sum(verdicts) >= 0.9 * len(verdicts)
+
+
+def test_the_pose_is_right_to_a_few_degrees() -> None:
+    drawn = draw_views(3)
+    found = proposed(drawn).camera_from_radar
+    assert found is not None
+    assert rotation_angle_rad(found.rotation @ drawn.camera_from_radar.rotation.T) < np.radians(3.0)
+
+
+def test_a_person_who_stood_still_is_not_proposed_and_the_reason_says_why() -> None:
+    drawn = draw_views(5, Drawing(persons=4))
+    proposals = proposed(drawn)
+    persons = {drawn.views[i].placement.start for i in np.flatnonzero(np.isnan(drawn.pixels[:, 0]))}
+    left_out = {placement.start: reason for placement, reason in proposals.unproposed}
+    assert persons <= set(left_out)
+    assert all("weaker" in left_out[start] for start in persons)
+
+
+def test_the_radar_of_one_recording_with_the_pictures_of_another_proposes_nothing() -> None:
+    for seed in range(3):
+        one, other = draw_views(seed), draw_views(100 + seed)
+        proposals = proposals_of(with_pictures_of(one, other), other.camera, OPTIONS)
+        assert not proposals.ranked
+        assert {reason for _, reason in proposals.unproposed} == {
+            "picture and radar agree on no mounting within 26 deg of the nominal one"
+        }
+
+
+def test_what_is_confirmed_is_not_proposed_again_and_counts() -> None:
+    drawn = draw_views(2, Drawing(count=5, first_share=0.2))
+    before, after = proposed(drawn), proposed(drawn, (0, 3))
+    covered = {drawn.views[i].placement.start for i in (0, 3)}
+    assert not covered & {one.placement.start for one in after.ranked}
+    assert not covered & {placement.start for placement, _ in after.unproposed}
+    assert all(right(drawn, after))
+    assert min((one.confidence for one in after.ranked), default=0.0) >= min(
+        (one.confidence for one in before.ranked), default=0.0
+    )
+
+
+def test_one_click_makes_proposals_of_two_dwells_possible() -> None:
+    drawn = draw_views(1, Drawing(count=3, clutter=0))
+    assert all(right(drawn, proposed(drawn, (0,))))
+
+
+def test_the_proposed_pixel_is_always_a_candidate_of_the_picture() -> None:
+    drawn = draw_views(4)
+    candidates = {view.placement.start: view.candidates for view in drawn.views}
+    for one in proposed(drawn).ranked:
+        assert one.candidates[0] in candidates[one.placement.start]
+        assert (one.pixel_px == one.candidates[0].pixel_px).all()
+
+
+def test_dwells_without_pictures_or_changes_say_so() -> None:
+    drawn = draw_views(6)
+    dark = replace(drawn.views[0], frames=np.zeros(0, np.int64), candidates=())
+    same = replace(drawn.views[1], candidates=())
+    proposals = proposals_of([dark, same, *drawn.views[2:]], drawn.camera, OPTIONS)
+    reasons = {placement.start: reason for placement, reason in proposals.unproposed}
+    assert reasons[dark.placement.start] == "the camera recorded no frame while it stood there"
+    assert reasons[same.placement.start] == "nothing of the reflector's size changed in the picture"
+
+
+def test_the_nominal_mounting_is_where_the_search_starts() -> None:
+    drawn = draw_views(7, Drawing(turned_deg=0.0))
+    turned = replace(OPTIONS, mounting=MountingOptions(yaw_deg=60.0))
+    assert proposed(drawn).ranked
+    assert not proposals_of(drawn.views, drawn.camera, turned).ranked
+
+
+@settings(max_examples=8, deadline=None)
+@given(seed=st.integers(0, 10_000), count=st.integers(0, 5), listed=st.floats(0.0, 1.0), data=st.data())
+def test_every_dwell_is_proposed_or_not_exactly_once_in_any_order(
+    seed: int, count: int, listed: float, data: st.DataObject
+) -> None:
+    drawn = draw_views(seed, Drawing(count=count, listed_share=listed, decoys=2))
+    proposals = proposed(drawn)
+    starts = [one.placement.start for one in proposals.ranked] + [one.start for one, _ in proposals.unproposed]
+    assert sorted(starts) == sorted(view.placement.start for view in drawn.views)
+    confidences = [one.confidence for one in proposals.ranked]
+    assert confidences == sorted(confidences, reverse=True)
+    assert all(0.0 < one <= 1.0 for one in confidences)
+    shuffled = data.draw(st.permutations(drawn.views))
+    again = proposals_of(shuffled, drawn.camera, OPTIONS)
+    assert [one.placement.start for one in again.ranked] == [one.placement.start for one in proposals.ranked]
+
+
+def test_one_wrong_click_does_not_mislead() -> None:
+    drawn = draw_views(3, Drawing(count=10, listed_share=1.0))
+    wrong = replace(drawn.click(1), u_px=60.0, v_px=60.0)
+    proposals = proposals_of(drawn.views, drawn.camera, OPTIONS, confirmed=[wrong])
+    assert len(proposals.ranked) >= 8
+    assert all(right(drawn, proposals))
+
+
+def test_confidence_is_borne_out() -> None:
+    """Of proposals with confidence p a share of about p is right, and the surer third is right more often than the other end."""
+    drawn = [draw_views(seed, Drawing(count=10, decoys=6, first_share=0.4, listed_share=0.8)) for seed in range(6)]
+    found = [(one.confidence, good) for own in drawn for one, good in _with_verdicts(own)]
+    confidence, good = np.array(sorted(found)).T
+    third = len(found) // 3
+    assert confidence.mean() == pytest.approx(good.mean(), abs=0.1)
+    assert good[:third].mean() < good[-third:].mean()
+
+
+def _with_verdicts(drawn: DrawnViews) -> list[tuple[Proposal, bool]]:
+    proposals = proposed(drawn)
+    return list(zip(proposals.ranked, right(drawn, proposals), strict=True))
