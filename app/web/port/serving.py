@@ -23,6 +23,8 @@ from calib_core.recordings import EncodedImage, Recording
 
 __all__ = ["ChoosingDesk", "Service"]
 
+_WAIT_S = 0.25
+"""A signal is noticed at the latest after this time [s]."""
 _log = logging.getLogger(__name__)
 
 
@@ -107,7 +109,7 @@ class Service:
         server = self._running()
         try:
             server.admit(workspace, recording)
-            self._chosen.wait()
+            self._wait_for_choice()
         except KeyboardInterrupt:
             server.close()
             return False
@@ -124,7 +126,12 @@ class Service:
             OSError: no port can be bound.
         """
         self._running().ask(choices)
-        self._chosen.wait()
+        self._wait_for_choice()
+
+    def _wait_for_choice(self) -> None:
+        """Wait until a page has chosen. A signal that comes just before a wait does not end it, so each wait is short."""
+        while not self._chosen.wait(_WAIT_S):
+            pass
 
     def _running(self) -> RunningServer:
         """Return the server, started now if that was not needed earlier."""

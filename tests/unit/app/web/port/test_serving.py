@@ -381,6 +381,30 @@ def test_a_second_signal_does_not_interrupt_the_closing(tmp_path: Path, second: 
     assert (tmp_path / "session" / "session.json").is_file()
 
 
+SIGNAL_IN_ANOTHER_THREAD = f"""{PRINTS_WHEN_IT_SERVES}
+import sys, time
+def raise_when_it_waits():
+    sys.stdin.readline()
+    main = threading.main_thread().ident
+    while sys._current_frames()[main].f_code.co_name != "wait":
+        time.sleep(0)
+    signal.raise_signal(signal.SIGTERM)
+threading.Thread(target=raise_when_it_waits, daemon=True).start()
+"""
+
+
+@POSIX_SIGNALS
+def test_a_signal_that_does_not_wake_the_waiting_thread_is_noticed_soon(tmp_path: Path) -> None:
+    """Such as one that comes just before it waits."""
+    arguments = ["demo", "--no-browser", "--port", 0, "--session", tmp_path / "session"]
+    running = started(arguments, patch=SIGNAL_IN_ANOTHER_THREAD, sigint="SIG_IGN")
+    assert running.stdout is not None
+    assert any("serving" in line for line in running.stdout)
+    out, errors = running.communicate("\n", timeout=30)
+    assert (running.returncode, errors) == (0, "")
+    assert "all clicks are saved" in out
+
+
 @POSIX_SIGNALS
 def test_a_signal_that_is_switched_off_stays_off(tmp_path: Path) -> None:
     """`nohup cocalib open` outlives its terminal."""
