@@ -106,5 +106,6 @@ def proposal_figures(
         f"{name} surely nowhere": float(surely_nowhere),
         f"{name} axes": float(len(scaled)),
         f"{name} covered": float(np.sum(np.abs(scaled) <= _COVERED)),
+        f"{name} squares": float(np.sum(np.square(scaled))),
         f"{name} median px": float(np.median(errors)) if errors else None,
     }

@@ -1,6 +1,6 @@
 """Poses from clicks that a person made, accepted, or left to the machine."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from calib_core.calibration import calibrate
 from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
 from calib_core.proposing import Proposal
+from calib_core.results import Calibration
 
 __all__ = ["accepted_clicks", "pose_figures"]
 
@@ -33,8 +34,14 @@ def accepted_clicks(proposals: Sequence[Proposal], drawn: Drawn) -> tuple[Reflec
     return tuple(accepted)
 
 
-def pose_figures(name: str, clicks: Sequence[ReflectorClick], drawn: Drawn) -> Figures:
-    """Calibrate, and compare with the true pose.
+def pose_figures(
+    name: str,
+    clicks: Sequence[ReflectorClick],
+    drawn: Drawn,
+    *,
+    refuses: Callable[[Calibration], bool] = lambda _: False,
+) -> Figures:
+    """Calibrate, and compare with the true pose; there are no figures of an answer that is refused.
 
     "far" is 1 if the truth is outside twice the stated 99.9 % quantile, or more than 5 deg away: the answer is confidently
     wrong.
@@ -43,6 +50,8 @@ def pose_figures(name: str, clicks: Sequence[ReflectorClick], drawn: Drawn) -> F
         return {f"{name} clicks": 0.0}
     scans, camera = drawn.scans, drawn.recording.camera
     outcome = solved_or_refused(lambda: calibrate(clicks, scans, camera, CalibrationOptions(), background=scans))
+    if isinstance(outcome, Calibration) and refuses(outcome):
+        return {f"{name} clicks": float(len(clicks))}
     figures = outcome_figures(outcome, drawn.recording.stage.camera_from_reported)
     found: Figures = {f"{name} {key}": value for key, value in figures.items() if key in _KEPT}
     squared, quantile, turned = figures.get("squared"), figures.get("quantile"), figures.get("rotation_rad")

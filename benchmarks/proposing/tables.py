@@ -85,7 +85,9 @@ def _pixels(trials: Sequence[Figures]) -> list[_Row]:
     for name, words, _ in _CLICKING:
         covered = _share(trials, f"{name} covered", f"{name} axes")
         verdict = _verdict(abs(covered - 0.95), 0.03)
-        rows.append((f"errors within 1.96 stated sigmas, {words}", "95 %", f"{covered:.1%}", verdict))
+        rms = float(np.sqrt(_share(trials, f"{name} squares", f"{name} axes")))
+        measured = f"{covered:.1%}; error over sigma {rms:.2f} (RMS)"
+        rows.append((f"errors within 1.96 stated sigmas, {words}", "95 %", measured, verdict))
     return rows
 
 
