@@ -1,0 +1,93 @@
+"""Outcome: what came of one job, as the file that every engine returns (cocalib/outcome-1)."""
+
+from typing import Final, Literal
+
+import msgspec
+from msgspec import Struct, field
+
+__all__ = [
+    "OUTCOME_SCHEMA",
+    "Outcome",
+    "OutcomeFile",
+    "OutcomeRun",
+    "Status",
+    "StepState",
+    "outcome_text",
+    "read_outcome",
+]
+
+OUTCOME_SCHEMA: Final = "cocalib/outcome-1"
+Status = Literal["solved", "weak", "refused", "failed"]
+"""A calibration; one that is doubtful; the data give none; an input cannot be read or the program failed."""
+StepState = Literal["done", "not available", "not asked", "failed"]
+
+
+class OutcomeFile(Struct, frozen=True, forbid_unknown_fields=True):
+    """A file beside the outcome, by its relative name, and its sha256."""
+
+    name: str
+    sha256: str
+
+
+class OutcomeRun(Struct, frozen=True, forbid_unknown_fields=True):
+    """When and where the job ran; the only part that differs between two runs of the same job."""
+
+    host: str
+    started: str
+    """ISO 8601, UTC."""
+    seconds: float
+
+
+class Outcome(Struct, frozen=True, forbid_unknown_fields=True):
+    """What came of one job.
+
+    Attributes:
+        digest: of the job.
+        status: of the calibration.
+        reason: why there is none, or why it is weak.
+        hint: what to do about it.
+        verdict: of the calibration; None without one.
+        recorded_ns: first stamp of the recording [ns]; None if it was not opened.
+        sigma_deg: largest standard deviation of the rotation about an axis [deg].
+        sigma_cm: of the position along an axis [cm].
+        aed_px: mean residual of the used pairs [px].
+        pairs: how many were used.
+        warnings: codes of the calibration's warnings, in order.
+        steps: evaluate, report, export: what came of each.
+        files: beside the outcome, in order of their names.
+    """
+
+    schema: Literal["cocalib/outcome-1"]
+    digest: str
+    vehicle: str
+    session: str
+    status: Status
+    reason: str = ""
+    hint: str = ""
+    vehicle_type: str | None = None
+    radar_serial: str | None = None
+    camera_serial: str | None = None
+    verdict: str | None = None
+    recorded_ns: int | None = None
+    sigma_deg: float | None = None
+    sigma_cm: float | None = None
+    aed_px: float | None = None
+    pairs: int = 0
+    warnings: tuple[str, ...] = ()
+    steps: dict[str, StepState] = field(default_factory=dict)
+    files: tuple[OutcomeFile, ...] = ()
+    run: OutcomeRun | None = None
+
+
+def outcome_text(outcome: Outcome) -> str:
+    """Write outcome-1 JSON."""
+    return msgspec.json.format(msgspec.json.encode(outcome), indent=1).decode() + "\n"
+
+
+def read_outcome(text: str) -> Outcome:
+    """Read outcome-1 JSON.
+
+    Raises:
+        msgspec.DecodeError: it is something else.
+    """
+    return msgspec.json.decode(text, type=Outcome)
