@@ -87,7 +87,7 @@ def test_an_absolute_path_stays_as_it_is(tmp_path: Path) -> None:
     ("text", "fault"),
     [
         ('[[session]]\nvehicle = "a"\nrecordin = "b.bag"', "session 1: recordin: unknown key; did you mean recording?"),
-        ('[sesion]\nvehicle = "a"', "sesion: unknown key; did you mean session?"),
+        ('[sessions]\nvehicle = "a"', "sessions: unknown key; did you mean session?"),
         ("session = 3", "session: expected array, got int"),
         ("[defaults]\nauto = 3", "defaults.auto: expected bool, got int"),
         ("", "no session in it; add one, or let cocalib batch"),
