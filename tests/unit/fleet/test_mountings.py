@@ -65,7 +65,7 @@ def test_the_covariance_of_the_mean_is_that_of_simulated_sessions() -> None:
     rng, share = np.random.default_rng(3), 0.4
     root = np.linalg.cholesky(COVARIANCE)
     errors = []
-    for _ in range(1500):
+    for _ in range(700):
         common = root @ rng.standard_normal(6) * np.sqrt(share)
         rows = [
             session(k, share=share, pose=NOMINAL.perturbed(common + root @ rng.standard_normal(6) * np.sqrt(1 - share)))
@@ -74,4 +74,4 @@ def test_the_covariance_of_the_mean_is_that_of_simulated_sessions() -> None:
         errors.append(mounting_of(rows).camera_from_radar.error_from(NOMINAL))
     stated = mounting_of([session(k, share=share) for k in range(3)]).covariance
     ratio = np.einsum("ni,ij,nj->n", errors, np.linalg.inv(stated), errors).mean() / 6.0
-    assert ratio == pytest.approx(1.0, abs=0.06)
+    assert ratio == pytest.approx(1.0, abs=0.08)
