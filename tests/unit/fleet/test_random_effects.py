@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from calib_core.fleet.random_effects import PRIOR_VECTORS, RandomEffects, random_effects
-from calib_core.fleet.session_pose import CHI2_95
 from calib_core.fleet.tails import quantile
 
 EQUAL = np.full(6, 0.005)
@@ -44,9 +43,9 @@ def test_unequal_axes_are_covered_too(count: int) -> None:
     assert covered(count, 20, UNEQUAL, EXACT) >= 0.92
 
 
-@pytest.mark.parametrize("count", [10, 49])
+@pytest.mark.parametrize("count", [10, 20])
 def test_errors_twice_as_large_as_the_scatter_do_not_make_it_overconfident(count: int) -> None:
-    assert covered(count, 15, EQUAL, ROUGH) >= 0.93
+    assert covered(count, 30, EQUAL, ROUGH) >= 0.93
 
 
 def test_many_exact_vectors_give_the_sample_covariance_and_a_little_of_the_prior() -> None:
