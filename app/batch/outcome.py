@@ -53,8 +53,13 @@ class Outcome(Struct, frozen=True, forbid_unknown_fields=True):
         aed_px: mean residual of the used pairs [px].
         pairs: how many were used.
         warnings: codes of the calibration's warnings, in order.
-        steps: evaluate, report, export: what came of each.
+        steps: evaluate, report, export: what came of each; empty without a calibration.
         files: beside the outcome, in order of their names.
+        is_final: running the job again would give the same; otherwise it is run again the next time: a file was not reached,
+            memory was short, or the program failed.
+        step_reasons: why a step failed, by its name.
+        notes: what the user may want to know, such as clicks that were moved to frames.
+        version: of the program.
     """
 
     schema: Literal["cocalib/outcome-1"]
@@ -77,6 +82,10 @@ class Outcome(Struct, frozen=True, forbid_unknown_fields=True):
     steps: dict[str, StepState] = field(default_factory=dict)
     files: tuple[OutcomeFile, ...] = ()
     run: OutcomeRun | None = None
+    is_final: bool = True
+    step_reasons: dict[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    version: str = ""
 
 
 def outcome_text(outcome: Outcome) -> str:
@@ -88,6 +97,28 @@ def read_outcome(text: str) -> Outcome:
     """Read outcome-1 JSON.
 
     Raises:
-        msgspec.DecodeError: it is something else.
+        msgspec.DecodeError: it is something else; the message says what and what to do.
     """
-    return msgspec.json.decode(text, type=Outcome)
+    try:
+        return msgspec.json.decode(text, type=Outcome)
+    except msgspec.ValidationError as error:
+        schema = _schema_in(text)
+        if schema is None or schema == OUTCOME_SCHEMA:
+            raise
+        raise msgspec.ValidationError(
+            f"a result of another version of cocalib ({schema}, this one reads {OUTCOME_SCHEMA}): name another folder with "
+            "--out, or use that version"
+        ) from error
+
+
+def _schema_in(text: str) -> str | None:
+    """Return the name of a document's schema, if it states one of ours."""
+    try:
+        schema = msgspec.json.decode(text, type=_Named).schema
+    except msgspec.DecodeError:
+        return None
+    return schema if schema.startswith("cocalib/") and schema.isprintable() else None
+
+
+class _Named(Struct):
+    schema: str
