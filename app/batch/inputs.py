@@ -9,7 +9,7 @@ from pathlib import Path
 
 from app.batch.manifest import ManifestRow
 
-__all__ = ["InputFile", "InputPath", "inputs_of", "state_of"]
+__all__ = ["InputFile", "InputPath", "all_reached", "inputs_of", "state_of"]
 
 _LEVELS = 4
 """As far above a folder of pictures as data sets keep their calibration."""
@@ -70,6 +70,14 @@ def inputs_of(row: ManifestRow) -> tuple[InputPath, ...]:
         *(InputPath("recording", path) for path in row.recording),
         *(InputPath(role, path) for role, path in single.items() if path is not None),
     )
+
+
+def all_reached(inputs: tuple[InputPath, ...]) -> bool:
+    """Return whether all inputs are there, as far as one can tell without reading them."""
+    try:
+        return all(os.access(file.path, os.R_OK) for one in inputs for file in one.files())
+    except OSError:
+        return False
 
 
 def state_of(inputs: tuple[InputPath, ...]) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from app.batch.inputs import inputs_of, state_of
+from app.batch.inputs import all_reached, inputs_of, state_of
 from app.batch.job import Job
 from app.batch.outcome import Outcome, OutcomeRun, outcome_text
 from app.batch.results_folder import LOG_FILE, OUTCOME_FILE, ResultsFolder, listed_files
@@ -38,6 +38,8 @@ def run_job(job: Job, results: Path) -> Outcome:
     if job.state in ("", state):
         result = run_steps(job.row)
         outcome = outcome_of(job, result)
+        if not all_reached(inputs):
+            outcome = replace(outcome, is_final=False)
         if state_of(inputs) == state:
             log = "\n\n".join(result.log)
             files = {**result.files, **({LOG_FILE: log.encode(errors="backslashreplace")} if log else {})}
