@@ -1,9 +1,12 @@
 """The outcome's file is read strictly, and one of another version is told by its name."""
 
+from pathlib import Path
+
 import msgspec
 import pytest
 
 from app.batch.outcome import OUTCOME_SCHEMA, Outcome, OutcomeFile, OutcomeRun, outcome_text, read_outcome
+from app.batch.outcome_schema import write_outcome_schema
 
 OUTCOME = Outcome(
     OUTCOME_SCHEMA,
@@ -45,3 +48,11 @@ def test_a_result_of_another_version_is_named() -> None:
 def test_anything_else_is_refused(text: str) -> None:
     with pytest.raises(msgspec.DecodeError):
         read_outcome(text)
+
+
+def test_the_published_schema_is_that_of_the_type(tmp_path: Path, project_root: Path) -> None:
+    written = write_outcome_schema(tmp_path)
+    published = project_root / "docs" / "schemas" / written.name
+    assert published.read_text(encoding="utf-8") == written.read_text(encoding="utf-8"), (
+        "run: python -m app.batch.outcome_schema docs/schemas"
+    )
