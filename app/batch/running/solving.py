@@ -64,7 +64,7 @@ def given_files(row: ManifestRow) -> GivenFiles:
     """
     if row.auto and row.options.method == "ccm":
         raise InputError("method ccm takes clicks on the corners of a checkerboard, and auto finds a reflector")
-    camera = None if row.camera is None else CameraFile.read(row.camera)
+    camera = None if row.camera is None else CameraFile.read(row.camera, rescale=row.rescale_camera)
     clicks = None if row.clicks is None else file_of_clicks(row.clicks)
     if row.auto and clicks is not None and clicks.unconfirmed is not None:
         raise InputError(
@@ -119,7 +119,7 @@ def _placed(
         clicks = at_frames.clicks
     if not row.auto:
         return PlacedClicks(clicks, file.unconfirmed if file is not None else None)
-    placed = place_clicks(recording, camera, row.options, confirmed=clicks)
+    placed = place_clicks(recording, camera, row.options, confirmed=clicks, reflector_m=row.reflector_m)
     if not isinstance(placed, Unsolvable):
         notes.append(f"automatic: {placed.words}")
     return placed

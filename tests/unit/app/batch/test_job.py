@@ -59,6 +59,8 @@ CHANGES: dict[str, Callable[[Path], object]] = {
         solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.1), 0.01))
     ),
     "exports": lambda _: ("tf2",),
+    "rescale_camera": lambda _: True,
+    "reflector_m": lambda _: 0.3,
 }
 
 

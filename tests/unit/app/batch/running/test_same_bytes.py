@@ -99,10 +99,15 @@ def test_intrinsics_of_a_file_a_measured_position_and_options(commands: Commands
         solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.045), 0.02)),
         refining=RefiningOptions(intrinsics=True),
     )
-    row = ManifestRow("van", "1", BAGS, clicks=CLICKS, camera=given, options=options)
+    row = ManifestRow("van", "1", BAGS, clicks=CLICKS, camera=given, rescale_camera=True, options=options)
+    given_camera = solving.given_files(row).camera
+    assert given_camera is not None
+    assert given_camera.rescale
     outcome, files = done(row, tmp_path / "results")
     flags = ("--camera-position-m", "0", "0", "0.045", "--camera-position-sigma-m", "0.02", "--refine-intrinsics")
-    assert files["calibration.json"] == commands.solve("--clicks", CLICKS, "--camera", given, *flags)
+    assert files["calibration.json"] == commands.solve(
+        "--clicks", CLICKS, "--camera", given, "--rescale-camera", *flags
+    )
     assert json.loads(files["calibration.json"])["provenance"]["inputs"][-1]["name"] == "camera.yaml"
     assert files["report.html"] == commands.report("--clicks", CLICKS)
     assert outcome.steps["evaluate"] == "done"
@@ -115,6 +120,7 @@ def test_clicks_of_a_person_and_of_nobody(commands: Commands, tmp_path: Path, mo
     sample = solving.file_of_clicks(CLICKS).clicks
 
     def place(_recording: object, _camera: object, _options: object, **flags: object) -> PlacedClicks:
+        assert flags["reflector_m"] == 0.3
         confirmed = flags["confirmed"]
         assert isinstance(confirmed, tuple)
         assert len(confirmed) == 4
@@ -124,9 +130,11 @@ def test_clicks_of_a_person_and_of_nobody(commands: Commands, tmp_path: Path, mo
 
     monkeypatch.setattr(solving, "place_clicks", place)
     monkeypatch.setattr(automatic_solving, "place_clicks", place)
-    outcome, files = done(ManifestRow("van", "1", BAGS, clicks=given, auto=True), tmp_path / "results")
+    outcome, files = done(ManifestRow("van", "1", BAGS, clicks=given, auto=True, reflector_m=0.3), tmp_path / "results")
     placed = commands.folder / "clicks.json"
-    assert files["calibration.json"] == commands.solve("--clicks", given, "--auto", "--clicks-out", placed)
+    assert files["calibration.json"] == commands.solve(
+        "--clicks", given, "--auto", "--reflector-m", "0.3", "--clicks-out", placed
+    )
     assert files["clicks.json"] == placed.read_bytes()
     assert files["evaluation.json"] == commands.evaluate("--clicks", placed)
     assert files["report.html"] == commands.report("--clicks", placed)
