@@ -35,7 +35,7 @@ _one_at_a_time = threading.Lock()
 
 
 @contextlib.contextmanager
-def error_boundary(doing: str, tell: Callable[[str], None]) -> Iterator[None]:
+def error_boundary(doing: str, tell: Callable[[str], None], keep: Callable[[str], str] | None = None) -> Iterator[None]:
     """End an unforeseen exception of the `with` block: save a report, and pass one line to `tell`.
 
     KeyboardInterrupt, SystemExit and the cancellation of a task pass.
@@ -43,14 +43,15 @@ def error_boundary(doing: str, tell: Callable[[str], None]) -> Iterator[None]:
     Args:
         doing: what was being done, such as "cocalib info".
         tell: takes the line; must not raise.
+        keep: takes the report and returns where it is, as a clause; None for a file in the state folder.
     """
     try:
         yield
     except Exception as error:  # noqa: BLE001
-        tell(report_of(error, doing))
+        tell(report_of(error, doing, keep))
 
 
-def report_of(error: BaseException, doing: str) -> str:
+def report_of(error: BaseException, doing: str, keep: Callable[[str], str] | None = None) -> str:
     """Save a report of an exception; return one line that says what happened and where the report is.
 
     The same error at the same place is saved once per process. With COCALIB_DEBUG set, the traceback goes to stderr too.
@@ -58,11 +59,14 @@ def report_of(error: BaseException, doing: str) -> str:
     Args:
         error: the exception.
         doing: what was being done.
+        keep: takes the report and returns where it is, as a clause; None for a file in the state folder.
     """
     if os.environ.get(_DEBUG):
         traceback.print_exception(error, file=sys.stderr)
-    key = (type(error).__name__, *map(str, traceback.extract_tb(error.__traceback__)[-3:]))
     what = f"internal error ({type(error).__name__}: {_one_line(str(error))})"
+    if keep is not None:
+        return f"{what}; this is a bug in cocalib, {keep(_report_text(error, doing))}"
+    key = (type(error).__name__, *map(str, traceback.extract_tb(error.__traceback__)[-3:]))
     with _one_at_a_time:
         if key not in _reported:
             _reported[key] = _saved(_report_text(error, doing))

@@ -28,11 +28,20 @@ from calib_core.measurements import NS_PER_S, RadarScans, ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, DataWarning
 
-__all__ = ["Evidence", "EvidenceOptions", "RadarRecording", "evaluate_recording", "evidence_in", "judged"]
+__all__ = [
+    "Evidence",
+    "EvidenceOptions",
+    "RadarRecording",
+    "evaluate_recording",
+    "evaluation_exit_code",
+    "evidence_in",
+    "judged",
+]
 
 _AROUND_S = 3.0
 """Scans before the first and after the last annotated frame, for targets to be followed into the frames."""
 
+_DOUBTFUL = frozenset({"other-lens", "no-target-in-a-box", "turned-from-boxes", "mostly-moving"})
 _TURNED_RAD = np.deg2rad(4.0)
 
 
@@ -186,6 +195,14 @@ def judged(
         boxes = judged_by_boxes(pose, lens, found.returns, radar_errors=calibration.radar_errors, progress=progress)
         warnings += _turned(calibration, found.returns)
     return Evaluation(residuals, boxes, tuple(warnings))
+
+
+def evaluation_exit_code(evaluation: Evaluation) -> int:
+    """Return 0 if a calibration was judged, 1 if there was nothing to judge it by, 3 if there are doubts."""
+    residuals, boxes = evaluation.residuals, evaluation.boxes
+    if residuals is None and (boxes is None or boxes.acc is None):
+        return 1
+    return 3 if any(one.code in _DOUBTFUL for one in evaluation.warnings) else 0
 
 
 def _pairs(

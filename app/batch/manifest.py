@@ -23,6 +23,8 @@ class ManifestRow:
         clicks: file of clicks in this recording; None without.
         auto: place clicks without a person where there are none.
         camera: file of intrinsics; None for the recording's own.
+        rescale_camera: scale these intrinsics to the recorded pictures, if they are the calibrated ones resized.
+        reflector_m: width of the reflector as the camera sees it [m], for auto.
         boxes: file of boxes to evaluate by; None without.
         topics: which topics, and how they are read.
         options: of the calibration, the tape-measured camera position included.
@@ -43,6 +45,8 @@ class ManifestRow:
     topics: RecordingOptions = field(default_factory=RecordingOptions)
     options: CalibrationOptions = field(default_factory=CalibrationOptions)
     exports: tuple[str, ...] = ()
+    rescale_camera: bool = False
+    reflector_m: float = 0.24
     place: str = ""
 
     @property

@@ -39,44 +39,49 @@ class OutcomeRun(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Outcome(Struct, frozen=True, forbid_unknown_fields=True):
-    """What came of one job.
-
-    Attributes:
-        digest: of the job.
-        status: of the calibration.
-        reason: why there is none, or why it is weak.
-        hint: what to do about it.
-        verdict: of the calibration; None without one.
-        recorded_ns: first stamp of the recording [ns]; None if it was not opened.
-        sigma_deg: largest standard deviation of the rotation about an axis [deg].
-        sigma_cm: of the position along an axis [cm].
-        aed_px: mean residual of the used pairs [px].
-        pairs: how many were used.
-        warnings: codes of the calibration's warnings, in order.
-        steps: evaluate, report, export: what came of each.
-        files: beside the outcome, in order of their names.
-    """
+    """What came of one job."""
 
     schema: Literal["cocalib/outcome-1"]
     digest: str
+    """Of the job."""
     vehicle: str
     session: str
     status: Status
     reason: str = ""
+    """Why there is no calibration, or why it is weak."""
     hint: str = ""
+    """What to do about it."""
     vehicle_type: str | None = None
     radar_serial: str | None = None
     camera_serial: str | None = None
     verdict: str | None = None
+    """On the calibration; None without one."""
     recorded_ns: int | None = None
+    """First stamp of the recording [ns]; None if it was not opened."""
     sigma_deg: float | None = None
+    """Largest standard deviation of the rotation about an axis [deg]."""
     sigma_cm: float | None = None
+    """Largest standard deviation of the position along an axis [cm]."""
     aed_px: float | None = None
+    """Mean residual of the used pairs [px]."""
     pairs: int = 0
+    """How many were used."""
     warnings: tuple[str, ...] = ()
+    """Codes of the calibration's warnings, in order."""
     steps: dict[str, StepState] = field(default_factory=dict)
+    """What came of evaluate, report and export; empty without a calibration."""
     files: tuple[OutcomeFile, ...] = ()
+    """Beside the outcome, in order of their names."""
     run: OutcomeRun | None = None
+    is_final: bool = True
+    """Running the job again would give the same. Otherwise it is run again the next time: a file was not reached, memory was
+    short, or the program failed."""
+    step_reasons: dict[str, str] = field(default_factory=dict)
+    """Why a step failed, by its name."""
+    notes: tuple[str, ...] = ()
+    """What the user may want to know, such as clicks that were moved to frames."""
+    version: str = ""
+    """Of the program."""
 
 
 def outcome_text(outcome: Outcome) -> str:
@@ -88,6 +93,28 @@ def read_outcome(text: str) -> Outcome:
     """Read outcome-1 JSON.
 
     Raises:
-        msgspec.DecodeError: it is something else.
+        msgspec.DecodeError: it is something else; the message says what and what to do.
     """
-    return msgspec.json.decode(text, type=Outcome)
+    try:
+        return msgspec.json.decode(text, type=Outcome)
+    except msgspec.ValidationError as error:
+        schema = _schema_in(text)
+        if schema is None or schema == OUTCOME_SCHEMA:
+            raise
+        raise msgspec.ValidationError(
+            f"a result of another version of cocalib ({schema}, this one reads {OUTCOME_SCHEMA}): name another folder with "
+            "--out, or use that version"
+        ) from error
+
+
+def _schema_in(text: str) -> str | None:
+    """Return the name of a document's schema, if it states one of ours."""
+    try:
+        schema = msgspec.json.decode(text, type=_Named).schema
+    except msgspec.DecodeError:
+        return None
+    return schema if schema.startswith("cocalib/") and schema.isprintable() else None
+
+
+class _Named(Struct):
+    schema: str

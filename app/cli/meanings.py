@@ -118,8 +118,8 @@ class MeaningFlags:
         Raises:
             CalibrationError: there is no recording or no camera, or they cannot be read.
         """
-        from app.cli.output import required_camera
         from app.hypothesis_sheet import contact_sheet, frame_with_returns, png
+        from app.required_camera import required_camera
         from calib_core.recordings import open_recording
 
         if not self.recording:

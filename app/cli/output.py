@@ -1,4 +1,4 @@
-"""Shared by the commands: reading and writing files, required intrinsics, progress."""
+"""Shared by the commands: reading and writing files, what is printed to stderr, progress."""
 
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -8,26 +8,21 @@ from typing import TYPE_CHECKING
 
 from app import whole_file
 from app.terminal import terminal_stream
+from app.text_files import read_text
 from calib_core.errors import InputError
-from calib_core.input_files import file_text, read_input
 
 if TYPE_CHECKING:
-    from calib_core.camera import Camera
-    from calib_core.interchange import CameraFile
-    from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
+    from calib_core.measurements import ReflectorClick, Unsolvable
     from calib_core.recordings import Recording
 
 __all__ = [
     "explain_unsolvable",
     "progress_bar",
     "read_text",
-    "required_camera",
-    "seconds_text",
+    "tell_notes",
     "told_clicks_at_frames",
     "write_whole",
 ]
-
-_MAX_TEXT_BYTES = 64 * 1024 * 1024
 
 
 def explain_unsolvable(outcome: "Unsolvable", *, what: str = "no calibration") -> int:
@@ -45,22 +40,6 @@ def explain_unsolvable(outcome: "Unsolvable", *, what: str = "no calibration") -
     return 1
 
 
-def read_text(path: Path) -> str:
-    """Read a text file.
-
-    Raises:
-        InputError: it is missing, a folder, a pipe or a device, unreadable, too large or not text.
-    """
-    try:
-        return file_text(read_input(path, max_bytes=_MAX_TEXT_BYTES, is_what="a file of clicks or pairs"))
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file; check the path") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: not a text file (byte {error.start} is not UTF-8)") from error
-
-
 def write_whole(path: Path, content: str | bytes) -> None:
     """Write a file atomically: a reader finds the old or the new content, never a part.
 
@@ -71,31 +50,6 @@ def write_whole(path: Path, content: str | bytes) -> None:
         whole_file.write_whole(path, content.encode("utf-8") if isinstance(content, str) else content)
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {(error.strerror or str(error)).lower()}") from error
-
-
-def required_camera(recording: "Recording", camera_file: "CameraFile | None") -> "Camera":
-    """Return the intrinsics: from the file if one is given, else from the recording.
-
-    Raises:
-        InputError: there are none.
-    """
-    from app.solving import camera_for, intrinsics_near
-
-    camera = camera_for(recording, camera_file)
-    if camera is None:
-        found = (
-            f"{recording.camera_info_topic} has none that can be used"
-            if recording.camera_info_topic
-            else "it has no CameraInfo topic"
-        )
-        near = intrinsics_near(recording.paths)
-        raise InputError(
-            f"{recording.paths[0].name}: no intrinsics for {recording.image_topic}: {found}; "
-            "give them with --camera FILE (ROS camera_info YAML, OpenCV YAML or XML, Kalibr camchain, JSON)"
-            + (f", such as --camera {near}" if near else "")
-            + "; or calibrate the lens from pictures of a board: cocalib intrinsics --help"
-        )
-    return camera
 
 
 @contextmanager
@@ -128,14 +82,11 @@ def told_clicks_at_frames(
     from app.session.click_stamps import clicks_at_frames
 
     found = clicks_at_frames(clicks, recording.image_times, source=source)
-    for line in found.moved:
-        print(f"note: {line}", file=sys.stderr)
+    tell_notes(found.moved)
     return found.clicks
 
 
-def seconds_text(time: "TimeNs") -> str:
-    """Write a stamp as seconds with all its digits."""
-    from calib_core.measurements import time_parts
-
-    sec, nanosec = time_parts(time)
-    return f"{sec}.{nanosec:09d} s"
+def tell_notes(notes: Sequence[str]) -> None:
+    """Print what a user may want to know to stderr, a line for each."""
+    for line in notes:
+        print(f"note: {line}", file=sys.stderr)

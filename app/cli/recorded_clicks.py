@@ -1,77 +1,25 @@
-"""Clicks of a file for a recording: checked that they are of it, and moved to its frames."""
+"""Clicks of a file for a recording, with a note on stderr for each that is moved to a frame."""
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-import numpy as np
-
-from app.cli.output import read_text, seconds_text, told_clicks_at_frames
+from app.cli.output import tell_notes
+from app.recorded_clicks import clicks_in_recording
 from calib_core.camera import Camera
-from calib_core.errors import InputError
-from calib_core.interchange.own.clicks_json import ClicksFile, read_clicks_file
-from calib_core.measurements import ReflectorClick, TimeNs
+from calib_core.measurements import ReflectorClick
+from calib_core.recordings import Recording
 
-if TYPE_CHECKING:
-    from calib_core.recordings import Recording
-
-__all__ = ["file_of_clicks", "recorded_clicks", "require_confirmed"]
-
-
-def file_of_clicks(path: Path) -> ClicksFile:
-    """Read a clicks-1 file.
-
-    Raises:
-        InputError: it cannot be read.
-    """
-    return read_clicks_file(read_text(path), source=str(path))
+__all__ = ["recorded_clicks"]
 
 
 def recorded_clicks(
-    clicks: Sequence[ReflectorClick], recording: "Recording", camera: Camera, *, source: Path
+    clicks: Sequence[ReflectorClick], recording: Recording, camera: Camera, *, source: Path
 ) -> tuple[ReflectorClick, ...]:
     """Return the clicks of a file at the frames of a recording.
 
     Raises:
         InputError: a click is not of this recording.
     """
-    _require_inside(clicks, recording, camera, source=source)
-    return told_clicks_at_frames(clicks, recording, source=str(source))
-
-
-def require_confirmed(recording: "Recording") -> None:
-    """Refuse a recording whose units, signs or meanings are assumed.
-
-    Raises:
-        InputError: there is an unconfirmed assumption; all are named.
-    """
-    if recording.assumptions:
-        named = "; ".join(f"{one.topic}: {one.text} (confirm: {one.confirm})" for one in recording.assumptions)
-        raise InputError(
-            f"{recording.name}: the recording does not state everything that is needed: {named}; "
-            "state what is right, or confirm all of it with --confirm-assumptions"
-        )
-
-
-def _require_inside(clicks: Sequence[ReflectorClick], recording: "Recording", camera: Camera, *, source: Path) -> None:
-    """Refuse clicks that cannot belong to this recording.
-
-    Raises:
-        InputError: a click is outside the recording or the image; the first one is named.
-    """
-    from app.session.click_stamps import half_interval_ns
-
-    first, last = int(recording.image_times[0]), int(recording.image_times[-1])
-    half_ns = half_interval_ns(recording.image_times)
-    for click in clicks:
-        if not first - half_ns <= click.image_time <= last + half_ns:
-            raise InputError(
-                f"{source}: click {click.id} at {seconds_text(click.image_time)} is outside the recording, "
-                f"whose frames run from {seconds_text(TimeNs(first))} to {seconds_text(TimeNs(last))}; "
-                "give the clicks of this recording"
-            )
-        if not camera.in_image(np.array([[click.u_px, click.v_px]]))[0]:
-            raise InputError(
-                f"{source}: click {click.id} at ({click.u_px:g}, {click.v_px:g}) px is outside the image of "
-                f"{camera.width_px} x {camera.height_px} px; give the clicks of this recording"
-            )
+    found = clicks_in_recording(clicks, recording, camera, source=source)
+    tell_notes(found.moved)
+    return found.clicks

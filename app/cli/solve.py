@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Self
 import tyro
 
 from app.cli.flags import File, Switch
-from app.cli.output import explain_unsolvable, read_text, required_camera, write_whole
+from app.cli.output import explain_unsolvable, read_text, write_whole
 from app.cli.recording_flags import CameraPosition, MeasuredCamera, Options, Recordings, TopicFlags, Topics
 from app.terminal import print_exactly
 from app.view import summary_lines
@@ -111,7 +111,8 @@ class Solve:
 
     def _solve_recording(self) -> int:
         from app.automatic_solving import solve_placed_clicks
-        from app.cli.recorded_clicks import require_confirmed
+        from app.recorded_clicks import require_confirmed
+        from app.required_camera import required_camera
         from app.solving import calibration_text
         from calib_core.interchange import CameraFile
         from calib_core.recordings import open_recording
@@ -146,7 +147,7 @@ class Solve:
                 raise InputError(f"{path}: the folder {path.parent} does not exist; create it first")
 
     def _clicks_file(self) -> "ClicksFile":
-        from app.cli.recorded_clicks import file_of_clicks
+        from app.recorded_clicks import file_of_clicks
         from calib_core.interchange.own.clicks_json import ClicksFile
 
         return ClicksFile(()) if self.clicks is None else file_of_clicks(self.clicks)

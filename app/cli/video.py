@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 from app.cli.flags import File, NewFile, Switch, called
-from app.cli.output import progress_bar, seconds_text
+from app.cli.output import progress_bar
 from app.cli.recording_flags import Recordings, TopicFlags, Topics
 from app.cli.shown_recording import ShownFlags, shown_recording
 from calib_core.errors import InputError
@@ -60,6 +60,8 @@ class Video:
             progress_bar("writing frames") as progress,
         ):
             written = write_video(recording, self.out, progress=progress)
+        from app.recorded_clicks import seconds_text
+
         print(f"{self.out}: {written.frames} frames, {written.duration_s:.3f} s, from {seconds_text(written.start)}")
         for warning in recording.warnings:
             if warning.code in ("picture-sizes", "unreadable-pictures"):

@@ -19,6 +19,8 @@ class SharedDocument(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     camera_serial: Name | None = None
     auto: bool = False
     camera: str | None = None
+    rescale_camera: bool = False
+    reflector_m: Annotated[float, Meta(ge=0.02, le=2.0)] = 0.24
     camera_position_m: tuple[float, float, float] | None = None
     camera_position_sigma_m: float | None = None
     exports: tuple[str, ...] = ()

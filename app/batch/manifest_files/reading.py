@@ -25,7 +25,7 @@ _MOST_BYTES = 64 * 1024 * 1024
 _SEPARATOR = ";"
 _SEVERAL = ("recording", "exports", "camera_position_m", "map")
 """Columns of a CSV manifest that hold several values."""
-_SWITCHES = ("auto", "confirm_assumptions")
+_SWITCHES = ("auto", "rescale_camera", "confirm_assumptions")
 _YES_NO = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
 _TAPE_SIGMA_M = 0.01
 
@@ -125,7 +125,7 @@ def _value(name: str, cell: str, where: str) -> Any:
         if cell.lower() not in _YES_NO:
             raise InputError(f"{where}: {name}: '{cell}'; write yes or no")
         return _YES_NO[cell.lower()]
-    if key == "camera_position_sigma_m":
+    if key in ("camera_position_sigma_m", "reflector_m"):
         return _number(cell, where, name)
     return _scalar(cell) if name.startswith("options.") else cell
 
@@ -184,6 +184,8 @@ def _row(document: SessionDocument, place: str, path: Path) -> ManifestRow:
         topics=document.topics,
         options=_options(document, where),
         exports=document.exports,
+        rescale_camera=document.rescale_camera,
+        reflector_m=document.reflector_m,
         place=place,
     )
 

@@ -73,13 +73,15 @@ class Compare:
 
     def _on_recording(self, a: Path, b: Path, camera: "Camera | None") -> "tuple[ComparedOnRecording, Camera]":
         """Judge both on the recording; also return the lens to compare their poses through."""
-        from app.cli.evaluation.judged_calibration import judged_calibration
         from app.comparing import compare_on_recording
+        from app.judged_calibration import judged_calibration
         from calib_core.recordings import open_recording
 
         options = self.evidence.options()
         with open_recording(self.recording, self.topics, require=("radar",)) as recording:
-            of_a, of_b = (judged_calibration(one, recording, frames=self.frames, camera=camera) for one in (a, b))
+            of_a, of_b = (
+                judged_calibration(self.frames.read([one])[0], one, recording, camera=camera) for one in (a, b)
+            )
             clicks = self.evidence.clicks_in(recording, self.recording, [of_a.found, of_b.found])
             boxes, labels = self.evidence.boxes_in(recording)
             if not clicks and boxes is None:

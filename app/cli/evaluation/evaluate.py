@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Evaluate"]
 
-_DOUBTFUL = frozenset({"other-lens", "no-target-in-a-box", "turned-from-boxes", "mostly-moving"})
-
 
 @dataclass(frozen=True, slots=True)
 class Evaluate:
@@ -46,12 +44,13 @@ class Evaluate:
 
     def run(self) -> int:
         """Print the figures; return the exit code."""
+        from app.evaluating import evaluation_exit_code
         from calib_core.evaluation import evaluation_json, evaluation_lines
 
         if self.calibration is None or not self.recording:
             raise InputError("evaluate needs a calibration and a recording; see cocalib evaluate --help")
         evaluation = self._evaluation(self.calibration)
-        code = _exit_code(evaluation)
+        code = evaluation_exit_code(evaluation)
         if self.json:
             names = [path.name for path in self.recording]
             print_exactly(
@@ -62,15 +61,15 @@ class Evaluate:
         return code
 
     def _evaluation(self, path: Path) -> "Evaluation":
-        from app.cli.evaluation.judged_calibration import judged_calibration
         from app.evaluating import evaluate_recording
+        from app.judged_calibration import judged_calibration
         from calib_core.interchange import read_camera_file
         from calib_core.recordings import open_recording
 
         options = self.evidence.options()
         camera = None if self.camera is None else read_camera_file(self.camera)
         with open_recording(self.recording, self.topics, require=("radar",)) as recording:
-            judged = judged_calibration(path, recording, frames=self.frames, camera=camera)
+            judged = judged_calibration(self.frames.read([path])[0], path, recording, camera=camera)
             clicks = self.evidence.clicks_in(recording, self.recording, [judged.found])
             boxes, labels = self.evidence.boxes_in(recording)
             if not clicks and boxes is None:
@@ -92,10 +91,3 @@ class Evaluate:
             if recording.radar_choice:
                 print(f"radar: {recording.radar_choice}", file=sys.stderr)
             return replace(evaluation, warnings=(*judged.warnings, *evaluation.warnings))
-
-
-def _exit_code(evaluation: "Evaluation") -> int:
-    residuals, boxes = evaluation.residuals, evaluation.boxes
-    if residuals is None and (boxes is None or boxes.acc is None):
-        return 1
-    return 3 if any(one.code in _DOUBTFUL for one in evaluation.warnings) else 0

@@ -98,7 +98,7 @@ class Report:
         self, found: "ImportedCalibration", other: "ImportedCalibration | None", camera: "Camera | None"
     ) -> "tuple[ReportSubject, tuple[str, ...]]":
         """Return what is reported with what the recording says of it, and which of two calibrations is better on it."""
-        from app.cli.evaluation.judged_calibration import require_size
+        from app.judged_calibration import require_size
         from app.recording_check import other_camera
         from app.report import known_calibration, subject_of, watched
         from calib_core.recordings import open_recording

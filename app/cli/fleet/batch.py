@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from app.cli.flags import Folder, called
-from app.cli.output import write_whole
+from app.cli.output import progress_bar, write_whole
 from calib_core.errors import InputError
 
 if TYPE_CHECKING:
     from app.batch.engines.engine import Engine
-    from app.batch.job import Job
     from app.batch.manifest import Manifest
 
 __all__ = ["Batch"]
@@ -83,11 +82,17 @@ class Batch:
 
     def _calibrate(self, manifest: "Manifest") -> int:
         from app.batch.driving import drive
+        from app.batch.job import jobs_of
         from app.batch.results_folder import ResultsFolder
         from app.cli.fleet.batch_text import batch_lines, exit_code, shown_batch
 
         results = ResultsFolder(self.out or manifest.source.with_suffix(""))
-        jobs = _jobs(manifest)
+        try:
+            results.remove_leftovers()
+            with progress_bar("reading recordings") as progress_bytes:
+                jobs = jobs_of(manifest.rows, results.path, progress_bytes)
+        except OSError as error:
+            raise InputError(f"{results.path}: cannot be written: {(error.strerror or str(error)).lower()}") from error
         with shown_batch(len(jobs)) as progress:
             outcomes = drive(jobs, self._engine(len(jobs)), results, progress)
         print("\n".join(batch_lines(outcomes)))
@@ -100,11 +105,3 @@ class Batch:
         if self.workers is not None or self.scheduler is not None or self.engine == "dask":
             return DaskCluster(self.workers, self.scheduler)
         return InProcess()
-
-
-def _jobs(manifest: "Manifest") -> "tuple[Job, ...]":
-    import hashlib
-
-    from app.batch.job import job_of
-
-    return tuple(job_of(row, lambda path: hashlib.sha256(path.read_bytes()).hexdigest()) for row in manifest.rows)

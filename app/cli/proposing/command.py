@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from app.cli.flags import File, Switch
-from app.cli.output import explain_unsolvable, required_camera, write_whole
+from app.cli.output import explain_unsolvable, write_whole
 from app.cli.recording_flags import CameraPosition, MeasuredCamera, Options, Recordings, TopicFlags, Topics
 from app.terminal import print_exactly
 from calib_core.errors import InputError
@@ -52,8 +52,10 @@ class Propose:
     def run(self) -> int:
         """Find the proposals and print them; return the exit code."""
         from app.cli.proposing.flags import checked_reflector_m, shown_progress
-        from app.cli.recorded_clicks import file_of_clicks, recorded_clicks, require_confirmed
+        from app.cli.recorded_clicks import recorded_clicks
         from app.proposing import find_proposals
+        from app.recorded_clicks import file_of_clicks, require_confirmed
+        from app.required_camera import required_camera
         from calib_core.interchange import CameraFile
         from calib_core.measurements import Unsolvable
         from calib_core.recordings import open_recording

@@ -24,7 +24,7 @@ from calib_core.interchange.own.lens_documents import (
 from calib_core.interchange.own.proposal_documents import PROPOSALS_SCHEMA, ProposalsDocument
 from calib_core.interchange.syntax.json_text import json_text
 
-__all__ = ["schema_texts", "write_schemas"]
+__all__ = ["schema_file_name", "schema_text", "schema_texts", "write_schemas"]
 
 _DOCUMENTS: dict[str, Any] = {
     CLICKS_SCHEMA: ClicksDocument,
@@ -40,15 +40,27 @@ _DOCUMENTS: dict[str, Any] = {
 
 def schema_texts() -> dict[str, str]:
     """Return the JSON Schema (2020-12) of each of our files, keyed by the file name of the schema."""
-    texts = {}
-    for name, document in _DOCUMENTS.items():
-        head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": name}
-        schema = {**head, **msgspec.json.schema(document)}
-        for part, definition in schema["$defs"].items():
-            if part.endswith(("Options", "Prior")):  # settings: the reader refuses unknown keys
-                definition["additionalProperties"] = False
-        texts[f"{name.removeprefix('cocalib/')}.schema.json"] = json_text(_null_last(schema))
-    return texts
+    return {schema_file_name(name): schema_text(name, document) for name, document in _DOCUMENTS.items()}
+
+
+def schema_file_name(name: str) -> str:
+    """Return the file name of a schema, such as outcome-1.schema.json of cocalib/outcome-1."""
+    return f"{name.removeprefix('cocalib/')}.schema.json"
+
+
+def schema_text(name: str, document: Any) -> str:
+    """Return the JSON Schema (2020-12) of a kind of file.
+
+    Args:
+        name: of the schema, such as cocalib/clicks-1.
+        document: the type of its content.
+    """
+    head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": name}
+    schema = {**head, **msgspec.json.schema(document)}
+    for part, definition in schema["$defs"].items():
+        if part.endswith(("Options", "Prior")):  # settings: the reader refuses unknown keys
+            definition["additionalProperties"] = False
+    return json_text(_null_last(schema))
 
 
 def write_schemas(folder: Path) -> None:

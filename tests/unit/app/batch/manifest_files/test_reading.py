@@ -152,3 +152,17 @@ def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(InputError, match="not a text file"):
         read_manifest(tmp_path / "binary.toml")
+
+
+def test_the_size_of_the_reflector_and_resized_pictures(tmp_path: Path) -> None:
+    toml, table = tmp_path / "fleet.toml", tmp_path / "fleet.csv"
+    toml.write_text(
+        '[defaults]\nreflector_m = 0.3\n[[session]]\nvehicle = "a"\nrecording = "a.bag"\nrescale_camera = true\n'
+    )
+    table.write_text("vehicle,recording,reflector_m,rescale_camera\na,a.bag,0.3,yes\n")
+    for path in (toml, table):
+        (row,) = read_manifest(path).rows
+        assert (row.reflector_m, row.rescale_camera) == (0.3, True)
+    toml.write_text('[[session]]\nvehicle = "a"\nrecording = "a.bag"\nreflector_m = 24\n')
+    with pytest.raises(InputError, match="reflector_m"):
+        read_manifest(toml)

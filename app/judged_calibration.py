@@ -1,17 +1,14 @@
-"""A calibration that is to be judged on a recording: read from any format, with a lens that fits the recording."""
+"""A calibration that is to be judged on a recording: with a lens that fits the recording."""
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from app.recording_check import calibration_of, other_camera
+from calib_core.camera import Camera
 from calib_core.errors import InputError
-
-if TYPE_CHECKING:
-    from app.cli.tree_flags import FrameFlags
-    from calib_core.camera import Camera
-    from calib_core.interchange import ImportedCalibration
-    from calib_core.recordings import Recording
-    from calib_core.results import Calibration, DataWarning
+from calib_core.interchange import ImportedCalibration
+from calib_core.recordings import Recording
+from calib_core.results import Calibration, DataWarning
 
 __all__ = ["JudgedCalibration", "judged_calibration", "require_size"]
 
@@ -26,29 +23,25 @@ class JudgedCalibration:
         warnings: about the lens, and about the recording if the calibration names another.
     """
 
-    found: "ImportedCalibration"
-    calibration: "Calibration"
-    warnings: "tuple[DataWarning, ...]"
+    found: ImportedCalibration
+    calibration: Calibration
+    warnings: tuple[DataWarning, ...]
 
 
 def judged_calibration(
-    path: Path, recording: "Recording", *, frames: "FrameFlags", camera: "Camera | None"
+    found: ImportedCalibration, path: Path, recording: Recording, *, camera: Camera | None = None
 ) -> JudgedCalibration:
-    """Read a calibration that is to be judged on a recording.
+    """Return what was read as a calibration that can be judged on a recording.
 
     Args:
-        path: of its file.
+        found: what was read.
+        path: of its file, for messages.
         recording: that it is judged on.
-        frames: which frames of a tree.
         camera: the intrinsics, if the file has none.
 
     Raises:
-        InputError: it cannot be read, there are no intrinsics, or they are of pictures of another size.
+        InputError: there are no intrinsics, or they are of pictures of another size.
     """
-    from app.recording_check import calibration_of, other_camera
-    from calib_core.results import DataWarning
-
-    found, _ = frames.read([path])
     recorded = recording.camera()
     calibration = calibration_of(found, str(path), camera or recorded)
     require_size(calibration.camera, recording, path)
@@ -58,7 +51,7 @@ def judged_calibration(
     )
 
 
-def require_size(camera: "Camera", recording: "Recording", path: Path) -> None:
+def require_size(camera: Camera, recording: Recording, path: Path) -> None:
     """Refuse a calibration for pictures of another size.
 
     Raises:

@@ -1,0 +1,211 @@
+"""Whatever goes wrong in a job is an outcome in words, and says whether another run may go well."""
+
+import dataclasses
+import errno
+import json
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.batch.job import Job, jobs_of
+from app.batch.manifest import ManifestRow
+from app.batch.outcome import Outcome
+from app.batch.results_folder import LOG_FILE, ResultsFolder
+from app.batch.running import run_job, running_job, steps
+from calib_core.errors import InputError, RecordingError
+from calib_core.measurements import Unsolvable
+
+SAMPLE = Path(__file__).resolve().parents[5] / "sample_data" / "rooftop"
+
+
+@pytest.fixture
+def row(tmp_path: Path) -> ManifestRow:
+    """A session whose files may be changed."""
+    for name in ("radar.bag", "camera.bag", "clicks.json"):
+        shutil.copy(SAMPLE / name, tmp_path / name)
+    return ManifestRow(
+        "van", "1", (tmp_path / "radar.bag", tmp_path / "camera.bag"), clicks=tmp_path / "clicks.json", place="line 2"
+    )
+
+
+def job_of(row: ManifestRow, results: Path) -> Job:
+    (job,) = jobs_of([row], results)
+    return job
+
+
+def outcome_of(row: ManifestRow, results: Path) -> Outcome:
+    """Run the job of a row; what is final is kept, and only that counts as done."""
+    job = job_of(row, results)
+    outcome = run_job(job, results)
+    assert (ResultsFolder(results).outcome(job.digest) is not None) == outcome.is_final
+    assert "\n" not in outcome.reason + outcome.hint
+    assert outcome.digest == job.digest
+    return outcome
+
+
+def raising(error: BaseException) -> Callable[..., object]:
+    def fail(*_arguments: object, **_flags: object) -> object:
+        raise error
+
+    return fail
+
+
+@pytest.mark.parametrize("name", ["radar.bag", "clicks.json"])
+def test_a_missing_file_is_not_final(name: str, row: ManifestRow, tmp_path: Path) -> None:
+    (tmp_path / name).unlink()
+    outcome = outcome_of(row, tmp_path / "results")
+    assert (outcome.status, outcome.is_final) == ("failed", False)
+    assert name in outcome.reason
+
+
+def test_a_file_that_only_the_worker_misses_is_not_final(
+    row: ManifestRow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def unreached(*_arguments: object, **_flags: object) -> object:
+        try:
+            raise OSError(errno.ESTALE, "stale file handle", "radar.bag")
+        except OSError as error:
+            raise RecordingError("radar.bag: cannot be read") from error
+
+    monkeypatch.setattr(steps, "open_recording", unreached)
+    assert not outcome_of(row, tmp_path / "results").is_final
+
+
+def test_a_broken_recording_is_final(row: ManifestRow, tmp_path: Path) -> None:
+    (tmp_path / "radar.bag").write_bytes(b"#ROSBAG V2.0\n")
+    outcome = outcome_of(dataclasses.replace(row, recording=row.recording[:1]), tmp_path / "results")
+    assert (outcome.status, outcome.is_final) == ("failed", True)
+    assert "radar.bag" in outcome.reason
+
+
+def test_clicks_that_are_no_clicks_are_final(row: ManifestRow, tmp_path: Path) -> None:
+    (tmp_path / "clicks.json").write_text("[]")
+    outcome = outcome_of(row, tmp_path / "results")
+    assert (outcome.status, outcome.is_final, outcome.files) == ("failed", True, ())
+
+
+def test_clicks_of_another_recording_are_refused_as_the_command_does(row: ManifestRow, tmp_path: Path) -> None:
+    document = json.loads((tmp_path / "clicks.json").read_text())
+    document["clicks"][0]["image_time"]["sec"] += 1000
+    (tmp_path / "clicks.json").write_text(json.dumps(document))
+    outcome = outcome_of(row, tmp_path / "results")
+    assert outcome.status == "failed"
+    assert "outside the recording" in outcome.reason
+
+
+def test_nothing_was_clicked(row: ManifestRow, tmp_path: Path) -> None:
+    outcome = outcome_of(dataclasses.replace(row, clicks=None), tmp_path / "results")
+    assert (outcome.status, outcome.reason, outcome.is_final) == ("refused", "nothing was clicked", True)
+    assert outcome.recorded_ns is not None
+    assert outcome.steps == {}
+
+
+def test_too_few_clicks_are_refused_with_a_hint(row: ManifestRow, tmp_path: Path) -> None:
+    document = json.loads((tmp_path / "clicks.json").read_text())
+    (tmp_path / "clicks.json").write_text(json.dumps({**document, "clicks": document["clicks"][:2]}))
+    outcome = outcome_of(row, tmp_path / "results")
+    assert (outcome.status, outcome.is_final, outcome.files) == ("refused", True, ())
+    assert outcome.reason
+    assert outcome.hint
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (MemoryError(), "not enough memory"),
+        (np.exceptions.AxisError("a\nb"), "internal error (AxisError: a b)"),
+        (PermissionError(errno.EACCES, "Permission denied", "camera.bag"), "camera.bag: permission denied"),
+        (OSError("av: invalid data"), "internal error (OSError: av: invalid data)"),
+    ],
+)
+def test_what_nobody_expected_is_not_final(
+    error: Exception, words: str, row: ManifestRow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(steps, "solve_session", raising(error))
+    outcome = outcome_of(row, tmp_path / "results")
+    assert (outcome.status, outcome.is_final) == ("failed", False)
+    assert outcome.reason.startswith(words)
+    log = ResultsFolder(tmp_path / "results").folder_of(outcome.digest) / LOG_FILE
+    assert log.is_file() == ("internal error" in words)
+    assert not log.is_file() or "Traceback" in log.read_text(encoding="utf-8")
+    monkeypatch.undo()
+    assert outcome_of(row, tmp_path / "results").status == "solved"
+
+
+def test_to_be_interrupted_is_no_outcome(row: ManifestRow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(steps, "solve_session", raising(KeyboardInterrupt()))
+    with pytest.raises(KeyboardInterrupt):
+        outcome_of(row, tmp_path / "results")
+    assert not (tmp_path / "results" / "results").exists()
+
+
+@pytest.mark.parametrize(
+    ("step", "function", "error", "final", "files"),
+    [
+        ("evaluate", "judge_session", InputError("no box"), True, {"calibration.json", "report.html", "export/kitti.txt"}),
+        ("report", "report_session", ValueError("a bug"), False, {"calibration.json", "evaluation.json", "export/kitti.txt"}),
+        ("export", "export_session", InputError("no"), True, {"calibration.json", "evaluation.json", "report.html"}),
+    ],
+)  # fmt: skip
+def test_a_step_fails_on_its_own(
+    step: str,
+    function: str,
+    error: Exception,
+    final: bool,
+    files: set[str],
+    row: ManifestRow,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def export(*_arguments: object) -> dict[str, bytes]:
+        return {"export/kitti.txt": b"P2: 1"}
+
+    monkeypatch.setattr(steps, "export_session", export)
+    monkeypatch.setattr(steps, "report_session", lambda *_: "<p>report</p>")
+    monkeypatch.setattr(steps, function, raising(error))
+    outcome = outcome_of(dataclasses.replace(row, exports=("kitti",)), tmp_path / "results")
+    assert (outcome.status, outcome.is_final) == ("solved", final)
+    assert outcome.steps == {"evaluate": "done", "report": "done", "export": "done"} | {step: "failed"}
+    assert [name.split()[0] for name in outcome.step_reasons] == [step]
+    assert str(error) in next(iter(outcome.step_reasons.values()))
+    assert {file.name for file in outcome.files} == files
+
+
+def test_an_input_that_changes_while_the_job_runs_is_no_result(
+    row: ManifestRow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def change(*_arguments: object) -> Unsolvable:
+        os.utime(tmp_path / "camera.bag", (1, 1))
+        return Unsolvable("too-few-pairs", "reason", "hint")
+
+    monkeypatch.setattr(steps, "solve_session", change)
+    outcome = outcome_of(row, tmp_path / "results")
+    assert (outcome.status, outcome.is_final) == ("failed", False)
+    assert "an input changed" in outcome.reason
+    assert not (tmp_path / "results" / "results").exists()
+
+
+def test_an_input_that_changed_before_the_job_ran_is_not_read(
+    row: ManifestRow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    job = job_of(row, tmp_path / "results")
+    with (tmp_path / "camera.bag").open("ab") as file:
+        file.write(b"more")
+    monkeypatch.setattr(running_job, "run_steps", raising(AssertionError("it is read")))
+    assert "an input changed" in run_job(job, tmp_path / "results").reason
+
+
+def test_a_full_disk_is_an_outcome_that_nobody_keeps(
+    row: ManifestRow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(steps, "solve_session", lambda *_: Unsolvable("too-few-pairs", "reason", "hint"))
+    monkeypatch.setattr(running_job, "listed_files", raising(OSError(errno.ENOSPC, "No space left on device")))
+    outcome = outcome_of(row, tmp_path / "results")
+    assert (outcome.status, outcome.is_final) == ("failed", False)
+    assert outcome.reason == f"{tmp_path / 'results'}: the result cannot be written: no space left on device"
+    assert "make room" in outcome.hint
+    assert list((tmp_path / "results" / "results").iterdir()) == []

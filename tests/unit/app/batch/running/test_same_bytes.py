@@ -1,0 +1,142 @@
+"""A job gives the bytes of the commands."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from app import automatic_solving
+from app.automatic_solving import PlacedClicks
+from app.batch.job import jobs_of
+from app.batch.manifest import ManifestRow
+from app.batch.outcome import Outcome
+from app.batch.results_folder import OUTCOME_FILE, ResultsFolder
+from app.batch.running import run_job, solving
+from app.cli import run
+from calib_core.options import CalibrationOptions, CameraPositionPrior, RefiningOptions, SolvingOptions
+from calib_core.results import UnconfirmedClicks
+
+SAMPLE = Path(__file__).resolve().parents[5] / "sample_data" / "rooftop"
+BAGS = (SAMPLE / "radar.bag", SAMPLE / "camera.bag")
+CLICKS = SAMPLE / "clicks.json"
+
+
+def done(row: ManifestRow, results: Path) -> tuple[Outcome, dict[str, bytes]]:
+    """Run the job of a row; return its outcome and its files."""
+    (job,) = jobs_of([row], results)
+    outcome = run_job(job, results)
+    folder = ResultsFolder(results).folder_of(job.digest)
+    files = {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    files.pop(OUTCOME_FILE)
+    return outcome, files
+
+
+class Commands:
+    """Runs commands on the sample and keeps what they write."""
+
+    def __init__(self, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        self.folder, self.capsys = folder, capsys
+        self.calibration = folder / "calibration.json"
+
+    def solve(self, *flags: str | Path) -> bytes:
+        self._run("solve", *BAGS, *flags, "--out", self.calibration)
+        return self.calibration.read_bytes()
+
+    def evaluate(self, *flags: str | Path) -> bytes:
+        return self._run("evaluate", self.calibration, *BAGS, *flags, "--json").encode()
+
+    def report(self, *flags: str | Path) -> bytes:
+        self._run("report", self.calibration, *BAGS, *flags, "--out", self.folder / "report.html")
+        return (self.folder / "report.html").read_bytes()
+
+    def export(self, name: str, out: Path) -> None:
+        self._run("export", self.calibration, "--to", name, "--out", out)
+
+    def _run(self, *arguments: str | Path) -> str:
+        self.capsys.readouterr()
+        assert run([str(argument) for argument in arguments]) == 0
+        return self.capsys.readouterr().out
+
+
+@pytest.fixture
+def commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Commands:
+    (tmp_path / "commands").mkdir()
+    return Commands(tmp_path / "commands", capsys)
+
+
+def test_a_clicked_session(commands: Commands, tmp_path: Path) -> None:
+    row = ManifestRow("van", "1", BAGS, clicks=CLICKS, exports=("tf2", "opencv", "pack"))
+    outcome, files = done(row, tmp_path / "results")
+    assert (outcome.status, outcome.is_final, outcome.step_reasons) == ("solved", True, {})
+    assert outcome.steps == {"evaluate": "done", "report": "done", "export": "done"}
+    assert files["calibration.json"] == commands.solve("--clicks", CLICKS)
+    assert files["evaluation.json"] == commands.evaluate("--clicks", CLICKS)
+    assert files["report.html"] == commands.report("--clicks", CLICKS)
+    exports = tmp_path / "exports"
+    exports.mkdir()
+    commands.export("tf2", exports)
+    commands.export("opencv", exports)
+    (packed,) = (name for name in files if name.endswith(".zip"))
+    commands.export("pack", exports / Path(packed).name)
+    assert {name: data for name, data in files.items() if name.startswith("export/")} == {
+        f"export/{path.name}": path.read_bytes() for path in exports.iterdir()
+    }
+    again, same = done(row, tmp_path / "elsewhere")
+    assert same == files
+    assert same_but_for_the_run(again, outcome)
+
+
+def same_but_for_the_run(one: Outcome, other: Outcome) -> bool:
+    """Compare outcomes, times and host apart."""
+    return all(getattr(one, name) == getattr(other, name) for name in Outcome.__struct_fields__ if name != "run")
+
+
+def test_intrinsics_of_a_file_a_measured_position_and_options(commands: Commands, tmp_path: Path) -> None:
+    given = tmp_path / "camera.yaml"
+    commands.solve("--clicks", CLICKS)
+    commands.export("camera-info", given)
+    options = CalibrationOptions(
+        solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.045), 0.02)),
+        refining=RefiningOptions(intrinsics=True),
+    )
+    row = ManifestRow("van", "1", BAGS, clicks=CLICKS, camera=given, rescale_camera=True, options=options)
+    given_camera = solving.given_files(row).camera
+    assert given_camera is not None
+    assert given_camera.rescale
+    outcome, files = done(row, tmp_path / "results")
+    flags = ("--camera-position-m", "0", "0", "0.045", "--camera-position-sigma-m", "0.02", "--refine-intrinsics")
+    assert files["calibration.json"] == commands.solve(
+        "--clicks", CLICKS, "--camera", given, "--rescale-camera", *flags
+    )
+    assert json.loads(files["calibration.json"])["provenance"]["inputs"][-1]["name"] == "camera.yaml"
+    assert files["report.html"] == commands.report("--clicks", CLICKS)
+    assert outcome.steps["evaluate"] == "done"
+
+
+def test_clicks_of_a_person_and_of_nobody(commands: Commands, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    given = tmp_path / "clicks.json"
+    document = json.loads(CLICKS.read_text())
+    given.write_text(json.dumps({**document, "clicks": document["clicks"][:4]}))
+    sample = solving.file_of_clicks(CLICKS).clicks
+
+    def place(_recording: object, _camera: object, _options: object, **flags: object) -> PlacedClicks:
+        assert flags["reflector_m"] == 0.3
+        confirmed = flags["confirmed"]
+        assert isinstance(confirmed, tuple)
+        assert len(confirmed) == 4
+        known = {click.id for click in confirmed}
+        rest = tuple(click for click in reversed(sample) if click.id not in known)
+        return PlacedClicks((*confirmed, *rest), UnconfirmedClicks(tuple(one.id for one in rest), 0.99), "they agree")
+
+    monkeypatch.setattr(solving, "place_clicks", place)
+    monkeypatch.setattr(automatic_solving, "place_clicks", place)
+    outcome, files = done(ManifestRow("van", "1", BAGS, clicks=given, auto=True, reflector_m=0.3), tmp_path / "results")
+    placed = commands.folder / "clicks.json"
+    assert files["calibration.json"] == commands.solve(
+        "--clicks", given, "--auto", "--reflector-m", "0.3", "--clicks-out", placed
+    )
+    assert files["clicks.json"] == placed.read_bytes()
+    assert files["evaluation.json"] == commands.evaluate("--clicks", placed)
+    assert files["report.html"] == commands.report("--clicks", placed)
+    assert "nobody-confirmed" in outcome.warnings
+    assert any("they agree" in note for note in outcome.notes)

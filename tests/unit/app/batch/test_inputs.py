@@ -1,0 +1,77 @@
+"""Everything that opening a recording reads is an input: its files, and those beside and above it."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from app.batch.inputs import InputPath
+
+_OPENED = """
+import os, sys
+from pathlib import Path
+
+root, given = Path(sys.argv[1]), [Path(one) for one in sys.argv[2:]]
+opened = set()
+
+def hook(event, arguments):
+    if event == "open" and isinstance(arguments[0], (str, bytes, os.PathLike)):
+        path = Path(os.path.abspath(os.fsdecode(arguments[0])))
+        if path.is_relative_to(root) and path.is_file():
+            opened.add(str(path))
+
+from calib_core.recordings import open_recording, RecordingOptions
+sys.addaudithook(hook)
+with open_recording(given, RecordingOptions(confirm_assumptions=True), require=("image",)) as recording:
+    recording.camera()
+    recording.image(0)
+print("\\n".join(sorted(opened)))
+"""
+
+_P2 = "P2: " + " ".join(["700", "0", "32", "0", "0", "700", "24", "0", "0", "0", "1", "0"]) + "\n"
+
+
+def pictures(folder: Path, names: tuple[str, ...]) -> Path:
+    """Write small pictures."""
+    import cv2
+    import numpy as np
+
+    folder.mkdir(parents=True)
+    for name in names:
+        assert cv2.imwrite(str(folder / name), np.full((48, 64, 3), 80, dtype=np.uint8))
+    return folder
+
+
+def kitti_frames(root: Path) -> Path:
+    folder = pictures(root / "set" / "image_2", ("000000.png", "000001.png"))
+    (root / "set" / "calib").mkdir()
+    for name in ("000000.txt", "000001.txt"):
+        (root / "set" / "calib" / name).write_text(_P2)
+    (root / "set" / "timestamps.txt").write_text("1760000000.0\n1760000000.1\n")
+    return folder
+
+
+def kitti_raw(root: Path) -> Path:
+    folder = pictures(root / "day" / "drive" / "image_02" / "data", ("0.png", "1.png"))
+    (folder.parent / "timestamps.txt").write_text("2026-01-01 10:00:00.000000000\n2026-01-01 10:00:00.100000000\n")
+    (root / "day" / "calib_cam_to_cam.txt").write_text(_P2.replace("P2", "P_rect_02") + "S_rect_02: 64 48\n")
+    return folder
+
+
+def table_beside(root: Path) -> Path:
+    folder = pictures(root / "camera", ("a.png", "b.png"))
+    (root / "camera.csv").write_text("file,time_ns\na.png,1760000000000000000\nb.png,1760000000100000000\n")
+    return folder
+
+
+@pytest.mark.parametrize(("layout", "beside"), [(kitti_frames, 2), (kitti_raw, 2), (table_beside, 1)])
+def test_what_opening_reads_is_an_input(layout, beside: int, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    given = layout(tmp_path)
+    command = [sys.executable, "-c", _OPENED, str(tmp_path), str(given)]
+    printed = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    assert printed.returncode == 0, printed.stderr
+    opened = set(printed.stdout.split("\n")) - {""}
+    inputs = {str(file.path) for file in InputPath("recording", given).files()}
+    assert opened <= inputs
+    assert len({path for path in opened if not Path(path).is_relative_to(given)}) >= beside

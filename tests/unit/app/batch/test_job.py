@@ -1,0 +1,192 @@
+"""The digest of a job: everything that the result depends on, and nothing else."""
+
+import dataclasses
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from app.batch import input_digests
+from app.batch.input_digests import InputDigests
+from app.batch.inputs import inputs_of, state_of
+from app.batch.job import Job, jobs_of
+from app.batch.manifest import ManifestRow
+from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
+from calib_core.recordings import RecordingOptions
+
+
+def put(path: Path, content: str = "content", age_s: float = 60.0) -> Path:
+    """Write a file that was changed a while ago."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(content)
+    then_s = path.stat().st_mtime - age_s
+    os.utime(path, (then_s, then_s))
+    return path
+
+
+@pytest.fixture
+def row(tmp_path: Path) -> ManifestRow:
+    recording = put(tmp_path / "in" / "drive.bag"), put(tmp_path / "in" / "pictures" / "1.jpg").parent
+    return ManifestRow("van", "1", recording, place="line 3")
+
+
+@pytest.fixture(autouse=True)
+def settled(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Take every file as unchanged for long enough."""
+    monkeypatch.setattr(input_digests, "_SETTLED_NS", 0)
+
+
+def job_of(row: ManifestRow, results: Path) -> Job:
+    (job,) = jobs_of([row], results)
+    return job
+
+
+CHANGES: dict[str, Callable[[Path], object]] = {
+    "vehicle": lambda _: "bus",
+    "session": lambda _: "2",
+    "recording": lambda folder: (put(folder / "in" / "drive.bag"),),
+    "vehicle_type": lambda _: "long van",
+    "radar_serial": lambda _: "R1",
+    "camera_serial": lambda _: "C1",
+    "clicks": lambda folder: put(folder / "clicks.json"),
+    "auto": lambda _: True,
+    "camera": lambda folder: put(folder / "camera.yaml"),
+    "boxes": lambda folder: put(folder / "boxes.json"),
+    "topics": lambda _: RecordingOptions(confirm_assumptions=True),
+    "options": lambda _: CalibrationOptions(
+        solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.1), 0.01))
+    ),
+    "exports": lambda _: ("tf2",),
+    "rescale_camera": lambda _: True,
+    "reflector_m": lambda _: 0.3,
+}
+
+
+@pytest.mark.parametrize("name", [one.name for one in dataclasses.fields(ManifestRow) if one.name != "place"])
+def test_each_field_of_a_row_changes_the_digest(name: str, row: ManifestRow, tmp_path: Path) -> None:
+    changed = dataclasses.replace(row, **{name: CHANGES[name](tmp_path)})
+    assert job_of(changed, tmp_path).digest != job_of(row, tmp_path).digest
+
+
+def test_where_a_row_stands_and_where_its_files_lie_does_not_matter(row: ManifestRow, tmp_path: Path) -> None:
+    shutil.copytree(tmp_path / "in", tmp_path / "copy")
+    copied = tuple(tmp_path / "copy" / path.name for path in row.recording)
+    moved = dataclasses.replace(row, recording=copied, place="line 9")
+    assert job_of(moved, tmp_path).digest == job_of(row, tmp_path).digest
+
+
+def test_another_version_of_the_program_makes_another_digest(
+    row: ManifestRow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = job_of(row, tmp_path).digest
+    monkeypatch.setattr("app.batch.job.version", lambda: "9.9.9")
+    assert job_of(row, tmp_path).digest != before
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("drive.bag", "pictures/1.jpg", "pictures/2.jpg", "pictures/below/3.jpg", "metadata.yaml", "drive.csv"),
+        *("pictures.csv", "pictures.txt", "timestamps.txt", "calib.txt", "calib/000001.txt", "calib_cam_to_cam.txt"),
+        "v1.0-mini/calibrated_sensor.json",
+    ],
+)
+def test_a_file_that_is_read_with_the_recording_changes_the_digest(name: str, row: ManifestRow, tmp_path: Path) -> None:
+    before = job_of(row, tmp_path)
+    put(tmp_path / "in" / name, "other content")
+    after = job_of(row, tmp_path)
+    assert after.digest != before.digest
+    assert after.state != before.state
+
+
+@pytest.mark.parametrize("name", ["clicks.json", "other.bag", "pictures/.hidden", "drive.bag.cocalib-session/journal"])
+def test_a_file_that_is_not_read_with_the_recording_does_not(name: str, row: ManifestRow, tmp_path: Path) -> None:
+    before = job_of(row, tmp_path)
+    put(tmp_path / "in" / name)
+    assert job_of(row, tmp_path) == before
+
+
+def test_names_and_contents_are_not_mixed_up(tmp_path: Path) -> None:
+    one, other = tmp_path / "one" / "in", tmp_path / "other" / "in"
+    put(one / "a", "b"), put(one / "c", "d")
+    put(other / "a", "d"), put(other / "c", "b")
+    jobs = jobs_of([ManifestRow("van", "1", (folder,)) for folder in (one, other)], tmp_path)
+    assert jobs[0].digest != jobs[1].digest
+
+
+def test_a_missing_input_makes_a_job_too(row: ManifestRow, tmp_path: Path) -> None:
+    missing = dataclasses.replace(row, clicks=tmp_path / "clicks.json")
+    before = job_of(missing, tmp_path)
+    put(tmp_path / "clicks.json")
+    assert job_of(missing, tmp_path).digest != before.digest != job_of(row, tmp_path).digest
+
+
+def test_a_camera_of_several_in_a_file_is_told_apart(row: ManifestRow, tmp_path: Path) -> None:
+    put(tmp_path / "cameras.yaml")
+    digests = {
+        job_of(dataclasses.replace(row, camera=tmp_path / f"cameras.yaml#{name}"), tmp_path).digest for name in "ab"
+    }
+    assert len(digests) == 2
+    changed = put(tmp_path / "cameras.yaml", "other")
+    assert job_of(dataclasses.replace(row, camera=Path(f"{changed}#a")), tmp_path).digest not in digests
+
+
+class Reading:
+    """Counts the bytes that are read for digests."""
+
+    def __init__(self) -> None:
+        self.calls: list[tuple[int, int]] = []
+
+    def __call__(self, done: int, total: int) -> None:
+        self.calls.append((done, total))
+
+
+def test_what_has_not_changed_is_not_read_again(row: ManifestRow, tmp_path: Path) -> None:
+    first, second = Reading(), Reading()
+    jobs = jobs_of([row, row], tmp_path, first)
+    assert first.calls == [(7, 14), (14, 14)]
+    assert jobs_of([row, row], tmp_path, second) == jobs
+    assert second.calls == []
+
+
+@pytest.mark.parametrize("kept", ["", "{", '{"schema": "cocalib/input-digests-9", "inputs": {}}', "[]"])
+def test_a_file_of_digests_that_cannot_be_read_is_as_good_as_none(kept: str, row: ManifestRow, tmp_path: Path) -> None:
+    before = job_of(row, tmp_path)
+    (tmp_path / "inputs.json").write_text(kept)
+    assert job_of(row, tmp_path) == before
+
+
+def test_content_of_the_same_size_with_a_new_time_is_read_again(row: ManifestRow, tmp_path: Path) -> None:
+    before = job_of(row, tmp_path)
+    put(row.recording[0], "CONTENT", age_s=59.0)
+    after = job_of(row, tmp_path)
+    assert after.digest != before.digest
+    assert after.state != before.state
+
+
+def test_what_was_changed_just_now_is_not_kept(
+    row: ManifestRow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(input_digests, "_SETTLED_NS", 10**15)
+    job_of(row, tmp_path)
+    reading = Reading()
+    jobs_of([row], tmp_path, reading)
+    assert reading.calls[-1] == (14, 14)
+
+
+def test_drivers_that_share_a_folder_keep_what_the_others_read(row: ManifestRow, tmp_path: Path) -> None:
+    given = inputs_of(row)
+    one, other = InputDigests(tmp_path), InputDigests(tmp_path)
+    one.digest(given[0]), other.digest(given[1])
+    one.save(), other.save()
+    reading = Reading()
+    jobs_of([row], tmp_path, reading)
+    assert reading.calls == []
+
+
+def test_the_state_of_inputs_does_not_depend_on_where_they_are(row: ManifestRow, tmp_path: Path) -> None:
+    shutil.copytree(tmp_path / "in", tmp_path / "copy")
+    copied = dataclasses.replace(row, recording=tuple(tmp_path / "copy" / path.name for path in row.recording))
+    assert state_of(inputs_of(copied)) == state_of(inputs_of(row))

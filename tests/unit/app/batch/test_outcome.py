@@ -1,0 +1,58 @@
+"""The outcome's file is read strictly, and one of another version is told by its name."""
+
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from app.batch.outcome import OUTCOME_SCHEMA, Outcome, OutcomeFile, OutcomeRun, outcome_text, read_outcome
+from app.batch.outcome_schema import write_outcome_schema
+
+OUTCOME = Outcome(
+    OUTCOME_SCHEMA,
+    "0123",
+    "van",
+    "1",
+    "solved",
+    recorded_ns=1_760_000_000_363_870_074,
+    steps={"evaluate": "done", "report": "failed"},
+    step_reasons={"report": "no camera"},
+    files=(OutcomeFile("calibration.json", "ab"),),
+    run=OutcomeRun("host", "2026-11-23T07:00:00+00:00", 1.5),
+)
+
+
+def test_what_is_written_is_read() -> None:
+    assert read_outcome(outcome_text(OUTCOME)) == OUTCOME
+
+
+def test_a_result_of_another_version_is_named() -> None:
+    text = outcome_text(OUTCOME).replace("outcome-1", "outcome-2")
+    with pytest.raises(
+        msgspec.ValidationError, match=r"another version of cocalib \(cocalib/outcome-2, this one reads"
+    ):
+        read_outcome(text)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "[]",
+        "{}",
+        outcome_text(OUTCOME)[:-9],
+        outcome_text(OUTCOME).replace('"solved"', '"perfect"'),
+        outcome_text(OUTCOME).replace('"vehicle"', '"car"'),
+    ],
+)
+def test_anything_else_is_refused(text: str) -> None:
+    with pytest.raises(msgspec.DecodeError):
+        read_outcome(text)
+
+
+def test_the_published_schema_is_that_of_the_type(tmp_path: Path, project_root: Path) -> None:
+    written = write_outcome_schema(tmp_path)
+    published = project_root / "docs" / "schemas" / written.name
+    assert published.read_text(encoding="utf-8") == written.read_text(encoding="utf-8"), (
+        "run: python -m app.batch.outcome_schema docs/schemas"
+    )
