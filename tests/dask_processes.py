@@ -30,14 +30,25 @@ def worker_process(
     """Start workers, as children of the given process, which starts them again when they are killed."""
     arguments = ("--nworkers", str(count), "--nthreads", "1", "--no-dashboard", "--death-timeout", "5")
     with _process("distributed.cli.dask_worker", address, *arguments, environment=environment) as process:
-        _said(process, r"(Starting established connection|Registered to)")
+        for _ in range(count):
+            _said(process, r"(Registered to)")
         yield process
 
 
-def worker_processes(process: "subprocess.Popen[str]") -> list[psutil.Process]:
-    """Return the workers that run now."""
-    children = psutil.Process(process.pid).children()
-    return [child for child in children if "spawn_main" in " ".join(child.cmdline())]
+def worker_processes(parent: int) -> list[psutil.Process]:
+    """Return the workers that are children of a process now.
+
+    Args:
+        parent: its id.
+    """
+    return [child for child in psutil.Process(parent).children() if "spawn_main" in _command(child)]
+
+
+def _command(process: psutil.Process) -> str:
+    try:
+        return " ".join(process.cmdline())
+    except psutil.NoSuchProcess:
+        return ""
 
 
 @contextmanager

@@ -3,14 +3,13 @@
 import asyncio
 import logging
 import os
-import shutil
 import ssl
-import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from app.batch.engines.local_cluster import local_cluster
 from app.batch.engines.scheduler_address import checked_address
 from app.batch.engines.worker_checks import check_workers
 from calib_core.errors import InputError
@@ -21,14 +20,14 @@ if TYPE_CHECKING:
 __all__ = ["Connection", "connected"]
 
 _PATIENCE_S = 5
-_COUNTED_EVERY_S = 2.0
-_ALLOWED_DEATHS = 1
-_PRELOADED = "app.batch.engines.worker_side"
+_START_S = 120
+_COUNTED_EVERY_S = 1.0
 _LOGGERS = ("distributed", "distributed.client", "distributed.worker", "tornado", "tornado.application", "asyncio")
 _SETTINGS: dict[str, Any] = {
     "distributed.worker.profile.enabled": False,
     "distributed.admin.system-monitor.gil.enabled": False,
     "distributed.comm.timeouts.connect": f"{_PATIENCE_S}s",
+    "distributed.deploy.lost-worker-timeout": "60s",  # a busy machine takes long to start one again
 }
 
 
@@ -95,32 +94,18 @@ def connected(workers: int | None, scheduler: str | None) -> Iterator[Connection
 
 @contextmanager
 def _local(workers: int | None) -> Iterator[Connection]:
-    """Start a scheduler in this process and workers as its children, which end with it, however it ends."""
-    import dask
-    from distributed import Client, LocalCluster
-    from distributed.system import MEMORY_LIMIT
+    """Start a cluster and connect to it when its first worker is there."""
+    from distributed import Client
 
     count = workers or os.cpu_count() or 1
-    folder = tempfile.mkdtemp(prefix="cocalib-workers-")
-    try:
-        with (
-            dask.config.set({"temporary-directory": folder}),
-            LocalCluster(
-                n_workers=count,
-                threads_per_worker=1,
-                host="127.0.0.1",
-                dashboard_address=None,
-                memory_limit=MEMORY_LIMIT // count,
-                local_directory=folder,
-                silence_logs=logging.CRITICAL,
-                preload=[_PRELOADED],
-                scheduler_kwargs={"allowed_failures": _ALLOWED_DEATHS},
-            ) as cluster,
-            Client(cluster, set_as_default=False) as client,
-        ):
-            yield Connection(client, "the cluster on this machine", cluster)
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
+    with local_cluster(count) as cluster, Client(cluster, set_as_default=False) as client:
+        try:
+            client.wait_for_workers(1, timeout=_START_S)
+        except TimeoutError:
+            raise InputError(
+                f"no worker process starts on this machine within {_START_S} s; use --engine none"
+            ) from None
+        yield Connection(client, "the cluster on this machine", cluster)
 
 
 @contextmanager

@@ -1,6 +1,5 @@
 """A cluster that is started here: the same outcomes as in one process, workers that die, and a driver that does."""
 
-import multiprocessing
 import os
 import signal
 import subprocess
@@ -21,6 +20,7 @@ from app.batch.outcome import Outcome
 from app.batch.results_folder import ResultsFolder
 from calib_core.errors import InputError
 from tests.batch_calls import attempts, dying, dying_job, failing, quick_jobs, squared
+from tests.dask_processes import worker_processes
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore::ResourceWarning")]
 
@@ -42,7 +42,7 @@ def test_workers_killed_at_random_change_no_outcome_and_leave_nothing_behind(tmp
     killed = []
 
     def kill(_: object) -> None:
-        workers = multiprocessing.active_children()
+        workers = worker_processes(os.getpid())
         if len(killed) < 2 and len(workers) == 2 and random.uniform() < 0.5:
             process = workers[int(random.integers(2))]
             process.kill()
@@ -52,7 +52,7 @@ def test_workers_killed_at_random_change_no_outcome_and_leave_nothing_behind(tmp
     assert len(killed) == 2
     plain = drive(jobs, InProcess(), ResultsFolder(tmp_path / "none"))
     assert _without_run(found) == _without_run(plain)
-    assert multiprocessing.active_children() == []
+    assert worker_processes(os.getpid()) == []
     assert list(temporary.iterdir()) == []
 
 
