@@ -118,8 +118,9 @@ def _existing(address: str) -> Iterator[Connection]:
         client = Client(address, timeout=_PATIENCE_S, set_as_default=False)
     except (ssl.SSLError, TypeError, RuntimeError, FileNotFoundError) as error:
         raise InputError(
-            f"--scheduler {address}: no TLS connection ({error}); name the certificates in the environment: "
-            "DASK_DISTRIBUTED__COMM__TLS__CA_FILE, ..__CLIENT__CERT and ..__CLIENT__KEY"
+            f"--scheduler {address}: no connection with TLS, because certificates are missing or refused ({error}); name "
+            "their files in DASK_DISTRIBUTED__COMM__TLS__CA_FILE, DASK_DISTRIBUTED__COMM__TLS__CLIENT__CERT and "
+            "DASK_DISTRIBUTED__COMM__TLS__CLIENT__KEY"
         ) from error
     except (OSError, TimeoutError) as error:
         raise InputError(

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from app.batch.driving import drive
-from app.batch.engines import dask_cluster
+from app.batch.engines import dask_cluster, local_cluster
 from app.batch.engines.dask_cluster import DaskCluster
 from app.batch.engines.in_process import InProcess
 from app.batch.outcome import Outcome
@@ -75,6 +75,13 @@ def test_functions_run_on_it_too_and_one_death_costs_one_more_run(tmp_path: Path
     assert sorted(cluster.run_all(squared, [(3,), (1,), (2,)])) == [(0, 9), (1, 1), (2, 4)]
     assert list(cluster.run_all(dying, [(str(tmp_path), "a", 1)])) == [(0, "a")]
     assert attempts(tmp_path, "a") == 2
+
+
+def test_a_worker_that_is_killed_while_it_starts_is_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DYING_START", str(tmp_path))
+    monkeypatch.setattr(local_cluster, "_PRELOADED", "tests.dying_start")
+    assert list(DaskCluster(workers=1).run_all(squared, [(3,)])) == [(0, 9)]
+    assert attempts(tmp_path, "start") == 3
 
 
 def test_what_a_function_raises_is_raised(tmp_path: Path) -> None:
