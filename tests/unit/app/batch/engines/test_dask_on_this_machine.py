@@ -1,8 +1,6 @@
-"""A cluster that is started here: the same outcomes as in one process, workers that die, and a driver that does."""
+"""A cluster that is started here: the same outcomes as in one process, and workers that die."""
 
 import os
-import signal
-import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -94,24 +92,3 @@ def test_nothing_starts_for_nothing(monkeypatch: pytest.MonkeyPatch, tmp_path: P
     assert list(DaskCluster().run((), tmp_path)) == []
     with pytest.raises(InputError, match=r"Dask is not installed; install cocalib\[fleet\], or use --engine none"):
         list(DaskCluster().run(quick_jobs(tmp_path, 1), tmp_path))
-
-
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT], ids=["killed", "Ctrl+C"])
-def test_a_driver_that_ends_leaves_no_workers(number: signal.Signals, project_root: Path, tmp_path: Path) -> None:
-    environment = {**os.environ, "PYTHONPATH": str(project_root), "TMPDIR": str(tmp_path)}
-    driver = subprocess.Popen(
-        [sys.executable, "-m", "tests.batch_driver"],
-        cwd=project_root, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
-    )  # fmt: skip
-    assert driver.stdout is not None
-    lines = sorted(driver.stdout.readline().strip() for _ in range(3))
-    assert lines == ["finished 0", "running 1", "running 2"]
-    if number is signal.SIGINT:
-        os.killpg(driver.pid, number)  # as a terminal does
-    else:
-        driver.kill()
-    _, errors = driver.communicate()  # ends when no process has the pipes any more
-    if number is signal.SIGINT:
-        assert errors.rstrip().endswith(f"KeyboardInterrupt: {int(number)}")
-        assert errors.count("Traceback") == 1
-        assert list(tmp_path.iterdir()) == []
