@@ -1,21 +1,18 @@
-"""Measure rows trial by trial in several processes. Neither their number nor an interruption changes a figure."""
+"""Measure rows trial by trial on an engine. Neither the number of workers nor an interruption changes a figure."""
 
-import os
-import signal
 import sys
-import threading
 import time
 from collections.abc import Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from multiprocessing import get_context, parent_process
 
+from app.batch.engines.dask_cluster import DaskCluster
+from app.batch.engines.engine import Engine
+from app.batch.engines.in_process import InProcess
 from benchmarks.accuracy.keeping import Keeper
 from benchmarks.accuracy.rows import Figures, Kept, Row
 
 __all__ = ["kept_figures", "run"]
 
 _CHUNK = 10
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
 _Measured = list[tuple[int, Figures]]
 
@@ -26,27 +23,17 @@ def run(rows: Sequence[Row], keeper: Keeper, *, jobs: int, most: int | None = No
     Args:
         rows: in the order in which they are measured.
         keeper: stores the figures.
-        jobs: number of processes, one BLAS thread each; 1 measures in this process.
+        jobs: number of worker processes, one thread each; 1 measures in this process.
         most: largest number of trials per row.
         first: number of the first trial; other numbers are other draws.
     """
     chunks = [(row, chunk) for row in rows for chunk in _missing(row, keeper, most, first)]
     progress = _Progress(sum(len(chunk) for _, chunk in chunks))
-    if jobs == 1:
-        for row, chunk in chunks:
-            keeper.add(row.key, _measure(row, chunk))
-            progress.report(row.key, len(chunk))
-        return
-    os.environ.update(dict.fromkeys(_THREADS, "1"))  # before the children load NumPy
-    pool = ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=_begin)
-    try:
-        running: dict[Future[_Measured], Row] = {pool.submit(_measure, row, chunk): row for row, chunk in chunks}
-        for done in as_completed(running):
-            row, measured = running[done], done.result()
-            keeper.add(row.key, measured)
-            progress.report(row.key, len(measured))
-    finally:
-        pool.shutdown(wait=False, cancel_futures=True)
+    engine: Engine = InProcess() if jobs == 1 else DaskCluster(jobs)
+    for number, measured in engine.run_all(_measure, chunks):
+        row, _ = chunks[number]
+        keeper.add(row.key, measured)
+        progress.report(row.key, len(measured))
 
 
 def kept_figures(rows: Sequence[Row], keeper: Keeper, *, most: int | None = None, first: int = 0) -> Kept:
@@ -70,22 +57,6 @@ def _missing(row: Row, keeper: Keeper, most: int | None, first: int) -> list[lis
 
 def _measure(row: Row, trials: list[int]) -> _Measured:
     return [(trial, row.measure(trial)) for trial in trials]
-
-
-def _begin() -> None:
-    """Prepare a child process: one thread, and exit when the parent ends, for whatever reason."""
-    import cv2
-
-    cv2.setNumThreads(1)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles Ctrl-C
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    parent = parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
 
 
 class _Progress:

@@ -1,1 +1,1 @@
-"""How well the fleet's mathematics keeps what it states, on simulated fleets."""
+"""Simulated fleets: their mathematics at the level of poses, and whole batches of recordings."""

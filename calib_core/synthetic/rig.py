@@ -40,8 +40,12 @@ class RigOptions:
         (0.0, 0.0, 0.045), "Nominal camera centre in the radar frame: forward, left, up [m]."
     )
     camera_offset_sigma_m: float = option(0.01, "Standard deviation of the true camera centre about it, per axis [m].")
+    camera_angles_deg: tuple[float, float, float] = option(
+        (0.0, 0.0, 0.0),
+        "Nominal rotation of the camera away from looking where the radar looks: its rotation vector in the camera frame [deg].",
+    )
     camera_angle_sigma_deg: float = option(
-        3.0, "Standard deviation of the true rotation about looking where the radar looks, per axis [deg]."
+        3.0, "Standard deviation of the true rotation about the nominal one, per axis [deg]."
     )
 
 
@@ -127,7 +131,7 @@ def random_rig(rng: np.random.Generator, *, camera: Camera, options: RigOptions 
     """
     options = options or RigOptions()
     error_rad = np.deg2rad(options.camera_angle_sigma_deg) * rng.standard_normal(3)
-    rotation = rotation_exp(error_rad) @ nominal_rotation()
+    rotation = rotation_exp(error_rad) @ rotation_exp(np.deg2rad(options.camera_angles_deg)) @ nominal_rotation()
     centre = np.array(options.camera_offset_m) + options.camera_offset_sigma_m * rng.standard_normal(3)
     return Rig(camera, RigidTransform(rotation, -rotation @ centre), radar_stand(options))
 

@@ -19,7 +19,8 @@ _CHROMIUM = (
     *("disable-background-networking", "disable-dev-shm-usage", "disable-extensions", "disable-gpu", "headless"),
     *("host-resolver-rules", "no-first-run", "no-pdf-header-footer", "no-sandbox", "print-to-pdf", "user-data-dir"),
 )
-OTHER_PROGRAMS = {f"--{name}" for name in (*_TRANSFORM_PUBLISHER, *_RERUN, *_CHROMIUM)}
+_DASK = ("death-timeout", "nthreads")
+OTHER_PROGRAMS = {f"--{name}" for name in (*_TRANSFORM_PUBLISHER, *_RERUN, *_CHROMIUM, *_DASK)}
 """Options of other programs that ours names or starts."""
 
 _COMMAND = re.compile(r"(?<![\w/.-])cocalib[ \t]+(?P<command>[a-z][\w-]*)(?P<rest>[^\n`;()]*)")

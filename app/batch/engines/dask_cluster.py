@@ -1,17 +1,27 @@
 """The engine Dask: jobs run in the worker processes of a cluster, one that is started here or one that exists."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, TypeVar
 
+from app.batch.engines.dask_calls import Call, Died, finished_calls
+from app.batch.engines.dask_connection import connected
+from app.batch.engines.one_job import failed_outcome
+from app.batch.engines.worker_side import call, run_in_worker
 from app.batch.job import Job
 from app.batch.outcome import Outcome
-from app.batch.running import run_job
+from app.resources import version
 from calib_core.errors import InputError
 
 __all__ = ["DaskCluster"]
 
-_RETRIES = 1
+_Found = TypeVar("_Found")
+_DIED = "every worker that ran this job died of it or was killed"
+_DIED_HINT = (
+    "the most frequent cause is memory: run it with fewer --workers, or with --engine none to see it; "
+    "delete its folder in results/ to try it again"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +29,7 @@ class DaskCluster:
     """Runs jobs with Dask.
 
     Attributes:
-        workers: processes on this machine; None if there is a scheduler.
+        workers: processes on this machine; None if there is a scheduler, or for one per processor.
         scheduler: address of a scheduler that exists; None to start a cluster on this machine.
     """
 
@@ -29,19 +39,34 @@ class DaskCluster:
     def run(self, jobs: Sequence[Job], results: Path) -> Iterator[Outcome]:
         """Run each job once; Dask gives the job of a worker that died to another one.
 
+        A job is given up when its workers died again and again, also while nothing else ran; the others go on.
+
         Raises:
-            InputError: Dask is not installed.
+            InputError: Dask is not installed, the scheduler cannot be used, or a worker cannot do any job.
         """
-        try:
-            from distributed import Client, LocalCluster, as_completed
-        except ImportError:
-            raise InputError("Dask is not installed; install cocalib[fleet], or use --engine none") from None
         if not jobs:
             return
-        where: str | LocalCluster = self.scheduler or LocalCluster(
-            n_workers=self.workers, threads_per_worker=1, host="127.0.0.1", dashboard_address=None
-        )
-        with Client(where) as client:
-            futures = [client.submit(run_job, job, results, key=job.digest, retries=_RETRIES) for job in jobs]
-            for future in as_completed(futures):
-                yield future.result()
+        shared = results.resolve()
+        shared.mkdir(parents=True, exist_ok=True)
+        calls = [Call(number, run_in_worker, (job, shared, version())) for number, job in enumerate(jobs)]
+        with connected(self.workers, self.scheduler) as cluster:
+            for number, found in finished_calls(cluster, calls):
+                job = jobs[number]
+                yield failed_outcome(job, shared, reason=_DIED, hint=_DIED_HINT) if found is Died.AGAIN else found
+
+    def run_all(
+        self, function: Callable[..., _Found], arguments: Sequence[tuple[Any, ...]]
+    ) -> Iterator[tuple[int, _Found]]:
+        """Call a function with each of the arguments; its exceptions are raised here.
+
+        Raises:
+            InputError: Dask is not installed, the scheduler cannot be used, or workers died of a call.
+        """
+        if not arguments:
+            return
+        calls = [Call(number, call, (function, *given)) for number, given in enumerate(arguments)]
+        with connected(self.workers, self.scheduler) as cluster:
+            for number, found in finished_calls(cluster, calls):
+                if found is Died.AGAIN:
+                    raise InputError(f"call {number} of {function.__name__}: {_DIED}; use fewer workers")
+                yield number, found

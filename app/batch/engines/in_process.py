@@ -1,13 +1,16 @@
 """The engine `none`: one job after the other, in this process."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import Any, TypeVar
 
+from app.batch.engines.one_job import run_once
 from app.batch.job import Job
 from app.batch.outcome import Outcome
-from app.batch.running import run_job
 
 __all__ = ["InProcess"]
+
+_Found = TypeVar("_Found")
 
 
 class InProcess:
@@ -16,4 +19,11 @@ class InProcess:
     def run(self, jobs: Sequence[Job], results: Path) -> Iterator[Outcome]:
         """Run each job, in order."""
         for job in jobs:
-            yield run_job(job, results)
+            yield run_once(job, results)
+
+    def run_all(
+        self, function: Callable[..., _Found], arguments: Sequence[tuple[Any, ...]]
+    ) -> Iterator[tuple[int, _Found]]:
+        """Call a function with each of the arguments, in order."""
+        for number, given in enumerate(arguments):
+            yield number, function(*given)

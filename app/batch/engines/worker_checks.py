@@ -1,0 +1,77 @@
+"""Whether the workers of a scheduler can do jobs for this process, or what to do about it."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from app.batch.engines.worker_side import worker_version
+from app.resources import version
+from calib_core.errors import InputError
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+__all__ = ["check_workers", "dask_trouble", "version_trouble"]
+
+
+def check_workers(client: "Client", address: str, patience_s: float) -> None:
+    """Check that there are workers, and that they run this version of Dask and of cocalib.
+
+    Args:
+        client: connected to the scheduler.
+        address: of the scheduler.
+        patience_s: how long to wait for the first worker [s].
+
+    Raises:
+        InputError: what is wrong, and what to do.
+    """
+    try:
+        client.wait_for_workers(1, timeout=patience_s)
+    except TimeoutError:
+        raise InputError(
+            f"--scheduler {address}: it has no workers; start some with `dask worker {address} --nthreads 1 "
+            "--death-timeout 60`"
+        ) from None
+    versions: Any = client.get_versions()
+    trouble = dask_trouble(versions) or version_trouble(version(), client.run(worker_version, on_error="return"))
+    if trouble:
+        raise InputError(f"--scheduler {address}: {trouble}")
+
+
+def dask_trouble(versions: Mapping[str, Any]) -> str:
+    """Say which versions of Dask do not go together; "" if they are all the same.
+
+    Args:
+        versions: as `Client.get_versions` returns them.
+    """
+
+    def of(part: Mapping[str, Any]) -> str:
+        return str(part["packages"]["distributed"])
+
+    here = of(versions["client"])
+    others = {"the scheduler": of(versions["scheduler"])}
+    others |= {f"the worker at {address}": of(part) for address, part in sorted(versions["workers"].items())}
+    for name, found in others.items():
+        if found != here:
+            return f"{name} runs Dask {found} and this process {here}; install the same version in both places"
+    return ""
+
+
+def version_trouble(here: str, found: Mapping[str, Any]) -> str:
+    """Say which worker runs another cocalib, or none; "" if all run this one.
+
+    Args:
+        here: the version of this process.
+        found: the version of each worker by its address, or the exception that asking raised.
+    """
+    for address, there in sorted(found.items()):
+        if isinstance(there, BaseException):
+            return (
+                f"the worker at {address} has no cocalib ({type(there).__name__}: {there}); "
+                f"install cocalib[fleet] {here} where it runs"
+            )
+        if there != here:
+            return (
+                f"the worker at {address} runs cocalib {there} and this is cocalib {here}, whose results differ; "
+                "install the same version in both places"
+            )
+    return ""

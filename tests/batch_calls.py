@@ -1,0 +1,62 @@
+"""Calls and jobs for engines: they end at once, never end, or end their worker."""
+
+import os
+import signal
+import sys
+import threading
+from pathlib import Path
+
+from app.batch.job import Job
+from app.batch.manifest import ManifestRow
+from app.batch.outcome import Outcome
+
+__all__ = ["attempts", "dying", "dying_job", "endless", "failing", "quick_jobs", "squared"]
+
+
+def quick_jobs(folder: Path, count: int) -> tuple[Job, ...]:
+    """Return jobs that fail at once, because there are no recordings, each in words of its own."""
+    rows = [ManifestRow(f"v{number:03d}", "s1", (folder / f"{number}.bag",)) for number in range(count)]
+    return tuple(Job(row, f"{number:032x}") for number, row in enumerate(rows))
+
+
+def squared(number: int) -> int:
+    """Return the square."""
+    return number * number
+
+
+def failing(number: int) -> int:
+    """Raise what a function may raise."""
+    raise ValueError(f"not {number}")
+
+
+def dying(folder: str, name: str, times: int) -> str:
+    """Kill this worker the first so many times, then return the name; each run leaves a file."""
+    before = attempts(Path(folder), name)
+    (Path(folder) / f"{name}.{before}").touch()
+    if before < times:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return name
+
+
+def dying_job(job: Job, results: Path, _: str) -> Outcome:
+    """Kill this worker whenever it runs the job of vehicle v001, as one that needs too much memory does."""
+    from app.batch.engines.one_job import run_once
+
+    (results / f"{job.row.vehicle}.{attempts(results, job.row.vehicle)}").touch()
+    if job.row.vehicle == "v001":
+        os.kill(os.getpid(), signal.SIGKILL)
+    return run_once(job, results)
+
+
+def attempts(folder: Path, name: str) -> int:
+    """Return how often a call was begun."""
+    return len(list(folder.glob(f"{name}.*")))
+
+
+def endless(number: int) -> int:
+    """Say on stdout that it runs, and never return; 0 returns at once."""
+    if number:
+        sys.stdout.write(f"running {number}\n")
+        sys.stdout.flush()
+        threading.Event().wait()
+    return number

@@ -1,0 +1,99 @@
+"""A scheduler and workers that others started, in processes of their own on loopback."""
+
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from app.batch.driving import drive
+from app.batch.engines import dask_connection
+from app.batch.engines.dask_cluster import DaskCluster
+from app.batch.engines.in_process import InProcess
+from app.batch.results_folder import ResultsFolder
+from app.resources import version
+from calib_core.errors import InputError
+from tests.batch_calls import quick_jobs, squared
+from tests.dask_processes import scheduler_process, worker_process, worker_processes
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def address() -> Iterator[str]:
+    with scheduler_process() as (_, address):
+        yield address
+
+
+@pytest.fixture
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(dask_connection, "_PATIENCE_S", 1)
+
+
+def test_workers_of_a_scheduler_that_are_killed_change_no_outcome(address: str, tmp_path: Path) -> None:
+    jobs, random = quick_jobs(tmp_path, 20), np.random.default_rng(2)
+    with worker_process(address, count=2) as nanny:
+        alive = worker_processes(nanny.pid)
+
+        def kill(_: object) -> None:
+            if alive and random.uniform() < 0.4:
+                alive.pop(int(random.integers(len(alive)))).kill()
+
+        found = drive(jobs, DaskCluster(scheduler=address), ResultsFolder(tmp_path / "dask"), kill)
+    assert alive == []
+    plain = drive(jobs, InProcess(), ResultsFolder(tmp_path / "none"))
+    assert [msgspec.structs.replace(one, run=None) for one in found] == [
+        msgspec.structs.replace(one, run=None) for one in plain
+    ]
+
+
+@pytest.mark.usefixtures("impatient")
+def test_a_scheduler_without_workers_is_told_with_the_command_that_starts_one(address: str) -> None:
+    with pytest.raises(InputError, match=rf"--scheduler {address}: it has no workers; start some with `dask worker"):
+        list(DaskCluster(scheduler=address).run_all(squared, [(1,)]))
+
+
+def test_a_worker_of_another_version_is_told_before_any_job_runs(address: str, tmp_path: Path) -> None:
+    other = tmp_path / "other" / "cocalib-9.9.dist-info"
+    other.mkdir(parents=True)
+    (other / "METADATA").write_text("Metadata-Version: 2.1\nName: cocalib\nVersion: 9.9\n")
+    root = str(Path(__file__).resolve().parents[5])
+    with (
+        worker_process(address, environment={"PYTHONPATH": f"{tmp_path / 'other'}:{root}"}),
+        pytest.raises(InputError, match=rf"the worker at tcp://\S+ runs cocalib 9\.9 and this is cocalib {version()}"),
+    ):
+        list(DaskCluster(scheduler=address).run(quick_jobs(tmp_path, 2), tmp_path / "out"))
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+@pytest.mark.usefixtures("impatient")
+@pytest.mark.parametrize("listening", [True, False], ids=["silent", "closed"])
+def test_a_scheduler_that_does_not_answer_is_told_within_seconds(listening: bool) -> None:
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        if listening:
+            other.listen()
+        address = f"tcp://127.0.0.1:{other.getsockname()[1]}"
+        with pytest.raises(
+            InputError, match=rf"--scheduler {address}: no Dask scheduler answers there within 1 s; start"
+        ):
+            list(DaskCluster(scheduler=address).run_all(squared, [(1,)]))
+
+
+@pytest.mark.usefixtures("impatient")
+def test_tls_without_certificates_is_told_in_words() -> None:
+    with pytest.raises(InputError, match=r"--scheduler tls://127\.0\.0\.1:9: .*certificate"):
+        list(DaskCluster(scheduler="tls://127.0.0.1:9").run_all(squared, [(1,)]))
+
+
+def test_a_scheduler_that_ends_in_the_middle_is_told_and_what_is_done_is_kept(tmp_path: Path) -> None:
+    jobs, results = quick_jobs(tmp_path, 20), ResultsFolder(tmp_path / "out")
+    with (
+        scheduler_process() as (scheduler, address),
+        worker_process(address),
+        pytest.raises(InputError, match=r"stopped answering"),
+    ):
+        drive(jobs, DaskCluster(scheduler=address), results, lambda now: scheduler.kill() if now.latest else None)
+    assert results.outcome(jobs[0].digest) is not None

@@ -1,0 +1,51 @@
+"""A job runs once, whatever other drivers do, and whatever goes wrong is an outcome."""
+
+from pathlib import Path
+
+import pytest
+
+from app.batch.engines import one_job
+from app.batch.engines.in_process import InProcess
+from app.batch.engines.one_job import failed_outcome, run_once
+from app.batch.job import Job
+from app.batch.outcome import Outcome
+from app.batch.results_folder import ResultsFolder
+from calib_core.errors import InputError
+from tests.batch_calls import quick_jobs, squared
+
+
+def test_jobs_run_in_order_and_leave_their_outcomes(tmp_path: Path) -> None:
+    jobs = quick_jobs(tmp_path, 3)
+    outcomes = list(InProcess().run(jobs, tmp_path / "out"))
+    assert [outcome.digest for outcome in outcomes] == [job.digest for job in jobs]
+    assert [ResultsFolder(tmp_path / "out").outcome(job.digest) for job in jobs] == outcomes
+
+
+def test_functions_run_in_order() -> None:
+    assert list(InProcess().run_all(squared, [(3,), (1,)])) == [(0, 9), (1, 1)]
+
+
+def test_what_another_driver_finished_is_not_run_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (job,) = quick_jobs(tmp_path, 1)
+    first = run_once(job, tmp_path)
+    monkeypatch.setattr(one_job, "run_job", lambda *_: pytest.fail("it ran again"))
+    assert run_once(job, tmp_path) == first
+
+
+def test_a_bug_in_one_job_is_its_outcome(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(job: Job, _: Path) -> Outcome:
+        raise RuntimeError(f"no such thing as {job.row.vehicle}")
+
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setattr(one_job, "run_job", broken)
+    outcomes = list(InProcess().run(quick_jobs(tmp_path, 2), tmp_path))
+    assert [outcome.status for outcome in outcomes] == ["failed", "failed"]
+    assert "RuntimeError: no such thing as v001" in outcomes[1].reason
+    assert ResultsFolder(tmp_path).outcome(outcomes[1].digest) == outcomes[1]
+
+
+def test_a_folder_that_cannot_be_written_is_told_in_words(tmp_path: Path) -> None:
+    (job,) = quick_jobs(tmp_path, 1)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match=r"the result of v000 / s1 cannot be written .*what is done is kept"):
+        failed_outcome(job, tmp_path / "file", reason="its worker died")

@@ -1,0 +1,121 @@
+"""Driving a batch: nothing is run twice, the order is kept, shards divide the work, and the time left is honest."""
+
+import os
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.batch import driving
+from app.batch.driving import BatchProgress, chosen_engine, drive, shard_of
+from app.batch.engines.dask_cluster import DaskCluster
+from app.batch.engines.in_process import InProcess
+from app.batch.engines.one_job import run_once
+from app.batch.job import Job
+from app.batch.manifest import ManifestRow
+from app.batch.outcome import Outcome
+from app.batch.results_folder import ResultsFolder
+from calib_core.errors import InputError, OptionError
+from tests.batch_calls import quick_jobs
+
+
+class _Backwards(InProcess):
+    """Finishes the last job first, and counts."""
+
+    def __init__(self) -> None:
+        self.ran: list[str] = []
+
+    def run(self, jobs: Sequence[Job], results: Path) -> Iterator[Outcome]:
+        for job in reversed(jobs):
+            self.ran.append(job.digest)
+            yield run_once(job, results)
+
+
+def test_outcomes_are_in_the_order_of_the_jobs_and_equal_jobs_run_once(tmp_path: Path) -> None:
+    a, b, c = quick_jobs(tmp_path, 3)
+    engine, told = _Backwards(), []
+    outcomes = drive((a, b, a, c), engine, ResultsFolder(tmp_path), told.append)
+    assert [outcome.digest for outcome in outcomes] == [a.digest, b.digest, a.digest, c.digest]
+    assert engine.ran == [c.digest, b.digest, a.digest]
+    assert [(now.done, now.count) for now in told] == [(0, 4), (1, 4), (2, 4), (4, 4)]
+
+
+def test_what_is_done_is_not_run_again(tmp_path: Path) -> None:
+    jobs, results, engine = quick_jobs(tmp_path, 3), ResultsFolder(tmp_path), _Backwards()
+    first = drive(jobs[:2], engine, results)
+    told: list[BatchProgress] = []
+    assert drive(jobs, engine, results, told.append)[:2] == first
+    assert engine.ran == [jobs[1].digest, jobs[0].digest, jobs[2].digest]
+    assert told[0] == BatchProgress(2, 3)
+
+
+def test_a_killed_driver_goes_on_where_it_was(tmp_path: Path) -> None:
+    jobs, results, engine = quick_jobs(tmp_path, 4), ResultsFolder(tmp_path), _Backwards()
+
+    def interrupt(now: BatchProgress) -> None:
+        if now.done == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        drive(jobs, engine, results, interrupt)
+    drive(jobs, engine, results)
+    assert engine.ran == [job.digest for job in reversed(jobs)]
+
+
+def test_the_time_left_is_unknown_until_some_jobs_have_finished(tmp_path: Path) -> None:
+    clock = iter(range(0, 1000, 10))
+    told: list[BatchProgress] = []
+    drive(quick_jobs(tmp_path, 5), InProcess(), ResultsFolder(tmp_path), told.append, lambda: float(next(clock)))
+    assert [now.left_s for now in told] == [None, None, None, 20.0, 10.0, 0.0]
+
+
+def test_kept_outcomes_do_not_make_the_rest_look_quick(tmp_path: Path) -> None:
+    jobs, results = quick_jobs(tmp_path, 10), ResultsFolder(tmp_path)
+    drive(jobs[:6], InProcess(), results)
+    clock = iter(range(0, 1000, 10))
+    told: list[BatchProgress] = []
+    drive(jobs, InProcess(), results, told.append, lambda: float(next(clock)))
+    assert [now.left_s for now in told] == [None, None, None, 10.0, 0.0]
+
+
+@given(st.lists(st.integers(0, 60), max_size=60), st.integers(1, 9))
+def test_shards_are_complete_disjoint_balanced_and_do_not_depend_on_the_order(numbers: list[int], n: int) -> None:
+    jobs = [Job(ManifestRow("v", str(number), ()), f"{number * 7919 % 101:032x}") for number in numbers]
+    shards = [shard_of(jobs, k, n) for k in range(1, n + 1)]
+    digests = [{job.digest for job in shard} for shard in shards]
+    assert sorted(job.digest for shard in shards for job in shard) == sorted(job.digest for job in jobs)
+    assert sum(map(len, digests)) == len({job.digest for job in jobs})
+    assert max(map(len, digests)) - min(map(len, digests)) <= 1
+    assert [{job.digest for job in shard_of(jobs[::-1], k, n)} for k in range(1, n + 1)] == digests
+
+
+@pytest.mark.parametrize(("k", "n"), [(0, 3), (4, 3), (-1, 3), (1, 0), (1, -2)])
+def test_a_shard_that_does_not_exist_is_refused_in_words(k: int, n: int) -> None:
+    with pytest.raises(OptionError, match=rf"--shard {k}/{n}: there is no such part; write 1/"):
+        shard_of((), k, n)
+
+
+def test_small_manifests_run_in_this_process_and_large_ones_on_all_processors(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "cpu_count", lambda: 4)
+    assert isinstance(chosen_engine(7), InProcess)
+    assert chosen_engine(8) == DaskCluster()
+    monkeypatch.setattr(driving, "find_spec", lambda _: None)
+    assert isinstance(chosen_engine(8), InProcess)
+
+
+def test_what_is_asked_for_is_taken() -> None:
+    assert chosen_engine(1, workers=3) == DaskCluster(3)
+    assert chosen_engine(1, engine="dask") == DaskCluster()
+    assert chosen_engine(1, scheduler="tls://h:1") == DaskCluster(scheduler="tls://h:1")
+    assert isinstance(chosen_engine(10_000, engine="none"), InProcess)
+
+
+def test_flags_that_do_not_go_together_are_refused() -> None:
+    with pytest.raises(InputError, match="give one of them"):
+        chosen_engine(1, workers=2, scheduler="tls://h:1")
+    with pytest.raises(InputError, match="--engine none runs in this process"):
+        chosen_engine(1, engine="none", workers=2)
+    with pytest.raises(OptionError, match="at least 1"):
+        chosen_engine(1, workers=0)
