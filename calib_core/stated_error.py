@@ -7,7 +7,7 @@ import numpy as np
 from calib_core.geometry import skew
 from calib_core.results import Calibration
 
-__all__ = ["StatedError", "stated_error"]
+__all__ = ["StatedError", "degrees_of_freedom", "stated_error"]
 
 _BEYOND = 0.05 / 3.0  # rotation, position and picture hold together, so each may fail in a third of the 5 %
 _LEAST_FREEDOM, _MOST_FREEDOM = 0.5, 1e5
@@ -52,7 +52,7 @@ def stated_error(calibration: Calibration) -> StatedError:
         calibration: with a finite covariance.
     """
     pose, in_plane = calibration.camera_from_radar, not calibration.sees_elevation
-    freedom = _freedom(calibration.covariance_quantile)
+    freedom = degrees_of_freedom(calibration.covariance_quantile)
     turned = pose.rotation.T
     to_centre = np.concatenate([-turned, -turned @ skew(pose.translation_m)], axis=1)
     about_axes = np.concatenate([np.zeros((3, 3)), turned], axis=1)[2 if in_plane else 0 :]
@@ -73,7 +73,7 @@ def stated_error(calibration: Calibration) -> StatedError:
     )
 
 
-def _freedom(quantile_95: float) -> float:
+def degrees_of_freedom(quantile_95: float) -> float:
     """Return nu, the degrees of freedom that the quantile of the 6 parameters states: 6 F(6, nu) is at most that with 95 %."""
     from scipy.special import fdtri
 

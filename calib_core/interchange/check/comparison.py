@@ -6,7 +6,6 @@ import numpy as np
 
 from calib_core.arrays import Matrix66
 from calib_core.camera import Camera
-from calib_core.geometry import skew
 from calib_core.interchange.check.pixel_differences import (
     DISTANCES_M,
     LOST_TEXT,
@@ -18,13 +17,12 @@ from calib_core.interchange.check.pixel_differences import (
     shown,
 )
 from calib_core.interchange.imported import ImportedCalibration
+from calib_core.pose_difference import pose_difference, squared_distance
 
 __all__ = ["CHI2_95", "ComparedFigure", "Comparison", "compare"]
 
 CHI2_95 = 12.591587243743977
 """The 95 % quantile of chi2 with 6 degrees of freedom."""
-
-_ZERO_LENGTH = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,27 +143,24 @@ def compare(a: ImportedCalibration, b: ImportedCalibration, *, camera: Camera | 
         camera: the intrinsics, if neither has any.
     """
     a_pose, b_pose = a.camera_from_radar, b.camera_from_radar
-    error = b_pose.error_from(a_pose)
     known = _known_covariances(a, b)
     covariance = np.sum(known, axis=0) if known else np.full((6, 6), np.nan)
-    a_position_m, b_position_m = a_pose.inverse().translation_m, b_pose.inverse().translation_m
-    position_jacobian = -a_pose.rotation.T @ np.hstack([np.eye(3), skew(a_pose.translation_m)])
-    moved_m = b_position_m - a_position_m
-    chi2, limit = _chi2(error, covariance), _chi2_limit(a, b)
-    likelihood = chi2 * CHI2_95 / limit  # a larger quantile stands for heavier tails: 5 % are beyond it
+    difference = pose_difference(a_pose, b_pose, covariance)
+    limit = _chi2_limit(a, b)
+    likelihood = difference.squared * CHI2_95 / limit  # a larger quantile stands for heavier tails: 5 % are beyond it
     lenses = lenses_of(a, b, camera)
     return Comparison(
-        rotation_deg=float(np.degrees(np.linalg.norm(error[3:]))),
-        rotation_sigma_deg=float(np.degrees(_sigma_along(error[3:], covariance[3:, 3:]))),
-        position_cm=float(np.linalg.norm(moved_m)) * 100.0,
-        position_sigma_cm=_sigma_along(moved_m, position_jacobian @ covariance @ position_jacobian.T) * 100.0,
+        rotation_deg=difference.rotation_deg,
+        rotation_sigma_deg=difference.rotation_sigma_deg,
+        position_cm=difference.position_cm,
+        position_sigma_cm=difference.position_sigma_cm,
         pixels=tuple(pixel_difference(a_pose, b_pose, lenses, distance_m, covariance) for distance_m in DISTANCES_M)
         if lenses
         else (),
-        chi2=chi2,
+        chi2=difference.squared,
         p_value=_p_value(likelihood),
         covariances=len(known),
-        beyond=(_beyond(a, error), _beyond(b, a_pose.error_from(b_pose))),
+        beyond=(_beyond(a, difference.error), _beyond(b, a_pose.error_from(b_pose))),
         sigmas=_sigmas(likelihood),
         chi2_limit=limit,
         lens=lenses.difference if lenses else None,
@@ -177,7 +172,7 @@ def _beyond(side: ImportedCalibration, error: np.ndarray) -> bool | None:
     """Return whether an error (6,) of a pose is outside its 95 % ellipsoid; None if it states none."""
     if side.file is None:
         return None
-    squared = _chi2(error, side.file.calibration.covariance)
+    squared = squared_distance(error, side.file.calibration.covariance)
     quantile = side.file.calibration.covariance_quantile
     return squared > quantile if np.isfinite(squared) and np.isfinite(quantile) else None
 
@@ -188,18 +183,6 @@ def _known_covariances(a: ImportedCalibration, b: ImportedCalibration) -> list[M
         for side in (a, b)
         if side.file is not None and np.isfinite(side.file.calibration.covariance).all()
     ]
-
-
-def _sigma_along(direction: np.ndarray, covariance: np.ndarray) -> float:
-    length = float(np.linalg.norm(direction))
-    variance = np.trace(covariance) / 3 if length < _ZERO_LENGTH else direction @ covariance @ direction / length**2
-    return float(np.sqrt(variance)) if variance >= 0 else float("nan")
-
-
-def _chi2(error: np.ndarray, covariance: Matrix66) -> float:
-    if not np.isfinite(covariance).all() or np.linalg.matrix_rank(covariance, hermitian=True) < 6:
-        return float("nan")
-    return float(error @ np.linalg.solve(covariance, error))
 
 
 def _chi2_limit(a: ImportedCalibration, b: ImportedCalibration) -> float:

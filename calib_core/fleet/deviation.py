@@ -1,0 +1,80 @@
+"""How far one mounting is from the others of its kind: one test over six degrees of freedom."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.arrays import Matrix66, Values, frozen_array
+from calib_core.fleet.random_effects import RandomEffects
+from calib_core.fleet.tails import DIMENSIONS, FALSE_RATE, quantile, tail
+
+__all__ = ["Deviation", "deviation"]
+
+_WHOLE = 5.0
+_MOST_OF_FREEDOM = 0.8
+_AXES = ("forward", "left", "up", "roll", "pitch", "yaw")
+_NAMED, _MOST_NAMED = 3.0, 3
+_TO_SHOWN = np.array([100.0] * 3 + [180.0 / np.pi] * 3)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Deviation:
+    """A mounting compared with what the others predict of it.
+
+    Attributes:
+        coordinates: (6,) from their mean: camera forward, left, up [m], roll, pitch, yaw [rad], in the radar's axes.
+        covariance: (6, 6) that is expected: scatter, uncertainty of the mean, and of this mounting's calibration.
+        squared: squared Mahalanobis distance.
+        limit: what it is below in all but 1 of 10,000 sound cases.
+        probability: of a distance this large in a sound case.
+    """
+
+    coordinates: Values
+    covariance: Matrix66
+    squared: float
+    limit: float
+    probability: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "coordinates", frozen_array(self.coordinates, (6,)))
+        object.__setattr__(self, "covariance", frozen_array(self.covariance, (6, 6)))
+
+    @property
+    def is_beyond(self) -> bool:
+        """Whether it is beyond the 1-in-10,000 point."""
+        return self.squared > self.limit
+
+    @property
+    def text(self) -> str:
+        """The axes that stand out, at least the largest, each with what is expected to scatter: "yaw 4.2 deg (± 0.4)"."""
+        sigma = np.sqrt(np.diag(self.covariance))
+        order = np.argsort(-np.abs(self.coordinates / sigma), kind="stable")[:_MOST_NAMED].tolist()
+        named = [axis for axis in order if abs(self.coordinates[axis]) >= _NAMED * sigma[axis]] or order[:1]
+        shown = [(axis, self.coordinates[axis] * _TO_SHOWN[axis], sigma[axis] * _TO_SHOWN[axis]) for axis in named]
+        return ", ".join(
+            f"{'camera ' if axis < 3 else ''}{_AXES[axis]} {value:+.2g} {'cm' if axis < 3 else 'deg'} (± {spread:.2g})"
+            for axis, value, spread in shown
+        )
+
+
+def deviation(effects: RandomEffects, vector: Values, covariance: Matrix66, *, freedom: float) -> Deviation:
+    """Compare one mounting with the distribution of others.
+
+    The expected covariance is a sum of an estimated scatter (Hotelling's T2 with the degrees of freedom that the others give it)
+    and of the calibration's own (6 F(6, nu) with those of its noise level); Satterthwaite's rule gives those of the sum.
+
+    Args:
+        effects: of the others.
+        vector: (6,) coordinates of this one.
+        covariance: (6, 6) of its calibration, in these coordinates.
+        freedom: degrees of freedom of that.
+    """
+    predicted = effects.covariance
+    total = predicted + covariance
+    away = vector - effects.mean
+    squared = float(away @ np.linalg.solve(total, away))
+    share = float(np.trace(np.linalg.solve(total, predicted))) / DIMENSIONS
+    nu = 1.0 / (share**2 / effects.freedom + (1.0 - share) ** 2 / freedom)
+    whole = min(_WHOLE * share, _MOST_OF_FREEDOM * nu)
+    limit = quantile(1.0 - FALSE_RATE, nu, whole=whole)
+    return Deviation(away, total, squared, limit, tail(squared, nu, whole=whole))

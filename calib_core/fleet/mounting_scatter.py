@@ -1,0 +1,173 @@
+"""How the mountings of a vehicle type scatter, estimated from their calibrations; those that are off are left out."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.arrays import Matrix66
+from calib_core.fleet.common_mounting import common_mounting, robust_distances
+from calib_core.fleet.deviation import Deviation, deviation
+from calib_core.fleet.mounting_coordinates import coordinate_jacobian, coordinates, pose_from_coordinates
+from calib_core.fleet.mountings import Mounting
+from calib_core.fleet.random_effects import RandomEffects, random_effects
+from calib_core.geometry import RigidTransform
+from calib_core.measurements import Unsolvable
+
+__all__ = ["MIN_MOUNTINGS", "LeftOut", "MountingScatter", "mounting_scatter"]
+
+MIN_MOUNTINGS = 5
+"""The fewest mountings that a scatter is estimated from: fewer do not show how differently it spreads along the axes."""
+
+_FEWEST_FITTED = 4
+_CANDIDATE = 22.457744484825323  # the 99.9 % quantile of chi2 with 6 degrees of freedom
+_FEW = 12  # up to so many, a vehicle may hide itself by widening the scatter: each is tested against the others
+_USUAL = 12.591587243743977
+
+
+@dataclass(frozen=True, slots=True)
+class LeftOut:
+    """A mounting that was not counted.
+
+    Attributes:
+        mounting: the mounting.
+        deviation: from those that were.
+        reason: why, with figures and without a full stop.
+    """
+
+    mounting: Mounting
+    deviation: Deviation
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MountingScatter:
+    """The distribution of the mountings of one vehicle type.
+
+    Attributes:
+        vehicle_type: its name.
+        common: the mounting that the coordinates are relative to.
+        effects: mean and scatter in the coordinates of `mounting_coordinates`: camera forward, left, up [m], roll, pitch, yaw
+            [rad].
+        mountings: those that were counted.
+        left_out: those that were not.
+    """
+
+    vehicle_type: str
+    common: RigidTransform
+    effects: RandomEffects
+    mountings: tuple[Mounting, ...]
+    left_out: tuple[LeftOut, ...] = ()
+
+    @property
+    def camera_from_radar(self) -> RigidTransform:
+        """The mean pose."""
+        return pose_from_coordinates(self.effects.mean, self.common)
+
+    @property
+    def scatter(self) -> Matrix66:
+        """Covariance (6, 6) of the mountings: camera forward, left, up [m], roll, pitch, yaw [rad]."""
+        return self.effects.scatter
+
+    def deviation_of(self, mounting: Mounting) -> Deviation:
+        """Compare a mounting that was not counted with those that were."""
+        return deviation(self.effects, *_measured(mounting, self.common), freedom=mounting.freedom)
+
+    def without(self, vehicle: str) -> "MountingScatter | Unsolvable":
+        """Estimate the scatter again without one vehicle's mountings; others that were left out stay so."""
+        rest = tuple(one for one in self.mountings if one.vehicle != vehicle)
+        if len(rest) == len(self.mountings):
+            return self
+        if len(rest) < _FEWEST_FITTED:
+            return _too_few(len(rest), 0)
+        measured = [_measured(one, self.common) for one in rest]
+        effects = random_effects(np.array([row[0] for row in measured]), np.array([row[1] for row in measured]))
+        others = tuple(one for one in self.left_out if one.mounting.vehicle != vehicle)
+        return MountingScatter(self.vehicle_type, self.common, effects, rest, others)
+
+
+def mounting_scatter(mountings: Sequence[Mounting], *, vehicle_type: str) -> MountingScatter | Unsolvable:
+    """Estimate how the mountings of one vehicle type scatter.
+
+    A mounting that is beyond the 1-in-10,000 point of what the others predict is left out. The estimate starts from the half that
+    agrees best, so that a few wrong ones cannot hide each other, takes back whatever that half explains, and then tests
+    each one against the others.
+
+    Args:
+        mountings: of all vehicles; a remounted vehicle counts once for each mounting.
+        vehicle_type: its name.
+    """
+    count = len(mountings)
+    if count < MIN_MOUNTINGS:
+        return _too_few(count, 0)
+    common = common_mounting([one.camera_from_radar for one in mountings])
+    measured = [_measured(one, common) for one in mountings]
+    vectors, covariances = np.array([row[0] for row in measured]), np.array([row[1] for row in measured])
+    freedoms = np.array([one.freedom for one in mountings])
+    kept = _agreeing(vectors, covariances, freedoms)
+    if kept.sum() < MIN_MOUNTINGS:
+        return _too_few(int(kept.sum()), int((~kept).sum()))
+    effects = random_effects(vectors[kept], covariances[kept])
+    left_out = []
+    for k in np.flatnonzero(~kept).tolist():
+        away = deviation(effects, vectors[k], covariances[k], freedom=freedoms[k])
+        reason = f"off its kind: {away.text}, beyond the 1-in-10,000 point of the other mountings"
+        left_out.append(LeftOut(mountings[k], away, reason))
+    counted = tuple(one for one, counts in zip(mountings, kept.tolist(), strict=True) if counts)
+    return MountingScatter(vehicle_type, common, effects, counted, tuple(left_out))
+
+
+def _too_few(count: int, left_out: int) -> Unsolvable:
+    without = f" after {left_out} that are off their kind were left out" if left_out else ""
+    return Unsolvable(
+        "too-few-vehicles",
+        f"{count} of at least {MIN_MOUNTINGS} required mountings{without}: too few to tell how they scatter",
+        "calibrate more vehicles of this type, or go on without a prior",
+    )
+
+
+def _measured(mounting: Mounting, common: RigidTransform) -> tuple[np.ndarray, np.ndarray]:
+    """Return a mounting's coordinates (6,) and their covariance (6, 6)."""
+    jacobian = coordinate_jacobian(mounting.camera_from_radar, common)
+    return coordinates(mounting.camera_from_radar, common), jacobian @ mounting.covariance @ jacobian.T
+
+
+def _agreeing(vectors: np.ndarray, covariances: np.ndarray, freedoms: np.ndarray) -> np.ndarray:
+    """Return which mountings (n,) agree with each other."""
+    count = len(vectors)
+    squared = robust_distances(vectors, covariances)
+    fewest = max(_FEWEST_FITTED, count // 2 + 1)
+    kept = squared <= max(_CANDIDATE, float(np.sort(squared)[fewest - 1]))
+    while not kept.all():
+        effects = random_effects(vectors[kept], covariances[kept])
+        taken = [
+            k
+            for k in np.flatnonzero(~kept)
+            if not deviation(effects, vectors[k], covariances[k], freedom=freedoms[k]).is_beyond
+        ]
+        if not taken:
+            break
+        kept[taken] = True
+    while kept.sum() > fewest:
+        worst = _worst(vectors, covariances, freedoms, np.flatnonzero(kept))
+        if worst is None:
+            break
+        kept[worst] = False
+    return kept
+
+
+def _worst(vectors: np.ndarray, covariances: np.ndarray, freedoms: np.ndarray, kept: np.ndarray) -> int | None:
+    """Return which of the kept ones is farthest beyond what the others of them predict; None if none is."""
+    effects = random_effects(vectors[kept], covariances[kept])
+    worst: int | None = None
+    least = 1.0
+    for place, k in enumerate(kept.tolist()):
+        inside = deviation(effects, vectors[k], covariances[k], freedom=freedoms[k])
+        if len(kept) > _FEW and inside.squared <= _USUAL:
+            continue
+        others = np.delete(kept, place)
+        outside = random_effects(vectors[others], covariances[others])
+        away = deviation(outside, vectors[k], covariances[k], freedom=freedoms[k])
+        if away.is_beyond and away.probability < least:
+            worst, least = k, away.probability
+    return worst

@@ -1,0 +1,118 @@
+"""The mountings of a vehicle: its sessions in order of time, parted where the radar was remounted, and averaged in between."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from calib_core.arrays import Matrix66, frozen_array
+from calib_core.fleet.session_pose import SessionPose
+from calib_core.fleet.transitions import RelevantChange, Transition, transition
+from calib_core.geometry import RigidTransform
+
+__all__ = ["Mounting", "mounting_of", "mountings_of", "transitions_of"]
+
+_NOT_SYSTEMATIC = 1e-6  # least share of a covariance that counts as a session's own
+_ROUNDS = 3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mounting:
+    """What all sessions of one mounting say together.
+
+    Attributes:
+        vehicle: its name.
+        sessions: names of the sessions, in order of time.
+        camera_from_radar: their weighted mean.
+        covariance: (6, 6) of its error (dt, dtheta) [m, rad]; what is systematic is not averaged out.
+        freedom: degrees of freedom of the noise levels: the fewest of the sessions.
+        radar_serial: of the radar; None if unknown.
+        camera_serial: of the camera; None if unknown.
+    """
+
+    vehicle: str
+    sessions: tuple[str, ...]
+    camera_from_radar: RigidTransform
+    covariance: Matrix66
+    freedom: float
+    radar_serial: str | None = None
+    camera_serial: str | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "covariance", frozen_array(self.covariance, (6, 6)))
+
+
+def transitions_of(
+    sessions: Iterable[SessionPose], *, relevant: RelevantChange | None = None
+) -> tuple[Transition, ...]:
+    """Return each vehicle's transitions from session to session, vehicles by name, sessions in order of time.
+
+    Args:
+        sessions: of any number of vehicles, in any order; sessions without a time come first, by name.
+        relevant: the change that must not stay unseen.
+    """
+    return tuple(
+        transition(before, after, relevant=relevant) for row in _by_vehicle(sessions) for before, after in pairwise(row)
+    )
+
+
+def mountings_of(sessions: Iterable[SessionPose]) -> tuple[Mounting, ...]:
+    """Return the mountings, vehicles by name: a new one begins at a remount, and with another radar or camera.
+
+    Args:
+        sessions: of any number of vehicles, in any order.
+    """
+    found = []
+    for row in _by_vehicle(sessions):
+        together = [row[0]]
+        for after in row[1:]:
+            step = transition(together[-1], after)
+            if step.is_remount or step.other_sensors:
+                found.append(mounting_of(together))
+                together = []
+            together.append(after)
+        found.append(mounting_of(together))
+    return tuple(found)
+
+
+def mounting_of(sessions: Sequence[SessionPose]) -> Mounting:
+    """Average the sessions of one mounting.
+
+    Each weighs as its covariance says. Their own errors average out; the systematic ones are taken to be the same in all.
+
+    Args:
+        sessions: at least one, of one vehicle with one mounting.
+    """
+    pose = sessions[0].camera_from_radar
+    own = [one.covariance - (1.0 - _NOT_SYSTEMATIC) * one.systematic for one in sessions]
+    information = np.linalg.inv([one.covariance for one in sessions])
+    gains = np.linalg.inv(information.sum(axis=0)) @ information
+    for _ in range(_ROUNDS):
+        errors = np.array([one.camera_from_radar.error_from(pose) for one in sessions])
+        pose = pose.perturbed(np.einsum("nij,nj->i", gains, errors))
+    shared = np.sum([gain @ _root(one.systematic) for gain, one in zip(gains, sessions, strict=True)], axis=0)
+    averaged = np.sum([gain @ part @ gain.T for gain, part in zip(gains, own, strict=True)], axis=0)
+    covariance = averaged + (1.0 - _NOT_SYSTEMATIC) * shared @ shared.T
+    return Mounting(
+        vehicle=sessions[0].vehicle,
+        sessions=tuple(one.session for one in sessions),
+        camera_from_radar=pose,
+        covariance=(covariance + covariance.T) / 2.0,
+        freedom=min(one.freedom for one in sessions),
+        radar_serial=sessions[-1].radar_serial,
+        camera_serial=sessions[-1].camera_serial,
+    )
+
+
+def _by_vehicle(sessions: Iterable[SessionPose]) -> list[list[SessionPose]]:
+    rows: dict[str, list[SessionPose]] = {}
+    for one in sorted(sessions, key=lambda one: (one.vehicle, one.time_ns is not None, one.time_ns or 0, one.session)):
+        rows.setdefault(one.vehicle, []).append(one)
+    return list(rows.values())
+
+
+def _root(matrix: np.ndarray) -> np.ndarray:
+    """Return the symmetric root of a positive semi-definite matrix; rounding below zero is zero."""
+    values, vectors = np.linalg.eigh(matrix)
+    return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)

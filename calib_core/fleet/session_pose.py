@@ -1,0 +1,137 @@
+"""What the fleet needs of one calibration: whose it is, its pose, and which part of its uncertainty does not average out."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.arrays import Matrix66, Vector3, frozen_array
+from calib_core.camera import Camera
+from calib_core.errors import InputError
+from calib_core.geometry import RigidTransform
+from calib_core.measurements import TimeNs
+from calib_core.results import Calibration
+from calib_core.stated_error import degrees_of_freedom
+from calib_core.systematic_errors import SystematicErrorResult
+
+__all__ = ["CHI2_95", "SessionPose", "session_pose"]
+
+CHI2_95 = 12.591587243743977
+"""The 95 % quantile of chi2 with 6 degrees of freedom: the quantile of a covariance whose noise level is known."""
+
+_SCALES = ("azimuth_scale", "elevation_scale")
+_ROUNDING, _EXCESS = 1e-12, 1e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SessionPose:
+    """One calibration of one vehicle, as the fleet sees it.
+
+    Attributes:
+        vehicle: its name.
+        session: name of the session, or of its file.
+        camera_from_radar: the pose.
+        covariance: (6, 6) of the error (dt, dtheta) [m, rad], as `Calibration.covariance`.
+        systematic: (6, 6) the part of the covariance that further sessions with the same sensors do not average out; the
+            whole covariance if nothing was stated.
+        quantile: the factor on covariance that gives its 95 % ellipsoid.
+        time_ns: of the session; None if unknown.
+        radar_serial: of the radar; None if unknown.
+        camera_serial: of the camera; None if unknown.
+        camera: its intrinsics, for figures in the picture; None if unknown.
+        reference_radar_m: (3,) the position in the radar frame where these are stated; None if unknown.
+        angle_scales: what is known of the radar's azimuth and elevation scale.
+
+    Raises:
+        InputError: pose and covariance cannot be used: a number is not finite, or the covariance is singular.
+    """
+
+    vehicle: str
+    session: str
+    camera_from_radar: RigidTransform
+    covariance: Matrix66
+    systematic: Matrix66 = None  # type: ignore[assignment]
+    quantile: float = CHI2_95
+    time_ns: TimeNs | None = None
+    radar_serial: str | None = None
+    camera_serial: str | None = None
+    camera: Camera | None = None
+    reference_radar_m: Vector3 | None = None
+    angle_scales: tuple[SystematicErrorResult, ...] = ()
+
+    def __post_init__(self) -> None:
+        systematic = self.covariance if self.systematic is None else self.systematic
+        object.__setattr__(self, "covariance", frozen_array(self.covariance, (6, 6)))
+        object.__setattr__(self, "systematic", frozen_array(systematic, (6, 6)))
+        if self.reference_radar_m is not None:
+            object.__setattr__(self, "reference_radar_m", frozen_array(self.reference_radar_m, (3,)))
+        _check(self)
+
+    @property
+    def freedom(self) -> float:
+        """Degrees of freedom of the estimated noise level that the quantile states; very many if it was known."""
+        return degrees_of_freedom(self.quantile)
+
+    @property
+    def sensors(self) -> tuple[str | None, str | None]:
+        """The serials of radar and camera."""
+        return self.radar_serial, self.camera_serial
+
+
+def _check(pose: SessionPose) -> None:
+    where = f"vehicle {pose.vehicle!r}, session {pose.session!r}"
+    if not (np.isfinite(pose.covariance).all() and np.isfinite(pose.systematic).all()):
+        raise InputError(
+            f"{where}: the calibration states no uncertainty, so it cannot be weighed; solve it with the default method"
+        )
+    scale = np.sqrt(np.maximum(np.diag(pose.covariance), 1e-300))
+    if np.linalg.eigvalsh(pose.covariance / np.outer(scale, scale))[0] <= _ROUNDING:
+        raise InputError(f"{where}: the covariance is singular; export the calibration again with all digits")
+    if np.linalg.eigvalsh((pose.covariance - pose.systematic) / np.outer(scale, scale))[0] < -_EXCESS:
+        raise InputError(f"{where}: the systematic part exceeds the covariance; give the part that sessions share")
+
+
+def session_pose(
+    calibration: Calibration,
+    *,
+    vehicle: str,
+    session: str,
+    time_ns: TimeNs | None = None,
+    radar_serial: str | None = None,
+    camera_serial: str | None = None,
+) -> SessionPose:
+    """Take from a calibration what the fleet needs.
+
+    Errors that all pairs share (the radar's scales and range, the lens, clicks and reflector) are the same ones in the next
+    session with these sensors, so further sessions do not average them out. A calibration states their shares of the variance
+    of position and rotation, not their (6, 6). The larger of the two shares is taken of the whole firm covariance, and what a
+    radar without elevation leaves to assumptions is added: at least the true part, never more than the covariance.
+
+    Args:
+        calibration: with a covariance.
+        vehicle: its name.
+        session: name of the session, or of its file.
+        time_ns: of the session.
+        radar_serial: of the radar.
+        camera_serial: of the camera.
+
+    Raises:
+        InputError: the calibration states no uncertainty, or a singular one.
+    """
+    firm, errors = calibration.firm_covariance, calibration.errors_of_firm
+    shares = [sum(one.position_share for one in errors), sum(one.rotation_share for one in errors)]
+    share = min(max(0.0, *np.nan_to_num(shares).tolist()), 1.0) if errors else 1.0
+    places_m = [pair.point_radar_m for pair in calibration.pairs if pair.inlier]
+    return SessionPose(
+        vehicle=vehicle,
+        session=session,
+        camera_from_radar=calibration.camera_from_radar,
+        covariance=calibration.covariance,
+        systematic=calibration.covariance - (1.0 - share) * firm,
+        quantile=calibration.covariance_quantile,
+        time_ns=time_ns,
+        radar_serial=radar_serial,
+        camera_serial=camera_serial,
+        camera=calibration.camera,
+        reference_radar_m=np.median(places_m, axis=0) if places_m else None,
+        angle_scales=tuple(one for one in calibration.systematic_errors if one.name in _SCALES and one.estimated),
+    )
