@@ -86,9 +86,7 @@ class Fleet:
         options = {"--json": self.json, "--parquet": self.parquet, "--csv": self.csv}
         for name, given in options.items():
             if given and self.action not in _FLAG_OF[name]:
-                raise InputError(
-                    f"{name} applies to fleet {' and '.join(_FLAG_OF[name])} only; see cocalib fleet --help"
-                )
+                raise InputError(f"{name} applies to fleet {', '.join(_FLAG_OF[name])} only; see cocalib fleet --help")
         wanted = (*_NAMES[self.action], "OUT")
         if len(self.given) != len(wanted):
             raise InputError(
