@@ -21,7 +21,7 @@ import { goLive } from "./live.js";
 import { magnify, stretchContrast } from "./loupe.js";
 import { nextWorst } from "./pairs.js";
 import { togglePalette } from "./palette.js";
-import { acceptProposal, nextPlace, nextProposal, openProposals, previousProposal, rejectProposal, shownOffer, toggleProposals } from "./proposals.js";
+import { acceptProposal, nextPlace, nextProposal, openProposals, previousProposal, rejectProposal, shownOffer, takesEnter, toggleProposals } from "./proposals.js";
 import { chooseRecording } from "./opening.js";
 import { fit, zoomBy } from "./picture.js";
 import { goTo, pause, play, step } from "./player.js";
@@ -88,7 +88,7 @@ export const ACTIONS = [
   { id: "previous-placement", group: "Time", words: "Previous placement", keys: ["P"], also: "reflector position back", run: () => previousProposal() || placement(-1), ...PLACES },
   { id: "live", group: "Time", words: "Show the newest frame as it comes", also: "live follow recording now", run: goLive, when: following },
 
-  { id: "place-mark", group: "Mark", words: "Show the keyboard's cross, then set the mark there", keys: ["Enter"], also: "click place add", run: () => (boxing.on ? newBox() : shownOffer() && !state.cross ? acceptProposal() : enterCross()), when: withPictures },
+  { id: "place-mark", group: "Mark", words: "Show the keyboard's cross, then set the mark there", keys: ["Enter"], also: "click place add", run: () => (boxing.on ? newBox() : takesEnter() && !state.cross ? acceptProposal() : enterCross()), when: withPictures },
   { id: "cross", group: "Mark", words: "Keyboard's cross: 1 to 9 zoom into a field, arrows move it, Backspace zooms out, Esc ends", keys: ["G"], also: "grid nine fields marking without mouse", run: toggleCross, when: withPictures },
   { id: "next-candidate", group: "Mark", words: "Take the return that fits better, or the next one", keys: ["C"], also: "candidate choose radar association", run: () => (shownOffer() ? nextPlace() : nextCandidate()), when: () => withPictures() || (shownOffer() ? "" : withoutCandidates()) },
   { id: "free-candidate", group: "Mark", words: "Leave the choice of the return to the program", keys: ["Shift+C"], also: "candidate automatic unchoose", run: () => choose(-1), when: () => withPictures() || (selectedClick()?.chosen ? "" : "No return was chosen for this mark") },

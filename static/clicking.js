@@ -1,6 +1,7 @@
 // @ts-check
 /** Pointer input on the frame: click to place, drag a mark to move it, click a candidate's number to choose it, drag elsewhere to pan, wheel to zoom at the cursor, arrow keys to nudge. */
 
+import { askApex } from "./apex.js";
 import { boxing } from "./boxes.js";
 import { boxesTake, cancelBox, cursorOver, dragBox, dropBox, pressBox } from "./boxing.js";
 import { candidateNear, choose } from "./candidates.js";
@@ -12,6 +13,7 @@ import { marks, redraw, zoomBy } from "./picture.js";
 import { send } from "./socket.js";
 import { clickIn, clicks, clicksIn, emit, on, select, selectedClick, stampOf, state } from "./state.js";
 import { pause } from "./player.js";
+import { shownOffer } from "./proposals.js";
 import { dragRuler, dropRuler, pressRuler, refusesMarks } from "./rectified.js";
 import { toast } from "./notices.js";
 
@@ -152,7 +154,8 @@ function hover(point) {
 }
 
 /**
- * Place a mark in the frame on screen and select it; other marks of the frame stay.
+ * Place a mark in the frame on screen and select it; other marks of the frame stay. Where a proposal is shown, it goes to the apex that the
+ * frames of the placement show next to it, if they do: one step, as the click is not placed before.
  * @param {number} u @param {number} v @param {{mark?: import("./messages.js").ClickRow["mark"], sigma_px?: number|null}} [how] clicked by a person, unless said otherwise
  */
 export async function place(u, v, { mark = "clicked", sigma_px = null } = {}) {
@@ -165,8 +168,15 @@ export async function place(u, v, { mark = "clicked", sigma_px = null } = {}) {
   const image_time = stampOf(index);
   const known = new Set(clicksIn(index).map((click) => click.id));
   const key = `new-${nextDraft++}`;
+  const corrects = mark === "clicked" && shownOffer() !== null;
   draft(key, { u, v, image_time, mark });
   awaited = { index, known };
+  const { found } = corrects ? await askApex({ image_time, pixel_px: [u, v], over_dwell: true }) : { found: null };
+  if (found?.pixel_px) {
+    [u, v] = found.pixel_px;
+    [mark, sigma_px] = ["snapped", found.sigma_px];
+    draft(key, { u, v, image_time, mark });
+  }
   await settle(key, { type: "click_placed", image_time, pixel_px: [u, v], mark, sigma_px });
   selectAwaited();
 }

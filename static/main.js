@@ -2,6 +2,7 @@
 /** The page: wires the modules together and passes the server's messages to those that draw them. */
 
 import { act, actionNamed } from "./actions.js";
+import { takeSnapped } from "./apex.js";
 import { startArriving } from "./arriving.js";
 import { ask, content } from "./asking.js";
 import { boxing, takeFrameBoxes } from "./boxes.js";
@@ -44,7 +45,6 @@ import { startSpace, takeSpace } from "./space.js";
 import { clickIn, clicks, clicksIn, emit, on, select, selectedClick, stampOf, state } from "./state.js";
 import { startStatus } from "./status.js";
 import { startGuide } from "./steps.js";
-import { takeSnapped } from "./snapping.js";
 import { startTimeline } from "./timeline.js";
 import { startVerdict } from "./verdict.js";
 import { startTouch } from "./touch.js";

@@ -1224,6 +1224,7 @@ export interface SnapForm {
   image_time: StampForm;
   pixel_px: [number, number];
   id?: string | null;
+  over_dwell?: boolean;
   request?: number;
 }
 

@@ -5,7 +5,6 @@
  */
 
 import { boxing } from "./boxes.js";
-import { place } from "./clicking.js";
 import { dismiss } from "./dismissing.js";
 import { lookAt, lookInto, pan, toCss, viewport, zoom } from "./geometry.js";
 import { make, toast } from "./notices.js";
@@ -45,6 +44,8 @@ let current = null;
 /** The frame to zoom into once it is shown. @type {Row|null} */
 let awaited = null;
 let moved = -Infinity;
+/** Whether the last proposal was decided just now: Enter then means nothing else until another key is pressed, or the pointer. */
+let over = false;
 /** The switch; made at the start. @type {HTMLButtonElement} */
 let chip;
 
@@ -61,6 +62,8 @@ export function startProposals() {
   on(["shown"], arrive);
   on(["view"], settle);
   on(["playing"], () => state.playing && (awaited = null));
+  addEventListener("keydown", (event) => event.key !== "Enter" && (over = false), { capture: true });
+  addEventListener("pointerdown", () => (over = false), { capture: true });
 }
 
 /** @param {import("./messages.js").ProposalNews} message */
@@ -181,10 +184,13 @@ function zoomInto({ row, place }) {
 /** Whether a better place was found a moment ago for what is on screen. */
 export const justMoved = () => performance.now() - moved < UNSEEN;
 
+/** Whether Enter is about proposals: one is on screen, or the last one was decided just now. */
+export const takesEnter = () => shownOffer() !== null || (over && !openProposals().length);
+
 /** Enter: what the picture shows becomes a mark, and the next proposal is shown. */
 export async function acceptProposal() {
   const offer = shownOffer();
-  if (!offer) return;
+  if (!offer) return void (over && sayOver());
   if (justMoved()) return toast("A better place was just found: look again.");
   const { u_px, v_px, sigma_px } = offer.place;
   await decide(offer.row, { type: "click_placed", image_time: offer.row.image_time, pixel_px: [u_px, v_px], mark: "snapped", sigma_px });
@@ -211,10 +217,13 @@ async function decide(row, message) {
 
 function finish() {
   current = null;
+  over = true;
   fit();
   emit("proposals");
-  toast("All proposals are decided.", state.proposals?.unproposed.length ? "N goes to the placements without a proposal." : "");
+  sayOver();
 }
+
+const sayOver = () => toast("All proposals are decided.", state.proposals?.unproposed.length ? "N goes to the placements without a proposal." : "");
 
 /** C: the next place where the reflector may stand. */
 export function nextPlace() {

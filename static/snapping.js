@@ -1,19 +1,12 @@
 // @ts-check
 /** S: the mark, or the keyboard's cross, goes to the reflector's apex that the picture shows within 15 px; the server finds it. */
 
+import { askApex } from "./apex.js";
 import { flushNudge, moveTo, place } from "./clicking.js";
 import { toast } from "./notices.js";
-import { send } from "./socket.js";
 import { clickIn, stampOf, state } from "./state.js";
 
-/** The server's last answer, until it is used. @type {import("./messages.js").Snapped|null} */
-let answer = null;
 let busy = false;
-
-/** @param {import("./messages.js").Snapped} message */
-export function takeSnapped(message) {
-  answer = message;
-}
 
 /** Where to search: at the cross, or else at the mark. @returns {{id: string|null, u: number, v: number}|null} */
 function start() {
@@ -42,10 +35,7 @@ export async function snap() {
 async function snapFrom(index) {
   const from = start();
   if (!from || from.id === "") return;
-  const image_time = stampOf(index);
-  answer = null;
-  const refusal = await send({ type: "snap_wanted", image_time, pixel_px: [from.u, from.v], id: from.id });
-  const found = /** @type {import("./messages.js").Snapped|null} */ (answer);
+  const { found, refusal } = await askApex({ image_time: stampOf(index), pixel_px: [from.u, from.v], id: from.id });
   if (refusal || !found) return toast(refusal ?? "The server did not answer.", "The mark stays where it is.");
   if (!found.pixel_px) return toast(found.words, "The mark stays where it is: move it closer, or set it by hand.", "snap");
   const [u, v] = found.pixel_px;

@@ -124,6 +124,11 @@ COMMANDS: Mapping[str, Command] = {
             "Show a recording with its calibration in the Rerun viewer.",
         ),
         Command(
+            "batch",
+            "app.cli.fleet.batch:Batch",
+            "Calibrate many sessions: solve, evaluate, report and export each; what is done already is not done again.",
+        ),
+        Command(
             "session",
             "app.cli.session:Session",
             "List the sessions of recordings, repair a damaged one, or export its clicks.",

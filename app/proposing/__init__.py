@@ -1,6 +1,6 @@
 """Find where the reflector stood in a recording, for the command line and the page."""
 
-from app.proposing.finding import REFLECTOR_M, RecordedFrames, find_proposals, proposed_again
+from app.proposing.finding import REFLECTOR_M, RecordedFrames, find_proposals, proposed_again, view_at
 from app.proposing.job import ProposingJob, ProposingSnapshot, ProposingStage, ProposingWish
 
 __all__ = [
@@ -12,4 +12,5 @@ __all__ = [
     "RecordedFrames",
     "find_proposals",
     "proposed_again",
+    "view_at",
 ]

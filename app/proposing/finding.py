@@ -6,15 +6,16 @@ from typing import Protocol
 
 import numpy as np
 
+from calib_core.arrays import Vector2
 from calib_core.association.gating import static_returns
 from calib_core.association.placements import Placement, find_placements, in_stretches
 from calib_core.camera import Camera
-from calib_core.measurements import NS_PER_S, RadarScans, ReflectorClick, Unsolvable
+from calib_core.measurements import NS_PER_S, RadarScans, ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions, GatingOptions
 from calib_core.proposing import DwellView, FrameSource, Proposals, ViewProgress, dwell_views, proposals_of
 from calib_core.proposing.look import Look, look_of, with_look
 
-__all__ = ["REFLECTOR_M", "RecordedFrames", "find_proposals", "looks_of", "proposed_again"]
+__all__ = ["REFLECTOR_M", "RecordedFrames", "find_proposals", "looks_of", "proposed_again", "view_at"]
 
 REFLECTOR_M = 0.24
 """Width of the reflector if nothing is said of it [m]."""
@@ -106,19 +107,26 @@ def proposed_again(
 
 
 def looks_of(click: ReflectorClick, views: Sequence[DwellView], frames: FrameSource) -> Iterator[Look]:
-    """Yield what a confirmed click shows; nothing if it lies in no dwell, or no frame of that can be read.
-
-    Of two reflectors that stood at once, the click shows the one with a candidate nearer to it.
-    """
+    """Yield what a confirmed click shows; nothing if it lies in no dwell, or no frame of that can be read."""
     pixel_px = np.array([click.u_px, click.v_px])
-    meanwhile = [
-        view for view in views if view.placement.start <= click.image_time <= view.placement.end and len(view.frames)
-    ]
-    if meanwhile:
-        nearest = min(meanwhile, key=lambda view: _distance_px(view, pixel_px))
-        look = look_of(nearest, frames, pixel_px)
-        if look is not None:
-            yield look
+    view = view_at(click.image_time, pixel_px, views)
+    look = None if view is None else look_of(view, frames, pixel_px)
+    if look is not None:
+        yield look
+
+
+def view_at(image_time: TimeNs, pixel_px: Vector2, views: Sequence[DwellView]) -> DwellView | None:
+    """Return the view of the dwell that a pixel of a frame is of; None if none of that time was looked at.
+
+    Of two reflectors that stood at once, that with a candidate nearer to the pixel.
+
+    Args:
+        image_time: stamp of the frame.
+        pixel_px: (2,) in it.
+        views: of all placements.
+    """
+    meanwhile = [one for one in views if one.placement.start <= image_time <= one.placement.end and len(one.frames)]
+    return min(meanwhile, key=lambda view: _distance_px(view, pixel_px), default=None)
 
 
 def _distance_px(view: DwellView, pixel_px: np.ndarray) -> float:

@@ -29,7 +29,9 @@ Written by `python -m benchmarks.proposing`; do not edit. Simulated recordings o
 light that changes (brightness by up to 60 %, tint, one change of exposure), passers-by, two reflectors at a time, a
 tripod, noise of the camera. A seed names one recording; seeds from 20,000 were not looked at before. "After one click" means
 that the person clicks the first proposal of a placement at the true pixel with an error of 0.7 px; that placement counts
-as right. A person accepts what lies on the reflector, within half of its width. What is not proposed is not right.
+as right. A person accepts what lies on the reflector, within half of its width. What is not proposed is not right. A pose is
+confidently wrong if the truth is outside twice its stated 99.9 % region, or more than 5 deg away although its verdict is good
+or usable; a weak verdict says itself how far off the pose may be.
 """
 
 

@@ -13,6 +13,7 @@ from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
 from calib_core.proposing import Proposal
 from calib_core.results import Calibration
+from calib_core.verdict import verdict_on
 
 __all__ = ["accepted_clicks", "pose_figures"]
 
@@ -43,8 +44,8 @@ def pose_figures(
 ) -> Figures:
     """Calibrate, and compare with the true pose; there are no figures of an answer that is refused.
 
-    "far" is 1 if the truth is outside twice the stated 99.9 % quantile, or more than 5 deg away: the answer is confidently
-    wrong.
+    "far" is 1 if the answer is confidently wrong: the truth is outside twice the stated 99.9 % quantile, or more than 5 deg
+    away although the verdict is good or usable. A weak verdict states how far off the answer may be.
     """
     if not clicks:
         return {f"{name} clicks": 0.0}
@@ -56,5 +57,6 @@ def pose_figures(
     found: Figures = {f"{name} {key}": value for key, value in figures.items() if key in _KEPT}
     squared, quantile, turned = figures.get("squared"), figures.get("quantile"), figures.get("rotation_rad")
     outside = squared is not None and quantile is not None and not squared <= _FAR * quantile_999(quantile)
-    far = outside or (turned is not None and turned > _TURNED_RAD)
+    relied_on = isinstance(outcome, Calibration) and verdict_on(outcome).level in ("good", "usable")
+    far = outside or (relied_on and turned is not None and turned > _TURNED_RAD)
     return found | {f"{name} clicks": float(len(clicks)), f"{name} far": float(far)}

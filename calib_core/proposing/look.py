@@ -13,7 +13,7 @@ from calib_core.proposing.frame_source import FrameSource
 from calib_core.proposing.picture_candidates import PictureCandidate, Surroundings
 from calib_core.vision.apex import Apex, find_apex
 
-__all__ = ["CoveredPixel", "Look", "covering", "look_of", "with_look"]
+__all__ = ["Look", "look_of", "with_look"]
 
 _HALF = 0.75
 """Half the side of the patch, in widths of the reflector."""
@@ -63,44 +63,6 @@ class Look:
         object.__setattr__(self, "offset_px", frozen_array(self.offset_px, (2,)))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class CoveredPixel:
-    """A click as it holds for its whole dwell.
-
-    Attributes:
-        pixel_px: (2,) averaged over the frames of the dwell.
-        sigma_px: standard deviation per axis.
-    """
-
-    pixel_px: Vector2
-    sigma_px: float
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "pixel_px", frozen_array(self.pixel_px, (2,)))
-
-
-def covering(view: DwellView, frames: FrameSource, pixel_px: Vector2) -> CoveredPixel:
-    """Average a click over the frames of its dwell: the apex seen in their median, where the click means it.
-
-    Args:
-        view: of the dwell.
-        frames: of the camera.
-        pixel_px: (2,) clicked.
-    """
-    return _covered(full_picture(view.clear, frames), pixel_px, view.width_px)[0]
-
-
-def _covered(picture: np.ndarray | None, pixel_px: Vector2, width_px: float) -> tuple[CoveredPixel, bool]:
-    """Return the apex next to a click, and whether there is one."""
-    pixel_px = np.asarray(pixel_px, dtype=np.float64)
-    if picture is not None:
-        reach_px = max(_LEAST_SNAP_PX, _SNAP * width_px)
-        apex = find_apex(picture, pixel_px, reach_px=reach_px, size_px=width_px)
-        if isinstance(apex, Apex):
-            return CoveredPixel(apex.pixel_px, apex.sigma_px), True
-    return CoveredPixel(pixel_px, _CLICK_SIGMA_PX), False
-
-
 def look_of(view: DwellView, frames: FrameSource, pixel_px: Vector2) -> Look | None:
     """Take the look of the reflector at a confirmed pixel; None if no frame of the dwell can be read.
 
@@ -114,11 +76,15 @@ def look_of(view: DwellView, frames: FrameSource, pixel_px: Vector2) -> Look | N
     picture = full_picture(view.clear, frames)
     if picture is None:
         return None
-    covered, at_apex = _covered(picture, pixel_px, view.width_px)
-    middle = np.round(covered.pixel_px)
+    pixel_px = np.asarray(pixel_px, dtype=np.float64)
+    reach_px = max(_LEAST_SNAP_PX, _SNAP * view.width_px)
+    apex = find_apex(picture, pixel_px, reach_px=reach_px, size_px=view.width_px)
+    at_apex = isinstance(apex, Apex)
+    at_px, sigma_px = (apex.pixel_px, apex.sigma_px) if isinstance(apex, Apex) else (pixel_px, _CLICK_SIGMA_PX)
+    middle = np.round(at_px)
     side = 2 * max(4, int(np.ceil(_HALF * view.width_px)) + 2) + 1
     patch = cv2.getRectSubPix(picture, (side, side), (float(middle[0]), float(middle[1])))
-    return Look(patch, covered.pixel_px - middle, view.width_px, covered.sigma_px, at_apex)
+    return Look(patch, at_px - middle, view.width_px, sigma_px, at_apex)
 
 
 def with_look(

@@ -145,6 +145,48 @@ def test_twenty_placements_take_at_most_25_keys_and_clicks(
     assert page.value("__cocalib.shownOffer()") is None
 
 
+def test_a_correcting_click_goes_to_the_apex_that_its_frames_show_in_one_step(
+    pictures: Pictures, proposing: RunningServer, open_page: Callable[..., Driver]
+) -> None:
+    pictures.allowed.set()
+    page = open_page(proposing.url)
+    page.until(READY)
+    page.press("n")
+    guide(page)
+    u, v = pictures.at(page.value("__cocalib.shownOffer().row.image_time"))
+    page.click(u + 2, v - 1)
+    page.until("__cocalib.state.view.clicks.length === 1 && !__cocalib.shownOffer()")
+    corrected = page.view["clicks"][0]
+    assert corrected["mark"] == "snapped"
+    assert np.hypot(corrected["u_px"] - u, corrected["v_px"] - v) < 0.8
+    assert 0.05 < corrected["sigma_px"] < 0.8
+    page.press("Control+z")
+    page.until("__cocalib.state.view.clicks.length === 0 && __cocalib.shownOffer()")
+
+
+def test_enter_after_the_last_proposal_does_nothing_else(
+    pictures: Pictures, proposing: RunningServer, open_page: Callable[..., Driver]
+) -> None:
+    pictures.allowed.set()
+    page = open_page(proposing.url)
+    page.until(READY)
+    page.press("n")
+    while page.value("__cocalib.state.proposals.rows.length"):
+        page.until(f"{READY} && !__cocalib.justMoved() && (({ON_SCREEN}) || !__cocalib.state.proposals.rows.length)")
+        page.press("Enter")
+        page.until("__cocalib.unconfirmed() === 0")
+    clicks = len(page.view["clicks"])
+    page.press("Enter")
+    page.press("Enter")
+    assert "All proposals are decided." in page.text("#toasts")
+    assert page.value("__cocalib.state.cross") is None
+    assert len(page.view["clicks"]) == clicks
+    page.press("ArrowRight")
+    page.until("__cocalib.state.shown.index === __cocalib.state.cursor")
+    page.press("Enter")
+    page.until("__cocalib.state.cross")
+
+
 def test_a_proposal_is_rejected_corrected_and_undone_and_all_of_them_are_switched_off(
     pictures: Pictures, proposing: RunningServer, open_page: Callable[..., Driver]
 ) -> None:
@@ -167,11 +209,11 @@ def test_a_proposal_is_rejected_corrected_and_undone_and_all_of_them_are_switche
     assert guide(page).split(",")[0] == first.split(",")[0]
 
     u, v = (page.value(f"__cocalib.shownOffer().place.{axis}") for axis in ("u_px", "v_px"))
-    page.click(u + 2, v + 2)
+    page.click(u + 25, v + 25)
     page.until("__cocalib.state.view.clicks.length === 1 && !__cocalib.shownOffer()")
     corrected = page.view["clicks"][0]
     assert corrected["mark"] == "clicked"
-    assert np.hypot(corrected["u_px"] - u - 2, corrected["v_px"] - v - 2) < 1
+    assert np.hypot(corrected["u_px"] - u - 25, corrected["v_px"] - v - 25) < 1
     page.press("n")
     assert guide(page).startswith("Proposal 2 of ")
     page.press("Control+z")

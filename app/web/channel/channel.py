@@ -35,6 +35,7 @@ from app.web.messages import (
     Problem,
     ProposingSwitch,
     ReviewRequest,
+    Snapped,
     SnapWanted,
     ViewpointWanted,
     ViewWanted,
@@ -166,12 +167,22 @@ class Channel:
         elif isinstance(command, FollowingStopped | ProposingSwitch):
             self._switch(command)
         elif isinstance(command, SnapWanted):
-            hub = self._hub
-            self.outbox.put(encode(await snapped(command, hub.moments, hub.frames, hub.executor)))
+            self.outbox.put(encode(await self._snapped(command)))
         elif isinstance(command, LensRequest):
             await self._hub.lens.obey(command)
         else:
             await self._change(command)
+
+    async def _snapped(self, wanted: SnapWanted) -> Snapped:
+        """Search for an apex in one frame, or in those of its placement.
+
+        Raises:
+            CalibrationError: the frame cannot be read.
+        """
+        hub = self._hub
+        if wanted.over_dwell:
+            return await hub.proposing.averaged(wanted)
+        return await snapped(wanted, hub.moments, hub.frames, hub.executor)
 
     def _switch(self, command: FollowingStopped | ProposingSwitch) -> None:
         """Start or stop what goes on in the background."""

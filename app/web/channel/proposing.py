@@ -4,7 +4,9 @@ import asyncio
 import logging
 from collections.abc import Callable
 
-from app.proposing import ProposingJob, ProposingSnapshot, ProposingWish
+import numpy as np
+
+from app.proposing import ProposingJob, ProposingSnapshot, ProposingWish, view_at
 from app.view import is_dismissed, sentence
 from app.web.channel.outbox import Outbox
 from app.web.messages import (
@@ -13,6 +15,8 @@ from app.web.messages import (
     ProposalPlace,
     ProposalRow,
     ProposingSwitch,
+    Snapped,
+    SnapWanted,
     UnproposedRow,
     encode,
 )
@@ -20,6 +24,7 @@ from app.workspace import Workspace
 from calib_core.association.placements import Placement
 from calib_core.measurements import NS_PER_S, Stamp
 from calib_core.proposing import DwellView, Proposal
+from calib_core.proposing.dwell_average import averaged_over_dwell
 from calib_core.recordings import FollowedRecording, Recording
 
 __all__ = ["ProposingDesk"]
@@ -92,6 +97,30 @@ class ProposingDesk:
         self._asked = asked
         gone = frozenset(number for number, one in enumerate(self._placements) if is_dismissed(one, session))
         self._job.ask(ProposingWish(camera, session.options, self._placements, session.clicks, gone))
+
+    async def averaged(self, wanted: SnapWanted) -> Snapped:
+        """Average a click over the frames of its placement, off the event loop.
+
+        Args:
+            wanted: by a page, for a click that is not placed yet.
+
+        Raises:
+            CalibrationError: the clicked frame cannot be read.
+        """
+        return await asyncio.to_thread(self._averaged, wanted)
+
+    def _averaged(self, wanted: SnapWanted) -> Snapped:
+        pixel_px = np.array(wanted.pixel_px)
+        frame = self._workspace.facts.frame_at(wanted.image_time)
+        view = view_at(wanted.image_time, pixel_px, self._job.snapshot.views)
+        if frame is None or view is None:
+            return Snapped(None, None, "The pictures of this placement were not looked at.", wanted.id)
+        found = averaged_over_dwell(view, self._recording, frame, pixel_px)
+        if found is None:
+            return Snapped(None, None, "The pictures of this placement show no apex there.", wanted.id)
+        column, row = (float(value) for value in found.pixel_px)
+        words = f"Averaged over {found.frames} frames, with a standard deviation of {found.sigma_px:.2f} px."
+        return Snapped((column, row), found.sigma_px, words, wanted.id)
 
     def switch(self, switch: ProposingSwitch) -> None:
         """Propose, or propose nothing any more."""

@@ -137,12 +137,14 @@ class SnapWanted:
     Attributes:
         image_time: stamp of the frame.
         pixel_px: column and row.
-        id: of the click that stands there; None for the keyboard's cross.
+        id: of the click that stands there; None for the keyboard's cross, and for a new click.
+        over_dwell: whether to average it over the frames of the placement, near the pixel.
     """
 
     image_time: TimeNs
     pixel_px: tuple[float, float]
     id: str | None = None
+    over_dwell: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,6 +248,7 @@ class SnapForm(_Form, frozen=True, tag="snap_wanted"):
     image_time: forms.StampForm
     pixel_px: forms.PixelForm
     id: forms.ClickId | None = None
+    over_dwell: bool = False
 
 
 class LoadBoxesForm(_Form, frozen=True, tag="load_boxes"):
@@ -409,7 +412,7 @@ def _import(form: ImportForm) -> Command:
 
 @_command.register
 def _snap(form: SnapForm) -> Command:
-    return SnapWanted(form.image_time.stamp.time, form.pixel_px, form.id)
+    return SnapWanted(form.image_time.stamp.time, form.pixel_px, form.id, form.over_dwell)
 
 
 @_command.register

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from calib_core.proposing import DwellView, dwell_views
-from calib_core.proposing.look import Look, covering, look_of, with_look
+from calib_core.proposing.look import Look, look_of, with_look
 from calib_core.proposing.picture_candidates import PictureCandidate
 from tests.unit.proposing.drawn_dwells import CAMERA, DrawnDwell, DrawnFrames, placements_of
 
@@ -63,20 +63,6 @@ def test_without_a_look_nothing_changes(views: tuple[DwellView, ...]) -> None:
     assert with_look(views, [], FRAMES, CAMERA) == views
 
 
-def test_a_click_next_to_the_apex_covers_its_dwell_there(views: tuple[DwellView, ...]) -> None:
-    apex_px = np.array(FRAMES.dwells[0].apex_px)
-    covered = covering(views[0], FRAMES, apex_px + np.array([1.0, -0.8]))
-    assert np.hypot(*(covered.pixel_px - apex_px)) < 0.5
-    assert covered.sigma_px < 0.5
-
-
-def test_a_click_where_no_apex_is_stays(views: tuple[DwellView, ...]) -> None:
-    covered = covering(views[0], FRAMES, np.array([280.0, 180.0]))
-    assert covered.pixel_px.tolist() == [280.0, 180.0]
-    assert covered.sigma_px >= 0.5
-
-
 def test_a_dwell_whose_frames_cannot_be_read_has_no_look(views: tuple[DwellView, ...]) -> None:
     broken = replace(FRAMES, broken=frozenset(views[0].frames.tolist()))
     assert look_of(views[0], broken, np.array(FRAMES.dwells[0].apex_px)) is None
-    assert covering(views[0], broken, np.array([60.0, 60.0])).pixel_px.tolist() == [60.0, 60.0]

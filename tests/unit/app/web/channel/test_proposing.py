@@ -2,17 +2,20 @@
 
 import asyncio
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
 from app.session import PlacementDismissed, RecordingFacts
 from app.session.file import open_session_file
 from app.web.channel.proposing import ProposingDesk
-from app.web.messages import Outgoing, ProposalNews, ProposingSwitch
+from app.web.messages import Outgoing, ProposalNews, ProposingSwitch, SnapWanted
 from app.workspace import GivenIntrinsics, Workspace
+from calib_core.measurements import TimeNs
 from calib_core.proposing import ViewProgress
 from tests.drawn_views import draw_views
 
@@ -53,6 +56,18 @@ def found(monkeypatch: pytest.MonkeyPatch) -> None:
         return DRAWN.views, None
 
     monkeypatch.setattr("app.proposing.job.find_proposals", find)
+
+
+class Cameras(Sensors):
+    """A recording whose frames all show one reflector: three sheets that meet at (30.0, 24.0)."""
+
+    def image(self, index: int, /) -> np.ndarray:
+        """Draw a frame."""
+        y, x = (np.mgrid[: 48 * 8, : 64 * 8] + 0.5) / 8 - 0.5
+        turned = np.rad2deg(np.arctan2(y - 24.0, x - 30.0)) % 360.0
+        grey = np.select([turned < 120.0, turned < 240.0], [60, 230], 140).astype(np.uint8)
+        grey[np.hypot(x - 30.0, y - 24.0) > 14.0] = 100
+        return np.repeat(cv2.resize(grey, (64, 48), interpolation=cv2.INTER_AREA)[..., None], 3, axis=2)
 
 
 def at_desk(
@@ -102,6 +117,32 @@ def test_pages_are_told_the_proposals_with_their_placements_and_frames(workspace
         await until(told, lambda one: gone not in [row.placement for row in one.rows])
 
     at_desk(workspace, visit)
+
+
+def test_a_click_is_averaged_over_the_frames_of_its_placement(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    views = tuple(replace(view, width_px=28.0) for view in DRAWN.views)
+    monkeypatch.setattr("app.proposing.job.find_proposals", lambda *_, **__: (views, None))
+    time = views[1].image_time
+
+    async def visit(desk: ProposingDesk, told: list[Any]) -> None:
+        early = await desk.averaged(SnapWanted(time, (31.0, 25.0), over_dwell=True))
+        assert (early.pixel_px, early.words) == (None, "The pictures of this placement were not looked at.")
+        desk.surveyed(PLACEMENTS)
+        await until(told, lambda one: one.stage == "ready")
+        found = await desk.averaged(SnapWanted(time, (31.5, 25.0), over_dwell=True))
+        assert found.pixel_px == pytest.approx((30.0, 24.0), abs=0.3)
+        assert found.sigma_px is not None
+        assert f"{found.sigma_px:.2f} px" in found.words
+        missed = await desk.averaged(SnapWanted(time, (8.0, 8.0), over_dwell=True))
+        assert missed.pixel_px is None
+        assert missed.words == "The pictures of this placement show no apex there."
+        between = await desk.averaged(SnapWanted(TimeNs(time + 1), (31.0, 25.0), over_dwell=True))
+        assert between.pixel_px is None
+        assert not workspace.session.clicks
+
+    at_desk(workspace, visit, Cameras())
 
 
 def test_nothing_is_proposed_until_it_is_switched_on_and_again_once_it_is_off(workspace: Workspace) -> None:

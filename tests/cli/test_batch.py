@@ -1,0 +1,82 @@
+"""`cocalib batch` as a person with many vehicles runs it."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from app.cli import run
+
+SAMPLE = Path(__file__).resolve().parents[2] / "sample_data" / "rooftop"
+
+
+@pytest.fixture
+def fleet(tmp_path: Path) -> Path:
+    """A folder with a session that was clicked, one that was not, and a broken one."""
+    for session in ("van/clicked", "van/not-clicked"):
+        (tmp_path / session).mkdir(parents=True)
+        for name in ("radar.bag", "camera.bag"):
+            shutil.copy(SAMPLE / name, tmp_path / session / name)
+    shutil.copy(SAMPLE / "clicks.json", tmp_path / "van" / "clicked" / "clicks.json")
+    (tmp_path / "broken.bag").write_bytes(b"#ROSBAG V2.0\n")
+    return tmp_path
+
+
+def test_from_a_folder_to_a_table(fleet: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    manifest = fleet / "fleet.toml"
+    assert run(["batch", str(manifest), "--init", str(fleet)]) == 0
+    assert "3 sessions written to" in capsys.readouterr().out
+    assert run(["batch", str(manifest)]) == 12
+    printed = capsys.readouterr()
+    assert printed.out.splitlines()[0] == "3 sessions: 1 solved, 1 refused, 1 failed"
+    why = {line.split()[1]: line for line in printed.out.splitlines()[3:]}
+    assert "refused" in why["not-clicked"]
+    assert "failed" in why["broken"]
+    assert printed.err.splitlines()[0] == "3 sessions"
+    assert (fleet / "fleet" / "results").is_dir()
+
+
+def test_what_is_done_is_not_done_again(fleet: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    manifest = fleet / "fleet.toml"
+    manifest.write_text(
+        '[[session]]\nvehicle = "van"\nsession = "1"\nrecording = ["van/clicked/radar.bag", "van/clicked/camera.bag"]\n'
+        'clicks = "van/clicked/clicks.json"\n',
+        encoding="utf-8",
+    )
+    assert run(["batch", str(manifest), "--out", str(fleet / "out")]) == 0
+    (calibration,) = (fleet / "out").rglob("calibration.json")
+    written, first = calibration.stat().st_mtime_ns, calibration.read_bytes()
+    capsys.readouterr()
+    assert run(["batch", str(manifest), "--out", str(fleet / "out")]) == 0
+    assert calibration.stat().st_mtime_ns == written
+    assert "1 of 1 sessions are done already" in capsys.readouterr().err
+    solved = fleet / "solved.json"
+    clicked = fleet / "van" / "clicked"
+    recordings = [str(clicked / "radar.bag"), str(clicked / "camera.bag")]
+    assert run(["solve", *recordings, "--clicks", str(clicked / "clicks.json"), "--out", str(solved)]) == 0
+    assert solved.read_bytes() == first
+
+
+def test_a_first_manifest_is_never_written_over_another_file(fleet: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    manifest = fleet / "fleet.toml"
+    manifest.write_text("mine", encoding="utf-8")
+    assert run(["batch", str(manifest), "--init", str(fleet)]) == 2
+    assert "exists already" in capsys.readouterr().err
+    assert manifest.read_text(encoding="utf-8") == "mine"
+    assert run(["batch", str(fleet / "fleet.csv"), "--init", str(fleet)]) == 2
+
+
+@pytest.mark.parametrize(
+    ("flags", "fault"),
+    [
+        (["--workers", "2", "--scheduler", "tcp://127.0.0.1:1"], "give one of them"),
+        (["--engine", "none", "--workers", "2"], "leave out --workers"),
+        (["--workers", "0"], "give one worker process or more"),
+        (["--engine", "ray"], "--engine takes"),
+    ],
+)
+def test_flags_that_contradict_each_other_are_refused(
+    flags: list[str], fault: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["batch", str(tmp_path / "fleet.toml"), *flags]) == 2
+    assert fault in capsys.readouterr().err

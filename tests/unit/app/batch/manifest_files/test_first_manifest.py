@@ -1,0 +1,88 @@
+"""A first manifest says what lies in a folder, and can be read back."""
+
+from pathlib import Path
+
+import pytest
+
+from app.batch.manifest import ManifestRow
+from app.batch.manifest_files.first_manifest import first_manifest
+from app.batch.manifest_files.reading import read_manifest
+from calib_core.errors import InputError
+
+CLICKS = '{"schema": "cocalib/clicks-1", "clicks": []}'
+
+
+def lay(folder: Path, *names: str) -> None:
+    for name in names:
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(CLICKS if path.suffix == ".json" else "", encoding="utf-8")
+
+
+def read_back(folder: Path) -> dict[tuple[str, str], ManifestRow]:
+    manifest = folder / "fleet.toml"
+    text, count = first_manifest(folder, manifest)
+    manifest.write_text(text, encoding="utf-8")
+    rows = read_manifest(manifest).rows
+    assert len(rows) == count
+    return {(row.vehicle, row.session): row for row in rows}
+
+
+def test_vehicles_and_sessions_are_folders(tmp_path: Path) -> None:
+    lay(
+        tmp_path,
+        "van 7/spring/radar.bag",
+        "van 7/spring/camera.bag",
+        "van 7/autumn/drive.mcap",
+        "van 8/radar.bag",
+        "van 8/cam.bag",
+    )
+    found = read_back(tmp_path)
+    assert set(found) == {("van 7", "spring"), ("van 7", "autumn"), ("van 8", "1")}
+    assert {path.name for path in found["van 7", "spring"].recording} == {"radar.bag", "camera.bag"}
+    assert len(found["van 8", "1"].recording) == 2
+
+
+def test_recordings_of_one_folder_belong_together_if_only_the_sensor_differs(tmp_path: Path) -> None:
+    lay(tmp_path, "van/radar_01.bag", "van/camera_01.bag", "van/radar_02.bag", "van/camera_02.bag", "single.bag")
+    found = read_back(tmp_path)
+    assert set(found) == {("van", "01"), ("van", "02"), ("single", "single")}
+    assert [path.name for path in found["van", "02"].recording] == ["camera_02.bag", "radar_02.bag"]
+
+
+def test_a_bag_folder_is_one_recording(tmp_path: Path) -> None:
+    lay(tmp_path, "van/2026-01-02/bag/metadata.yaml", "van/2026-01-02/bag/bag_0.db3", ".hidden/a.bag")
+    found = read_back(tmp_path)
+    assert [row.recording for row in found.values()] == [(tmp_path / "van" / "2026-01-02" / "bag",)]
+
+
+def test_clicks_beside_the_only_recording_are_taken(tmp_path: Path) -> None:
+    lay(tmp_path, "van/a/drive.bag", "van/a/clicks.json", "van/b/drive.bag", "van/b/one.json", "van/b/two.json")
+    (tmp_path / "van" / "a" / "truth.json").write_text('{"schema": "cocalib/truth-1"}', encoding="utf-8")
+    found = read_back(tmp_path)
+    assert found["van", "a"].clicks == tmp_path / "van" / "a" / "clicks.json"
+    assert found["van", "b"].clicks is None
+    assert not any(row.auto for row in found.values())
+    assert "van/b/one.json, van/b/two.json" in first_manifest(tmp_path, tmp_path / "x.toml")[0]
+
+
+def test_names_of_any_kind_survive(tmp_path: Path) -> None:
+    lay(tmp_path, 'a"b é/c d.bag')
+    ((row),) = read_back(tmp_path).values()
+    assert row.recording == (tmp_path / 'a"b é' / "c d.bag",)
+
+
+def test_a_manifest_elsewhere_names_whole_paths(tmp_path: Path) -> None:
+    lay(tmp_path, "data/van.bag")
+    manifest = tmp_path / "other" / "fleet.toml"
+    manifest.parent.mkdir()
+    manifest.write_text(first_manifest(tmp_path / "data", manifest)[0], encoding="utf-8")
+    (row,) = read_manifest(manifest).rows
+    assert row.recording == (tmp_path / "data" / "van.bag",)
+
+
+def test_a_folder_without_recordings_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no recording in it"):
+        first_manifest(tmp_path, tmp_path / "x.toml")
+    with pytest.raises(InputError, match="no such folder"):
+        first_manifest(tmp_path / "absent", tmp_path / "x.toml")
