@@ -3,7 +3,7 @@
     y_k = mu + b_k + e_k,   b_k ~ N(0, S),   e_k ~ N(0, C_k),   k = 1 .. n;   C_k known, mu and S unknown.
 
 The level of S is integrated out: over S_0 = diag(p^2 I, r^2 I), p of the positions and r of the rotations, with a flat prior on p
-and r and the restricted likelihood of the data, on a grid; the mean of p and r gives S_0. Its shape follows by EM: restricted
+and r and the restricted likelihood of the data, on a grid; S_0 is its posterior mean. Its shape follows by EM: restricted
 maximum likelihood with an inverse-Wishart prior that counts as `PRIOR_VECTORS` vectors scattered by S_0. Where the C_k hide
 the scatter, S stays at S_0, which the flat prior keeps from collapsing to zero.
 """
@@ -72,7 +72,7 @@ def random_effects(vectors: np.ndarray, covariances: np.ndarray) -> RandomEffect
         vectors: (n, 6) [m, rad], n at least 3; positions first.
         covariances: (n, 6, 6) of each.
     """
-    level = np.repeat(_levels(vectors, covariances) ** 2, 3)
+    level = np.repeat(_levels(vectors, covariances), 3)
     prior = np.diag(level)
     scatter, count = prior, len(vectors)
     for _ in range(_ITERATIONS):
@@ -100,7 +100,7 @@ def random_effects(vectors: np.ndarray, covariances: np.ndarray) -> RandomEffect
 
 
 def _levels(vectors: np.ndarray, covariances: np.ndarray) -> np.ndarray:
-    """Return the posterior means (2,) of the standard deviations per axis of position and rotation, by a grid that zooms in."""
+    """Return the posterior means (2,) of the variances per axis of position and rotation, by a grid that zooms in."""
     count = len(vectors)
     centred = vectors - vectors.mean(axis=0)
     spread = np.array([np.sqrt((centred[:, block] ** 2).mean() * count / (count - 1)) for block in _BLOCKS])
@@ -116,7 +116,7 @@ def _levels(vectors: np.ndarray, covariances: np.ndarray) -> np.ndarray:
             kept = np.flatnonzero(marginal > _NEGLIGIBLE * marginal.max())
             low[block] = max(0.0, axes[block, kept[0]] - steps[block])
             high[block] = axes[block, kept[-1]] + steps[block]
-    return np.asarray((density[..., None] * grid).sum(axis=(0, 1)) / density.sum())
+    return np.asarray((density[..., None] * grid**2).sum(axis=(0, 1)) / density.sum())
 
 
 def _restricted_log_likelihood(vectors: np.ndarray, covariances: np.ndarray, levels: np.ndarray) -> np.ndarray:

@@ -1,0 +1,138 @@
+"""Measure at the level of poses: `python -m benchmarks.fleet [--fleets N] [--seed N]`.
+
+The errors of the calibrations are normal, with the covariance that they state, so that only the fleet's mathematics is tested.
+"""
+
+import argparse
+from collections.abc import Iterator
+
+import numpy as np
+
+from benchmarks.fleet.simulated_poses import Accuracy, Spread, simulated_fleet, simulated_mounting, simulated_session
+from calib_core.fleet import (
+    MountingScatter,
+    fleet_prior_of,
+    mounting_of,
+    mounting_scatter,
+    mountings_of,
+    off_kind,
+    off_kinds,
+    transitions_of,
+)
+from calib_core.fleet.mountings import Mounting
+from calib_core.fleet.session_pose import CHI2_95
+from calib_core.geometry import RigidTransform
+
+_NEW = 200
+_NARROW, _WIDE = Spread(0.005, 0.3), Spread(0.05, 5.0)
+_ACCURACIES = (Accuracy(0.001, 0.05), Accuracy(0.02, 0.15), Accuracy(0.07, 0.6))
+
+
+def main() -> None:
+    """Print the three tables."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.fleet", description=__doc__)
+    parser.add_argument("--fleets", type=int, default=40, help="simulated fleets for each row")
+    parser.add_argument("--seed", type=int, default=1)
+    given = parser.parse_args()
+    for line in (*named(given.fleets, given.seed), *predicted(given.fleets, given.seed), *gained(given.seed)):
+        print(line, flush=True)
+
+
+def named(fleets: int, seed: int) -> Iterator[str]:
+    """Say of fleets with remounts and wrong radars what is named."""
+    yield "| calibrations | remounts named | wrong radars named | false remounts | false off-kind | unchanged | cannot tell |"
+    yield "|---|---|---|---|---|---|---|"
+    for accuracy in _ACCURACIES:
+        rng = np.random.default_rng(seed)
+        right = np.zeros(2, dtype=int)
+        false = np.zeros(2, dtype=int)
+        of = np.zeros(4, dtype=int)
+        unchanged = 0
+        for _ in range(fleets):
+            fleet = simulated_fleet(_NARROW, accuracy, rng)
+            steps = transitions_of(fleet.sessions)
+            scatter = mounting_scatter(mountings_of(fleet.sessions), vehicle_type="van")
+            assert isinstance(scatter, MountingScatter)
+            tested = off_kinds(scatter)
+            odd = fleet.wrong | fleet.remounted
+            remounts = [one.before.vehicle for one in steps if one.is_remount]
+            off = [one.mounting.vehicle for one in tested if one.is_off]
+            right += [len(fleet.remounted & set(remounts)), len(fleet.wrong & set(off))]
+            false += [len(remounts) - len(fleet.remounted & set(remounts)), len(set(off) - odd)]
+            quiet = [one for one in steps if not one.is_remount]
+            unchanged += sum(one.is_unchanged for one in quiet)
+            of += [len(fleet.remounted), len(fleet.wrong), len(steps) - len(fleet.remounted), len(quiet)]
+        yield (
+            f"| {_text(accuracy)} | {right[0]} of {of[0]} | {right[1]} of {of[1]} | {false[0]} of {of[2]} | "
+            f"{false[1]} of {45 * fleets} | {unchanged} | {of[3] - unchanged} |"
+        )
+
+
+def predicted(fleets: int, seed: int) -> Iterator[str]:
+    """Say how often the next vehicle lies within the prior's 95 %, and how often a sound one is called off its kind."""
+    yield ""
+    yield "| vehicles | scatter | calibrations | coverage of the prior | sound vehicles called off their kind | no answer |"
+    yield "|---|---|---|---|---|---|"
+    for vehicles in (5, 10, 49):
+        for spread in (_NARROW, _WIDE):
+            for accuracy in _ACCURACIES:
+                rng = np.random.default_rng(seed)
+                inside = called = silent = 0
+                for _ in range(fleets):
+                    scatter = _scatter(vehicles, spread, accuracy, rng)
+                    if scatter is None:
+                        silent += 1
+                        continue
+                    prior = fleet_prior_of(scatter)
+                    weight = np.linalg.inv(prior.covariance)
+                    for _ in range(_NEW):
+                        truth = simulated_mounting(spread, rng)
+                        error = truth.error_from(prior.camera_from_radar)
+                        inside += bool(error @ weight @ error <= CHI2_95)
+                        outcome = off_kind(_calibrated(truth, accuracy, rng, "next"), scatter)
+                        called += not hasattr(outcome, "is_off") or outcome.is_off
+                count = (fleets - silent) * _NEW
+                yield (
+                    f"| {vehicles} | {100 * spread.position_m:g} cm, {spread.rotation_deg:g} deg | {_text(accuracy)} | "
+                    f"{100 * inside / count:.1f} % | {called} of {count} | {silent} of {fleets} |"
+                )
+
+
+def gained(seed: int) -> Iterator[str]:
+    """Say what the prior of 49 others does to the standard deviations of the next vehicle's calibration."""
+    yield ""
+    yield "| scatter | its calibration | sigma of position, without and with the prior | sigma of rotation |"
+    yield "|---|---|---|---|"
+    for spread in (_NARROW, _WIDE):
+        for own in (Accuracy(0.07, 0.6), Accuracy(0.14, 1.2)):
+            rng = np.random.default_rng(seed)
+            scatter = _scatter(49, spread, Accuracy(0.07, 0.6), rng)
+            assert scatter is not None
+            prior = fleet_prior_of(scatter)
+            alone = simulated_session(simulated_mounting(spread, rng), own, rng, vehicle="next").covariance
+            both = np.linalg.inv(np.linalg.inv(alone) + np.linalg.inv(prior.covariance))
+            figures = [
+                f"{unit * np.sqrt(np.trace(one[part, part])):.2f} -> {unit * np.sqrt(np.trace(other[part, part])):.2f} {name}"
+                for part, unit, name in ((slice(0, 3), 100.0, "cm"), (slice(3, 6), 180.0 / np.pi, "deg"))
+                for one, other in ((alone, both),)
+            ]
+            yield f"| {100 * spread.position_m:g} cm, {spread.rotation_deg:g} deg | {_text(own)} | {' | '.join(figures)} |"
+
+
+def _scatter(vehicles: int, spread: Spread, accuracy: Accuracy, rng: np.random.Generator) -> MountingScatter | None:
+    """Draw a fleet without faults; None if its scatter cannot be told."""
+    mountings = [_calibrated(simulated_mounting(spread, rng), accuracy, rng, f"{k:03d}") for k in range(vehicles)]
+    scatter = mounting_scatter(mountings, vehicle_type="van")
+    return scatter if isinstance(scatter, MountingScatter) else None
+
+
+def _calibrated(truth: RigidTransform, accuracy: Accuracy, rng: np.random.Generator, name: str) -> Mounting:
+    return mounting_of([simulated_session(truth, accuracy, rng, vehicle=name)])
+
+
+def _text(accuracy: Accuracy) -> str:
+    return f"{100 * accuracy.position_m:g} cm, {accuracy.rotation_deg:g} deg"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,175 @@
+"""The scatter of a vehicle type: what is estimated, what is left out, and when it is refused."""
+
+import numpy as np
+import pytest
+
+from benchmarks.fleet.simulated_poses import (
+    NOMINAL,
+    Accuracy,
+    Spread,
+    simulated_fleet,
+    simulated_mounting,
+    simulated_session,
+)
+from calib_core.fleet import (
+    MountingScatter,
+    OffKind,
+    fleet_prior_of,
+    mounting_of,
+    mounting_scatter,
+    mountings_of,
+    off_kind,
+    off_kinds,
+)
+from calib_core.fleet.mounting_coordinates import pose_from_coordinates
+from calib_core.fleet.mountings import Mounting
+from calib_core.fleet.session_pose import CHI2_95
+from calib_core.geometry import RigidTransform
+from calib_core.measurements import Unsolvable
+
+NARROW, FINE, COARSE = Spread(0.005, 0.3), Accuracy(0.001, 0.05), Accuracy(0.07, 0.6)
+WRONG = pose_from_coordinates(np.array([0.3, -0.1, 0.0, 0.0, 0.1, 0.3]), NOMINAL)
+
+
+def calibrated(truth: RigidTransform, rng: np.random.Generator, name: str, accuracy: Accuracy = FINE) -> Mounting:
+    return mounting_of([simulated_session(truth, accuracy, rng, vehicle=name)])
+
+
+def fleet(
+    count: int, rng: np.random.Generator, *, spread: Spread = NARROW, accuracy: Accuracy = FINE
+) -> list[Mounting]:
+    return [calibrated(simulated_mounting(spread, rng), rng, f"v{k:02d}", accuracy) for k in range(count)]
+
+
+def scattered(mountings: list[Mounting]) -> MountingScatter:
+    scatter = mounting_scatter(mountings, vehicle_type="van")
+    assert isinstance(scatter, MountingScatter)
+    return scatter
+
+
+def test_mean_and_scatter_are_those_of_the_simulation() -> None:
+    scatter = scattered(fleet(80, np.random.default_rng(1)))
+    sigma = np.sqrt(np.diag(scatter.scatter))
+    np.testing.assert_allclose(sigma[:3], 0.005, rtol=0.3)
+    np.testing.assert_allclose(np.rad2deg(sigma[3:]), 0.3, rtol=0.3)
+    error = scatter.camera_from_radar.error_from(NOMINAL)
+    assert np.rad2deg(np.linalg.norm(error[3:])) < 0.1
+    assert np.linalg.norm(error[:3]) < 0.002
+
+
+def test_the_errors_of_the_calibrations_are_no_scatter() -> None:
+    rng = np.random.default_rng(2)
+    rows = fleet(80, rng, accuracy=COARSE)
+    sigma = np.sqrt(np.diag(scattered(rows).scatter))
+    observed = np.std([one.camera_from_radar.error_from(NOMINAL) for one in rows], axis=0)
+    assert observed[3:].mean() > np.deg2rad(0.55)
+    assert np.rad2deg(sigma[3:]).max() < 0.5
+    assert sigma[:3].max() < 0.03
+
+
+def test_wrong_radars_are_left_out_with_the_axis_that_is_off() -> None:
+    rng = np.random.default_rng(3)
+    rows = fleet(12, rng)
+    rows[4], rows[7] = calibrated(WRONG, rng, "v04"), calibrated(WRONG, rng, "v07")
+    scatter = scattered(rows)
+    assert [one.mounting.vehicle for one in scatter.left_out] == ["v04", "v07"]
+    assert all("yaw +17 deg" in one.reason and "off its kind" in one.reason for one in scatter.left_out)
+    prior = fleet_prior_of(scatter)
+    assert prior.left_out == ("v04", "v07")
+    assert len(prior.vehicles) == 10
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 4])
+def test_too_few_vehicles_are_refused_with_reason_and_hint(count: int) -> None:
+    outcome = mounting_scatter(fleet(count, np.random.default_rng(4)), vehicle_type="van")
+    assert isinstance(outcome, Unsolvable)
+    assert (outcome.code, f"{count} of at least 5" in outcome.reason) == ("too-few-vehicles", True)
+    assert outcome.hint
+
+
+def test_wrong_radars_among_few_are_not_averaged_in() -> None:
+    rng = np.random.default_rng(6)
+    outcome = mounting_scatter([*fleet(4, rng), calibrated(WRONG, rng, "odd")], vehicle_type="van")
+    assert isinstance(outcome, Unsolvable)
+    assert "after 1 that are off their kind were left out" in outcome.reason
+
+
+def test_few_vehicles_give_a_wider_prior_than_many() -> None:
+    few, many = (
+        [np.trace(fleet_prior_of(scattered(fleet(count, np.random.default_rng(seed)))).covariance) for seed in range(4)]
+        for count in (5, 30)
+    )
+    assert np.mean(few) > 1.3 * np.mean(many)
+
+
+def test_a_prior_names_type_and_vehicles_and_has_the_convention_of_a_calibration() -> None:
+    rng = np.random.default_rng(8)
+    prior = fleet_prior_of(scattered(fleet(49, rng)))
+    assert prior.vehicle_type == "van"
+    assert prior.vehicles == tuple(f"v{k:02d}" for k in range(49))
+    errors = [simulated_mounting(NARROW, rng).error_from(prior.camera_from_radar) for _ in range(3000)]
+    stated, found = np.sqrt(np.diag(prior.covariance)), np.std(errors, axis=0)
+    np.testing.assert_allclose(stated / found, 1.05, atol=0.3)
+
+
+def test_the_prior_covers_the_next_vehicle_in_about_95_percent() -> None:
+    rng, inside = np.random.default_rng(1), []
+    for _ in range(12):
+        prior = fleet_prior_of(scattered(fleet(14, rng, accuracy=Accuracy(0.01, 0.3))))
+        errors = [simulated_mounting(NARROW, rng).error_from(prior.camera_from_radar) for _ in range(60)]
+        squared = np.einsum("ni,ij,nj->n", errors, np.linalg.inv(prior.covariance), errors)
+        inside.append((squared <= CHI2_95).mean())
+    assert np.mean(inside) >= 0.93
+
+
+@pytest.mark.parametrize(
+    ("spread", "own", "largest", "smallest"),
+    [(NARROW, Accuracy(0.14, 1.2), 0.6, 0.0), (Spread(0.5, 5.0), Accuracy(0.07, 0.6), 1.0, 0.95)],
+)
+def test_a_narrow_scatter_helps_few_placements_and_a_wide_one_changes_little(
+    spread: Spread, own: Accuracy, largest: float, smallest: float
+) -> None:
+    rng = np.random.default_rng(9)
+    alone = simulated_session(NOMINAL, own, rng, vehicle="next").covariance
+    prior = fleet_prior_of(scattered(fleet(49, rng, spread=spread, accuracy=COARSE)))
+    both = np.linalg.inv(np.linalg.inv(alone) + np.linalg.inv(prior.covariance))
+    ratio = np.sqrt(np.diag(both) / np.diag(alone))
+    assert ratio.max() <= largest
+    assert ratio.min() >= smallest
+
+
+def test_in_50_vehicles_wrong_radars_and_remounts_are_off_and_no_other() -> None:
+    simulated = simulated_fleet(NARROW, Accuracy(0.02, 0.15), np.random.default_rng(10))
+    tested = off_kinds(scattered(list(mountings_of(simulated.sessions))))
+    assert len(tested) == 53
+    off = {one.mounting.vehicle for one in tested if one.is_off}
+    assert simulated.wrong <= off <= simulated.wrong | simulated.remounted
+
+
+def test_a_vehicle_off_its_kind_is_named_with_figures_and_what_to_do() -> None:
+    rng = np.random.default_rng(12)
+    scatter = scattered(fleet(20, rng))
+    outcome = off_kind(calibrated(WRONG, rng, "odd"), scatter)
+    assert isinstance(outcome, OffKind)
+    assert outcome.is_off
+    assert outcome.words.startswith("odd is off its kind: ")
+    assert "20 other mountings" in outcome.words
+    assert outcome.hint.startswith("check that radar, camera and intrinsics are this vehicle's")
+
+
+def test_a_vehicle_is_tested_against_the_others_only() -> None:
+    rows = fleet(8, np.random.default_rng(13))
+    scatter = scattered(rows)
+    within, without = off_kind(rows[3], scatter), off_kind(rows[3], scattered(rows[:3] + rows[4:]))
+    assert isinstance(within, OffKind)
+    assert isinstance(without, OffKind)
+    assert within.others == without.others == 7
+    assert within.deviation.squared == pytest.approx(without.deviation.squared, rel=1e-3)
+
+
+def test_without_enough_others_there_is_no_test() -> None:
+    rng = np.random.default_rng(14)
+    five = scattered(fleet(5, rng))
+    fewer = five.without("v00")
+    assert isinstance(fewer, MountingScatter)
+    assert isinstance(fewer.without("v01"), Unsolvable)

@@ -1,0 +1,74 @@
+"""Mean and scatter of vectors with known covariances: truth by simulation, and how often a further one is covered."""
+
+import numpy as np
+import pytest
+
+from calib_core.fleet.random_effects import PRIOR_VECTORS, RandomEffects, random_effects
+from calib_core.fleet.tails import quantile
+
+EQUAL = np.full(6, 0.005)
+UNEQUAL = np.array([0.01, 0.003, 0.001, 0.001, 0.01, 0.003])
+EXACT, ROUGH = 1e-7 * np.eye(6), np.diag(np.repeat([1e-4, 1e-4], 3))
+
+
+def estimated(count: int, sigma: np.ndarray, error: np.ndarray, rng: np.random.Generator) -> RandomEffects:
+    vectors = sigma * rng.standard_normal((count, 6)) + rng.multivariate_normal(np.zeros(6), error, count)
+    return random_effects(vectors, np.repeat(error[None], count, axis=0))
+
+
+def squared_of_new(
+    effects: RandomEffects, sigma: np.ndarray, rng: np.random.Generator, count: int = 1000
+) -> np.ndarray:
+    away = sigma * rng.standard_normal((count, 6)) - effects.mean
+    return np.asarray(np.einsum("ni,ij,nj->n", away, np.linalg.inv(effects.covariance), away))
+
+
+def covered(count: int, fleets: int, sigma: np.ndarray, error: np.ndarray) -> float:
+    """Return the share of new vectors inside the widened covariance, as `fleet_prior_of` widens it."""
+    rng, shares = np.random.default_rng(count), []
+    for _ in range(fleets):
+        effects = estimated(count, sigma, error, rng)
+        limit = quantile(0.95, effects.freedom, whole=effects.whole)
+        shares.append((squared_of_new(effects, sigma, rng) <= limit).mean())
+    return float(np.mean(shares))
+
+
+@pytest.mark.parametrize(("count", "fleets"), [(5, 120), (10, 80), (49, 20)])
+def test_a_further_vector_is_covered_in_95_percent(count: int, fleets: int) -> None:
+    assert 0.93 <= covered(count, fleets, EQUAL, EXACT) <= 0.98
+
+
+@pytest.mark.parametrize("count", [10, 49])
+def test_unequal_axes_are_covered_too(count: int) -> None:
+    assert covered(count, 20, UNEQUAL, EXACT) >= 0.92
+
+
+@pytest.mark.parametrize("count", [10, 20])
+def test_errors_twice_as_large_as_the_scatter_do_not_make_it_overconfident(count: int) -> None:
+    assert covered(count, 30, EQUAL, ROUGH) >= 0.93
+
+
+def test_many_exact_vectors_give_the_sample_covariance_and_a_little_of_the_prior() -> None:
+    rng, count = np.random.default_rng(3), 300
+    vectors = UNEQUAL * rng.standard_normal((count, 6))
+    effects = random_effects(vectors, np.repeat(1e-9 * np.eye(6)[None], count, axis=0))
+    sample = (vectors - vectors.mean(axis=0)).T @ (vectors - vectors.mean(axis=0)) / (count - 1)
+    equal = np.repeat(np.diag(sample).reshape(2, 3).mean(axis=1), 3)
+    expected = (count * sample + PRIOR_VECTORS * np.diag(equal)) / (count + PRIOR_VECTORS)
+    np.testing.assert_allclose(np.diag(effects.scatter), np.diag(expected), rtol=0.02)
+    np.testing.assert_allclose(effects.mean, vectors.mean(axis=0), atol=1e-5)
+    assert effects.informative == pytest.approx(count, rel=0.01)
+
+
+def test_where_the_errors_hide_the_scatter_it_is_neither_zero_nor_theirs() -> None:
+    effects = estimated(30, np.full(6, 1e-4), ROUGH, np.random.default_rng(4))
+    sigma = np.sqrt(np.diag(effects.scatter))
+    assert (sigma > 3e-4).all()
+    assert (sigma < 6e-3).all()
+    assert effects.informative < 5.0
+
+
+def test_vectors_that_are_all_the_same_have_next_to_no_scatter() -> None:
+    effects = random_effects(np.zeros((6, 6)), np.repeat(1e-8 * np.eye(6)[None], 6, axis=0))
+    assert np.sqrt(np.diag(effects.scatter)).max() < 2e-4
+    assert np.linalg.eigvalsh(effects.scatter)[0] > 0.0

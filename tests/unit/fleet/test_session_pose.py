@@ -1,0 +1,50 @@
+"""What the fleet takes from a calibration."""
+
+import numpy as np
+import pytest
+
+from calib_core.calibration import calibrate_pairs
+from calib_core.errors import InputError
+from calib_core.fleet import session_pose
+from calib_core.options import CalibrationOptions
+from calib_core.results import Calibration
+from calib_core.synthetic import simulate_pairs
+
+
+@pytest.fixture(scope="module")
+def calibration() -> Calibration:
+    simulated = simulate_pairs(20, rng=np.random.default_rng(5), noise="ti")
+    outcome = calibrate_pairs(simulated.pairs, simulated.camera)
+    assert isinstance(outcome, Calibration)
+    return outcome
+
+
+def test_pose_uncertainty_and_scales_are_the_calibrations(calibration: Calibration) -> None:
+    pose = session_pose(calibration, vehicle="van", session="spring", radar_serial="R1")
+    np.testing.assert_array_equal(pose.covariance, calibration.covariance)
+    assert pose.quantile == calibration.covariance_quantile
+    assert pose.freedom < 1e4  # the noise level was estimated
+    assert {one.name for one in pose.angle_scales} == {"azimuth_scale", "elevation_scale"}
+    assert pose.camera is calibration.camera
+    assert pose.reference_radar_m is not None
+    assert pose.sensors == ("R1", None)
+
+
+def test_the_systematic_part_is_at_least_what_the_shares_say_and_never_more_than_all(calibration: Calibration) -> None:
+    pose = session_pose(calibration, vehicle="van", session="spring")
+    shares = [
+        sum(getattr(one, name) for one in calibration.systematic_errors)
+        for name in ("position_share", "rotation_share")
+    ]
+    for part, share in zip((slice(0, 3), slice(3, 6)), shares, strict=True):
+        whole, shared = np.trace(pose.covariance[part, part]), np.trace(pose.systematic[part, part])
+        assert min(share, 1.0) * whole <= shared * (1.0 + 1e-9)
+        assert shared <= whole * (1.0 + 1e-9)
+
+
+def test_a_method_without_a_noise_model_is_refused_with_what_to_do() -> None:
+    simulated = simulate_pairs(20, rng=np.random.default_rng(5), noise="ti")
+    outcome = calibrate_pairs(simulated.pairs, simulated.camera, CalibrationOptions(method="paper"))
+    assert isinstance(outcome, Calibration)
+    with pytest.raises(InputError, match=r"states no uncertainty.*default method"):
+        session_pose(outcome, vehicle="van", session="spring")
