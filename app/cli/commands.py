@@ -136,7 +136,7 @@ COMMANDS: Mapping[str, Command] = {
         Command(
             "fleet",
             "app.cli.fleet.fleet:Fleet",
-            "Tell how a fleet is calibrated, from the results of a batch: status, history, comparisons, summary page.",
+            "Tell how a fleet is calibrated, from the results of a batch: status, history, comparisons, prior, summary page.",
         ),
         Command(
             "simulate",

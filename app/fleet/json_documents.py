@@ -5,24 +5,27 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from app.fleet.choosing import ComparedSessions
-from app.fleet.kinds import Kind
+from app.fleet.kinds import Kind, NotCounted, PriorOfType, prior_sigma
 from app.fleet.records import FleetRecord, SessionRecord, UnreadResult, VehicleRecord
 from app.fleet.standing import VehicleStanding, age_days
-from calib_core.fleet import MountingScatter, OffKind, SessionPose, Transition
-from calib_core.geometry import quaternion_wxyz_from_matrix
+from calib_core.fleet import MountingScatter, OffKind, Transition
+from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 
 __all__ = [
     "COMPARISON_SCHEMA",
     "HISTORY_SCHEMA",
+    "PRIOR_SCHEMA",
     "STATUS_SCHEMA",
     "comparison_document",
     "history_document",
+    "prior_document",
     "status_document",
 ]
 
 STATUS_SCHEMA: Final = "cocalib/fleet-status-1"
 HISTORY_SCHEMA: Final = "cocalib/fleet-history-1"
 COMPARISON_SCHEMA: Final = "cocalib/fleet-comparison-1"
+PRIOR_SCHEMA: Final = "cocalib/fleet-mounting-1"
 _COORDINATES = ("forward_cm", "left_cm", "up_cm", "roll_deg", "pitch_deg", "yaw_deg")
 
 
@@ -74,6 +77,20 @@ def comparison_document(compared: ComparedSessions) -> dict[str, Any]:
     }
 
 
+def prior_document(found: PriorOfType) -> dict[str, Any]:
+    """Return what a type says of its next vehicle, and what that does not rest on."""
+    prior = found.prior
+    return {
+        "schema": PRIOR_SCHEMA,
+        "vehicle_type": prior.vehicle_type,
+        "camera_from_radar": _transform(prior.camera_from_radar),
+        "covariance": prior.covariance.tolist(),
+        "sigma": dict(zip(_COORDINATES, prior_sigma(prior), strict=True)),
+        "vehicles": list(prior.vehicles),
+        "not_counted": _not_counted(found.not_counted),
+    }
+
+
 def _standing(standing: VehicleStanding, now_ns: int) -> dict[str, Any]:
     vehicle, age = standing.vehicle, age_days(standing.last, now_ns)
     return {
@@ -106,16 +123,16 @@ def _session(record: SessionRecord) -> dict[str, Any]:
         "aed_px": outcome.aed_px,
         "pairs": outcome.pairs,
         "report": record.report,
-        "camera_from_radar": None if record.pose is None else _pose(record.pose),
+        "camera_from_radar": None if record.pose is None else _transform(record.pose.camera_from_radar),
         "covariance": None if record.pose is None else record.pose.covariance.tolist(),
         "pose_problem": record.pose_problem or None,
     }
 
 
-def _pose(pose: SessionPose) -> dict[str, Any]:
+def _transform(camera_from_radar: RigidTransform) -> dict[str, Any]:
     return {
-        "rotation_wxyz": quaternion_wxyz_from_matrix(pose.camera_from_radar.rotation).tolist(),
-        "translation_m": pose.camera_from_radar.translation_m.tolist(),
+        "rotation_wxyz": quaternion_wxyz_from_matrix(camera_from_radar.rotation).tolist(),
+        "translation_m": camera_from_radar.translation_m.tolist(),
     }
 
 
@@ -164,10 +181,12 @@ def _kind(kind: Kind) -> dict[str, Any]:
         "mountings": len(kind.scatter.mountings) if isinstance(kind.scatter, MountingScatter) else None,
         "sigma": None if kind.sigma is None else dict(zip(_COORDINATES, kind.sigma, strict=True)),
         "reason": kind.reason or None,
-        "not_counted": [
-            {"vehicle": one.vehicle, "session": one.session, "reason": one.reason} for one in kind.not_counted
-        ],
+        "not_counted": _not_counted(kind.not_counted),
     }
+
+
+def _not_counted(rows: Sequence[NotCounted]) -> list[dict[str, str]]:
+    return [{"vehicle": one.vehicle, "session": one.session, "reason": one.reason} for one in rows]
 
 
 def _unread(result: UnreadResult) -> dict[str, str]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from app.fleet.records import FleetRecord, SessionRecord, VehicleRecord
+from calib_core.arrays import Matrix66
 from calib_core.errors import InputError
 from calib_core.fleet import (
     Mounting,
@@ -19,10 +20,11 @@ from calib_core.fleet import (
     off_kind,
     off_kinds,
 )
+from calib_core.fleet.mounting_coordinates import coordinate_jacobian
 from calib_core.fleet_prior import FleetPrior
 from calib_core.measurements import TimeNs, Unsolvable
 
-__all__ = ["Kind", "NotCounted", "PriorOfType", "kinds_of", "prior_of_type"]
+__all__ = ["Kind", "NotCounted", "PriorOfType", "kinds_of", "prior_of_type", "prior_sigma"]
 
 _COUNTED = ("good", "usable")
 
@@ -66,8 +68,7 @@ class Kind:
         """Standard deviations of the mountings: camera forward, left, up [cm]; roll, pitch, yaw [deg]; None if unknown."""
         if isinstance(self.scatter, Unsolvable):
             return None
-        sigma = np.sqrt(np.diag(self.scatter.scatter))
-        return tuple([*(100.0 * sigma[:3]).tolist(), *np.degrees(sigma[3:]).tolist()])
+        return _shown_sigma(self.scatter.scatter)
 
     @property
     def reason(self) -> str:
@@ -110,6 +111,19 @@ def prior_of_type(fleet: FleetRecord, vehicle_type: str) -> PriorOfType | Unsolv
         raise InputError(f"no vehicle of type {vehicle_type!r}; {known}")
     scatter, not_counted = _scatter(fleet.of_type(vehicle_type), vehicle_type)
     return scatter if isinstance(scatter, Unsolvable) else PriorOfType(fleet_prior_of(scatter), not_counted)
+
+
+def prior_sigma(prior: FleetPrior) -> tuple[float, ...]:
+    """Return the standard deviations of a prior: camera forward, left, up [cm]; roll, pitch, yaw [deg]."""
+    pose = prior.camera_from_radar
+    jacobian = coordinate_jacobian(pose, pose)
+    return _shown_sigma(jacobian @ prior.covariance @ jacobian.T)
+
+
+def _shown_sigma(covariance: Matrix66) -> tuple[float, ...]:
+    """Return standard deviations in cm and deg of a covariance (6, 6) of mounting coordinates."""
+    sigma = np.sqrt(np.diag(covariance))
+    return tuple([*(100.0 * sigma[:3]).tolist(), *np.degrees(sigma[3:]).tolist()])
 
 
 def _kind(fleet: FleetRecord, vehicle_type: str) -> Kind:

@@ -46,7 +46,7 @@ def test_a_sound_fleet_has_nothing_to_look_at(cocalib: Cocalib, sound: Path) -> 
 def test_what_needs_a_look_is_exit_code_3(cocalib: Cocalib, moved: Path) -> None:
     answer = cocalib("fleet", "status", moved)
     assert answer.code == 3
-    assert "1 of 2 vehicles need a look:\n  V001: this radar was remounted: " in answer.out
+    assert "1 of 2 vehicles to look at:\n  V001: this radar was remounted: " in answer.out
     assert "REMOUNTED" in answer.out
 
 
@@ -81,7 +81,7 @@ def test_history_has_each_transition_with_its_covariance(cocalib: Cocalib, moved
     assert change["picture_px"] > 0
     text = cocalib("fleet", "history", "V001", moved)
     assert "this radar was remounted" in text.out
-    assert "1 older results of these sessions were superseded" in text.out
+    assert f"superseded by later runs: s0 ({digest_of('V001', 's0')})" in text.out
 
 
 def test_compare_says_whether_two_differ(cocalib: Cocalib, moved: Path) -> None:
@@ -93,6 +93,20 @@ def test_compare_says_whether_two_differ(cocalib: Cocalib, moved: Path) -> None:
     assert json.loads(same.out)["outcome"] in ("same", "cannot-tell")
     vehicles = cocalib("fleet", "compare", "V000", "V001", moved)
     assert "V000 and V001" in vehicles.out
+
+
+def test_the_prior_of_a_type_is_told_with_what_it_rests_on(cocalib: Cocalib, sound: Path, moved: Path) -> None:
+    text = cocalib("fleet", "prior", "van", sound)
+    assert text.code == 0, text.err
+    assert text.out.startswith("the next vehicle of type van, from 6 vehicles:")
+    found = json.loads(cocalib("fleet", "prior", "van", sound, "--json").out)
+    assert found["vehicles"] == [f"V00{index}" for index in range(6)]
+    assert np.linalg.eigvalsh(np.array(found["covariance"]))[0] > 0
+    assert all(one > 0 for one in found["sigma"].values())
+    few = cocalib("fleet", "prior", "van", moved)
+    assert few.code == 1
+    assert "too few to tell how they scatter" in few.err
+    assert cocalib("fleet", "prior", "lorry", sound).code == 2
 
 
 def test_rebuild_writes_index_and_summary(cocalib: Cocalib, moved: Path) -> None:
@@ -139,7 +153,7 @@ def test_results_of_another_version_are_named(cocalib: Cocalib, tmp_path: Path) 
         (("compare", "A", "OUT"), "fleet compare takes A B OUT; 2 given"),
         (("status", "/nowhere"), "/nowhere: no such folder"),
         (("export", "OUT"), "--parquet FILE or --csv FILE"),
-        (("export", "OUT", "--json"), "--json applies to fleet status, history, compare only"),
+        (("export", "OUT", "--json"), "--json applies to fleet status, history, compare, prior only"),
         (("history", "V9", "OUT"), "no vehicle 'V9' among 6"),
         (("walk", "OUT"), "not 'walk'"),
     ],

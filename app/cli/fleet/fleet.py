@@ -18,17 +18,18 @@ if TYPE_CHECKING:
 
 __all__ = ["Fleet"]
 
-_Action: TypeAlias = Literal["status", "history", "compare", "export", "summary", "rebuild"]
+_Action: TypeAlias = Literal["status", "history", "compare", "prior", "export", "summary", "rebuild"]
 _NAMES: Final[dict[str, tuple[str, ...]]] = {
     "status": (),
     "history": ("VEHICLE",),
     "compare": ("A", "B"),
+    "prior": ("TYPE",),
     "export": (),
     "summary": (),
     "rebuild": (),
 }
 _FLAG_OF = {
-    "--json": ("status", "history", "compare"),
+    "--json": ("status", "history", "compare", "prior"),
     "--parquet": ("export",),
     "--csv": ("export",),
 }
@@ -37,22 +38,23 @@ _LOOK: Final = 3
 
 @dataclass(frozen=True, slots=True)
 class Fleet:
-    """Tell how a fleet is calibrated, from the results of a batch: status, history, comparisons, summary page.
+    """Tell how a fleet is calibrated, from the results of a batch: status, history, comparisons, prior, summary page.
 
     OUT is the folder that batch wrote to. `status OUT`: where each vehicle stands. `history VEHICLE OUT`: its sessions and what
-    changed in between. `compare A B OUT`: two sessions VEHICLE/SESSION, or two vehicles of one type. `export OUT`: all sessions
-    as a table. `summary OUT`: write OUT/summary.html. `rebuild OUT`: write index and summary page from the results.
+    changed in between. `compare A B OUT`: two sessions VEHICLE/SESSION, or two vehicles of one type. `prior TYPE OUT`: what the
+    vehicles of a type say of the next one. `export OUT`: all sessions as a table. `summary OUT`: write OUT/summary.html.
+    `rebuild OUT`: write index and summary page from the results.
 
-    Exit codes: 0 done, and nothing to look at; 2 nothing can be read; 3 something needs a look: a vehicle without a calibration
-    to rely on, remounted, or off its kind; or two that differ.
+    Exit codes: 0 done, and nothing to look at; 1 too few vehicles for a prior; 2 nothing can be read; 3 something needs a look:
+    a vehicle without a calibration to rely on, remounted, or off its kind; or two that differ.
     """
 
     action: Annotated[_Action, tyro.conf.Positional, called("ACTION")]
-    """What to do: status, history, compare, export, summary or rebuild."""
+    """What to do: status, history, compare, prior, export, summary or rebuild."""
     given: Annotated[tuple[str, ...], tyro.conf.Positional, called("NAME... OUT")] = ()
     """Names that the action takes, then the folder that batch wrote to."""
     json: Switch = False
-    """With status, history, compare: print one JSON object instead of text."""
+    """With status, history, compare, prior: print one JSON object instead of text."""
     parquet: File = None
     """With export: Parquet file to write."""
     csv: File = None
@@ -75,6 +77,8 @@ class Fleet:
             return self._history(fleet, names[0])
         if self.action == "compare":
             return self._compare(fleet, *names)
+        if self.action == "prior":
+            return self._prior(fleet, names[0])
         return self._export(fleet) if self.action == "export" else _summary(folder, fleet)
 
     def _fitting_folder(self) -> Path:
@@ -136,6 +140,22 @@ class Fleet:
         else:
             print(compared.words)
         return _LOOK if compared.outcome == "differs" else 0
+
+    def _prior(self, fleet: "FleetRecord", vehicle_type: str) -> int:
+        from app.cli.fleet.text_tables import prior_lines
+        from app.cli.output import explain_unsolvable
+        from app.fleet.json_documents import prior_document
+        from app.fleet.kinds import prior_of_type
+        from calib_core.measurements import Unsolvable
+
+        found = prior_of_type(fleet, vehicle_type)
+        if isinstance(found, Unsolvable):
+            return explain_unsolvable(found, what=f"no prior for {vehicle_type}")
+        if self.json:
+            _print_json(prior_document(found))
+        else:
+            print("\n".join(prior_lines(found)))
+        return 0
 
     def _export(self, fleet: "FleetRecord") -> int:
         from app.fleet.table_export import csv_bytes, parquet_bytes

@@ -3,13 +3,13 @@
 from collections.abc import Iterator, Sequence
 
 from app.fleet.dates import recorded_text
-from app.fleet.kinds import Kind
+from app.fleet.kinds import Kind, PriorOfType, prior_sigma
 from app.fleet.records import SessionRecord, VehicleRecord
 from app.fleet.standing import VehicleStanding, age_days
 from app.view.number_format import plain, with_sigma
 from calib_core.fleet import Transition
 
-__all__ = ["history_lines", "kind_lines", "status_lines"]
+__all__ = ["history_lines", "kind_lines", "prior_lines", "status_lines"]
 
 _DASH = "–"
 _LONGEST = 32
@@ -38,10 +38,10 @@ def status_lines(standings: Sequence[VehicleStanding], *, now_ns: int) -> Iterat
     yield from _table(heads, [_standing_cells(one, now_ns) for one in standings])
     needing = [one for one in standings if one.needs]
     if not needing:
-        yield f"{len(standings)} vehicles, nothing to look at"
+        yield f"{_vehicles(len(standings))}, nothing to look at"
         return
     yield ""
-    yield f"{len(needing)} of {len(standings)} vehicles need a look:"
+    yield f"{len(needing)} of {_vehicles(len(standings))} to look at:"
     for one in needing:
         yield from (f"  {one.vehicle.name}: {reason}" for reason in one.needs)
 
@@ -49,7 +49,7 @@ def status_lines(standings: Sequence[VehicleStanding], *, now_ns: int) -> Iterat
 def kind_lines(kinds: Sequence[Kind]) -> Iterator[str]:
     """Return how the mountings of each type scatter."""
     for kind in kinds:
-        count = f"{kind.vehicles} vehicle{'' if kind.vehicles == 1 else 's'}"
+        count = _vehicles(kind.vehicles)
         if kind.sigma is None:
             yield f"type {kind.vehicle_type}, {count}: {kind.reason}"
             continue
@@ -58,6 +58,19 @@ def kind_lines(kinds: Sequence[Kind]) -> Iterator[str]:
             f"type {kind.vehicle_type}, {count}: mountings scatter by {forward}, {left}, {up} cm (forward, left, up) "
             f"and {roll}, {pitch}, {yaw} deg (roll, pitch, yaw)"
         )
+
+
+def prior_lines(found: PriorOfType) -> Iterator[str]:
+    """Return what a type says of its next vehicle, what that rests on, and what it does not."""
+    prior = found.prior
+    sigma = prior_sigma(prior)
+    forward, left, up = (plain(100.0 * one) for one in prior.camera_from_radar.inverse().translation_m)
+    yield f"the next vehicle of type {prior.vehicle_type}, from {_vehicles(len(prior.vehicles))}:"
+    yield f"  camera at {forward}, {left}, {up} cm from the radar (forward, left, up)"
+    yield f"  ± {', '.join(plain(one, 2) for one in sigma[:3])} cm (forward, left, up)"
+    yield f"  ± {', '.join(plain(one, 2) for one in sigma[3:])} deg (roll, pitch, yaw)"
+    for one in found.not_counted:
+        yield f"  not counted: {one.vehicle} ({one.session}): {one.reason}"
 
 
 def history_lines(vehicle: VehicleRecord, superseded: Sequence[SessionRecord]) -> Iterator[str]:
@@ -69,7 +82,7 @@ def history_lines(vehicle: VehicleRecord, superseded: Sequence[SessionRecord]) -
             yield f"  {record.name}: {reason}"
     yield from (f"  {change.words}" for change in vehicle.transitions)
     if superseded:
-        yield f"  {len(superseded)} older results of these sessions were superseded by later runs"
+        yield f"  superseded by later runs: {', '.join(f'{one.name} ({one.outcome.digest})' for one in superseded)}"
 
 
 def _standing_cells(standing: VehicleStanding, now_ns: int) -> tuple[str, ...]:
@@ -114,6 +127,10 @@ def _change_cells(change: Transition | None) -> tuple[str, str, str]:
 
 def _since(change: Transition | None) -> str:
     return _DASH if change is None else f"{change.before.session}: {_WORDS[change.outcome]}"
+
+
+def _vehicles(count: int) -> str:
+    return f"{count} vehicle{'' if count == 1 else 's'}"
 
 
 def _number(value: float | None) -> str:
