@@ -103,7 +103,7 @@ def _insert(connection: sqlite3.Connection, record: SessionRecord) -> None:
     named = ", ".join(f":{name}" for name in row)
     connection.execute(f"INSERT INTO sessions ({', '.join(row)}) VALUES ({named})", row)
     files = [(outcome.digest, file.name, file.sha256) for file in outcome.files]
-    connection.executemany("INSERT INTO files VALUES (?, ?, ?)", files)
+    connection.executemany("INSERT OR REPLACE INTO files VALUES (?, ?, ?)", files)
     if record.pose is not None:
         insert_pose(connection, outcome.digest, record.pose)
 

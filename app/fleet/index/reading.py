@@ -36,7 +36,7 @@ def read_fleet(folder: Path) -> FleetRecord:
         fleet = _of_index(folder, path, finished) if path.is_file() else _of_results(folder, finished)
     except sqlite3.OperationalError:  # a killed writer left a journal, or the drive has no locks
         fleet = _of_results(folder, finished)
-    except sqlite3.DatabaseError as error:
+    except (sqlite3.DatabaseError, ValueError) as error:  # msgspec's and json's errors are ValueErrors
         raise damaged(path, error) from error
     if not fleet.vehicles:
         first = fleet.unread[0]

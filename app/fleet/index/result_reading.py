@@ -17,6 +17,7 @@ from calib_core.measurements import TimeNs
 __all__ = ["finished_digests", "outcome_in", "with_pose"]
 
 _CALIBRATION = "calibration.json"
+_MOST = 2**63
 
 
 def finished_digests(folder: Path) -> frozenset[str]:
@@ -40,6 +41,8 @@ def outcome_in(folder: Path, digest: str) -> Outcome | UnreadResult:
         return UnreadResult(place, f"{(error.strerror or str(error)).lower()}; check its permissions")
     except (UnicodeDecodeError, msgspec.DecodeError) as error:
         return UnreadResult(place, _not_ours(error))
+    if not -_MOST <= (found.recorded_ns or 0) < _MOST or found.pairs >= _MOST:
+        return UnreadResult(place, "states a time or a number of pairs that no recording has; run the batch again")
     if found.digest != digest:
         return UnreadResult(place, f"belongs to the job {found.digest}; move it back to its folder, or delete this one")
     return found

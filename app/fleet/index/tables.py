@@ -105,8 +105,8 @@ def require_version(connection: sqlite3.Connection, path: Path) -> None:
         )
 
 
-def damaged(path: Path, error: sqlite3.Error) -> InputError:
-    """Return the error about an index that SQLite cannot read."""
+def damaged(path: Path, error: Exception) -> InputError:
+    """Return the error about an index that SQLite cannot read, or whose rows another version wrote."""
     return InputError(
         f"{path}: cannot be read as an index: {error}; write it again from the results, which are not changed: "
         f"cocalib fleet rebuild {path.parent}"

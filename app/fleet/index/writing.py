@@ -48,7 +48,7 @@ class FleetIndex:
             self.unread = self._catch_up()
         except sqlite3.OperationalError as error:
             raise _not_written(path, error) from error
-        except sqlite3.DatabaseError as error:
+        except (sqlite3.DatabaseError, ValueError) as error:  # msgspec's and json's errors are ValueErrors
             raise damaged(path, error) from error
 
     def add(self, outcome: Outcome) -> None:

@@ -181,6 +181,20 @@ def test_a_file_that_is_no_index_says_what_to_do(folder: Path) -> None:
         FleetIndex(folder)
 
 
+def test_rows_that_another_version_wrote_say_what_to_do(folder: Path) -> None:
+    rebuild_index(folder)
+    with closing(sqlite3.connect(index_path(folder))) as connection, connection:
+        connection.execute("UPDATE sessions SET outcome = replace(outcome, 'outcome-1', 'outcome-2')")
+    with pytest.raises(InputError, match="cocalib fleet rebuild"):
+        read_fleet(folder)
+
+
+def test_a_result_that_no_table_can_hold_is_named(folder: Path) -> None:
+    make_result(folder, "V9", "s0", recorded_ns=2**64)
+    (unread,) = read_fleet(folder).unread
+    assert "states a time" in unread.reason
+
+
 def test_results_of_another_version_are_left_out_and_named(folder: Path) -> None:
     place = ResultsFolder(folder).folder_of(digest_of("V000", "s0")) / "outcome.json"
     place.write_text(place.read_text().replace("outcome-1", "outcome-2"))
