@@ -7,46 +7,50 @@ from pathlib import Path
 from typing import Any
 
 from app.batch.outcome import Outcome, outcome_text, read_outcome
-from app.fleet.index.result_reading import outcome_in, with_pose
+from app.fleet.index.result_reading import outcome_of, with_pose
 from app.fleet.index.stored_pose import insert_pose, insert_transition, pose_of
 from app.fleet.records import NO_POSE_OF, SessionRecord, UnreadResult
 from app.fleet.session_order import current_and_superseded, in_order
 from calib_core.fleet import transition
 
-__all__ = ["Places", "fill", "known_digests", "put", "set_places"]
+__all__ = ["Places", "fill", "known_results", "put", "set_places"]
 
 Places = Mapping[tuple[str, str], int]
 """Vehicle and session to the place in the manifest, from 0."""
 
 
-def known_digests(connection: sqlite3.Connection) -> frozenset[str]:
-    """Return the digests of the results in the index."""
-    return frozenset(digest for (digest,) in connection.execute("SELECT digest FROM sessions"))
+def known_results(connection: sqlite3.Connection) -> Mapping[str, str]:
+    """Return the text of every outcome in the index by its digest."""
+    return dict(connection.execute("SELECT digest, outcome FROM sessions").fetchall())
 
 
 def fill(
-    connection: sqlite3.Connection, folder: Path, finished: frozenset[str], places: Places
+    connection: sqlite3.Connection, folder: Path, finished: Mapping[str, str | UnreadResult], places: Places
 ) -> tuple[UnreadResult, ...]:
     """Make the tables hold exactly the finished results of a folder; return those that cannot be read.
 
     Args:
         connection: within a transaction.
         folder: holds the results.
-        finished: digests of the results there.
+        finished: the text of each outcome there by its digest.
         places: of the manifest, as far as known.
     """
     unread, changed = [], set()
-    known = known_digests(connection)
-    for digest in sorted(known - finished):
-        (vehicle,) = connection.execute("SELECT vehicle FROM sessions WHERE digest = ?", (digest,)).fetchone()
-        connection.execute("DELETE FROM sessions WHERE digest = ?", (digest,))
-        changed.add(vehicle)
-    for digest in sorted(finished - known):
-        found = outcome_in(folder, digest)
+    known = known_results(connection)
+    for digest in sorted(known):
+        if finished.get(digest) != known[digest]:
+            (vehicle,) = connection.execute("SELECT vehicle FROM sessions WHERE digest = ?", (digest,)).fetchone()
+            connection.execute("DELETE FROM sessions WHERE digest = ?", (digest,))
+            changed.add(vehicle)
+    for digest in sorted(finished):
+        text = finished[digest]
+        if known.get(digest) == text:
+            continue
+        found = text if isinstance(text, UnreadResult) else outcome_of(text, folder, digest)
         if isinstance(found, UnreadResult):
             unread.append(found)
             continue
-        _insert(connection, with_pose(folder, found, places.get((found.vehicle, found.session))))
+        _insert(connection, with_pose(folder, found, places.get((found.vehicle, found.session))), str(text))
         changed.add(found.vehicle)
     for vehicle in sorted(changed):
         _settle(connection, vehicle)
@@ -63,7 +67,9 @@ def put(connection: sqlite3.Connection, folder: Path, outcome: Outcome, places: 
         places: of the manifest, as far as known.
     """
     connection.execute("DELETE FROM sessions WHERE digest = ?", (outcome.digest,))
-    _insert(connection, with_pose(folder, outcome, places.get((outcome.vehicle, outcome.session))))
+    _insert(
+        connection, with_pose(folder, outcome, places.get((outcome.vehicle, outcome.session))), outcome_text(outcome)
+    )
     _settle(connection, outcome.vehicle)
 
 
@@ -78,7 +84,7 @@ def set_places(connection: sqlite3.Connection, places: Places) -> None:
         _settle(connection, vehicle)
 
 
-def _insert(connection: sqlite3.Connection, record: SessionRecord) -> None:
+def _insert(connection: sqlite3.Connection, record: SessionRecord, text: str) -> None:
     outcome = record.outcome
     row: dict[str, Any] = {
         "digest": outcome.digest,
@@ -98,7 +104,7 @@ def _insert(connection: sqlite3.Connection, record: SessionRecord) -> None:
         "pairs": outcome.pairs,
         "started": None if outcome.run is None else outcome.run.started,
         "pose_problem": record.pose_problem,
-        "outcome": outcome_text(outcome),
+        "outcome": text,
     }
     named = ", ".join(f":{name}" for name in row)
     connection.execute(f"INSERT INTO sessions ({', '.join(row)}) VALUES ({named})", row)

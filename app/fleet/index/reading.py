@@ -1,16 +1,17 @@
 """Read a fleet from its index without changing anything, also while a batch is running."""
 
 import sqlite3
+from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
 from app.batch.outcome import read_outcome
-from app.fleet.index.filling import fill, known_digests
-from app.fleet.index.result_reading import finished_digests
+from app.fleet.index.filling import fill, known_results
+from app.fleet.index.result_reading import finished_results
 from app.fleet.index.stored_pose import pose_of, transition_of
 from app.fleet.index.tables import create_tables, damaged, has_tables, index_path, read_only, require_version
-from app.fleet.records import FleetRecord, SessionRecord, VehicleRecord
+from app.fleet.records import FleetRecord, SessionRecord, UnreadResult, VehicleRecord
 from calib_core.errors import InputError
 
 __all__ = ["read_fleet"]
@@ -28,7 +29,7 @@ def read_fleet(folder: Path) -> FleetRecord:
     Raises:
         InputError: there are no results that can be read, or the index is of another version or damaged.
     """
-    finished = finished_digests(folder)
+    finished = finished_results(folder)
     if not finished:
         raise InputError(f"{folder}: no results; give the folder that cocalib batch wrote to, which holds results/")
     path = index_path(folder)
@@ -45,13 +46,13 @@ def read_fleet(folder: Path) -> FleetRecord:
     return fleet
 
 
-def _of_index(folder: Path, path: Path, finished: frozenset[str]) -> FleetRecord:
+def _of_index(folder: Path, path: Path, finished: Mapping[str, str | UnreadResult]) -> FleetRecord:
     with closing(read_only(path)) as connection:
         connection.execute("BEGIN")  # one state of the tables for all that follows
         if not has_tables(connection):  # its writer is just beginning
             return _of_results(folder, finished)
         require_version(connection, path)
-        if known_digests(connection) == finished:
+        if dict(known_results(connection)) == dict(finished):
             return _loaded(connection)
         with closing(sqlite3.connect(":memory:", isolation_level=None)) as copy:
             copy.execute("PRAGMA foreign_keys = ON")
@@ -66,7 +67,7 @@ def _of_index(folder: Path, path: Path, finished: frozenset[str]) -> FleetRecord
             return replace(_loaded(copy), unread=unread)
 
 
-def _of_results(folder: Path, finished: frozenset[str]) -> FleetRecord:
+def _of_results(folder: Path, finished: Mapping[str, str | UnreadResult]) -> FleetRecord:
     with closing(sqlite3.connect(":memory:", isolation_level=None)) as memory:
         create_tables(memory)
         unread = fill(memory, folder, finished, {})

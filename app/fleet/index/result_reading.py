@@ -1,6 +1,7 @@
 """Read one result from its folder: the outcome, and the pose from calibration.json."""
 
 import hashlib
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,38 +15,56 @@ from calib_core.fleet import session_pose
 from calib_core.interchange import read_calibration
 from calib_core.measurements import TimeNs
 
-__all__ = ["finished_digests", "outcome_in", "with_pose"]
+__all__ = ["finished_results", "outcome_of", "with_pose"]
 
 _CALIBRATION = "calibration.json"
 _MOST = 2**63
 
 
-def finished_digests(folder: Path) -> frozenset[str]:
-    """Return the digests of all results in a folder; what a job is still writing has a hidden name."""
+def finished_results(folder: Path) -> Mapping[str, str | UnreadResult]:
+    """Return the text of every outcome in a folder by its digest; what a job is still writing has a hidden name."""
     place = ResultsFolder(folder).folder_of("")
     if not place.is_dir():
-        return frozenset()
-    return frozenset(
-        one.name for one in place.iterdir() if not one.name.startswith(".") and (one / OUTCOME_FILE).is_file()
-    )
+        return {}
+    names = sorted(one.name for one in place.iterdir() if not one.name.startswith("."))
+    texts = {name: _text(folder, name) for name in names}
+    return {name: text for name, text in texts.items() if text is not None}
 
 
-def outcome_in(folder: Path, digest: str) -> Outcome | UnreadResult:
-    """Return the outcome of a result, or why it cannot be read."""
-    path = ResultsFolder(folder).folder_of(digest) / OUTCOME_FILE
-    place = path.relative_to(folder).as_posix()
+def outcome_of(text: str, folder: Path, digest: str) -> Outcome | UnreadResult:
+    """Return the outcome in the text of its file, or why it cannot be read.
+
+    Args:
+        text: of the file.
+        folder: holds the results.
+        digest: of the job.
+    """
+    place = _place(folder, digest)
     try:
-        text = path.read_text(encoding="utf-8")
         found = read_outcome(text)
-    except OSError as error:
-        return UnreadResult(place, f"{(error.strerror or str(error)).lower()}; check its permissions")
-    except (UnicodeDecodeError, msgspec.DecodeError) as error:
+    except msgspec.DecodeError as error:
         return UnreadResult(place, _not_ours(error))
     if not -_MOST <= (found.recorded_ns or 0) < _MOST or found.pairs >= _MOST:
         return UnreadResult(place, "states a time or a number of pairs that no recording has; run the batch again")
     if found.digest != digest:
         return UnreadResult(place, f"belongs to the job {found.digest}; move it back to its folder, or delete this one")
     return found
+
+
+def _text(folder: Path, digest: str) -> str | UnreadResult | None:
+    """Return the text of an outcome; None if there is no such file."""
+    try:
+        return (ResultsFolder(folder).folder_of(digest) / OUTCOME_FILE).read_text(encoding="utf-8")
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except OSError as error:
+        return UnreadResult(_place(folder, digest), f"{(error.strerror or str(error)).lower()}; check its permissions")
+    except UnicodeDecodeError as error:
+        return UnreadResult(_place(folder, digest), _not_ours(error))
+
+
+def _place(folder: Path, digest: str) -> str:
+    return (ResultsFolder(folder).folder_of(digest) / OUTCOME_FILE).relative_to(folder).as_posix()
 
 
 def _not_ours(error: Exception) -> str:

@@ -9,7 +9,7 @@ from typing import Self
 from app.batch.manifest import ManifestRow
 from app.batch.outcome import Outcome
 from app.fleet.index.filling import Places, fill, put, set_places
-from app.fleet.index.result_reading import finished_digests
+from app.fleet.index.result_reading import finished_results
 from app.fleet.index.tables import create_tables, damaged, has_tables, index_path, require_version, writable
 from app.fleet.records import UnreadResult
 from app.whole_file import whole_path
@@ -76,7 +76,7 @@ class FleetIndex:
     def _catch_up(self) -> tuple[UnreadResult, ...]:
         with _Transaction(self._connection):
             set_places(self._connection, self._places)
-            return fill(self._connection, self._folder, finished_digests(self._folder), self._places)
+            return fill(self._connection, self._folder, finished_results(self._folder), self._places)
 
 
 def rebuild_index(folder: Path, rows: Sequence[ManifestRow] = ()) -> tuple[UnreadResult, ...]:
@@ -93,7 +93,7 @@ def rebuild_index(folder: Path, rows: Sequence[ManifestRow] = ()) -> tuple[Unrea
         InputError: there are no results.
         OSError: the index cannot be written.
     """
-    finished = finished_digests(folder)
+    finished = finished_results(folder)
     if not finished:
         raise InputError(f"{folder}: no results in {folder / 'results'}; give the folder that cocalib batch wrote to")
     places = {(row.vehicle, row.session): place for place, row in enumerate(rows)}

@@ -119,6 +119,18 @@ def test_results_that_the_index_lacks_are_read_and_those_deleted_are_not_and_not
     assert _summary(read_fleet(folder)) == _summary(fleet)
 
 
+def test_a_job_that_was_run_again_without_the_index_is_read_again(folder: Path) -> None:
+    rebuild_index(folder)
+    make_result(folder, "V002", "s9", recorded_ns=FIRST_NS + 5 * DAY_NS)
+    fleet = read_fleet(folder)
+    assert [(one.name, one.outcome.status) for one in fleet.vehicles[2].sessions][-1] == ("s9", "solved")
+    with FleetIndex(folder):
+        pass
+    content = _content(folder)
+    rebuild_index(folder)
+    assert _content(folder) == content
+
+
 def test_a_writer_at_work_is_read_past(folder: Path) -> None:
     rebuild_index(folder)
     expected = _summary(read_fleet(folder))
@@ -181,12 +193,28 @@ def test_a_file_that_is_no_index_says_what_to_do(folder: Path) -> None:
         FleetIndex(folder)
 
 
-def test_rows_that_another_version_wrote_say_what_to_do(folder: Path) -> None:
+def test_rows_that_were_changed_are_read_from_the_results(folder: Path) -> None:
     rebuild_index(folder)
+    expected = _summary(read_fleet(folder))
     with closing(sqlite3.connect(index_path(folder))) as connection, connection:
         connection.execute("UPDATE sessions SET outcome = replace(outcome, 'outcome-1', 'outcome-2')")
+    assert _summary(read_fleet(folder)) == expected
+
+
+def test_an_index_of_results_that_a_newer_program_wrote_says_what_to_do(folder: Path) -> None:
+    rebuild_index(folder)
+    for place in (folder / "results").glob("*/outcome.json"):
+        text = place.read_text()
+        if '"session": "s0"' in text:
+            place.write_text(text.replace('"pairs"', '"couples"'))
+    with closing(sqlite3.connect(index_path(folder))) as connection, connection:
+        connection.execute(
+            "UPDATE sessions SET outcome = replace(outcome, '\"pairs\"', '\"couples\"') WHERE session = 's0'"
+        )
     with pytest.raises(InputError, match="cocalib fleet rebuild"):
         read_fleet(folder)
+    assert len(rebuild_index(folder)) == 4
+    assert [one.name for one in read_fleet(folder).vehicles[0].sessions] == ["s1"]
 
 
 def test_a_result_that_no_table_can_hold_is_named(folder: Path) -> None:
