@@ -177,11 +177,9 @@ def _rebuild(folder: Path) -> int:
 
 
 def _summary(folder: Path, fleet: "FleetRecord") -> int:
-    from app.fleet.summary_page import summary_html
+    from app.fleet.summary_page import write_summary
 
-    path = folder / "summary.html"
-    write_whole(path, summary_html(fleet))
-    print(f"{path} written", file=sys.stderr)
+    print(f"{write_summary(folder, fleet)} written", file=sys.stderr)
     return 0
 
 

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
+from typing import Final
 
 from app.fleet.kinds import Kind, kinds_of
 from app.fleet.records import FleetRecord, UnreadResult
@@ -12,8 +13,26 @@ from app.fleet.summary_page.tables import session_table, type_table, vehicle_tab
 from app.report.html_file import html_file
 from app.report.markup import Child, Markup, tag
 from app.view.wording import sentence
+from app.whole_file import write_whole
 
-__all__ = ["summary_html"]
+__all__ = ["SUMMARY_FILE", "summary_html", "write_summary"]
+
+SUMMARY_FILE: Final = "summary.html"
+
+
+def write_summary(folder: Path, fleet: FleetRecord) -> Path:
+    """Write the page next to the results; a reader finds the old one or the new one. Return where it is.
+
+    Args:
+        folder: holds the results.
+        fleet: what they say.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    path = folder / SUMMARY_FILE
+    write_whole(path, summary_html(fleet).encode())
+    return path
 
 
 def summary_html(fleet: FleetRecord) -> str:

@@ -141,6 +141,17 @@ def test_a_writer_at_work_is_read_past(folder: Path) -> None:
         writer.execute("ROLLBACK")
 
 
+def test_two_drivers_of_one_folder_write_one_index(folder: Path) -> None:
+    with FleetIndex(folder) as one, FleetIndex(folder) as other:
+        for index in range(4):
+            outcome = make_result(folder, f"W{index % 2}", f"s{index}", recorded_ns=FIRST_NS - index * DAY_NS)
+            (one, other)[index // 2].add(outcome)
+    content = _content(folder)
+    rebuild_index(folder)
+    assert _content(folder) == content
+    assert [record.name for record in read_fleet(folder).vehicles[3].sessions] == ["s2", "s0"]
+
+
 _KILLED = """
 import os, sqlite3, sys
 connection = sqlite3.connect(sys.argv[1], isolation_level=None)
