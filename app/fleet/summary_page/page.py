@@ -113,7 +113,7 @@ def _left_out(kinds: Sequence[Kind]) -> Markup | None:
     if not rows:
         return None
     items = (
-        tag("li", f"{one.vehicle} ({one.session}) is not counted in {kind.vehicle_type}: {sentence(one.reason)}")
+        tag("li", f"{one.vehicle} ({one.session}) is not counted in {kind.vehicle_type}: {one.reason}.")
         for kind, one in rows
     )
     return tag("ul", *items, class_="look note")
