@@ -12,7 +12,7 @@ from benchmarks.proposing.cases import Case
 from benchmarks.proposing.drawn import drawn_from
 from calib_core.association.placements import Placement, find_placements
 from calib_core.camera import Camera
-from calib_core.errors import CalibrationError
+from calib_core.errors import CalibrationError, OptionError
 from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.proposing import FrameSource, dwell_views, proposals_of
@@ -56,9 +56,13 @@ def drive_of(seed: int) -> Case:
 
 
 def measure_drive(folder: Path, seed: int) -> Figures:
-    """Draw a drive and measure it."""
+    """Draw a drive and measure it; no figures if its traffic does not fit into the scene."""
     case = drive_of(seed)
-    drawn = drawn_from(_without_reflector(simulate(case.options)), case, folder / "drives")
+    try:
+        recording = _without_reflector(simulate(case.options))
+    except OptionError:
+        return {}
+    drawn = drawn_from(recording, case, folder / "drives")
     return _measured(drawn.placements, drawn.frames, drawn.recording.camera)
 
 

@@ -12,7 +12,7 @@ __all__ = ["drives_table", "mismatched_table", "real_table"]
 
 def drives_table(kept: Mapping[int, Figures]) -> Table:
     """Tell what is found where no reflector stands."""
-    trials = list(kept.values())
+    trials = [trial for trial in kept.values() if trial]
     accepted = int(summed(trials, "accepted"))
     row = (
         str(len(trials)),

@@ -50,6 +50,7 @@ def off_kinds(scatter: MountingScatter) -> tuple[OffKind, ...]:
 
     In a fleet of more than 12 mountings, one that is within the 95 % point of all of them, its own included, is not tested again
     without it: its own part in the estimate is too small to hide it.
+    In a very small fleet, a vehicle without which fewer than 4 mountings are left is not tested; `off_kind` says so of it.
 
     Args:
         scatter: of the type.

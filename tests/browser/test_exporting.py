@@ -308,35 +308,40 @@ def test_warnings_of_the_calibration_are_shown_next_to_the_text(page: Driver, tr
         expect(page.page.locator(f"{DIALOG} .with-warnings")).to_contain_text(row["message"])
 
 
-@pytest.mark.parametrize("size", [(1280, 720), (1440, 900), (390, 844)])
-def test_the_panel_fits_the_screen(solved: Driver, size: tuple[int, int]) -> None:
-    solved.page.set_viewport_size({"width": size[0], "height": size[1]})
-    solved.page.click("#export")
-    choose(solved, "tf2")
-    radar = solved.page.locator(f'{DIALOG} [data-field="radar_frame"]')
-    usual = radar.input_value()
-    radar.fill("a$b")
-    expect(solved.page.locator(f"{DIALOG} .reason")).to_contain_text("until the field above is corrected")
-    assert solved.value(
-        f"document.querySelector('{DIALOG} .text').scrollHeight <= document.querySelector('{DIALOG} .text').clientHeight"
+def test_the_panel_fits_the_screen(solved: Driver) -> None:
+    for width, height in ((1280, 720), (1440, 900), (390, 844)):
+        solved.page.set_viewport_size({"width": width, "height": height})
+        solved.page.click("#export")
+        choose(solved, "tf2")
+        radar = solved.page.locator(f'{DIALOG} [data-field="radar_frame"]')
+        usual = radar.input_value()
+        radar.fill("a$b")
+        expect(solved.page.locator(f"{DIALOG} .reason")).to_contain_text("until the field above is corrected")
+        assert solved.value(
+            f"document.querySelector('{DIALOG} .text').scrollHeight <= document.querySelector('{DIALOG} .text').clientHeight"
+        )
+        radar.fill(usual)
+        expect(solved.page.locator(f"{DIALOG} .text")).to_contain_text(f"--frame-id {usual}")
+        for name in ("autoware", "numpy", "nuscenes", "kitti"):
+            choose(solved, name)
+            nothing_spills(solved)
+        expect(solved.page.locator(f"{DIALOG} .first")).to_be_in_viewport()
+        solved.page.keyboard.press("Escape")
+        expect(solved.page.locator(DIALOG)).to_be_hidden()
+
+
+def nothing_spills(page: Driver) -> None:
+    """Check that no part of the panel leaves the screen, and that the table of numbers stays in its column."""
+    page.until(f"document.querySelector('{DIALOG} .frames')")
+    page.drawn()
+    parts = ", ".join(f"{DIALOG} {part}" for part in ("", ".foot *", "aside :not(image)", ".names *", ".rectified *"))
+    spilled = page.value(
+        f"[...document.querySelectorAll('{parts}')].filter((part) => {{ const box = part.getBoundingClientRect(); "
+        "return box.width && (box.right > innerWidth || box.left < 0); }).length"
     )
-    radar.fill(usual)
-    expect(solved.page.locator(f"{DIALOG} .text")).to_contain_text(f"--frame-id {usual}")
-    for name in ("autoware", "numpy", "nuscenes", "kitti"):
-        choose(solved, name)
-        solved.until(f"document.querySelector('{DIALOG} .frames')")
-        solved.drawn()
-        parts = ", ".join(
-            f"{DIALOG} {part}" for part in ("", ".foot *", "aside :not(image)", ".names *", ".rectified *")
-        )
-        spilled = solved.value(
-            f"[...document.querySelectorAll('{parts}')].filter((part) => {{ const box = part.getBoundingClientRect(); "
-            "return box.width && (box.right > innerWidth || box.left < 0); }).length"
-        )
-        assert spilled == 0
-        panel = solved.page.locator(f"{DIALOG} aside").bounding_box()
-        table = solved.page.locator(f"{DIALOG} .pose-numbers").first.bounding_box()
-        assert panel is not None
-        assert table is not None
-        assert table["x"] + table["width"] <= panel["x"] + panel["width"]
-    expect(solved.page.locator(f"{DIALOG} .first")).to_be_in_viewport()
+    assert spilled == 0
+    panel = page.page.locator(f"{DIALOG} aside").bounding_box()
+    table = page.page.locator(f"{DIALOG} .pose-numbers").first.bounding_box()
+    assert panel is not None
+    assert table is not None
+    assert table["x"] + table["width"] <= panel["x"] + panel["width"]
