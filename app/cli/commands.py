@@ -134,6 +134,11 @@ COMMANDS: Mapping[str, Command] = {
             "List the sessions of recordings, repair a damaged one, or export its clicks.",
         ),
         Command(
+            "fleet",
+            "app.cli.fleet.fleet:Fleet",
+            "Tell how a fleet is calibrated, from the results of a batch: status, history, comparisons, prior, summary page.",
+        ),
+        Command(
             "simulate",
             "app.cli.simulate:Simulate",
             "Simulate a recording: radar, camera, and the ground truth (truth.json).",

@@ -14,9 +14,9 @@ from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 from calib_core.results import Calibration
 from calib_core.verdict import Verdict, verdict_on
 
-__all__ = ["answer"]
+__all__ = ["LEVEL_SIGNS", "answer"]
 
-_SIGNS = {"good": "●", "usable": "◐", "weak": "○", "contradictory": "✕", "nothing": "–", "not judged": "–"}
+LEVEL_SIGNS = {"good": "●", "usable": "◐", "weak": "○", "contradictory": "✕", "nothing": "–", "not judged": "–"}
 """The level as a shape, for print without colour."""
 _ROW = 15.0
 _GOOD_LIMITS = "10 cm and 1 deg"
@@ -40,7 +40,12 @@ def _verdict(subject: ReportSubject) -> Markup:
     level, reason, action = _judgement(subject)
     return tag(
         "div",
-        tag("p", tag("span", _SIGNS[level], class_="sign", aria_hidden="true"), tag("strong", level), class_="level"),
+        tag(
+            "p",
+            tag("span", LEVEL_SIGNS[level], class_="sign", aria_hidden="true"),
+            tag("strong", level),
+            class_="level",
+        ),
         tag("div", tag("p", sentence(reason)), tag("p", tag("b", "Next: "), sentence(action), class_="next")),
         class_=f"verdict {level.split()[0]}",
     )

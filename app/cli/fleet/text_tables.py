@@ -1,0 +1,144 @@
+"""What `cocalib fleet` prints for people: tables with one line for each vehicle, session or type."""
+
+from collections.abc import Iterator, Sequence
+
+from app.fleet.dates import recorded_text
+from app.fleet.kinds import Kind, PriorOfType, prior_sigma
+from app.fleet.records import SessionRecord, VehicleRecord
+from app.fleet.standing import VehicleStanding, age_days
+from app.view.number_format import plain, with_sigma
+from calib_core.fleet import Transition
+
+__all__ = ["history_lines", "kind_lines", "prior_lines", "status_lines"]
+
+_DASH = "–"
+_LONGEST = 32
+_WORDS = {"remounted": "REMOUNTED", "unchanged": "unchanged", "cannot-tell": "cannot tell"}
+
+
+def status_lines(standings: Sequence[VehicleStanding], *, now_ns: int) -> Iterator[str]:
+    """Return a line for each vehicle, and what somebody has to look at.
+
+    Args:
+        standings: of all vehicles.
+        now_ns: the time that ages count to [ns].
+    """
+    heads = (
+        "vehicle",
+        "last session",
+        "age d",
+        "verdict",
+        "sigma deg",
+        "sigma cm",
+        "change deg",
+        "change cm",
+        "since",
+        "kind",
+    )
+    yield from _table(heads, [_standing_cells(one, now_ns) for one in standings])
+    needing = [one for one in standings if one.needs]
+    if not needing:
+        yield f"{_vehicles(len(standings))}, nothing to look at"
+        return
+    yield ""
+    yield f"{len(needing)} of {_vehicles(len(standings))} to look at:"
+    for one in needing:
+        yield from (f"  {one.vehicle.name}: {reason}" for reason in one.needs)
+
+
+def kind_lines(kinds: Sequence[Kind]) -> Iterator[str]:
+    """Return how the mountings of each type scatter."""
+    for kind in kinds:
+        count = _vehicles(kind.vehicles)
+        if kind.sigma is None:
+            yield f"type {kind.vehicle_type}, {count}: {kind.reason}"
+            continue
+        forward, left, up, roll, pitch, yaw = (plain(one, 2) for one in kind.sigma)
+        yield (
+            f"type {kind.vehicle_type}, {count}: mountings scatter by {forward}, {left}, {up} cm (forward, left, up) "
+            f"and {roll}, {pitch}, {yaw} deg (roll, pitch, yaw)"
+        )
+
+
+def prior_lines(found: PriorOfType) -> Iterator[str]:
+    """Return what a type says of its next vehicle, what that rests on, and what it does not."""
+    prior = found.prior
+    sigma = prior_sigma(prior)
+    forward, left, up = (plain(100.0 * one) for one in prior.camera_from_radar.inverse().translation_m)
+    yield f"the next vehicle of type {prior.vehicle_type}, from {_vehicles(len(prior.vehicles))}:"
+    yield f"  camera at {forward}, {left}, {up} cm from the radar (forward, left, up)"
+    yield f"  ± {', '.join(plain(one, 2) for one in sigma[:3])} cm (forward, left, up)"
+    yield f"  ± {', '.join(plain(one, 2) for one in sigma[3:])} deg (roll, pitch, yaw)"
+    for one in found.not_counted:
+        yield f"  not counted: {one.vehicle} ({one.session}): {one.reason}"
+
+
+def history_lines(vehicle: VehicleRecord, superseded: Sequence[SessionRecord]) -> Iterator[str]:
+    """Return the sessions of a vehicle and what changed from one to the next."""
+    heads = ("session", "recorded", "verdict", "sigma deg", "sigma cm", "change deg", "change cm", "change px", "since")
+    yield from _table(heads, [_session_cells(one, vehicle.transition_to(one.name)) for one in vehicle.sessions])
+    for record in vehicle.sessions:
+        for reason in filter(None, (record.outcome.reason, record.pose_problem)):
+            yield f"  {record.name}: {reason}"
+    yield from (f"  {change.words}" for change in vehicle.transitions)
+    if superseded:
+        yield f"  superseded by later runs: {', '.join(f'{one.name} ({one.outcome.digest})' for one in superseded)}"
+
+
+def _standing_cells(standing: VehicleStanding, now_ns: int) -> tuple[str, ...]:
+    outcome, change = standing.last.outcome, standing.change
+    age = age_days(standing.last, now_ns)
+    kind = _DASH if standing.kind is None else "OFF" if standing.kind.is_off else "ok"
+    return (
+        standing.vehicle.name,
+        outcome.session,
+        _DASH if age is None else f"{age:.0f}",
+        outcome.verdict or outcome.status,
+        _number(outcome.sigma_deg),
+        _number(outcome.sigma_cm),
+        *_change_cells(change)[:2],
+        _since(change),
+        kind,
+    )
+
+
+def _session_cells(record: SessionRecord, change: Transition | None) -> tuple[str, ...]:
+    outcome = record.outcome
+    return (
+        outcome.session,
+        recorded_text(outcome.recorded_ns),
+        outcome.verdict or outcome.status,
+        _number(outcome.sigma_deg),
+        _number(outcome.sigma_cm),
+        *_change_cells(change),
+        _since(change),
+    )
+
+
+def _change_cells(change: Transition | None) -> tuple[str, str, str]:
+    if change is None:
+        return _DASH, _DASH, _DASH
+    return (
+        with_sigma(change.rotation_deg, change.rotation_sigma_deg),
+        with_sigma(change.position_cm, change.position_sigma_cm),
+        with_sigma(change.picture_px, change.picture_sigma_px),
+    )
+
+
+def _since(change: Transition | None) -> str:
+    return _DASH if change is None else f"{change.before.session}: {_WORDS[change.outcome]}"
+
+
+def _vehicles(count: int) -> str:
+    return f"{count} vehicle{'' if count == 1 else 's'}"
+
+
+def _number(value: float | None) -> str:
+    return _DASH if value is None else plain(value, 2)
+
+
+def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    rows = [[text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…" for text in row] for row in rows]
+    widths = [max(map(len, column)) for column in zip(heads, *rows, strict=True)]
+    for row in (heads, *rows):
+        yield "  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip()

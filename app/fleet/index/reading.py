@@ -1,0 +1,105 @@
+"""Read a fleet from its index without changing anything, also while a batch is running."""
+
+import sqlite3
+from collections.abc import Mapping
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
+from app.batch.outcome import read_outcome
+from app.fleet.index.filling import fill, known_results
+from app.fleet.index.result_reading import finished_results
+from app.fleet.index.stored_pose import pose_of, transition_of
+from app.fleet.index.tables import create_tables, damaged, has_tables, index_path, read_only, require_version
+from app.fleet.records import FleetRecord, SessionRecord, UnreadResult, VehicleRecord
+from calib_core.errors import InputError
+
+__all__ = ["read_fleet"]
+
+
+def read_fleet(folder: Path) -> FleetRecord:
+    """Return what the results of a folder say.
+
+    Results that the index does not have yet, such as those of shards or after a driver was killed, are read from the folder
+    itself; the index is not changed.
+
+    Args:
+        folder: holds the results and the index.
+
+    Raises:
+        InputError: there are no results that can be read, or the index is of another version or damaged.
+    """
+    finished = finished_results(folder)
+    if not finished:
+        raise InputError(f"{folder}: no results; give the folder that cocalib batch wrote to, which holds results/")
+    path = index_path(folder)
+    try:
+        fleet = _of_index(folder, path, finished) if path.is_file() else _of_results(folder, finished)
+    except sqlite3.OperationalError:  # a killed writer left a journal, or the drive has no locks
+        fleet = _of_results(folder, finished)
+    except (sqlite3.DatabaseError, ValueError) as error:  # msgspec's and json's errors are ValueErrors
+        raise damaged(path, error) from error
+    if not fleet.vehicles:
+        first = fleet.unread[0]
+        more = f" ({len(fleet.unread)} such results)" if len(fleet.unread) > 1 else ""
+        raise InputError(f"{folder}: no result can be read: {first.place}: {first.reason}{more}")
+    return fleet
+
+
+def _of_index(folder: Path, path: Path, finished: Mapping[str, str | UnreadResult]) -> FleetRecord:
+    with closing(read_only(path)) as connection:
+        connection.execute("BEGIN")  # one state of the tables for all that follows
+        if not has_tables(connection):  # its writer is just beginning
+            return _of_results(folder, finished)
+        require_version(connection, path)
+        if dict(known_results(connection)) == dict(finished):
+            return _loaded(connection)
+        with closing(sqlite3.connect(":memory:", isolation_level=None)) as copy:
+            copy.execute("PRAGMA foreign_keys = ON")
+            connection.execute("COMMIT")
+            connection.backup(copy)
+            places = {
+                (vehicle, session): place
+                for vehicle, session, place in copy.execute("SELECT vehicle, session, place FROM sessions")
+                if place is not None
+            }
+            unread = fill(copy, folder, finished, places)
+            return replace(_loaded(copy), unread=unread)
+
+
+def _of_results(folder: Path, finished: Mapping[str, str | UnreadResult]) -> FleetRecord:
+    with closing(sqlite3.connect(":memory:", isolation_level=None)) as memory:
+        create_tables(memory)
+        unread = fill(memory, folder, finished, {})
+        return replace(_loaded(memory), unread=unread)
+
+
+def _loaded(connection: sqlite3.Connection) -> FleetRecord:
+    connection.row_factory = sqlite3.Row
+    poses = {row["digest"]: row for row in connection.execute("SELECT * FROM poses")}
+    superseded = []
+    by_vehicle: dict[str, list[SessionRecord]] = {}
+    query = "SELECT * FROM sessions ORDER BY vehicle, superseded, position, session, started, digest"
+    for row in connection.execute(query):
+        outcome = read_outcome(row["outcome"])
+        stored = poses.get(outcome.digest)
+        pose = None if stored is None else pose_of(stored, outcome)
+        record = SessionRecord(outcome, row["place"], pose, row["pose_problem"])
+        if row["superseded"]:
+            superseded.append(record)
+        else:
+            by_vehicle.setdefault(outcome.vehicle, []).append(record)
+    changes = {row["after"]: row for row in connection.execute("SELECT * FROM transitions")}
+    vehicles = (_vehicle(name, by_vehicle[name], changes) for name in sorted(by_vehicle))
+    return FleetRecord(tuple(vehicles), tuple(superseded))
+
+
+def _vehicle(name: str, sessions: list[SessionRecord], changes: dict[str, sqlite3.Row]) -> VehicleRecord:
+    poses = {one.outcome.digest: one.pose for one in sessions}
+    steps = []
+    for one in sessions:
+        row = changes.get(one.outcome.digest)
+        before, after = (None, None) if row is None else (poses[row["before"]], one.pose)
+        if row is not None and before is not None and after is not None:
+            steps.append(transition_of(row, before, after))
+    return VehicleRecord(name, tuple(sessions), tuple(steps))

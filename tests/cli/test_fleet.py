@@ -1,0 +1,172 @@
+"""`cocalib fleet`: what it prints, writes and returns."""
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet
+import pytest
+
+from app.batch.results_folder import ResultsFolder
+from app.fleet.index import index_path
+from tests.unit.app.fleet.made_results import digest_of, make_fleet, make_result
+
+Cocalib = Callable[..., Any]
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("sound")
+    make_fleet(folder, 6, 2)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def moved(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("moved")
+    make_fleet(folder, 2, 2, moved={"V001": np.array([0.0, 0.0, 0.0, 0.1, 0.0, 0.0])})
+    make_result(folder, "V001", "s0", run=1)
+    return folder
+
+
+def test_a_sound_fleet_has_nothing_to_look_at(cocalib: Cocalib, sound: Path) -> None:
+    answer = cocalib("fleet", "status", sound)
+    assert answer.code == 0, answer.err
+    lines = answer.out.splitlines()
+    assert lines[0].split()[:3] == ["vehicle", "last", "session"]
+    assert [line.split()[0] for line in lines[1:7]] == [f"V00{index}" for index in range(6)]
+    assert lines[7] == "6 vehicles, nothing to look at"
+    assert lines[8].startswith("type van, 6 vehicles: mountings scatter by ")
+    assert not index_path(sound).exists()
+
+
+def test_what_needs_a_look_is_exit_code_3(cocalib: Cocalib, moved: Path) -> None:
+    answer = cocalib("fleet", "status", moved)
+    assert answer.code == 3
+    assert "1 of 2 vehicles to look at:\n  V001: this radar was remounted: " in answer.out
+    assert "REMOUNTED" in answer.out
+
+
+def test_status_as_json_has_every_figure(cocalib: Cocalib, moved: Path) -> None:
+    answer = cocalib("fleet", "status", moved, "--json")
+    assert answer.code == 3
+    found = json.loads(answer.out)
+    assert found["schema"] == "cocalib/fleet-status-1"
+    one, other = found["vehicles"]
+    assert (one["vehicle"], one["remounted"], one["needs"]) == ("V000", False, [])
+    assert (other["vehicle"], other["remounted"]) == ("V001", True)
+    assert other["last"]["verdict"] in ("good", "usable")
+    assert other["change"]["rotation_deg"] > 4
+    assert other["age_days"] > 0
+    assert found["types"][0]["sigma"] is None
+    assert "too few" in found["types"][0]["reason"]
+
+
+def test_history_has_each_transition_with_its_covariance(cocalib: Cocalib, moved: Path) -> None:
+    answer = cocalib("fleet", "history", "V001", moved, "--json")
+    assert answer.code == 0
+    found = json.loads(answer.out)
+    assert [one["session"] for one in found["sessions"]] == ["s0", "s1"]
+    assert [one["digest"] for one in found["superseded"]] == [digest_of("V001", "s0")]
+    (change,) = found["transitions"]
+    covariance = np.array(change["covariance"])
+    before, after = (np.array(one["covariance"]) for one in found["sessions"])
+    assert np.allclose(covariance, before + after, rtol=1e-12)
+    squared = np.array(change["change"]) @ np.linalg.solve(covariance, np.array(change["change"]))
+    assert squared == pytest.approx(change["squared_distance"], rel=1e-6)
+    assert change["outcome"] == "remounted"
+    assert change["picture_px"] > 0
+    text = cocalib("fleet", "history", "V001", moved)
+    assert "this radar was remounted" in text.out
+    assert f"superseded by later runs: s0 ({digest_of('V001', 's0')})" in text.out
+
+
+def test_compare_says_whether_two_differ(cocalib: Cocalib, moved: Path) -> None:
+    differing = cocalib("fleet", "compare", "V001/s0", "V001/s1", moved)
+    assert differing.code == 3
+    assert differing.out.startswith("this radar was remounted: ")
+    same = cocalib("fleet", "compare", "V000/s0", "V000/s1", moved, "--json")
+    assert same.code == 0
+    assert json.loads(same.out)["outcome"] in ("same", "cannot-tell")
+    vehicles = cocalib("fleet", "compare", "V000", "V001", moved)
+    assert "V000 and V001" in vehicles.out
+
+
+def test_the_prior_of_a_type_is_told_with_what_it_rests_on(cocalib: Cocalib, sound: Path, moved: Path) -> None:
+    text = cocalib("fleet", "prior", "van", sound)
+    assert text.code == 0, text.err
+    assert text.out.startswith("the next vehicle of type van, from 6 vehicles:")
+    found = json.loads(cocalib("fleet", "prior", "van", sound, "--json").out)
+    assert found["vehicles"] == [f"V00{index}" for index in range(6)]
+    assert np.linalg.eigvalsh(np.array(found["covariance"]))[0] > 0
+    assert all(one > 0 for one in found["sigma"].values())
+    few = cocalib("fleet", "prior", "van", moved)
+    assert few.code == 1
+    assert "too few to tell how they scatter" in few.err
+    assert cocalib("fleet", "prior", "lorry", sound).code == 2
+
+
+def test_rebuild_writes_index_and_summary(cocalib: Cocalib, moved: Path) -> None:
+    answer = cocalib("fleet", "rebuild", moved)
+    assert answer.code == 0, answer.err
+    assert index_path(moved).is_file()
+    assert "<html" in (moved / "summary.html").read_text()
+    (moved / "summary.html").unlink()
+    assert cocalib("fleet", "summary", moved).code == 0
+    assert (moved / "summary.html").is_file()
+    assert cocalib("fleet", "status", moved).code == 3
+
+
+def test_export_writes_both_tables(cocalib: Cocalib, moved: Path, tmp_path: Path) -> None:
+    answer = cocalib("fleet", "export", moved, "--parquet", tmp_path / "f.parquet", "--csv", tmp_path / "f.csv")
+    assert answer.code == 0, answer.err
+    table = pyarrow.parquet.read_table(tmp_path / "f.parquet")
+    assert table.num_rows == 5
+    assert len((tmp_path / "f.csv").read_text().splitlines()) == 6
+
+
+def test_names_cannot_act_on_the_terminal(cocalib: Cocalib, tmp_path: Path) -> None:
+    make_result(tmp_path, "V\x1b[2J", "s\u202e0", status="failed", reason="\x07")
+    for action in ("status", "history V\x1b[2J"):
+        out = cocalib("fleet", *action.split(" "), tmp_path).out
+        assert not set(out) & {"\x1b", "\u202e", "\x07"}
+
+
+def test_results_of_another_version_are_named(cocalib: Cocalib, tmp_path: Path) -> None:
+    make_fleet(tmp_path, 2, 1)
+    place = ResultsFolder(tmp_path).folder_of(digest_of("V001", "s0")) / "outcome.json"
+    place.write_text(place.read_text().replace("outcome-1", "outcome-2"))
+    answer = cocalib("fleet", "status", tmp_path)
+    assert answer.code == 3
+    assert re.search(r"note: results/\w+/outcome\.json is no cocalib/outcome-1", answer.err)
+    assert "V000" in answer.out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("status",), "fleet status takes OUT; 0 given"),
+        (("history", "OUT"), "fleet history takes VEHICLE OUT; 1 given"),
+        (("compare", "A", "OUT"), "fleet compare takes A B OUT; 2 given"),
+        (("status", "/nowhere"), "/nowhere: no such folder"),
+        (("export", "OUT"), "--parquet FILE or --csv FILE"),
+        (("export", "OUT", "--json"), "--json applies to fleet status, history, compare, prior only"),
+        (("history", "V9", "OUT"), "no vehicle 'V9' among 6"),
+        (("walk", "OUT"), "not 'walk'"),
+    ],
+)
+def test_wrong_usage_says_what_is_right(cocalib: Cocalib, sound: Path, arguments: tuple[str, ...], words: str) -> None:
+    answer = cocalib("fleet", *(str(sound) if each == "OUT" else each for each in arguments))
+    assert answer.code == 2
+    assert words in answer.err
+    assert len(answer.err.splitlines()) == 1
+
+
+def test_a_folder_without_results_is_refused(cocalib: Cocalib, tmp_path: Path) -> None:
+    for action in ("status", "rebuild", "summary"):
+        answer = cocalib("fleet", action, tmp_path)
+        assert answer.code == 2
+        assert "no results" in answer.err

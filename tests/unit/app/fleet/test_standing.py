@@ -1,0 +1,118 @@
+"""Where vehicles stand: what is planted is named, and nothing else; names on the command line mean one session."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.fleet.choosing import compare_sessions, vehicle_named
+from app.fleet.index import read_fleet
+from app.fleet.kinds import PriorOfType, kinds_of, prior_of_type
+from app.fleet.records import FleetRecord
+from app.fleet.standing import age_days, standings_of
+from calib_core.errors import InputError
+from calib_core.measurements import Unsolvable
+from tests.unit.app.fleet.made_results import DAY_NS, FIRST_NS, make_fleet, make_result, session_error
+
+_TURNED = np.array([0.0, 0.0, 0.0, 0.0, 0.12, 0.0])
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory: pytest.TempPathFactory) -> FleetRecord:
+    folder = tmp_path_factory.mktemp("fleet")
+    rng = np.random.default_rng(2)
+    make_fleet(folder, 7, 2, moved={"V002": _TURNED})
+    for day in range(2):
+        error = np.array([0.0, 0.0, 0.0, 0.2, 0.0, 0.0]) + session_error(rng)
+        make_result(folder, "odd", f"s{day}", error=error, vehicle_type="van", recorded_ns=FIRST_NS + day * DAY_NS)
+    make_result(folder, "V003", "s2", status="failed", reason="no such file", hint="check the path", vehicle_type="van")
+    make_result(folder, "V004", "s2", verdict="contradictory", error=_TURNED, recorded_ns=FIRST_NS + 2 * DAY_NS)
+    make_result(folder, "truck/1", "s/0", vehicle_type="truck")
+    return read_fleet(folder)
+
+
+def test_what_is_wrong_is_named_and_nothing_else(fleet: FleetRecord) -> None:
+    standings = {one.vehicle.name: one for one in standings_of(fleet, kinds_of(fleet))}
+    assert [name for name, one in standings.items() if one.remounted] == ["V002"]
+    assert [name for name, one in standings.items() if one.off_kind] == ["V002", "odd"]
+    assert [name for name, one in standings.items() if one.needs] == ["V002", "V003", "V004", "odd"]
+    assert standings["V002"].needs[0].startswith("this radar was remounted: ")
+    assert standings["odd"].needs[0].startswith("is off its kind: pitch -11 deg")
+    assert standings["V003"].needs == ("s2 failed: no such file; check the path",)
+    assert standings["V004"].needs == ("s2 is contradictory: see its report",)
+
+
+def test_a_pose_that_its_own_data_contradict_is_not_compared(fleet: FleetRecord) -> None:
+    vehicle = vehicle_named(fleet, "V004")
+    assert vehicle.calibrated is not None
+    assert vehicle.calibrated.name == "s2"
+    assert [one.after.session for one in vehicle.transitions] == ["s1"]
+
+
+def test_ages_count_from_the_recording(fleet: FleetRecord) -> None:
+    assert age_days(vehicle_named(fleet, "V000").last, FIRST_NS + 3 * DAY_NS) == 2.0
+    assert age_days(vehicle_named(fleet, "V003").last, FIRST_NS) is None
+
+
+def test_the_scatter_names_whom_it_does_not_rest_on_and_why(fleet: FleetRecord) -> None:
+    truck, van = kinds_of(fleet)
+    assert truck.sigma is None
+    assert "too few" in truck.reason
+    assert van.sigma is not None
+    assert all(math.isfinite(one) for one in van.sigma)
+    reasons = {(one.vehicle, one.session): one.reason for one in van.not_counted}
+    assert reasons[("V003", "s2")] == "failed: no such file"
+    assert reasons[("V004", "s2")] == "the verdict is contradictory"
+    assert reasons[("odd", "s0, s1")].startswith("off its kind: pitch ")
+    assert reasons[("V002", "s1")].startswith("off its kind: yaw ")
+    found = prior_of_type(fleet, "van")
+    assert isinstance(found, PriorOfType)
+    assert found.prior.vehicles == tuple(f"V{index:03}" for index in range(7))
+    assert found.prior.left_out == ("odd",)
+    assert isinstance(prior_of_type(fleet, "truck"), Unsolvable)
+    with pytest.raises(InputError, match="the types are truck, van"):
+        prior_of_type(fleet, "lorry")
+
+
+def test_two_sessions_of_a_vehicle_are_compared(fleet: FleetRecord) -> None:
+    compared = compare_sessions(fleet, "V002/s0", "V002/s1")
+    assert compared.outcome == "differs"
+    assert compared.words.startswith("this radar was remounted")
+    assert compare_sessions(fleet, "V001/s1", "V001/s1").change.rotation_deg == 0.0
+
+
+def test_two_vehicles_differ_without_a_remount(fleet: FleetRecord) -> None:
+    compared = compare_sessions(fleet, "V000", "odd")
+    assert compared.outcome == "differs"
+    assert compared.words.startswith("V000 and odd are mounted differently: ")
+    assert "between V000/s1 and odd/s1" in compared.words
+    assert "remounted" not in compared.words
+    assert "instead of" not in compared.words
+
+
+def test_names_with_slashes_are_found(fleet: FleetRecord) -> None:
+    assert compare_sessions(fleet, "truck/1", "truck/1/s/0").a.session == "s/0"
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "words"),
+    [
+        ("V000", "truck/1", "is of type van and truck/1 of type truck"),
+        ("V000/s7", "V001", "no session 'V000/s7'; V000 has s0, s1"),
+        ("V0O0", "V001", "did you mean V00"),
+        ("V003/s2", "V001", r"V003/s2: s2 has no pose to compare \(failed: no such file\)"),
+    ],
+)
+def test_a_wrong_name_is_refused_with_what_there_is(fleet: FleetRecord, a: str, b: str, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        compare_sessions(fleet, a, b)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_fleet_of_one_or_two_has_no_kind_to_be_off(tmp_path: Path, count: int) -> None:
+    make_fleet(tmp_path, count, 2)
+    fleet = read_fleet(tmp_path)
+    (kind,) = kinds_of(fleet)
+    assert kind.judged == {}
+    assert all(one.needs == () for one in standings_of(fleet, [kind]))
