@@ -22,11 +22,11 @@ import psutil
 from app.batch.driving import drive
 from app.batch.engines.dask_cluster import DaskCluster
 from app.batch.engines.in_process import InProcess
-from app.batch.job import Job
+from app.batch.job import Job, jobs_of
+from app.batch.manifest_files.reading import read_manifest
 from app.batch.outcome import Outcome
 from app.batch.results_folder import OUTCOME_FILE, ResultsFolder
 from app.batch.running import run_job
-from benchmarks.fleet.jobs import fleet_jobs
 from benchmarks.fleet.plan import plan_fleet
 from benchmarks.fleet.simulated_fleet import write_fleet
 
@@ -164,7 +164,9 @@ def main(arguments: list[str]) -> int:
     manifest = given.folder / "manifest.toml"
     if not manifest.exists():
         write_fleet(given.folder, plan_fleet(given.vehicles, given.sessions, given.seed), DaskCluster(given.workers))
-    measured = _everything(fleet_jobs(manifest), given.folder, given.workers, given.kills, given.seed)
+    measured = _everything(
+        jobs_of(read_manifest(manifest).rows, given.folder), given.folder, given.workers, given.kills, given.seed
+    )
     print(_table(measured))
     return int(any(_differences(measured[0], one) for one in measured[1:]))
 

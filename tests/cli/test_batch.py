@@ -29,11 +29,24 @@ def test_from_a_folder_to_a_table(fleet: Path, capsys: pytest.CaptureFixture[str
     assert run(["batch", str(manifest)]) == 12
     printed = capsys.readouterr()
     assert printed.out.splitlines()[0] == "3 sessions: 1 solved, 1 refused, 1 failed"
-    why = {line.split()[1]: line for line in printed.out.splitlines()[3:]}
+    why = {line.split()[1]: line for line in printed.out.splitlines()[3:5]}
     assert "refused" in why["not-clicked"]
     assert "failed" in why["broken"]
     assert printed.err.splitlines()[0] == "3 sessions"
-    assert (fleet / "fleet" / "results").is_dir()
+    assert (fleet / "fleet" / "summary.html").is_file()
+    assert run(["fleet", "status", str(fleet / "fleet")]) == 3
+    assert "not-clicked" in capsys.readouterr().out
+
+
+def test_parts_leave_the_index_to_one_process_afterwards(fleet: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    manifest = fleet / "fleet.toml"
+    assert run(["batch", str(manifest), "--init", str(fleet)]) == 0
+    codes = [run(["batch", str(manifest), "--shard", f"{part}/2"]) for part in (1, 2)]
+    assert sum(max(code - 10, 0) for code in codes) == 2
+    assert "cocalib fleet rebuild" in capsys.readouterr().out
+    assert not (fleet / "fleet" / "fleet.sqlite").exists()
+    assert run(["fleet", "rebuild", str(fleet / "fleet")]) == 0
+    assert (fleet / "fleet" / "fleet.sqlite").is_file()
 
 
 def test_what_is_done_is_not_done_again(fleet: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -71,12 +84,15 @@ def test_a_first_manifest_is_never_written_over_another_file(fleet: Path, capsys
     [
         (["--workers", "2", "--scheduler", "tcp://127.0.0.1:1"], "give one of them"),
         (["--engine", "none", "--workers", "2"], "leave out --workers"),
-        (["--workers", "0"], "give one worker process or more"),
+        (["--workers", "0"], "there must be at least 1"),
         (["--engine", "ray"], "--engine takes"),
+        (["--shard", "3/2"], "there is no such part"),
+        (["--shard", "half"], "such as 3/16"),
     ],
 )
 def test_flags_that_contradict_each_other_are_refused(
     flags: list[str], fault: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    (tmp_path / "fleet.toml").write_text('[[session]]\nvehicle = "a"\nrecording = "absent.bag"\n', encoding="utf-8")
     assert run(["batch", str(tmp_path / "fleet.toml"), *flags]) == 2
     assert fault in capsys.readouterr().err

@@ -54,6 +54,7 @@ def failed_outcome(job: Job, results: Path, *, reason: str, hint: str = "") -> O
         "failed",
         reason=reason,
         hint=hint,
+        is_final=False,
         vehicle_type=row.vehicle_type,
         radar_serial=row.radar_serial,
         camera_serial=row.camera_serial,

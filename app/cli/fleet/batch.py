@@ -1,5 +1,7 @@
 """`cocalib batch`: calibrate the sessions of a manifest."""
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -11,8 +13,9 @@ from app.cli.output import progress_bar, write_whole
 from calib_core.errors import InputError
 
 if TYPE_CHECKING:
-    from app.batch.engines.engine import Engine
+    from app.batch.driving import BatchProgress
     from app.batch.manifest import Manifest
+    from app.batch.results_folder import ResultsFolder
 
 __all__ = ["Batch"]
 
@@ -47,7 +50,6 @@ class Batch:
             return self._write_first(self.manifest, self.init)
         from app.batch.manifest_files.reading import read_manifest
 
-        self._require_one_engine()
         return self._calibrate(read_manifest(self.manifest))
 
     def _write_first(self, manifest: Path, folder: Path) -> int:
@@ -65,43 +67,67 @@ class Batch:
         )
         return 0
 
-    def _require_one_engine(self) -> None:
-        """Refuse flags that contradict each other.
-
-        Raises:
-            InputError: names both.
-        """
-        if self.workers is not None and self.scheduler is not None:
-            raise InputError(
-                "--workers starts a cluster on this machine, --scheduler uses another one; give one of them"
-            )
-        if self.engine == "none" and (self.workers is not None or self.scheduler is not None):
-            raise InputError("--engine none runs in this process; leave out --workers and --scheduler")
-        if self.workers is not None and self.workers < 1:
-            raise InputError(f"--workers {self.workers}: give one worker process or more")
-
     def _calibrate(self, manifest: "Manifest") -> int:
-        from app.batch.driving import drive
+        from app.batch.driving import chosen_engine, drive, shard_of
         from app.batch.job import jobs_of
         from app.batch.results_folder import ResultsFolder
         from app.cli.fleet.batch_text import batch_lines, exit_code, shown_batch
 
+        shard = None if self.shard is None else _shard(self.shard)
         results = ResultsFolder(self.out or manifest.source.with_suffix(""))
         try:
             results.remove_leftovers()
             with progress_bar("reading recordings") as progress_bytes:
                 jobs = jobs_of(manifest.rows, results.path, progress_bytes)
+            jobs = jobs if shard is None else shard_of(jobs, *shard)
+            engine = chosen_engine(
+                len(jobs),
+                engine=None if self.engine == "auto" else self.engine,
+                workers=self.workers,
+                scheduler=self.scheduler,
+            )
+            with shown_batch(len(jobs)) as show, self._indexed(results, manifest) as add:
+
+                def tell(now: "BatchProgress") -> None:
+                    show(now)
+                    add(now)
+
+                outcomes = drive(jobs, engine, results, tell)
         except OSError as error:
             raise InputError(f"{results.path}: cannot be written: {(error.strerror or str(error)).lower()}") from error
-        with shown_batch(len(jobs)) as progress:
-            outcomes = drive(jobs, self._engine(len(jobs)), results, progress)
-        print("\n".join(batch_lines(outcomes)))
+        print("\n".join([*batch_lines(outcomes), *self._next_lines(results.path)]))
         return exit_code(outcomes)
 
-    def _engine(self, count: int) -> "Engine":
-        from app.batch.engines.dask_cluster import DaskCluster
-        from app.batch.engines.in_process import InProcess
+    @contextmanager
+    def _indexed(self, results: "ResultsFolder", manifest: "Manifest") -> "Iterator[Callable[[BatchProgress], None]]":
+        """Keep index and summary page meanwhile; parts of a batch leave them to one process afterwards."""
+        from app.fleet.batch_index import indexed_batch
 
-        if self.workers is not None or self.scheduler is not None or self.engine == "dask":
-            return DaskCluster(self.workers, self.scheduler)
-        return InProcess()
+        if self.shard is not None:
+            yield lambda _: None
+            return
+        with indexed_batch(results.path, manifest.rows) as add:
+            yield add
+
+    def _next_lines(self, results: Path) -> list[str]:
+        """Say where the results are, and what comes next."""
+        from app.fleet.summary_page import SUMMARY_FILE
+
+        if self.shard is not None:
+            return ["", f"results: {results}; once all parts are done: cocalib fleet rebuild {results}"]
+        return [
+            "",
+            f"results: {results}; summary: {results / SUMMARY_FILE}; who needs a look: cocalib fleet status {results}",
+        ]
+
+
+def _shard(text: str) -> tuple[int, int]:
+    """Return number and count of `K/N`.
+
+    Raises:
+        InputError: it is something else.
+    """
+    k, slash, n = text.partition("/")
+    if not (slash and k.isdecimal() and n.isdecimal()):
+        raise InputError(f"--shard {text}: write the number of the part and how many there are, such as 3/16")
+    return int(k), int(n)

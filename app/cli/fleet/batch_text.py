@@ -55,16 +55,25 @@ def shown_batch(count: int) -> "Iterator[Callable[[BatchProgress], None]]":
         count: of sessions.
     """
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
     console = Console(file=terminal_stream(sys.stderr))
     if not console.is_terminal:
         yield _tell
         return
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[left]}"))
     with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task("sessions", total=count)
-        yield lambda now: bar.update(task, completed=now.done)
+        task = bar.add_task("sessions", total=count, left="")
+        yield lambda now: bar.update(task, completed=now.done, left=_left_words(now.left_s))
+
+
+def _left_words(left_s: float | None) -> str:
+    """Say how long the rest takes; "" while that is unknown, and at the end."""
+    if not left_s:
+        return ""
+    minutes, seconds = divmod(round(left_s), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes} min left" if hours else f"{minutes} min left" if minutes else f"{seconds} s left"
 
 
 def _tell(now: "BatchProgress") -> None:
@@ -72,4 +81,5 @@ def _tell(now: "BatchProgress") -> None:
         words = f"{now.done} of {now.count} sessions are done already" if now.done else f"{now.count} sessions"
     else:
         words = f"{now.done} of {now.count}: {now.latest.vehicle} / {now.latest.session}: {now.latest.status}"
+        words += f" ({left})" if (left := _left_words(now.left_s)) else ""
     print(words, file=sys.stderr, flush=True)
