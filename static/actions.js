@@ -21,7 +21,7 @@ import { goLive } from "./live.js";
 import { magnify, stretchContrast } from "./loupe.js";
 import { nextWorst } from "./pairs.js";
 import { togglePalette } from "./palette.js";
-import { acceptProposal, nextPlace, nextProposal, openProposals, previousProposal, rejectProposal, shownOffer, takesEnter, takesX, toggleProposals } from "./proposals.js";
+import { acceptProposal, nextPlace, nextProposal, openProposals, previousProposal, rejectProposal, shownOffer, takesEnter, toggleProposals } from "./proposals.js";
 import { chooseRecording } from "./opening.js";
 import { fit, zoomBy } from "./picture.js";
 import { goTo, pause, play, step } from "./player.js";
@@ -112,7 +112,7 @@ export const ACTIONS = [
   { id: "proposals", group: "Proposal on screen", words: "Propose where the reflector stood, or do not", keys: ["O"], also: "automatic find suggest off on switch", run: toggleProposals, when: withPictures },
 
   { id: "worst", group: "Pairs", words: "Next worst pair", keys: ["J"], also: "outlier residual largest wrong bad", run: nextWorst, when: withResiduals },
-  { id: "exclude", group: "Pairs", words: "Exclude the pair, or include it again; without a mark, dismiss the placement", keys: ["X"], also: "leave out use ignore disable spurious", run: () => (takesX() ? rejectProposal() : clickIn(state.cursor) ? toggleExcluded() : dismissHere()), when: () => withPictures() || (takesX() ? "" : clickIn(state.cursor) ? withSelected() : withoutPlacement()) },
+  { id: "exclude", group: "Pairs", words: "Exclude the pair, or include it again; without a mark, dismiss the placement", keys: ["X"], also: "leave out use ignore disable spurious", run: () => (shownOffer() ? rejectProposal() : clickIn(state.cursor) ? toggleExcluded() : dismissHere()), when: () => withPictures() || (shownOffer() ? "" : clickIn(state.cursor) ? withSelected() : withoutPlacement()) },
 
   { id: "evaluate", group: "Boxes", words: "Draw boxes and judge the calibration by them, or go back to the clicks", keys: ["A"], also: "tab evaluate annotate acc accuracy bounding people cars moving", run: toggleEvaluate, when: withPictures },
   { id: "next-box", group: "Boxes", words: "Select the next box in this frame", keys: ["Q"], also: "object cycle", run: nextBox, when: withBoxes },

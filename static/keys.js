@@ -5,7 +5,6 @@ import { ACTIONS, act } from "./actions.js";
 import { comeTo } from "./arriving.js";
 import { flushNudge } from "./clicking.js";
 import { crossTakes } from "./cross.js";
-import { shownOffer } from "./proposals.js";
 import { clicksOf, isDismissed, isOffered, placementAt, state } from "./state.js";
 
 /** Keys that stay with the page even where a field has the focus. */
@@ -18,13 +17,6 @@ export function listen(owner) {
   owner.addEventListener("keydown", pressed, { capture: true });
 }
 
-/** A key held down does these once: it sets one mark, rejects one proposal. */
-const ONCE = ["place-mark", "exclude"];
-/** What the pointer pressed last: it has the focus without having been chosen by Tab. @type {Element|null} */
-let touched = null;
-addEventListener("pointerdown", (event) => (touched = event.target instanceof Element ? event.target.closest("button, label, summary") : null), { capture: true });
-addEventListener("keydown", (event) => event.key === "Tab" && (touched = null), { capture: true });
-
 /** @param {KeyboardEvent} event */
 function pressed(event) {
   const inside = event.view !== null && event.view !== window;
@@ -36,7 +28,7 @@ function pressed(event) {
   if (!action && !(inside && event.key.startsWith("Arrow"))) return;
   event.preventDefault();
   event.stopImmediatePropagation();
-  if (action && !(event.repeat && ONCE.includes(action.id))) act(action);
+  if (action && !(event.repeat && action.id === "place-mark")) act(action); // a key held down sets one mark
 }
 
 /** Whether the key belongs to a field, a button, a row or a dialog. @param {KeyboardEvent} event */
@@ -47,7 +39,6 @@ function typing(event) {
   if (ANYWHERE.includes(combination(event))) return false;
   if (target.matches("input:not([type=checkbox]), select, textarea")) return true;
   const presses = event.key === " " || event.key === "Enter";
-  if (event.key === "Enter" && target === touched && shownOffer()) return false; // a button that was clicked leaves Enter to the proposal
   if (target.matches(".plot")) return presses || event.key.startsWith("Arrow") || event.key === "Escape";
   if (target.matches("button, a, summary, label, input") && presses) return !target.matches("#play");
   if (target.dataset.roves?.split(" ").includes(event.key)) return !event.altKey;

@@ -35,7 +35,7 @@ import { startPalette } from "./palette.js";
 import { startPicture } from "./picture.js";
 import { startPictureChanges } from "./picture_changes.js";
 import { frameFailed, goTo, receiveFrame, requestAgain, tellCursor } from "./player.js";
-import { isUnseen, shownOffer, startProposals, takeProposals } from "./proposals.js";
+import { justMoved, shownOffer, startProposals, takeProposals } from "./proposals.js";
 import { startRectified } from "./rectified.js";
 import { plots, startReview, takePair, takeReview } from "./review.js";
 import { startRoving } from "./roving.js";
@@ -208,5 +208,5 @@ startSpace();
 
 /** Exposed for the browser tests. */
 Object.assign(window, {
-  __cocalib: { state, viewport, zoom, toCss, toImage, onImage, clicks, clickIn, clicksIn, goTo, unconfirmed, follower, plots, boxing, shownOffer, isUnseen, stampOf },
+  __cocalib: { state, viewport, zoom, toCss, toImage, onImage, clicks, clickIn, clicksIn, goTo, unconfirmed, follower, plots, boxing, shownOffer, justMoved, stampOf },
 });

@@ -22,7 +22,7 @@ const WIDTHS = 9;
 const PART = 0.1;
 /** Room below a proposal for the line on the frame, so that it does not cover the reflector [CSS px]. */
 const BELOW = 120;
-/** Nothing is decided so soon after a proposal, or a better place for it, came on screen [ms]: nobody has seen it yet. */
+/** Nothing is accepted so soon after a better place was found for what is on screen [ms]: nobody has seen it yet. */
 const UNSEEN = 300;
 /** A place that moved by less is the same [px]. */
 const SAME_PX = 1;
@@ -43,8 +43,7 @@ const taken = new Map();
 let current = null;
 /** The frame to zoom into once it is shown. @type {Row|null} */
 let awaited = null;
-/** When what is on screen came there, and what to say to a key that comes too soon. */
-let unseen = { since: -Infinity, words: "" };
+let moved = -Infinity;
 /** Whether the last proposal was decided just now: Enter then means nothing else until another key is pressed, or the pointer. */
 let over = false;
 /** The switch; made at the start. @type {HTMLButtonElement} */
@@ -80,7 +79,7 @@ export function takeProposals(message) {
   state.proposals = message;
   const after = shownOffer();
   if (before && after && before.row.placement === after.row.placement && !samePlace(before.place, after.place)) {
-    unseen = { since: performance.now(), words: "A better place was just found: look again." };
+    moved = performance.now();
     if (before.row.placement === current) zoomInto(after);
   }
   emit("proposals");
@@ -129,10 +128,7 @@ export function nextProposal() {
   const open = openProposals();
   if (open.every(({ placement }) => skipped.has(placement))) skipped.clear();
   const next = open.find(({ placement }) => placement !== here && !skipped.has(placement)) ?? open[0];
-  if (!next) {
-    if (state.proposals?.on && state.proposals.problem) toast(progressWords());
-    return false;
-  }
+  if (!next) return false;
   if (here !== undefined && next.placement !== here) visited.push(here);
   show(next);
   return true;
@@ -166,7 +162,6 @@ function arrive() {
   if (!awaited || state.shown?.index !== awaited.frame) return;
   const offer = shownOffer();
   awaited = null;
-  unseen = { since: performance.now(), words: "Just shown: look, then press again." };
   if (offer) zoomInto(offer);
 }
 
@@ -186,50 +181,24 @@ function zoomInto({ row, place }) {
   emit("box");
 }
 
-/** Whether what is on screen came there a moment ago. */
-export const isUnseen = () => performance.now() - unseen.since < UNSEEN;
+/** Whether a better place was found a moment ago for what is on screen. */
+export const justMoved = () => performance.now() - moved < UNSEEN;
 
-/** Whether a proposal is on its way to the screen. */
-const isComing = () => awaited !== null && state.cursor === awaited.frame;
-
-/** Whether proposals are being looked for, and there is none yet. */
-const isSearching = () => state.proposals?.on === true && state.proposals.stage === "looking" && !openProposals().length;
-
-/** Whether Enter is about proposals: one is on screen or comes, the first one is looked for, or the last one was decided just now. */
-export const takesEnter = () => shownOffer() !== null || isComing() || isSearching() || (over && !openProposals().length);
-
-/** Whether X is about proposals: one is on screen or comes. */
-export const takesX = () => shownOffer() !== null || isComing();
-
-/** The proposal on screen, if it can be decided now; else why not is said. @returns {Offer|null} */
-function decidable() {
-  const offer = shownOffer();
-  if (!offer) return null;
-  if (!isUnseen() && state.shown?.index === offer.row.frame && inView(offer.place)) return offer;
-  toast(isUnseen() ? unseen.words : "Back to the proposal: look, then press again.");
-  if (!isUnseen()) show(offer.row);
-  return null;
-}
-
-/** @param {Place} place */
-function inView({ u_px, v_px }) {
-  const [x, y] = toCss(u_px, v_px);
-  return x >= 0 && y >= 0 && x <= viewport.width && y <= viewport.height;
-}
+/** Whether Enter is about proposals: one is on screen, or the last one was decided just now. */
+export const takesEnter = () => shownOffer() !== null || (over && !openProposals().length);
 
 /** Enter: what the picture shows becomes a mark, and the next proposal is shown. */
 export async function acceptProposal() {
-  if (isSearching()) return toast(progressWords());
-  if (!shownOffer()) return void (over && !isComing() && sayOver());
-  const offer = decidable();
-  if (!offer) return;
+  const offer = shownOffer();
+  if (!offer) return void (over && sayOver());
+  if (justMoved()) return toast("A better place was just found: look again.");
   const { u_px, v_px, sigma_px } = offer.place;
   await decide(offer.row, { type: "click_placed", image_time: offer.row.image_time, pixel_px: [u_px, v_px], mark: "snapped", sigma_px });
 }
 
 /** X: it is not the reflector. */
 export async function rejectProposal() {
-  const offer = decidable();
+  const offer = shownOffer();
   if (!offer) return;
   await decide(offer.row, dismiss(state.placements[offer.row.placement]));
 }
@@ -290,8 +259,7 @@ export function proposalWords() {
   const several = row.places.length > 1;
   const sure = number ? `place ${number + 1} of ${row.places.length}` : surely(row.confidence);
   const why = row.reason && !number ? `: ${row.reason}` : "";
-  const soFar = state.proposals?.stage === "looking" ? " so far" : "";
-  const head = `Proposal ${at} of ${total}${soFar}, ${state.placements[row.placement].range_m.toFixed(1)} m away, ${sure}${why}.\n`;
+  const head = `Proposal ${at} of ${total}, ${state.placements[row.placement].range_m.toFixed(1)} m away, ${sure}${why}.\n`;
   return [head, { key: "Enter", action: "accept-proposal" }, " accepts it, ", ...(several ? [{ key: "C", action: "next-place" }, ` other place${row.places.length > 2 ? "s" : ""}, `] : []), { key: "X", action: "reject-proposal" }, " no reflector, ", { key: "N", action: "next-proposal" }, " next; or click the inner corner"];
 }
 

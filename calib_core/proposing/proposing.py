@@ -12,7 +12,7 @@ from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
 from calib_core.proposing.agreement.apex_evidence import apex_log_odds
 from calib_core.proposing.agreement.candidate_rays import CandidateRays, candidate_rays, weaker_db
-from calib_core.proposing.agreement.mounting_prior import mounting_prior
+from calib_core.proposing.agreement.mounting_prior import MOST_TURNED_RAD, mounting_prior
 from calib_core.proposing.agreement.pose_agreement import PoseAgreement, pose_agreement
 from calib_core.proposing.dwell_views import DwellView
 from calib_core.proposing.proposals import Proposal, Proposals
@@ -36,18 +36,15 @@ _FAR_SIGMA = 3.5
 _WEAK_ECHO_DB = 6.0
 _SAME_PLACE = 3.0
 """Standard deviations between two candidates that are one place."""
-_ON_THE_REFLECTOR = 0.5
-"""A click within so many widths of a proposal marks the same reflector."""
 _VAGUE_PX = 3.0
 _VAGUE = "its apex is not seen clearly"
 _NO_FRAME = "the camera recorded no frame while it stood there"
 _NO_CHANGE = "nothing of the reflector's size changed in the picture"
-_NO_POSE = "pictures and radar agree on no pose yet"
+_NO_POSE = f"picture and radar agree on no mounting within {np.degrees(MOST_TURNED_RAD):.0f} deg of the nominal one"
 _NO_APEX = "what stood there shows no reflector's apex; if it is one, click it once"
 _ELSEWHERE = "no place that changed lies where the other placements say"
 _TWO_PLACES = "two places there are about as likely"
 _TAKEN = "the only likely place is another reflector's"
-_MARKED = "the reflector is marked there already, at another placement of the same time"
 _FEW = "too few placements to compare with each other"
 _TWO_POSES = "the placements nearly agree on another mounting, too"
 _UNLIKELY = "what changed there does not look like the reflector"
@@ -83,8 +80,6 @@ def proposals_of(
         proposal = judged.proposal(i)
         if proposal is None:
             unproposed.append((view.placement, judged.reason(i)))
-        elif _is_marked(proposal, view.width_px, clicks):
-            unproposed.append((view.placement, _MARKED))
         else:
             ranked.append(proposal)
     ranked.sort(key=lambda one: (-one.confidence, one.placement.start))
@@ -97,16 +92,6 @@ def proposals_of(
         agreement.agreeing(rays),
         agreement.agreeing_with_rival(rays),
         agreement.trials,
-    )
-
-
-def _is_marked(proposal: Proposal, width_px: float, clicks: Sequence[ReflectorClick]) -> bool:
-    """Return whether a click of the same time lies on what is proposed: an echo of the clicked reflector stood there."""
-    start, end = proposal.placement.start, proposal.placement.end
-    return any(
-        start <= click.image_time <= end
-        and float(np.hypot(*(proposal.pixel_px - (click.u_px, click.v_px)))) <= _ON_THE_REFLECTOR * width_px
-        for click in clicks
     )
 
 

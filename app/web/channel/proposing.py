@@ -173,11 +173,8 @@ class ProposingDesk:
             for one in now.proposals.ranked
             if id(one.placement) in number
         )
-        so_far = f"only {now.done} of {now.count} placements are looked at yet" if stage == "looking" else ""
         without = tuple(
-            UnproposedRow(number[id(one)], so_far or reason)
-            for one, reason in now.proposals.unproposed
-            if id(one) in number
+            UnproposedRow(number[id(one)], reason) for one, reason in now.proposals.unproposed if id(one) in number
         )
         return ProposalNews(True, stage, now.done, now.count, sentence(problem), sentence(hint), rows, without)
 
