@@ -21,6 +21,7 @@ import { goLive } from "./live.js";
 import { magnify, stretchContrast } from "./loupe.js";
 import { nextWorst } from "./pairs.js";
 import { togglePalette } from "./palette.js";
+import { sayNone } from "./proposal_words.js";
 import { acceptProposal, nextPlace, nextProposal, openProposals, previousProposal, rejectProposal, shownOffer, takesEnter, toggleProposals } from "./proposals.js";
 import { chooseRecording } from "./opening.js";
 import { fit, zoomBy } from "./picture.js";
@@ -84,7 +85,7 @@ export const ACTIONS = [
   { id: "ten-forward", group: "Time", words: "Ten frames forward", keys: ["Shift+ArrowRight"], also: "next jump skip", run: () => step(10), ...TENS },
   { id: "first-frame", group: "Time", words: "Go to the first frame", keys: ["Home"], also: "start beginning", run: () => goTo(0), ...ENDS },
   { id: "last-frame", group: "Time", words: "Go to the last frame", keys: ["End"], also: "finish newest", run: () => goTo(state.seconds.length - 1), ...ENDS },
-  { id: "next-placement", group: "Time", words: "Next placement", keys: ["N"], also: "reflector position forward proposal", run: () => nextProposal() || placement(1), ...PLACES },
+  { id: "next-placement", group: "Time", words: "Next placement", keys: ["N"], also: "reflector position forward proposal", run: () => nextProposal() || (sayNone(), placement(1)), ...PLACES },
   { id: "previous-placement", group: "Time", words: "Previous placement", keys: ["P"], also: "reflector position back", run: () => previousProposal() || placement(-1), ...PLACES },
   { id: "live", group: "Time", words: "Show the newest frame as it comes", also: "live follow recording now", run: goLive, when: following },
 
