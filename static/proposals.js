@@ -209,13 +209,19 @@ export function heldBack() {
 /** Whether Enter would open the keyboard's cross where a proposal may come yet. */
 const isTooEarly = () => isSearching() && !state.playing && state.shown !== null && !clickIn(state.shown.index);
 
+/** Whether N, or a decision, leads to a proposal whose frame is not on screen yet. */
+const isComing = () => awaited !== null && state.cursor === awaited.frame && state.shown?.index !== awaited.frame;
+
+/** Whether X and C are about proposals: one is on screen, or about to be. */
+export const takesKeys = () => shownOffer() !== null || isComing();
+
 /** Whether Enter is about proposals: one is on screen, may come yet or was decided without the server, or the last one was decided just now. */
-export const takesEnter = () => shownOffer() !== null || heldBack() !== "" || isTooEarly() || (over && !openProposals().length);
+export const takesEnter = () => takesKeys() || heldBack() !== "" || isTooEarly() || (over && !openProposals().length);
 
 /** The proposal on screen, once somebody can have seen it. @returns {Offer|null} */
 function seenOffer() {
   const offer = shownOffer();
-  if (!offer || !justMoved()) return offer;
+  if (!isComing() && (!offer || !justMoved())) return offer;
   say("Just shown: press again", 1000);
   return null;
 }
@@ -228,7 +234,7 @@ function isInView({ row, place }) {
 
 /** Enter: what the picture shows becomes a mark, and the next proposal is shown. */
 export async function acceptProposal() {
-  if (!shownOffer()) return void (over ? sayOver() : heldBack() || say(searchWords()));
+  if (!takesKeys()) return void (over ? sayOver() : heldBack() || say(searchWords()));
   const offer = seenOffer();
   if (!offer) return;
   if (!isInView(offer)) {

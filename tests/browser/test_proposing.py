@@ -228,3 +228,90 @@ def test_a_proposal_is_rejected_corrected_and_undone_and_all_of_them_are_switche
     page.press("Enter")
     page.until("__cocalib.state.cross")
     assert page.view["clicks"] == []
+
+
+def test_only_what_is_seen_is_decided_and_the_line_says_how_far_the_search_is(
+    pictures: Pictures, proposing: RunningServer, open_page: Callable[..., Driver]
+) -> None:
+    page = open_page(proposing.url)
+    user = page.page
+    page.until("__cocalib.state.proposals?.rows.length >= 5")
+    page.press("Enter")
+    assert "Proposals are being looked for: 8 of 20" in page.text("#guide")
+    assert page.value("__cocalib.state.cross") is None
+    assert "N goes to the first of" in page.text("#verdict").replace("\n", " ")
+    page.go_to(page.value("__cocalib.state.placements[15].frame"))
+    page.until("document.getElementById('guide').textContent.includes('pictures of 8 of 20 placements looked at')")
+    assert "apex" not in page.text("#guide")
+
+    page.press("n")
+    assert " so far, " in guide(page)
+    page.value("dispatchEvent(new KeyboardEvent('keydown', {key: 'x', bubbles: true}))")
+    page.value("dispatchEvent(new KeyboardEvent('keydown', {key: 'x', bubbles: true}))")  # unseen
+    page.until("document.getElementById('guide').textContent.startsWith('Just shown: press again.')")
+    page.settle()
+    assert len(page.view["dismissed"]) == 1
+    guide(page)
+    user.keyboard.down("x")
+    page.until("__cocalib.state.view.dismissed.length === 2")
+    guide(page)
+    user.keyboard.down("x")  # held
+    user.keyboard.up("x")
+    page.settle()
+    assert len(page.view["dismissed"]) == 2
+
+    guide(page)
+    frame = page.value("__cocalib.shownOffer().row.frame")
+    page.press("ArrowRight")
+    page.until(f"__cocalib.state.shown.index === {frame + 1}")
+    page.press("Enter")
+    page.until(f"__cocalib.state.shown.index === {frame}")
+    assert guide(page).startswith("Back at the proposal: look, then press Enter again.")
+    width, height = page.value("[__cocalib.viewport.width, __cocalib.viewport.height]")
+    left, top = page.value("(({left, top}) => [left, top])(document.getElementById('marks').getBoundingClientRect())")
+    user.mouse.move(left + 20, top + height / 2)
+    user.mouse.down()
+    user.mouse.move(left + width - 10, top + height / 2, steps=3)
+    user.mouse.up()
+    page.press("Enter")
+    assert page.view["clicks"] == []
+    guide(page)
+
+    user.locator("#layers .chip").first.click()
+    page.press("Enter")
+    assert len(page.view["clicks"]) == 1
+    guide(page)
+    user.keyboard.press("Tab")
+    before = page.value("document.activeElement.getAttribute('aria-pressed')")
+    page.press("Enter")
+    assert page.value("document.activeElement.getAttribute('aria-pressed')") != before
+    assert len(page.view["clicks"]) == 1
+
+
+def test_what_is_accepted_while_the_server_is_gone_is_drawn_and_sent_when_it_is_back(
+    pictures: Pictures,
+    proposing: RunningServer,
+    workspace: Workspace,
+    sample: Recording,
+    open_page: Callable[..., Driver],
+) -> None:
+    pictures.allowed.set()
+    page = open_page(proposing.url)
+    page.until(READY)
+    page.press("n")
+    guide(page)
+    frame = page.value("__cocalib.state.cursor")
+    port = int(page.page.url.split(":")[2].split("/")[0])
+    proposing.close()
+    page.until("!__cocalib.state.connected")
+    page.page.keyboard.press("Enter")
+    page.drawn()
+    assert page.text("#guide") == "Accepted; sent when the server is back"
+    assert page.value(f"__cocalib.clicksIn({frame}).map((click) => click.state)") == ["pending"]
+    again = start(workspace, sample, ServerOptions(port=port, token="test", proposes=True))
+    try:
+        page.until("__cocalib.unconfirmed() === 0 && __cocalib.state.view.clicks.length === 1")
+        assert len(workspace.session.clicks) == 1
+    finally:
+        again.close()
+    page.forget_lost_connections()
