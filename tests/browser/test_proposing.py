@@ -3,13 +3,14 @@
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from app.web.port.server import RunningServer, ServerOptions, start
-from app.workspace import Workspace
+from app.workspace import Workspace, open_workspace
 from calib_core.association.placements import Placement
 from calib_core.camera import Camera
 from calib_core.measurements import NS_PER_S, TimeNs
@@ -315,3 +316,20 @@ def test_what_is_accepted_while_the_server_is_gone_is_drawn_and_sent_when_it_is_
     finally:
         again.close()
     page.forget_lost_connections()
+
+
+def test_without_intrinsics_the_line_says_why_nothing_is_proposed(
+    sample: Recording, tmp_path: Path, open_page: Callable[..., Driver]
+) -> None:
+    opened = open_workspace(sample, camera=None, session_folder=tmp_path / "session", name="sample")
+    running = start(opened, sample, ServerOptions(port=0, token="test", proposes=True))
+    try:
+        page = open_page(running.url)
+        page.until("__cocalib.state.proposals?.problem")
+        page.press("n")
+        page.until("document.getElementById('guide').textContent.includes('No proposals: ')")
+        page.until("__cocalib.state.shown.index === __cocalib.state.cursor")
+        assert "intrinsics" in page.text("#guide")
+    finally:
+        running.close()
+        opened.close()
