@@ -33,7 +33,7 @@ const made = new Map();
 let drawn = "";
 
 export function startPairs() {
-  on(["opening", "view", "selected", "recording", "placements", "candidates"], draw);
+  on(["opening", "view", "selected", "recording", "placements", "candidates", "proposals"], draw);
   page.addEventListener("click", pressed);
 }
 

@@ -26,9 +26,7 @@ HELD_FROM = 8
 UNCERTAIN = 4.0
 """Standard deviation of a place whose apex is not seen [px]."""
 READY = "__cocalib.state.proposals?.stage === 'ready'"
-ON_SCREEN = (
-    "__cocalib.shownOffer() && __cocalib.state.shown.index === __cocalib.state.cursor && !__cocalib.justMoved()"
-)
+ON_SCREEN = "__cocalib.shownOffer() && __cocalib.state.shown.index === __cocalib.state.cursor && !__cocalib.justMoved()"
 
 
 class Pictures:
