@@ -234,7 +234,7 @@ def test_only_what_is_seen_is_decided_and_the_line_says_how_far_the_search_is(
 ) -> None:
     page = open_page(proposing.url)
     user = page.page
-    page.until("__cocalib.state.proposals?.rows.length >= 5")
+    page.until("__cocalib.state.proposals?.rows.length >= 5 && __cocalib.state.proposals.done === 8")
     page.press("Enter")
     assert "Proposals are being looked for: 8 of 20" in page.text("#guide")
     assert page.value("__cocalib.state.cross") is None
