@@ -13,7 +13,7 @@ import { marks, redraw, zoomBy } from "./picture.js";
 import { send } from "./socket.js";
 import { clickIn, clicks, clicksIn, emit, on, select, selectedClick, stampOf, state } from "./state.js";
 import { pause } from "./player.js";
-import { shownOffer } from "./proposals.js";
+import { correctProposal, shownOffer } from "./proposals.js";
 import { dragRuler, dropRuler, pressRuler, refusesMarks } from "./rectified.js";
 import { toast } from "./notices.js";
 
@@ -168,16 +168,18 @@ export async function place(u, v, { mark = "clicked", sigma_px = null } = {}) {
   const image_time = stampOf(index);
   const known = new Set(clicksIn(index).map((click) => click.id));
   const key = `new-${nextDraft++}`;
-  const corrects = mark === "clicked" && shownOffer() !== null;
+  const offer = mark === "clicked" ? shownOffer() : null;
   draft(key, { u, v, image_time, mark });
   awaited = { index, known };
-  const { found } = corrects ? await askApex({ image_time, pixel_px: [u, v], over_dwell: true }) : { found: null };
+  const { found } = offer ? await askApex({ image_time, pixel_px: [u, v], over_dwell: true }) : { found: null };
   if (found?.pixel_px) {
     [u, v] = found.pixel_px;
     [mark, sigma_px] = ["snapped", found.sigma_px];
     draft(key, { u, v, image_time, mark });
   }
-  await settle(key, { type: "click_placed", image_time, pixel_px: [u, v], mark, sigma_px });
+  const sending = settle(key, { type: "click_placed", image_time, pixel_px: [u, v], mark, sigma_px });
+  if (offer && state.cursor === index) correctProposal(offer.row, sending);
+  await sending;
   selectAwaited();
 }
 
@@ -221,13 +223,14 @@ function draft(key, mark) {
   emit("view");
 }
 
-/** Send the change, then show what the server has. @param {string} key @param {Record<string, any>} message */
+/** Send the change, then show what the server has. @param {string} key @param {Record<string, any>} message @returns {Promise<string|null>} why it was refused */
 async function settle(key, message) {
   const mine = state.local.get(key);
   const refusal = await send(message);
   if (state.local.get(key) === mine) state.local.delete(key);
   if (refusal) toast(refusal, "The mark was moved back.");
   emit("view");
+  return refusal;
 }
 
 /** Move the click of this frame a little. @param {number} du @param {number} dv image px @returns {boolean} */

@@ -5,16 +5,24 @@ import { ACTIONS, act } from "./actions.js";
 import { comeTo } from "./arriving.js";
 import { flushNudge } from "./clicking.js";
 import { crossTakes } from "./cross.js";
+import { shownOffer } from "./proposals.js";
 import { clicksOf, isDismissed, isOffered, placementAt, state } from "./state.js";
 
 /** Keys that stay with the page even where a field has the focus. */
 const ANYWHERE = ["Ctrl+K"];
+/** What a key that is held down does once. */
+const ONCE = ["place-mark", "exclude", "next-candidate"];
+/** Whether the pointer is down, and what it gave the focus to. @type {{isDown: boolean, target: EventTarget|null}} */
+const pointed = { isDown: false, target: null };
 /** The action of each combination of keys; made once all modules are loaded. @type {Map<string, import("./actions.js").Action>|null} */
 let bound = null;
 
 /** Listen in a window, in the capture phase so as to run before viser's own handlers. @param {Window} owner */
 export function listen(owner) {
   owner.addEventListener("keydown", pressed, { capture: true });
+  owner.addEventListener("pointerdown", () => (pointed.isDown = true), { capture: true });
+  for (const end of ["pointerup", "pointercancel"]) owner.addEventListener(end, () => (pointed.isDown = false), { capture: true });
+  owner.addEventListener("focusin", (event) => (pointed.target = pointed.isDown ? event.target : null), { capture: true });
 }
 
 /** @param {KeyboardEvent} event */
@@ -28,7 +36,7 @@ function pressed(event) {
   if (!action && !(inside && event.key.startsWith("Arrow"))) return;
   event.preventDefault();
   event.stopImmediatePropagation();
-  if (action && !(event.repeat && action.id === "place-mark")) act(action); // a key held down sets one mark
+  if (action && !(event.repeat && ONCE.includes(action.id))) act(action); // a key held down sets one mark
 }
 
 /** Whether the key belongs to a field, a button, a row or a dialog. @param {KeyboardEvent} event */
@@ -40,7 +48,7 @@ function typing(event) {
   if (target.matches("input:not([type=checkbox]), select, textarea")) return true;
   const presses = event.key === " " || event.key === "Enter";
   if (target.matches(".plot")) return presses || event.key.startsWith("Arrow") || event.key === "Escape";
-  if (target.matches("button, a, summary, label, input") && presses) return !target.matches("#play");
+  if (target.matches("button, a, summary, label, input") && presses) return !target.matches("#play") && !(event.key === "Enter" && target === pointed.target && shownOffer());
   if (target.dataset.roves?.split(" ").includes(event.key)) return !event.altKey;
   return target.closest("[role=tablist], .divider") !== null && event.key.startsWith("Arrow");
 }

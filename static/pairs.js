@@ -6,6 +6,7 @@ import { candidatesOf, choose } from "./candidates.js";
 import { LARGE_PX, residualColour } from "./colours.js";
 import { toggleExcluded } from "./clicking.js";
 import { make } from "./notices.js";
+import { proposalAdvice } from "./proposal_words.js";
 import { drawSteps } from "./steps.js";
 import { clicks, on, rangeApart, select, stampKey, state } from "./state.js";
 
@@ -33,7 +34,7 @@ const made = new Map();
 let drawn = "";
 
 export function startPairs() {
-  on(["opening", "view", "selected", "recording", "placements", "candidates"], draw);
+  on(["opening", "view", "selected", "recording", "placements", "candidates", "proposals"], draw);
   page.addEventListener("click", pressed);
 }
 
@@ -65,7 +66,7 @@ function draw() {
   count.textContent = rows.length ? String(rows.length) : "";
   const steps = !rows.length || !state.view?.has_calibration;
   const used = rows.filter((click) => click.state !== "excluded" && click.state !== "untouched").length;
-  const text = JSON.stringify([sorting, rows.length > 0, steps, steps && used, state.placements.length, state.placementsKnown, state.recording === null]);
+  const text = JSON.stringify([sorting, rows.length > 0, steps, steps && used, steps && proposalAdvice(), state.placements.length, state.placementsKnown, state.recording === null]);
   const held = document.activeElement?.matches("[data-act]") ? idOf(document.activeElement) : undefined;
   const changed = drawRows(rows);
   if (text !== drawn) drawAround(rows.length > 0, steps);

@@ -10,8 +10,9 @@ import { lookAt, lookInto, pan, toCss, viewport, zoom } from "./geometry.js";
 import { make, toast } from "./notices.js";
 import { fit, marks, redraw } from "./picture.js";
 import { goTo, pause } from "./player.js";
+import { isSearching, progressWords, say, searchWords } from "./proposal_words.js";
 import { send } from "./socket.js";
-import { emit, isDismissed, isLookedAt, isOffered, on, state } from "./state.js";
+import { clickIn, emit, isDismissed, isLookedAt, isOffered, on, placementsAt, state } from "./state.js";
 
 /** @typedef {import("./messages.js").ProposalRow} Row */
 /** @typedef {import("./messages.js").ProposalPlace} Place */
@@ -22,7 +23,7 @@ const WIDTHS = 9;
 const PART = 0.1;
 /** Room below a proposal for the line on the frame, so that it does not cover the reflector [CSS px]. */
 const BELOW = 120;
-/** Nothing is accepted so soon after a better place was found for what is on screen [ms]: nobody has seen it yet. */
+/** Nothing is decided so soon after a proposal appeared, or moved to a better place [ms]: nobody has seen it yet. */
 const UNSEEN = 300;
 /** A place that moved by less is the same [px]. */
 const SAME_PX = 1;
@@ -43,7 +44,12 @@ const taken = new Map();
 let current = null;
 /** The frame to zoom into once it is shown. @type {Row|null} */
 let awaited = null;
+/** When the proposal on screen appeared there, or moved [ms]. */
 let moved = -Infinity;
+/** The placement whose proposal is on screen. @type {number|undefined} */
+let seen;
+/** Placements that were decided or clicked here and whose decision is on its way, with what was decided. @type {Map<number, string>} */
+const onTheWay = new Map();
 /** Whether the last proposal was decided just now: Enter then means nothing else until another key is pressed, or the pointer. */
 let over = false;
 /** The switch; made at the start. @type {HTMLButtonElement} */
@@ -60,6 +66,7 @@ export function startProposals() {
   drawChip();
   on(["proposals", "recording", "placements"], drawChip);
   on(["shown"], arrive);
+  on(["shown", "view", "proposals", "placements", "playing"], notice);
   on(["view"], settle);
   on(["playing"], () => state.playing && (awaited = null));
   addEventListener("keydown", (event) => event.key !== "Enter" && (over = false), { capture: true });
@@ -83,6 +90,14 @@ export function takeProposals(message) {
     if (before.row.placement === current) zoomInto(after);
   }
   emit("proposals");
+}
+
+/** Take note of a proposal that has just appeared on screen. */
+function notice() {
+  const now = shownOffer()?.row.placement;
+  if (now === seen) return;
+  seen = now;
+  if (now !== undefined) moved = performance.now();
 }
 
 /** @param {Place} one @param {Place|undefined} other */
@@ -114,7 +129,7 @@ export function shownOffer() {
 }
 
 /** How many are decided, how many there are, and which one is on screen. @param {Row} row */
-function counted(row) {
+export function counted(row) {
   const done = state.placements.filter((placement, index) => sent.has(index) || isDismissed(placement) || isLookedAt(placement)).length;
   const open = openProposals();
   const passed = open.filter(({ placement }) => skipped.has(placement) && placement !== row.placement).length;
@@ -181,38 +196,102 @@ function zoomInto({ row, place }) {
   emit("box");
 }
 
-/** Whether a better place was found a moment ago for what is on screen. */
+/** Whether what is on screen appeared there a moment ago. */
 export const justMoved = () => performance.now() - moved < UNSEEN;
 
-/** Whether Enter is about proposals: one is on screen, or the last one was decided just now. */
-export const takesEnter = () => shownOffer() !== null || (over && !openProposals().length);
+/** What was decided at the frame on screen and waits for the server to come back; "" if nothing does. */
+export function heldBack() {
+  if (state.connected || !state.shown || shownOffer()) return "";
+  const here = placementsAt(state.shown.index).map((placement) => state.placements.indexOf(placement));
+  return onTheWay.get(here.find((placement) => onTheWay.has(placement)) ?? -1) ?? "";
+}
+
+/** Whether Enter would open the keyboard's cross where a proposal may come yet. */
+const isTooEarly = () => isSearching() && !state.playing && state.shown !== null && !clickIn(state.shown.index);
+
+/** Whether N, or a decision, leads to a proposal whose frame is not on screen yet. */
+const isComing = () => awaited !== null && state.cursor === awaited.frame && state.shown?.index !== awaited.frame;
+
+/** Whether X and C are about proposals: one is on screen, or about to be. */
+export const takesKeys = () => shownOffer() !== null || isComing();
+
+/** Whether Enter is about proposals: one is on screen, may come yet or was decided without the server, or the last one was decided just now. */
+export const takesEnter = () => takesKeys() || heldBack() !== "" || isTooEarly() || (over && !openProposals().length);
+
+/** The proposal on screen, once somebody can have seen it. @returns {Offer|null} */
+function seenOffer() {
+  const offer = shownOffer();
+  if (!isComing() && (!offer || !justMoved())) return offer;
+  say("Just shown: press again", 1000);
+  return null;
+}
+
+/** Whether the cross of a proposal is in view, in the frame that it is of. @param {Offer} offer */
+function isInView({ row, place }) {
+  const [x, y] = toCss(place.u_px, place.v_px);
+  return state.shown?.index === row.frame && x >= 0 && y >= 0 && x <= viewport.width && y <= viewport.height;
+}
 
 /** Enter: what the picture shows becomes a mark, and the next proposal is shown. */
 export async function acceptProposal() {
-  const offer = shownOffer();
-  if (!offer) return void (over && sayOver());
-  if (justMoved()) return toast("A better place was just found: look again.");
+  if (!takesKeys()) return void (over ? sayOver() : heldBack() || say(searchWords()));
+  const offer = seenOffer();
+  if (!offer) return;
+  if (!isInView(offer)) {
+    show(offer.row);
+    moved = performance.now();
+    return say("Back at the proposal: look, then press Enter again");
+  }
   const { u_px, v_px, sigma_px } = offer.place;
-  await decide(offer.row, { type: "click_placed", image_time: offer.row.image_time, pixel_px: [u_px, v_px], mark: "snapped", sigma_px });
+  const { placement, image_time } = offer.row;
+  const mark = /** @type {const} */ ("snapped");
+  const key = `proposal-${placement}`;
+  state.local.set(key, { u: u_px, v: v_px, image_time, mark });
+  await decide(offer.row, "Accepted", { type: "click_placed", image_time, pixel_px: [u_px, v_px], mark, sigma_px }, key);
 }
 
 /** X: it is not the reflector. */
 export async function rejectProposal() {
-  const offer = shownOffer();
-  if (!offer) return;
-  await decide(offer.row, dismiss(state.placements[offer.row.placement]));
+  const offer = seenOffer();
+  if (offer) await decide(offer.row, "Dismissed", dismiss(state.placements[offer.row.placement]));
 }
 
-/** @param {Row} row @param {Record<string, any>} message */
-async function decide(row, message) {
+/** @param {Row} row @param {string} word @param {Record<string, any>} message @param {string} [key] of the mark shown until the server has it */
+async function decide(row, word, message, key = "") {
   sent.add(row.placement);
   decided.push(row.placement);
-  if (!nextProposal()) finish();
-  const refusal = await send(message);
-  if (!refusal) return settle();
-  sent.delete(row.placement);
+  const refusal = await goOnWhile(row, word, send(message));
+  state.local.delete(key);
+  if (refusal) sent.delete(row.placement);
+  emit("view");
+  if (!refusal) return;
   toast(refusal, "The proposal is offered again.");
   emit("proposals");
+}
+
+/** A click decides the proposal on screen: the next one is shown; undo leads back. @param {Row} row @param {Promise<string|null>} sending */
+export async function correctProposal(row, sending) {
+  const refusal = await goOnWhile(row, "Marked", sending);
+  if (refusal) return;
+  decided.push(row.placement);
+  settle();
+}
+
+/** Show the next proposal while a decision is sent; without a server, once it is back. @param {Row} row @param {string} word @param {Promise<string|null>} sending */
+async function goOnWhile(row, word, sending) {
+  const [wasConnected, cursor] = [state.connected, state.cursor];
+  say("");
+  onTheWay.set(row.placement, word);
+  emit("view");
+  if (wasConnected) goOn();
+  const refusal = await sending;
+  onTheWay.delete(row.placement);
+  if (!wasConnected && !refusal && state.cursor === cursor) goOn();
+  return refusal;
+}
+
+function goOn() {
+  if (!nextProposal()) finish();
 }
 
 function finish() {
@@ -227,7 +306,7 @@ const sayOver = () => toast("All proposals are decided.", state.proposals?.unpro
 
 /** C: the next place where the reflector may stand. */
 export function nextPlace() {
-  const offer = shownOffer();
+  const offer = seenOffer();
   if (!offer) return;
   taken.set(offer.row.placement, (offer.number + 1) % offer.row.places.length);
   const after = shownOffer();
@@ -237,7 +316,7 @@ export function nextPlace() {
 
 /** The server has what was decided; a decision that was undone is shown again. */
 function settle() {
-  for (const placement of sent) if (state.placements[placement] && !isOffered(state.placements[placement])) sent.delete(placement);
+  for (const placement of sent) if (!onTheWay.has(placement) && state.placements[placement] && !isOffered(state.placements[placement])) sent.delete(placement);
   const last = decided[decided.length - 1];
   if (last === undefined || sent.has(last)) return;
   if (!isOpen(last)) return void closed.add(last);
@@ -250,40 +329,10 @@ function settle() {
 /** Decided placements that the server's view had as decided. @type {Set<number>} */
 const closed = new Set();
 
-/** What is proposed, and what to do, for the line on the frame; null if nothing is. @returns {import("./steps.js").Words|null} */
-export function proposalWords() {
-  const offer = shownOffer();
-  if (!offer) return null;
-  const { row, number } = offer;
-  const { number: at, total } = counted(row);
-  const several = row.places.length > 1;
-  const sure = number ? `place ${number + 1} of ${row.places.length}` : surely(row.confidence);
-  const why = row.reason && !number ? `: ${row.reason}` : "";
-  const head = `Proposal ${at} of ${total}, ${state.placements[row.placement].range_m.toFixed(1)} m away, ${sure}${why}.\n`;
-  return [head, { key: "Enter", action: "accept-proposal" }, " accepts it, ", ...(several ? [{ key: "C", action: "next-place" }, ` other place${row.places.length > 2 ? "s" : ""}, `] : []), { key: "X", action: "reject-proposal" }, " no reflector, ", { key: "N", action: "next-proposal" }, " next; or click the inner corner"];
-}
-
-/** A probability in words; none is certain. @param {number} confidence */
-const surely = (confidence) => (confidence > 0.99 ? "over 99 % sure" : `${Math.round(100 * confidence)} % sure`);
-
-/** Why a placement has no proposal, as a clause; "" if it has one or nothing is known. @param {number} placement */
-export const unproposedReason = (placement) => (state.proposals?.on ? (state.proposals.unproposed.find((one) => one.placement === placement)?.reason ?? "") : "");
-
 /** O: propose, or do not. */
 export async function toggleProposals() {
   const refusal = await send({ type: "propose", on: !state.proposals?.on });
   if (refusal) toast(refusal);
-}
-
-/** How far the proposals are, in one line; "" if they are not being made. */
-function progressWords() {
-  const news = state.proposals;
-  if (!news?.on) return "";
-  if (news.problem) return [news.problem, news.hint].filter(Boolean).join(" ");
-  if (news.stage === "off") return "Waits for the placements in the radar data.";
-  if (news.stage === "looking") return `Looks at the pictures of placement ${Math.min(news.done + 1, news.count)} of ${news.count}.`;
-  if (news.stage === "comparing") return `Compares ${news.done} of ${news.count} placements with what was confirmed.`;
-  return `${openProposals().length} to decide${news.unproposed.length ? `; for ${news.unproposed.length} nothing can be proposed` : ""}.`;
 }
 
 function drawChip() {

@@ -18,7 +18,7 @@ const REACH = 8;
 export function startStatus() {
   on(["opening"], drawOpening);
   on(["recording"], drawRecording);
-  on(["opening", "view", "connection", "progress", "placements", "following"], drawStatus);
+  on(["opening", "view", "connection", "progress", "placements", "following", "proposals"], drawStatus);
   get("zoom").onclick = fit;
   on(["cursor", "shown", "recording", "grown"], drawClock);
   on(["playing"], drawPlay);

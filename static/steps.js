@@ -5,7 +5,7 @@ import { act, actionNamed } from "./actions.js";
 import { boxing } from "./boxes.js";
 import { boxAdvice } from "./evaluating.js";
 import { make } from "./notices.js";
-import { proposalWords, unproposedReason } from "./proposals.js";
+import { proposalAdvice, proposalWords, saidWords, silentWords } from "./proposal_words.js";
 import { clickIn, clicks, clicksIn, isClicked, isDismissed, isOffered, on, placementAt, placementsAt, rangeApart, state } from "./state.js";
 
 const guide = /** @type {HTMLElement} */ (document.getElementById("guide"));
@@ -17,7 +17,7 @@ const CENTRE = "the inner corner, where its three sheets meet";
 /** Text with keys in between; a key with an action is a button. @typedef {(string|{key: string, action?: string})[]} Words */
 
 export function startGuide() {
-  on(["opening", "shown", "view", "placements", "playing", "overlay", "candidates", "cross", "selected", "boxes", "layers", "proposals"], drawGuide);
+  on(["opening", "shown", "view", "placements", "playing", "overlay", "candidates", "cross", "selected", "boxes", "layers", "proposals", "connection"], drawGuide);
 }
 
 /** Three steps to the first calibration. */
@@ -31,7 +31,7 @@ export function drawSteps() {
   const searching = live ? soFar : state.placementsKnown ? foundNone : goesOn;
   const now = count === 0 ? 0 : count < FEWEST ? 1 : 2;
   const steps = [
-    ["Go to a placement", found ? [key("N"), ` jumps to the next of ${found} found in the radar data.`] : [searching]],
+    ["Go to a placement", found ? [key("N"), proposalAdvice() || ` jumps to the next of ${found} found in the radar data.`] : [searching]],
     ["Click the reflector's centre", [`That is ${CENTRE}. Zoom with the wheel; `, key("Alt"), "+arrows move the mark by 0.1 px."]],
     [`Repeat for at least ${FEWEST} placements`, [count ? `${count} done. ` : "", "Spread them: near and far, left and right. The pose appears automatically and improves with each one."]],
   ];
@@ -89,13 +89,15 @@ function advice(index) {
   if (state.cross) return atCross(state.cross);
   const offer = proposalWords();
   if (offer) return { text: offer, act: true, long: true };
+  const said = saidWords();
+  if (said && !(placement && isOffered(placement))) return { text: [said.trim()], act: false, long: true };
   if (here) return afterClick(here);
   if (placement && isDismissed(placement)) return { text: ["This placement is dismissed. ", { key: "X" }, " offers it again"], act: false };
   if (placement && isOffered(placement)) {
     const number = state.placements.indexOf(placement) + 1;
     const several = placementsAt(index).length > 1 ? ` (one of ${placementsAt(index).length} at this time)` : "";
-    const why = unproposedReason(number - 1);
-    const silent = why ? ` Not proposed: ${why}.` : "";
+    const why = said.trim() || silentWords(number - 1);
+    const silent = why ? `. ${why}` : "";
     return { text: [`Placement ${number} of ${state.placements.length}, ${placement.range_m.toFixed(1)} m away${several}: click the reflector's inner corner, where its three sheets meet. No reflector here: `, { key: "X" }, silent], act: true, long: silent !== "" };
   }
   const next = nextAction();
@@ -142,6 +144,7 @@ export function nextAction() {
   const guesses = clicks().filter((click) => click.state === "untouched").length;
   if (guesses && !state.placements.some(isOffered)) return [`${guesses} ${guesses > 1 ? "marks are guesses that do" : "mark is a guess that does"} not count: move each to the reflector`];
   if (done) return ["Done. Press ", { key: "E" }, " to export the calibration"];
+  if (key === "N" && proposalAdvice()) return [{ key }, proposalAdvice()];
   return key ? [`${action} Press `, { key }] : null; // others are longer than a line: the verdict shows them
 }
 

@@ -2,6 +2,7 @@
 /** The verdict at the top of the panel: how far to trust the calibration, in one line, and what to do. It never scrolls away. */
 
 import { make } from "./notices.js";
+import { proposalAdvice } from "./proposal_words.js";
 import { on, state } from "./state.js";
 
 /** @typedef {import("./messages.js").VerdictRow} VerdictRow */
@@ -17,7 +18,7 @@ const SHAPES = {
 let drawn = "";
 
 export function startVerdict() {
-  on(["view", "recording"], draw);
+  on(["view", "recording", "proposals"], draw);
 }
 
 function draw() {
@@ -26,14 +27,15 @@ function draw() {
   if (!view || state.looking) return;
   box.classList.toggle("stale", view.solving && view.has_calibration);
   const { level, line, action, key, done } = view.verdict;
-  const text = JSON.stringify(view.verdict);
+  const proposed = key === "N" ? proposalAdvice() : "";
+  const text = JSON.stringify(view.verdict) + proposed;
   if (text === drawn) return;
   drawn = text;
   box.dataset.level = level;
-  box.dataset.hint = [line, action].filter(Boolean).join("\n");
+  box.dataset.hint = [line, proposed ? `N${proposed}` : action].filter(Boolean).join("\n");
   const rest = line.startsWith(level) ? line.slice(level.length) : ` ${line}`;
-  const next = make("p", done ? "next done" : "next", [make("span", "", action)]);
-  if (key) next.append(make("span", "key", key));
+  const next = make("p", done ? "next done" : "next", proposed ? [make("span", "key", key), make("span", "", proposed)] : [make("span", "", action)]);
+  if (key && !proposed) next.append(make("span", "key", key));
   box.replaceChildren(shape(level), make("div", "words", [make("p", "line", [make("strong", "", level), rest]), next]));
 }
 

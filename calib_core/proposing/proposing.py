@@ -12,7 +12,7 @@ from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
 from calib_core.proposing.agreement.apex_evidence import apex_log_odds
 from calib_core.proposing.agreement.candidate_rays import CandidateRays, candidate_rays, weaker_db
-from calib_core.proposing.agreement.mounting_prior import MOST_TURNED_RAD, mounting_prior
+from calib_core.proposing.agreement.mounting_prior import mounting_prior
 from calib_core.proposing.agreement.pose_agreement import PoseAgreement, pose_agreement
 from calib_core.proposing.dwell_views import DwellView
 from calib_core.proposing.proposals import Proposal, Proposals
@@ -21,8 +21,8 @@ __all__ = ["LEAST_CONFIDENCE", "proposals_of"]
 
 LEAST_CONFIDENCE = 0.4
 """What is less probably the reflector is not proposed."""
-_WEAK = 0.8
-"""A proposal of less confidence comes with a reason."""
+_WEAK, _UNSURE = 0.8, 0.9
+"""A proposal of less confidence comes with a reason, and with one if its apex is not seen."""
 _CHANCE_SCORE, _CHANCE_STEP = 20.0, 2.0
 """Score that a pose needs to be as probable as not, and how fast that changes: the radar of one recording with the pictures
 of another reaches up to 19, whatever the number of dwells; ten placements of one recording reach 54 and more."""
@@ -40,7 +40,7 @@ _VAGUE_PX = 3.0
 _VAGUE = "its apex is not seen clearly"
 _NO_FRAME = "the camera recorded no frame while it stood there"
 _NO_CHANGE = "nothing of the reflector's size changed in the picture"
-_NO_POSE = f"picture and radar agree on no mounting within {np.degrees(MOST_TURNED_RAD):.0f} deg of the nominal one"
+_NO_POSE = "picture and radar agree on no pose yet"
 _NO_APEX = "what stood there shows no reflector's apex; if it is one, click it once"
 _ELSEWHERE = "no place that changed lies where the other placements say"
 _TWO_PLACES = "two places there are about as likely"
@@ -72,6 +72,7 @@ def proposals_of(
     agreement = pose_agreement(rays, mounting_prior(options, is_flat=rays.is_flat))
     judged = _Judged.of(views, rays, agreement)
     covered = _covered(rays, judged, len(clicks))
+    marks = [(views[i].placement, clicks[row]) for i, rows in covered.items() for row in rows]
     ranked: list[Proposal] = []
     unproposed: list[tuple[Placement, str]] = []
     for i, view in enumerate(views):
@@ -80,8 +81,11 @@ def proposals_of(
         proposal = judged.proposal(i)
         if proposal is None:
             unproposed.append((view.placement, judged.reason(i)))
-        else:
+        elif (marked := _marked(proposal, view, marks)) is None:
             ranked.append(proposal)
+        else:
+            range_m = np.linalg.norm(marked.position_radar_m)
+            unproposed.append((view.placement, f"its place is marked already, at the placement of {range_m:.1f} m"))
     ranked.sort(key=lambda one: (-one.confidence, one.placement.start))
     if agreement is None:
         return Proposals(tuple(ranked), tuple(unproposed))
@@ -95,15 +99,25 @@ def proposals_of(
     )
 
 
-def _covered(rays: CandidateRays, judged: "_Judged", clicks: int) -> frozenset[int]:
-    """Return the dwells that the confirmed clicks belong to: each click to the one of its dwells that it suits best."""
-    found = []
+def _covered(rays: CandidateRays, judged: "_Judged", clicks: int) -> dict[int, list[int]]:
+    """Return the dwells with the rows of their confirmed clicks: each click is of the one of its dwells that it suits best."""
+    found: dict[int, list[int]] = {}
     for row in range(clicks):
         dwells, which = np.nonzero(rays.click == row)
         if len(dwells):
             fits = judged.probability[dwells, which] + 1e-6 * rays.odds[dwells, which]
-            found.append(int(dwells[np.argmax(fits)]))
-    return frozenset(found)
+            found.setdefault(int(dwells[np.argmax(fits)]), []).append(row)
+    return found
+
+
+def _marked(proposal: Proposal, view: DwellView, own: Sequence[tuple[Placement, ReflectorClick]]) -> Placement | None:
+    """Return the placement at the same time with a click on the proposed place: the radar saw one reflector twice."""
+    for placement, click in own:
+        apart_px = np.hypot(*(proposal.pixel_px - [click.u_px, click.v_px]))
+        overlaps = placement.start <= view.placement.end and view.placement.start <= placement.end
+        if overlaps and apart_px <= 0.5 * view.width_px:
+            return placement
+    return None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -158,7 +172,8 @@ class _Judged:
         candidates = tuple(view.candidates[k - first] for k in order)
         confidence = float(min(probability[order[0]], 1.0))
         best = candidates[0]
-        reason = self.reason(i) if confidence < _WEAK else _VAGUE if best.sigma_px > _VAGUE_PX else ""
+        is_vague = best.sigma_px > _VAGUE_PX or (confidence < _UNSURE and not best.has_apex)
+        reason = self.reason(i) if confidence < _WEAK else _VAGUE if is_vague else ""
         return Proposal(view.placement, view.image_time, best.pixel_px, best.sigma_px, confidence, candidates, reason)
 
     def _is_candidate(self, i: int, k: int) -> bool:

@@ -3,13 +3,14 @@
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from app.web.port.server import RunningServer, ServerOptions, start
-from app.workspace import Workspace
+from app.workspace import Workspace, open_workspace
 from calib_core.association.placements import Placement
 from calib_core.camera import Camera
 from calib_core.measurements import NS_PER_S, TimeNs
@@ -25,7 +26,7 @@ HELD_FROM = 8
 UNCERTAIN = 4.0
 """Standard deviation of a place whose apex is not seen [px]."""
 READY = "__cocalib.state.proposals?.stage === 'ready'"
-ON_SCREEN = "__cocalib.shownOffer() && __cocalib.state.shown.index === __cocalib.state.cursor"
+ON_SCREEN = "__cocalib.shownOffer() && __cocalib.state.shown.index === __cocalib.state.cursor && !__cocalib.justMoved()"
 
 
 class Pictures:
@@ -123,7 +124,7 @@ def test_twenty_placements_take_at_most_25_keys_and_clicks(
 
     count, accepted = 2, 1
     while (done := page.value("__cocalib.state.view.clicks.length")) < 20:
-        page.until(f"{READY} && !__cocalib.justMoved() && (({ON_SCREEN}) || !__cocalib.state.proposals.rows.length)")
+        page.until(f"{READY} && (({ON_SCREEN}) || !__cocalib.state.proposals.rows.length)")
         if page.value("__cocalib.shownOffer() === null"):
             page.press("n")
             page.until("__cocalib.state.shown.index === __cocalib.state.cursor")
@@ -155,13 +156,15 @@ def test_a_correcting_click_goes_to_the_apex_that_its_frames_show_in_one_step(
     guide(page)
     u, v = pictures.at(page.value("__cocalib.shownOffer().row.image_time"))
     page.click(u + 2, v - 1)
-    page.until("__cocalib.state.view.clicks.length === 1 && !__cocalib.shownOffer()")
+    page.until("__cocalib.state.view.clicks.length === 1")
+    assert guide(page).startswith("Proposal 2 of ")
     corrected = page.view["clicks"][0]
     assert corrected["mark"] == "snapped"
     assert np.hypot(corrected["u_px"] - u, corrected["v_px"] - v) < 0.8
     assert 0.05 < corrected["sigma_px"] < 0.8
     page.press("Control+z")
     page.until("__cocalib.state.view.clicks.length === 0 && __cocalib.shownOffer()")
+    assert guide(page).startswith("Proposal 1 of ")
 
 
 def test_enter_after_the_last_proposal_does_nothing_else(
@@ -172,7 +175,7 @@ def test_enter_after_the_last_proposal_does_nothing_else(
     page.until(READY)
     page.press("n")
     while page.value("__cocalib.state.proposals.rows.length"):
-        page.until(f"{READY} && !__cocalib.justMoved() && (({ON_SCREEN}) || !__cocalib.state.proposals.rows.length)")
+        page.until(f"{READY} && (({ON_SCREEN}) || !__cocalib.state.proposals.rows.length)")
         page.press("Enter")
         page.until("__cocalib.unconfirmed() === 0")
     clicks = len(page.view["clicks"])
@@ -210,11 +213,10 @@ def test_a_proposal_is_rejected_corrected_and_undone_and_all_of_them_are_switche
 
     u, v = (page.value(f"__cocalib.shownOffer().place.{axis}") for axis in ("u_px", "v_px"))
     page.click(u + 25, v + 25)
-    page.until("__cocalib.state.view.clicks.length === 1 && !__cocalib.shownOffer()")
+    page.until("__cocalib.state.view.clicks.length === 1")
     corrected = page.view["clicks"][0]
     assert corrected["mark"] == "clicked"
     assert np.hypot(corrected["u_px"] - u - 25, corrected["v_px"] - v - 25) < 1
-    page.press("n")
     assert guide(page).startswith("Proposal 2 of ")
     page.press("Control+z")
     page.until("__cocalib.state.view.clicks.length === 0")
@@ -225,3 +227,107 @@ def test_a_proposal_is_rejected_corrected_and_undone_and_all_of_them_are_switche
     page.press("Enter")
     page.until("__cocalib.state.cross")
     assert page.view["clicks"] == []
+
+
+def test_only_what_is_seen_is_decided_and_the_line_says_how_far_the_search_is(
+    pictures: Pictures, proposing: RunningServer, open_page: Callable[..., Driver]
+) -> None:
+    page = open_page(proposing.url)
+    user = page.page
+    page.until("__cocalib.state.proposals?.rows.length >= 5 && __cocalib.state.proposals.done === 8")
+    page.press("Enter")
+    assert "Proposals are being looked for: 8 of 20" in page.text("#guide")
+    assert page.value("__cocalib.state.cross") is None
+    assert "N goes to the first of" in page.text("#verdict").replace("\n", " ")
+    page.go_to(page.value("__cocalib.state.placements[15].frame"))
+    page.until("document.getElementById('guide').textContent.includes('pictures of 8 of 20 placements looked at')")
+    assert "apex" not in page.text("#guide")
+
+    page.press("n")
+    assert " so far, " in guide(page)
+    page.value("dispatchEvent(new KeyboardEvent('keydown', {key: 'x', bubbles: true}))")
+    page.value("dispatchEvent(new KeyboardEvent('keydown', {key: 'x', bubbles: true}))")  # unseen
+    page.until("document.getElementById('guide').textContent.startsWith('Just shown: press again.')")
+    page.settle()
+    assert len(page.view["dismissed"]) == 1
+    guide(page)
+    user.keyboard.down("x")
+    page.until("__cocalib.state.view.dismissed.length === 2")
+    guide(page)
+    user.keyboard.down("x")  # held
+    user.keyboard.up("x")
+    page.settle()
+    assert len(page.view["dismissed"]) == 2
+
+    guide(page)
+    frame = page.value("__cocalib.shownOffer().row.frame")
+    page.press("ArrowRight")
+    page.until(f"__cocalib.state.shown.index === {frame + 1}")
+    page.press("Enter")
+    page.until(f"__cocalib.state.shown.index === {frame}")
+    assert guide(page).startswith("Back at the proposal: look, then press Enter again.")
+    width, height = page.value("[__cocalib.viewport.width, __cocalib.viewport.height]")
+    left, top = page.value("(({left, top}) => [left, top])(document.getElementById('marks').getBoundingClientRect())")
+    user.mouse.move(left + 20, top + height / 2)
+    user.mouse.down()
+    user.mouse.move(left + width - 10, top + height / 2, steps=3)
+    user.mouse.up()
+    page.press("Enter")
+    assert page.view["clicks"] == []
+    guide(page)
+
+    user.locator("#layers .chip").first.click()
+    page.press("Enter")
+    assert len(page.view["clicks"]) == 1
+    guide(page)
+    user.keyboard.press("Tab")
+    before = page.value("document.activeElement.getAttribute('aria-pressed')")
+    page.press("Enter")
+    assert page.value("document.activeElement.getAttribute('aria-pressed')") != before
+    assert len(page.view["clicks"]) == 1
+
+
+def test_what_is_accepted_while_the_server_is_gone_is_drawn_and_sent_when_it_is_back(
+    pictures: Pictures,
+    proposing: RunningServer,
+    workspace: Workspace,
+    sample: Recording,
+    open_page: Callable[..., Driver],
+) -> None:
+    pictures.allowed.set()
+    page = open_page(proposing.url)
+    page.until(READY)
+    page.press("n")
+    guide(page)
+    frame = page.value("__cocalib.state.cursor")
+    port = int(page.page.url.split(":")[2].split("/")[0])
+    proposing.close()
+    page.until("!__cocalib.state.connected")
+    page.page.keyboard.press("Enter")
+    page.drawn()
+    assert page.text("#guide") == "Accepted; sent when the server is back"
+    assert page.value(f"__cocalib.clicksIn({frame}).map((click) => click.state)") == ["pending"]
+    again = start(workspace, sample, ServerOptions(port=port, token="test", proposes=True))
+    try:
+        page.until("__cocalib.unconfirmed() === 0 && __cocalib.state.view.clicks.length === 1")
+        assert len(workspace.session.clicks) == 1
+    finally:
+        again.close()
+    page.forget_lost_connections()
+
+
+def test_without_intrinsics_the_line_says_why_nothing_is_proposed(
+    sample: Recording, tmp_path: Path, open_page: Callable[..., Driver]
+) -> None:
+    opened = open_workspace(sample, camera=None, session_folder=tmp_path / "session", name="sample")
+    running = start(opened, sample, ServerOptions(port=0, token="test", proposes=True))
+    try:
+        page = open_page(running.url)
+        page.until("__cocalib.state.proposals?.problem")
+        page.press("n")
+        page.until("document.getElementById('guide').textContent.includes('No proposals: ')")
+        page.until("__cocalib.state.shown.index === __cocalib.state.cursor")
+        assert "intrinsics" in page.text("#guide")
+    finally:
+        running.close()
+        opened.close()

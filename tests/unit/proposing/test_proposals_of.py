@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from calib_core.geometry import rotation_angle_rad
+from calib_core.measurements import TimeNs
 from calib_core.options import CalibrationOptions, MountingOptions
 from calib_core.proposing import Proposal, Proposals, proposals_of
 from tests.drawn_views import Drawing, DrawnViews, draw_views, with_pictures_of
@@ -69,9 +70,7 @@ def test_the_radar_of_one_recording_with_the_pictures_of_another_proposes_nothin
         one, other = draw_views(seed), draw_views(100 + seed)
         proposals = proposals_of(with_pictures_of(one, other), other.camera, OPTIONS)
         assert not proposals.ranked
-        assert {reason for _, reason in proposals.unproposed} == {
-            "picture and radar agree on no mounting within 26 deg of the nominal one"
-        }
+        assert {reason for _, reason in proposals.unproposed} == {"picture and radar agree on no pose yet"}
 
 
 def test_what_is_confirmed_is_not_proposed_again_and_counts() -> None:
@@ -154,3 +153,34 @@ def test_confidence_is_borne_out() -> None:
 def _with_verdicts(drawn: DrawnViews) -> list[tuple[Proposal, bool]]:
     proposals = proposed(drawn)
     return list(zip(proposals.ranked, right(drawn, proposals), strict=True))
+
+
+@pytest.mark.parametrize(("apart_px", "is_same"), [(2.0, True), (40.0, False)])
+def test_an_echo_of_a_marked_reflector_is_not_proposed_and_says_where_it_is_marked(
+    apart_px: float, is_same: bool
+) -> None:
+    drawn = draw_views(3, Drawing(count=2, decoys=0, clutter=0, listed_share=1.0))
+    first = replace(drawn.views[0], width_px=30.0)
+    placement = first.placement
+    later = replace(
+        placement, start=TimeNs(first.image_time + 1), position_radar_m=1.4 * np.array(placement.position_radar_m)
+    )
+    seen = replace(first.candidates[0], pixel_px=drawn.pixels[0] + [apart_px, 0.0], likeness=0.95)
+    echo = replace(first, placement=later, candidates=(seen,))
+    views = [first, drawn.views[1], echo]
+    found = proposals_of(views, drawn.camera, OPTIONS, confirmed=[drawn.click(0)])
+    assert (later.start in {one.placement.start for one in found.ranked}) != is_same
+    reasons = {one.start: reason for one, reason in found.unproposed}
+    range_m = np.linalg.norm(placement.position_radar_m)
+    words = f"its place is marked already, at the placement of {range_m:.1f} m"
+    assert (reasons.get(later.start) == words) == is_same
+    out = replace(drawn.click(0), excluded=True)
+    without = proposals_of(views, drawn.camera, OPTIONS, confirmed=[out])
+    assert words not in {reason for _, reason in without.unproposed}
+
+
+def test_a_fairly_sure_proposal_says_when_its_apex_is_not_seen() -> None:
+    found = [one for seed in range(4) for one in proposed(draw_views(seed, Drawing(count=7))).ranked]
+    fairly = [one for one in found if 0.8 <= one.confidence < 0.9]
+    assert fairly
+    assert {one.reason for one in fairly} == {"its apex is not seen clearly"}
