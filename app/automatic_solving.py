@@ -5,12 +5,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+
 from app.proposing import REFLECTOR_M, RecordedFrames, find_proposals
 from app.solving import RadarSource, solve_clicks
 from calib_core.camera import Camera
 from calib_core.diagnostics.confirmation import nobody_confirmed
 from calib_core.measurements import ReflectorClick, Unsolvable
 from calib_core.options import CalibrationOptions
+from calib_core.pose_difference import camera_position_jacobian
 from calib_core.proposing import ViewProgress
 from calib_core.proposing.automatic import automatic_clicks
 from calib_core.results import Calibration, UnconfirmedClicks
@@ -18,7 +21,11 @@ from calib_core.verdict import verdict_on
 
 __all__ = ["PlacedClicks", "is_doubtful", "place_clicks", "solve_placed_clicks"]
 
+_FARTHEST_M = 0.3
+"""Without a measured position, a camera that is certainly farther from the radar than this is not believed: whatever is carried
+from place to place beside the reflector looks like a camera so far away."""
 _BY_PERSON = "open the recording on the page and confirm what it proposes, from one click on"
+_BY_TAPE = "if it is, measure its position with a tape (--camera-position-m X Y Z); else look at the clicks on the page"
 
 
 class RecordedSensors(RecordedFrames, RadarSource, Protocol):
@@ -111,7 +118,23 @@ def solve_placed_clicks(
     if verdict.level == "contradictory":
         reason = f"nobody confirmed the clicks, and the pose from them is contradictory: {verdict.reason}"
         return Unsolvable("not-confident", reason, _BY_PERSON, outcome.unpaired)
+    away_m = _least_distance_m(outcome)
+    if options.solving.camera_position is None and away_m > _FARTHEST_M:
+        reason = (
+            f"nobody confirmed the clicks, and by them the camera is at least {away_m:.1f} m from the radar: something that was "
+            "carried along with the reflector would look the same"
+        )
+        return Unsolvable("not-confident", reason, _BY_TAPE, outcome.unpaired)
     return warned
+
+
+def _least_distance_m(calibration: Calibration) -> float:
+    """Return how far the camera is from the radar at least [m], two standard deviations below the estimate."""
+    pose = calibration.camera_from_radar
+    centre_m = -pose.rotation.T @ pose.translation_m
+    away_m = max(float(np.linalg.norm(centre_m)), 1e-9)
+    along = camera_position_jacobian(pose).T @ (centre_m / away_m)
+    return away_m - 2.0 * float(np.sqrt(along @ calibration.covariance @ along))
 
 
 def is_doubtful(calibration: Calibration) -> bool:

@@ -1,6 +1,13 @@
 """Find where the reflector stood in a recording, for the command line and the page."""
 
-from app.proposing.finding import REFLECTOR_M, RecordedFrames, find_proposals, proposed_again, view_at
+from app.proposing.finding import (
+    REFLECTOR_M,
+    RecordedFrames,
+    beside_the_reflector,
+    find_proposals,
+    proposed_again,
+    view_at,
+)
 from app.proposing.job import ProposingJob, ProposingSnapshot, ProposingStage, ProposingWish
 
 __all__ = [
@@ -10,6 +17,7 @@ __all__ = [
     "ProposingStage",
     "ProposingWish",
     "RecordedFrames",
+    "beside_the_reflector",
     "find_proposals",
     "proposed_again",
     "view_at",

@@ -15,10 +15,20 @@ from calib_core.options import CalibrationOptions, GatingOptions
 from calib_core.proposing import DwellView, FrameSource, Proposals, ViewProgress, dwell_views, proposals_of
 from calib_core.proposing.look import Look, look_of, with_look
 
-__all__ = ["REFLECTOR_M", "RecordedFrames", "find_proposals", "looks_of", "proposed_again", "view_at"]
+__all__ = [
+    "REFLECTOR_M",
+    "RecordedFrames",
+    "beside_the_reflector",
+    "find_proposals",
+    "looks_of",
+    "proposed_again",
+    "view_at",
+]
 
 REFLECTOR_M = 0.24
 """Width of the reflector if nothing is said of it [m]."""
+_BESIDE = 0.6
+"""A click farther than so many widths from everything that changed is not on the reflector, if one is seen there."""
 _LEAST_PLACEMENTS = 3
 """What changed in a dwell shows against at least two others."""
 _SHORTEST_NS = 2 * NS_PER_S
@@ -107,10 +117,14 @@ def proposed_again(
 
 
 def looks_of(click: ReflectorClick, views: Sequence[DwellView], frames: FrameSource) -> Iterator[Look]:
-    """Yield what a confirmed click shows; nothing if it lies in no dwell, or no frame of that can be read."""
+    """Yield what a confirmed click shows; nothing if it lies in no dwell, or no frame of that can be read.
+
+    A click beside the reflector shows nothing either: the same would be found beside the others.
+    """
     pixel_px = np.array([click.u_px, click.v_px])
     view = view_at(click.image_time, pixel_px, views)
-    look = None if view is None else look_of(view, frames, pixel_px)
+    beside = beside_the_reflector(click, views) is not None
+    look = None if view is None or beside else look_of(view, frames, pixel_px)
     if look is not None:
         yield look
 
@@ -127,6 +141,16 @@ def view_at(image_time: TimeNs, pixel_px: Vector2, views: Sequence[DwellView]) -
     """
     meanwhile = [one for one in views if one.placement.start <= image_time <= one.placement.end and len(one.frames)]
     return min(meanwhile, key=lambda view: _distance_px(view, pixel_px), default=None)
+
+
+def beside_the_reflector(click: ReflectorClick, views: Sequence[DwellView]) -> float | None:
+    """Return how far a click is from the nearest place that changed [px], if a reflector is seen there; None if it is on it."""
+    pixel_px = np.array([click.u_px, click.v_px])
+    view = view_at(click.image_time, pixel_px, views)
+    if view is None or not any(one.has_apex for one in view.candidates):
+        return None
+    off_px = _distance_px(view, pixel_px)
+    return off_px if off_px > _BESIDE * view.width_px else None
 
 
 def _distance_px(view: DwellView, pixel_px: np.ndarray) -> float:

@@ -87,6 +87,21 @@ def test_a_confirmed_click_stays_and_the_others_keep_their_ids(
         assert one["candidates"][0]["likeness"] is not None
 
 
+def test_a_click_beside_the_reflector_is_named_and_nothing_is_learned_from_it(
+    cocalib: Cocalib, recording: Path, tmp_path: Path
+) -> None:
+    third = {"sec": START // 10**9 + 2 * DWELL_S + 2, "nanosec": 0}
+    click = {"id": "beside", "image_time": third, "pixel_px": np.add(true_pixel_px(third), (40.0, 0.0)).tolist()}
+    clicks = tmp_path / "one.json"
+    clicks.write_text(json.dumps({"schema": "cocalib/clicks-1", "clicks": [click]}))
+    answer = cocalib("propose", recording, *SIZE, "--clicks", clicks, "--json")
+    assert answer.code == 0, answer.err
+    assert "warning: click beside is " in answer.err
+    proposals = json.loads(answer.out)["proposals"]
+    assert len(proposals) >= 8
+    assert max(off_px(one["click"]) for one in proposals if one["confidence"] > 0.9) < 3.0
+
+
 @dataclass(frozen=True)
 class Solved:
     """The files of a recording solved without a person."""

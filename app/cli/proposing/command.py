@@ -100,8 +100,8 @@ class Propose:
         nothing = Unsolvable(
             "nothing-proposed",
             f"none of the {len(proposals.unproposed)} placements shows where in the picture the reflector stood",
-            "check --reflector-m and that radar and camera were recorded together, or give a click with --clicks: it shows what "
-            "the reflector looks like",
+            "check that both recordings are of the same time, the intrinsics, --reflector-m and --radar-axes; or give a click "
+            "with --clicks: it shows what the reflector looks like",
         )
         return explain_unsolvable(nothing, what="no proposals")
 
@@ -114,9 +114,17 @@ class Propose:
     ) -> int:
         """Print the proposals, and write them to the file if one is given; return the exit code."""
         from app.cli.proposing.table import proposal_lines
+        from app.proposing import beside_the_reflector
         from calib_core.measurements import TimeNs
         from calib_core.proposing.proposals_json import ProposalSource, proposals_json
 
+        for click in clicks:
+            if click.counts and (off_px := beside_the_reflector(click, views)) is not None:
+                print(
+                    f"warning: click {click.id} is {off_px:.0f} px from everything that changed then, and a reflector is seen "
+                    "elsewhere: look at it again; nothing is learned from it",
+                    file=sys.stderr,
+                )
         confirmed = tuple(click.id for click in clicks if click.counts)
         source = ProposalSource(
             recording=tuple(name_text(path.name) for path in recording.paths),

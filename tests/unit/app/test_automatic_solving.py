@@ -1,18 +1,23 @@
 """Clicks placed without a person: which are whose, and what becomes of a pose that they contradict."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 import app.automatic_solving as automatic_solving
-from app.automatic_solving import place_clicks
+from app.automatic_solving import PlacedClicks, place_clicks, solve_placed_clicks
 from calib_core.association.placements import Placement
+from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
+from calib_core.geometry import RigidTransform
 from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
-from calib_core.options import CalibrationOptions
+from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 from calib_core.proposing import PictureCandidate, Proposal, Proposals
 from calib_core.proposing.automatic import AutomaticClicks
+from calib_core.results import Calibration, UnconfirmedClicks
+from calib_core.synthetic import simulate_pairs
 
 CAMERA = Camera("pinhole", 64, 48, np.array([[60.0, 0, 32], [0, 60, 24], [0, 0, 1]]), np.zeros(0))
 OPTIONS = CalibrationOptions()
@@ -57,3 +62,29 @@ def test_a_refusal_is_handed_on(monkeypatch: pytest.MonkeyPatch, at: str) -> Non
     refusal = Unsolvable("not-confident", "chance would do nearly as well", "confirm some")
     found(monkeypatch, refusal if at == "search" else ((), one_proposal()), refusal)
     assert place_clicks(RECORDING, CAMERA, OPTIONS) is refusal
+
+
+@pytest.mark.parametrize(
+    ("away_m", "measured", "nobody", "is_refused"),
+    [(0.0, False, True, False), (1.0, False, True, True), (1.0, True, True, False), (1.0, False, False, False)],
+    ids=["near", "far", "far-by-tape", "far-by-a-person"],
+)
+def test_a_camera_that_would_be_far_away_needs_a_tape_or_a_person(
+    away_m: float, measured: bool, nobody: bool, is_refused: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is carried along beside the reflector looks like a camera that is mounted elsewhere."""
+    simulated = simulate_pairs(20, rng=np.random.default_rng(8), noise="imaging")
+    options = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.0), 2.0)))
+    solved = calibrate_pairs(simulated.pairs, simulated.camera, options if measured else OPTIONS)
+    assert isinstance(solved, Calibration)
+    pose = solved.camera_from_radar
+    moved = RigidTransform(pose.rotation, pose.translation_m + np.array([away_m, 0.0, 0.0]))
+    monkeypatch.setattr(
+        automatic_solving, "solve_clicks", lambda *_, **__: replace(solved, camera_from_radar=moved, warnings=())
+    )
+    placed = PlacedClicks((PLACED,), UnconfirmedClicks((PLACED.id,), 0.99) if nobody else None)
+    outcome = solve_placed_clicks(RECORDING, placed, simulated.camera, options if measured else OPTIONS)
+    assert isinstance(outcome, Unsolvable) is is_refused
+    if isinstance(outcome, Unsolvable):
+        assert "m from the radar" in outcome.reason
+        assert "--camera-position-m" in outcome.hint
