@@ -1,4 +1,4 @@
-"""The priors of a fit as rows of the least-squares problem: the camera centre's, and those of the estimated errors."""
+"""The priors of a fit as rows of the least-squares problem: those of the pose, and those of the estimated errors."""
 
 import numpy as np
 
@@ -10,12 +10,13 @@ __all__ = ["prior_rows"]
 
 
 def prior_rows(measurements: PairMeasurements, camera_from_radar: RigidTransform) -> tuple[Values, np.ndarray]:
-    """Return the whitened residuals (3 + k,) and Jacobian (3 + k, 6 + k) of the priors of camera centre and k errors."""
+    """Return the whitened residuals (p + k,) and Jacobian (p + k, 6 + k) of the p rows of the pose's prior and k errors."""
     errors = measurements.errors
     residual, jacobian = measurements.prior.rows(camera_from_radar)
-    rows = np.zeros((3 + len(errors), 6 + len(errors)))
-    rows[:3, :6] = jacobian
+    count = len(residual)
+    rows = np.zeros((count + len(errors), 6 + len(errors)))
+    rows[:count, :6] = jacobian
     if not len(errors):
         return residual, rows
-    rows[3:, 6:] = np.diag(1.0 / errors.sigma)
+    rows[count:, 6:] = np.diag(1.0 / errors.sigma)
     return np.concatenate([residual, -errors.values / errors.sigma]), rows
