@@ -11,7 +11,7 @@ from app.proposing import REFLECTOR_M, RecordedFrames, find_proposals
 from app.solving import RadarSource, solve_clicks
 from calib_core.camera import Camera
 from calib_core.diagnostics.confirmation import nobody_confirmed
-from calib_core.measurements import ReflectorClick, Unsolvable
+from calib_core.measurements import ReflectorClick, Unpaired, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.pose_difference import camera_position_jacobian
 from calib_core.proposing import ViewProgress
@@ -19,7 +19,7 @@ from calib_core.proposing.automatic import automatic_clicks
 from calib_core.results import Calibration, UnconfirmedClicks
 from calib_core.verdict import verdict_on
 
-__all__ = ["PlacedClicks", "is_doubtful", "place_clicks", "solve_placed_clicks"]
+__all__ = ["PlacedClicks", "is_doubtful", "place_clicks", "refusal_of", "solve_placed_clicks"]
 
 _FARTHEST_M = 0.3
 """Without a measured position, a camera that is certainly farther from the radar than this is not believed: whatever is carried
@@ -114,18 +114,29 @@ def solve_placed_clicks(
         return outcome
     count = sum(click.counts for click in placed.clicks)
     warned = dataclasses.replace(outcome, warnings=(*outcome.warnings, nobody_confirmed(placed.unconfirmed, count)))
-    verdict = verdict_on(warned)
+    refusal = refusal_of(warned, outcome.unpaired)
+    return warned if refusal is None else refusal
+
+
+def refusal_of(calibration: Calibration, unpaired: tuple[Unpaired, ...] = ()) -> Unsolvable | None:
+    """Say why a pose from clicks that nobody confirmed is not believed; None if it is.
+
+    Args:
+        calibration: from such clicks.
+        unpaired: clicks without a radar position.
+    """
+    verdict = verdict_on(calibration)
     if verdict.level == "contradictory":
         reason = f"nobody confirmed the clicks, and the pose from them is contradictory: {verdict.reason}"
-        return Unsolvable("not-confident", reason, _BY_PERSON, outcome.unpaired)
-    away_m = _least_distance_m(outcome)
-    if options.solving.camera_position is None and away_m > _FARTHEST_M:
+        return Unsolvable("not-confident", reason, _BY_PERSON, unpaired)
+    away_m = _least_distance_m(calibration)
+    if calibration.options.solving.camera_position is None and away_m > _FARTHEST_M:
         reason = (
             f"nobody confirmed the clicks, and by them the camera is at least {away_m:.1f} m from the radar: something that was "
             "carried along with the reflector would look the same"
         )
-        return Unsolvable("not-confident", reason, _BY_TAPE, outcome.unpaired)
-    return warned
+        return Unsolvable("not-confident", reason, _BY_TAPE, unpaired)
+    return None
 
 
 def _least_distance_m(calibration: Calibration) -> float:

@@ -8,6 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from app.automatic_solving import refusal_of
 from benchmarks.accuracy.rows import Figures
 from benchmarks.proposing.cases import case_of
 from benchmarks.proposing.drawn import Drawn, draw, true_placement
@@ -18,7 +19,6 @@ from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.proposing import DwellView, Proposals, dwell_views, proposals_of
 from calib_core.proposing.automatic import automatic_clicks
-from calib_core.verdict import verdict_on
 
 __all__ = ["automatic_figures", "measure_mismatched"]
 
@@ -28,12 +28,12 @@ _NO_PICTURE = np.zeros((0, 0, 3), dtype=np.uint8)
 def automatic_figures(proposals: Proposals, views: Sequence[DwellView], drawn: Drawn) -> Figures:
     """Calibrate without a person, as `solve --auto` does, and compare with the true pose.
 
-    "auto refused" is 1 if there is no answer; like the command, this refuses a pose that its own clicks contradict.
+    "auto refused" is 1 if there is no answer; like the command, this refuses poses, too.
     """
     outcome = automatic_clicks(proposals, views, drawn.recording.camera, CalibrationOptions())
     if isinstance(outcome, Unsolvable):
         return {"auto refused": 1.0}
-    pose = pose_figures("auto", outcome.clicks, drawn, refuses=lambda one: verdict_on(one).level == "contradictory")
+    pose = pose_figures("auto", outcome.clicks, drawn, refuses=lambda one: refusal_of(one) is not None)
     wrong = sum(not click_on_the_reflector(click, drawn) for click in outcome.clicks)
     refused = float("auto rotation_rad" not in pose)
     return pose | {"auto refused": refused, "auto confidence": outcome.confidence, "auto wrong clicks": float(wrong)}
