@@ -70,7 +70,8 @@ def make_result(
             OutcomeFile(path.name, hashlib.sha256(path.read_bytes()).hexdigest())
             for path in sorted(unfinished.iterdir())
         )
-        changes = {"files": files, "run": OutcomeRun("host", started, 1.5)} | changes
+        is_final = outcome.status != "failed"
+        changes = {"files": files, "is_final": is_final, "run": OutcomeRun("host", started, 1.5)} | changes
         outcome = msgspec.structs.replace(outcome, **changes)
         (unfinished / OUTCOME_FILE).write_text(outcome_text(outcome), encoding="utf-8")
     return outcome
