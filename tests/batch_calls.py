@@ -8,15 +8,23 @@ from pathlib import Path
 
 from app.batch.job import Job
 from app.batch.manifest import ManifestRow
-from app.batch.outcome import Outcome
+from app.batch.outcome import Outcome, read_outcome
+from app.batch.results_folder import OUTCOME_FILE, ResultsFolder
 
-__all__ = ["attempts", "dying", "dying_job", "endless", "failing", "quick_jobs", "squared"]
+__all__ = ["attempts", "dying", "dying_job", "endless", "failing", "quick_jobs", "squared", "written"]
 
 
 def quick_jobs(folder: Path, count: int) -> tuple[Job, ...]:
-    """Return jobs that fail at once, because there are no recordings, each in words of its own."""
+    """Return jobs that fail at once and for good, because their recordings are none, each in words of its own."""
+    for number in range(count):
+        (folder / f"{number}.bag").write_bytes(b"not a recording")
     rows = [ManifestRow(f"v{number:03d}", "s1", (folder / f"{number}.bag",)) for number in range(count)]
     return tuple(Job(row, f"{number:032x}") for number, row in enumerate(rows))
+
+
+def written(results: Path, digest: str) -> Outcome:
+    """Return the outcome that lies in the results, also one that a rerun does not take."""
+    return read_outcome((ResultsFolder(results).folder_of(digest) / OUTCOME_FILE).read_text(encoding="utf-8"))
 
 
 def squared(number: int) -> int:

@@ -17,7 +17,7 @@ from app.batch.engines.in_process import InProcess
 from app.batch.outcome import Outcome
 from app.batch.results_folder import ResultsFolder
 from calib_core.errors import InputError
-from tests.batch_calls import attempts, dying, dying_job, failing, quick_jobs, squared
+from tests.batch_calls import attempts, dying, dying_job, failing, quick_jobs, squared, written
 from tests.dask_processes import worker_processes
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore::ResourceWarning")]
@@ -65,7 +65,8 @@ def test_a_job_that_kills_its_workers_fails_and_the_others_do_not(
     assert "memory" in outcomes[1].hint
     assert all("died" not in outcome.reason for outcome in (outcomes[0], *outcomes[2:]))
     assert attempts(tmp_path, "v001") == 3  # twice among others, and once alone
-    assert ResultsFolder(tmp_path).outcome(jobs[1].digest) == outcomes[1]
+    assert written(tmp_path, jobs[1].digest) == outcomes[1]
+    assert ResultsFolder(tmp_path).outcome(jobs[1].digest) is None  # it is run again next time
 
 
 def test_functions_run_on_it_too_and_one_death_costs_one_more_run(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from app.batch.job import Job
 from app.batch.outcome import Outcome
 from app.batch.results_folder import ResultsFolder
 from calib_core.errors import InputError
-from tests.batch_calls import quick_jobs, squared
+from tests.batch_calls import quick_jobs, squared, written
 
 
 def test_jobs_run_in_order_and_leave_their_outcomes(tmp_path: Path) -> None:
@@ -41,7 +41,7 @@ def test_a_bug_in_one_job_is_its_outcome(tmp_path: Path, monkeypatch: pytest.Mon
     outcomes = list(InProcess().run(quick_jobs(tmp_path, 2), tmp_path))
     assert [outcome.status for outcome in outcomes] == ["failed", "failed"]
     assert "RuntimeError: no such thing as v001" in outcomes[1].reason
-    assert ResultsFolder(tmp_path).outcome(outcomes[1].digest) == outcomes[1]
+    assert written(tmp_path, outcomes[1].digest) == outcomes[1]
 
 
 def test_a_folder_that_cannot_be_written_is_told_in_words(tmp_path: Path) -> None:
