@@ -6,11 +6,13 @@
 
 import { boxing } from "./boxes.js";
 import { dismiss } from "./dismissing.js";
-import { lookAt, lookInto, pan, toCss, viewport, zoom } from "./geometry.js";
-import { make, toast } from "./notices.js";
-import { fit, marks, redraw } from "./picture.js";
+import { toCss, viewport } from "./geometry.js";
+import { toast } from "./notices.js";
+import { fit } from "./picture.js";
 import { goTo, pause } from "./player.js";
-import { isSearching, progressWords, say, searchWords } from "./proposal_words.js";
+import { startSwitch } from "./proposal_switch.js";
+import { isSearching, say, searchWords } from "./proposal_words.js";
+import { zoomInto } from "./proposal_zoom.js";
 import { send } from "./socket.js";
 import { clickIn, emit, isDismissed, isLookedAt, isOffered, on, placementsAt, state } from "./state.js";
 
@@ -18,11 +20,6 @@ import { clickIn, emit, isDismissed, isLookedAt, isOffered, on, placementsAt, st
 /** @typedef {import("./messages.js").ProposalPlace} Place */
 /** A proposal on screen, and which of its places is taken. @typedef {{row: Row, place: Place, number: number}} Offer */
 
-/** What is shown of the picture around a proposal: so many widths of the reflector, and at least this part of the picture. */
-const WIDTHS = 9;
-const PART = 0.1;
-/** Room below a proposal for the line on the frame, so that it does not cover the reflector [CSS px]. */
-const BELOW = 120;
 /** Nothing is decided so soon after a proposal appeared, or moved to a better place [ms]: nobody has seen it yet. */
 const UNSEEN = 300;
 /** A place that moved by less is the same [px]. */
@@ -34,6 +31,8 @@ const known = new Map();
 const sent = new Set();
 /** Those decided here, the last one at the end; undo leads back to it. @type {number[]} */
 const decided = [];
+/** Decided placements that the server's view had as decided. @type {Set<number>} */
+const closed = new Set();
 /** Those that N left undecided in this round. @type {Set<number>} */
 const skipped = new Set();
 /** The way back. @type {number[]} */
@@ -52,19 +51,9 @@ let seen;
 const onTheWay = new Map();
 /** Whether the last proposal was decided just now: Enter then means nothing else until another key is pressed, or the pointer. */
 let over = false;
-/** The switch; made at the start. @type {HTMLButtonElement} */
-let chip;
 
 export function startProposals() {
-  chip = /** @type {HTMLButtonElement} */ (make("button", "chip", ""));
-  chip.dataset.layer = "proposals";
-  chip.onclick = (event) => {
-    toggleProposals();
-    if (event.detail) /** @type {HTMLElement} */ (marks.parentElement).focus({ preventScroll: true }); // Enter is for the picture then
-  };
-  document.getElementById("layers")?.append(chip);
-  drawChip();
-  on(["proposals", "recording", "placements"], drawChip);
+  startSwitch();
   on(["shown"], arrive);
   on(["shown", "view", "proposals", "placements", "playing"], notice);
   on(["view"], settle);
@@ -178,22 +167,6 @@ function arrive() {
   const offer = shownOffer();
   awaited = null;
   if (offer) zoomInto(offer);
-}
-
-/** The middle of a view of a place, such that the picture fills the view if it can. @param {number} at image px @param {number} box CSS px @param {number} size image px */
-function within(at, box, size) {
-  const half = box / zoom() / 2;
-  return half > size / 2 ? (size - 1) / 2 : Math.min(size - 0.5 - half, Math.max(half - 0.5, at));
-}
-
-/** @param {Offer} offer */
-function zoomInto({ row, place }) {
-  const field = Math.max(WIDTHS * row.width_px, PART * viewport.imageWidth);
-  lookInto(place.u_px, place.v_px, field, field);
-  lookAt(within(place.u_px, viewport.width, viewport.imageWidth), within(place.v_px, viewport.height, viewport.imageHeight));
-  pan(0, Math.min(0, viewport.height - BELOW - toCss(place.u_px, place.v_px)[1]));
-  redraw();
-  emit("box");
 }
 
 /** Whether what is on screen appeared there a moment ago. */
@@ -324,23 +297,4 @@ function settle() {
   decided.pop();
   const row = openProposals().find(({ placement }) => placement === last);
   if (row) show(row);
-}
-
-/** Decided placements that the server's view had as decided. @type {Set<number>} */
-const closed = new Set();
-
-/** O: propose, or do not. */
-export async function toggleProposals() {
-  const refusal = await send({ type: "propose", on: !state.proposals?.on });
-  if (refusal) toast(refusal);
-}
-
-function drawChip() {
-  const news = state.proposals;
-  const busy = news?.on && (news.stage === "looking" || news.stage === "comparing");
-  chip.hidden = !news || state.looking;
-  chip.setAttribute("aria-pressed", String(Boolean(news?.on)));
-  chip.classList.toggle("troubled", Boolean(news?.on && news.problem));
-  chip.replaceChildren(make("kbd", "", "O"), busy ? `Proposals ${news.done}/${news.count}` : news?.on && news.problem ? "Proposals: none" : "Proposals");
-  chip.dataset.hint = ["Proposes where the reflector stood: the radar says when, the picture shows where. Nothing counts before it is accepted. (O)", progressWords()].filter(Boolean).join("\n");
 }

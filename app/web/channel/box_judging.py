@@ -75,7 +75,8 @@ class BoxJudging:
         with error_boundary("judging the calibration by boxes", _log.error):
             while (wanted := self._workspace.to_judge) != self._judged and not self._is_waiting():
                 self._judged = wanted
-                self._workspace.show_acc(replace(self._workspace.acc, judging=True), wanted)
+                if self._workspace.session.boxes:
+                    self._workspace.show_acc(replace(self._workspace.acc, judging=True), wanted)
                 work = partial(self._panel, self._workspace.boxes, wanted[1])
                 panel = await asyncio.get_running_loop().run_in_executor(self._executor, work)
                 if self._workspace.to_judge == wanted:

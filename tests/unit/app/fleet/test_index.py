@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from app.batch.manifest import ManifestRow
-from app.batch.results_folder import ResultsFolder
+from app.batch.outcome import read_outcome
+from app.batch.results_folder import OUTCOME_FILE, ResultsFolder
 from app.fleet.index import INDEX_VERSION, FleetIndex, index_path, read_fleet, rebuild_index
 from app.fleet.records import FleetRecord
 from calib_core.errors import InputError
@@ -54,13 +55,11 @@ def _rows() -> list[ManifestRow]:
 
 @pytest.mark.parametrize("order", [1, -1])
 def test_an_index_written_along_equals_one_rebuilt_from_the_results(folder: Path, tmp_path: Path, order: int) -> None:
-    done, other = ResultsFolder(folder), tmp_path / "other"
+    other = tmp_path / "other"
     with FleetIndex(other, _rows()) as index:
         for place in sorted((folder / "results").iterdir())[::order]:
             shutil.copytree(place, other / "results" / place.name)
-            outcome = done.outcome(place.name)
-            assert outcome is not None
-            index.add(outcome)
+            index.add(read_outcome((place / OUTCOME_FILE).read_text()))
     rebuild_index(folder, _rows())
     assert _content(folder) == _content(other)
     assert _summary(read_fleet(folder)) == _summary(read_fleet(other))
