@@ -28,6 +28,8 @@ from calib_core.estimation.lens_prior import useless_covariance
 from calib_core.estimation.measurement_model import PairMeasurements, pair_measurements
 from calib_core.estimation.pair_results import excluded_pair_results, fit_metrics, used_pair_results
 from calib_core.estimation.posterior.beyond_the_fit import look_beyond
+from calib_core.fleet.prior_answer import fleet_answer, fleet_warnings
+from calib_core.fleet_prior import FleetAnswer, FleetPrior
 from calib_core.measurements import MIN_PAIRS, Pair, RadarScans, ReflectorClick, Unpaired, Unsolvable
 from calib_core.option_checks import checked_options
 from calib_core.options import CalibrationOptions
@@ -35,6 +37,7 @@ from calib_core.pair_checks import checked_pairs
 from calib_core.plausibility import implausible_input
 from calib_core.radar import cartesian_from_polar
 from calib_core.results import Calibration
+from calib_core.unsolved import DEGENERATE
 
 __all__ = ["calibrate", "calibrate_pairs", "calibration_steps", "preview_pairs", "solve_again"]
 
@@ -49,6 +52,7 @@ def calibrate(
     options: CalibrationOptions | None = None,
     *,
     background: RadarScans | None = None,
+    fleet_prior: FleetPrior | None = None,
 ) -> Calibration | Unsolvable:
     """Calibrate from clicks and radar scans.
 
@@ -58,8 +62,14 @@ def calibrate(
         camera: the intrinsics.
         options: None takes the defaults; method "paper" is Algorithm 1 as printed, "pmm" the pose of the mounting.
         background: scans of the whole recording, to tell what stands there before and after each placement; optional.
+        fleet_prior: what the fleet says of this vehicle; optional.
+
+    Raises:
+        InputError: the method takes no fleet's prior.
     """
-    *_, outcome = calibration_steps(clicks, scans, camera, options, background=background, preview=False)
+    *_, outcome = calibration_steps(
+        clicks, scans, camera, options, background=background, preview=False, fleet_prior=fleet_prior
+    )
     return outcome
 
 
@@ -72,6 +82,7 @@ def calibration_steps(
     background: RadarScans | None = None,
     previous: Calibration | None = None,
     preview: bool = True,
+    fleet_prior: FleetPrior | None = None,
 ) -> Iterator[Calibration | Unsolvable]:
     """Calibrate in two steps: first a preview with pose and local covariance, then the answer, the same as `calibrate`'s.
 
@@ -86,8 +97,13 @@ def calibration_steps(
         background: scans of the whole recording, to tell what stands there before and after each placement; optional.
         previous: the answer to nearly the same clicks, to start the preview from.
         preview: make one.
+        fleet_prior: what the fleet says of this vehicle; optional.
+
+    Raises:
+        InputError: the method takes no fleet's prior.
     """
     options = checked_options(options or CalibrationOptions())
+    _require_default(options, fleet_prior)
     if options.method == "paper":
         from calib_core.paper.algorithm_1 import calibrate_as_printed
 
@@ -98,7 +114,7 @@ def calibration_steps(
     if options.method in ("pmm", "ccm"):
         yield _baseline(pairing.pairs, pairing.unpaired, excluded, camera, options)
         return
-    task = _Task.of(pairing.pairs, pairing.unpaired, excluded, camera, options)
+    task = _Task.of(pairing.pairs, pairing.unpaired, excluded, camera, options, fleet_prior)
     for outcome in _steps(task, previous=previous, preview=preview):
         if isinstance(outcome, Unsolvable):
             yield replace(outcome, unpaired=pairing.unpaired, pairs=pairing.pairs)
@@ -113,6 +129,8 @@ def calibrate_pairs(
     camera: Camera,
     options: CalibrationOptions | None = None,
     excluded: frozenset[str] = frozenset(),
+    *,
+    fleet_prior: FleetPrior | None = None,
 ) -> Calibration | Unsolvable:
     """Calibrate from existing pairs, such as those of a pairs file.
 
@@ -121,19 +139,28 @@ def calibrate_pairs(
         camera: the intrinsics.
         options: None takes the defaults; method "paper" is Algorithm 1 as printed, from its RANSAC on.
         excluded: ids of pairs that are shown, but not used.
+        fleet_prior: what the fleet says of this vehicle; optional.
 
     Raises:
-        InputError: a pair contains a number that is impossible, or an id occurs twice.
+        InputError: a pair contains a number that is impossible, an id occurs twice, or the method takes no fleet's prior.
     """
     options = checked_options(options or CalibrationOptions())
+    _require_default(options, fleet_prior)
     if options.method == "paper":
         from calib_core.paper.algorithm_1 import solve_pairs_as_printed
 
         return solve_pairs_as_printed(checked_pairs(pairs, with_noise=False), camera, options, excluded)
     if options.method in ("pmm", "ccm"):
         return _baseline(_in_order(checked_pairs(pairs, with_noise=False)), (), excluded, camera, options)
-    *_, outcome = _steps(_task_of_pairs(pairs, camera, options, excluded), previous=None, preview=False)
+    *_, outcome = _steps(_task_of_pairs(pairs, camera, options, excluded, fleet_prior), previous=None, preview=False)
     return outcome
+
+
+def _require_default(options: CalibrationOptions, fleet_prior: FleetPrior | None) -> None:
+    if fleet_prior is not None and options.method != "default":
+        raise InputError(
+            f"a fleet's prior is used by the default method only, and the method is {options.method}; leave one of them out"
+        )
 
 
 def _baseline(
@@ -174,10 +201,14 @@ def preview_pairs(
 
 
 def _task_of_pairs(
-    pairs: Sequence[Pair], camera: Camera, options: CalibrationOptions, excluded: frozenset[str]
+    pairs: Sequence[Pair],
+    camera: Camera,
+    options: CalibrationOptions,
+    excluded: frozenset[str],
+    fleet_prior: FleetPrior | None = None,
 ) -> "_Task":
     checked_pairs(pairs, with_noise=True)
-    return _Task.of(tuple(_in_order(pairs)), (), excluded, camera, options)
+    return _Task.of(tuple(_in_order(pairs)), (), excluded, camera, options, fleet_prior)
 
 
 def _in_order(pairs: Sequence[Pair]) -> list[Pair]:
@@ -185,7 +216,9 @@ def _in_order(pairs: Sequence[Pair]) -> list[Pair]:
     return sorted(pairs, key=lambda pair: (pair.image_time is not None, pair.image_time or 0))
 
 
-def solve_again(calibration: Calibration, options: CalibrationOptions | None = None) -> Calibration | Unsolvable:
+def solve_again(
+    calibration: Calibration, options: CalibrationOptions | None = None, fleet_prior: FleetPrior | None = None
+) -> Calibration | Unsolvable:
     """Solve again from the pairs that a calibration kept; with the same options the result is the same, bit for bit.
 
     Whatever depends on the recording is copied: clicks without a radar position, and the warnings about clocks.
@@ -193,9 +226,10 @@ def solve_again(calibration: Calibration, options: CalibrationOptions | None = N
     Args:
         calibration: solved here, or read from a calibration-1 file.
         options: None takes the calibration's own. Refined intrinsics are taken as they were before.
+        fleet_prior: None takes the one that the calibration was given, if any.
 
     Raises:
-        InputError: the calibration does not contain the candidates of its pairs.
+        InputError: the method takes no fleet's prior, or the calibration does not contain the candidates of its pairs.
     """
     kept = [pair.measured for pair in calibration.pairs if pair.measured is not None]
     if not calibration.pairs:
@@ -209,7 +243,10 @@ def solve_again(calibration: Calibration, options: CalibrationOptions | None = N
     if options.method != "paper":
         kept = [_with_noise(pair, options) for pair in kept]
     excluded = frozenset(pair.id for pair in calibration.pairs if pair.excluded)
-    outcome = calibrate_pairs(kept, calibration.given_camera or calibration.camera, options, excluded)
+    if fleet_prior is None and calibration.fleet is not None and options.method == "default":
+        fleet_prior = calibration.fleet.prior
+    camera = calibration.given_camera or calibration.camera
+    outcome = calibrate_pairs(kept, camera, options, excluded, fleet_prior=fleet_prior)
     if isinstance(outcome, Unsolvable):
         return replace(outcome, unpaired=calibration.unpaired)
     clock_warnings = [warning for warning in calibration.warnings if warning.code in CLOCK_CODES]
@@ -234,6 +271,8 @@ class _Task:
         clicked: the pairs that are used, in an order that the input order does not change.
         camera: the intrinsics.
         options: checked.
+        fleet_prior: what the fleet says of this vehicle; None without.
+        fleet: what that prior does; None as long as it is not known, or without a prior.
     """
 
     shown: tuple[Pair, ...]
@@ -242,6 +281,8 @@ class _Task:
     clicked: tuple[Pair, ...]
     camera: Camera
     options: CalibrationOptions
+    fleet_prior: FleetPrior | None = None
+    fleet: FleetAnswer | None = None
 
     @classmethod
     def of(
@@ -251,9 +292,15 @@ class _Task:
         excluded: frozenset[str],
         camera: Camera,
         options: CalibrationOptions,
+        fleet_prior: FleetPrior | None = None,
     ) -> "_Task":
         clicked = sorted((pair for pair in shown if pair.id not in excluded), key=_canonical)
-        return cls(shown, unpaired, excluded, tuple(clicked), camera, options)
+        return cls(shown, unpaired, excluded, tuple(clicked), camera, options, fleet_prior)
+
+    def measurements(self, groups: Sequence[PlacementGroup]) -> PairMeasurements:
+        """Stack the placements, with the fleet's prior once it is known to apply."""
+        prior = self.fleet.prior if self.fleet is not None and self.fleet.used else None
+        return pair_measurements([group.pair for group in groups], self.camera, self.options, prior)
 
 
 def _steps(task: _Task, *, previous: Calibration | None, preview: bool) -> Iterator[Calibration | Unsolvable]:
@@ -270,7 +317,7 @@ def _steps(task: _Task, *, previous: Calibration | None, preview: bool) -> Itera
     if len(groups) < MIN_PAIRS:
         yield unsolved.one_place(len(task.clicked), len(groups))
         return
-    measurements = pair_measurements([group.pair for group in groups], task.camera, task.options)
+    measurements = task.measurements(groups)
     if preview:
         quick = quick_fit(measurements, task.options, previous)
         if quick is not None:
@@ -278,7 +325,27 @@ def _steps(task: _Task, *, previous: Calibration | None, preview: bool) -> Itera
             described = _described(task, groups, measurements, solution)
             first = flat_radar(quick, solution.uncertainty, task.options.radar)
             yield _preview(described, previous or replace(described, warnings=tuple(first)))
-    yield _answer(task, groups, measurements)
+    answer = _answer(task, groups, measurements)
+    yield answer if task.fleet_prior is None else _with_fleet(task, groups, answer, task.fleet_prior)
+
+
+def _with_fleet(
+    task: _Task, groups: Sequence[PlacementGroup], alone: Calibration | Unsolvable, prior: FleetPrior
+) -> Calibration | Unsolvable:
+    """Test the answer of the data alone against the fleet's prior, and solve with the prior unless it is contradicted.
+
+    Pairs that agree on no pose are refused with a prior as without one: it only replaces what placements leave open.
+    """
+    if isinstance(alone, Unsolvable) and alone.code != DEGENERATE:
+        return alone
+    fleet = fleet_answer(prior, alone)
+    if not fleet.used and isinstance(alone, Calibration):
+        return replace(alone, fleet=fleet, warnings=(*fleet_warnings(fleet, alone), *alone.warnings))
+    informed = replace(task, fleet=fleet)
+    answer = _answer(informed, groups, informed.measurements(groups))
+    if isinstance(answer, Unsolvable):
+        return answer
+    return replace(answer, warnings=(*fleet_warnings(fleet, answer), *answer.warnings))
 
 
 def _preview(calibration: Calibration, previous: Calibration) -> Calibration:
@@ -371,6 +438,7 @@ def _described(
         radar_errors=refined.measurements.errors.radar,
         systematic_errors=uncertainty.systematic_errors,
         given_camera=task.camera if camera is not None else None,
+        fleet=task.fleet,
     )
     return replace(calibration, pairs=click_results(calibration, groups, task.shown))
 

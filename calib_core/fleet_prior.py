@@ -1,11 +1,11 @@
-"""What a fleet says about its next vehicle: where camera and radar of its type are mounted, and how far that scatters."""
+"""What a fleet says about its next vehicle, as a prior, and what that prior did to a calibration."""
 
 from dataclasses import dataclass
 
 from calib_core.arrays import Matrix66, frozen_array
 from calib_core.geometry import RigidTransform
 
-__all__ = ["FleetPrior"]
+__all__ = ["DataAlone", "FleetAnswer", "FleetPrior"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -16,9 +16,11 @@ class FleetPrior:
         vehicle_type: its name.
         camera_from_radar: the mean pose of the type.
         covariance: (6, 6) of a further vehicle about that mean: the scatter of the mountings and the uncertainty of the mean
-            [m, rad], in the order and convention of `Calibration.covariance`.
+            [m, rad], in the order and convention of `Calibration.covariance`; widened for the scatter being an estimate.
         vehicles: names of the vehicles it rests on, in order.
         left_out: names of those that were not counted, in order.
+        widened: the factor by which that made the covariance wider; at least 1.
+        freedom: degrees of freedom of the estimated scatter; infinite if it is known.
     """
 
     vehicle_type: str
@@ -26,6 +28,45 @@ class FleetPrior:
     covariance: Matrix66
     vehicles: tuple[str, ...]
     left_out: tuple[str, ...] = ()
+    widened: float = 1.0
+    freedom: float = float("inf")
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "covariance", frozen_array(self.covariance, (6, 6)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DataAlone:
+    """The answer of the pairs without the fleet's prior.
+
+    Attributes:
+        camera_from_radar: the pose.
+        covariance: (6, 6) of its error, as `Calibration.covariance`.
+        covariance_quantile: the factor on covariance that gives the 95 % ellipsoid.
+    """
+
+    camera_from_radar: RigidTransform
+    covariance: Matrix66
+    covariance_quantile: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "covariance", frozen_array(self.covariance, (6, 6)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FleetAnswer:
+    """What a fleet's prior did to a calibration.
+
+    Attributes:
+        prior: the prior that was given.
+        used: the pose rests on it; False if the vehicle is off its kind, so that the pose is that of the data alone.
+        data_alone: the answer without it; None if the data alone give no pose, so that nothing tests the prior.
+        squared: squared Mahalanobis distance of that answer from the prior's mean; NaN if it was not tested.
+        limit: its 1-in-10,000 point; NaN if it was not tested.
+    """
+
+    prior: FleetPrior
+    used: bool
+    data_alone: DataAlone | None
+    squared: float = float("nan")
+    limit: float = float("nan")

@@ -8,6 +8,7 @@ import numpy as np
 from calib_core.arrays import Matrix66, Points2, Points3, Vector2, Vector3, frozen_array
 from calib_core.camera import Camera
 from calib_core.errors import InputError
+from calib_core.fleet_prior import FleetAnswer, FleetPrior
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 from calib_core.measurements import Pair, TimeNs, Unpaired
 from calib_core.options import CalibrationOptions
@@ -208,6 +209,7 @@ class Calibration:
         systematic_errors: every error that the pairs share, and its part in the uncertainty.
         checking: whether this is a preview: its warnings and advice are those of the previous answer.
         given_camera: the intrinsics before they were refined; None if they were not.
+        fleet: what a fleet's prior did; None if none was given.
     """
 
     camera_from_radar: RigidTransform
@@ -228,6 +230,7 @@ class Calibration:
     systematic_errors: tuple[SystematicErrorResult, ...] = ()
     checking: bool = False
     given_camera: Camera | None = None
+    fleet: FleetAnswer | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "covariance", frozen_array(self.covariance, (6, 6)))
@@ -263,6 +266,11 @@ class Calibration:
         """The camera, as well known as it was before any pair: to weigh these pairs, or others, with it once more."""
         given = self.given_camera
         return self.camera if given is None else replace(self.camera, covariance=given.covariance)
+
+    @property
+    def fleet_prior(self) -> FleetPrior | None:
+        """The fleet's prior that the pose rests on; None if it rests on none."""
+        return self.fleet.prior if self.fleet is not None and self.fleet.used else None
 
     @property
     def sees_elevation(self) -> bool:

@@ -4,7 +4,20 @@ from calib_core.arrays import Vector3
 from calib_core.measurements import MIN_PAIRS, Pair, Unpaired, Unsolvable
 from calib_core.options import CameraPositionPrior
 
-__all__ = ["contradicted", "degenerate", "mirrored", "no_board_pictures", "no_pose", "one_place", "too_few"]
+__all__ = [
+    "DEGENERATE",
+    "contradicted",
+    "degenerate",
+    "mirrored",
+    "no_board_pictures",
+    "no_pose",
+    "one_place",
+    "too_few",
+]
+
+
+DEGENERATE = "degenerate-placements"
+"""The code of placements that leave part of the pose open."""
 
 
 def too_few(used: int, excluded: int, unpaired: int, untouched: int = 0) -> Unsolvable:
@@ -30,7 +43,7 @@ def mirrored(reason: str) -> Unsolvable:
 def degenerate(count: int) -> Unsolvable:
     """The placements leave part of the pose open."""
     return Unsolvable(
-        "degenerate-placements",
+        DEGENERATE,
         f"the {count} placements do not determine the pose: they lie at one place or on one line",
         "spread the placements: near and far, left and right",
     )
@@ -39,7 +52,7 @@ def degenerate(count: int) -> Unsolvable:
 def one_place(clicks: int, placements: int) -> Unsolvable:
     """Most clicks show the same placement."""
     return Unsolvable(
-        "degenerate-placements",
+        DEGENERATE,
         f"the {clicks} clicks show {placements} of at least {MIN_PAIRS} required placements: clicks of one placement count "
         "as one",
         "move the reflector between clicks: near and far, left and right",

@@ -21,6 +21,7 @@ __all__ = [
     "GOOD_DEG",
     "HELD_OUT_RATIO",
     "SURE_PAIRS",
+    "SURE_PAIRS_OF_KIND",
     "USABLE_CM",
     "USABLE_DEG",
     "Verdict",
@@ -38,6 +39,8 @@ USABLE_DEG, USABLE_CM = 3.0, 30.0
 does not depend on how it is mounted, its position does."""
 SURE_PAIRS = 8
 """With fewer pairs neither a wrong pair nor a wrong noise level can be detected: the verdict is weak."""
+SURE_PAIRS_OF_KIND = 5
+"""The same for a pose that rests on a fleet's prior: its six parameters take nothing from the pairs' residuals."""
 HELD_OUT_RATIO = 2.0
 """With a held-out error above this many times the fitted one, single pairs decide: the verdict is not good."""
 
@@ -147,7 +150,7 @@ def _judged(calibration: Calibration, error: StatedError, warning: DataWarning |
             return Verdict("weak", warning.message, action)
         few = f", from only {count} pairs" if warning.code == "few-pairs" else ""
         return Verdict("weak", f"uncertain to {error.text}{few}", action)
-    if count < SURE_PAIRS:
+    if count < (SURE_PAIRS if calibration.fleet_prior is None else SURE_PAIRS_OF_KIND):
         return Verdict("weak", f"uncertain to {error.text}, from only {count} pairs", _most_helpful(calibration, left))
     if error.rotation_deg > USABLE_DEG or error.position_cm > USABLE_CM:
         return Verdict("weak", f"uncertain to {error.text}", _most_helpful(calibration, left))

@@ -37,6 +37,8 @@ _CODES: dict[Consequence, tuple[str, ...]] = {
         "clock-bias-suspected",
         "radar-axes-suspected",
         "repeated-placements",
+        "off-its-kind",
+        "fleet-prior-untested",
     ),
     "limited": (
         "flat-radar",
@@ -49,6 +51,7 @@ _CODES: dict[Consequence, tuple[str, ...]] = {
         "handedness-assumed",
         "beside-board",
         "nobody-confirmed",
+        "fleet-prior-decides",
     ),
 }
 """The codes of each consequence, the gravest first."""

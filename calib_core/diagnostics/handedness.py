@@ -92,8 +92,8 @@ class GroundSides:
 
 def mirrored_axes(fit: SolvedFit) -> list[DataWarning]:
     """Warn if mirrored radar axes are more likely, or about as likely."""
-    if fit.measurements.flat:
-        return []  # a mirrored axis is then a rotation, which the pose absorbs
+    if fit.measurements.flat or fit.measurements.prior.fleet is not None:
+        return []  # a mirrored axis is then a rotation, which the pose absorbs; or the pose would be far from the fleet's
     plane = _plane(fit)
     sides, heights_decide = _expected_sides(plane, fit), _heights_decide(plane)
     if sides is not None and sides.same and not heights_decide:
@@ -123,8 +123,8 @@ def mirrored_axes(fit: SolvedFit) -> list[DataWarning]:
 def assumed_axes(fit: SolvedFit) -> list[DataWarning]:
     """Warn if only the expected camera distance, and not the pairs, rules out mirrored axes."""
     already_warned = fit.mirror_gain > NOT_MIRRORED_GAIN or fit.measurements.flat
-    plane = _plane(fit)
-    if already_warned or fit.measurements.prior.measured or _heights_decide(plane):
+    prior, plane = fit.measurements.prior, _plane(fit)
+    if already_warned or prior.measured or prior.fleet is not None or _heights_decide(plane):
         return []
     sides = _expected_sides(plane, fit)
     if sides is not None and (sides.same or sides.opposite):
@@ -133,7 +133,7 @@ def assumed_axes(fit: SolvedFit) -> list[DataWarning]:
         DataWarning(
             "handedness-assumed",
             "the placements lie near one plane, so mirrored radar axes fit equally well: that none is mirrored is inferred "
-            f"only from the camera being within about {fit.measurements.prior.sigma_m:g} m of the radar",
+            f"only from the camera being within about {prior.sigma_m:g} m of the radar",
             "measure the camera position (0.3 m is enough for this), or add placements at other heights (a tripod)",
         )
     ]

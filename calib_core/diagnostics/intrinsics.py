@@ -103,7 +103,9 @@ def lens_errors(fit: SolvedFit) -> tuple[LensError, LensError]:
     jacobian, residual, lens = _as_if_given(fit)
     prior_residual, prior_jacobian = prior_rows(refined.measurements, refined.camera_from_radar)
     kept = _not_of_lens(fit)
-    prior_residual, prior_jacobian = prior_residual[kept[3:]], prior_jacobian[kept[3:]][:, kept]
+    of_pose = np.ones(len(prior_residual) - len(kept[6:]), dtype=np.bool_)
+    rows = np.concatenate([of_pose, kept[6:]])
+    prior_residual, prior_jacobian = prior_residual[rows], prior_jacobian[rows][:, kept]
     moves_px = np.stack([offset_px, offset_px * share[:, None]], axis=2)
     gains = ((refined.model.whitening @ moves_px) * root[:, :, None]).reshape(-1, 2)
     unknowns = prior_jacobian.shape[1]

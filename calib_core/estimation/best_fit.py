@@ -55,7 +55,7 @@ def best_fit(measurements: PairMeasurements, options: CalibrationOptions) -> Bes
         return degenerate(len(measurements))
     refined = fit_errors_in_variables(measurements, found[0], estimate_scale=estimate_scale)
     gain = -np.inf
-    if not _clearly_not_mirrored(measurements, refined):
+    if fleet is None and not _clearly_not_mirrored(measurements, refined):
         fitted = refined if few is measurements else None
         gain = mirror_gain(few, found[0], plain=fitted, estimate_scale=estimate_scale, seed=seed)
     inliers = int(refined.inliers.sum())

@@ -6,7 +6,6 @@ from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit, fit_
 from calib_core.estimation.gnc import GncSolution, mixture_cost, solve_gnc
 from calib_core.estimation.initialization import initial_poses
 from calib_core.estimation.measurement_model import PairMeasurements
-from calib_core.geometry import RigidTransform
 
 __all__ = ["MIRRORED_GAIN", "NOT_MIRRORED_GAIN", "mirror_gain"]
 
@@ -50,9 +49,8 @@ def mirror_gain(
     found = solve_gnc(mirrored, starts, estimate_scale=estimate_scale)
     if not found:
         return -np.inf
-    of_pairs = best.cost - _fleet_cost(measurements, best.camera_from_radar)
-    if abs(of_pairs - found[0].cost) > _DECISIVE_DIFFERENCE:
-        return of_pairs - found[0].cost
+    if abs(best.cost - found[0].cost) > _DECISIVE_DIFFERENCE:
+        return best.cost - found[0].cost
     gain = -np.inf
     for coarse in (True, False):
         straight = plain or fit_errors_in_variables(measurements, best, estimate_scale=estimate_scale, coarse=coarse)
@@ -64,10 +62,4 @@ def mirror_gain(
 
 
 def _cost(fit: ErrorsInVariablesFit) -> float:
-    pose = fit.camera_from_radar
-    return mixture_cost(fit.measurements, pose) - _fleet_cost(fit.measurements, pose)
-
-
-def _fleet_cost(measurements: PairMeasurements, pose: RigidTransform) -> float:
-    """Return the share of the fleet's prior in a cost: it knows only one handedness, so neither is judged by it."""
-    return float(measurements.prior.fleet_costs(pose.rotation, pose.translation_m))
+    return mixture_cost(fit.measurements, fit.camera_from_radar)

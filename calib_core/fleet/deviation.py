@@ -8,11 +8,12 @@ from calib_core.arrays import Matrix66, Values, frozen_array
 from calib_core.fleet.random_effects import RandomEffects
 from calib_core.fleet.tails import DIMENSIONS, FALSE_RATE, quantile, tail
 
-__all__ = ["Deviation", "deviation"]
+__all__ = ["Deviation", "departure", "deviation"]
 
 _WHOLE = 5.0
 _MOST_OF_FREEDOM = 0.8
 _AXES = ("forward", "left", "up", "roll", "pitch", "yaw")
+_MOST_KNOWN = 1e7
 _NAMED, _MOST_NAMED = 3.0, 3
 _TO_SHOWN = np.array([100.0] * 3 + [180.0 / np.pi] * 3)
 
@@ -69,12 +70,31 @@ def deviation(effects: RandomEffects, vector: Values, covariance: Matrix66, *, f
         covariance: (6, 6) of its calibration, in these coordinates.
         freedom: degrees of freedom of that.
     """
-    predicted = effects.covariance
+    return departure(
+        vector - effects.mean,
+        effects.covariance,
+        covariance,
+        predicted_freedom=effects.freedom,
+        freedom=freedom,
+    )
+
+
+def departure(
+    away: Values, predicted: Matrix66, covariance: Matrix66, *, predicted_freedom: float, freedom: float
+) -> Deviation:
+    """Judge how far one mounting is from the mean of others, as `deviation` does.
+
+    Args:
+        away: (6,) coordinates of this one from that mean.
+        predicted: (6, 6) covariance of a further mounting about it.
+        covariance: (6, 6) of this one's calibration.
+        predicted_freedom: degrees of freedom of the scatter in `predicted`.
+        freedom: degrees of freedom of `covariance`.
+    """
     total = predicted + covariance
-    away = vector - effects.mean
     squared = float(away @ np.linalg.solve(total, away))
     share = float(np.trace(np.linalg.solve(total, predicted))) / DIMENSIONS
-    nu = 1.0 / (share**2 / effects.freedom + (1.0 - share) ** 2 / freedom)
+    nu = 1.0 / (share**2 / min(predicted_freedom, _MOST_KNOWN) + (1.0 - share) ** 2 / freedom)
     whole = min(_WHOLE * share, _MOST_OF_FREEDOM * nu)
     limit = quantile(1.0 - FALSE_RATE, nu, whole=whole)
     return Deviation(away, total, squared, limit, tail(squared, nu, whole=whole))

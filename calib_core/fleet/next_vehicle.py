@@ -28,4 +28,6 @@ def fleet_prior_of(scatter: MountingScatter) -> FleetPrior:
         covariance=pose_covariance(wider * effects.covariance, pose),
         vehicles=tuple(sorted(counted)),
         left_out=tuple(sorted({one.mounting.vehicle for one in scatter.left_out} - counted)),
+        widened=wider,
+        freedom=effects.freedom,
     )

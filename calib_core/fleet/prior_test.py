@@ -1,52 +1,29 @@
 """Is a vehicle off its kind by the fleet's prior alone, as when the other vehicles' calibrations are not at hand?"""
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from calib_core.arrays import Matrix66
-from calib_core.fleet.session_pose import CHI2_95
-from calib_core.fleet.tails import FALSE_RATE, quantile
-from calib_core.fleet_prior import FleetPrior
-from calib_core.geometry import RigidTransform
+from calib_core.fleet.deviation import Deviation, departure
+from calib_core.fleet.mounting_coordinates import coordinate_jacobian, coordinates
+from calib_core.fleet_prior import DataAlone, FleetPrior
+from calib_core.stated_error import degrees_of_freedom
 
-__all__ = ["PriorTest", "prior_test"]
-
-_WHOLE, _MOST_OF_FREEDOM, _LEAST_FREEDOM = 5.0, 0.8, 2.0
+__all__ = ["prior_test"]
 
 
-@dataclass(frozen=True, slots=True)
-class PriorTest:
-    """A calibration compared with a fleet's prior.
-
-    Attributes:
-        squared: squared Mahalanobis distance from the prior's mean, under the sum of both covariances.
-        limit: the 1-in-10,000 point over six degrees of freedom.
-    """
-
-    squared: float
-    limit: float
-
-    @property
-    def is_off(self) -> bool:
-        """Whether the vehicle is off its kind."""
-        return self.squared > self.limit
-
-
-def prior_test(prior: FleetPrior, camera_from_radar: RigidTransform, covariance: Matrix66) -> PriorTest:
-    """Test a calibration that was made without the prior.
-
-    The prior's covariance is widened so that its normal ellipsoid holds 95 % of further vehicles; the limit is as much farther
-    out as the 1-in-10,000 point is in a fleet of its size, with one degree of freedom for each vehicle but one.
+def prior_test(prior: FleetPrior, alone: DataAlone) -> Deviation:
+    """Test a calibration that was made without the prior against it.
 
     Args:
         prior: of the vehicle's type, without this vehicle.
-        camera_from_radar: from the data alone.
-        covariance: (6, 6) of that [m, rad].
+        alone: the calibration from the data alone.
     """
-    error = camera_from_radar.error_from(prior.camera_from_radar)
-    squared = float(error @ np.linalg.solve(prior.covariance + covariance, error))
-    freedom = max(len(prior.vehicles) - 1.0, _LEAST_FREEDOM)
-    whole = min(_WHOLE, _MOST_OF_FREEDOM * freedom)
-    ratio = quantile(1.0 - FALSE_RATE, freedom, whole=whole) / quantile(0.95, freedom, whole=whole)
-    return PriorTest(squared, CHI2_95 * ratio)
+    mean = prior.camera_from_radar
+    to_mounting = coordinate_jacobian(mean, mean)
+    own = coordinate_jacobian(alone.camera_from_radar, mean)
+    return departure(
+        coordinates(alone.camera_from_radar, mean),
+        np.asarray(to_mounting @ prior.covariance @ to_mounting.T) / prior.widened,
+        np.asarray(own @ alone.covariance @ own.T),
+        predicted_freedom=prior.freedom,
+        freedom=degrees_of_freedom(alone.covariance_quantile),
+    )

@@ -1,0 +1,90 @@
+"""What a fleet's prior does to a calibration: the test of the data alone against it, and what the user must know."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from calib_core.fleet.prior_test import prior_test
+from calib_core.fleet_prior import DataAlone, FleetAnswer, FleetPrior
+from calib_core.measurements import Unsolvable
+from calib_core.results import Calibration, DataWarning
+from calib_core.stated_error import stated_error
+
+__all__ = ["fleet_answer", "fleet_warnings"]
+
+_DECIDES = 2.0
+"""The prior decides if the data alone state an error this many times as large, of rotation or position."""
+
+
+def fleet_answer(prior: FleetPrior, alone: Calibration | Unsolvable) -> FleetAnswer:
+    """Test the answer of the data alone against the fleet's prior.
+
+    Args:
+        prior: of the vehicle's type, without this vehicle.
+        alone: the answer without the prior, or why there is none.
+    """
+    if isinstance(alone, Unsolvable) or not np.isfinite(alone.covariance).all():
+        return FleetAnswer(prior, used=True, data_alone=None)
+    data = DataAlone(alone.camera_from_radar, alone.covariance, alone.covariance_quantile)
+    away = prior_test(prior, data)
+    return FleetAnswer(prior, not away.is_beyond, data, away.squared, away.limit)
+
+
+def fleet_warnings(fleet: FleetAnswer, calibration: Calibration) -> tuple[DataWarning, ...]:
+    """Say what the fleet's prior means for an answer.
+
+    Args:
+        fleet: what it did.
+        calibration: the answer; its own warnings do not matter.
+    """
+    kind = fleet.prior.vehicle_type
+    if fleet.data_alone is None:
+        return (
+            DataWarning(
+                "fleet-prior-untested",
+                f"the data alone give no pose, so nothing tests whether this vehicle is of type {kind}; the fleet's "
+                "prior decides the pose",
+                "add placements until the data alone give a pose: near and far, left and right",
+            ),
+        )
+    away = prior_test(fleet.prior, fleet.data_alone)
+    if not fleet.used:
+        return (
+            DataWarning(
+                "off-its-kind",
+                f"the data contradict the fleet's prior of type {kind}: {away.text} (squared distance {away.squared:.3g}, "
+                f"1-in-10,000 point {away.limit:.3g}); the prior is not used",
+                "check that radar, camera, intrinsics and type are this vehicle's; if the mounting really is so, calibrate it "
+                "without the fleet's prior",
+            ),
+        )
+    return _decides(fleet, fleet.data_alone, calibration)
+
+
+def _decides(fleet: FleetAnswer, alone: DataAlone, calibration: Calibration) -> tuple[DataWarning, ...]:
+    """Say that the data alone are much less certain, so that a mounting unlike the others would be pulled to them."""
+    without = stated_error(_with(calibration, alone))
+    with_prior = stated_error(calibration)
+    rotation = without.rotation_deg >= _DECIDES * with_prior.rotation_deg
+    position = without.position_cm >= _DECIDES * with_prior.position_cm
+    if not (rotation or position):
+        return ()
+    return (
+        DataWarning(
+            "fleet-prior-decides",
+            f"the pose rests on the fleet's prior of type {fleet.prior.vehicle_type} ({len(fleet.prior.vehicles)} vehicles): the "
+            f"data alone are uncertain to {without.rotation_deg:g} deg, {without.position_cm:g} cm (95 %), so a mounting that "
+            "differs by less would be drawn to the others' unnoticed",
+            "add placements: with enough of them the data decide",
+        ),
+    )
+
+
+def _with(calibration: Calibration, alone: DataAlone) -> Calibration:
+    """Return a calibration with the pose of the data alone, as far as its stated error needs it."""
+    return replace(
+        calibration,
+        camera_from_radar=alone.camera_from_radar,
+        covariance=alone.covariance,
+        covariance_quantile=alone.covariance_quantile,
+    )
