@@ -22,6 +22,7 @@ from calib_core.results import Calibration
 
 if TYPE_CHECKING:
     from app.automatic_solving import PlacedClicks
+    from app.fleet_prior_file import FleetPriorFile
     from calib_core.interchange.own.clicks_json import ClicksFile
     from calib_core.recordings import Recording
 
@@ -58,6 +59,8 @@ class Solve:
     """Output file (cocalib/calibration-1 JSON); stdout if omitted."""
     refine_intrinsics: Switch = False
     """Estimate focal length, principal point and k1 with the pose; their covariance or the refining options say how sure."""
+    fleet_prior: File = None
+    """What the fleet says of this vehicle (cocalib/fleet-prior-1 JSON, written by fleet prior); the data alone are shown, too."""
     measured: CameraPosition = field(default_factory=MeasuredCamera)
     topics: Topics = field(default_factory=TopicFlags)
     options: Options = field(default_factory=CalibrationOptions)
@@ -120,7 +123,7 @@ class Solve:
         self._require_folders()
         camera_file = None if self.camera is None else CameraFile.read(self.camera, rescale=self.rescale_camera)
         options = self._all_options()
-        file = self._clicks_file()
+        file, fleet = self._clicks_file(), self._fleet_prior_file()
         with open_recording(self.recording, self.topics) as recording:
             require_confirmed(recording)
             if recording.radar_choice:
@@ -129,11 +132,17 @@ class Solve:
             placed = self._placed(file, recording, camera, options)
             if isinstance(placed, Unsolvable):
                 return explain_unsolvable(placed)
-            outcome = solve_placed_clicks(recording, placed, camera, options)
+            outcome = solve_placed_clicks(recording, placed, camera, options, fleet.prior if fleet else None)
             if isinstance(outcome, Unsolvable):
                 return explain_unsolvable(outcome)
             self._write_clicks(placed, recording)
-            text = calibration_text(outcome, recording, camera_file=camera_file, unconfirmed=placed.unconfirmed)
+            text = calibration_text(
+                outcome,
+                recording,
+                camera_file=camera_file,
+                unconfirmed=placed.unconfirmed,
+                fleet_prior=fleet.file if fleet else None,
+            )
             return self._deliver(outcome, text)
 
     def _require_folders(self) -> None:
@@ -151,6 +160,21 @@ class Solve:
         from calib_core.interchange.own.clicks_json import ClicksFile
 
         return ClicksFile(()) if self.clicks is None else file_of_clicks(self.clicks)
+
+    def _fleet_prior_file(self) -> "FleetPriorFile | None":
+        """Read the fleet's prior, unless the method cannot use it; None without.
+
+        Raises:
+            InputError: it cannot be read, or used.
+        """
+        if self.fleet_prior is None:
+            return None
+        from app.fleet_prior_file import FleetPriorFile
+        from calib_core.calibration import require_default
+
+        fleet = FleetPriorFile.read(self.fleet_prior)
+        require_default(self.options, fleet.prior)
+        return fleet
 
     def _placed(
         self, file: "ClicksFile", recording: "Recording", camera: Camera, options: CalibrationOptions
@@ -192,10 +216,12 @@ class Solve:
         from app.solving import calibration_text_of_pairs, solve_pairs
 
         text = read_text(path) if self.pairs_text is None else self.pairs_text
-        outcome = solve_pairs(text, source=str(path), options=self._all_options())
+        fleet = self._fleet_prior_file()
+        outcome = solve_pairs(text, str(path), self._all_options(), fleet.prior if fleet else None)
         if isinstance(outcome, Unsolvable):
             return explain_unsolvable(outcome)
-        return self._deliver(outcome, calibration_text_of_pairs(outcome, text, name=name_text(path.name)))
+        given = fleet.file if fleet else None
+        return self._deliver(outcome, calibration_text_of_pairs(outcome, text, name_text(path.name), given))
 
     def _deliver(self, calibration: Calibration, text: str) -> int:
         from app.automatic_solving import is_doubtful

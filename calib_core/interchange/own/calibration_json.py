@@ -23,6 +23,7 @@ from calib_core.interchange.own import documents
 from calib_core.interchange.own.angle_map_document import angle_map_document, angle_map_of
 from calib_core.interchange.own.camera_document import camera_document, camera_of
 from calib_core.interchange.own.clicks_json import refuse_repeated_ids
+from calib_core.interchange.own.fleet_answer_document import fleet_answer_document, fleet_answer_of
 from calib_core.interchange.own.numbers import finite_or_none, nan_if_none, nested
 from calib_core.interchange.own.pair_document import SOLVED_FROM_KEYS, solved_pair_document, solved_pair_of
 from calib_core.interchange.own.provenance_document import provenance_document, provenance_of
@@ -137,6 +138,7 @@ def write_calibration(file: CalibrationFile) -> str:
         pairs=[solved_pair_document(pair) for pair in calibration.pairs],
         camera=camera_document(calibration.camera),
         given_camera=camera_document(calibration.given_camera) if calibration.given_camera is not None else None,
+        fleet_prior=fleet_answer_document(calibration.fleet),
         options=calibration.options,
         provenance=provenance_document(file.provenance),
     )
@@ -154,6 +156,7 @@ def write_calibration(file: CalibrationFile) -> str:
     absent |= {"verdict"} if file.verdict is None else set()
     absent |= {"evidence"} if file.evidence is None else set()
     absent |= {"given_camera"} if calibration.given_camera is None else set()
+    absent |= {"fleet_prior"} if calibration.fleet is None else set()
     if not calibration.systematic_errors and calibration.radar_errors == RadarErrors():
         absent |= {"radar_errors", "systematic_errors"}
     known = encodable({key: content[key] for key in _KEY_ORDER if key not in absent})
@@ -174,7 +177,8 @@ _KEY_ORDER = (
         "covariance",
     ),
     *("covariance_convention", "covariance_quantile", "metrics", "noise_scale", "radar_errors", "systematic_errors"),
-    *("radar_angle_map", "paper", "warnings", "unpaired", "pairs", "camera", "given_camera", "options", "provenance"),
+    *("radar_angle_map", "paper", "warnings", "unpaired", "pairs", "camera", "given_camera", "fleet_prior", "options"),
+    "provenance",
 )
 
 
@@ -232,6 +236,7 @@ def calibration_file_of(
         angle_map=angle_map_of(document.radar_angle_map, source=source),
         radar_errors=radar_errors_of(document.radar_errors),
         systematic_errors=tuple(map(systematic_error_of, document.systematic_errors)),
+        fleet=fleet_answer_of(document.fleet_prior, source=source),
     )
     try:
         frames = FrameNames(document.frames.radar, document.frames.camera)

@@ -25,6 +25,8 @@ __all__ = [
     "CheckPointDocument",
     "ClickDocument",
     "ClicksDocument",
+    "DataAloneDocument",
+    "FleetAnswerDocument",
     "FramesDocument",
     "PairDocument",
     "PairsDocument",
@@ -388,6 +390,34 @@ class AngleMapDocument(Struct, frozen=True):
     corrected_aed_px: float | None = None
 
 
+class DataAloneDocument(Struct, frozen=True):
+    """The answer of the pairs without the fleet's prior."""
+
+    camera_from_radar: TransformDocument
+    covariance: Matrix66
+    covariance_quantile: float | None = None
+
+
+class FleetAnswerDocument(Struct, frozen=True, omit_defaults=True):
+    """A fleet's prior, and what it did: camera_from_radar and covariance are the prior's, as in fleet-prior-1.
+
+    used is false if the data alone contradict it: their squared distance from it is beyond limit. Without data_alone the data
+    gave no pose, so the prior was not tested.
+    """
+
+    vehicle_type: Name
+    used: bool
+    camera_from_radar: TransformDocument
+    covariance: Matrix66
+    vehicles: Annotated[list[Name], Meta(min_length=1)]
+    left_out: list[Name] = []
+    widened: Annotated[float, Meta(ge=1.0, le=1e9)] | None = None
+    freedom: Annotated[float, Meta(gt=0.0, le=1e9)] | None = None
+    squared_distance: float | None = None
+    limit: float | None = None
+    data_alone: DataAloneDocument | None = None
+
+
 class CalibrationDocument(Struct, frozen=True):
     """A solved extrinsic calibration with its uncertainty."""
 
@@ -414,6 +444,7 @@ class CalibrationDocument(Struct, frozen=True):
     unpaired: list[UnpairedDocument] = []
     pairs: list[SolvedPairDocument] = []
     given_camera: CameraDocument | None = None
+    fleet_prior: FleetAnswerDocument | None = None
     options: CalibrationOptions = field(default_factory=CalibrationOptions)
     provenance: ProvenanceDocument = field(default_factory=ProvenanceDocument)
 
