@@ -302,6 +302,12 @@ class _Task:
         clicked = sorted((pair for pair in shown if pair.id not in excluded), key=_canonical)
         return cls(shown, unpaired, excluded, tuple(clicked), camera, options, fleet_prior)
 
+    def expecting(self, previous: Calibration | None) -> "_Task":
+        """Return the task for a preview: the fleet's prior does what it did in the previous answer."""
+        if self.fleet_prior is None or previous is None or previous.fleet is None:
+            return self
+        return replace(self, fleet=previous.fleet)
+
     def measurements(self, groups: Sequence[PlacementGroup]) -> PairMeasurements:
         """Stack the placements, with the fleet's prior once it is known to apply."""
         prior = self.fleet.prior if self.fleet is not None and self.fleet.used else None
@@ -324,10 +330,12 @@ def _steps(task: _Task, *, previous: Calibration | None, preview: bool) -> Itera
         return
     measurements = task.measurements(groups)
     if preview:
-        quick = quick_fit(measurements, task.options, previous)
+        shown = task.expecting(previous)
+        expected = measurements if shown is task else shown.measurements(groups)
+        quick = quick_fit(expected, task.options, previous)
         if quick is not None:
             solution = _Solution.local(quick, task.options, smooth=False)
-            described = _described(task, groups, measurements, solution)
+            described = _described(shown, groups, expected, solution)
             first = flat_radar(quick, solution.uncertainty, task.options.radar)
             yield _preview(described, previous or replace(described, warnings=tuple(first)))
     answer = _answer(task, groups, measurements)

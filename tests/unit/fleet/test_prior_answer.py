@@ -59,6 +59,8 @@ def test_few_placements_of_a_vehicle_of_its_kind_give_a_pose_to_use_and_the_data
     assert np.diag(found.covariance).max() < 0.1 * np.diag(data.covariance).max()
     assert "fleet-prior-decides" in codes(found)
     assert (verdict_on(data).level, verdict_on(found).level) == ("weak", "usable")
+    assert verdict_on(found).action == "Add placements: with enough of them the data decide"
+    assert verdict_on(found, left=3).action == "Click the 3 placements that are left"
 
 
 def test_the_answer_lies_where_prior_and_data_balance() -> None:
