@@ -19,7 +19,7 @@ from app.web.port.routes import Routes
 from calib_core.fleet_prior import FleetPrior
 from calib_core.interchange import read_clicks
 from calib_core.interchange.own.fleet_prior_json import write_fleet_prior
-from calib_core.measurements import ReflectorClick
+from calib_core.measurements import ReflectorClick, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording, open_recording
 from calib_core.results import Calibration
@@ -73,17 +73,18 @@ def test_preview_and_answer_rest_on_it_and_other_methods_do_not(
     try:
         first = answered(worker, clicks[:5], DEFAULTS)[-1].outcome
         preview, second = (one.outcome for one in answered(worker, clicks[:6], DEFAULTS))
-        mounted = answered(worker, clicks[:6], CalibrationOptions(method="pmm"))[-1].outcome
+        paper = answered(worker, clicks[:6], CalibrationOptions(method="paper"))[-1].outcome
     finally:
         worker.close()
     expected = solve_clicks(recording, clicks[:6], recording.camera(), DEFAULTS, given.prior).unwrap()
-    for outcome in (first, preview, second, mounted):
+    for outcome in (first, preview, second):
         assert isinstance(outcome, Calibration)
     assert first.fleet_prior is preview.fleet_prior is second.fleet_prior is given.prior
     assert preview.checking
     assert np.diag(preview.covariance)[:3].max() < 1e-4  # the data alone say 20 cm
     assert np.array_equal(second.covariance, expected.covariance)
-    assert mounted.fleet is None
+    assert isinstance(paper, Unsolvable)
+    assert paper.code == "no-consensus"  # its own reason, not that it takes no prior
 
 
 def test_the_view_says_what_it_did_and_the_download_is_the_file_of_solve(
