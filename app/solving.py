@@ -25,6 +25,7 @@ from calib_core.interchange import (
     CameraFile,
     FrameNames,
     Provenance,
+    VehicleNote,
     names_schema,
     read_calibration,
     read_pairs,
@@ -289,6 +290,7 @@ def calibration_text(
     camera_file: CameraFile | None = None,
     unconfirmed: UnconfirmedClicks | None = None,
     fleet_prior: InputFile | None = None,
+    vehicle: VehicleNote | None = None,
 ) -> str:
     """Write a calibration-1 file; the page and the command line give the same bytes for the same clicks.
 
@@ -299,6 +301,7 @@ def calibration_text(
         camera_file: the file whose intrinsics were used; None for the recording's own.
         unconfirmed: clicks that nobody confirmed.
         fleet_prior: the file of the fleet's prior; None without.
+        vehicle: which vehicle it is of; None if nobody said.
     """
     assumed = [
         (one.assumption, one.confirmed or one.assumption.words in confirmed) for one in recording.stated_assumptions
@@ -326,7 +329,7 @@ def calibration_text(
         assumptions=tuple(AssumptionNote(assumption.words, sure) for assumption, sure in assumed),
         unconfirmed=unconfirmed,
     )
-    return interchange_text(calibration, _frame_names(recording), provenance)
+    return interchange_text(calibration, _frame_names(recording), provenance, vehicle=vehicle)
 
 
 def _input_file(camera_file: CameraFile) -> InputFile:
@@ -348,7 +351,11 @@ def _frame_names(recording: Recording) -> FrameNames:
 
 
 def calibration_text_of_pairs(
-    calibration: Calibration, text: str, name: str, fleet_prior: InputFile | None = None
+    calibration: Calibration,
+    text: str,
+    name: str,
+    fleet_prior: InputFile | None = None,
+    vehicle: VehicleNote | None = None,
 ) -> str:
     """Write a calibration-1 file for a calibration solved from a pairs-1 file, or again from a calibration-1 file.
 
@@ -357,7 +364,9 @@ def calibration_text_of_pairs(
         text: the content of the file of pairs.
         name: its name without the folder.
         fleet_prior: the file of the fleet's prior, if one was given.
+        vehicle: which vehicle it is of; what it leaves out is taken from a calibration-1 file.
     """
+    vehicle = vehicle or VehicleNote()
     data = text.encode()
     inputs = (
         InputFile(name, len(data), hashlib.sha256(data).hexdigest()),
@@ -368,5 +377,5 @@ def calibration_text_of_pairs(
         provenance = dataclasses.replace(file.provenance, inputs=inputs, version=version())
         kept = tuple(warning for warning in file.calibration.warnings if warning.code in _KEPT_WARNINGS)
         calibration = dataclasses.replace(calibration, warnings=(*calibration.warnings, *kept))
-        return interchange_text(calibration, file.frames, provenance)
-    return interchange_text(calibration, provenance=Provenance(inputs=inputs, version=version()))
+        return interchange_text(calibration, file.frames, provenance, vehicle=vehicle.over(file.vehicle))
+    return interchange_text(calibration, provenance=Provenance(inputs=inputs, version=version()), vehicle=vehicle)

@@ -10,7 +10,16 @@ import tyro
 
 from app.cli.flags import File, Switch
 from app.cli.output import explain_unsolvable, read_text, write_whole
-from app.cli.recording_flags import CameraPosition, MeasuredCamera, Options, Recordings, TopicFlags, Topics
+from app.cli.recording_flags import (
+    CameraPosition,
+    MeasuredCamera,
+    Options,
+    Recordings,
+    TopicFlags,
+    Topics,
+    Vehicle,
+    VehicleFlags,
+)
 from app.terminal import print_exactly
 from app.view import summary_lines
 from calib_core.camera import Camera
@@ -23,6 +32,7 @@ from calib_core.results import Calibration
 if TYPE_CHECKING:
     from app.automatic_solving import PlacedClicks
     from app.fleet_prior_file import FleetPriorFile
+    from calib_core.interchange import VehicleNote
     from calib_core.interchange.own.clicks_json import ClicksFile
     from calib_core.recordings import Recording
 
@@ -62,6 +72,7 @@ class Solve:
     fleet_prior: File = None
     """What the fleet says of this vehicle (cocalib/fleet-prior-1 JSON, written by fleet prior); the data alone are shown, too."""
     measured: CameraPosition = field(default_factory=MeasuredCamera)
+    of: Vehicle = field(default_factory=VehicleFlags)
     topics: Topics = field(default_factory=TopicFlags)
     options: Options = field(default_factory=CalibrationOptions)
     pairs_text: Annotated[str | None, tyro.conf.Suppress] = None
@@ -86,6 +97,7 @@ class Solve:
         """Solve, write the calibration, print its summary; return the exit code."""
         if self.pairs is not None and (self.recording or self.clicks or self.auto):
             raise InputError("solve takes either a recording with --clicks or --auto, or --pairs, not both")
+        vehicle = self.of.note()
         if not self.auto and (self.clicks_out is not None or self.reflector_m != _REFLECTOR_M):
             raise InputError("--clicks-out and --reflector-m apply with --auto only; add it")
         if self.auto and self.options.method == "ccm":
@@ -95,7 +107,7 @@ class Solve:
                 "--camera and the options of a recording do not apply to --pairs, which brings its own camera"
             )
         if self.pairs is not None:
-            return self._solve_pairs(self.pairs)
+            return self._solve_pairs(self.pairs, vehicle)
         if not self.recording:
             raise InputError("solve needs a recording and --clicks CLICKS.json or --auto, or --pairs PAIRS.json")
         if self.clicks is None and not self.auto:
@@ -103,7 +115,7 @@ class Solve:
                 "solve needs the clicks of this recording: --clicks CLICKS.json (the page exports them), or --auto to do "
                 "without a person"
             )
-        return self._solve_recording()
+        return self._solve_recording(vehicle)
 
     def _all_options(self) -> CalibrationOptions:
         """Return the options with what has a flag of its own."""
@@ -112,7 +124,7 @@ class Solve:
             return options
         return dataclasses.replace(options, refining=dataclasses.replace(options.refining, intrinsics=True))
 
-    def _solve_recording(self) -> int:
+    def _solve_recording(self, vehicle: "VehicleNote") -> int:
         from app.automatic_solving import solve_placed_clicks
         from app.recorded_clicks import require_confirmed
         from app.required_camera import required_camera
@@ -142,6 +154,7 @@ class Solve:
                 camera_file=camera_file,
                 unconfirmed=placed.unconfirmed,
                 fleet_prior=fleet.file if fleet else None,
+                vehicle=vehicle,
             )
             return self._deliver(outcome, text)
 
@@ -212,7 +225,7 @@ class Solve:
         write_whole(self.clicks_out, text)
         print(f"clicks written to {self.clicks_out}", file=sys.stderr)
 
-    def _solve_pairs(self, path: Path) -> int:
+    def _solve_pairs(self, path: Path, vehicle: "VehicleNote") -> int:
         from app.solving import calibration_text_of_pairs, solve_pairs
 
         text = read_text(path) if self.pairs_text is None else self.pairs_text
@@ -221,7 +234,7 @@ class Solve:
         if isinstance(outcome, Unsolvable):
             return explain_unsolvable(outcome)
         given = fleet.file if fleet else None
-        return self._deliver(outcome, calibration_text_of_pairs(outcome, text, name_text(path.name), given))
+        return self._deliver(outcome, calibration_text_of_pairs(outcome, text, name_text(path.name), given, vehicle))
 
     def _deliver(self, calibration: Calibration, text: str) -> int:
         from app.automatic_solving import is_doubtful

@@ -10,7 +10,7 @@ from app.required_camera import required_camera
 from app.solving import calibration_text
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.interchange import CameraFile, ImportedCalibration, imported, read_calibration
+from calib_core.interchange import CameraFile, ImportedCalibration, VehicleNote, imported, read_calibration
 from calib_core.interchange.own.clicks_json import ClicksFile, read_clicks_file, write_clicks
 from calib_core.measurements import ReflectorClick, Unsolvable
 from calib_core.recordings import Recording
@@ -128,6 +128,8 @@ def _placed(
 def _calibration_text(
     row: ManifestRow, calibration: Calibration, recording: Recording, given: GivenFiles, placed: PlacedClicks
 ) -> str:
-    """Write calibration.json: the one place where what the row says of its sensors can be handed to it."""
-    del row  # calibration-1 has no keys for the vehicle and the serials of its sensors
-    return calibration_text(calibration, recording, camera_file=given.camera, unconfirmed=placed.unconfirmed)
+    """Write calibration.json, with what the row says of vehicle and sensors."""
+    vehicle = VehicleNote(row.vehicle, row.vehicle_type, row.session, row.radar_serial, row.camera_serial)
+    return calibration_text(
+        calibration, recording, camera_file=given.camera, unconfirmed=placed.unconfirmed, vehicle=vehicle
+    )

@@ -38,6 +38,7 @@ __all__ = [
     "SystematicErrorDocument",
     "TimeDocument",
     "TransformDocument",
+    "VehicleDocument",
     "names_schema",
 ]
 
@@ -390,6 +391,16 @@ class AngleMapDocument(Struct, frozen=True):
     corrected_aed_px: float | None = None
 
 
+class VehicleDocument(Struct, frozen=True, omit_defaults=True):
+    """Which vehicle the calibration is of, and the serials of its sensors."""
+
+    name: str | None = None
+    type: str | None = None
+    session: str | None = None
+    radar_serial: str | None = None
+    camera_serial: str | None = None
+
+
 class DataAloneDocument(Struct, frozen=True):
     """The answer of the pairs without the fleet's prior."""
 
@@ -445,6 +456,7 @@ class CalibrationDocument(Struct, frozen=True):
     pairs: list[SolvedPairDocument] = []
     given_camera: CameraDocument | None = None
     fleet_prior: FleetAnswerDocument | None = None
+    vehicle: VehicleDocument | None = None
     options: CalibrationOptions = field(default_factory=CalibrationOptions)
     provenance: ProvenanceDocument = field(default_factory=ProvenanceDocument)
 

@@ -19,6 +19,11 @@ from calib_core.results import UnconfirmedClicks
 SAMPLE = Path(__file__).resolve().parents[5] / "sample_data" / "rooftop"
 BAGS = (SAMPLE / "radar.bag", SAMPLE / "camera.bag")
 CLICKS = SAMPLE / "clicks.json"
+SENSORS = {"vehicle_type": "long", "radar_serial": "R-1", "camera_serial": "C-2"}
+VEHICLE = (
+    *("--vehicle", "van", "--session-name", "1"),
+    *("--vehicle-type", "long", "--radar-serial", "R-1", "--camera-serial", "C-2"),
+)
 
 
 def done(row: ManifestRow, results: Path) -> tuple[Outcome, dict[str, bytes]]:
@@ -39,7 +44,7 @@ class Commands:
         self.calibration = folder / "calibration.json"
 
     def solve(self, *flags: str | Path) -> bytes:
-        self._run("solve", *BAGS, *flags, "--out", self.calibration)
+        self._run("solve", *BAGS, *flags, *VEHICLE, "--out", self.calibration)
         return self.calibration.read_bytes()
 
     def evaluate(self, *flags: str | Path) -> bytes:
@@ -65,7 +70,7 @@ def commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Commands:
 
 
 def test_a_clicked_session(commands: Commands, tmp_path: Path) -> None:
-    row = ManifestRow("van", "1", BAGS, clicks=CLICKS, exports=("tf2", "opencv", "pack"))
+    row = ManifestRow("van", "1", BAGS, **SENSORS, clicks=CLICKS, exports=("tf2", "opencv", "pack"))
     outcome, files = done(row, tmp_path / "results")
     assert (outcome.status, outcome.is_final, outcome.step_reasons) == ("solved", True, {})
     assert outcome.steps == {"evaluate": "done", "report": "done", "export": "done"}
@@ -99,7 +104,7 @@ def test_intrinsics_of_a_file_a_measured_position_and_options(commands: Commands
         solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.045), 0.02)),
         refining=RefiningOptions(intrinsics=True),
     )
-    row = ManifestRow("van", "1", BAGS, clicks=CLICKS, camera=given, rescale_camera=True, options=options)
+    row = ManifestRow("van", "1", BAGS, **SENSORS, clicks=CLICKS, camera=given, rescale_camera=True, options=options)
     given_camera = solving.given_files(row).camera
     assert given_camera is not None
     assert given_camera.rescale
@@ -130,7 +135,9 @@ def test_clicks_of_a_person_and_of_nobody(commands: Commands, tmp_path: Path, mo
 
     monkeypatch.setattr(solving, "place_clicks", place)
     monkeypatch.setattr(automatic_solving, "place_clicks", place)
-    outcome, files = done(ManifestRow("van", "1", BAGS, clicks=given, auto=True, reflector_m=0.3), tmp_path / "results")
+    outcome, files = done(
+        ManifestRow("van", "1", BAGS, **SENSORS, clicks=given, auto=True, reflector_m=0.3), tmp_path / "results"
+    )
     placed = commands.folder / "clicks.json"
     assert files["calibration.json"] == commands.solve(
         "--clicks", given, "--auto", "--reflector-m", "0.3", "--clicks-out", placed
