@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.text_files import read_text
+from calib_core.errors import InputError
 from calib_core.fleet_prior import FleetPrior
 from calib_core.input_files import name_text
 from calib_core.interchange.own.fleet_prior_json import read_fleet_prior
@@ -36,3 +37,18 @@ class FleetPriorFile:
         data = text.encode()
         digest = hashlib.sha256(data).hexdigest()
         return cls(read_fleet_prior(text, str(path)), InputFile(name_text(path.name), len(data), digest))
+
+    def require_not_of(self, vehicle: str | None) -> None:
+        """Refuse a prior that rests on the vehicle itself: what is known of it would count twice.
+
+        Args:
+            vehicle: its name; None if nobody said.
+
+        Raises:
+            InputError: it does.
+        """
+        if vehicle is not None and vehicle in self.prior.vehicles:
+            raise InputError(
+                f"{self.file.name}: the prior rests on {vehicle} itself, so that its earlier calibrations would count twice; "
+                f"write one without it (cocalib fleet prior {self.prior.vehicle_type} OUT --without {vehicle} --out FILE)"
+            )

@@ -187,6 +187,7 @@ class Solve:
 
         fleet = FleetPriorFile.read(self.fleet_prior)
         require_default(self.options, fleet.prior)
+        fleet.require_not_of(self.of.vehicle)
         return fleet
 
     def _placed(

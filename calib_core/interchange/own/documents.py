@@ -72,6 +72,9 @@ Name = Annotated[str, Meta(min_length=1, max_length=200)]
 Positive = Annotated[float, Meta(ge=1e-12, le=1e9)]
 """A standard deviation; its square and the reciprocal of that are far from overflowing."""
 Count = Annotated[int, Meta(ge=0)]
+Widened = Annotated[float, Meta(ge=1.0, le=1e9)]
+"""How much wider an estimated covariance is for being estimated."""
+Freedom = Annotated[float, Meta(ge=1.0, le=1e9)]
 
 
 class TimeDocument(Struct, frozen=True, forbid_unknown_fields=True):
@@ -422,8 +425,8 @@ class FleetAnswerDocument(Struct, frozen=True, omit_defaults=True):
     covariance: Matrix66
     vehicles: Annotated[list[Name], Meta(min_length=1)]
     left_out: list[Name] = []
-    widened: Annotated[float, Meta(ge=1.0, le=1e9)] | None = None
-    freedom: Annotated[float, Meta(gt=0.0, le=1e9)] | None = None
+    widened: Widened | None = None
+    freedom: Freedom | None = None
     squared_distance: float | None = None
     limit: float | None = None
     data_alone: DataAloneDocument | None = None

@@ -5,7 +5,7 @@ import msgspec
 from calib_core.errors import InputError
 from calib_core.fleet_prior import FleetPrior
 from calib_core.interchange.own.fleet_prior_document import FLEET_PRIOR_SCHEMA, FleetPriorDocument
-from calib_core.interchange.own.numbers import nested
+from calib_core.interchange.own.numbers import finite_or_none, nested
 from calib_core.interchange.own.stated_covariance import stated_covariance
 from calib_core.interchange.own.transform_document import transform_document, transform_of
 from calib_core.interchange.syntax.json_text import json_text
@@ -23,8 +23,11 @@ def write_fleet_prior(prior: FleetPrior) -> str:
         covariance=nested(0.5 * (prior.covariance + prior.covariance.T) + 0.0),
         vehicles=list(prior.vehicles),
         left_out=list(prior.left_out),
+        widened=prior.widened if prior.widened != 1.0 else None,
+        freedom=finite_or_none(prior.freedom),
     )
-    return json_text(msgspec.to_builtins(document))
+    content = msgspec.to_builtins(document)
+    return json_text({key: value for key, value in content.items() if value is not None})
 
 
 def read_fleet_prior(text: str, source: str = "fleet prior") -> FleetPrior:
@@ -45,6 +48,8 @@ def read_fleet_prior(text: str, source: str = "fleet prior") -> FleetPrior:
         covariance=stated_covariance(document.covariance, source=source),
         vehicles=tuple(document.vehicles),
         left_out=tuple(document.left_out),
+        widened=1.0 if document.widened is None else document.widened,
+        freedom=float("inf") if document.freedom is None else document.freedom,
     )
 
 
