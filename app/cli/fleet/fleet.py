@@ -62,7 +62,7 @@ class Fleet:
     csv: File = None
     """With export: CSV file to write."""
     out: File = None
-    """With prior: file to write it to (cocalib/fleet-prior-1 JSON), for solve --fleet-prior."""
+    """With prior: file to write it to (cocalib/fleet-prior-1 JSON), for solve, open and batch."""
     without: Annotated[tuple[str, ...], called("VEHICLE..."), tyro.conf.UseAppendAction] = ()
     """With prior: leave a vehicle out, such as the one that it is for; repeat it for several."""
 
