@@ -18,6 +18,7 @@ __all__ = [
 
 OUTCOME_SCHEMA: Final = "cocalib/outcome-1"
 Status = Literal["solved", "weak", "refused", "failed"]
+PriorUse = Literal["used", "untested", "contradicted"]
 """A calibration; one that is doubtful; the data give none; an input cannot be read or the program failed."""
 StepState = Literal["done", "not available", "not asked", "failed"]
 
@@ -66,6 +67,8 @@ class Outcome(Struct, frozen=True, forbid_unknown_fields=True):
     """Mean residual of the used pairs [px]."""
     pairs: int = 0
     """How many were used."""
+    fleet_prior: PriorUse | None = None
+    """What a fleet's prior did: the pose rests on it, on it alone in part, or not, as the data contradict it; None without."""
     warnings: tuple[str, ...] = ()
     """Codes of the calibration's warnings, in order."""
     steps: dict[str, StepState] = field(default_factory=dict)

@@ -122,6 +122,7 @@ def _session(record: SessionRecord) -> dict[str, Any]:
         "sigma_cm": outcome.sigma_cm,
         "aed_px": outcome.aed_px,
         "pairs": outcome.pairs,
+        "fleet_prior": outcome.fleet_prior,
         "report": record.report,
         "camera_from_radar": None if record.pose is None else _transform(record.pose.camera_from_radar),
         "covariance": None if record.pose is None else record.pose.covariance.tolist(),

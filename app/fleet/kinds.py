@@ -23,6 +23,8 @@ from calib_core.fleet import (
 from calib_core.fleet.mounting_coordinates import coordinate_jacobian
 from calib_core.fleet_prior import FleetPrior
 from calib_core.measurements import TimeNs, Unsolvable
+from calib_core.stated_error import pose_error
+from calib_core.verdict import USABLE_CM, USABLE_DEG
 
 __all__ = ["Kind", "NotCounted", "PriorOfType", "kinds_of", "prior_of_type", "prior_sigma"]
 
@@ -174,11 +176,21 @@ def _scatter(
 def _why_not(record: SessionRecord) -> str | None:
     """Return why a session says nothing about the type's mounting; None if it does."""
     outcome = record.outcome
+    if record.pose is not None and record.pose.of_data_alone:
+        return _why_data_do_not_count(record.pose)
     if record.pose is not None:
         return None if outcome.verdict in _COUNTED else f"the verdict is {outcome.verdict or 'missing'}"
     if record.pose_problem:
         return record.pose_problem
     return f"{outcome.status}: {outcome.reason}" if outcome.reason else outcome.status
+
+
+def _why_data_do_not_count(pose: SessionPose) -> str | None:
+    """Return why the data of a session that was solved with a prior say nothing; None if they are good enough alone."""
+    rotation_deg, position_cm = pose_error(pose.camera_from_radar, pose.covariance, pose.freedom)
+    if rotation_deg <= USABLE_DEG and position_cm <= USABLE_CM:
+        return None
+    return f"solved with a fleet's prior; its data alone are uncertain to {rotation_deg:g} deg, {position_cm:g} cm"
 
 
 def _present_mounting(vehicle: VehicleRecord) -> Mounting | None:

@@ -33,6 +33,13 @@ class SessionRecord:
         return self.outcome.session
 
     @property
+    def prior_words(self) -> str:
+        """What a fleet's prior did to its calibration, for a table; "" without one."""
+        return {"used": "with prior", "untested": "by prior", "contradicted": "off prior"}.get(
+            self.outcome.fleet_prior or "", ""
+        )
+
+    @property
     def compared_pose(self) -> SessionPose | None:
         """The pose to compare with others; None without one, or if its own data contradict it."""
         return None if self.outcome.verdict in NO_POSE_OF else self.pose

@@ -14,7 +14,18 @@ from calib_core.geometry import quaternion_wxyz_from_matrix
 
 __all__ = ["csv_bytes", "parquet_bytes"]
 
-_TEXT = ("vehicle", "session", "vehicle_type", "status", "reason", "verdict", "radar_serial", "camera_serial", "digest")
+_TEXT = (
+    "vehicle",
+    "session",
+    "vehicle_type",
+    "status",
+    "reason",
+    "verdict",
+    "radar_serial",
+    "camera_serial",
+    "fleet_prior",
+    "digest",
+)
 _REAL = ("sigma_deg", "sigma_cm", "aed_px", "qw", "qx", "qy", "qz", "x_m", "y_m", "z_m")
 _CHANGE = (
     *("rotation_deg", "rotation_sigma_deg", "position_cm", "position_sigma_cm", "picture_px", "picture_sigma_px"),

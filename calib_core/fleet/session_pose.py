@@ -1,6 +1,6 @@
 """What the fleet needs of one calibration: whose it is, its pose, and which part of its uncertainty does not average out."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -40,6 +40,7 @@ class SessionPose:
         camera: its intrinsics, for figures in the picture; None if unknown.
         reference_radar_m: (3,) the position in the radar frame where these are stated; None if unknown.
         angle_scales: what is known of the radar's azimuth and elevation scale.
+        of_data_alone: the calibration was made with a fleet's prior, and this is the answer of its data without it.
 
     Raises:
         InputError: pose and covariance cannot be used: a number is not finite, or the covariance is singular.
@@ -57,6 +58,7 @@ class SessionPose:
     camera: Camera | None = None
     reference_radar_m: Vector3 | None = None
     angle_scales: tuple[SystematicErrorResult, ...] = ()
+    of_data_alone: bool = False
 
     def __post_init__(self) -> None:
         systematic = self.covariance if self.systematic is None else self.systematic
@@ -106,6 +108,9 @@ def session_pose(
     of position and rotation, not their (6, 6). The larger of the two shares is taken of the whole firm covariance, and what a
     radar without elevation leaves to assumptions is added: at least the true part, never more than the covariance.
 
+    Of a calibration that rests on a fleet's prior it is the answer of the data alone: its pose is drawn to the fleet's mean,
+    which would hide scatter and remounts. What further sessions do not average out is not known of it: all of it is taken.
+
     Args:
         calibration: with a covariance.
         vehicle: its name.
@@ -115,8 +120,10 @@ def session_pose(
         camera_serial: of the camera.
 
     Raises:
-        InputError: the calibration states no uncertainty, or a singular one.
+        InputError: the calibration states no uncertainty, or a singular one, or nothing but a fleet's prior gives its pose.
     """
+    if calibration.fleet_prior is not None:
+        calibration = _of_data_alone(calibration, f"vehicle {vehicle!r}, session {session!r}")
     firm, errors = calibration.firm_covariance, calibration.errors_of_firm
     shares = [sum(one.position_share for one in errors), sum(one.rotation_share for one in errors)]
     share = min(max(0.0, *np.nan_to_num(shares).tolist()), 1.0) if errors else 1.0
@@ -134,4 +141,23 @@ def session_pose(
         camera=calibration.camera,
         reference_radar_m=np.median(places_m, axis=0) if places_m else None,
         angle_scales=tuple(one for one in calibration.systematic_errors if one.name in _SCALES and one.estimated),
+        of_data_alone=calibration.fleet_prior is not None,
+    )
+
+
+def _of_data_alone(calibration: Calibration, where: str) -> Calibration:
+    """Return a calibration with the pose of its data alone, as far as the fleet needs it.
+
+    Raises:
+        InputError: they give none.
+    """
+    alone = calibration.fleet.data_alone if calibration.fleet is not None else None
+    if alone is None:
+        raise InputError(f"{where}: only the fleet's prior closes what its placements leave open; add placements")
+    return replace(
+        calibration,
+        camera_from_radar=alone.camera_from_radar,
+        covariance=alone.covariance,
+        covariance_quantile=alone.covariance_quantile,
+        systematic_errors=(),
     )

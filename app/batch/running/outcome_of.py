@@ -4,11 +4,12 @@ import numpy as np
 from msgspec.structs import replace
 
 from app.batch.job import Job
-from app.batch.outcome import OUTCOME_SCHEMA, Outcome, Status
+from app.batch.outcome import OUTCOME_SCHEMA, Outcome, PriorUse, Status
 from app.batch.running.attempting import Failure
 from app.batch.running.solving import SolvedSession
 from app.batch.running.steps import SessionResult
 from app.resources import version
+from calib_core.fleet_prior import FleetAnswer
 from calib_core.measurements import Unsolvable
 from calib_core.verdict import verdict_on
 
@@ -44,18 +45,28 @@ def _of_calibration(job: Job, solved: SolvedSession) -> Outcome:
     assert solved.found.file is not None
     sigma = np.sqrt(np.diag(calibration.covariance))
     known = bool(np.isfinite(sigma).all())
+    doubtful = solved.is_weak or verdict.level not in ("good", "usable")
     return replace(
         _outcome(job, "weak" if solved.is_weak else "solved"),
-        reason=verdict.reason if solved.is_weak else "",
-        hint=verdict.action if solved.is_weak else "",
+        reason=verdict.reason if doubtful else "",
+        hint=verdict.action if doubtful else "",
         verdict=verdict.level,
         sigma_deg=float(np.degrees(sigma[3:].max())) if known else None,
         sigma_cm=float(100.0 * sigma[:3].max()) if known else None,
         aed_px=calibration.metrics.aed_px,
         pairs=sum(pair.inlier for pair in calibration.pairs),
+        fleet_prior=_prior_use(calibration.fleet),
         warnings=tuple(warning.code for warning in solved.found.file.calibration.warnings),
         notes=solved.notes,
     )
+
+
+def _prior_use(fleet: FleetAnswer | None) -> PriorUse | None:
+    if fleet is None:
+        return None
+    if not fleet.used:
+        return "contradicted"
+    return "untested" if fleet.data_alone is None else "used"
 
 
 def _outcome(job: Job, status: Status) -> Outcome:

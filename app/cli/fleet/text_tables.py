@@ -93,7 +93,7 @@ def _standing_cells(standing: VehicleStanding, now_ns: int) -> tuple[str, ...]:
         standing.vehicle.name,
         outcome.session,
         _DASH if age is None else f"{age:.0f}",
-        outcome.verdict or outcome.status,
+        _verdict(standing.last),
         _number(outcome.sigma_deg),
         _number(outcome.sigma_cm),
         *_change_cells(change)[:2],
@@ -107,12 +107,18 @@ def _session_cells(record: SessionRecord, change: Transition | None) -> tuple[st
     return (
         outcome.session,
         recorded_text(outcome.recorded_ns),
-        outcome.verdict or outcome.status,
+        _verdict(record),
         _number(outcome.sigma_deg),
         _number(outcome.sigma_cm),
         *_change_cells(change),
         _since(change),
     )
+
+
+def _verdict(record: SessionRecord) -> str:
+    """Return verdict or status, and what a fleet's prior did."""
+    verdict = record.outcome.verdict or record.outcome.status
+    return f"{verdict} ({record.prior_words})" if record.prior_words else verdict
 
 
 def _change_cells(change: Transition | None) -> tuple[str, str, str]:

@@ -85,7 +85,8 @@ def verdict_cell(record: SessionRecord) -> Markup:
     level = outcome.verdict if outcome.verdict in LEVEL_SIGNS else outcome.status
     sign = LEVEL_SIGNS.get(level) or _OTHER_SIGNS.get(level, "●")
     key = _ORDER.index(level) if level in _ORDER else len(_ORDER)
-    parts: list[Child] = [tag("span", sign, class_="sign", aria_hidden="true"), level]
+    shown = f"{level} ({record.prior_words})" if record.prior_words else level
+    parts: list[Child] = [tag("span", sign, class_="sign", aria_hidden="true"), shown]
     return tag("td", *parts, class_=f"state{' bad' if level in _BAD else ''}", data_key=str(key))
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from app.batch.outcome import OUTCOME_SCHEMA, Outcome, OutcomeFile, OutcomeRun, outcome_text
 from app.batch.results_folder import OUTCOME_FILE, ResultsFolder
 from calib_core.calibration import calibrate_pairs
+from calib_core.fleet_prior import FleetAnswer
 from calib_core.interchange import calibration_text
 from calib_core.results import Calibration
 from calib_core.synthetic.pairs.simulated import simulate_pairs
@@ -47,7 +48,14 @@ def digest_of(vehicle: str, session: str, run: int = 0) -> str:
 
 
 def make_result(
-    folder: Path, vehicle: str, session: str, *, error: np.ndarray = _AS_IT_IS, run: int = 0, **changes: Any
+    folder: Path,
+    vehicle: str,
+    session: str,
+    *,
+    error: np.ndarray = _AS_IT_IS,
+    run: int = 0,
+    fleet: FleetAnswer | None = None,
+    **changes: Any,
 ) -> Outcome:
     """Write the result of one job.
 
@@ -57,6 +65,7 @@ def make_result(
         session: its name.
         error: (6,) of the pose.
         run: a later run of the same session has a larger number.
+        fleet: what a fleet's prior did.
         changes: of the outcome; a status "failed" or "refused" leaves the calibration out.
     """
     digest = digest_of(vehicle, session, run)
@@ -64,7 +73,7 @@ def make_result(
     started = (_RUN + timedelta(minutes=run)).isoformat(timespec="seconds")
     with ResultsFolder(folder).writing(digest) as unfinished:
         if outcome.status in ("solved", "weak"):
-            outcome = _with_calibration(outcome, unfinished, error)
+            outcome = _with_calibration(outcome, unfinished, error, fleet)
             (unfinished / "report.html").write_text("<p>report</p>")
         files = tuple(
             OutcomeFile(path.name, hashlib.sha256(path.read_bytes()).hexdigest())
@@ -77,9 +86,9 @@ def make_result(
     return outcome
 
 
-def _with_calibration(outcome: Outcome, folder: Path, error: np.ndarray) -> Outcome:
+def _with_calibration(outcome: Outcome, folder: Path, error: np.ndarray, fleet: FleetAnswer | None) -> Outcome:
     base = calibration()
-    moved = dataclasses.replace(base, camera_from_radar=base.camera_from_radar.perturbed(error))
+    moved = dataclasses.replace(base, camera_from_radar=base.camera_from_radar.perturbed(error), fleet=fleet)
     (folder / "calibration.json").write_text(calibration_text(moved), encoding="utf-8")
     sigma = np.sqrt(np.diag(base.covariance))
     return msgspec.structs.replace(
