@@ -28,6 +28,7 @@ if TYPE_CHECKING:
         FrameNames,
         PairsFile,
         Provenance,
+        VehicleNote,
     )
     from calib_core.interchange.files import (
         check,
@@ -105,6 +106,7 @@ __all__ = [
     "Unpaired",
     "Unsolvable",
     "UnsolvableError",
+    "VehicleNote",
     "Verdict",
     "acc",
     "aed",
@@ -142,6 +144,7 @@ _MODULES = {
         "FrameNames",
         "PairsFile",
         "Provenance",
+        "VehicleNote",
     ),
     "interchange.files": (
         *("check", "export", "read_calibration", "read_camera", "read_clicks", "read_pairs"),

@@ -84,14 +84,19 @@ class VehicleFlags:
         """Return what is stated.
 
         Raises:
-            InputError: a text is empty, too long or not printable.
+            InputError: a text is empty, too long or not printable, or a name has a slash; the message names the flag.
         """
-        from calib_core.interchange import VehicleNote
+        from calib_core.interchange.vehicle_note import VehicleNote, require_label, require_name
 
+        for one in dataclasses.fields(self):
+            if (text := getattr(self, one.name)) is not None:
+                require = require_name if one.name in ("vehicle", "session_name") else require_label
+                require(text, f"--{one.name.replace('_', '-')}")
         return VehicleNote(self.vehicle, self.vehicle_type, self.session_name, self.radar_serial, self.camera_serial)
 
 
-Vehicle: TypeAlias = Annotated[VehicleFlags, tyro.conf.arg(name="")]
+# Without a prefix, but in a group of their own in the help.
+Vehicle: TypeAlias = Annotated[VehicleFlags, tyro.conf.OmitArgPrefixes]
 CameraPosition: TypeAlias = Annotated[MeasuredCamera, tyro.conf.arg(name="")]
 # The camera position has its own flags; here it would become a subcommand.
 Options: TypeAlias = Annotated[

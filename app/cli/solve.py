@@ -72,7 +72,7 @@ class Solve:
     fleet_prior: File = None
     """What the fleet says of this vehicle (cocalib/fleet-prior-1 JSON, written by fleet prior); the data alone are shown, too."""
     measured: CameraPosition = field(default_factory=MeasuredCamera)
-    of: Vehicle = field(default_factory=VehicleFlags)
+    vehicle: Vehicle = field(default_factory=VehicleFlags)
     topics: Topics = field(default_factory=TopicFlags)
     options: Options = field(default_factory=CalibrationOptions)
     pairs_text: Annotated[str | None, tyro.conf.Suppress] = None
@@ -97,7 +97,7 @@ class Solve:
         """Solve, write the calibration, print its summary; return the exit code."""
         if self.pairs is not None and (self.recording or self.clicks or self.auto):
             raise InputError("solve takes either a recording with --clicks or --auto, or --pairs, not both")
-        vehicle = self.of.note()
+        vehicle = self.vehicle.note()
         if not self.auto and (self.clicks_out is not None or self.reflector_m != _REFLECTOR_M):
             raise InputError("--clicks-out and --reflector-m apply with --auto only; add it")
         if self.auto and self.options.method == "ccm":
@@ -187,7 +187,7 @@ class Solve:
 
         fleet = FleetPriorFile.read(self.fleet_prior)
         require_default(self.options, fleet.prior)
-        fleet.require_not_of(self.of.vehicle)
+        fleet.require_not_of(self.vehicle.vehicle)
         return fleet
 
     def _placed(

@@ -157,7 +157,8 @@ def flags_of(kind: type[Any], prefix: str = "") -> Iterator[str]:
         if tyro.conf.Suppress in notes:
             continue
         if dataclasses.is_dataclass(value):
-            unnamed = any(getattr(note, "name", None) == "" for note in notes)  # set by tyro.conf.arg(name="")
+            # tyro.conf.arg(name="") sets a name
+            unnamed = tyro.conf.OmitArgPrefixes in notes or any(getattr(note, "name", None) == "" for note in notes)
             yield from flags_of(typing.cast(type, value), prefix if unnamed else f"{prefix}{field.name}.")
         elif tyro.conf.Positional not in notes and not any(map(dataclasses.is_dataclass, typing.get_args(value))):
             given = next((name for note in notes if (name := getattr(note, "name", None))), field.name)

@@ -16,6 +16,7 @@ from calib_core.interchange.exporting import export as export_file
 from calib_core.interchange.imported import ImportedCalibration, imported
 from calib_core.interchange.importing import read_any_file
 from calib_core.interchange.own import calibration_json, clicks_json, pairs_json
+from calib_core.interchange.vehicle_note import VehicleNote
 from calib_core.measurements import ReflectorClick
 from calib_core.options import NoiseOptions
 from calib_core.results import Calibration
@@ -105,6 +106,7 @@ def write_calibration(
     *,
     frames: FrameNames | None = None,
     provenance: Provenance | None = None,
+    vehicle: VehicleNote | None = None,
 ) -> None:
     """Write a calibration-1 file; the same calibration gives the same bytes.
 
@@ -113,12 +115,13 @@ def write_calibration(
         calibration: a result of the solver, or the content of a file, which is written unchanged.
         frames: names of the two frames, for a result; None uses "radar" and "camera_optical".
         provenance: where a result comes from.
+        vehicle: which vehicle a result is of; None if nobody said.
 
     Raises:
         InputError: the file cannot be written.
     """
     text = (
-        calibration_json.calibration_text(calibration, frames, provenance)
+        calibration_json.calibration_text(calibration, frames, provenance, vehicle=vehicle)
         if isinstance(calibration, Calibration)
         else calibration_json.write_calibration(calibration)
     )

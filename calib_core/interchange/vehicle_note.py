@@ -4,10 +4,10 @@ from dataclasses import dataclass, fields, replace
 
 from calib_core.errors import InputError
 
-__all__ = ["MOST_CHARACTERS", "VehicleNote"]
+__all__ = ["MOST_CHARACTERS", "VehicleNote", "require_label", "require_name"]
 
 MOST_CHARACTERS = 120
-"""The longest name or serial."""
+"""The longest name or serial, in manifests, files and flags alike."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +22,7 @@ class VehicleNote:
         camera_serial: of the camera.
 
     Raises:
-        InputError: a text is empty, too long or not printable.
+        InputError: a text is empty, too long or not printable, or a name has a slash; the message begins with the key.
     """
 
     name: str | None = None
@@ -33,7 +33,8 @@ class VehicleNote:
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            _require_label(getattr(self, field.name), field.name)
+            if (text := getattr(self, field.name)) is not None:
+                (require_name if field.name in ("name", "session") else require_label)(text, f"vehicle.{field.name}")
 
     def over(self, other: "VehicleNote") -> "VehicleNote":
         """Return another note with what this one states instead."""
@@ -41,11 +42,33 @@ class VehicleNote:
         return replace(other, **{name: value for name, value in stated.items() if value is not None})
 
 
-def _require_label(text: str | None, what: str) -> None:
-    if text is None:
-        return
+def require_name(name: str, where: str) -> None:
+    """Refuse what cannot name a vehicle or a session, since `VEHICLE/SESSION` names one session.
+
+    Args:
+        name: of a vehicle or a session.
+        where: the name of the key or flag, with its file, for the message.
+
+    Raises:
+        InputError: it is blank, only dots, or too long, or has a slash or an unprintable character.
+    """
+    require_label(name, where)
+    if not name.strip(". ") or set(name) & set("/\\"):
+        raise InputError(f"{where}: {name!r} cannot be a name; give one without slashes")
+
+
+def require_label(text: str, where: str) -> None:
+    """Refuse what cannot be a vehicle's type or a sensor's serial.
+
+    Args:
+        text: as it was stated.
+        where: the name of the key or flag, with its file, for the message.
+
+    Raises:
+        InputError: it is blank, too long or not printable.
+    """
     if not text.strip() or not text.isprintable() or len(text) > MOST_CHARACTERS:
         shown = text if len(text) <= MOST_CHARACTERS else f"{text[:20]}…"
         raise InputError(
-            f"vehicle.{what} is {shown!r}; give 1 to {MOST_CHARACTERS} printable characters that are not all spaces"
+            f"{where} is {shown!r}; give 1 to {MOST_CHARACTERS} printable characters that are not all spaces"
         )

@@ -5,6 +5,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 Cocalib = Callable[..., Any]
 
 
@@ -34,4 +36,48 @@ def test_nothing_stated_writes_nothing_and_nonsense_is_refused(
     assert "vehicle" not in json.loads((tmp_path / "calibration.json").read_text())
     answer = cocalib("solve", "--pairs", pairs_file(), "--radar-serial", "")
     assert answer.code == 2
-    assert "vehicle.radar_serial is ''; give 1 to 120 printable characters" in answer.err
+    assert "--radar-serial is ''; give 1 to 120 printable characters" in answer.err
+
+
+def test_a_calibration_from_a_recording_differs_in_what_was_stated_alone(
+    cocalib: Cocalib, made: Callable[..., Path], clicks_file: Path
+) -> None:
+    recording, flags = made(), ("--vehicle", "V017", "--camera-serial", "C-2")
+    stated, plain = (cocalib("solve", recording, "--clicks", clicks_file, *given) for given in (flags, ()))
+    assert (stated.code, plain.code) == (0, 0), stated.err + plain.err
+    document = json.loads(stated.out)
+    assert document.pop("vehicle") == {"name": "V017", "camera_serial": "C-2"}
+    assert document == json.loads(plain.out)
+
+
+def test_exports_and_imports_of_the_whole_calibration_keep_it(
+    cocalib: Cocalib, pairs_file: Callable[..., Path], tmp_path: Path
+) -> None:
+    out, copy, pack, unpacked = (tmp_path / name for name in ("a.json", "copy.json", "pack.zip", "unpacked.json"))
+    assert cocalib("solve", "--pairs", pairs_file(), "--vehicle", "V017", "--out", out).code == 0
+    assert cocalib("export", out, "--to", "json", "--out", copy).code == 0
+    assert cocalib("export", out, "--to", "pack", "--out", pack).code == 0
+    assert cocalib("import", pack, "--out", unpacked).code == 0
+    assert copy.read_bytes() == unpacked.read_bytes() == out.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("flags", "fault"),
+    [
+        (("--vehicle", "a/b"), "--vehicle: 'a/b' cannot be a name; give one without slashes"),
+        (("--session-name", ".."), "--session-name: '..' cannot be a name"),
+        (("--vehicle-type", " "), "--vehicle-type is ' '; give 1 to 120 printable characters"),
+        (("--camera-serial", "x" * 121), "--camera-serial is 'xxxxxxxxxxxxxxxxxxxx…'; give 1 to 120"),
+    ],
+)
+def test_a_flag_that_no_file_can_hold_is_refused_before_anything_is_read(
+    cocalib: Cocalib, tmp_path: Path, flags: tuple[str, str], fault: str
+) -> None:
+    answer = cocalib("solve", tmp_path / "absent.mcap", "--clicks", tmp_path / "absent.json", *flags)
+    assert answer.code == 2
+    assert fault in answer.err
+
+
+def test_the_flags_are_a_group_of_the_help(cocalib: Cocalib) -> None:
+    group = cocalib("solve", "--help").out.partition("vehicle options")[2].partition("gating options")[0]
+    assert all(f"{flag} " in group for flag in ("--vehicle", "--vehicle-type", "--session-name", "--radar-serial"))

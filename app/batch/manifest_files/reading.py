@@ -15,8 +15,9 @@ from app.batch.manifest_files.documents import ManifestDocument, SessionDocument
 from app.option_changes import options_from_tree
 from calib_core.errors import CalibrationError, InputError
 from calib_core.input_files import file_text, read_input
-from calib_core.interchange import VehicleNote, format_named
+from calib_core.interchange import format_named
 from calib_core.interchange.syntax.strict_json import checked
+from calib_core.interchange.vehicle_note import require_label, require_name
 from calib_core.options import CalibrationOptions, CameraPositionPrior
 
 __all__ = ["read_manifest"]
@@ -169,11 +170,10 @@ def _row(document: SessionDocument, place: str, path: Path) -> ManifestRow:
     folder = path.parent
     session = document.session or Path(recordings[0]).stem
     for key, name in (("vehicle", document.vehicle), ("session", session)):
-        _require_name(name, f"{where}: {key}")
-    try:
-        VehicleNote(document.vehicle, document.vehicle_type, session, document.radar_serial, document.camera_serial)
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
+        require_name(name, f"{where}: {key}")
+    for key in ("vehicle_type", "radar_serial", "camera_serial"):
+        if (text := getattr(document, key)) is not None:
+            require_label(text, f"{where}: {key}")
     return ManifestRow(
         document.vehicle,
         session,
@@ -193,16 +193,6 @@ def _row(document: SessionDocument, place: str, path: Path) -> ManifestRow:
         reflector_m=document.reflector_m,
         place=place,
     )
-
-
-def _require_name(name: str, where: str) -> None:
-    """Refuse what cannot name a vehicle or a session, since `VEHICLE/SESSION` names one session.
-
-    Raises:
-        InputError: it is blank, only dots, or has a slash or an unprintable character.
-    """
-    if not name.strip(". ") or not name.isprintable() or set(name) & set("/\\"):
-        raise InputError(f"{where}: {name!r} cannot be a name; give one without slashes")
 
 
 def _path(folder: Path, name: str | None) -> Path | None:

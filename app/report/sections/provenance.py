@@ -14,7 +14,7 @@ from calib_core.results import InputFile
 
 __all__ = ["provenance"]
 
-_MOST_FILES, _MOST_ROWS = 12, 16
+_MOST_FILES, _MOST_ROWS = 12, 19
 _RESTS_ON = {
     "clicked": "clicks: solved from pairs of radar positions and clicked pixels",
     "imported_proven": "an import whose meaning a check point, pairs or another calibration proved",

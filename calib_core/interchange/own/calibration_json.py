@@ -145,7 +145,7 @@ def write_calibration(file: CalibrationFile) -> str:
         camera=camera_document(calibration.camera),
         given_camera=camera_document(calibration.given_camera) if calibration.given_camera is not None else None,
         fleet_prior=fleet_answer_document(calibration.fleet),
-        vehicle=vehicle_document(file.vehicle),
+        vehicle=vehicle_document(file.vehicle, file.unknown),
         options=calibration.options,
         provenance=provenance_document(file.provenance),
     )

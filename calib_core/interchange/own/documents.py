@@ -10,6 +10,7 @@ from msgspec import UNSET, Meta, Struct, UnsetType, field
 
 from calib_core.camera import CameraModel
 from calib_core.interchange.evidence import Evidence
+from calib_core.interchange.vehicle_note import MOST_CHARACTERS
 from calib_core.measurements import Mark
 from calib_core.options import CalibrationOptions
 from calib_core.verdict import VerdictLevel
@@ -69,6 +70,8 @@ Matrix22 = tuple[Vector2, Vector2]
 Matrix33 = tuple[Position, Position, Position]
 Matrix66 = tuple[Vector6, Vector6, Vector6, Vector6, Vector6, Vector6]
 Name = Annotated[str, Meta(min_length=1, max_length=200)]
+Label = Annotated[str, Meta(extra_json_schema={"minLength": 1, "maxLength": MOST_CHARACTERS})]
+"""A vehicle, type, session or serial. For the schema only: VehicleNote refuses what is none, and says what to do."""
 Positive = Annotated[float, Meta(ge=1e-12, le=1e9)]
 """A standard deviation; its square and the reciprocal of that are far from overflowing."""
 Count = Annotated[int, Meta(ge=0)]
@@ -397,11 +400,11 @@ class AngleMapDocument(Struct, frozen=True):
 class VehicleDocument(Struct, frozen=True, omit_defaults=True):
     """Which vehicle the calibration is of, and the serials of its sensors."""
 
-    name: str | None = None
-    type: str | None = None
-    session: str | None = None
-    radar_serial: str | None = None
-    camera_serial: str | None = None
+    name: Label | None = None
+    type: Label | None = None
+    session: Label | None = None
+    radar_serial: Label | None = None
+    camera_serial: Label | None = None
 
 
 class DataAloneDocument(Struct, frozen=True):

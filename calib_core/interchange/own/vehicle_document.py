@@ -3,22 +3,29 @@
 from dataclasses import asdict
 
 from calib_core.errors import InputError
+from calib_core.interchange.calibration_file import UnknownResult
 from calib_core.interchange.own.documents import VehicleDocument
 from calib_core.interchange.vehicle_note import VehicleNote
 
 __all__ = ["vehicle_document", "vehicle_of"]
 
 
-def vehicle_document(note: VehicleNote) -> VehicleDocument | None:
-    """Return the document; None if nothing is stated."""
-    return None if note == VehicleNote() else VehicleDocument(**asdict(note))
+def vehicle_document(note: VehicleNote, kept: tuple[UnknownResult, ...] = ()) -> VehicleDocument | None:
+    """Return the document; None if nothing is stated.
+
+    Args:
+        note: what is stated.
+        kept: results of a later version that go back to their places, which may be in this document alone.
+    """
+    has_more = any(result.place[0] == "vehicle" for result in kept)
+    return VehicleDocument(**asdict(note)) if has_more or note != VehicleNote() else None
 
 
 def vehicle_of(document: VehicleDocument | None, *, source: str) -> VehicleNote:
     """Return what a document states.
 
     Raises:
-        InputError: a text is empty, too long or not printable.
+        InputError: a text is empty, too long or not printable, or a name has a slash; the message names the file and the key.
     """
     if document is None:
         return VehicleNote()

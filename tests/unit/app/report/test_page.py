@@ -12,7 +12,7 @@ from app.report import Against, Judged, ReportSubject, known_calibration, report
 from app.view.number_format import plain
 from calib_core.evaluation import Evaluation
 from calib_core.geometry import quaternion_wxyz_from_matrix
-from calib_core.interchange import compare, export, imported, read_any
+from calib_core.interchange import AssumptionNote, Provenance, VehicleNote, compare, export, imported, read_any
 from calib_core.results import DataWarning
 from tests.unit.app.report.planted import FILE, box_figures, golden, subject_for, watched_recording
 
@@ -96,6 +96,38 @@ def test_text_of_a_recording_or_a_file_stays_text(project_root: Path) -> None:
     assert "<img" not in html
     assert "&lt;img src=x onerror=alert(1)&gt;" in html
     assert not list(_parsed(subject).iter(f"{_HTML}img"))
+
+
+def test_what_is_said_of_the_vehicle_hides_nothing_else(project_root: Path) -> None:
+    plain = replace(
+        subject_for(project_root), recording=watched_recording(topics=(("radar", "/r"), ("pictures", "/i")))
+    )
+    file = plain.found.file
+    assert file is not None
+    made = Provenance(
+        version="1",
+        radar_topic="/r",
+        image_topic="/i",
+        camera_info_topic="/c",
+        radar_axes="forward,left,up",
+        video_start="0",
+        column_map=("x=a:m",),
+        assumptions=(AssumptionNote("metres", True), AssumptionNote("m/s", True)),
+    )
+    file = replace(file, provenance=made)
+    note = VehicleNote("V017", "van", "2026-09-21", "R-1", "<img src=x>")
+
+    def facts(vehicle: VehicleNote) -> list[str]:
+        subject = replace(plain, found=replace(plain.found, file=replace(file, vehicle=vehicle)))
+        assert "<img" not in report_html(subject)
+        (section,) = (one for one in _parsed(subject).iter(f"{_HTML}section") if one.get("id") == "provenance")
+        rows = ("".join(one.itertext()) for one in section.iter() if one.tag in (f"{_HTML}dt", f"{_HTML}dd"))
+        return [f"{name}: {text}" for name, text in zip(rows, rows, strict=True)]
+
+    stated = ["vehicle: V017, of type van", "session: 2026-09-21", "serials: radar R-1, camera <img src=x>"]
+    assert facts(VehicleNote())[-1] == "recording, pictures: /i"
+    assert [one for one in facts(note) if one not in stated] == facts(VehicleNote())
+    assert [one for one in facts(note) if one in stated] == stated
 
 
 def test_a_method_without_a_noise_model_gets_no_error_bars_and_no_map(project_root: Path) -> None:

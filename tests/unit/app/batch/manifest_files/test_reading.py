@@ -94,6 +94,22 @@ def test_an_absolute_path_stays_as_it_is(tmp_path: Path) -> None:
         ("[[session", "not valid TOML: "),
         ('[[session]]\nvehicle = "a/b"\nrecording = "b.bag"', "session 1 (a/b): vehicle: 'a/b' cannot be a name"),
         ('[[session]]\nvehicle = "a"\nrecording = ".."', "session 1 (a): session: '..' cannot be a name"),
+        (
+            f'[[session]]\nvehicle = "a"\nrecording = "{"b" * 121}.bag"',
+            "session 1 (a): session is 'bbbbbbbbbbbbbbbbbbbb…'; give 1 to 120 printable characters",
+        ),
+        (
+            '[[session]]\nvehicle = "a"\nrecording = "b.bag"\nradar_serial = "R\\t1"',
+            "session 1 (a): radar_serial is 'R\\t1'; give 1 to 120 printable characters",
+        ),
+        (
+            '[[session]]\nvehicle = "a"\nrecording = "b.bag"\nvehicle_type = " "',
+            "session 1 (a): vehicle_type is ' '; give 1 to 120 printable characters",
+        ),
+        (
+            f'[[session]]\nvehicle = "a"\nrecording = "b.bag"\ncamera_serial = "{"x" * 121}"',
+            "session 1: camera_serial: expected str of length <= 120",
+        ),
         ('[[session]]\nvehicle = "a"\nrecording = []', "session 1 (a): recording: names no file"),
         (
             '[[session]]\nvehicle = "a"\nrecording = "b.bag"\noptions.noise.sigmapx = 1',
