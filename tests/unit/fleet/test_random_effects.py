@@ -28,7 +28,7 @@ def covered(count: int, fleets: int, sigma: np.ndarray, error: np.ndarray) -> fl
     rng, shares = np.random.default_rng(count), []
     for _ in range(fleets):
         effects = estimated(count, sigma, error, rng)
-        limit = quantile(0.95, effects.freedom, whole=effects.whole)
+        limit = effects.widened * quantile(0.95, 1e7)
         shares.append((squared_of_new(effects, sigma, rng) <= limit).mean())
     return float(np.mean(shares))
 
