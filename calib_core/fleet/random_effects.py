@@ -205,4 +205,4 @@ class _Nodes:
         scale = np.sqrt(np.diag(covariance))
         whitening = np.linalg.inv(np.linalg.cholesky(covariance / np.outer(scale, scale))) / scale
         squares = np.linalg.eigvalsh(whitening @ each @ whitening.T)
-        return mixture_quantile(_INSIDE, squares, probabilities) / quantile(_INSIDE, float("inf"))
+        return max(1.0, mixture_quantile(_INSIDE, squares, probabilities) / quantile(_INSIDE, float("inf")))
