@@ -11,7 +11,7 @@ from benchmarks.fleet.simulated_poses import Spread
 from calib_core.verdict import VerdictLevel
 
 if TYPE_CHECKING:
-    from benchmarks.fleet.prior_value import FleetFigures
+    from benchmarks.fleet.prior_value import FleetFigures, OffKindTrial
 
 __all__ = ["answers_table", "gain_table", "off_kind_table", "prior_table", "share_by_fleet"]
 
@@ -54,16 +54,15 @@ def answers_table(rows: _Rows) -> Iterator[str]:
                 yield f"| {setting.text} | {name} | {_answers(answers, by_fleet)} |"
 
 
-def off_kind_table(rows: _Rows) -> Iterator[str]:
+def off_kind_table(rows: "Mapping[Setting, Sequence[OffKindTrial]]") -> Iterator[str]:
     """Say what becomes of vehicles that are off their kind."""
     yield ""
     yield (
         "| scatter | turned by | placements | named | not named: true error of rotation (RMS, largest) | inside 95 % | "
-        "fleet-prior-decides | good or usable | of these outside the stated error |"
+        "far-from-its-kind | fleet-prior-decides | good or usable | of these outside the stated error |"
     )
-    yield "|---|---|---|---|---|---|---|---|---|"
-    for setting, fleets in rows.items():
-        trials = [one for fleet in fleets for one in fleet.off_kind]
+    yield "|---|---|---|---|---|---|---|---|---|---|"
+    for setting, trials in rows.items():
         for turned_deg in sorted({one.turned_deg for one in trials}):
             chosen = [one for one in trials if one.turned_deg == turned_deg]
             for count, answers in ((6, [one.few for one in chosen]), (20, [one.many for one in chosen])):
@@ -126,6 +125,7 @@ def _off_kinds(answers: Sequence[Answer]) -> str:
             f"{sum(one.off_kind for one in answers)} of {len(answers)}",
             wrong,
             f"{sum(one.inside for one in unnamed)} of {len(unnamed)}",
+            str(sum("far-from-its-kind" in one.warnings for one in unnamed)),
             str(sum("fleet-prior-decides" in one.warnings for one in unnamed)),
             str(len(stated)),
             str(sum(not one.kept for one in stated)),

@@ -6,7 +6,6 @@ whatever the number of processes.
 """
 
 import argparse
-from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -24,9 +23,17 @@ from benchmarks.fleet.paired_fleet import (
 )
 from benchmarks.fleet.prior_tables import answers_table, gain_table, off_kind_table, prior_table
 from benchmarks.fleet.simulated_poses import Spread
-from calib_core.fleet_prior import FleetPrior
 
-__all__ = ["OTHERS", "SETTINGS", "FleetFigures", "OffKindTrial", "main", "measure_fleet", "measure_gain"]
+__all__ = [
+    "OTHERS",
+    "SETTINGS",
+    "FleetFigures",
+    "OffKindTrial",
+    "main",
+    "measure_fleet",
+    "measure_gain",
+    "measure_off_kind",
+]
 
 OTHERS = 49
 NEXT = 25
@@ -41,7 +48,7 @@ SETTINGS = (
 )
 """The first two have as many vehicles as asked for, the others a quarter of that."""
 _EVERY = 5  # one vehicle in so many is also solved with prior from all its placements
-_OFF_KIND = 1  # vehicles off their kind by each turn, for each fleet
+_OFF_KIND = 5  # vehicles off their kind by each turn, for each fleet
 _GAIN_SPREADS = (Spread(0.005, 5.0), Spread(0.05, 5.0), Spread(0.5, 5.0))
 _GAIN_PLACEMENTS = (6, 10, 20, 40)
 _GAIN_VEHICLES = 20
@@ -67,7 +74,6 @@ class FleetFigures:
         left_out: how many of the others were not counted.
         held: for each next vehicle whether its true mounting is in the prior's 95 % ellipsoid.
         answers: of the next vehicles, by column: placements and whether the prior was given.
-        off_kind: vehicles that are off their kind.
     """
 
     widened: float
@@ -76,7 +82,6 @@ class FleetFigures:
     left_out: int
     held: tuple[bool, ...]
     answers: dict[tuple[int, bool], tuple[Answer, ...]]
-    off_kind: tuple[OffKindTrial, ...]
 
 
 def main() -> None:
@@ -87,15 +92,21 @@ def main() -> None:
     parser.add_argument("--processes", type=int, default=1)
     given = parser.parse_args()
     most = -(-given.vehicles // NEXT)
-    counts = {setting: most if place < 2 else -(-most // 4) for place, setting in enumerate(SETTINGS)}
+    fewer = -(-most // 4)
+    counts = {setting: most if place < 2 else fewer for place, setting in enumerate(SETTINGS)}
     todo = [(setting, (given.first, number)) for setting, fleets in counts.items() for number in range(fleets)]
     with ProcessPoolExecutor(given.processes, mp_context=get_context("spawn")) as pool:
         gains = pool.map(partial(measure_gain, seed=given.first), _GAIN_SPREADS)
+        turned = {
+            setting: pool.map(partial(measure_off_kind, setting), [(given.first, k) for k in range(fewer)])
+            for setting in SETTINGS[:3]
+        }
         measured = pool.map(measure_fleet, *zip(*todo, strict=True))
         rows: dict[Setting, list[FleetFigures]] = {setting: [] for setting in SETTINGS}
         for (setting, _), figures in zip(todo, measured, strict=True):
             rows[setting].append(figures)
-    for line in chain(prior_table(rows), answers_table(rows), off_kind_table(rows), gain_table(tuple(gains))):
+        off_kind = {setting: list(chain.from_iterable(fleets)) for setting, fleets in turned.items()}
+    for line in chain(prior_table(rows), answers_table(rows), off_kind_table(off_kind), gain_table(tuple(gains))):
         print(line, flush=True)
 
 
@@ -104,7 +115,6 @@ def measure_fleet(
     seed: tuple[int, int],
     *,
     following: int = NEXT,
-    off_kind: int = _OFF_KIND,
     many: bool = True,
 ) -> FleetFigures:
     """Draw a fleet, make its prior, and give it to vehicles that it does not contain.
@@ -113,7 +123,6 @@ def measure_fleet(
         setting: how it is drawn.
         seed: another one is another fleet.
         following: how many next vehicles.
-        off_kind: how many vehicles off their kind by each turn.
         many: whether vehicles are also solved from all placements.
     """
     start = (*seed, SETTINGS.index(setting) if setting in SETTINGS else len(SETTINGS))
@@ -137,16 +146,24 @@ def measure_fleet(
         len(prior.left_out),
         tuple(held),
         {column: tuple(row) for column, row in answers.items()},
-        tuple(_off_kind(setting, start, prior, off_kind)),
     )
 
 
-def _off_kind(setting: Setting, start: tuple[int, ...], prior: FleetPrior, count: int) -> Iterator[OffKindTrial]:
-    """Try the prior on vehicles whose camera is turned."""
-    for (place, turned_deg), number in product(enumerate(TURNS_DEG), range(count)):
+def measure_off_kind(setting: Setting, seed: tuple[int, int]) -> tuple[OffKindTrial, ...]:
+    """Try the prior of a fleet on vehicles whose camera is turned away from their kind.
+
+    Args:
+        setting: how the fleet is drawn.
+        seed: another one is another fleet.
+    """
+    start = (*seed, 100 + SETTINGS.index(setting))
+    prior = prior_from([draw_vehicle(setting, (*start, number)) for number in range(OTHERS)])
+    found = []
+    for (place, turned_deg), number in product(enumerate(TURNS_DEG), range(_OFF_KIND)):
         vehicle = draw_vehicle(setting, (*start, 1000 + 100 * place + number), turned_deg=turned_deg)
         few, many = (answered(vehicle.solved(placements, prior), vehicle.truth) for placements in (FEW, MANY))
-        yield OffKindTrial(turned_deg, few, many)
+        found.append(OffKindTrial(turned_deg, few, many))
+    return tuple(found)
 
 
 def measure_gain(spread: Spread, seed: int) -> tuple[Spread, dict[int, list[tuple[Answer, Answer]]]]:
