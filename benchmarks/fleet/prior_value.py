@@ -110,31 +110,23 @@ def main() -> None:
         print(line, flush=True)
 
 
-def measure_fleet(
-    setting: Setting,
-    seed: tuple[int, int],
-    *,
-    following: int = NEXT,
-    many: bool = True,
-) -> FleetFigures:
+def measure_fleet(setting: Setting, seed: tuple[int, int]) -> FleetFigures:
     """Draw a fleet, make its prior, and give it to vehicles that it does not contain.
 
     Args:
         setting: how it is drawn.
         seed: another one is another fleet.
-        following: how many next vehicles.
-        many: whether vehicles are also solved from all placements.
     """
-    start = (*seed, SETTINGS.index(setting) if setting in SETTINGS else len(SETTINGS))
+    start = (*seed, SETTINGS.index(setting))
     prior = prior_from([draw_vehicle(setting, (*start, number)) for number in range(OTHERS)])
     held: list[bool] = []
     answers: dict[tuple[int, bool], list[Answer]] = {}
-    for number in range(following):
+    for number in range(NEXT):
         vehicle = draw_vehicle(setting, (*start, OTHERS + number))
         held.append(prior_holds(prior, vehicle.truth))
-        columns = [(FEW, False), (FEW, True)]
-        if many:
-            columns += [(MANY, False), (MANY, True)] if number % _EVERY == 0 else [(MANY, False)]
+        columns = [(FEW, False), (FEW, True), (MANY, False)]
+        if number % _EVERY == 0:
+            columns.append((MANY, True))
         for count, with_prior in columns:
             outcome = vehicle.solved(count, prior if with_prior else None)
             answers.setdefault((count, with_prior), []).append(answered(outcome, vehicle.truth))
