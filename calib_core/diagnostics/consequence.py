@@ -28,6 +28,7 @@ _CODES: dict[Consequence, tuple[str, ...]] = {
     ),
     "weak": (
         "off-its-kind",
+        "far-from-its-kind",
         "fleet-prior-untested",
         "weak-geometry",
         "board-geometry",

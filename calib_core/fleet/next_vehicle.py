@@ -2,8 +2,6 @@
 
 from calib_core.fleet.mounting_coordinates import pose_covariance
 from calib_core.fleet.mounting_scatter import MountingScatter
-from calib_core.fleet.session_pose import CHI2_95
-from calib_core.fleet.tails import quantile
 from calib_core.fleet_prior import FleetPrior
 
 __all__ = ["fleet_prior_of"]
@@ -14,13 +12,14 @@ def fleet_prior_of(scatter: MountingScatter) -> FleetPrior:
 
     Its covariance is scatter plus uncertainty of the mean, widened by the ratio of two 95 % quantiles: that of the squared
     distance of a further vehicle, whose tails are wide because the scatter was estimated, and that of chi2. So the
-    ellipsoid of a normal distribution with this covariance contains the next vehicle in 95 % of fleets.
+    ellipsoid of a normal distribution with this covariance contains the next vehicle in 95 % of fleets, averaged over the
+    scatters that the data allow.
 
     Args:
         scatter: of the vehicle type.
     """
     effects, pose = scatter.effects, scatter.camera_from_radar
-    wider = quantile(0.95, effects.freedom, whole=effects.whole) / CHI2_95
+    wider = effects.widened
     counted = {one.vehicle for one in scatter.mountings}
     return FleetPrior(
         vehicle_type=scatter.vehicle_type,

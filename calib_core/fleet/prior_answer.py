@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from calib_core.fleet.deviation import Deviation
 from calib_core.fleet.prior_test import prior_test
 from calib_core.fleet_prior import DataAlone, FleetAnswer, FleetPrior
 from calib_core.measurements import Unsolvable
@@ -12,6 +13,8 @@ from calib_core.stated_error import stated_error
 
 __all__ = ["fleet_answer", "fleet_warnings"]
 
+_RARE = 0.01
+"""A sound vehicle is this far from the prior, or farther, less often than this: the prior then draws the pose of an odd one."""
 _DECIDES = 2.0
 """The prior decides if the data alone state an error this many times as large, of rotation or position."""
 
@@ -58,7 +61,22 @@ def fleet_warnings(fleet: FleetAnswer, calibration: Calibration) -> tuple[DataWa
                 "without the fleet's prior",
             ),
         )
-    return _decides(fleet, fleet.data_alone, calibration)
+    return (*_far(fleet, away), *_decides(fleet, fleet.data_alone, calibration))
+
+
+def _far(fleet: FleetAnswer, away: Deviation) -> tuple[DataWarning, ...]:
+    """Say that the data are farther from the prior than nearly all sound vehicles, though not so far that it is refused."""
+    if away.probability >= _RARE:
+        return ()
+    return (
+        DataWarning(
+            "far-from-its-kind",
+            f"the data are far from the fleet's prior of type {fleet.prior.vehicle_type}: {away.text}; fewer than 1 in 100 "
+            "vehicles of this kind are that far off, and the prior would draw the pose of one that is not to the others'",
+            "add placements: with more of them the data agree with the fleet, or the vehicle is named as off its kind; and check "
+            "that radar, camera, intrinsics and type are this vehicle's",
+        ),
+    )
 
 
 def _decides(fleet: FleetAnswer, alone: DataAlone, calibration: Calibration) -> tuple[DataWarning, ...]:

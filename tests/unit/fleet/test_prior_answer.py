@@ -79,6 +79,16 @@ def test_a_wide_prior_leaves_the_answer_of_the_data() -> None:
     assert "fleet-prior-decides" not in codes(found)
 
 
+def test_a_vehicle_that_is_far_from_its_kind_and_not_refused_is_weak() -> None:
+    sound, far = solved(6, prior(6)), solved(6, prior(6, turned_deg=3.0))
+    assert far.fleet is not None
+    assert far.fleet.used
+    assert "far-from-its-kind" in codes(far)
+    assert " deg " in far.warnings[0].message
+    assert verdict_on(far).level == "weak"
+    assert "far-from-its-kind" not in codes(sound)
+
+
 def test_a_vehicle_off_its_kind_keeps_the_answer_of_its_data_and_is_named_first() -> None:
     found, data = solved(20, prior(20, turned_deg=20.0)), alone(20)
     assert found.fleet is not None

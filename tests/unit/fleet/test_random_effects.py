@@ -28,7 +28,7 @@ def covered(count: int, fleets: int, sigma: np.ndarray, error: np.ndarray) -> fl
     rng, shares = np.random.default_rng(count), []
     for _ in range(fleets):
         effects = estimated(count, sigma, error, rng)
-        limit = quantile(0.95, effects.freedom, whole=effects.whole)
+        limit = effects.widened * quantile(0.95, 1e7)
         shares.append((squared_of_new(effects, sigma, rng) <= limit).mean())
     return float(np.mean(shares))
 
@@ -72,3 +72,28 @@ def test_vectors_that_are_all_the_same_have_next_to_no_scatter() -> None:
     effects = random_effects(np.zeros((6, 6)), np.repeat(1e-8 * np.eye(6)[None], 6, axis=0))
     assert np.sqrt(np.diag(effects.scatter)).max() < 2e-4
     assert np.linalg.eigvalsh(effects.scatter)[0] > 0.0
+
+
+def test_exact_vectors_vary_as_their_number_and_the_prior_say() -> None:
+    count = 49
+    effects = estimated(count, EQUAL, 1e-10 * np.eye(6), np.random.default_rng(5))
+    freedom = (count + PRIOR_VECTORS) ** 2 / count
+    assert effects.shape_freedom == pytest.approx(freedom * (1.0 + 1.0 / count) ** 2, rel=0.01)
+    assert effects.level_widened == pytest.approx(1.0, abs=0.03)
+    hotelling = quantile(0.95, effects.shape_freedom, whole=5.0) / quantile(0.95, 1e7)
+    assert effects.widened == pytest.approx(effects.level_widened * hotelling)
+
+
+def test_a_hidden_scatter_is_widened_for_its_level_and_hardly_for_its_shape() -> None:
+    effects = estimated(30, np.full(6, 1e-4), ROUGH, np.random.default_rng(4))
+    assert 1.05 < effects.level_widened < 1.4
+    assert effects.shape_freedom > 150.0
+
+
+def test_the_axes_in_which_vectors_are_given_do_not_matter() -> None:
+    rng = np.random.default_rng(6)
+    vectors, errors = EQUAL * rng.standard_normal((20, 6)), np.array([np.diag(row) for row in rng.random((20, 6))])
+    turned = np.kron(np.eye(2), np.linalg.qr(rng.standard_normal((3, 3)))[0])
+    one = random_effects(vectors, 1e-4 * errors)
+    other = random_effects(vectors @ turned.T, 1e-4 * turned @ errors @ turned.T)
+    assert other.widened == pytest.approx(one.widened, rel=1e-4)
