@@ -1,5 +1,6 @@
 """The truth about a simulated fleet: how each vehicle is mounted in each session, and what is wrong with some."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,7 +82,15 @@ class FleetPlan:
     sessions: tuple[PlannedSession, ...]
 
 
-def plan_fleet(vehicles: int, sessions: int, seed: int, *, recording: SimulationOptions = RECORDING) -> FleetPlan:
+def plan_fleet(
+    vehicles: int,
+    sessions: int,
+    seed: int,
+    *,
+    recording: SimulationOptions = RECORDING,
+    remounts: Sequence[Remount] = REMOUNTS,
+    sound: bool = False,
+) -> FleetPlan:
     """Draw a fleet: three vehicles are remounted once, two have a wrong radar, one session is broken, one has no clicks.
 
     Args:
@@ -89,10 +98,12 @@ def plan_fleet(vehicles: int, sessions: int, seed: int, *, recording: Simulation
         sessions: of each vehicle, a month apart.
         seed: of the random generator; each vehicle has a stream of its own.
         recording: what all recordings have in common.
+        remounts: up to three, one for each vehicle that is remounted.
+        sound: leave out remounts and faults.
     """
     mean = Mounting(np.array(_TYPE_ANGLES_DEG), np.array(_TYPE_POSITION_M))
-    special = [int(number) for number in np.random.default_rng([seed, 0]).permutation(vehicles)]
-    remounts = dict(zip(special[:3], REMOUNTS, strict=False)) if sessions > 1 else {}
+    special = [] if sound else np.random.default_rng([seed, 0]).permutation(vehicles).tolist()
+    changes = dict(zip(special[:3], remounts, strict=False)) if sessions > 1 else {}
     radars = dict(zip(special[3:5], _WRONG_RADARS, strict=False))
     spoilt = dict(zip(special[5:7], _SPOILT, strict=False))
     planned: list[PlannedSession] = []
@@ -100,7 +111,7 @@ def plan_fleet(vehicles: int, sessions: int, seed: int, *, recording: Simulation
         rng = np.random.default_rng([seed, 1 + number])
         mounting = mean.moved(_SCATTER_DEG * rng.standard_normal(3), _SCATTER_M * rng.standard_normal(3))
         errors = VehicleErrors.drawn(rng, width_px=recording.width_px)
-        remount = remounts.get(number)
+        remount = changes.get(number)
         change = None if remount is None else int(rng.integers(1, sessions))
         spoilt_session = int(rng.integers(sessions))
         for index in range(sessions):
