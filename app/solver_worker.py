@@ -12,6 +12,7 @@ from app.session import Solved
 from app.solving import RadarSource, check_clicks, solve_in_steps
 from calib_core.camera import Camera
 from calib_core.errors import CalibrationError
+from calib_core.fleet_prior import FleetPrior
 from calib_core.measurements import ReflectorClick, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, PairResult
@@ -31,12 +32,22 @@ class _Request:
 
 
 class SolverWorker:
-    """Solves in its own thread; of several waiting requests, only the newest is solved."""
+    """Solves in its own thread; of several waiting requests, only the newest is solved.
 
-    def __init__(self, recording: RadarSource, camera: Camera | None, reference: Calibration | None = None) -> None:
+    A fleet's prior takes part in the default method, and is left out of the others, which have no use for it.
+    """
+
+    def __init__(
+        self,
+        recording: RadarSource,
+        camera: Camera | None,
+        reference: Calibration | None = None,
+        fleet_prior: FleetPrior | None = None,
+    ) -> None:
         self._recording = recording
         self._camera = camera
         self._reference = reference
+        self._fleet_prior = fleet_prior
         self._lock = threading.Lock()
         self._newest_revision = -1
         self._closed = False
@@ -82,7 +93,10 @@ class SolverWorker:
         if request.revision != self._newest_revision:
             return None
         latest = self._latest if self._latest_camera is request.camera else None
-        steps = solve_in_steps(self._recording, request.clicks, request.camera, request.options, previous=latest)
+        fleet_prior = self._fleet_prior if request.options.method == "default" else None
+        steps = solve_in_steps(
+            self._recording, request.clicks, request.camera, request.options, previous=latest, fleet_prior=fleet_prior
+        )
         for outcome in steps:
             if not (isinstance(outcome, Calibration) and outcome.checking):
                 break

@@ -14,9 +14,10 @@ from app.board_search import find_board
 from app.resources import version
 from app.session import Outcome
 from calib_core.association.pairing import pair_clicks
-from calib_core.calibration import calibrate_pairs, calibration_steps, solve_again
+from calib_core.calibration import calibrate_pairs, calibration_steps, require_default, solve_again
 from calib_core.camera import Camera
 from calib_core.errors import InputError, OptionError
+from calib_core.fleet_prior import FleetPrior
 from calib_core.input_files import name_text
 from calib_core.interchange import (
     CALIBRATION_SCHEMA,
@@ -24,6 +25,7 @@ from calib_core.interchange import (
     CameraFile,
     FrameNames,
     Provenance,
+    VehicleNote,
     names_schema,
     read_calibration,
     read_pairs,
@@ -66,7 +68,11 @@ class RadarSource(Protocol):
 
 
 def solve_clicks(
-    recording: RadarSource, clicks: Sequence[ReflectorClick], camera: Camera | None, options: CalibrationOptions
+    recording: RadarSource,
+    clicks: Sequence[ReflectorClick],
+    camera: Camera | None,
+    options: CalibrationOptions,
+    fleet_prior: FleetPrior | None = None,
 ) -> Outcome:
     """Solve for camera_from_radar.
 
@@ -75,12 +81,13 @@ def solve_clicks(
         clicks: in any order; excluded ones are paired and shown, but not used.
         camera: the intrinsics; without them, the outcome says that they are missing.
         options: of the calibration.
+        fleet_prior: what the fleet says of this vehicle; optional.
 
     Raises:
         OptionError: an option is out of range.
-        CalibrationError: the recording cannot be read at the clicks.
+        CalibrationError: the recording cannot be read at the clicks, or the method takes no fleet's prior.
     """
-    *_, outcome = solve_in_steps(recording, clicks, camera, options, preview=False)
+    *_, outcome = solve_in_steps(recording, clicks, camera, options, preview=False, fleet_prior=fleet_prior)
     return outcome
 
 
@@ -92,6 +99,7 @@ def solve_in_steps(
     *,
     previous: Calibration | None = None,
     preview: bool = True,
+    fleet_prior: FleetPrior | None = None,
 ) -> Iterator[Outcome]:
     """Solve, with a preview of the answer first if there can be one; the last step is what `solve_clicks` returns.
 
@@ -102,11 +110,13 @@ def solve_in_steps(
         options: of the calibration.
         previous: the answer to nearly the same clicks.
         preview: make one.
+        fleet_prior: what the fleet says of this vehicle; optional.
 
     Raises:
         OptionError: an option is out of range.
-        CalibrationError: the recording cannot be read at the clicks.
+        CalibrationError: the recording cannot be read at the clicks, or the method takes no fleet's prior.
     """
+    require_default(options, fleet_prior)
     checked_options(options)
     if camera is None:
         yield Unsolvable(
@@ -121,7 +131,9 @@ def solve_in_steps(
     if options.method == "ccm":
         yield _solved_on_board(recording, clicks, scans, camera, options)
         return
-    yield from calibration_steps(clicks, scans, camera, options, previous=previous, preview=preview)
+    yield from calibration_steps(
+        clicks, scans, camera, options, previous=previous, preview=preview, fleet_prior=fleet_prior
+    )
 
 
 def _solved_on_board(
@@ -200,7 +212,9 @@ _OPTIONS_OF_PAIRING = (
 """Options that choose radar returns: they cannot change pairs that exist already."""
 
 
-def solve_pairs(text: str, source: str, options: CalibrationOptions | None = None) -> Outcome:
+def solve_pairs(
+    text: str, source: str, options: CalibrationOptions | None = None, fleet_prior: FleetPrior | None = None
+) -> Outcome:
     """Solve for camera_from_radar from the text of a pairs-1 file, or again from that of a calibration-1 file.
 
     Args:
@@ -208,9 +222,10 @@ def solve_pairs(text: str, source: str, options: CalibrationOptions | None = Non
         source: its name, for error messages.
         options: for the solver; None takes those of a calibration-1 file, and the defaults for a pairs-1 file, whose
             own statements about noise replace the options.
+        fleet_prior: what the fleet says of this vehicle; None takes that of a calibration-1 file, if it has one.
 
     Raises:
-        InputError: the text is neither, or a calibration without the candidates of its pairs.
+        InputError: the text is neither, the method takes no fleet's prior, or a calibration without the candidates of its pairs.
         OptionError: an option, or what the file says about noise, is out of range or cannot apply.
     """
     if names_schema(text, CALIBRATION_SCHEMA):
@@ -218,12 +233,12 @@ def solve_pairs(text: str, source: str, options: CalibrationOptions | None = Non
         if options is not None:
             _require_same_pairing(calibration.options, options, source)
         try:
-            return solve_again(calibration, options)
+            return solve_again(calibration, options, fleet_prior)
         except InputError as error:
             raise InputError(f"{source}: {error}") from None
     options = checked_options(options or CalibrationOptions())
     pairs_file = read_pairs(text, source, noise=options.noise)
-    return calibrate_pairs(pairs_file.pairs, pairs_file.camera, pairs_file.options(options))
+    return calibrate_pairs(pairs_file.pairs, pairs_file.camera, pairs_file.options(options), fleet_prior=fleet_prior)
 
 
 def _require_same_pairing(kept: CalibrationOptions, given: CalibrationOptions, source: str) -> None:
@@ -274,6 +289,8 @@ def calibration_text(
     confirmed: Sequence[str] = (),
     camera_file: CameraFile | None = None,
     unconfirmed: UnconfirmedClicks | None = None,
+    fleet_prior: InputFile | None = None,
+    vehicle: VehicleNote | None = None,
 ) -> str:
     """Write a calibration-1 file; the page and the command line give the same bytes for the same clicks.
 
@@ -283,6 +300,8 @@ def calibration_text(
         confirmed: texts of the assumptions that were confirmed after the recording was opened.
         camera_file: the file whose intrinsics were used; None for the recording's own.
         unconfirmed: clicks that nobody confirmed.
+        fleet_prior: the file of the fleet's prior; None without.
+        vehicle: which vehicle it is of; None if nobody said.
     """
     assumed = [
         (one.assumption, one.confirmed or one.assumption.words in confirmed) for one in recording.stated_assumptions
@@ -291,7 +310,11 @@ def calibration_text(
     if unsure:
         calibration = dataclasses.replace(calibration, warnings=(*calibration.warnings, *unsure))
     provenance = Provenance(
-        inputs=(*recording.fingerprint(), *([] if camera_file is None else [_input_file(camera_file)])),
+        inputs=(
+            *recording.fingerprint(),
+            *([] if camera_file is None else [_input_file(camera_file)]),
+            *([] if fleet_prior is None else [fleet_prior]),
+        ),
         radar_topic=recording.radar_topic,
         radar_topics=recording.radar_topics,
         radar_choice=recording.radar_choice,
@@ -306,7 +329,7 @@ def calibration_text(
         assumptions=tuple(AssumptionNote(assumption.words, sure) for assumption, sure in assumed),
         unconfirmed=unconfirmed,
     )
-    return interchange_text(calibration, _frame_names(recording), provenance)
+    return interchange_text(calibration, _frame_names(recording), provenance, vehicle=vehicle)
 
 
 def _input_file(camera_file: CameraFile) -> InputFile:
@@ -327,20 +350,32 @@ def _frame_names(recording: Recording) -> FrameNames:
         return usual
 
 
-def calibration_text_of_pairs(calibration: Calibration, text: str, name: str) -> str:
+def calibration_text_of_pairs(
+    calibration: Calibration,
+    text: str,
+    name: str,
+    fleet_prior: InputFile | None = None,
+    vehicle: VehicleNote | None = None,
+) -> str:
     """Write a calibration-1 file for a calibration solved from a pairs-1 file, or again from a calibration-1 file.
 
     Args:
         calibration: what was solved.
         text: the content of the file of pairs.
         name: its name without the folder.
+        fleet_prior: the file of the fleet's prior, if one was given.
+        vehicle: which vehicle it is of; what it leaves out is taken from a calibration-1 file.
     """
+    vehicle = vehicle or VehicleNote()
     data = text.encode()
-    origin = InputFile(name, len(data), hashlib.sha256(data).hexdigest())
+    inputs = (
+        InputFile(name, len(data), hashlib.sha256(data).hexdigest()),
+        *([] if fleet_prior is None else [fleet_prior]),
+    )
     if names_schema(text, CALIBRATION_SCHEMA):
         file = read_calibration(text, name)
-        provenance = dataclasses.replace(file.provenance, inputs=(origin,), version=version())
+        provenance = dataclasses.replace(file.provenance, inputs=inputs, version=version())
         kept = tuple(warning for warning in file.calibration.warnings if warning.code in _KEPT_WARNINGS)
         calibration = dataclasses.replace(calibration, warnings=(*calibration.warnings, *kept))
-        return interchange_text(calibration, file.frames, provenance)
-    return interchange_text(calibration, provenance=Provenance(inputs=(origin,), version=version()))
+        return interchange_text(calibration, file.frames, provenance, vehicle=vehicle.over(file.vehicle))
+    return interchange_text(calibration, provenance=Provenance(inputs=inputs, version=version()), vehicle=vehicle)

@@ -39,7 +39,7 @@ from calib_core.radar import cartesian_from_polar
 from calib_core.results import Calibration
 from calib_core.unsolved import DEGENERATE
 
-__all__ = ["calibrate", "calibrate_pairs", "calibration_steps", "preview_pairs", "solve_again"]
+__all__ = ["calibrate", "calibrate_pairs", "calibration_steps", "preview_pairs", "require_default", "solve_again"]
 
 _UNDETERMINED_ROTATION_RAD = 0.5  # a larger standard deviation means that the pairs do not determine the rotation
 _AGREEING_SHARE = 0.9
@@ -103,7 +103,7 @@ def calibration_steps(
         InputError: the method takes no fleet's prior.
     """
     options = checked_options(options or CalibrationOptions())
-    _require_default(options, fleet_prior)
+    require_default(options, fleet_prior)
     if options.method == "paper":
         from calib_core.paper.algorithm_1 import calibrate_as_printed
 
@@ -145,7 +145,7 @@ def calibrate_pairs(
         InputError: a pair contains a number that is impossible, an id occurs twice, or the method takes no fleet's prior.
     """
     options = checked_options(options or CalibrationOptions())
-    _require_default(options, fleet_prior)
+    require_default(options, fleet_prior)
     if options.method == "paper":
         from calib_core.paper.algorithm_1 import solve_pairs_as_printed
 
@@ -156,7 +156,12 @@ def calibrate_pairs(
     return outcome
 
 
-def _require_default(options: CalibrationOptions, fleet_prior: FleetPrior | None) -> None:
+def require_default(options: CalibrationOptions, fleet_prior: FleetPrior | None) -> None:
+    """Refuse a fleet's prior for a method that cannot use it.
+
+    Raises:
+        InputError: it cannot.
+    """
     if fleet_prior is not None and options.method != "default":
         raise InputError(
             f"a fleet's prior is used by the default method only, and the method is {options.method}; leave one of them out"
@@ -297,6 +302,12 @@ class _Task:
         clicked = sorted((pair for pair in shown if pair.id not in excluded), key=_canonical)
         return cls(shown, unpaired, excluded, tuple(clicked), camera, options, fleet_prior)
 
+    def expecting(self, previous: Calibration | None) -> "_Task":
+        """Return the task for a preview: the fleet's prior does what it did in the previous answer."""
+        if self.fleet_prior is None or previous is None or previous.fleet is None:
+            return self
+        return replace(self, fleet=previous.fleet)
+
     def measurements(self, groups: Sequence[PlacementGroup]) -> PairMeasurements:
         """Stack the placements, with the fleet's prior once it is known to apply."""
         prior = self.fleet.prior if self.fleet is not None and self.fleet.used else None
@@ -319,10 +330,12 @@ def _steps(task: _Task, *, previous: Calibration | None, preview: bool) -> Itera
         return
     measurements = task.measurements(groups)
     if preview:
-        quick = quick_fit(measurements, task.options, previous)
+        shown = task.expecting(previous)
+        expected = measurements if shown is task else shown.measurements(groups)
+        quick = quick_fit(expected, task.options, previous)
         if quick is not None:
             solution = _Solution.local(quick, task.options, smooth=False)
-            described = _described(task, groups, measurements, solution)
+            described = _described(shown, groups, expected, solution)
             first = flat_radar(quick, solution.uncertainty, task.options.radar)
             yield _preview(described, previous or replace(described, warnings=tuple(first)))
     answer = _answer(task, groups, measurements)

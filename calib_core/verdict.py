@@ -47,6 +47,7 @@ HELD_OUT_RATIO = 2.0
 _CONTRADICTIONS = ("mirrored-axes", "no-pose", "camera-position-contradicted", "no-consensus", "refinement-diverged")
 _ABOUT_FIGURES = ("weak-geometry", "few-pairs")
 _MORE_PAIRS_HELP = (*_ABOUT_FIGURES, "one-pair-decides")
+_PRIOR_DECIDES = "fleet-prior-decides"
 _BETWEEN = {"good": " to ", "usable": " to ", "nothing": " yet: "}
 _LEAST_VARIANCE, _MOST_VARIANCE = 1e-18, 1e12
 _CORNER = "the reflector's inner corner, where its three sheets meet"
@@ -158,6 +159,8 @@ def _judged(calibration: Calibration, error: StatedError, warning: DataWarning |
     small = error.rotation_deg <= GOOD_DEG and error.position_cm <= GOOD_CM and steady
     if small and consequence == "note":
         return Verdict("good", error.text, _when_good(calibration, left))
+    if warning is not None and warning.code == _PRIOR_DECIDES:  # it hides what further placements would tell
+        return Verdict("usable", error.text, _click_the_rest(left) if left else _capitalized(warning.hint))
     better = (
         _capitalized(warning.hint) if small and warning is not None and not left else _most_helpful(calibration, left)
     )

@@ -292,6 +292,7 @@ export interface View {
   box_labels: string[];
   acc: AccPanel;
   systematic_errors: SystematicErrorTable;
+  fleet: string[];
   verdict: VerdictRow;
 }
 

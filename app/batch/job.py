@@ -15,9 +15,10 @@ from app.resources import version
 
 __all__ = ["Job", "job_of", "jobs_of"]
 
-_RESULT_VERSION = 1
+_RESULT_VERSION = 2
 """Counts up when the same inputs give other files."""
 _DIGITS = 32
+_SINGLE = ("clicks", "camera", "boxes", "fleet_prior")
 _UNREAD = "cannot be read"
 
 
@@ -69,7 +70,7 @@ def job_of(row: ManifestRow, digest_of: Callable[[InputPath], str]) -> Job:
     row = _with_absolute_paths(row)
     inputs = inputs_of(row)
     state = state_of(inputs)
-    paths = {"place", "recording", "clicks", "camera", "boxes"}
+    paths = {"place", "recording", *_SINGLE}
     settings: dict[str, Any] = {key: value for key, value in dataclasses.asdict(row).items() if key not in paths}
     settings["inputs"] = [(one.role, one.name, _digest(one, digest_of)) for one in inputs]
     content = json.dumps([_RESULT_VERSION, version(), settings], sort_keys=True, default=str)
@@ -84,5 +85,5 @@ def _digest(given: InputPath, digest_of: Callable[[InputPath], str]) -> str:
 
 
 def _with_absolute_paths(row: ManifestRow) -> ManifestRow:
-    single = {name: path.absolute() for name in ("clicks", "camera", "boxes") if (path := getattr(row, name))}
+    single = {name: path.absolute() for name in _SINGLE if (path := getattr(row, name))}
     return dataclasses.replace(row, recording=tuple(path.absolute() for path in row.recording), **single)

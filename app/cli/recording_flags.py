@@ -3,7 +3,7 @@
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, TypeAlias
+from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 import tyro
 
@@ -11,7 +11,19 @@ from app.cli.flags import called, same
 from calib_core.options import CalibrationOptions, CameraPositionPrior
 from calib_core.recordings import RecordingOptions
 
-__all__ = ["CameraPosition", "MeasuredCamera", "Options", "Recordings", "TopicFlags", "Topics"]
+if TYPE_CHECKING:
+    from calib_core.interchange import VehicleNote
+
+__all__ = [
+    "CameraPosition",
+    "MeasuredCamera",
+    "Options",
+    "Recordings",
+    "TopicFlags",
+    "Topics",
+    "Vehicle",
+    "VehicleFlags",
+]
 
 Recordings: TypeAlias = Annotated[tuple[Path, ...], tyro.conf.Positional, called("RECORDING...")]
 
@@ -53,6 +65,33 @@ class MeasuredCamera:
         return dataclasses.replace(options, solving=dataclasses.replace(options.solving, camera_position=prior))
 
 
+@dataclass(frozen=True, slots=True)
+class VehicleFlags:
+    """Which vehicle it is; the calibration names it, and so does the report."""
+
+    vehicle: Annotated[str | None, called("NAME")] = None
+    """Name of the vehicle."""
+    vehicle_type: Annotated[str | None, called("TYPE")] = None
+    """Its type: vehicles of one type are mounted alike."""
+    session_name: Annotated[str | None, called("NAME")] = None
+    """Name of this session with it, such as a date."""
+    radar_serial: Annotated[str | None, called("SERIAL")] = None
+    """Serial number of the radar."""
+    camera_serial: Annotated[str | None, called("SERIAL")] = None
+    """Serial number of the camera."""
+
+    def note(self) -> "VehicleNote":
+        """Return what is stated.
+
+        Raises:
+            InputError: a text is empty, too long or not printable.
+        """
+        from calib_core.interchange import VehicleNote
+
+        return VehicleNote(self.vehicle, self.vehicle_type, self.session_name, self.radar_serial, self.camera_serial)
+
+
+Vehicle: TypeAlias = Annotated[VehicleFlags, tyro.conf.arg(name="")]
 CameraPosition: TypeAlias = Annotated[MeasuredCamera, tyro.conf.arg(name="")]
 # The camera position has its own flags; here it would become a subcommand.
 Options: TypeAlias = Annotated[

@@ -10,7 +10,16 @@ import tyro
 
 from app.cli.flags import File, Switch
 from app.cli.output import explain_unsolvable, read_text, write_whole
-from app.cli.recording_flags import CameraPosition, MeasuredCamera, Options, Recordings, TopicFlags, Topics
+from app.cli.recording_flags import (
+    CameraPosition,
+    MeasuredCamera,
+    Options,
+    Recordings,
+    TopicFlags,
+    Topics,
+    Vehicle,
+    VehicleFlags,
+)
 from app.terminal import print_exactly
 from app.view import summary_lines
 from calib_core.camera import Camera
@@ -22,6 +31,8 @@ from calib_core.results import Calibration
 
 if TYPE_CHECKING:
     from app.automatic_solving import PlacedClicks
+    from app.fleet_prior_file import FleetPriorFile
+    from calib_core.interchange import VehicleNote
     from calib_core.interchange.own.clicks_json import ClicksFile
     from calib_core.recordings import Recording
 
@@ -58,7 +69,10 @@ class Solve:
     """Output file (cocalib/calibration-1 JSON); stdout if omitted."""
     refine_intrinsics: Switch = False
     """Estimate focal length, principal point and k1 with the pose; their covariance or the refining options say how sure."""
+    fleet_prior: File = None
+    """What the fleet says of this vehicle (cocalib/fleet-prior-1 JSON, written by fleet prior); the data alone are shown, too."""
     measured: CameraPosition = field(default_factory=MeasuredCamera)
+    of: Vehicle = field(default_factory=VehicleFlags)
     topics: Topics = field(default_factory=TopicFlags)
     options: Options = field(default_factory=CalibrationOptions)
     pairs_text: Annotated[str | None, tyro.conf.Suppress] = None
@@ -83,6 +97,7 @@ class Solve:
         """Solve, write the calibration, print its summary; return the exit code."""
         if self.pairs is not None and (self.recording or self.clicks or self.auto):
             raise InputError("solve takes either a recording with --clicks or --auto, or --pairs, not both")
+        vehicle = self.of.note()
         if not self.auto and (self.clicks_out is not None or self.reflector_m != _REFLECTOR_M):
             raise InputError("--clicks-out and --reflector-m apply with --auto only; add it")
         if self.auto and self.options.method == "ccm":
@@ -92,7 +107,7 @@ class Solve:
                 "--camera and the options of a recording do not apply to --pairs, which brings its own camera"
             )
         if self.pairs is not None:
-            return self._solve_pairs(self.pairs)
+            return self._solve_pairs(self.pairs, vehicle)
         if not self.recording:
             raise InputError("solve needs a recording and --clicks CLICKS.json or --auto, or --pairs PAIRS.json")
         if self.clicks is None and not self.auto:
@@ -100,7 +115,7 @@ class Solve:
                 "solve needs the clicks of this recording: --clicks CLICKS.json (the page exports them), or --auto to do "
                 "without a person"
             )
-        return self._solve_recording()
+        return self._solve_recording(vehicle)
 
     def _all_options(self) -> CalibrationOptions:
         """Return the options with what has a flag of its own."""
@@ -109,7 +124,7 @@ class Solve:
             return options
         return dataclasses.replace(options, refining=dataclasses.replace(options.refining, intrinsics=True))
 
-    def _solve_recording(self) -> int:
+    def _solve_recording(self, vehicle: "VehicleNote") -> int:
         from app.automatic_solving import solve_placed_clicks
         from app.recorded_clicks import require_confirmed
         from app.required_camera import required_camera
@@ -120,7 +135,7 @@ class Solve:
         self._require_folders()
         camera_file = None if self.camera is None else CameraFile.read(self.camera, rescale=self.rescale_camera)
         options = self._all_options()
-        file = self._clicks_file()
+        file, fleet = self._clicks_file(), self._fleet_prior_file()
         with open_recording(self.recording, self.topics) as recording:
             require_confirmed(recording)
             if recording.radar_choice:
@@ -129,11 +144,18 @@ class Solve:
             placed = self._placed(file, recording, camera, options)
             if isinstance(placed, Unsolvable):
                 return explain_unsolvable(placed)
-            outcome = solve_placed_clicks(recording, placed, camera, options)
+            outcome = solve_placed_clicks(recording, placed, camera, options, fleet.prior if fleet else None)
             if isinstance(outcome, Unsolvable):
                 return explain_unsolvable(outcome)
             self._write_clicks(placed, recording)
-            text = calibration_text(outcome, recording, camera_file=camera_file, unconfirmed=placed.unconfirmed)
+            text = calibration_text(
+                outcome,
+                recording,
+                camera_file=camera_file,
+                unconfirmed=placed.unconfirmed,
+                fleet_prior=fleet.file if fleet else None,
+                vehicle=vehicle,
+            )
             return self._deliver(outcome, text)
 
     def _require_folders(self) -> None:
@@ -151,6 +173,22 @@ class Solve:
         from calib_core.interchange.own.clicks_json import ClicksFile
 
         return ClicksFile(()) if self.clicks is None else file_of_clicks(self.clicks)
+
+    def _fleet_prior_file(self) -> "FleetPriorFile | None":
+        """Read the fleet's prior, unless the method cannot use it; None without.
+
+        Raises:
+            InputError: it cannot be read, or used.
+        """
+        if self.fleet_prior is None:
+            return None
+        from app.fleet_prior_file import FleetPriorFile
+        from calib_core.calibration import require_default
+
+        fleet = FleetPriorFile.read(self.fleet_prior)
+        require_default(self.options, fleet.prior)
+        fleet.require_not_of(self.of.vehicle)
+        return fleet
 
     def _placed(
         self, file: "ClicksFile", recording: "Recording", camera: Camera, options: CalibrationOptions
@@ -188,14 +226,16 @@ class Solve:
         write_whole(self.clicks_out, text)
         print(f"clicks written to {self.clicks_out}", file=sys.stderr)
 
-    def _solve_pairs(self, path: Path) -> int:
+    def _solve_pairs(self, path: Path, vehicle: "VehicleNote") -> int:
         from app.solving import calibration_text_of_pairs, solve_pairs
 
         text = read_text(path) if self.pairs_text is None else self.pairs_text
-        outcome = solve_pairs(text, source=str(path), options=self._all_options())
+        fleet = self._fleet_prior_file()
+        outcome = solve_pairs(text, str(path), self._all_options(), fleet.prior if fleet else None)
         if isinstance(outcome, Unsolvable):
             return explain_unsolvable(outcome)
-        return self._deliver(outcome, calibration_text_of_pairs(outcome, text, name=name_text(path.name)))
+        given = fleet.file if fleet else None
+        return self._deliver(outcome, calibration_text_of_pairs(outcome, text, name_text(path.name), given, vehicle))
 
     def _deliver(self, calibration: Calibration, text: str) -> int:
         from app.automatic_solving import is_doubtful

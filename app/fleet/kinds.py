@@ -1,7 +1,7 @@
 """The mounting scatter of each vehicle type, which vehicles are off their kind, and the prior of the next one."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -94,22 +94,30 @@ def kinds_of(fleet: FleetRecord) -> tuple[Kind, ...]:
     return tuple(_kind(fleet, name) for name in fleet.types)
 
 
-def prior_of_type(fleet: FleetRecord, vehicle_type: str) -> PriorOfType | Unsolvable:
+def prior_of_type(fleet: FleetRecord, vehicle_type: str, without: Sequence[str] = ()) -> PriorOfType | Unsolvable:
     """Return the prior that the vehicles of a type give the next one.
 
     Args:
         fleet: all results.
         vehicle_type: its name.
+        without: names of vehicles that it must not rest on, such as the one it is for.
 
     Raises:
-        InputError: there is no such type.
+        InputError: there is no such type, or no such vehicle of it.
     """
     if vehicle_type not in fleet.types:
         known = (
             f"the types are {', '.join(fleet.types)}" if fleet.types else "the manifest names no type of any vehicle"
         )
         raise InputError(f"no vehicle of type {vehicle_type!r}; {known}")
-    scatter, not_counted = _scatter(fleet.of_type(vehicle_type), vehicle_type)
+    vehicles = fleet.of_type(vehicle_type)
+    names = [one.name for one in vehicles]
+    for name in without:
+        if name not in names:
+            raise InputError(
+                f"--without {name}: no vehicle of type {vehicle_type} has this name; there are {', '.join(names)}"
+            )
+    scatter, not_counted = _scatter(tuple(one for one in vehicles if one.name not in without), vehicle_type)
     return scatter if isinstance(scatter, Unsolvable) else PriorOfType(fleet_prior_of(scatter), not_counted)
 
 

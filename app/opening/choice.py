@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal, TypeAlias
 
+from app.fleet_prior_file import FleetPriorFile
 from app.web.messages import OpenWith, SessionPlan
 from calib_core.errors import CalibrationError, InputError
 from calib_core.input_files import name_text
@@ -82,6 +83,7 @@ class Choice:
         name: what to call it; by default, the name of the first.
         topics: how to read it.
         camera_file: the intrinsics; None to use the recording's own.
+        fleet_prior: what the fleet says of the vehicle; None without.
         calibration_file: a calibration to show; None for none.
         pick: what its numbers mean, if it does not say and a person picked it.
         clicks: to start a new session with.
@@ -99,6 +101,7 @@ class Choice:
     name: str = ""
     topics: RecordingOptions = field(default_factory=RecordingOptions)
     camera_file: CameraFile | None = None
+    fleet_prior: FleetPriorFile | None = None
     calibration_file: Path | None = None
     pick: MeaningPick = MeaningPick()
     clicks: GivenClicks | None = None

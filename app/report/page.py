@@ -10,6 +10,7 @@ from app.report.sections.answer import answer
 from app.report.sections.cautions import cautions
 from app.report.sections.comparison import comparison
 from app.report.sections.coverage import coverage
+from app.report.sections.fleet_prior import fleet_prior
 from app.report.sections.pairs import pair_table
 from app.report.sections.provenance import provenance
 from app.report.sections.residuals import residuals
@@ -40,6 +41,8 @@ def _sections(subject: ReportSubject) -> list[Child]:
     shown: list[Child] = [answer(subject), cautions(subject)]
     if subject.against is not None:
         shown.append(comparison(subject.against, subject.name))
+    if subject.calibration is not None:
+        shown.append(fleet_prior(subject.calibration))
     shown.append(uncertainty(subject))
     if subject.calibration is not None:
         shown += _of_pairs(subject, subject.calibration)

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from app.view.figures import assumed_figures, metric_figures, pose_figures
+from app.view.fleet_answer import fleet_sentences
 from app.view.model import Figure
 from app.view.number_format import plain
 from app.view.systematic_errors import refined_sentences, uncertainty_sentences
@@ -33,6 +34,7 @@ def summary_lines(calibration: Calibration) -> tuple[str, ...]:
         parts = ", ".join(f"{figure.label} {figure.value} {figure.unit}" for figure in assumed)
         lines.insert(len(pose), f"assumed, because this radar measures no elevation: {parts}")
     lines += [f"uncertainty: {line}" for line in uncertainty_sentences(calibration)]
+    lines += [f"fleet: {line}" for line in fleet_sentences(calibration)]
     lines += [f"intrinsics: {line}" for line in refined_sentences(calibration)]
     lines += [
         f"disagrees: {pair.id}: {plain(pair.distance_px)} px from its radar position"

@@ -27,6 +27,8 @@ _CODES: dict[Consequence, tuple[str, ...]] = {
         "doubtful-pair",
     ),
     "weak": (
+        "off-its-kind",
+        "fleet-prior-untested",
         "weak-geometry",
         "board-geometry",
         "swapped-parts",
@@ -37,8 +39,6 @@ _CODES: dict[Consequence, tuple[str, ...]] = {
         "clock-bias-suspected",
         "radar-axes-suspected",
         "repeated-placements",
-        "off-its-kind",
-        "fleet-prior-untested",
     ),
     "limited": (
         "flat-radar",

@@ -51,6 +51,7 @@ from calib_core.interchange.trees.joint import Joint, Place
 from calib_core.interchange.trees.patching import Patch, patched
 from calib_core.interchange.trees.posed_in_tree import calibration_in_tree
 from calib_core.interchange.trees.reading import TreeFile, joined_tree
+from calib_core.interchange.vehicle_note import VehicleNote
 
 __all__ = [
     "CALIBRATION_SCHEMA",
@@ -85,6 +86,7 @@ __all__ = [
     "Reads",
     "StatedCheckPoint",
     "TreeFile",
+    "VehicleNote",
     "Verdict",
     "WantedFrames",
     "WrittenPose",

@@ -6,6 +6,7 @@ import numpy as np
 
 from calib_core.errors import InputError
 from calib_core.interchange.evidence import Evidence
+from calib_core.interchange.vehicle_note import VehicleNote
 from calib_core.results import Calibration, CheckPoint, InputFile, PairResult, UnconfirmedClicks
 from calib_core.verdict import Verdict
 
@@ -145,6 +146,7 @@ class CalibrationFile:
         unknown: results written by a later version and unknown to this one; kept when the file is rewritten.
         verdict: how far to trust it, as it was judged when it was solved; None in files of older versions and other tools.
         evidence: what the pose rests on, as the file states it; None in files of older versions.
+        vehicle: what is stated of the vehicle and its sensors.
         made_from_sha256: the SHA-256 of the calibration-1 file that this was made from, if something was changed on the way to
             another format, such as the camera of rectified pictures; "" if nothing was.
     """
@@ -157,6 +159,7 @@ class CalibrationFile:
     verdict: Verdict | None = None
     evidence: Evidence | None = None
     made_from_sha256: str = ""
+    vehicle: VehicleNote = field(default_factory=VehicleNote)
 
     @property
     def rests_on(self) -> Evidence:

@@ -66,7 +66,8 @@ def test_what_is_done_is_not_done_again(fleet: Path, capsys: pytest.CaptureFixtu
     solved = fleet / "solved.json"
     clicked = fleet / "van" / "clicked"
     recordings = [str(clicked / "radar.bag"), str(clicked / "camera.bag")]
-    assert run(["solve", *recordings, "--clicks", str(clicked / "clicks.json"), "--out", str(solved)]) == 0
+    flags = ["--clicks", str(clicked / "clicks.json"), "--vehicle", "van", "--session-name", "1"]
+    assert run(["solve", *recordings, *flags, "--out", str(solved)]) == 0
     assert solved.read_bytes() == first
 
 

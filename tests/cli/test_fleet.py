@@ -12,6 +12,7 @@ import pytest
 
 from app.batch.results_folder import ResultsFolder
 from app.fleet.index import index_path
+from calib_core.interchange.own.fleet_prior_json import read_fleet_prior
 from tests.unit.app.fleet.made_results import digest_of, make_fleet, make_result
 
 Cocalib = Callable[..., Any]
@@ -170,3 +171,27 @@ def test_a_folder_without_results_is_refused(cocalib: Cocalib, tmp_path: Path) -
         answer = cocalib("fleet", action, tmp_path)
         assert answer.code == 2
         assert "no results" in answer.err
+
+
+def test_the_prior_is_written_for_solve_and_can_leave_the_vehicle_itself_out(
+    cocalib: Cocalib, sound: Path, pairs_file: Callable[..., Path], tmp_path: Path
+) -> None:
+    whole, other = tmp_path / "van.json", tmp_path / "without.json"
+    answer = cocalib("fleet", "prior", "van", sound, "--out", whole)
+    assert answer.code == 0
+    assert "the next vehicle of type van, from 6 vehicles" in answer.out
+    assert f"{whole} written" in answer.err
+    assert cocalib("fleet", "prior", "van", sound, "--without", "V003", "--out", other).code == 0
+    assert read_fleet_prior(whole.read_text()).vehicles == tuple(f"V00{index}" for index in range(6))
+    assert read_fleet_prior(other.read_text()).vehicles == ("V000", "V001", "V002", "V004", "V005")
+    assert read_fleet_prior(whole.read_text()).widened > 1.0
+    solve = ("solve", "--pairs", pairs_file(), "--out", tmp_path / "calibration.json", "--vehicle", "V003")
+    refused = cocalib(*solve, "--fleet-prior", whole)
+    assert refused.code == 2
+    assert "van.json: the prior rests on V003 itself" in refused.err
+    assert "cocalib fleet prior van OUT --without V003 --out FILE" in refused.err
+    assert cocalib(*solve, "--fleet-prior", other).code == 0
+    unknown = cocalib("fleet", "prior", "van", sound, "--without", "V9")
+    assert unknown.code == 2
+    assert "--without V9: no vehicle of type van has this name; there are V000, V001" in unknown.err
+    assert cocalib("fleet", "status", sound, "--out", whole).code == 2

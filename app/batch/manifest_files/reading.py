@@ -15,7 +15,7 @@ from app.batch.manifest_files.documents import ManifestDocument, SessionDocument
 from app.option_changes import options_from_tree
 from calib_core.errors import CalibrationError, InputError
 from calib_core.input_files import file_text, read_input
-from calib_core.interchange import format_named
+from calib_core.interchange import VehicleNote, format_named
 from calib_core.interchange.syntax.strict_json import checked
 from calib_core.options import CalibrationOptions, CameraPositionPrior
 
@@ -170,6 +170,10 @@ def _row(document: SessionDocument, place: str, path: Path) -> ManifestRow:
     session = document.session or Path(recordings[0]).stem
     for key, name in (("vehicle", document.vehicle), ("session", session)):
         _require_name(name, f"{where}: {key}")
+    try:
+        VehicleNote(document.vehicle, document.vehicle_type, session, document.radar_serial, document.camera_serial)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
     return ManifestRow(
         document.vehicle,
         session,
@@ -181,6 +185,7 @@ def _row(document: SessionDocument, place: str, path: Path) -> ManifestRow:
         auto=document.auto,
         camera=_path(folder, document.camera),
         boxes=_path(folder, document.boxes),
+        fleet_prior=_path(folder, document.fleet_prior),
         topics=document.topics,
         options=_options(document, where),
         exports=document.exports,

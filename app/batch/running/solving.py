@@ -5,12 +5,14 @@ from pathlib import Path
 
 from app.automatic_solving import PlacedClicks, is_doubtful, place_clicks, solve_placed_clicks
 from app.batch.manifest import ManifestRow
+from app.fleet_prior_file import FleetPriorFile
 from app.recorded_clicks import clicks_in_recording, file_of_clicks, require_confirmed
 from app.required_camera import required_camera
 from app.solving import calibration_text
+from calib_core.calibration import require_default
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.interchange import CameraFile, ImportedCalibration, imported, read_calibration
+from calib_core.interchange import CameraFile, ImportedCalibration, VehicleNote, imported, read_calibration
 from calib_core.interchange.own.clicks_json import ClicksFile, read_clicks_file, write_clicks
 from calib_core.measurements import ReflectorClick, Unsolvable
 from calib_core.recordings import Recording
@@ -29,10 +31,12 @@ class GivenFiles:
     Attributes:
         camera: intrinsics; None for the recording's own.
         clicks: None without.
+        fleet_prior: None without.
     """
 
     camera: CameraFile | None
     clicks: ClicksFile | None
+    fleet_prior: FleetPriorFile | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,7 +61,7 @@ class SolvedSession:
 
 
 def given_files(row: ManifestRow) -> GivenFiles:
-    """Read the intrinsics and clicks of a row.
+    """Read the intrinsics, the clicks and the fleet's prior of a row.
 
     Raises:
         InputError: one cannot be read, or they contradict the row.
@@ -71,7 +75,21 @@ def given_files(row: ManifestRow) -> GivenFiles:
             f"{row.clicks}: nobody confirmed {len(clicks.unconfirmed.ids)} of its clicks; with auto give only clicks that a "
             "person placed"
         )
-    return GivenFiles(camera, clicks)
+    return GivenFiles(camera, clicks, _fleet_prior(row))
+
+
+def _fleet_prior(row: ManifestRow) -> FleetPriorFile | None:
+    """Read the fleet's prior of a row.
+
+    Raises:
+        InputError: it cannot be read, or used for this vehicle or with this method.
+    """
+    if row.fleet_prior is None:
+        return None
+    found = FleetPriorFile.read(row.fleet_prior)
+    require_default(row.options, found.prior)
+    found.require_not_of(row.vehicle)
+    return found
 
 
 def solve_session(row: ManifestRow, given: GivenFiles, recording: Recording) -> SolvedSession | Unsolvable:
@@ -93,7 +111,8 @@ def solve_session(row: ManifestRow, given: GivenFiles, recording: Recording) -> 
     placed = _placed(row, given.clicks, recording, camera, notes)
     if isinstance(placed, Unsolvable):
         return placed
-    outcome = solve_placed_clicks(recording, placed, camera, row.options)
+    prior = given.fleet_prior.prior if given.fleet_prior is not None else None
+    outcome = solve_placed_clicks(recording, placed, camera, row.options, prior)
     if isinstance(outcome, Unsolvable):
         return outcome
     text = _calibration_text(row, outcome, recording, given, placed)
@@ -128,6 +147,13 @@ def _placed(
 def _calibration_text(
     row: ManifestRow, calibration: Calibration, recording: Recording, given: GivenFiles, placed: PlacedClicks
 ) -> str:
-    """Write calibration.json: the one place where what the row says of its sensors can be handed to it."""
-    del row  # calibration-1 has no keys for the vehicle and the serials of its sensors
-    return calibration_text(calibration, recording, camera_file=given.camera, unconfirmed=placed.unconfirmed)
+    """Write calibration.json, with what the row says of vehicle and sensors."""
+    vehicle = VehicleNote(row.vehicle, row.vehicle_type, row.session, row.radar_serial, row.camera_serial)
+    return calibration_text(
+        calibration,
+        recording,
+        camera_file=given.camera,
+        unconfirmed=placed.unconfirmed,
+        fleet_prior=given.fleet_prior.file if given.fleet_prior is not None else None,
+        vehicle=vehicle,
+    )

@@ -32,6 +32,8 @@ _FLAG_OF = {
     "--json": ("status", "history", "compare", "prior"),
     "--parquet": ("export",),
     "--csv": ("export",),
+    "--out": ("prior",),
+    "--without": ("prior",),
 }
 _LOOK: Final = 3
 
@@ -42,8 +44,8 @@ class Fleet:
 
     OUT is the folder that batch wrote to. `status OUT`: where each vehicle stands. `history VEHICLE OUT`: its sessions and what
     changed in between. `compare A B OUT`: two sessions VEHICLE/SESSION, or two vehicles of one type. `prior TYPE OUT`: what the
-    vehicles of a type say of the next one. `export OUT`: all sessions as a table. `summary OUT`: write OUT/summary.html.
-    `rebuild OUT`: write index and summary page from the results.
+    vehicles of a type say of the next one. `export OUT`: all sessions as a table. `summary OUT`: write
+    OUT/summary.html. `rebuild OUT`: write index and summary page from the results.
 
     Exit codes: 0 done, and nothing to look at; 1 too few vehicles for a prior; 2 nothing can be read; 3 something needs a look:
     a vehicle without a calibration to rely on, remounted, or off its kind; or two that differ.
@@ -59,6 +61,10 @@ class Fleet:
     """With export: Parquet file to write."""
     csv: File = None
     """With export: CSV file to write."""
+    out: File = None
+    """With prior: file to write it to (cocalib/fleet-prior-1 JSON), for solve, open and batch."""
+    without: Annotated[tuple[str, ...], called("VEHICLE..."), tyro.conf.UseAppendAction] = ()
+    """With prior: leave a vehicle out, such as the one that it is for; repeat it for several."""
 
     def run(self) -> int:
         """Run the action; return the exit code."""
@@ -87,7 +93,13 @@ class Fleet:
         Raises:
             InputError: they do not fit.
         """
-        options = {"--json": self.json, "--parquet": self.parquet, "--csv": self.csv}
+        options: dict[str, object] = {
+            "--json": self.json,
+            "--parquet": self.parquet,
+            "--csv": self.csv,
+            "--out": self.out,
+            "--without": self.without,
+        }
         for name, given in options.items():
             if given and self.action not in _FLAG_OF[name]:
                 raise InputError(f"{name} applies to fleet {', '.join(_FLAG_OF[name])} only; see cocalib fleet --help")
@@ -146,15 +158,19 @@ class Fleet:
         from app.cli.output import explain_unsolvable
         from app.fleet.json_documents import prior_document
         from app.fleet.kinds import prior_of_type
+        from calib_core.interchange.own.fleet_prior_json import write_fleet_prior
         from calib_core.measurements import Unsolvable
 
-        found = prior_of_type(fleet, vehicle_type)
+        found = prior_of_type(fleet, vehicle_type, self.without)
         if isinstance(found, Unsolvable):
             return explain_unsolvable(found, what=f"no prior for {vehicle_type}")
         if self.json:
             _print_json(prior_document(found))
         else:
             print("\n".join(prior_lines(found)))
+        if self.out is not None:
+            write_whole(self.out, write_fleet_prior(found.prior))
+            print(f"{self.out} written: solve --fleet-prior takes it", file=sys.stderr)
         return 0
 
     def _export(self, fleet: "FleetRecord") -> int:

@@ -8,6 +8,7 @@ from app.report.markup import Markup, scrolled, tag
 from app.report.subject import ReportSubject
 from app.view.wording import sentence
 from calib_core.camera import Camera
+from calib_core.interchange import VehicleNote
 from calib_core.options import CalibrationOptions
 from calib_core.results import InputFile
 
@@ -79,6 +80,9 @@ def _facts(subject: ReportSubject) -> Iterator[tuple[str, str]]:
     if file is not None:
         made = file.provenance
         yield from _known(
+            ("vehicle", _vehicle(file.vehicle)),
+            ("session", file.vehicle.session),
+            ("serials", _serials(file.vehicle)),
             ("solved by", f"cocalib {made.version}" if made.version else None),
             ("radar", made.radar_choice or _topic(made.radar_topic, made.radar_clock)),
             ("pictures", _topic(made.image_topic, made.image_clock)),
@@ -96,6 +100,15 @@ def _facts(subject: ReportSubject) -> Iterator[tuple[str, str]]:
             yield "lens before it was refined", _lens(subject.calibration.given_camera)
     if subject.recording is not None:
         yield from ((f"recording, {what}", topic) for what, topic in subject.recording.topics)
+
+
+def _vehicle(note: VehicleNote) -> str | None:
+    return f"{note.name or 'unnamed'}, of type {note.type}" if note.type else note.name
+
+
+def _serials(note: VehicleNote) -> str | None:
+    stated = (("radar", note.radar_serial), ("camera", note.camera_serial))
+    return ", ".join(f"{what} {serial}" for what, serial in stated if serial) or None
 
 
 def _known(*rows: tuple[str, str | None]) -> Iterator[tuple[str, str]]:

@@ -23,6 +23,7 @@ from calib_core.interchange.own import documents
 from calib_core.interchange.own.angle_map_document import angle_map_document, angle_map_of
 from calib_core.interchange.own.camera_document import camera_document, camera_of
 from calib_core.interchange.own.clicks_json import refuse_repeated_ids
+from calib_core.interchange.own.fleet_answer_document import fleet_answer_document, fleet_answer_of
 from calib_core.interchange.own.numbers import finite_or_none, nan_if_none, nested
 from calib_core.interchange.own.pair_document import SOLVED_FROM_KEYS, solved_pair_document, solved_pair_of
 from calib_core.interchange.own.provenance_document import provenance_document, provenance_of
@@ -34,9 +35,11 @@ from calib_core.interchange.own.radar_errors_document import (
 )
 from calib_core.interchange.own.transform_document import are_inverse, transform_document, transform_of
 from calib_core.interchange.own.unknown_results import unknown_results, with_unknown
+from calib_core.interchange.own.vehicle_document import vehicle_document, vehicle_of
 from calib_core.interchange.syntax.content import decoded
 from calib_core.interchange.syntax.json_text import json_text
 from calib_core.interchange.syntax.strict_json import json_object, parse_document
+from calib_core.interchange.vehicle_note import VehicleNote
 from calib_core.measurements import ReflectorClick, Unpaired
 from calib_core.options import BoardOptions, MountingOptions, RefiningOptions
 from calib_core.radar import RadarErrors
@@ -66,6 +69,7 @@ def calibration_text(
     provenance: Provenance | None = None,
     *,
     clicks: Iterable[ReflectorClick] = (),
+    vehicle: VehicleNote | None = None,
 ) -> str:
     """Write a solved calibration as calibration-1 text; the same input gives the same bytes, never NaN.
 
@@ -74,8 +78,9 @@ def calibration_text(
         frames: the names of the two frames; None uses "radar" and "camera_optical".
         provenance: where it comes from.
         clicks: for pairs without a frame stamp, the stamp of the click with the same id is used.
+        vehicle: which vehicle it is of; None if nobody said.
     """
-    return write_calibration(calibration_file(calibration, frames, provenance, clicks=clicks))
+    return write_calibration(calibration_file(calibration, frames, provenance, clicks=clicks, vehicle=vehicle))
 
 
 def calibration_file(
@@ -84,6 +89,7 @@ def calibration_file(
     provenance: Provenance | None = None,
     *,
     clicks: Iterable[ReflectorClick] = (),
+    vehicle: VehicleNote | None = None,
 ) -> CalibrationFile:
     """Return the content of a calibration-1 file: the calibration with its frames, a check point and its provenance."""
     times = {click.id: click.image_time for click in clicks}
@@ -100,6 +106,7 @@ def calibration_file(
         provenance=provenance or Provenance(),
         verdict=verdict_on(stamped, unconfirmed=unconfirmed),
         evidence="automatic" if provenance is not None and provenance.unconfirmed is not None else "clicked",
+        vehicle=vehicle or VehicleNote(),
     )
 
 
@@ -137,6 +144,8 @@ def write_calibration(file: CalibrationFile) -> str:
         pairs=[solved_pair_document(pair) for pair in calibration.pairs],
         camera=camera_document(calibration.camera),
         given_camera=camera_document(calibration.given_camera) if calibration.given_camera is not None else None,
+        fleet_prior=fleet_answer_document(calibration.fleet),
+        vehicle=vehicle_document(file.vehicle),
         options=calibration.options,
         provenance=provenance_document(file.provenance),
     )
@@ -154,6 +163,8 @@ def write_calibration(file: CalibrationFile) -> str:
     absent |= {"verdict"} if file.verdict is None else set()
     absent |= {"evidence"} if file.evidence is None else set()
     absent |= {"given_camera"} if calibration.given_camera is None else set()
+    absent |= {"fleet_prior"} if calibration.fleet is None else set()
+    absent |= {"vehicle"} if document.vehicle is None else set()
     if not calibration.systematic_errors and calibration.radar_errors == RadarErrors():
         absent |= {"radar_errors", "systematic_errors"}
     known = encodable({key: content[key] for key in _KEY_ORDER if key not in absent})
@@ -164,6 +175,7 @@ _KEY_ORDER = (
     *(
         "schema",
         "equation",
+        "vehicle",
         "frames",
         "camera_from_radar",
         "radar_from_camera",
@@ -174,7 +186,8 @@ _KEY_ORDER = (
         "covariance",
     ),
     *("covariance_convention", "covariance_quantile", "metrics", "noise_scale", "radar_errors", "systematic_errors"),
-    *("radar_angle_map", "paper", "warnings", "unpaired", "pairs", "camera", "given_camera", "options", "provenance"),
+    *("radar_angle_map", "paper", "warnings", "unpaired", "pairs", "camera", "given_camera", "fleet_prior", "options"),
+    "provenance",
 )
 
 
@@ -210,7 +223,7 @@ def calibration_file_of(
     """Return the content of a parsed calibration-1 file, with a given pose.
 
     Raises:
-        InputError: the camera or a frame name is invalid.
+        InputError: the camera, a frame name or what is said of the vehicle is invalid.
     """
     refuse_repeated_ids([pair.id for pair in document.pairs], source=source, place="pairs")
     check = document.check_point
@@ -232,6 +245,7 @@ def calibration_file_of(
         angle_map=angle_map_of(document.radar_angle_map, source=source),
         radar_errors=radar_errors_of(document.radar_errors),
         systematic_errors=tuple(map(systematic_error_of, document.systematic_errors)),
+        fleet=fleet_answer_of(document.fleet_prior, source=source),
     )
     try:
         frames = FrameNames(document.frames.radar, document.frames.camera)
@@ -244,6 +258,7 @@ def calibration_file_of(
         provenance=provenance_of(document.provenance),
         verdict=_verdict_of(document.verdict),
         evidence=document.evidence,
+        vehicle=vehicle_of(document.vehicle, source=source),
     )
 
 

@@ -25,6 +25,8 @@ __all__ = [
     "CheckPointDocument",
     "ClickDocument",
     "ClicksDocument",
+    "DataAloneDocument",
+    "FleetAnswerDocument",
     "FramesDocument",
     "PairDocument",
     "PairsDocument",
@@ -36,6 +38,7 @@ __all__ = [
     "SystematicErrorDocument",
     "TimeDocument",
     "TransformDocument",
+    "VehicleDocument",
     "names_schema",
 ]
 
@@ -69,6 +72,9 @@ Name = Annotated[str, Meta(min_length=1, max_length=200)]
 Positive = Annotated[float, Meta(ge=1e-12, le=1e9)]
 """A standard deviation; its square and the reciprocal of that are far from overflowing."""
 Count = Annotated[int, Meta(ge=0)]
+Widened = Annotated[float, Meta(ge=1.0, le=1e9)]
+"""How much wider an estimated covariance is for being estimated."""
+Freedom = Annotated[float, Meta(ge=1.0, le=1e9)]
 
 
 class TimeDocument(Struct, frozen=True, forbid_unknown_fields=True):
@@ -388,6 +394,44 @@ class AngleMapDocument(Struct, frozen=True):
     corrected_aed_px: float | None = None
 
 
+class VehicleDocument(Struct, frozen=True, omit_defaults=True):
+    """Which vehicle the calibration is of, and the serials of its sensors."""
+
+    name: str | None = None
+    type: str | None = None
+    session: str | None = None
+    radar_serial: str | None = None
+    camera_serial: str | None = None
+
+
+class DataAloneDocument(Struct, frozen=True):
+    """The answer of the pairs without the fleet's prior."""
+
+    camera_from_radar: TransformDocument
+    covariance: Matrix66
+    covariance_quantile: float | None = None
+
+
+class FleetAnswerDocument(Struct, frozen=True, omit_defaults=True):
+    """A fleet's prior, and what it did: camera_from_radar and covariance are the prior's, as in fleet-prior-1.
+
+    used is false if the data alone contradict it: their squared distance from it is beyond limit. Without data_alone the data
+    gave no pose, so the prior was not tested.
+    """
+
+    vehicle_type: Name
+    used: bool
+    camera_from_radar: TransformDocument
+    covariance: Matrix66
+    vehicles: Annotated[list[Name], Meta(min_length=1)]
+    left_out: list[Name] = []
+    widened: Widened | None = None
+    freedom: Freedom | None = None
+    squared_distance: float | None = None
+    limit: float | None = None
+    data_alone: DataAloneDocument | None = None
+
+
 class CalibrationDocument(Struct, frozen=True):
     """A solved extrinsic calibration with its uncertainty."""
 
@@ -414,6 +458,8 @@ class CalibrationDocument(Struct, frozen=True):
     unpaired: list[UnpairedDocument] = []
     pairs: list[SolvedPairDocument] = []
     given_camera: CameraDocument | None = None
+    fleet_prior: FleetAnswerDocument | None = None
+    vehicle: VehicleDocument | None = None
     options: CalibrationOptions = field(default_factory=CalibrationOptions)
     provenance: ProvenanceDocument = field(default_factory=ProvenanceDocument)
 

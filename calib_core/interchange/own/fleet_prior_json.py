@@ -1,23 +1,17 @@
 """Write and read fleet-prior-1, the file in which a fleet hands its prior to the next vehicle."""
 
 import msgspec
-import numpy as np
 
-from calib_core.arrays import Matrix66
 from calib_core.errors import InputError
 from calib_core.fleet_prior import FleetPrior
 from calib_core.interchange.own.fleet_prior_document import FLEET_PRIOR_SCHEMA, FleetPriorDocument
-from calib_core.interchange.own.numbers import nested
+from calib_core.interchange.own.numbers import finite_or_none, nested
+from calib_core.interchange.own.stated_covariance import stated_covariance
 from calib_core.interchange.own.transform_document import transform_document, transform_of
 from calib_core.interchange.syntax.json_text import json_text
 from calib_core.interchange.syntax.strict_json import parse_document
 
 __all__ = ["read_fleet_prior", "write_fleet_prior"]
-
-_SYMMETRIC = 1e-6
-"""The largest difference allowed between two entries that ought to be equal, as a share of the two sigmas' product."""
-_DEFINITE = 1e-12
-"""The smallest eigenvalue allowed of the correlation matrix; below, its inverse is rounding."""
 
 
 def write_fleet_prior(prior: FleetPrior) -> str:
@@ -29,8 +23,11 @@ def write_fleet_prior(prior: FleetPrior) -> str:
         covariance=nested(0.5 * (prior.covariance + prior.covariance.T) + 0.0),
         vehicles=list(prior.vehicles),
         left_out=list(prior.left_out),
+        widened=prior.widened if prior.widened != 1.0 else None,
+        freedom=finite_or_none(prior.freedom),
     )
-    return json_text(msgspec.to_builtins(document))
+    content = msgspec.to_builtins(document)
+    return json_text({key: value for key, value in content.items() if value is not None})
 
 
 def read_fleet_prior(text: str, source: str = "fleet prior") -> FleetPrior:
@@ -48,31 +45,12 @@ def read_fleet_prior(text: str, source: str = "fleet prior") -> FleetPrior:
     return FleetPrior(
         vehicle_type=document.vehicle_type,
         camera_from_radar=transform_of(document.camera_from_radar, source=source, place="camera_from_radar"),
-        covariance=_covariance(document, source=source),
+        covariance=stated_covariance(document.covariance, source=source),
         vehicles=tuple(document.vehicles),
         left_out=tuple(document.left_out),
+        widened=1.0 if document.widened is None else document.widened,
+        freedom=float("inf") if document.freedom is None else document.freedom,
     )
-
-
-def _covariance(document: FleetPriorDocument, *, source: str) -> Matrix66:
-    """Return the covariance, exactly symmetric; refuse one that no distribution has."""
-    stated = np.array(document.covariance)
-    variances = np.diagonal(stated)
-    if not (np.isfinite(stated).all() and (variances > 0.0).all()):
-        raise InputError(
-            f"{source}: covariance: a variance on the diagonal is not positive; write it in m^2 and rad^2, "
-            "all six above zero"
-        )
-    sigma = np.sqrt(variances)
-    correlation = stated / sigma[:, None] / sigma
-    if np.abs(correlation - correlation.T).max() > _SYMMETRIC:
-        raise InputError(f"{source}: covariance: is not symmetric; write the whole matrix, rows and columns alike")
-    if np.linalg.eigvalsh(0.5 * (correlation + correlation.T))[0] < _DEFINITE:
-        raise InputError(
-            f"{source}: covariance: is not positive definite; its entries contradict each other, write it with all "
-            "its digits"
-        )
-    return np.asarray(0.5 * (stated + stated.T))
 
 
 def _refuse_repeated(document: FleetPriorDocument, *, source: str) -> None:

@@ -19,7 +19,8 @@ def prior(seed: int = 1) -> FleetPrior:
     rng = np.random.default_rng(seed)
     spread = 5e-3 * rng.normal(size=(6, 9))
     pose = RigidTransform(rotation_exp(rng.normal(size=3)), rng.normal(size=3))
-    return FleetPrior("van", pose, spread @ spread.T, ("van 1", "van 2"), ("van 3",))
+    known = {} if seed % 2 else {"widened": 1.0 + rng.random(), "freedom": 8.0 + rng.random()}
+    return FleetPrior("van", pose, spread @ spread.T, ("van 1", "van 2"), ("van 3",), **known)
 
 
 @given(st.integers(0, 2**32 - 1))
@@ -28,6 +29,7 @@ def test_what_is_written_is_read_back(seed: int) -> None:
     text = write_fleet_prior(one)
     read = read_fleet_prior(text)
     assert (read.vehicle_type, read.vehicles, read.left_out) == (one.vehicle_type, one.vehicles, one.left_out)
+    assert (read.widened, read.freedom) == (one.widened, one.freedom)
     assert np.abs(read.camera_from_radar.as_matrix() - one.camera_from_radar.as_matrix()).max() < 1e-15
     assert np.abs(read.covariance - one.covariance).max() <= 1e-15 * np.abs(one.covariance).max()
     assert np.array_equal(read.covariance, read.covariance.T)

@@ -1,8 +1,10 @@
 """A job gives the bytes of the commands."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from app import automatic_solving
@@ -13,12 +15,20 @@ from app.batch.outcome import Outcome
 from app.batch.results_folder import OUTCOME_FILE, ResultsFolder
 from app.batch.running import run_job, solving
 from app.cli import run
+from calib_core.fleet_prior import FleetPrior
+from calib_core.interchange import read_calibration
+from calib_core.interchange.own.fleet_prior_json import write_fleet_prior
 from calib_core.options import CalibrationOptions, CameraPositionPrior, RefiningOptions, SolvingOptions
 from calib_core.results import UnconfirmedClicks
 
 SAMPLE = Path(__file__).resolve().parents[5] / "sample_data" / "rooftop"
 BAGS = (SAMPLE / "radar.bag", SAMPLE / "camera.bag")
 CLICKS = SAMPLE / "clicks.json"
+SENSORS = {"vehicle_type": "long", "radar_serial": "R-1", "camera_serial": "C-2"}
+VEHICLE = (
+    *("--vehicle", "van", "--session-name", "1"),
+    *("--vehicle-type", "long", "--radar-serial", "R-1", "--camera-serial", "C-2"),
+)
 
 
 def done(row: ManifestRow, results: Path) -> tuple[Outcome, dict[str, bytes]]:
@@ -39,7 +49,7 @@ class Commands:
         self.calibration = folder / "calibration.json"
 
     def solve(self, *flags: str | Path) -> bytes:
-        self._run("solve", *BAGS, *flags, "--out", self.calibration)
+        self._run("solve", *BAGS, *flags, *VEHICLE, "--out", self.calibration)
         return self.calibration.read_bytes()
 
     def evaluate(self, *flags: str | Path) -> bytes:
@@ -65,7 +75,7 @@ def commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Commands:
 
 
 def test_a_clicked_session(commands: Commands, tmp_path: Path) -> None:
-    row = ManifestRow("van", "1", BAGS, clicks=CLICKS, exports=("tf2", "opencv", "pack"))
+    row = ManifestRow("van", "1", BAGS, **SENSORS, clicks=CLICKS, exports=("tf2", "opencv", "pack"))
     outcome, files = done(row, tmp_path / "results")
     assert (outcome.status, outcome.is_final, outcome.step_reasons) == ("solved", True, {})
     assert outcome.steps == {"evaluate": "done", "report": "done", "export": "done"}
@@ -99,7 +109,7 @@ def test_intrinsics_of_a_file_a_measured_position_and_options(commands: Commands
         solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.045), 0.02)),
         refining=RefiningOptions(intrinsics=True),
     )
-    row = ManifestRow("van", "1", BAGS, clicks=CLICKS, camera=given, rescale_camera=True, options=options)
+    row = ManifestRow("van", "1", BAGS, **SENSORS, clicks=CLICKS, camera=given, rescale_camera=True, options=options)
     given_camera = solving.given_files(row).camera
     assert given_camera is not None
     assert given_camera.rescale
@@ -111,6 +121,29 @@ def test_intrinsics_of_a_file_a_measured_position_and_options(commands: Commands
     assert json.loads(files["calibration.json"])["provenance"]["inputs"][-1]["name"] == "camera.yaml"
     assert files["report.html"] == commands.report("--clicks", CLICKS)
     assert outcome.steps["evaluate"] == "done"
+
+
+def test_the_prior_of_a_fleet(commands: Commands, tmp_path: Path) -> None:
+    whole = read_calibration(commands.solve("--clicks", CLICKS)).calibration
+    few = tmp_path / "few.json"
+    few.write_text(json.dumps({**(document := json.loads(CLICKS.read_text())), "clicks": document["clicks"][:6]}))
+    given = tmp_path / "long.json"
+    scatter = np.diag([0.005] * 6) ** 2
+    given.write_text(write_fleet_prior(FleetPrior("long", whole.camera_from_radar, scatter, ("V1", "V2"))))
+    row = ManifestRow("van", "1", BAGS, **SENSORS, clicks=few, fleet_prior=given)
+    outcome, files = done(row, tmp_path / "results")
+    assert files["calibration.json"] == commands.solve("--clicks", few, "--fleet-prior", given)
+    assert json.loads(files["calibration.json"])["fleet_prior"]["used"] is True
+    assert b'id="fleet-prior"' in files["report.html"]
+    (job,), (without,) = jobs_of([row], tmp_path), jobs_of([replace(row, fleet_prior=None)], tmp_path)
+    assert job.digest != without.digest
+    given.write_text(write_fleet_prior(FleetPrior("long", whole.camera_from_radar, 2 * scatter, ("V1", "van"))))
+    assert jobs_of([row], tmp_path)[0].digest not in (job.digest, without.digest)
+    outcome, _ = done(row, tmp_path / "results")
+    assert outcome.status == "failed"
+    assert "long.json: the prior rests on van itself" in outcome.reason
+    outcome, _ = done(replace(row, options=CalibrationOptions(method="paper")), tmp_path / "results")
+    assert "a fleet's prior is used by the default method only" in outcome.reason
 
 
 def test_clicks_of_a_person_and_of_nobody(commands: Commands, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -130,7 +163,9 @@ def test_clicks_of_a_person_and_of_nobody(commands: Commands, tmp_path: Path, mo
 
     monkeypatch.setattr(solving, "place_clicks", place)
     monkeypatch.setattr(automatic_solving, "place_clicks", place)
-    outcome, files = done(ManifestRow("van", "1", BAGS, clicks=given, auto=True, reflector_m=0.3), tmp_path / "results")
+    outcome, files = done(
+        ManifestRow("van", "1", BAGS, **SENSORS, clicks=given, auto=True, reflector_m=0.3), tmp_path / "results"
+    )
     placed = commands.folder / "clicks.json"
     assert files["calibration.json"] == commands.solve(
         "--clicks", given, "--auto", "--reflector-m", "0.3", "--clicks-out", placed

@@ -1,0 +1,37 @@
+"""`cocalib solve --vehicle …`: the calibration says which vehicle it is of, and so does the report."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+Cocalib = Callable[..., Any]
+
+
+def test_the_file_names_it_keeps_it_and_the_report_shows_it(
+    cocalib: Cocalib, pairs_file: Callable[..., Path], tmp_path: Path
+) -> None:
+    out, again, report = (tmp_path / name for name in ("calibration.json", "again.json", "report.html"))
+    stated = ("--vehicle", "V<1>", "--vehicle-type", "van", "--session-name", "autumn")
+    serials = ("--radar-serial", "R-1", "--camera-serial", "C-2")
+    assert cocalib("solve", "--pairs", pairs_file(), "--out", out, *stated, *serials).code == 0
+    expected = {"name": "V<1>", "type": "van", "session": "autumn", "radar_serial": "R-1", "camera_serial": "C-2"}
+    assert json.loads(out.read_text())["vehicle"] == expected
+    assert cocalib("solve", "--pairs", out, "--out", again, "--session-name", "winter").code == 0
+    assert json.loads(again.read_text())["vehicle"] == expected | {"session": "winter"}
+    assert cocalib("report", out, "--out", report).code == 0
+    html = report.read_text()
+    assert "V&lt;1&gt;, of type van" in html
+    assert "radar R-1, camera C-2" in html
+    assert "V<1>" not in html
+
+
+def test_nothing_stated_writes_nothing_and_nonsense_is_refused(
+    cocalib: Cocalib, pairs_file: Callable[..., Path], tmp_path: Path
+) -> None:
+    answer = cocalib("solve", "--pairs", pairs_file(), "--out", tmp_path / "calibration.json")
+    assert answer.code == 0
+    assert "vehicle" not in json.loads((tmp_path / "calibration.json").read_text())
+    answer = cocalib("solve", "--pairs", pairs_file(), "--radar-serial", "")
+    assert answer.code == 2
+    assert "vehicle.radar_serial is ''; give 1 to 120 printable characters" in answer.err
