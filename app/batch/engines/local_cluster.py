@@ -1,10 +1,12 @@
 """A scheduler in this process and workers as its children. Those that die are replaced; all end with it, however it ends."""
 
 import logging
+import os
 import shutil
+import signal
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -51,10 +53,22 @@ def local_cluster(count: int) -> Iterator["LocalCluster"]:
             cluster.loop.add_callback(replacing.start)
             try:
                 yield cluster
+            except BaseException:
+                _kill_workers(cluster)
+                raise
             finally:
                 cluster.loop.add_callback(replacing.stop)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def _kill_workers(cluster: "LocalCluster") -> None:
+    """Kill the workers, none of which starts again: a call that goes on would hold up the end by seconds."""
+    for nanny in list(cluster.workers.values()):
+        nanny.close_gracefully(reason="the driver ends")
+        if nanny.pid is not None:
+            with suppress(ProcessLookupError):
+                os.kill(nanny.pid, getattr(signal, "SIGKILL", signal.SIGTERM))  # Windows has no SIGKILL
 
 
 def _replace_dead(cluster: "LocalCluster", count: int) -> None:

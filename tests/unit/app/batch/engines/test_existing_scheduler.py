@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.batch.driving import drive
-from app.batch.engines import dask_connection
+from app.batch.engines import dask_connection, worker_checks
 from app.batch.engines.dask_cluster import DaskCluster
 from app.batch.engines.in_process import InProcess
 from app.batch.results_folder import ResultsFolder
@@ -30,6 +30,7 @@ def address() -> Iterator[str]:
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(dask_connection, "_PATIENCE_S", 1)
+    monkeypatch.setattr(worker_checks, "_RESTART_S", 1)
 
 
 def test_workers_of_a_scheduler_that_are_killed_change_no_outcome(address: str, tmp_path: Path) -> None:
@@ -50,9 +51,12 @@ def test_workers_of_a_scheduler_that_are_killed_change_no_outcome(address: str, 
 
 
 @pytest.mark.usefixtures("impatient")
-def test_a_scheduler_without_workers_is_told_with_the_command_that_starts_one(address: str) -> None:
+def test_a_scheduler_without_workers_is_told_with_the_command_that_starts_one(
+    address: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     with pytest.raises(InputError, match=rf"--scheduler {address}: it has no workers; start some with `dask worker"):
         list(DaskCluster(scheduler=address).run_all(squared, [(1,)]))
+    assert capsys.readouterr().err == f"{address} has no workers; waiting 1 s more for one to start\n"
 
 
 def test_a_worker_of_another_version_is_told_before_any_job_runs(address: str, tmp_path: Path) -> None:

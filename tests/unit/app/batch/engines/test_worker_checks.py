@@ -39,6 +39,11 @@ def test_a_worker_without_cocalib_is_named() -> None:
     )
 
 
+def test_a_worker_that_went_away_is_no_trouble() -> None:
+    gone = ConnectionRefusedError("closed")
+    assert version_trouble("0.1.0", {"tcp://127.0.0.1:1": "0.1.0", "tcp://127.0.0.1:2": gone}) == ""
+
+
 def test_a_worker_of_another_cocalib_is_named() -> None:
     found = version_trouble("0.1.0", {"tcp://127.0.0.1:2": "9.9"})
     assert found.startswith("the worker at tcp://127.0.0.1:2 runs cocalib 9.9 and this is cocalib 0.1.0")
