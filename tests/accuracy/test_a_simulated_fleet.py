@@ -48,7 +48,9 @@ def test_what_was_planned_is_named_and_nothing_else(fleet: Path) -> None:
     *judged, verdicts = judge(read_truth(fleet), read_fleet(fleet / "out"))
     assert {one.question: one.wrong for one in judged if one.wrong} == {}
     assert [one.of for one in judged] == [7, 1, 1, 2, 1, 3]
-    assert all(words.endswith("verdict weak") for words in verdicts.wrong)  # 10 placements in such pictures may be too few
+    assert all(
+        words.endswith("verdict weak") for words in verdicts.wrong
+    )  # 10 placements in such pictures may be too few
 
 
 def test_the_reasons_of_what_was_not_calibrated_are_told(fleet: Path) -> None:
