@@ -1,62 +1,35 @@
 """The truth about a simulated fleet: how each vehicle is mounted in each session, and what is wrong with some."""
 
-from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
+from benchmarks.fleet.simulated_session import RECORDING, Fault, Mounting, VehicleErrors, recording_of
 from calib_core.arrays import Vector3, frozen_array
-from calib_core.geometry import rotation_exp, rotation_log
-from calib_core.synthetic import RadarDefects, SimulationOptions
-from calib_core.synthetic.rig import RigOptions
+from calib_core.synthetic import SimulationOptions
 
-__all__ = ["CAMERA_POSITION_M", "Fault", "FleetPlan", "Mounting", "PlannedSession", "plan_fleet"]
+__all__ = ["REMOUNTS", "TAPE_SIGMA_M", "FleetPlan", "PlannedSession", "Remount", "plan_fleet"]
 
-Fault: TypeAlias = Literal["mirrored radar", "radar of another type", "broken recording", "no clicks"]
+TAPE_SIGMA_M = 0.01
+"""Standard deviation of the camera position that each session measures with a tape, per axis [m]."""
 
-CAMERA_POSITION_M = (-0.02, 0.03, 0.11)
-"""Where the drawing has the camera in the radar frame [m]."""
-_TYPE_ANGLES_DEG = (1.2, -0.8, 0.5)
+
+@dataclass(frozen=True, slots=True)
+class Remount:
+    """How far a camera is turned [deg] and moved [m] when it is mounted again, each in a random direction."""
+
+    deg: float
+    m: float
+
+
+REMOUNTS = (Remount(5.0, 0.0), Remount(0.0, 0.1), Remount(4.0, 0.05))
+"""One for each vehicle that is remounted: put back crooked, put elsewhere, and both."""
+
+_WRONG_RADARS: tuple[Fault, ...] = ("mirrored radar", "radar of another type")
+_SPOILT: tuple[Fault, ...] = ("broken recording", "no clicks")
+_TYPE_POSITION_M, _TYPE_ANGLES_DEG = (-0.02, 0.03, 0.11), (1.2, -0.8, 0.5)
 _SCATTER_DEG, _SCATTER_M = 0.3, 0.005
-_REMOUNTED_DEG, _REMOUNTED_M = 2.0, 0.03
-_AZIMUTH_SCALE, _ELEVATION_SCALE = 0.005, 0.01
-_REMOUNTS = 3
-_START_S, _MONTH_S = 1_760_000_000, 30 * 86_400
-_SIMULATION = SimulationOptions(
-    scene="field",
-    radar="imaging",
-    placements=10,
-    dwell_s=3.5,
-    heights=True,
-    person=False,
-    width_px=320,
-    height_px=200,
-    camera_rate_hz=1.0,
-    radar_rate_hz=4.0,
-    click_sigma_px=0.25,
-)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Mounting:
-    """How a camera is mounted.
-
-    Attributes:
-        angles_deg: (3,) its rotation away from looking where the radar looks, in the camera frame [deg].
-        position_m: (3,) of its centre in the radar frame [m].
-    """
-
-    angles_deg: Vector3
-    position_m: Vector3
-
-    def __post_init__(self) -> None:
-        for name in ("angles_deg", "position_m"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (3,)))
-
-    def moved(self, angles_deg: Vector3, position_m: Vector3) -> "Mounting":
-        """Turn the camera by a rotation vector in its own frame and move it."""
-        turned = rotation_exp(np.deg2rad(angles_deg)) @ rotation_exp(np.deg2rad(self.angles_deg))
-        return Mounting(np.rad2deg(rotation_log(turned)), self.position_m + position_m)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,6 +42,7 @@ class PlannedSession:
         radar_serial: of the radar.
         camera_serial: of the camera.
         mounting: in this session.
+        tape_m: (3,) the camera position in the radar frame as measured with a tape [m].
         remounted: the camera was mounted again since the session before.
         fault: what is wrong; None if nothing is.
         simulation: the options of its recording.
@@ -79,9 +53,13 @@ class PlannedSession:
     radar_serial: str
     camera_serial: str
     mounting: Mounting
+    tape_m: Vector3
     remounted: bool
     fault: Fault | None
     simulation: SimulationOptions
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "tape_m", frozen_array(self.tape_m, (3,)))
 
     @property
     def folder(self) -> str:
@@ -104,35 +82,44 @@ class FleetPlan:
     sessions: tuple[PlannedSession, ...]
 
 
-def plan_fleet(vehicles: int, sessions: int, seed: int) -> FleetPlan:
-    """Draw a fleet: up to three vehicles are remounted, two have a wrong radar, one session is broken, one has no clicks.
+def plan_fleet(
+    vehicles: int,
+    sessions: int,
+    seed: int,
+    *,
+    recording: SimulationOptions = RECORDING,
+    remounts: Sequence[Remount] = REMOUNTS,
+    sound: bool = False,
+) -> FleetPlan:
+    """Draw a fleet: three vehicles are remounted once, two have a wrong radar, one session is broken, one has no clicks.
 
     Args:
-        vehicles: how many, at least 7 for all faults to be on vehicles of their own.
+        vehicles: how many; with at least 7, all these are on vehicles of their own, with fewer some are missing.
         sessions: of each vehicle, a month apart.
         seed: of the random generator; each vehicle has a stream of its own.
+        recording: what all recordings have in common.
+        remounts: up to three, one for each vehicle that is remounted.
+        sound: leave out remounts and faults.
     """
-    mean = Mounting(np.array(_TYPE_ANGLES_DEG), np.array(CAMERA_POSITION_M))
-    special = [int(number) for number in np.random.default_rng([seed, 0]).permutation(vehicles)]
-    remounted = set(special[:_REMOUNTS]) if sessions > 1 else set()
-    radars = dict(zip(special[3:5], ("mirrored radar", "radar of another type"), strict=False))
-    spoilt = dict(zip(special[5:7], ("broken recording", "no clicks"), strict=False))
+    mean = Mounting(np.array(_TYPE_ANGLES_DEG), np.array(_TYPE_POSITION_M))
+    special = [] if sound else np.random.default_rng([seed, 0]).permutation(vehicles).tolist()
+    changes = dict(zip(special[:3], remounts, strict=False)) if sessions > 1 else {}
+    radars = dict(zip(special[3:5], _WRONG_RADARS, strict=False))
+    spoilt = dict(zip(special[5:7], _SPOILT, strict=False))
     planned: list[PlannedSession] = []
     for number in range(vehicles):
         rng = np.random.default_rng([seed, 1 + number])
         mounting = mean.moved(_SCATTER_DEG * rng.standard_normal(3), _SCATTER_M * rng.standard_normal(3))
-        radar = RadarDefects(
-            azimuth_scale=1.0 + _AZIMUTH_SCALE * float(rng.standard_normal()),
-            elevation_scale=1.0 + _ELEVATION_SCALE * float(rng.standard_normal()),
-        )
-        change = int(rng.integers(1, sessions)) if number in remounted else None
+        errors = VehicleErrors.drawn(rng, width_px=recording.width_px)
+        remount = changes.get(number)
+        change = None if remount is None else int(rng.integers(1, sessions))
         spoilt_session = int(rng.integers(sessions))
         for index in range(sessions):
-            if index == change:
-                mounting = mounting.moved(_REMOUNTED_DEG * _direction(rng), _REMOUNTED_M * _direction(rng))
-            fault: Fault | None = radars.get(number)  # type: ignore[assignment]
+            if remount is not None and index == change:
+                mounting = mounting.moved(remount.deg * _direction(rng), remount.m * _direction(rng))
+            fault: Fault | None = radars.get(number)
             if index == spoilt_session:
-                fault = spoilt.get(number, fault)  # type: ignore[arg-type]
+                fault = spoilt.get(number, fault)
             planned.append(
                 PlannedSession(
                     f"v{number + 1:03d}",
@@ -140,30 +127,13 @@ def plan_fleet(vehicles: int, sessions: int, seed: int) -> FleetPlan:
                     f"R{number + 1:03d}",
                     f"C{number + 1:03d}",
                     mounting,
+                    mounting.position_m + TAPE_SIGMA_M * rng.standard_normal(3),
                     index == change,
                     fault,
-                    _simulation(mounting, radar, fault, index, int(rng.integers(2**31))),
+                    recording_of(mounting, errors, recording, rng, index=index, fault=fault),
                 )
             )
     return FleetPlan("van", mean, tuple(planned))
-
-
-def _simulation(
-    mounting: Mounting, radar: RadarDefects, fault: Fault | None, index: int, seed: int
-) -> SimulationOptions:
-    if fault == "mirrored radar":
-        radar = replace(radar, mirrored=True)
-    if fault == "radar of another type":
-        radar = replace(radar, azimuth_scale=1.35, elevation_scale=0.7)
-    x, y, z = (float(value) for value in mounting.position_m)
-    roll, pitch, yaw = (float(value) for value in mounting.angles_deg)
-    rig = RigOptions(
-        camera_offset_m=(x, y, z),
-        camera_offset_sigma_m=0.0,
-        camera_angles_deg=(roll, pitch, yaw),
-        camera_angle_sigma_deg=0.0,
-    )
-    return replace(_SIMULATION, rig=rig, defects=radar, seed=seed, start_s=_START_S + index * _MONTH_S)
 
 
 def _direction(rng: np.random.Generator) -> Vector3:

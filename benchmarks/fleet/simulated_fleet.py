@@ -14,7 +14,8 @@ import numpy as np
 from app.batch.engines.dask_cluster import DaskCluster
 from app.batch.engines.engine import Engine
 from app.batch.engines.in_process import InProcess
-from benchmarks.fleet.plan import CAMERA_POSITION_M, FleetPlan, Mounting, PlannedSession, plan_fleet
+from benchmarks.fleet.plan import TAPE_SIGMA_M, FleetPlan, PlannedSession, plan_fleet
+from benchmarks.fleet.simulated_session import Mounting
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.synthetic import simulate, write_recording
 from calib_core.synthetic.rig import nominal_rotation
@@ -22,7 +23,6 @@ from calib_core.synthetic.rig import nominal_rotation
 __all__ = ["RECORDING", "main", "write_fleet"]
 
 RECORDING = "recording_mcap"
-_CAMERA_POSITION_SIGMA_M = 0.01
 
 
 def write_fleet(folder: Path, plan: FleetPlan, engine: Engine) -> Path:
@@ -62,8 +62,8 @@ def _table(plan: FleetPlan, session: PlannedSession) -> str:
         "camera_serial": session.camera_serial,
         "recording": f"{session.folder}/{RECORDING}",
         "clicks": f"{session.folder}/clicks.json",
-        "camera_position_m": list(CAMERA_POSITION_M),
-        "camera_position_sigma_m": _CAMERA_POSITION_SIGMA_M,
+        "camera_position_m": session.tape_m.tolist(),
+        "camera_position_sigma_m": TAPE_SIGMA_M,
     }
     if session.fault == "no clicks":
         del values["clicks"]
