@@ -160,7 +160,8 @@ def _judged(calibration: Calibration, error: StatedError, warning: DataWarning |
     if small and consequence == "note":
         return Verdict("good", error.text, _when_good(calibration, left))
     if warning is not None and warning.code == _PRIOR_DECIDES:  # it hides what further placements would tell
-        return Verdict("usable", error.text, _click_the_rest(left) if left else _capitalized(warning.hint))
+        action = _click_the_rest(left) if left else _capitalized(warning.hint)
+        return Verdict("usable", f"{error.text}, if it is mounted like the others of its type", action)
     better = (
         _capitalized(warning.hint) if small and warning is not None and not left else _most_helpful(calibration, left)
     )

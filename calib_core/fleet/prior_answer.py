@@ -15,6 +15,8 @@ __all__ = ["fleet_answer", "fleet_warnings"]
 
 _RARE = 0.01
 """A sound vehicle is this far from the prior, or farther, less often than this: the prior then draws the pose of an odd one."""
+_UNTESTED_DEG = 9.0
+"""Three times what is usable: data that state more do not test the prior."""
 _DECIDES = 2.0
 """The prior decides if the data alone state an error this many times as large, of rotation or position."""
 
@@ -87,6 +89,15 @@ def _decides(fleet: FleetAnswer, alone: DataAlone, calibration: Calibration) -> 
     position = without.position_cm >= _DECIDES * with_prior.position_cm
     if not (rotation or position):
         return ()
+    if without.rotation_deg > _UNTESTED_DEG:
+        return (
+            DataWarning(
+                "fleet-prior-untested",
+                f"the data alone are uncertain to {without.rotation_deg:g} deg (95 %), so they hardly test whether this vehicle is "
+                f"of type {fleet.prior.vehicle_type}; the fleet's prior decides the pose",
+                "add placements: near and far, left and right",
+            ),
+        )
     return (
         DataWarning(
             "fleet-prior-decides",

@@ -9,6 +9,7 @@ import pytest
 from calib_core.association.clustering import candidate_at
 from calib_core.calibration import calibrate_pairs, solve_again
 from calib_core.errors import InputError
+from calib_core.fleet.prior_answer import fleet_warnings
 from calib_core.fleet_prior import FleetPrior
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import Pair, Unsolvable
@@ -59,6 +60,7 @@ def test_few_placements_of_a_vehicle_of_its_kind_give_a_pose_to_use_and_the_data
     assert np.diag(found.covariance).max() < 0.1 * np.diag(data.covariance).max()
     assert "fleet-prior-decides" in codes(found)
     assert (verdict_on(data).level, verdict_on(found).level) == ("weak", "usable")
+    assert verdict_on(found).reason.endswith(", if it is mounted like the others of its type")
     assert verdict_on(found).action == "Add placements: with enough of them the data decide"
     assert verdict_on(found, left=3).action == "Click the 3 placements that are left"
 
@@ -155,3 +157,12 @@ def test_other_methods_take_no_prior(method: str) -> None:
     options = CalibrationOptions(method=method)  # type: ignore[arg-type]
     with pytest.raises(InputError, match=f"the method is {method}"):
         calibrate_pairs(simulated(6).pairs, simulated(6).camera, options, fleet_prior=prior(6))
+
+
+def test_data_that_are_open_by_more_than_9_deg_do_not_test_a_prior() -> None:
+    found = solved(6, prior(6))
+    assert found.fleet is not None
+    assert found.fleet.data_alone is not None
+    open_data = replace(found.fleet.data_alone, covariance=9.0 * found.fleet.data_alone.covariance)
+    fleet = replace(found.fleet, data_alone=open_data)
+    assert [warning.code for warning in fleet_warnings(fleet, found)] == ["fleet-prior-untested"]
