@@ -93,8 +93,8 @@ def _decides(fleet: FleetAnswer, alone: DataAlone, calibration: Calibration) -> 
         return (
             DataWarning(
                 "fleet-prior-untested",
-                f"the data alone are uncertain to {without.rotation_deg:g} deg (95 %), so they hardly test whether this vehicle is "
-                f"of type {fleet.prior.vehicle_type}; the fleet's prior decides the pose",
+                f"the data alone are uncertain to {without.rotation_deg:g} deg (95 %), so they hardly test whether this is "
+                f"a vehicle of type {fleet.prior.vehicle_type}; the fleet's prior decides the pose",
                 "add placements: near and far, left and right",
             ),
         )
