@@ -1,5 +1,6 @@
 """The files that the result of a session depends on, and their state, which tells whether one changed."""
 
+import errno
 import hashlib
 import json
 import os
@@ -8,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.batch.manifest import ManifestRow
+from calib_core.input_files import special_kind
 
 __all__ = ["InputFile", "InputPath", "all_reached", "inputs_of", "state_of"]
 
@@ -50,7 +52,7 @@ class InputPath:
         """Return the files that are read, in order of their names.
 
         Raises:
-            OSError: it is missing, or a folder cannot be read.
+            OSError: it is missing, a pipe or a device, or a folder cannot be read.
         """
         path = self.path
         if self.role == "camera" and "#" in str(path) and not path.exists():  # FILE#CAMERA
@@ -59,6 +61,9 @@ class InputPath:
         found = list(_within(path)) if path.is_dir() else [path]
         if self.role == "recording":
             found += [side for side in _side_files(path) if side not in found and side.is_file()]
+        for file in found:
+            if (kind := special_kind(file)) is not None:
+                raise OSError(errno.EINVAL, f"is {kind}, not a file", str(file))  # reading it may never end
         named = {os.path.relpath(file, path.parent).replace(os.sep, "/"): file for file in found}
         return tuple(InputFile(name, named[name]) for name in sorted(named))
 

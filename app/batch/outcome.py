@@ -18,9 +18,9 @@ __all__ = [
 
 OUTCOME_SCHEMA: Final = "cocalib/outcome-1"
 Status = Literal["solved", "weak", "refused", "failed"]
+"""A good or usable calibration; one not to rely on; the data give none; an input cannot be read or the program failed."""
 PriorUse = Literal["used", "untested", "contradicted"]
-"""A calibration; one that is doubtful; the data give none; an input cannot be read or the program failed."""
-StepState = Literal["done", "not available", "not asked", "failed"]
+StepState = Literal["done", "left out", "not available", "not asked", "failed"]
 
 
 class OutcomeFile(Struct, frozen=True, forbid_unknown_fields=True):

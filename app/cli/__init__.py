@@ -50,8 +50,11 @@ def _ended(arguments: Sequence[str]) -> int:
         return refuse(f"{error.filename or 'a file'}: {(error.strerror or str(error)).lower()}")
     except KeyboardInterrupt as stop:  # carries the signal number if it was not Ctrl+C
         with contextlib.suppress(OSError):  # the terminal may be gone
-            print(file=sys.stderr)
+            print(f"\n{_STOPPED[arguments[0]]}" if arguments and arguments[0] in _STOPPED else "", file=sys.stderr)
         return 128 + int(stop.args[0] if stop.args else signal.SIGINT)
+
+
+_STOPPED = {"batch": "stopped: what is done is kept; the same command goes on from there"}
 
 
 def refuse(reason: str) -> int:

@@ -1,11 +1,10 @@
 """Keep index and summary page while a batch is driven."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from app.batch.driving import BatchProgress
-from app.batch.manifest import ManifestRow
 from app.fleet.index import FleetIndex, finished_results, read_fleet
 from app.fleet.summary_page import write_summary
 
@@ -13,20 +12,19 @@ __all__ = ["indexed_batch"]
 
 
 @contextmanager
-def indexed_batch(folder: Path, rows: Sequence[ManifestRow] = ()) -> Iterator[Callable[[BatchProgress], None]]:
+def indexed_batch(folder: Path) -> Iterator[Callable[[BatchProgress], None]]:
     """Open the index; yield what to call after each job, and write the summary page at the end.
 
     For the one process that drives a whole batch; parts of a batch leave the index to `cocalib fleet rebuild`.
 
     Args:
-        folder: holds the results.
-        rows: of the manifest.
+        folder: holds the results, and what the manifests want.
 
     Raises:
         InputError: the index is of another version, damaged, or cannot be written.
         OSError: the page cannot be written.
     """
-    with FleetIndex(folder, rows) as index:
+    with FleetIndex(folder) as index:
 
         def add(now: BatchProgress) -> None:
             if now.latest is not None:

@@ -45,6 +45,8 @@ def status_document(
         "vehicles": [_standing(one, now_ns) for one in standings],
         "types": [_kind(one) for one in kinds],
         "unread": [_unread(one) for one in fleet.unread],
+        "missing": [list(one) for one in fleet.missing],
+        "unlisted": [list(one) for one in fleet.unlisted],
     }
 
 

@@ -111,11 +111,17 @@ class FleetRecord:
         vehicles: by name.
         superseded: results of sessions that were run again, by vehicle, session and time of the run.
         unread: results that cannot be read.
+        missing: sessions that the manifests name and that have no result, as (vehicle, session), in their order.
+        unlisted: sessions with a result that no manifest names any more.
+        manifests: names of the manifests that were run here; empty if that is not known.
     """
 
     vehicles: tuple[VehicleRecord, ...]
     superseded: tuple[SessionRecord, ...] = ()
     unread: tuple[UnreadResult, ...] = ()
+    missing: tuple[tuple[str, str], ...] = ()
+    unlisted: tuple[tuple[str, str], ...] = ()
+    manifests: tuple[str, ...] = ()
 
     @property
     def types(self) -> tuple[str, ...]:

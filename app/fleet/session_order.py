@@ -1,6 +1,6 @@
 """The order of a vehicle's sessions: by the recording's time, else by the manifest."""
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from app.batch.outcome import Outcome
 
@@ -9,15 +9,18 @@ __all__ = ["current_and_superseded", "in_order"]
 _Place = tuple[Outcome, int | None]
 
 
-def current_and_superseded(rows: Iterable[_Place]) -> tuple[list[_Place], list[_Place]]:
-    """Return the latest result of each session of one vehicle, in no order, and the others.
+def current_and_superseded(rows: Iterable[_Place], wanted: Collection[str] = ()) -> tuple[list[_Place], list[_Place]]:
+    """Return the result of each session of one vehicle that counts, in no order, and the others.
+
+    That is the one that the latest batch wanted; of a session that no batch names, or whose job is not done, the latest one.
 
     Args:
         rows: each result with the session's place in the manifest.
+        wanted: digests of the jobs that the latest batches wanted.
     """
     latest: dict[str, _Place] = {}
     others = []
-    for row in sorted(rows, key=_run):
+    for row in sorted(rows, key=lambda row: (row[0].digest in wanted, *_run(row))):
         before = latest.get(row[0].session)
         if before is not None:
             others.append(before)

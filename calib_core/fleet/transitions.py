@@ -137,7 +137,7 @@ def transition(before: SessionPose, after: SessionPose, *, relevant: RelevantCha
         resolved_deg=resolved_deg,
         resolved_cm=resolved_cm,
         outcome=outcome,
-        words=_words(outcome, before, after, figures, bars, seen=seen, matters=matters),
+        words=_words(outcome, before, after, figures, bars, usual=difference.squared <= usual, matters=matters),
     )
 
 
@@ -192,7 +192,7 @@ def _words(
     figures: str,
     bars: str,
     *,
-    seen: bool,
+    usual: bool,
     matters: RelevantChange,
 ) -> str:
     change = f"{figures} between {before.session} and {after.session}"
@@ -204,8 +204,11 @@ def _words(
         return f"{what}: {change}, beyond both error bars"
     if outcome == "unchanged":
         return f"unchanged: {change}; 95 % error bars of {bars}"
-    if seen:
-        return f"cannot tell: {change} is more than 95 % error bars allow, and too little to name a remount"
+    if not usual:
+        return (
+            f"cannot tell: {change} is beyond the 95 % error bars ({bars}), and within what 1 in 10,000 unchanged mountings "
+            "show: perhaps remounted, measure again with more placements"
+        )
     return (
         f"cannot tell: {change}; 95 % error bars of {bars} would hide a change of {matters.deg:g} deg or {matters.cm:g} cm: "
         "more placements would narrow them"

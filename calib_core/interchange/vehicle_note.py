@@ -67,6 +67,8 @@ def require_label(text: str, where: str) -> None:
     Raises:
         InputError: it is blank, too long or not printable.
     """
+    if text != text.strip() and text.strip():
+        raise InputError(f"{where} is {text!r}; leave out the spaces around it")
     if not text.strip() or not text.isprintable() or len(text) > MOST_CHARACTERS:
         shown = text if len(text) <= MOST_CHARACTERS else f"{text[:20]}…"
         raise InputError(

@@ -40,7 +40,7 @@ def local_cluster(count: int) -> Iterator["LocalCluster"]:
                 n_workers=0,
                 threads_per_worker=1,
                 host="127.0.0.1",
-                dashboard_address=None,
+                dashboard_address="127.0.0.1:0",  # without one, a page is served at a fixed port
                 memory_limit=MEMORY_LIMIT // count,
                 local_directory=folder,
                 silence_logs=logging.CRITICAL,

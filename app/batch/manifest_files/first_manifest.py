@@ -70,7 +70,7 @@ def first_manifest(folder: Path, manifest: Path) -> tuple[str, int]:
 
 def _sessions(folder: Path) -> Iterator[_Found]:
     recordings: dict[tuple[Path, str], list[Path]] = {}
-    for path in _recordings(folder):
+    for path in _recordings(folder, {folder.resolve()}):
         recordings.setdefault((path.parent, _without_sensor(path)), []).append(path)
     several = {where for where in {where for where, _ in recordings} if sum(one == where for one, _ in recordings) > 1}
     for (where, rest), paths in recordings.items():
@@ -79,25 +79,38 @@ def _sessions(folder: Path) -> Iterator[_Found]:
             parts.append(rest or paths[0].stem)
         only_sensors = _without_sensor(paths[0]) == ""
         session = "-".join(parts[1:]) or (_ONLY_SESSION if only_sensors else paths[0].stem)
-        yield _Found(parts[0], session, tuple(sorted(paths)))
+        yield _Found(_as_name(parts[0]), _as_name(session), tuple(sorted(paths)))
 
 
-def _recordings(folder: Path) -> Iterator[Path]:
-    """Yield the recordings below a folder; hidden folders and the inside of bag folders are left out."""
+def _as_name(text: str) -> str:
+    """Return a name that a manifest takes: slashes and what cannot be printed are replaced."""
+    return "".join("_" if one in "/\\" or not one.isprintable() else one for one in text).strip() or "_"
+
+
+def _recordings(folder: Path, seen: set[Path] | None = None) -> Iterator[Path]:
+    """Yield the recordings below a folder, each real one once; hidden folders and the inside of bag folders are left out.
+
+    Args:
+        folder: to look in.
+        seen: real folders and files that were looked at already.
+    """
+    seen = set() if seen is None else seen
     try:
-        inside = sorted(folder.iterdir())
+        inside = sorted(folder.iterdir(), key=lambda path: (path.is_symlink(), path))
     except OSError as error:
         raise InputError(f"{folder}: cannot be read: {(error.strerror or str(error)).lower()}") from error
     for path in inside:
-        if path.name.startswith("."):
+        real = path.resolve()
+        if path.name.startswith(".") or real in seen:
             continue
+        seen.add(real)
         if path.is_file() and path.suffix.lower() in _SUFFIXES:
             yield path
         elif path.is_dir():
             if (path / _BAG_FOLDER).is_file():
                 yield path
             else:
-                yield from _recordings(path)
+                yield from _recordings(path, seen)
 
 
 def _without_sensor(path: Path) -> str:

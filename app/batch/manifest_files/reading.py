@@ -26,6 +26,7 @@ _MOST_BYTES = 64 * 1024 * 1024
 _SEPARATOR = ";"
 _SEVERAL = ("recording", "exports", "camera_position_m", "map")
 """Columns of a CSV manifest that hold several values."""
+_TEXTS = ("vehicle", "session", "vehicle_type", "radar_serial", "camera_serial")
 _SWITCHES = ("auto", "rescale_camera", "confirm_assumptions")
 _YES_NO = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
 _TAPE_SIGMA_M = 0.01
@@ -54,6 +55,7 @@ def read_manifest(path: Path) -> Manifest:
     ]
     rows = tuple(_row(one, place, path) for one, place in zip(sessions, places, strict=True))
     _require_different(rows, path)
+    _require_own_recordings(rows, path)
     return Manifest(path, rows)
 
 
@@ -65,7 +67,9 @@ def _text(path: Path) -> str:
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from error
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: not a text file (byte {error.start} is not UTF-8)") from error
+        raise InputError(
+            f"{path}: not a text file (byte {error.start} is not UTF-8); save it as UTF-8 (Excel: CSV UTF-8)"
+        ) from error
 
 
 def _toml(text: str, path: Path) -> tuple[list[str], dict[str, Any]]:
@@ -74,19 +78,42 @@ def _toml(text: str, path: Path) -> tuple[list[str], dict[str, Any]]:
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise InputError(f"{path}: not valid TOML: {error}") from None
     sessions = content.setdefault("session", [])
+    if isinstance(sessions, dict):
+        raise InputError(f"{path}: [session] is one table; write [[session]], with two brackets, above each session")
+    for number, one in enumerate(sessions if isinstance(sessions, list) else [], start=1):
+        _require_quoted(one, f"{path}: session {number}")
+    _require_quoted(content.get("defaults"), f"{path}: defaults")
     count = len(sessions) if isinstance(sessions, list) else 0
     return [f"session {number}" for number in range(1, count + 1)], content
+
+
+def _require_quoted(table: object, where: str) -> None:
+    """Refuse numbers and dates where TOML wants text in quotes.
+
+    Raises:
+        InputError: names the first.
+    """
+    for key, value in table.items() if isinstance(table, dict) else ():
+        if key in _TEXTS and not isinstance(value, str):
+            raise InputError(f'{where}: {key}: {value} is no text; write it in quotes: {key} = "{value}"')
+
+
+def _delimiter(text: str) -> str:
+    """Return what stands between the columns: Excel writes semicolons where the comma is the decimal sign, others write tabs."""
+    head = text.partition("\n")[0]
+    return max(",;\t", key=head.count)
 
 
 def _csv(text: str, path: Path) -> tuple[list[str], dict[str, Any]]:
     """Read a CSV file: a key for each column, such as `vehicle` or `options.noise.sigma_px`; empty cells say nothing."""
     try:
-        lines = csv.reader(io.StringIO(text.removeprefix("\ufeff"), newline=""), strict=True)
+        text = text.removeprefix("\ufeff")
+        lines = csv.reader(io.StringIO(text, newline=""), strict=True, delimiter=_delimiter(text))
         head = next(lines, [])
         rows = [(lines.line_num, cells) for cells in lines if any(cell.strip() for cell in cells)]
     except csv.Error as error:
         raise InputError(f"{path}: not valid CSV: {error}") from None
-    names = [name.strip() for name in head]
+    names = [_as_known(name.strip()) for name in head]
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise InputError(f"{path}: line 1: the column '{twice}' stands twice; remove one")
@@ -94,11 +121,17 @@ def _csv(text: str, path: Path) -> tuple[list[str], dict[str, Any]]:
     for number, cells in rows:
         if len(cells) != len(names):
             raise InputError(
-                f"{path}: line {number}: {len(cells)} cells, but {len(names)} columns; quote cells with commas"
+                f"{path}: line {number}: {len(cells)} cells, but {len(names)} columns; quote cells that contain what "
+                "stands between the columns"
             )
         places.append(f"line {number}")
         sessions.append(_from_cells(names, cells, f"{path}: line {number}"))
     return places, {"session": sessions}
+
+
+def _as_known(name: str) -> str:
+    """Return the name of a column without capitals if that is the key of a session."""
+    return name.lower() if name.lower() in SessionDocument.__struct_fields__ else name
 
 
 def _from_cells(names: Sequence[str], cells: Sequence[str], where: str) -> dict[str, Any]:
@@ -228,6 +261,23 @@ def _require_different(rows: Sequence[ManifestRow], path: Path) -> None:
             f"{path}: {first.place} and {second.place} are both session '{second.session}' of vehicle "
             f"'{second.vehicle}'; give each its own session"
         )
+
+
+def _require_own_recordings(rows: Sequence[ManifestRow], path: Path) -> None:
+    """Refuse a recording of two vehicles or sessions: one measurement would count as two that agree.
+
+    Raises:
+        InputError: names both rows.
+    """
+    known: dict[frozenset[Path], ManifestRow] = {}
+    for row in rows:
+        files = frozenset(one.resolve() for one in row.recording)
+        other = known.setdefault(files, row)
+        if other is not row:
+            raise InputError(
+                f"{path}: {other.place} ({other.name}) and {row.place} ({row.name}) have the same recording; name the one that "
+                "it is of, or try other options in a manifest with another --out"
+            )
 
 
 def _twice(rows: Sequence[ManifestRow]) -> Iterator[tuple[ManifestRow, ManifestRow]]:

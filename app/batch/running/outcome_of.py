@@ -47,7 +47,7 @@ def _of_calibration(job: Job, solved: SolvedSession) -> Outcome:
     known = bool(np.isfinite(sigma).all())
     doubtful = solved.is_weak or verdict.level not in ("good", "usable")
     return replace(
-        _outcome(job, "weak" if solved.is_weak else "solved"),
+        _outcome(job, "weak" if doubtful else "solved"),
         reason=verdict.reason if doubtful else "",
         hint=verdict.action if doubtful else "",
         verdict=verdict.level,

@@ -13,6 +13,7 @@ from app.batch.running.reporting import REPORT_FILE, report_session
 from app.batch.running.solving import SolvedSession, given_files, solve_session
 from calib_core.measurements import Unsolvable
 from calib_core.recordings import Recording, open_recording
+from calib_core.verdict import verdict_on
 
 __all__ = ["SessionResult", "run_steps"]
 
@@ -70,12 +71,15 @@ def _after_solving(row: ManifestRow, solved: SolvedSession, recording: Recording
     _report(solved, judged, recording, result)
     if not row.exports:
         result.states["export"] = "not asked"
+        return
+    if verdict_on(solved.calibration).level == "contradictory":
+        result.states["export"] = "left out"  # nobody must use its pose
+        return
     for name in row.exports:
         files = _step(f"export {name}", result, lambda name=name: export_session(solved, name, [*result.files]))  # type: ignore[misc]
         result.files |= files or {}
-    if row.exports:
-        states = [result.states.pop(f"export {name}") for name in dict.fromkeys(row.exports)]
-        result.states["export"] = "failed" if "failed" in states else "done"
+    states = [result.states.pop(f"export {name}") for name in dict.fromkeys(row.exports)]
+    result.states["export"] = "failed" if "failed" in states else "done"
 
 
 def _report(solved: SolvedSession, judged: JudgedSession | None, recording: Recording, result: SessionResult) -> None:

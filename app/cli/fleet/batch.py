@@ -70,6 +70,7 @@ class Batch:
     def _calibrate(self, manifest: "Manifest") -> int:
         from app.batch.driving import chosen_engine, drive, shard_of
         from app.batch.job import jobs_of
+        from app.batch.plan import write_plan
         from app.batch.results_folder import ResultsFolder
         from app.cli.fleet.batch_text import batch_lines, exit_code, shown_batch
 
@@ -79,6 +80,7 @@ class Batch:
             results.remove_leftovers()
             with progress_bar("reading recordings") as progress_bytes:
                 jobs = jobs_of(manifest.rows, results.path, progress_bytes)
+            write_plan(results.path, manifest.source, jobs)
             jobs = jobs if shard is None else shard_of(jobs, *shard)
             engine = chosen_engine(
                 len(jobs),
@@ -86,7 +88,7 @@ class Batch:
                 workers=self.workers,
                 scheduler=self.scheduler,
             )
-            with shown_batch(len(jobs)) as show, self._indexed(results, manifest) as add:
+            with shown_batch(len(jobs)) as show, self._indexed(results) as add:
 
                 def tell(now: "BatchProgress") -> None:
                     show(now)
@@ -99,14 +101,14 @@ class Batch:
         return exit_code(outcomes)
 
     @contextmanager
-    def _indexed(self, results: "ResultsFolder", manifest: "Manifest") -> "Iterator[Callable[[BatchProgress], None]]":
+    def _indexed(self, results: "ResultsFolder") -> "Iterator[Callable[[BatchProgress], None]]":
         """Keep index and summary page meanwhile; parts of a batch leave them to one process afterwards."""
         from app.fleet.batch_index import indexed_batch
 
         if self.shard is not None:
             yield lambda _: None
             return
-        with indexed_batch(results.path, manifest.rows) as add:
+        with indexed_batch(results.path) as add:
             yield add
 
     def _next_lines(self, results: Path) -> list[str]:

@@ -15,6 +15,16 @@ __all__ = ["batch_lines", "exit_code", "shown_batch"]
 
 _WEAK_CODE, _FAILED_FROM, _MOST_CODE = 3, 10, 99
 _WITHOUT = ("refused", "failed")
+_KEYS_OF = {
+    "--map": "map under [session.topics] (CSV: the column topics.map)",
+    "--confirm-assumptions": "confirm_assumptions = true under [session.topics] (CSV: the column topics.confirm_assumptions)",
+    "--radar-topic": "radar_topic under [session.topics]",
+    "--image-topic": "image_topic under [session.topics]",
+    "--camera ": "camera",
+    "--rescale-camera": "rescale_camera = true",
+    "--camera-position-m": "camera_position_m",
+}
+"""The keys for flags that advice of the commands names."""
 
 
 def exit_code(outcomes: "Sequence[Outcome]") -> int:
@@ -30,7 +40,8 @@ def batch_lines(outcomes: "Sequence[Outcome]") -> list[str]:
     counts = {
         status: sum(one.status == status for one in outcomes) for status in ("solved", "weak", "refused", "failed")
     }
-    head = f"{len(outcomes)} sessions: " + ", ".join(f"{count} {status}" for status, count in counts.items() if count)
+    kinds = ", ".join(f"{count} {status}" for status, count in counts.items() if count)
+    head = f"{len(outcomes)} session{'' if len(outcomes) == 1 else 's'}: {kinds}"
     rows = [(one.vehicle, one.session, one.status, _why(one)) for one in outcomes if one.status != "solved"]
     if not rows:
         return [head]
@@ -40,7 +51,9 @@ def batch_lines(outcomes: "Sequence[Outcome]") -> list[str]:
         "  ".join([*(cell.ljust(width) for cell, width in zip(row, widths, strict=False)), row[3]])
         for row in (titles, *rows)
     ]
-    return [head, "", *lines]
+    named = [flag for flag in _KEYS_OF if any(flag in row[3] for row in rows)]
+    keys = [f"in a manifest, {flag} is {_KEYS_OF[flag]}" for flag in named]
+    return [head, "", *lines, *([""] if keys else []), *keys]
 
 
 def _why(outcome: "Outcome") -> str:

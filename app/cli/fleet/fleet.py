@@ -116,7 +116,7 @@ class Fleet:
         return folder
 
     def _status(self, fleet: "FleetRecord") -> int:
-        from app.cli.fleet.text_tables import kind_lines, status_lines
+        from app.cli.fleet.text_tables import kind_lines, plan_lines, status_lines
         from app.fleet.json_documents import status_document
         from app.fleet.kinds import kinds_of
         from app.fleet.standing import standings_of
@@ -126,8 +126,10 @@ class Fleet:
         if self.json:
             _print_json(status_document(fleet, standings, kinds, now_ns=now_ns))
         else:
-            print("\n".join([*status_lines(standings, now_ns=now_ns), *kind_lines(kinds)]))
-        return _LOOK if fleet.unread or any(one.needs for one in standings) else 0
+            troubled = bool(fleet.unread or fleet.missing)
+            lines = [*status_lines(standings, now_ns=now_ns, troubled=troubled), *plan_lines(fleet)]
+            print("\n".join([*lines, *kind_lines(kinds)]))
+        return _LOOK if fleet.unread or fleet.missing or any(one.needs for one in standings) else 0
 
     def _history(self, fleet: "FleetRecord", name: str) -> int:
         from app.cli.fleet.text_tables import history_lines

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from app.fleet.dates import recorded_text
 from app.fleet.kinds import Kind, PriorOfType, prior_sigma
-from app.fleet.records import SessionRecord, VehicleRecord
+from app.fleet.records import FleetRecord, SessionRecord, VehicleRecord
 from app.fleet.standing import VehicleStanding, age_days
 from app.view.number_format import plain, with_sigma
 from calib_core.fleet import Transition
@@ -13,15 +13,17 @@ __all__ = ["history_lines", "kind_lines", "prior_lines", "status_lines"]
 
 _DASH = "–"
 _LONGEST = 32
+_MOST_NAMED = 10
 _WORDS = {"remounted": "REMOUNTED", "unchanged": "unchanged", "cannot-tell": "cannot tell"}
 
 
-def status_lines(standings: Sequence[VehicleStanding], *, now_ns: int) -> Iterator[str]:
+def status_lines(standings: Sequence[VehicleStanding], *, now_ns: int, troubled: bool = False) -> Iterator[str]:
     """Return a line for each vehicle, and what somebody has to look at.
 
     Args:
         standings: of all vehicles.
         now_ns: the time that ages count to [ns].
+        troubled: there are results that cannot be read, or are missing.
     """
     heads = (
         "vehicle",
@@ -38,12 +40,27 @@ def status_lines(standings: Sequence[VehicleStanding], *, now_ns: int) -> Iterat
     yield from _table(heads, [_standing_cells(one, now_ns) for one in standings])
     needing = [one for one in standings if one.needs]
     if not needing:
-        yield f"{_vehicles(len(standings))}, nothing to look at"
+        yield f"{_vehicles(len(standings))}, nothing to look at{' in what could be read' if troubled else ''}"
         return
     yield ""
     yield f"{len(needing)} of {_vehicles(len(standings))} to look at:"
     for one in needing:
         yield from (f"  {one.vehicle.name}: {reason}" for reason in one.needs)
+
+
+def plan_lines(fleet: FleetRecord) -> Iterator[str]:
+    """Return which sessions of the manifests have no result, and which results no manifest names."""
+    for names, words in (
+        (fleet.missing, "in the manifest without a result: run the batch again"),
+        (
+            fleet.unlisted,
+            "with a result in no manifest any more; history --json has the names of their folders in results/",
+        ),
+    ):
+        if names:
+            shown = ", ".join(f"{vehicle}/{session}" for vehicle, session in names[:_MOST_NAMED])
+            more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
+            yield f"{len(names)} session{'' if len(names) == 1 else 's'} {words}: {shown}{more}"
 
 
 def kind_lines(kinds: Sequence[Kind]) -> Iterator[str]:

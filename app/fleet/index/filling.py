@@ -7,16 +7,17 @@ from pathlib import Path
 from typing import Any
 
 from app.batch.outcome import Outcome, outcome_text, read_outcome
+from app.batch.plan import Wanted
 from app.fleet.index.result_reading import outcome_of, with_pose
 from app.fleet.index.stored_pose import insert_pose, insert_transition, pose_of
 from app.fleet.records import NO_POSE_OF, SessionRecord, UnreadResult
 from app.fleet.session_order import current_and_superseded, in_order
 from calib_core.fleet import transition
 
-__all__ = ["Places", "fill", "known_results", "put", "set_places"]
+__all__ = ["Places", "fill", "has_places", "known_results", "put", "set_places"]
 
-Places = Mapping[tuple[str, str], int]
-"""Vehicle and session to the place in the manifest, from 0."""
+Places = Mapping[tuple[str, str], Wanted]
+"""What the manifests want, by vehicle and session."""
 
 
 def known_results(connection: sqlite3.Connection) -> Mapping[str, str]:
@@ -50,7 +51,7 @@ def fill(
         if isinstance(found, UnreadResult):
             unread.append(found)
             continue
-        _insert(connection, with_pose(folder, found, places.get((found.vehicle, found.session))), str(text))
+        _insert(connection, with_pose(folder, found, _place(found, places)), str(text), places)
         changed.add(found.vehicle)
     for vehicle in sorted(changed):
         _settle(connection, vehicle)
@@ -67,30 +68,53 @@ def put(connection: sqlite3.Connection, folder: Path, outcome: Outcome, places: 
         places: of the manifest, as far as known.
     """
     connection.execute("DELETE FROM sessions WHERE digest = ?", (outcome.digest,))
-    _insert(
-        connection, with_pose(folder, outcome, places.get((outcome.vehicle, outcome.session))), outcome_text(outcome)
-    )
+    _insert(connection, with_pose(folder, outcome, _place(outcome, places)), outcome_text(outcome), places)
     _settle(connection, outcome.vehicle)
 
 
+def has_places(connection: sqlite3.Connection, places: Places) -> bool:
+    """Return whether the tables say what the manifests want."""
+    return not _moved(connection, places)
+
+
 def set_places(connection: sqlite3.Connection, places: Places) -> None:
-    """State the places of all sessions in the manifest anew."""
-    rows = connection.execute("SELECT digest, vehicle, session, place FROM sessions").fetchall()
-    moved = [(places.get((vehicle, session)), digest, vehicle, place) for digest, vehicle, session, place in rows]
-    for wanted, digest, _, place in moved:
-        if wanted != place:
-            connection.execute("UPDATE sessions SET place = ? WHERE digest = ?", (wanted, digest))
-    for vehicle in sorted({vehicle for wanted, _, vehicle, place in moved if wanted != place}):
+    """State anew what the manifests want."""
+    moved = _moved(connection, places)
+    connection.executemany("UPDATE sessions SET place = ?, wanted = ? WHERE digest = ?", [one[:3] for one in moved])
+    for vehicle in sorted({vehicle for *_, vehicle in moved}):
         _settle(connection, vehicle)
 
 
-def _insert(connection: sqlite3.Connection, record: SessionRecord, text: str) -> None:
+def _moved(connection: sqlite3.Connection, places: Places) -> list[tuple[int | None, bool, str, str]]:
+    """Return place, whether it is wanted, digest and vehicle of the results for which that is not as stored."""
+    rows = connection.execute("SELECT digest, vehicle, session, place, wanted FROM sessions").fetchall()
+    moved = []
+    for digest, vehicle, session, place, is_wanted in rows:
+        found = places.get((vehicle, session))
+        now = (None, False) if found is None else (found.place, found.digest == digest)
+        if now != (place, bool(is_wanted)):
+            moved.append((*now, digest, vehicle))
+    return moved
+
+
+def _place(outcome: Outcome, places: Places) -> int | None:
+    found = places.get((outcome.vehicle, outcome.session))
+    return None if found is None else found.place
+
+
+def _is_wanted(outcome: Outcome, places: Places) -> bool:
+    found = places.get((outcome.vehicle, outcome.session))
+    return found is not None and found.digest == outcome.digest
+
+
+def _insert(connection: sqlite3.Connection, record: SessionRecord, text: str, places: Places) -> None:
     outcome = record.outcome
     row: dict[str, Any] = {
         "digest": outcome.digest,
         "vehicle": outcome.vehicle,
         "session": outcome.session,
         "place": record.place,
+        "wanted": _is_wanted(outcome, places),
         "status": outcome.status,
         "reason": outcome.reason,
         "verdict": outcome.verdict,
@@ -117,10 +141,13 @@ def _insert(connection: sqlite3.Connection, record: SessionRecord, text: str) ->
 def _settle(connection: sqlite3.Connection, vehicle: str) -> None:
     """Write which results of a vehicle count, in which order, and what changed from one to the next."""
     given = [
-        (read_outcome(text), place)
-        for text, place in connection.execute("SELECT outcome, place FROM sessions WHERE vehicle = ?", (vehicle,))
+        (read_outcome(text), place, wanted)
+        for text, place, wanted in connection.execute(
+            "SELECT outcome, place, wanted FROM sessions WHERE vehicle = ?", (vehicle,)
+        )
     ]
-    latest, superseded = current_and_superseded(given)
+    wanted = {outcome.digest for outcome, _, is_wanted in given if is_wanted}
+    latest, superseded = current_and_superseded([(outcome, place) for outcome, place, _ in given], wanted)
     ordered = [outcome for outcome, _ in in_order(latest)]
     _mark(connection, ((None, 1, outcome.digest) for outcome, _ in superseded))
     _mark(connection, ((position, 0, outcome.digest) for position, outcome in enumerate(ordered)))

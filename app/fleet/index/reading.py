@@ -7,7 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from app.batch.outcome import read_outcome
-from app.fleet.index.filling import fill, known_results
+from app.batch.plan import Plan, read_plans
+from app.fleet.index.filling import fill, has_places, known_results, set_places
 from app.fleet.index.result_reading import finished_results
 from app.fleet.index.stored_pose import pose_of, transition_of
 from app.fleet.index.tables import create_tables, damaged, has_tables, index_path, read_only, require_version
@@ -32,45 +33,50 @@ def read_fleet(folder: Path) -> FleetRecord:
     finished = finished_results(folder)
     if not finished:
         raise InputError(f"{folder}: no results; give the folder that cocalib batch wrote to, which holds results/")
-    path = index_path(folder)
+    path, plan = index_path(folder), read_plans(folder)
     try:
-        fleet = _of_index(folder, path, finished) if path.is_file() else _of_results(folder, finished)
+        indexed = path.is_file()
+        fleet = _of_index(folder, path, finished, plan) if indexed else _of_results(folder, finished, plan)
     except sqlite3.OperationalError:  # a killed writer left a journal, or the drive has no locks
-        fleet = _of_results(folder, finished)
+        fleet = _of_results(folder, finished, plan)
     except (sqlite3.DatabaseError, ValueError) as error:  # msgspec's and json's errors are ValueErrors
         raise damaged(path, error) from error
     if not fleet.vehicles:
         first = fleet.unread[0]
         more = f" ({len(fleet.unread)} such results)" if len(fleet.unread) > 1 else ""
         raise InputError(f"{folder}: no result can be read: {first.place}: {first.reason}{more}")
-    return fleet
+    return _with_plan(fleet, plan)
 
 
-def _of_index(folder: Path, path: Path, finished: Mapping[str, str | UnreadResult]) -> FleetRecord:
+def _with_plan(fleet: FleetRecord, plan: Plan) -> FleetRecord:
+    """Add which sessions the manifests name and have no result, and the other way round."""
+    found = {(vehicle.name, one.name) for vehicle in fleet.vehicles for one in vehicle.sessions}
+    missing = tuple(name for name in plan.sessions if name not in found)
+    unlisted = tuple(sorted(name for name in found if name not in plan.sessions)) if plan.sessions else ()
+    return replace(fleet, missing=missing, unlisted=unlisted, manifests=plan.manifests)
+
+
+def _of_index(folder: Path, path: Path, finished: Mapping[str, str | UnreadResult], plan: Plan) -> FleetRecord:
     with closing(read_only(path)) as connection:
         connection.execute("BEGIN")  # one state of the tables for all that follows
         if not has_tables(connection):  # its writer is just beginning
-            return _of_results(folder, finished)
+            return _of_results(folder, finished, plan)
         require_version(connection, path)
-        if dict(known_results(connection)) == dict(finished):
+        if dict(known_results(connection)) == dict(finished) and has_places(connection, plan.sessions):
             return _loaded(connection)
         with closing(sqlite3.connect(":memory:", isolation_level=None)) as copy:
             copy.execute("PRAGMA foreign_keys = ON")
             connection.execute("COMMIT")
             connection.backup(copy)
-            places = {
-                (vehicle, session): place
-                for vehicle, session, place in copy.execute("SELECT vehicle, session, place FROM sessions")
-                if place is not None
-            }
-            unread = fill(copy, folder, finished, places)
+            set_places(copy, plan.sessions)
+            unread = fill(copy, folder, finished, plan.sessions)
             return replace(_loaded(copy), unread=unread)
 
 
-def _of_results(folder: Path, finished: Mapping[str, str | UnreadResult]) -> FleetRecord:
+def _of_results(folder: Path, finished: Mapping[str, str | UnreadResult], plan: Plan) -> FleetRecord:
     with closing(sqlite3.connect(":memory:", isolation_level=None)) as memory:
         create_tables(memory)
-        unread = fill(memory, folder, finished, {})
+        unread = fill(memory, folder, finished, plan.sessions)
         return replace(_loaded(memory), unread=unread)
 
 

@@ -26,7 +26,7 @@ _PATIENCE_S = 30.0
 _TABLES = """
 CREATE TABLE sessions (
     digest TEXT PRIMARY KEY, vehicle TEXT NOT NULL, session TEXT NOT NULL, place INTEGER,
-    position INTEGER, superseded INTEGER NOT NULL DEFAULT 0,
+    wanted INTEGER NOT NULL, position INTEGER, superseded INTEGER NOT NULL DEFAULT 0,
     status TEXT NOT NULL, reason TEXT NOT NULL, verdict TEXT, vehicle_type TEXT, radar_serial TEXT, camera_serial TEXT,
     recorded_ns INTEGER, sigma_deg REAL, sigma_cm REAL, aed_px REAL, pairs INTEGER NOT NULL, started TEXT,
     pose_problem TEXT NOT NULL, outcome TEXT NOT NULL

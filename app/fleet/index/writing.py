@@ -1,13 +1,12 @@
 """Write the index: by the process that drives the batch, one result at a time, or all of it again from the results."""
 
 import sqlite3
-from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from app.batch.manifest import ManifestRow
 from app.batch.outcome import Outcome
+from app.batch.plan import read_plans
 from app.fleet.index.filling import Places, fill, put, set_places
 from app.fleet.index.result_reading import finished_results
 from app.fleet.index.tables import create_tables, damaged, has_tables, index_path, require_version, writable
@@ -25,19 +24,18 @@ class FleetIndex:
     and that the next one continues.
     """
 
-    def __init__(self, folder: Path, rows: Sequence[ManifestRow] = ()) -> None:
+    def __init__(self, folder: Path) -> None:
         """Open or create the index.
 
         Args:
-            folder: holds the results.
-            rows: of the manifest, whose order counts for sessions without a time.
+            folder: holds the results, and what the manifests want.
 
         Raises:
             InputError: the index is of another version, or is damaged.
             OSError: it cannot be written.
         """
         self._folder = folder
-        self._places: Places = {(row.vehicle, row.session): place for place, row in enumerate(rows)}
+        self._places: Places = read_plans(folder).sessions
         folder.mkdir(parents=True, exist_ok=True)
         path = index_path(folder)
         try:
@@ -79,12 +77,11 @@ class FleetIndex:
             return fill(self._connection, self._folder, finished_results(self._folder), self._places)
 
 
-def rebuild_index(folder: Path, rows: Sequence[ManifestRow] = ()) -> tuple[UnreadResult, ...]:
+def rebuild_index(folder: Path) -> tuple[UnreadResult, ...]:
     """Write the index again from the results; readers find the old one or the new one.
 
     Args:
-        folder: holds the results.
-        rows: of the manifest, whose order counts for sessions without a time.
+        folder: holds the results, and what the manifests want.
 
     Returns:
         The results that cannot be read, and are not in the index.
@@ -96,7 +93,7 @@ def rebuild_index(folder: Path, rows: Sequence[ManifestRow] = ()) -> tuple[Unrea
     finished = finished_results(folder)
     if not finished:
         raise InputError(f"{folder}: no results in {folder / 'results'}; give the folder that cocalib batch wrote to")
-    places = {(row.vehicle, row.session): place for place, row in enumerate(rows)}
+    places = read_plans(folder).sessions
     path = index_path(folder)
     try:
         with whole_path(path) as unfinished:

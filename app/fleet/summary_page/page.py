@@ -12,6 +12,7 @@ from app.fleet.standing import VehicleStanding, standings_of
 from app.fleet.summary_page.tables import session_table, type_table, vehicle_table
 from app.report.html_file import html_file
 from app.report.markup import Child, Markup, tag
+from app.resources import version
 from app.view.wording import sentence
 from app.whole_file import write_whole
 
@@ -54,6 +55,7 @@ def _sections(fleet: FleetRecord, standings: Sequence[VehicleStanding], kinds: S
     return [
         _look(standings),
         _unread(fleet.unread),
+        _missing(fleet.missing),
         _section("Vehicles", vehicle_table(standings)),
         _section("Mounting scatter of the vehicle types", type_table(kinds), _left_out(kinds)) if kinds else None,
         _section("Sessions", session_table(fleet)),
@@ -87,7 +89,7 @@ def _look(standings: Sequence[VehicleStanding]) -> Markup:
         tag(
             "li",
             tag("a", one.vehicle.name, href=f"#vehicle-{index}"),
-            *(tag("p", sentence(reason)) for reason in one.needs),
+            *(tag("p", f"{reason}.") for reason in one.needs),
         )
         for index, one in enumerate(standings)
         if one.needs
@@ -107,6 +109,14 @@ def _unread(unread: Sequence[UnreadResult]) -> Markup | None:
     return _section("Results that cannot be read", tag("ul", *items, class_="look"))
 
 
+def _missing(missing: Sequence[tuple[str, str]]) -> Markup | None:
+    """Return the sessions of the manifests that have no result."""
+    if not missing:
+        return None
+    items = (tag("li", f"{vehicle} / {session}") for vehicle, session in missing)
+    return _section("Sessions without a result: run the batch again", tag("ul", *items, class_="look"))
+
+
 def _left_out(kinds: Sequence[Kind]) -> Markup | None:
     """Return what the scatters do not rest on."""
     rows = [(kind, one) for kind in kinds for one in kind.not_counted if kind.sigma is not None]
@@ -124,8 +134,16 @@ def _section(heading: str, *children: Child) -> Markup:
 
 
 def _what(fleet: FleetRecord) -> str:
+    """Say of when and of what it is: the same results give the same words."""
+    runs = [one.outcome.run.started for vehicle in fleet.vehicles for one in vehicle.sessions if one.outcome.run]
     count = len(fleet.superseded)
-    return f"{count} older result{'' if count == 1 else 's'} superseded by later runs" if count else ""
+    parts = (
+        ", ".join(fleet.manifests),
+        f"last run {max(runs)[:16].replace('T', ' ')} UTC" if runs else "",
+        f"cocalib {version()}",
+        f"{count} older result{'' if count == 1 else 's'} superseded" if count else "",
+    )
+    return "; ".join(part for part in parts if part)
 
 
 def _foot() -> str:

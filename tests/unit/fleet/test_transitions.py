@@ -88,7 +88,7 @@ def test_a_change_between_the_95_percent_and_the_1_in_10000_point_is_neither() -
     step = transition(session(), session("autumn", pose=turned(0.64)))
     assert CHI2_95 < step.squared < step.limit
     assert step.outcome == "cannot-tell"
-    assert "too little to name a remount" in step.words
+    assert "perhaps remounted, measure again" in step.words
 
 
 def test_the_wide_tails_of_few_pairs_are_no_remount() -> None:

@@ -7,7 +7,9 @@ from pathlib import Path
 import pytest
 
 from app.batch.driving import BatchProgress
+from app.batch.job import Job
 from app.batch.manifest import ManifestRow
+from app.batch.plan import write_plan
 from app.fleet.batch_index import indexed_batch
 from app.fleet.index import index_path, read_fleet
 from tests.unit.app.fleet.made_results import make_result
@@ -15,7 +17,8 @@ from tests.unit.app.fleet.made_results import make_result
 
 def test_each_result_is_in_the_index_at_once_and_the_page_comes_at_the_end(tmp_path: Path) -> None:
     rows = [ManifestRow("V0", "s0", ()), ManifestRow("V1", "s0", ())]
-    with indexed_batch(tmp_path, rows) as progress:
+    write_plan(tmp_path, Path("fleet.toml"), [Job(row, "unknown") for row in rows])
+    with indexed_batch(tmp_path) as progress:
         progress(BatchProgress(0, 2))
         for done, row in enumerate(rows, start=1):
             progress(BatchProgress(done, 2, make_result(tmp_path, row.vehicle, row.session)))

@@ -4,6 +4,7 @@ import shutil
 import sqlite3
 import subprocess
 import sys
+from collections.abc import Mapping
 from contextlib import closing
 from hashlib import sha256
 from pathlib import Path
@@ -11,8 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.batch.job import Job
 from app.batch.manifest import ManifestRow
 from app.batch.outcome import read_outcome
+from app.batch.plan import write_plan
 from app.batch.results_folder import OUTCOME_FILE, ResultsFolder
 from app.fleet.index import INDEX_VERSION, FleetIndex, index_path, read_fleet, rebuild_index
 from app.fleet.records import FleetRecord
@@ -48,19 +51,23 @@ def folder(results: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(results, tmp_path / "out"))
 
 
-def _rows() -> list[ManifestRow]:
-    names = [("V002", "s9"), ("V002", "s0"), ("V002", "s1"), ("V001", "s0"), ("V001", "s1"), ("V000", "s0")]
-    return [ManifestRow(vehicle, session, ()) for vehicle, session in names]
+def _write_plan(folder: Path, *names: tuple[str, str], digests: Mapping[tuple[str, str], str] | None = None) -> None:
+    """Write what a manifest wants; by default six sessions."""
+    rows = names or (("V002", "s9"), ("V002", "s0"), ("V002", "s1"), ("V001", "s0"), ("V001", "s1"), ("V000", "s0"))
+    jobs = [Job(ManifestRow(*name, ()), (digests or {}).get(name, "unknown")) for name in rows]
+    write_plan(folder, Path("fleet.toml"), jobs)
 
 
 @pytest.mark.parametrize("order", [1, -1])
 def test_an_index_written_along_equals_one_rebuilt_from_the_results(folder: Path, tmp_path: Path, order: int) -> None:
     other = tmp_path / "other"
-    with FleetIndex(other, _rows()) as index:
+    _write_plan(other)
+    _write_plan(folder)
+    with FleetIndex(other) as index:
         for place in sorted((folder / "results").iterdir())[::order]:
             shutil.copytree(place, other / "results" / place.name)
             index.add(read_outcome((place / OUTCOME_FILE).read_text()))
-    rebuild_index(folder, _rows())
+    rebuild_index(folder)
     assert _content(folder) == _content(other)
     assert _summary(read_fleet(folder)) == _summary(read_fleet(other))
 
@@ -94,11 +101,39 @@ def test_the_latest_run_of_a_session_counts_and_the_other_is_kept_as_superseded(
     assert [one.before.session for one in fleet.vehicles[1].transitions] == ["s0"]
 
 
+def test_the_result_counts_that_the_latest_batch_wanted_although_another_is_newer(folder: Path) -> None:
+    wanted = {("V001", "s0"): digest_of("V001", "s0")}
+    _write_plan(folder, ("V001", "s0"), digests=wanted)
+    for _ in range(2):
+        fleet = read_fleet(folder)
+        assert fleet.vehicles[1].sessions[0].outcome.digest == digest_of("V001", "s0")
+        assert [one.outcome.digest for one in fleet.superseded] == [digest_of("V001", "s0", 2)]
+        rebuild_index(folder)
+    _write_plan(folder, ("V001", "s0"), digests={("V001", "s0"): digest_of("V001", "s0", 2)})
+    assert [one.outcome.digest for one in read_fleet(folder).superseded] == [digest_of("V001", "s0")]
+    with FleetIndex(folder):
+        pass
+    assert [one.outcome.digest for one in read_fleet(folder).superseded] == [digest_of("V001", "s0")]
+
+
+def test_what_a_manifest_names_without_a_result_is_missing_and_the_other_way_round_unlisted(folder: Path) -> None:
+    assert read_fleet(folder).missing == read_fleet(folder).unlisted == ()
+    _write_plan(folder, ("V000", "s0"), ("V000", "s7"), ("new", "s0"))
+    (folder / "manifests" / "torn.toml.json").write_text("{")
+    fleet = read_fleet(folder)
+    assert fleet.missing == (("V000", "s7"), ("new", "s0"))
+    assert ("V001", "s0") in fleet.unlisted
+    assert ("V000", "s0") not in fleet.unlisted
+    assert fleet.manifests == ("fleet.toml",)
+
+
 def test_sessions_come_by_time_and_those_never_opened_after_the_one_before_them_in_the_manifest(folder: Path) -> None:
-    rebuild_index(folder, _rows())
+    _write_plan(folder)
+    rebuild_index(folder)
     assert [one.name for one in read_fleet(folder).vehicles[2].sessions] == ["s9", "s0", "s1"]
-    moved = [ManifestRow("V002", name, ()) for name in ("s0", "s9", "s1")]
-    with FleetIndex(folder, moved):
+    _write_plan(folder, ("V002", "s0"), ("V002", "s9"), ("V002", "s1"))
+    assert [one.name for one in read_fleet(folder).vehicles[2].sessions] == ["s0", "s9", "s1"]
+    with FleetIndex(folder):
         pass
     assert [one.name for one in read_fleet(folder).vehicles[2].sessions] == ["s0", "s9", "s1"]
     make_result(folder, "V002", "earlier", recorded_ns=FIRST_NS - DAY_NS)
