@@ -58,6 +58,7 @@ export function startExporting() {
   }
   build();
   dialog.addEventListener("keydown", trap);
+  dialog.addEventListener("cancel", () => /** @type {HTMLElement|null} */ (document.activeElement)?.blur()); // the next key is not for a field that is going
   dialog.addEventListener("click", (event) => {
     if (event.target === dialog) dialog.close();
   });

@@ -140,7 +140,7 @@ def test_the_preview_is_delivered_before_the_answer_and_the_next_one_starts_from
     assert isinstance(answer, Calibration)
     started_from: list[Calibration | None] = []
 
-    def steps(*_: object, previous: Calibration | None) -> Iterator[Calibration]:
+    def steps(*_: object, previous: Calibration | None, **__: object) -> Iterator[Calibration]:
         started_from.append(previous)
         yield replace(answer, checking=True)
         yield answer
