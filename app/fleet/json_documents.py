@@ -90,6 +90,7 @@ def prior_document(found: PriorOfType) -> dict[str, Any]:
         "sigma": dict(zip(_COORDINATES, prior_sigma(prior), strict=True)),
         "vehicles": list(prior.vehicles),
         "not_counted": _not_counted(found.not_counted),
+        "shared_tape": found.shared_tape or None,
     }
 
 
@@ -184,6 +185,7 @@ def _kind(kind: Kind) -> dict[str, Any]:
         "mountings": len(kind.scatter.mountings) if isinstance(kind.scatter, MountingScatter) else None,
         "sigma": None if kind.sigma is None else dict(zip(_COORDINATES, kind.sigma, strict=True)),
         "reason": kind.reason or None,
+        "shared_tape": kind.shared_tape or None,
         "not_counted": _not_counted(kind.not_counted),
     }
 

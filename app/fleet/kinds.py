@@ -73,6 +73,11 @@ class Kind:
         return _shown_sigma(self.scatter.scatter)
 
     @property
+    def shared_tape(self) -> str:
+        """What a measurement that several vehicles state means, without a full stop; "" if none does."""
+        return _tape_words(self.scatter)
+
+    @property
     def reason(self) -> str:
         """Why the scatter cannot be told, and what to do, without a full stop; "" if it can."""
         return f"{self.scatter.reason}; {self.scatter.hint}" if isinstance(self.scatter, Unsolvable) else ""
@@ -85,10 +90,12 @@ class PriorOfType:
     Attributes:
         prior: to write.
         not_counted: what was left out, and why.
+        shared_tape: what a measurement that several vehicles state means, without a full stop; "" if none does.
     """
 
     prior: FleetPrior
     not_counted: tuple[NotCounted, ...]
+    shared_tape: str = ""
 
 
 def kinds_of(fleet: FleetRecord) -> tuple[Kind, ...]:
@@ -120,7 +127,17 @@ def prior_of_type(fleet: FleetRecord, vehicle_type: str, without: Sequence[str] 
                 f"--without {name}: no vehicle of type {vehicle_type} has this name; there are {', '.join(names)}"
             )
     scatter, not_counted = _scatter(tuple(one for one in vehicles if one.name not in without), vehicle_type)
-    return scatter if isinstance(scatter, Unsolvable) else PriorOfType(fleet_prior_of(scatter), not_counted)
+    return (
+        scatter
+        if isinstance(scatter, Unsolvable)
+        else PriorOfType(fleet_prior_of(scatter), not_counted, _tape_words(scatter))
+    )
+
+
+def _tape_words(scatter: MountingScatter | Unsolvable) -> str:
+    if isinstance(scatter, Unsolvable) or scatter.shared_tape is None:
+        return ""
+    return scatter.shared_tape.words
 
 
 def prior_sigma(prior: FleetPrior) -> tuple[float, ...]:

@@ -1,7 +1,7 @@
 """How the mountings of a vehicle type scatter, estimated from their calibrations; those that are off are left out."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from calib_core.fleet.random_effects import RandomEffects, random_effects
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import Unsolvable
 
-__all__ = ["MIN_MOUNTINGS", "LeftOut", "MountingScatter", "mounting_scatter"]
+__all__ = ["MIN_MOUNTINGS", "LeftOut", "MountingScatter", "SharedTape", "mounting_scatter"]
 
 MIN_MOUNTINGS = 5
 """The fewest mountings that a scatter is estimated from: fewer do not show how differently it spreads along the axes."""
@@ -40,6 +40,31 @@ class LeftOut:
     reason: str
 
 
+@dataclass(frozen=True, slots=True)
+class SharedTape:
+    """A camera position that several vehicles state, to the last digit: one measurement that was copied.
+
+    Each calibration is drawn to it, so their agreement says nothing of how they are mounted: it counts as one measurement.
+
+    Attributes:
+        vehicles: how many state a position that another one states, too.
+        mountings: of how many mountings.
+        sigma_m: its standard deviation; the largest if there are several.
+    """
+
+    vehicles: int
+    mountings: int
+    sigma_m: float
+
+    @property
+    def words(self) -> str:
+        """What it means, without a full stop."""
+        return (
+            f"{self.vehicles} vehicles state a measured camera position that another one states, too: it counts as one "
+            f"measurement, so that ± {100.0 * self.sigma_m:.2g} cm are added to the scatter; measure each vehicle by itself"
+        )
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class MountingScatter:
     """The distribution of the mountings of one vehicle type.
@@ -51,6 +76,7 @@ class MountingScatter:
             [rad].
         mountings: those that were counted.
         left_out: those that were not.
+        shared_tape: what several vehicles' positions have in common; None if each was measured by itself.
     """
 
     vehicle_type: str
@@ -58,6 +84,7 @@ class MountingScatter:
     effects: RandomEffects
     mountings: tuple[Mounting, ...]
     left_out: tuple[LeftOut, ...] = ()
+    shared_tape: SharedTape | None = None
 
     @property
     def camera_from_radar(self) -> RigidTransform:
@@ -82,8 +109,10 @@ class MountingScatter:
             return _too_few(len(rest), 0)
         measured = [_measured(one, self.common) for one in rest]
         effects = random_effects(np.array([row[0] for row in measured]), np.array([row[1] for row in measured]))
+        shared = _shared_tape(rest)
+        effects = _widened(effects, shared)
         others = tuple(one for one in self.left_out if one.mounting.vehicle != vehicle)
-        return MountingScatter(self.vehicle_type, self.common, effects, rest, others)
+        return MountingScatter(self.vehicle_type, self.common, effects, rest, others, shared)
 
 
 def mounting_scatter(mountings: Sequence[Mounting], *, vehicle_type: str) -> MountingScatter | Unsolvable:
@@ -107,14 +136,37 @@ def mounting_scatter(mountings: Sequence[Mounting], *, vehicle_type: str) -> Mou
     kept = _agreeing(vectors, covariances, freedoms)
     if kept.sum() < MIN_MOUNTINGS:
         return _too_few(int(kept.sum()), int((~kept).sum()))
-    effects = random_effects(vectors[kept], covariances[kept])
+    counted = tuple(one for one, counts in zip(mountings, kept.tolist(), strict=True) if counts)
+    shared = _shared_tape(counted)
+    effects = _widened(random_effects(vectors[kept], covariances[kept]), shared)
     left_out = []
     for k in np.flatnonzero(~kept).tolist():
         away = deviation(effects, vectors[k], covariances[k], freedom=freedoms[k])
         reason = f"off its kind: {away.text}, beyond the 1-in-10,000 point of the other mountings"
         left_out.append(LeftOut(mountings[k], away, reason))
-    counted = tuple(one for one, counts in zip(mountings, kept.tolist(), strict=True) if counts)
-    return MountingScatter(vehicle_type, common, effects, counted, tuple(left_out))
+    return MountingScatter(vehicle_type, common, effects, counted, tuple(left_out), shared)
+
+
+def _shared_tape(mountings: Sequence[Mounting]) -> SharedTape | None:
+    """Return which measured camera positions several vehicles share."""
+    stated: dict[tuple[float, ...], set[str]] = {}
+    for one in mountings:
+        for measured in one.measured:
+            stated.setdefault(measured.position_m, set()).add(one.vehicle)
+    shared = {position for position, vehicles in stated.items() if len(vehicles) > 1}
+    rows = [one for one in mountings if any(measured.position_m in shared for measured in one.measured)]
+    if not rows:
+        return None
+    sigma_m = max(measured.sigma_m for one in rows for measured in one.measured if measured.position_m in shared)
+    return SharedTape(len({one.vehicle for one in rows}), len(rows), sigma_m)
+
+
+def _widened(effects: RandomEffects, shared: SharedTape | None) -> RandomEffects:
+    """Add the variance of a copied measurement to the scatter of the positions."""
+    if shared is None:
+        return effects
+    variances = np.repeat([shared.sigma_m**2, 0.0], 3)
+    return replace(effects, scatter=effects.scatter + np.diag(variances))
 
 
 def _too_few(count: int, left_out: int) -> Unsolvable:

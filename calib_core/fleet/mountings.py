@@ -10,6 +10,7 @@ from calib_core.arrays import Matrix66, frozen_array
 from calib_core.fleet.session_pose import SessionPose
 from calib_core.fleet.transitions import RelevantChange, Transition, transition
 from calib_core.geometry import RigidTransform
+from calib_core.options import CameraPositionPrior
 
 __all__ = ["Mounting", "mounting_of", "mountings_of", "transitions_of"]
 
@@ -29,6 +30,7 @@ class Mounting:
         freedom: degrees of freedom of the noise levels: the fewest of the sessions.
         radar_serial: of the radar; None if unknown.
         camera_serial: of the camera; None if unknown.
+        measured: the camera positions that its sessions were given as measured with a tape, each once.
     """
 
     vehicle: str
@@ -38,6 +40,7 @@ class Mounting:
     freedom: float
     radar_serial: str | None = None
     camera_serial: str | None = None
+    measured: tuple[CameraPositionPrior, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "covariance", frozen_array(self.covariance, (6, 6)))
@@ -102,6 +105,7 @@ def mounting_of(sessions: Sequence[SessionPose]) -> Mounting:
         freedom=min(one.freedom for one in sessions),
         radar_serial=sessions[-1].radar_serial,
         camera_serial=sessions[-1].camera_serial,
+        measured=tuple(dict.fromkeys(one.measured for one in sessions if one.measured is not None)),
     )
 
 

@@ -9,6 +9,7 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import TimeNs
+from calib_core.options import CameraPositionPrior
 from calib_core.results import Calibration
 from calib_core.stated_error import degrees_of_freedom
 from calib_core.systematic_errors import SystematicErrorResult
@@ -40,6 +41,7 @@ class SessionPose:
         camera: its intrinsics, for figures in the picture; None if unknown.
         reference_radar_m: (3,) the position in the radar frame where these are stated; None if unknown.
         angle_scales: what is known of the radar's azimuth and elevation scale.
+        measured: the camera position in the radar frame that was measured with a tape, and its standard deviation; None without.
         of_data_alone: the calibration was made with a fleet's prior, and this is the answer of its data without it.
 
     Raises:
@@ -58,6 +60,7 @@ class SessionPose:
     camera: Camera | None = None
     reference_radar_m: Vector3 | None = None
     angle_scales: tuple[SystematicErrorResult, ...] = ()
+    measured: CameraPositionPrior | None = None
     of_data_alone: bool = False
 
     def __post_init__(self) -> None:
@@ -141,6 +144,7 @@ def session_pose(
         camera=calibration.camera,
         reference_radar_m=np.median(places_m, axis=0) if places_m else None,
         angle_scales=tuple(one for one in calibration.systematic_errors if one.name in _SCALES and one.estimated),
+        measured=calibration.options.solving.camera_position,
         of_data_alone=calibration.fleet_prior is not None,
     )
 

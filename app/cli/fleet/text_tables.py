@@ -75,6 +75,8 @@ def kind_lines(kinds: Sequence[Kind]) -> Iterator[str]:
             f"type {kind.vehicle_type}, {count}: mountings scatter by {forward}, {left}, {up} cm (forward, left, up) "
             f"and {roll}, {pitch}, {yaw} deg (roll, pitch, yaw)"
         )
+        if kind.shared_tape:
+            yield f"  {kind.shared_tape}"
 
 
 def prior_lines(found: PriorOfType) -> Iterator[str]:
@@ -86,6 +88,8 @@ def prior_lines(found: PriorOfType) -> Iterator[str]:
     yield f"  camera at {forward}, {left}, {up} cm from the radar (forward, left, up)"
     yield f"  ± {', '.join(plain(one, 2) for one in sigma[:3])} cm (forward, left, up)"
     yield f"  ± {', '.join(plain(one, 2) for one in sigma[3:])} deg (roll, pitch, yaw)"
+    if found.shared_tape:
+        yield f"  {found.shared_tape}"
     for one in found.not_counted:
         yield f"  not counted: {one.vehicle} ({one.session}): {one.reason}"
 

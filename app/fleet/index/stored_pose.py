@@ -13,6 +13,7 @@ from calib_core.fleet import SessionPose, Transition
 from calib_core.geometry import RigidTransform
 from calib_core.interchange import camera_content, read_camera
 from calib_core.measurements import TimeNs
+from calib_core.options import CameraPositionPrior
 from calib_core.systematic_errors import SystematicErrorResult
 
 __all__ = ["insert_pose", "insert_transition", "pose_of", "transition_of"]
@@ -27,7 +28,7 @@ def insert_pose(connection: sqlite3.Connection, digest: str, pose: SessionPose) 
     """Write the pose of a result."""
     place = pose.reference_radar_m
     connection.execute(
-        "INSERT INTO poses VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        "INSERT INTO poses VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
         (
             digest,
             _text(pose.camera_from_radar.rotation),
@@ -39,6 +40,7 @@ def insert_pose(connection: sqlite3.Connection, digest: str, pose: SessionPose) 
             None if pose.camera is None else camera_content(pose.camera, "json"),
             msgspec.json.encode(pose.angle_scales).decode(),
             pose.of_data_alone,
+            None if pose.measured is None else msgspec.json.encode(pose.measured).decode(),
         ),
     )
 
@@ -64,6 +66,7 @@ def pose_of(row: sqlite3.Row, outcome: Outcome) -> SessionPose:
         reference_radar_m=None if place is None else _array(place),
         angle_scales=msgspec.json.decode(row["angle_scales"], type=tuple[SystematicErrorResult, ...]),
         of_data_alone=bool(row["of_data_alone"]),
+        measured=None if row["measured"] is None else msgspec.json.decode(row["measured"], type=CameraPositionPrior),
     )
 
 

@@ -119,14 +119,15 @@ def _missing(missing: Sequence[tuple[str, str]]) -> Markup | None:
 
 def _left_out(kinds: Sequence[Kind]) -> Markup | None:
     """Return what the scatters do not rest on."""
+    taped = [tag("li", f"{kind.vehicle_type}: {kind.shared_tape}.") for kind in kinds if kind.shared_tape]
     rows = [(kind, one) for kind in kinds for one in kind.not_counted if kind.sigma is not None]
-    if not rows:
+    if not (rows or taped):
         return None
     items = (
         tag("li", f"{one.vehicle} ({one.session}) is not counted in {kind.vehicle_type}: {one.reason}.")
         for kind, one in rows
     )
-    return tag("ul", *items, class_="look note")
+    return tag("ul", *taped, *items, class_="look note")
 
 
 def _section(heading: str, *children: Child) -> Markup:

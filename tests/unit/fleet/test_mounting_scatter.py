@@ -1,5 +1,7 @@
 """The scatter of a vehicle type: what is estimated, what is left out, and when it is refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -26,6 +28,7 @@ from calib_core.fleet.mountings import Mounting
 from calib_core.fleet.session_pose import CHI2_95
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import Unsolvable
+from calib_core.options import CameraPositionPrior
 
 NARROW, FINE, COARSE = Spread(0.005, 0.3), Accuracy(0.001, 0.05), Accuracy(0.07, 0.6)
 WRONG = pose_from_coordinates(np.array([0.3, -0.1, 0.0, 0.0, 0.1, 0.3]), NOMINAL)
@@ -173,3 +176,28 @@ def test_without_enough_others_there_is_no_test() -> None:
     fewer = five.without("v00")
     assert isinstance(fewer, MountingScatter)
     assert isinstance(fewer.without("v01"), Unsolvable)
+
+
+def test_a_measured_position_that_several_vehicles_state_is_one_measurement() -> None:
+    rng = np.random.default_rng(12)
+    copied, own = CameraPositionPrior((0.0, 0.05, 0.12), 0.01), (0.0, 0.05, 0.13)
+    rows, inside, narrow = 20, 0, 0
+    for _ in range(40):
+        common = np.concatenate([rng.normal(0.0, 0.01, 3), np.zeros(3)])  # what the copied measurement is off by
+        drawn = [pose_from_coordinates(common + rng.normal(0.0, [5e-4] * 3 + [5e-3] * 3), NOMINAL) for _ in range(rows)]
+        sessions = [simulated_session(pose, Accuracy(0.01, 0.05), rng, vehicle=f"v{k}") for k, pose in enumerate(drawn)]
+        stated = [replace(one, measured=copied) for one in sessions]
+        scatter = scattered([mounting_of([one]) for one in stated])
+        assert scatter.shared_tape is not None
+        assert (scatter.shared_tape.vehicles, scatter.shared_tape.sigma_m) == (rows, 0.01)
+        narrow += np.sqrt(np.diag(scatter.scatter))[:3].min() < 0.01
+        following = simulated_mounting(NARROW, rng)
+        away = following.error_from(fleet_prior_of(scatter).camera_from_radar)
+        inside += away @ np.linalg.solve(fleet_prior_of(scatter).covariance, away) <= CHI2_95
+    assert narrow == 0
+    assert inside >= 36
+    each = [
+        replace(one, measured=CameraPositionPrior((own[0], own[1], own[2] + 1e-4 * k), 0.01))
+        for k, one in enumerate(sessions)
+    ]
+    assert scattered([mounting_of([one]) for one in each]).shared_tape is None
