@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from playwright.sync_api import Route, expect
+from playwright.sync_api import Page, Route, expect
 
 from tests.browser.driving import Driver
 
@@ -14,11 +14,18 @@ DIALOG = "#export-dialog"
 GONE = "The server is not responding. Your clicks are safe"
 
 
+def _await_status(user: Page, address: str, status: int) -> None:
+    """Wait until requests are answered with a status; 0 if not at all: the browser takes a new route a moment later."""
+    answered = "([address, status]) => fetch(address).then((answer) => answer.status, () => 0).then((found) => found === status)"
+    user.wait_for_function(answered, arg=[address, status])
+
+
 def test_the_export_says_that_the_server_is_gone_and_tries_again(page: Driver, truth: Any) -> None:
     page.click_sample(truth, 4)
     user = page.page
     save = user.locator(f"{DIALOG} .first")
     user.route(re.compile(r"/api/"), lambda route: route.abort("connectionrefused"))
+    _await_status(user, "api/preview/none", 0)
     user.keyboard.press("e")
     expect(user.locator(f"{DIALOG} .text")).to_contain_text(GONE)
     for control in (save, user.get_by_role("button", name="Copy"), user.get_by_label("File name")):
@@ -50,6 +57,7 @@ def test_an_answer_that_is_an_error_is_shown_in_words(page: Driver, truth: Any) 
         route.fulfill(status=500, body="")
 
     user.route(re.compile(r"/api/preview/"), fail)
+    _await_status(user, "api/preview/none", 500)
     user.keyboard.press("e")
     expect(user.locator(f"{DIALOG} .text")).to_contain_text("The server answered with error 500")
     expect(user.get_by_role("button", name="Try again")).to_be_visible()

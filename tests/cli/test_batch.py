@@ -1,5 +1,6 @@
 """`cocalib batch` as a person with many vehicles runs it."""
 
+import json
 import shutil
 from pathlib import Path
 
@@ -97,3 +98,50 @@ def test_flags_that_contradict_each_other_are_refused(
     (tmp_path / "fleet.toml").write_text('[[session]]\nvehicle = "a"\nrecording = "absent.bag"\n', encoding="utf-8")
     assert run(["batch", str(tmp_path / "fleet.toml"), *flags]) == 2
     assert fault in capsys.readouterr().err
+
+
+def test_what_the_last_batch_wanted_counts_and_what_it_lacks_is_named(
+    fleet: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    manifest, out, clicks = fleet / "fleet.toml", fleet / "out", fleet / "van" / "clicked" / "clicks.json"
+    row = 'recording = ["van/clicked/radar.bag", "van/clicked/camera.bag"]\nclicks = "van/clicked/clicks.json"\n'
+    manifest.write_text(f'[[session]]\nvehicle = "van"\nsession = "1"\n{row}', encoding="utf-8")
+    whole = clicks.read_text()
+    few = json.loads(whole)
+    few["clicks"] = few["clicks"][:7]
+    for text in (whole, json.dumps(few), whole):
+        clicks.write_text(text)
+        run(["batch", str(manifest), "--out", str(out)])
+    capsys.readouterr()
+    run(["fleet", "history", "van", str(out), "--json"])
+    (session,) = json.loads(capsys.readouterr().out)["sessions"]
+    assert session["pairs"] == 20
+    manifest.write_text(
+        manifest.read_text().replace('"van"', '"VAN"', 1) + '[[session]]\nvehicle = "b"\nrecording = "broken.bag"\n'
+    )
+    run(["batch", str(manifest), "--out", str(out), "--shard", "1/2"])
+    run(["batch", str(manifest), "--out", str(out), "--shard", "2/2"])
+    (broken,) = (path.parent for path in out.rglob("outcome.json") if '"vehicle": "b"' in path.read_text())
+    shutil.rmtree(broken)
+    capsys.readouterr()
+    assert run(["fleet", "status", str(out)]) == 3
+    told = capsys.readouterr().out
+    assert "1 session in the manifest without a result: run the batch again: b/broken" in told
+    assert "1 session with a result in no manifest any more" in told
+    assert "van/1" in told
+
+
+def test_a_pose_that_nobody_must_use_is_weak_and_not_exported(fleet: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    manifest, clicks = fleet / "fleet.toml", fleet / "van" / "clicked" / "clicks.json"
+    mirrored = json.loads(clicks.read_text())
+    for click in mirrored["clicks"]:
+        click["pixel_px"][0] = 959.0 - click["pixel_px"][0]
+    clicks.write_text(json.dumps(mirrored))
+    manifest.write_text(
+        '[[session]]\nvehicle = "van"\nsession = "1"\nexports = ["tf2"]\n'
+        'recording = ["van/clicked/radar.bag", "van/clicked/camera.bag"]\nclicks = "van/clicked/clicks.json"\n'
+    )
+    code = run(["batch", str(manifest), "--out", str(fleet / "out")])
+    printed = capsys.readouterr().out
+    assert code in (3, 11), printed
+    assert not list((fleet / "out").rglob("static_transform*"))

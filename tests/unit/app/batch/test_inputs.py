@@ -1,5 +1,6 @@
 """Everything that opening a recording reads is an input: its files, and those beside and above it."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -7,6 +8,9 @@ from pathlib import Path
 import pytest
 
 from app.batch.inputs import InputPath
+from app.batch.job import jobs_of
+from app.batch.manifest import ManifestRow
+from app.batch.running import run_job
 
 _OPENED = """
 import os, sys
@@ -75,3 +79,15 @@ def test_what_opening_reads_is_an_input(layout, beside: int, tmp_path: Path) -> 
     inputs = {str(file.path) for file in InputPath("recording", given).files()}
     assert opened <= inputs
     assert len({path for path in opened if not Path(path).is_relative_to(given)}) >= beside
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no named pipes")
+def test_a_pipe_is_never_read_and_its_job_says_so(tmp_path: Path) -> None:
+    pipe = tmp_path / "drive.bag"
+    os.mkfifo(pipe)
+    with pytest.raises(OSError, match="is a named pipe"):
+        InputPath("recording", pipe).files()
+    (job,) = jobs_of([ManifestRow("van", "1", (pipe,))], tmp_path / "out")
+    outcome = run_job(job, tmp_path / "out")
+    assert outcome.status == "failed"
+    assert "named pipe" in outcome.reason

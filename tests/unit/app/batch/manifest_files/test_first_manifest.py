@@ -86,3 +86,10 @@ def test_a_folder_without_recordings_is_refused(tmp_path: Path) -> None:
         first_manifest(tmp_path, tmp_path / "x.toml")
     with pytest.raises(InputError, match="no such folder"):
         first_manifest(tmp_path / "absent", tmp_path / "x.toml")
+
+
+def test_links_are_followed_once_and_every_name_is_one_that_a_manifest_takes(tmp_path: Path) -> None:
+    lay(tmp_path, "van/spring/drive.mcap", "a\\b/autumn/drive.mcap")
+    (tmp_path / "van" / "loop").symlink_to(tmp_path, target_is_directory=True)
+    (tmp_path / "again").symlink_to(tmp_path / "van" / "spring", target_is_directory=True)
+    assert set(read_back(tmp_path)) == {("van", "spring"), ("a_b", "autumn")}

@@ -1,5 +1,7 @@
 """Manifests as a person writes them: TOML and CSV say the same, and every mistake is named with its place."""
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -182,3 +184,52 @@ def test_the_size_of_the_reflector_and_resized_pictures(tmp_path: Path) -> None:
     toml.write_text('[[session]]\nvehicle = "a"\nrecording = "a.bag"\nreflector_m = 24\n')
     with pytest.raises(InputError, match="reflector_m"):
         read_manifest(toml)
+
+
+@pytest.mark.parametrize("delimiter", [";", "\t"])
+def test_what_excel_writes_is_read(tmp_path: Path, delimiter: str) -> None:
+    head, *rows = CSV.splitlines()
+    cells = [delimiter.join(f'"{cell}"' if ";" in cell else cell for cell in row.split(",")) for row in rows]
+    text = "\ufeff" + "\r\n".join([head.replace(",", delimiter).replace("vehicle,", "Vehicle,"), *cells, ""])
+    text = text.replace("vehicle" + delimiter, "Vehicle" + delimiter, 1)
+    path = tmp_path / "fleet.csv"
+    path.write_bytes(text.encode())
+    (tmp_path / "plain").mkdir()
+    assert read_manifest(path).rows == tuple(
+        replace(
+            row,
+            recording=tuple(tmp_path / one.relative_to(tmp_path / "plain") for one in row.recording),
+            clicks=row.clicks and tmp_path / row.clicks.relative_to(tmp_path / "plain"),
+        )
+        for row in rows_of(CSV, tmp_path / "plain", "fleet.csv")
+    )
+
+
+def test_what_excel_writes_in_another_encoding_is_named_with_what_to_do(tmp_path: Path) -> None:
+    path = tmp_path / "fleet.csv"
+    path.write_bytes("vehicle,recording\nK\xe4fer,a.bag\n".encode("latin-1"))
+    with pytest.raises(InputError, match="save it as UTF-8"):
+        read_manifest(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('[session]\nvehicle = "a"\nrecording = "a.bag"\n', r"write \[\[session\]\], with two brackets"),
+        (
+            '[[session]]\nvehicle = 17\nrecording = "a.bag"\n',
+            r'vehicle: 17 is no text; write it in quotes: vehicle = "17"',
+        ),
+        (
+            '[[session]]\nvehicle = "a"\nsession = 2026-09-21\nrecording = "a.bag"\n',
+            r'session: 2026-09-21 is no text; write it in quotes: session = "2026-09-21"',
+        ),
+        ('[[session]]\nvehicle = "a "\nrecording = "a.bag"\n', r"leave out the spaces around it"),
+        (
+            '[[session]]\nvehicle = "a"\nrecording = "a.bag"\n[[session]]\nvehicle = "b"\nrecording = "x/../a.bag"\n',
+            r"session 1 \(a / a\) and session 2 \(b / a\) have the same recording",
+        ),
+    ],
+)
+def test_slips_of_the_pen_are_told_with_what_to_write(tmp_path: Path, text: str, words: str) -> None:
+    assert re.search(words, fault_of(text, tmp_path))
