@@ -139,3 +139,6 @@ def test_a_comparison_names_the_data_that_it_rests_on(fleet: FleetRecord) -> Non
     assert (document["a"]["of_data_alone"], document["b"]["of_data_alone"]) == (False, True)
     with pytest.raises(InputError, match="only the fleet's prior closes what its placements leave open"):
         compare_sessions(fleet, "V000", "open")
+    with pytest.raises(InputError, match=r"V001/s1: the data of s1 contradict its pose"):
+        compare_sessions(fleet, "V000", "V001/s1")
+    assert compare_sessions(fleet, "V000", "V001").b.session == "s0"
