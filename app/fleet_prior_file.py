@@ -38,6 +38,21 @@ class FleetPriorFile:
         digest = hashlib.sha256(data).hexdigest()
         return cls(read_fleet_prior(text, str(path)), InputFile(name_text(path.name), len(data), digest))
 
+    def require_of_type(self, vehicle_type: str | None) -> None:
+        """Refuse a prior of another type of vehicle.
+
+        Args:
+            vehicle_type: of the vehicle; None if nobody said.
+
+        Raises:
+            InputError: it is of another.
+        """
+        if vehicle_type is not None and vehicle_type != self.prior.vehicle_type:
+            raise InputError(
+                f"{self.file.name}: the prior is of vehicles of type {self.prior.vehicle_type}, and this vehicle is of type "
+                f"{vehicle_type}; give the prior of its own type, or none"
+            )
+
     def require_not_of(self, vehicle: str | None) -> None:
         """Refuse a prior that rests on the vehicle itself: what is known of it would count twice.
 

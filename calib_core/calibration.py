@@ -36,8 +36,9 @@ from calib_core.options import CalibrationOptions
 from calib_core.pair_checks import checked_pairs
 from calib_core.plausibility import implausible_input
 from calib_core.radar import cartesian_from_polar
-from calib_core.results import Calibration
+from calib_core.results import Calibration, DataWarning
 from calib_core.unsolved import DEGENERATE
+from calib_core.verdict import verdict_on
 
 __all__ = ["calibrate", "calibrate_pairs", "calibration_steps", "preview_pairs", "require_default", "solve_again"]
 
@@ -121,7 +122,7 @@ def calibration_steps(
         elif outcome.checking:
             yield outcome
         else:
-            yield replace(outcome, warnings=(*outcome.warnings, *clocks(outcome, scans)))
+            yield _with_clock_warnings(outcome, clocks(outcome, scans))
 
 
 def calibrate_pairs(
@@ -255,7 +256,16 @@ def solve_again(
     if isinstance(outcome, Unsolvable):
         return replace(outcome, unpaired=calibration.unpaired)
     clock_warnings = [warning for warning in calibration.warnings if warning.code in CLOCK_CODES]
-    return replace(outcome, unpaired=calibration.unpaired, warnings=(*outcome.warnings, *clock_warnings))
+    return _with_clock_warnings(replace(outcome, unpaired=calibration.unpaired), clock_warnings)
+
+
+def _with_clock_warnings(calibration: Calibration, warnings: Sequence[DataWarning]) -> Calibration:
+    """Add the warnings about clocks, which are no better for the data alone than for an answer with a fleet's prior."""
+    warned = replace(calibration, warnings=(*calibration.warnings, *warnings))
+    fleet = calibration.fleet
+    if not warnings or fleet is None or fleet.data_alone is None or fleet.data_alone.verdict not in ("good", "usable"):
+        return warned
+    return replace(warned, fleet=replace(fleet, data_alone=replace(fleet.data_alone, verdict="weak")))
 
 
 def _with_noise(pair: Pair, options: CalibrationOptions) -> Pair:
@@ -351,7 +361,7 @@ def _with_fleet(
     """
     if isinstance(alone, Unsolvable) and alone.code != DEGENERATE:
         return alone
-    fleet = fleet_answer(prior, alone)
+    fleet = fleet_answer(prior, alone, verdict_on(alone).level)
     if not fleet.used and isinstance(alone, Calibration):
         return replace(alone, fleet=fleet, warnings=(*fleet_warnings(fleet, alone), *alone.warnings))
     informed = replace(task, fleet=fleet)

@@ -43,11 +43,13 @@ class DataAlone:
         camera_from_radar: the pose.
         covariance: (6, 6) of its error, as `Calibration.covariance`.
         covariance_quantile: the factor on covariance that gives the 95 % ellipsoid.
+        verdict: the level of the verdict on it, such as "usable"; "" if nobody judged it.
     """
 
     camera_from_radar: RigidTransform
     covariance: Matrix66
     covariance_quantile: float
+    verdict: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "covariance", frozen_array(self.covariance, (6, 6)))

@@ -69,6 +69,12 @@ class Outcome(Struct, frozen=True, forbid_unknown_fields=True):
     """How many were used."""
     fleet_prior: PriorUse | None = None
     """What a fleet's prior did: the pose rests on it, on it alone in part, or not, as the data contradict it; None without."""
+    alone_verdict: str | None = None
+    """On the answer of the data without the fleet's prior; None without a prior, or if they give no pose."""
+    alone_sigma_deg: float | None = None
+    """Largest standard deviation of the rotation of that answer about an axis [deg]."""
+    alone_sigma_cm: float | None = None
+    """Largest standard deviation of its position along an axis [cm]."""
     warnings: tuple[str, ...] = ()
     """Codes of the calibration's warnings, in order."""
     steps: dict[str, StepState] = field(default_factory=dict)

@@ -187,6 +187,7 @@ class Solve:
 
         fleet = FleetPriorFile.read(self.fleet_prior)
         require_default(self.options, fleet.prior)
+        fleet.require_of_type(self.vehicle.vehicle_type)
         fleet.require_not_of(self.vehicle.vehicle)
         return fleet
 

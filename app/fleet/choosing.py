@@ -33,6 +33,15 @@ class ComparedSessions:
     outcome: _Outcome
     words: str
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Which of the two was solved with a fleet's prior, to whose mean its stated pose is drawn."""
+        return tuple(
+            f"{one.vehicle}/{one.session} was solved with a fleet's prior; the answer of its data alone is compared"
+            for one in (self.a, self.b)
+            if one.of_data_alone
+        )
+
 
 def vehicle_named(fleet: FleetRecord, name: str) -> VehicleRecord:
     """Return the vehicle with a name.
@@ -96,7 +105,7 @@ def _chosen(fleet: FleetRecord, name: str) -> tuple[VehicleRecord, SessionRecord
     found = []
     for vehicle in fleet.vehicles:
         if vehicle.name == name:
-            found.append((vehicle, vehicle.calibrated or vehicle.last))
+            found.append((vehicle, _last_compared(vehicle)))
         elif name.startswith(f"{vehicle.name}/"):
             rest = name.removeprefix(f"{vehicle.name}/")
             found += [(vehicle, record) for record in vehicle.sessions if record.name == rest]
@@ -112,14 +121,25 @@ def _chosen(fleet: FleetRecord, name: str) -> tuple[VehicleRecord, SessionRecord
     return known_vehicle, known_vehicle.last
 
 
+def _last_compared(vehicle: VehicleRecord) -> SessionRecord:
+    """Return the last session with a pose to compare; without one, the last that may say why."""
+    compared = (one for one in reversed(vehicle.sessions) if one.compared_pose is not None)
+    return next(compared, vehicle.calibrated or vehicle.last)
+
+
 def _pose(record: SessionRecord, name: str) -> SessionPose:
     """Return the pose of a session.
 
     Raises:
-        InputError: it has none.
+        InputError: it has none, or its own data contradict it.
     """
-    if record.pose is None:
-        outcome = record.outcome
+    outcome, pose = record.outcome, record.compared_pose
+    if pose is None and record.pose is not None:
+        raise InputError(
+            f"{name}: the data of {record.name} contradict its pose, so that it says nothing of the mounting; "
+            "choose another session"
+        )
+    if pose is None:
         why = record.pose_problem or f"{outcome.status}{f': {outcome.reason}' if outcome.reason else ''}"
         raise InputError(f"{name}: {record.name} has no pose to compare ({why}); choose another session")
-    return record.pose
+    return pose

@@ -8,7 +8,7 @@ from app.fleet.choosing import ComparedSessions
 from app.fleet.kinds import Kind, NotCounted, PriorOfType, prior_sigma
 from app.fleet.records import FleetRecord, SessionRecord, UnreadResult, VehicleRecord
 from app.fleet.standing import VehicleStanding, age_days
-from calib_core.fleet import MountingScatter, OffKind, Transition
+from calib_core.fleet import MountingScatter, OffKind, SessionPose, Transition
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 
 __all__ = [
@@ -71,8 +71,8 @@ def comparison_document(compared: ComparedSessions) -> dict[str, Any]:
     """Return how two sessions differ."""
     return {
         "schema": COMPARISON_SCHEMA,
-        "a": {"vehicle": compared.a.vehicle, "session": compared.a.session},
-        "b": {"vehicle": compared.b.vehicle, "session": compared.b.session},
+        "a": _compared(compared.a),
+        "b": _compared(compared.b),
         **_change(compared.change),
         "outcome": compared.outcome,
         "words": compared.words,
@@ -92,6 +92,10 @@ def prior_document(found: PriorOfType) -> dict[str, Any]:
         "not_counted": _not_counted(found.not_counted),
         "shared_tape": found.shared_tape or None,
     }
+
+
+def _compared(pose: SessionPose) -> dict[str, Any]:
+    return {"vehicle": pose.vehicle, "session": pose.session, "of_data_alone": pose.of_data_alone}
 
 
 def _standing(standing: VehicleStanding, now_ns: int) -> dict[str, Any]:
@@ -126,9 +130,13 @@ def _session(record: SessionRecord) -> dict[str, Any]:
         "aed_px": outcome.aed_px,
         "pairs": outcome.pairs,
         "fleet_prior": outcome.fleet_prior,
+        "alone_verdict": outcome.alone_verdict,
+        "alone_sigma_deg": outcome.alone_sigma_deg,
+        "alone_sigma_cm": outcome.alone_sigma_cm,
         "report": record.report,
         "camera_from_radar": None if record.pose is None else _transform(record.pose.camera_from_radar),
         "covariance": None if record.pose is None else record.pose.covariance.tolist(),
+        "pose_of_data_alone": None if record.pose is None else record.pose.of_data_alone,
         "pose_problem": record.pose_problem or None,
     }
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from app.batch.outcome import Outcome
 from app.fleet.records import FleetRecord, SessionRecord, VehicleRecord
 from calib_core.arrays import Matrix66
 from calib_core.errors import InputError
@@ -23,8 +24,6 @@ from calib_core.fleet import (
 from calib_core.fleet.mounting_coordinates import coordinate_jacobian
 from calib_core.fleet_prior import FleetPrior
 from calib_core.measurements import TimeNs, Unsolvable
-from calib_core.stated_error import pose_error
-from calib_core.verdict import USABLE_CM, USABLE_DEG
 
 __all__ = ["Kind", "NotCounted", "PriorOfType", "kinds_of", "prior_of_type", "prior_sigma"]
 
@@ -193,8 +192,8 @@ def _scatter(
 def _why_not(record: SessionRecord) -> str | None:
     """Return why a session says nothing about the type's mounting; None if it does."""
     outcome = record.outcome
-    if record.pose is not None and record.pose.of_data_alone:
-        return _why_data_do_not_count(record.pose)
+    if record.pose is not None and outcome.fleet_prior is not None:
+        return _why_data_do_not_count(outcome)
     if record.pose is not None:
         return None if outcome.verdict in _COUNTED else f"the verdict is {outcome.verdict or 'missing'}"
     if record.pose_problem:
@@ -202,12 +201,20 @@ def _why_not(record: SessionRecord) -> str | None:
     return f"{outcome.status}: {outcome.reason}" if outcome.reason else outcome.status
 
 
-def _why_data_do_not_count(pose: SessionPose) -> str | None:
-    """Return why the data of a session that was solved with a prior say nothing; None if they are good enough alone."""
-    rotation_deg, position_cm = pose_error(pose.camera_from_radar, pose.covariance, pose.freedom)
-    if rotation_deg <= USABLE_DEG and position_cm <= USABLE_CM:
+def _why_data_do_not_count(outcome: Outcome) -> str | None:
+    """Return why a session that was solved with a prior says nothing; None if its data would be good enough without it.
+
+    The verdict on the answer says nothing of that: a prior makes it better, and the warning of an unusual mounting makes it
+    weak. To leave those out would make the scatter smaller than it is; the scatter has its own test.
+    """
+    if outcome.alone_verdict in _COUNTED:
         return None
-    return f"solved with a fleet's prior; its data alone are uncertain to {rotation_deg:g} deg, {position_cm:g} cm"
+    figures = ""
+    if outcome.alone_sigma_deg is not None and outcome.alone_sigma_cm is not None:
+        figures = f" (sigma {outcome.alone_sigma_deg:.2g} deg, {outcome.alone_sigma_cm:.2g} cm)"
+    return (
+        f"solved with a fleet's prior; the verdict on its data alone is {outcome.alone_verdict or 'missing'}{figures}"
+    )
 
 
 def _present_mounting(vehicle: VehicleRecord) -> Mounting | None:

@@ -5,10 +5,14 @@ from dataclasses import dataclass
 from app.batch.outcome import Outcome
 from calib_core.fleet import SessionPose, Transition
 
-__all__ = ["NO_POSE_OF", "FleetRecord", "SessionRecord", "UnreadResult", "VehicleRecord"]
+__all__ = ["FleetRecord", "SessionRecord", "UnreadResult", "VehicleRecord", "is_compared"]
 
-NO_POSE_OF = frozenset({"contradictory", "nothing"})
-"""Verdicts whose pose is not compared with any other: its own data contradict it."""
+_NO_POSE_OF = frozenset({"contradictory", "nothing"})
+
+
+def is_compared(outcome: Outcome) -> bool:
+    """Return whether the pose of a result is compared with others: not if its own data contradict it."""
+    return _NO_POSE_OF.isdisjoint({outcome.verdict, outcome.alone_verdict})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,9 +44,14 @@ class SessionRecord:
         )
 
     @property
+    def is_drawn(self) -> bool:
+        """Whether its pose is drawn to the mean of a fleet, so that figures of its data alone tell more of it."""
+        return self.outcome.fleet_prior in ("used", "untested")
+
+    @property
     def compared_pose(self) -> SessionPose | None:
         """The pose to compare with others; None without one, or if its own data contradict it."""
-        return None if self.outcome.verdict in NO_POSE_OF else self.pose
+        return self.pose if is_compared(self.outcome) else None
 
     @property
     def report(self) -> str | None:

@@ -21,16 +21,17 @@ _DECIDES = 2.0
 """The prior decides if the data alone state an error this many times as large, of rotation or position."""
 
 
-def fleet_answer(prior: FleetPrior, alone: Calibration | Unsolvable) -> FleetAnswer:
+def fleet_answer(prior: FleetPrior, alone: Calibration | Unsolvable, verdict: str = "") -> FleetAnswer:
     """Test the answer of the data alone against the fleet's prior.
 
     Args:
         prior: of the vehicle's type, without this vehicle.
         alone: the answer without the prior, or why there is none.
+        verdict: the level of the verdict on it.
     """
     if isinstance(alone, Unsolvable) or not np.isfinite(alone.covariance).all():
         return FleetAnswer(prior, used=True, data_alone=None)
-    data = DataAlone(alone.camera_from_radar, alone.covariance, alone.covariance_quantile)
+    data = DataAlone(alone.camera_from_radar, alone.covariance, alone.covariance_quantile, verdict)
     away = prior_test(prior, data)
     return FleetAnswer(prior, not away.is_beyond, data, away.squared, away.limit)
 

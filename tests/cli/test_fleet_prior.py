@@ -71,6 +71,17 @@ def test_other_methods_refuse_it_before_anything_is_solved(
     assert f"a fleet's prior is used by the default method only, and the method is {method}" in answer.err
 
 
+def test_the_prior_of_another_type_or_of_the_vehicle_itself_is_refused(
+    cocalib: Cocalib, made: Callable[..., Path], clicks_file: Path, prior_file: Callable[..., Path]
+) -> None:
+    solve = ("solve", made(), "--clicks", clicks_file, "--fleet-prior", prior_file())
+    answer = cocalib(*solve, "--vehicle", "T1", "--vehicle-type", "truck")
+    assert answer.code == 2
+    assert "the prior is of vehicles of type van, and this vehicle is of type truck" in answer.err
+    answer = cocalib(*solve, "--vehicle", "V3", "--vehicle-type", "van")
+    assert (answer.code, "the prior rests on V3 itself" in answer.err) == (2, True)
+
+
 def test_another_file_in_its_place_is_named(cocalib: Cocalib, pairs_file: Callable[..., Path], tmp_path: Path) -> None:
     answer = cocalib("solve", "--pairs", pairs_file(), "--fleet-prior", tmp_path / "none.json")
     assert (answer.code, "none.json: no such file" in answer.err) == (2, True)

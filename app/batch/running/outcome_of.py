@@ -9,8 +9,9 @@ from app.batch.running.attempting import Failure
 from app.batch.running.solving import SolvedSession
 from app.batch.running.steps import SessionResult
 from app.resources import version
-from calib_core.fleet_prior import FleetAnswer
+from calib_core.arrays import Matrix66
 from calib_core.measurements import Unsolvable
+from calib_core.results import Calibration
 from calib_core.verdict import verdict_on
 
 __all__ = ["failed", "outcome_of"]
@@ -43,30 +44,43 @@ def failed(job: Job, failure: Failure) -> Outcome:
 def _of_calibration(job: Job, solved: SolvedSession) -> Outcome:
     calibration, verdict = solved.calibration, verdict_on(solved.calibration)
     assert solved.found.file is not None
-    sigma = np.sqrt(np.diag(calibration.covariance))
-    known = bool(np.isfinite(sigma).all())
+    alone = calibration.fleet.data_alone if calibration.fleet is not None else None
+    sigma_deg, sigma_cm = _largest_sigma(calibration.covariance)
+    alone_deg, alone_cm = (None, None) if alone is None else _largest_sigma(alone.covariance)
     doubtful = solved.is_weak or verdict.level not in ("good", "usable")
     return replace(
         _outcome(job, "weak" if doubtful else "solved"),
         reason=verdict.reason if doubtful else "",
         hint=verdict.action if doubtful else "",
         verdict=verdict.level,
-        sigma_deg=float(np.degrees(sigma[3:].max())) if known else None,
-        sigma_cm=float(100.0 * sigma[:3].max()) if known else None,
+        sigma_deg=sigma_deg,
+        sigma_cm=sigma_cm,
         aed_px=calibration.metrics.aed_px,
         pairs=sum(pair.inlier for pair in calibration.pairs),
-        fleet_prior=_prior_use(calibration.fleet),
+        fleet_prior=_prior_use(calibration),
+        alone_verdict=(alone.verdict or None) if alone is not None else None,
+        alone_sigma_deg=alone_deg,
+        alone_sigma_cm=alone_cm,
         warnings=tuple(warning.code for warning in solved.found.file.calibration.warnings),
         notes=solved.notes,
     )
 
 
-def _prior_use(fleet: FleetAnswer | None) -> PriorUse | None:
+def _largest_sigma(covariance: Matrix66) -> tuple[float | None, float | None]:
+    """Return the largest standard deviation of the rotation [deg] and of the position [cm]; None if they are not known."""
+    sigma = np.sqrt(np.diag(covariance))
+    if not np.isfinite(sigma).all():
+        return None, None
+    return float(np.degrees(sigma[3:].max())), float(100.0 * sigma[:3].max())
+
+
+def _prior_use(calibration: Calibration) -> PriorUse | None:
+    fleet = calibration.fleet
     if fleet is None:
         return None
     if not fleet.used:
         return "contradicted"
-    return "untested" if fleet.data_alone is None else "used"
+    return "untested" if any(one.code == "fleet-prior-untested" for one in calibration.warnings) else "used"
 
 
 def _outcome(job: Job, status: Status) -> Outcome:

@@ -88,6 +88,7 @@ def _fleet_prior(row: ManifestRow) -> FleetPriorFile | None:
         return None
     found = FleetPriorFile.read(row.fleet_prior)
     require_default(row.options, found.prior)
+    found.require_of_type(row.vehicle_type)
     found.require_not_of(row.vehicle)
     return found
 

@@ -152,7 +152,7 @@ class Fleet:
         if self.json:
             _print_json(comparison_document(compared))
         else:
-            print(compared.words)
+            print("\n".join([compared.words, *compared.notes]))
         return _LOOK if compared.outcome == "differs" else 0
 
     def _prior(self, fleet: "FleetRecord", vehicle_type: str) -> int:

@@ -101,6 +101,8 @@ def history_lines(vehicle: VehicleRecord, superseded: Sequence[SessionRecord]) -
     for record in vehicle.sessions:
         for reason in filter(None, (record.outcome.reason, record.pose_problem)):
             yield f"  {record.name}: {reason}"
+        if record.pose is not None and record.pose.of_data_alone:
+            yield f"  {record.name}: solved with a fleet's prior; changes are measured with the answer of its data alone"
     yield from (f"  {change.words}" for change in vehicle.transitions)
     if superseded:
         yield f"  superseded by later runs: {', '.join(f'{one.name} ({one.outcome.digest})' for one in superseded)}"
@@ -115,8 +117,7 @@ def _standing_cells(standing: VehicleStanding, now_ns: int) -> tuple[str, ...]:
         outcome.session,
         _DASH if age is None else f"{age:.0f}",
         _verdict(standing.last),
-        _number(outcome.sigma_deg),
-        _number(outcome.sigma_cm),
+        *_sigma_cells(standing.last),
         *_change_cells(change)[:2],
         _since(change),
         kind,
@@ -129,8 +130,7 @@ def _session_cells(record: SessionRecord, change: Transition | None) -> tuple[st
         outcome.session,
         recorded_text(outcome.recorded_ns),
         _verdict(record),
-        _number(outcome.sigma_deg),
-        _number(outcome.sigma_cm),
+        *_sigma_cells(record),
         *_change_cells(change),
         _since(change),
     )
@@ -140,6 +140,15 @@ def _verdict(record: SessionRecord) -> str:
     """Return verdict or status, and what a fleet's prior did."""
     verdict = record.outcome.verdict or record.outcome.status
     return f"{verdict} ({record.prior_words})" if record.prior_words else verdict
+
+
+def _sigma_cells(record: SessionRecord) -> tuple[str, str]:
+    """Return the standard deviations of the answer [deg], [cm]; with a fleet's prior, those of the data alone, too."""
+    outcome = record.outcome
+    deg, cm = _number(outcome.sigma_deg), _number(outcome.sigma_cm)
+    if not record.is_drawn:
+        return deg, cm
+    return f"{deg} (alone {_number(outcome.alone_sigma_deg)})", f"{cm} (alone {_number(outcome.alone_sigma_cm)})"
 
 
 def _change_cells(change: Transition | None) -> tuple[str, str, str]:

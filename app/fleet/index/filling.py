@@ -10,7 +10,7 @@ from app.batch.outcome import Outcome, outcome_text, read_outcome
 from app.batch.plan import Wanted
 from app.fleet.index.result_reading import outcome_of, with_pose
 from app.fleet.index.stored_pose import insert_pose, insert_transition, pose_of
-from app.fleet.records import NO_POSE_OF, SessionRecord, UnreadResult
+from app.fleet.records import SessionRecord, UnreadResult, is_compared
 from app.fleet.session_order import current_and_superseded, in_order
 from calib_core.fleet import transition
 
@@ -167,7 +167,7 @@ def _write_transitions(connection: sqlite3.Connection, ordered: Sequence[Outcome
     poses = []
     for outcome in ordered:
         row = cursor.execute("SELECT * FROM poses WHERE digest = ?", (outcome.digest,)).fetchone()
-        if row is not None and outcome.verdict not in NO_POSE_OF:
+        if row is not None and is_compared(outcome):
             poses.append((outcome.digest, pose_of(row, outcome)))
     for (before, earlier), (after, later) in pairwise(poses):
         insert_transition(connection, before, after, transition(earlier, later))

@@ -10,7 +10,16 @@ from app.report.sections.answer import LEVEL_SIGNS
 from app.view.number_format import plain, with_sigma
 from calib_core.fleet import Transition
 
-__all__ = ["Column", "change_cells", "number_cell", "report_cell", "sortable", "verdict_cell", "words_cell"]
+__all__ = [
+    "Column",
+    "change_cells",
+    "number_cell",
+    "report_cell",
+    "sigma_cells",
+    "sortable",
+    "verdict_cell",
+    "words_cell",
+]
 
 _DASH = "–"
 _LONG = 20
@@ -77,6 +86,16 @@ def number_cell(value: float | None, shown: str | None = None) -> Markup:
     if value is None or not isfinite(value):
         return tag("td", _DASH, class_="number", data_key="")
     return tag("td", shown or plain(value, 2), class_="number", data_key=repr(float(value)))
+
+
+def sigma_cells(record: SessionRecord) -> list[Markup]:
+    """Return the standard deviations of the answer [deg], [cm]; with a fleet's prior, those of the data alone, too."""
+    outcome = record.outcome
+    cells = []
+    for answer, alone in ((outcome.sigma_deg, outcome.alone_sigma_deg), (outcome.sigma_cm, outcome.alone_sigma_cm)):
+        beside = f" (alone {_DASH if alone is None else plain(alone, 2)})" if record.is_drawn else ""
+        cells.append(number_cell(answer, None if answer is None else f"{plain(answer, 2)}{beside}"))
+    return cells
 
 
 def verdict_cell(record: SessionRecord) -> Markup:

@@ -407,12 +407,13 @@ class VehicleDocument(Struct, frozen=True, omit_defaults=True):
     camera_serial: Label | None = None
 
 
-class DataAloneDocument(Struct, frozen=True):
-    """The answer of the pairs without the fleet's prior."""
+class DataAloneDocument(Struct, frozen=True, omit_defaults=True):
+    """The answer of the pairs without the fleet's prior, with the level of the verdict on it."""
 
     camera_from_radar: TransformDocument
     covariance: Matrix66
     covariance_quantile: float | None = None
+    verdict: VerdictLevel | None = None
 
 
 class FleetAnswerDocument(Struct, frozen=True, omit_defaults=True):

@@ -1,5 +1,7 @@
 """What a fleet's prior did to a calibration, in a calibration-1 file."""
 
+from typing import get_args
+
 import numpy as np
 
 from calib_core.fleet_prior import DataAlone, FleetAnswer, FleetPrior
@@ -7,6 +9,7 @@ from calib_core.interchange.own.documents import DataAloneDocument, FleetAnswerD
 from calib_core.interchange.own.numbers import finite_or_none, nan_if_none, nested
 from calib_core.interchange.own.stated_covariance import stated_covariance
 from calib_core.interchange.own.transform_document import transform_document, transform_of
+from calib_core.verdict import VerdictLevel
 
 __all__ = ["fleet_answer_document", "fleet_answer_of"]
 
@@ -59,6 +62,7 @@ def _alone_document(alone: DataAlone) -> DataAloneDocument:
         camera_from_radar=transform_document(alone.camera_from_radar),
         covariance=nested(alone.covariance + 0.0),
         covariance_quantile=finite_or_none(alone.covariance_quantile),
+        verdict=_level(alone.verdict),
     )
 
 
@@ -68,4 +72,9 @@ def _alone_of(document: DataAloneDocument, *, source: str) -> DataAlone:
         transform_of(document.camera_from_radar, source=source, place=f"{place}.camera_from_radar"),
         stated_covariance(document.covariance, source=source, place=f"{place}.covariance"),
         nan_if_none(document.covariance_quantile),
+        document.verdict or "",
     )
+
+
+def _level(verdict: str) -> VerdictLevel | None:
+    return next((level for level in get_args(VerdictLevel) if level == verdict), None)

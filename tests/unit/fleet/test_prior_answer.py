@@ -14,7 +14,7 @@ from calib_core.fleet_prior import FleetPrior
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import Pair, Unsolvable
 from calib_core.options import CalibrationOptions
-from calib_core.results import Calibration
+from calib_core.results import Calibration, DataWarning
 from calib_core.synthetic.pairs.simulated import NoiseName, SimulatedPairs, simulate_pairs
 from calib_core.verdict import verdict_on
 
@@ -57,6 +57,7 @@ def test_few_placements_of_a_vehicle_of_its_kind_give_a_pose_to_use_and_the_data
     assert found.fleet.data_alone is not None
     assert same_pose(found.fleet.data_alone.camera_from_radar, data.camera_from_radar)
     assert np.array_equal(found.fleet.data_alone.covariance, data.covariance)
+    assert found.fleet.data_alone.verdict == "weak"
     assert np.diag(found.covariance).max() < 0.1 * np.diag(data.covariance).max()
     assert "fleet-prior-decides" in codes(found)
     assert (verdict_on(data).level, verdict_on(found).level) == ("weak", "usable")
@@ -166,3 +167,16 @@ def test_data_that_are_open_by_more_than_9_deg_do_not_test_a_prior() -> None:
     open_data = replace(found.fleet.data_alone, covariance=9.0 * found.fleet.data_alone.covariance)
     fleet = replace(found.fleet, data_alone=open_data)
     assert [warning.code for warning in fleet_warnings(fleet, found)] == ["fleet-prior-untested"]
+
+
+def test_the_verdict_on_the_data_alone_is_theirs_and_clocks_that_disagree_make_it_weak() -> None:
+    found = solved(20, prior(20))
+    assert found.fleet is not None
+    assert found.fleet.data_alone is not None
+    assert found.fleet.data_alone.verdict == verdict_on(alone(20)).level == "usable"
+    late = DataWarning("clock-bias-suspected", "the radar's stamps are late", "correct them")
+    again = solve_again(replace(found, warnings=(*found.warnings, late)))
+    assert isinstance(again, Calibration)
+    assert again.fleet is not None
+    assert again.fleet.data_alone is not None
+    assert again.fleet.data_alone.verdict == "weak"

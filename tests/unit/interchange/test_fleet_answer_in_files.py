@@ -48,6 +48,7 @@ def test_reading_and_writing_it_again_gives_the_same_bytes_and_the_same_numbers(
     assert np.array_equal(wrote.prior.covariance, read.prior.covariance)
     assert np.array_equal(wrote.data_alone.covariance, read.data_alone.covariance)
     assert wrote.data_alone.covariance_quantile == read.data_alone.covariance_quantile
+    assert wrote.data_alone.verdict == read.data_alone.verdict == "usable"
     for one in ("vehicle_type", "vehicles", "left_out", "widened", "freedom"):
         assert getattr(wrote.prior, one) == getattr(read.prior, one)
     assert (wrote.used, wrote.squared, wrote.limit) == (read.used, read.squared, read.limit)
@@ -84,6 +85,7 @@ def test_without_a_prior_there_is_no_such_key() -> None:
         ),
         ("fleet_prior.vehicles", [], r"fleet_prior\.vehicles"),
         ("fleet_prior.widened", 0.5, r"fleet_prior\.widened"),
+        ("fleet_prior.data_alone.verdict", "fine", r"fleet_prior\.data_alone\.verdict"),
     ],
 )
 def test_what_no_distribution_has_is_refused_with_its_place(path: str, value: object, words: str) -> None:

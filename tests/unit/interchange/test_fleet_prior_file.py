@@ -60,6 +60,14 @@ def _of_nobody(document: dict[str, Any]) -> None:
     document["vehicles"] = []
 
 
+def _narrowed(document: dict[str, Any]) -> None:
+    document["widened"] = 0.5
+
+
+def _without_freedom(document: dict[str, Any]) -> None:
+    document["freedom"] = 0.0
+
+
 def _misspelt(document: dict[str, Any]) -> None:
     document["leftout"] = []
 
@@ -73,6 +81,8 @@ def _misspelt(document: dict[str, Any]) -> None:
         (_mirrored, r"fleet\.json: camera_from_radar\.rotation"),
         (_twice, r"fleet\.json: .*'van 1' occurs twice"),
         (_of_nobody, r"fleet\.json: vehicles"),
+        (_narrowed, r"fleet\.json: widened"),
+        (_without_freedom, r"fleet\.json: freedom"),
         (_misspelt, r"fleet\.json: .*leftout"),
     ],
 )

@@ -91,6 +91,15 @@ def _with_calibration(outcome: Outcome, folder: Path, error: np.ndarray, fleet: 
     moved = dataclasses.replace(base, camera_from_radar=base.camera_from_radar.perturbed(error), fleet=fleet)
     (folder / "calibration.json").write_text(calibration_text(moved), encoding="utf-8")
     sigma = np.sqrt(np.diag(base.covariance))
+    alone = fleet.data_alone if fleet is not None else None
+    if alone is not None:
+        of_data = np.sqrt(np.diag(alone.covariance))
+        outcome = msgspec.structs.replace(
+            outcome,
+            alone_verdict=alone.verdict,
+            alone_sigma_deg=float(np.degrees(of_data[3:].max())),
+            alone_sigma_cm=float(100.0 * of_data[:3].max()),
+        )
     return msgspec.structs.replace(
         outcome,
         verdict=verdict_on(base).level,

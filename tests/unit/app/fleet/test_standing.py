@@ -91,6 +91,10 @@ def test_two_vehicles_differ_without_a_remount(fleet: FleetRecord) -> None:
     assert "instead of" not in compared.words
 
 
+def test_a_vehicle_is_compared_by_its_last_session_that_can_be(fleet: FleetRecord) -> None:
+    assert compare_sessions(fleet, "V000", "V004").b.session == "s1"
+
+
 def test_names_with_slashes_are_found(fleet: FleetRecord) -> None:
     assert compare_sessions(fleet, "truck/1", "truck/1/s/0").a.session == "s/0"
 
@@ -101,6 +105,7 @@ def test_names_with_slashes_are_found(fleet: FleetRecord) -> None:
         ("V000", "truck/1", "is of type van and truck/1 of type truck"),
         ("V000/s7", "V001", "no session 'V000/s7'; V000 has s0, s1"),
         ("V0O0", "V001", "did you mean V00"),
+        ("V004/s2", "V001", "V004/s2: the data of s2 contradict its pose"),
         ("V003/s2", "V001", r"V003/s2: s2 has no pose to compare \(failed: no such file\)"),
     ],
 )

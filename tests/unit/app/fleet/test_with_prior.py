@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 
 from app.cli.fleet.text_tables import history_lines, status_lines
+from app.fleet.choosing import compare_sessions
 from app.fleet.index import read_fleet, rebuild_index
-from app.fleet.json_documents import history_document
+from app.fleet.json_documents import comparison_document, history_document
 from app.fleet.kinds import kinds_of
 from app.fleet.records import FleetRecord
 from app.fleet.standing import standings_of
 from app.fleet.summary_page import write_summary
 from app.fleet.table_export import csv_bytes
+from calib_core.errors import InputError
 from calib_core.fleet_prior import DataAlone, FleetAnswer, FleetPrior
 from tests.unit.app.fleet.made_results import DAY_NS, FIRST_NS, calibration, make_fleet, make_result
 
@@ -25,10 +27,13 @@ def prior() -> FleetPrior:
     return FleetPrior("van", calibration().camera_from_radar, np.diag([0.01] * 6) ** 2, ("V000", "V001"))
 
 
-def answer(*, widened: float = 1.0, error: np.ndarray = TURNED) -> FleetAnswer:
+def answer(
+    *, widened: float = 1.0, error: np.ndarray = TURNED, verdict: str = "usable", used: bool = True
+) -> FleetAnswer:
     base = calibration()
     pose = base.camera_from_radar.perturbed(error)
-    return FleetAnswer(prior(), True, DataAlone(pose, widened * base.covariance, base.covariance_quantile), 9.0, 30.0)
+    data = DataAlone(pose, widened * base.covariance, base.covariance_quantile, verdict)
+    return FleetAnswer(prior(), used, data, 9.0, 30.0)
 
 
 @pytest.fixture(scope="module")
@@ -37,11 +42,18 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     make_fleet(made, 6, 1)
     common = {"vehicle_type": "van", "recorded_ns": FIRST_NS + DAY_NS}
     make_result(made, "V000", "s1", fleet=answer(), fleet_prior="used", **common)
-    make_result(made, "few", "s0", fleet=answer(widened=400.0, error=0.1 * TURNED), fleet_prior="used", **common)
+    uncertain = answer(widened=400.0, error=0.1 * TURNED, verdict="weak")
+    make_result(made, "few", "s0", fleet=uncertain, fleet_prior="used", **common)
+    doubted = answer(error=0.1 * TURNED, verdict="weak")
+    make_result(made, "doubted", "s0", fleet=doubted, fleet_prior="used", **common)
+    make_result(made, "V001", "s1", fleet=answer(verdict="contradictory"), fleet_prior="used", **common)
+    unusual = {"verdict": "weak", "warnings": ("far-from-its-kind",)}
+    make_result(made, "far", "s0", fleet=answer(error=0.2 * TURNED), fleet_prior="used", **common, **unusual)
     make_result(made, "open", "s0", fleet=FleetAnswer(prior(), True, None), fleet_prior="untested", **common)
     odd = {"verdict": "weak", "reason": "the data contradict it", "hint": "check the radar"}
-    refused = FleetAnswer(prior(), False, answer().data_alone, 90.0, 30.0)
-    make_result(made, "odd", "s0", fleet=refused, fleet_prior="contradicted", **common, **odd)
+    refused = answer(used=False)
+    make_result(made, "odd", "s0", error=TURNED, fleet=refused, fleet_prior="contradicted", **common, **odd)
+    make_result(made, "sound", "s0", fleet=answer(used=False), fleet_prior="contradicted", **common, **odd)
     return made
 
 
@@ -57,13 +69,31 @@ def test_a_remount_is_seen_although_the_stated_pose_is_drawn_to_the_fleet(fleet:
     assert change.rotation_deg == pytest.approx(np.degrees(0.1), abs=1.5)
 
 
-def test_data_that_say_little_alone_do_not_count_and_those_without_a_pose_have_none(fleet: FleetRecord) -> None:
+def reasons(fleet: FleetRecord) -> dict[str, str]:
     (kind,) = kinds_of(fleet)
-    reasons = {one.vehicle: one.reason for one in kind.not_counted}
-    assert reasons["few"].startswith("solved with a fleet's prior; its data alone are uncertain to ")
-    assert "only the fleet's prior closes what its placements leave open" in reasons["open"]
-    assert reasons["odd"] == "the verdict is weak"
-    assert "V000" not in reasons or "off its kind" in reasons["V000"]
+    return {one.vehicle: one.reason for one in kind.not_counted}
+
+
+def test_data_count_in_the_scatter_if_they_would_be_usable_without_the_prior(fleet: FleetRecord) -> None:
+    found = reasons(fleet)
+    for name in ("few", "doubted"):  # however small the error that the data state
+        assert found[name].startswith("solved with a fleet's prior; the verdict on its data alone is weak (sigma ")
+    assert "only the fleet's prior closes what its placements leave open" in found["open"]
+    assert "V000" not in found or "off its kind" in found["V000"]
+
+
+def test_a_mounting_far_from_the_prior_is_judged_by_the_scatter_and_not_left_out_for_it(fleet: FleetRecord) -> None:
+    found = reasons(fleet)
+    assert "far" not in found
+    assert "sound" not in found
+    assert found["odd"].startswith("off its kind: ")
+
+
+def test_data_that_contradict_themselves_are_not_compared(fleet: FleetRecord) -> None:
+    (vehicle,) = (one for one in fleet.vehicles if one.name == "V001")
+    assert [one.name for one in vehicle.sessions] == ["s0", "s1"]
+    assert vehicle.transitions == ()
+    assert "the verdict on its data alone is contradictory" in reasons(fleet)["V001"]
 
 
 def test_an_index_brings_the_same_back(folder: Path, fleet: FleetRecord) -> None:
@@ -74,6 +104,7 @@ def test_an_index_brings_the_same_back(folder: Path, fleet: FleetRecord) -> None
             a.pose is None or a.pose.of_data_alone for a in other.sessions
         ]
         assert [a.outcome for a in one.sessions] == [a.outcome for a in other.sessions]
+        assert [a.words for a in one.transitions] == [b.words for b in other.transitions]
 
 
 def test_every_place_says_it(folder: Path, fleet: FleetRecord) -> None:
@@ -82,10 +113,32 @@ def test_every_place_says_it(folder: Path, fleet: FleetRecord) -> None:
     for name, words in (("V000", "(with prior)"), ("open", "(by prior)"), ("odd", "(off prior)")):
         (line,) = (one for one in told.splitlines() if one.startswith(f"{name} "))
         assert words in line
+        assert (" (alone " in line) == (name != "odd")
     assert "odd: s0 contradicts the fleet's prior, which was not used: the data contradict it; check the radar" in told
     vehicle = next(one for one in fleet.vehicles if one.name == "V000")
-    assert "(with prior)" in "\n".join(history_lines(vehicle, ()))
-    assert [one["fleet_prior"] for one in history_document(vehicle, ())["sessions"]] == [None, "used"]
-    rows = list(csv.DictReader(io.StringIO(csv_bytes(fleet).decode())))
-    assert {row["vehicle"]: row["fleet_prior"] for row in rows if row["session"] == "s0"}["odd"] == "contradicted"
-    assert "(with prior)" in write_summary(folder, fleet).read_text()
+    history = "\n".join(history_lines(vehicle, ()))
+    assert "(with prior)" in history
+    assert "  s1: solved with a fleet's prior; changes are measured with the answer of its data alone" in history
+    before, after = history_document(vehicle, ())["sessions"]
+    assert (before["fleet_prior"], before["alone_sigma_deg"], before["pose_of_data_alone"]) == (None, None, False)
+    assert (after["fleet_prior"], after["alone_verdict"], after["pose_of_data_alone"]) == ("used", "usable", True)
+    assert after["alone_sigma_deg"] == pytest.approx(after["sigma_deg"])
+    rows = {row["vehicle"]: row for row in csv.DictReader(io.StringIO(csv_bytes(fleet).decode()))}
+    assert (rows["odd"]["fleet_prior"], rows["odd"]["pose_of_data_alone"]) == ("contradicted", "False")
+    assert (rows["few"]["alone_verdict"], rows["few"]["pose_of_data_alone"]) == ("weak", "True")
+    assert float(rows["few"]["alone_sigma_cm"]) == pytest.approx(20.0 * float(rows["few"]["sigma_cm"]))
+    page = write_summary(folder, fleet).read_text()
+    assert "(with prior)" in page
+    assert " (alone " in page
+
+
+def test_a_comparison_names_the_data_that_it_rests_on(fleet: FleetRecord) -> None:
+    compared = compare_sessions(fleet, "V000/s0", "V000/s1")
+    assert compared.notes == ("V000/s1 was solved with a fleet's prior; the answer of its data alone is compared",)
+    document = comparison_document(compared)
+    assert (document["a"]["of_data_alone"], document["b"]["of_data_alone"]) == (False, True)
+    with pytest.raises(InputError, match="only the fleet's prior closes what its placements leave open"):
+        compare_sessions(fleet, "V000", "open")
+    with pytest.raises(InputError, match=r"V001/s1: the data of s1 contradict its pose"):
+        compare_sessions(fleet, "V000", "V001/s1")
+    assert compare_sessions(fleet, "V000", "V001").b.session == "s0"

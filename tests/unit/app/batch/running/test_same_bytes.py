@@ -133,7 +133,12 @@ def test_the_prior_of_a_fleet(commands: Commands, tmp_path: Path) -> None:
     row = ManifestRow("van", "1", BAGS, **SENSORS, clicks=few, fleet_prior=given)
     outcome, files = done(row, tmp_path / "results")
     assert files["calibration.json"] == commands.solve("--clicks", few, "--fleet-prior", given)
-    assert json.loads(files["calibration.json"])["fleet_prior"]["used"] is True
+    written = json.loads(files["calibration.json"])["fleet_prior"]
+    assert written["used"] is True
+    assert (outcome.fleet_prior, outcome.alone_verdict) == ("used", written["data_alone"]["verdict"])
+    assert outcome.alone_sigma_deg == pytest.approx(
+        np.degrees(np.sqrt(np.diag(written["data_alone"]["covariance"])[3:].max()))
+    )
     assert b'id="fleet-prior"' in files["report.html"]
     (job,), (without,) = jobs_of([row], tmp_path), jobs_of([replace(row, fleet_prior=None)], tmp_path)
     assert job.digest != without.digest
@@ -142,6 +147,8 @@ def test_the_prior_of_a_fleet(commands: Commands, tmp_path: Path) -> None:
     outcome, _ = done(row, tmp_path / "results")
     assert outcome.status == "failed"
     assert "long.json: the prior rests on van itself" in outcome.reason
+    outcome, _ = done(replace(row, vehicle_type="short"), tmp_path / "results")
+    assert "long.json: the prior is of vehicles of type long, and this vehicle is of type short" in outcome.reason
     outcome, _ = done(replace(row, options=CalibrationOptions(method="paper")), tmp_path / "results")
     assert "a fleet's prior is used by the default method only" in outcome.reason
 
