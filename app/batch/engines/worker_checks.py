@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 __all__ = ["check_workers", "dask_trouble", "version_trouble"]
 
-_RESTART_S = 30
+_RESTART_S = 90
 """How long workers that were killed may take to start again on a busy machine."""
 
 
