@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 import tyro
 
 from app.cli.flags import Switch, called
+from app.loopback import is_loopback
 from app.web.port.address import require_address, require_one_address, require_token
-from app.web.port.guard import is_loopback
 from app.web.port.link import Link, ServerOptions
 
 __all__ = ["ServingFlags"]

@@ -1,8 +1,8 @@
 """Which schedulers may be used: Dask's messages are pickles, so only this machine or TLS is trusted."""
 
-import ipaddress
 from urllib.parse import urlsplit
 
+from app.loopback import is_loopback
 from calib_core.errors import InputError
 
 __all__ = ["checked_address"]
@@ -27,19 +27,10 @@ def checked_address(address: str) -> str:
             f"--scheduler {address}: not an address of a Dask scheduler; "
             "write tcp://127.0.0.1:8786 for one on this machine, or tls://HOST:8786"
         )
-    if scheme == "tcp" and not _is_loopback(host):
+    if scheme == "tcp" and not is_loopback(host):
         raise InputError(
             f"--scheduler {address}: another machine without TLS is refused, because whoever can reach an open Dask port "
             "can run code on every machine of the cluster; start the scheduler and its workers with certificates and write "
             f"tls://{host}:{port}, or start the batch with --shard on each machine"
         )
     return address
-
-
-def _is_loopback(host: str) -> bool:
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False

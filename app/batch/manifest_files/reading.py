@@ -13,8 +13,8 @@ import msgspec
 from app.batch.manifest import Manifest, ManifestRow
 from app.batch.manifest_files.documents import ManifestDocument, SessionDocument
 from app.option_changes import options_from_tree
+from app.text_files import read_text
 from calib_core.errors import CalibrationError, InputError
-from calib_core.input_files import file_text, read_input
 from calib_core.interchange import format_named
 from calib_core.interchange.syntax.strict_json import checked
 from calib_core.interchange.vehicle_note import require_label, require_name
@@ -60,16 +60,13 @@ def read_manifest(path: Path) -> Manifest:
 
 
 def _text(path: Path) -> str:
-    try:
-        return file_text(read_input(path, max_bytes=_MOST_BYTES, is_what="a manifest"))
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file; cocalib batch {path} --init FOLDER writes one") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from error
-    except UnicodeDecodeError as error:
-        raise InputError(
-            f"{path}: not a text file (byte {error.start} is not UTF-8); save it as UTF-8 (Excel: CSV UTF-8)"
-        ) from error
+    return read_text(
+        path,
+        is_what="a manifest",
+        max_bytes=_MOST_BYTES,
+        if_missing=f"cocalib batch {path} --init FOLDER writes one",
+        if_no_text="save it as UTF-8 (Excel: CSV UTF-8)",
+    )
 
 
 def _toml(text: str, path: Path) -> tuple[list[str], dict[str, Any]]:

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 from typing import Literal
 from urllib.parse import parse_qs
 
+from app.loopback import is_loopback
 from app.web.port.admissions import Admissions
 
-__all__ = ["Admitted", "Allowed", "Guard", "Refused", "Request", "Verdict", "host_name", "is_address", "is_loopback"]
+__all__ = ["Admitted", "Allowed", "Guard", "Refused", "Request", "Verdict", "host_name", "is_address"]
 
 _HOST = re.compile(r"(\[[^\]]*\]|[^:\[\]]*)(?::[0-9]*)?")
 _LOOPBACK_NAMES = ("127.0.0.1", "localhost", "[::1]")
@@ -77,16 +78,6 @@ class Refused:
 
 
 Verdict = Allowed | Admitted | Refused
-
-
-def is_loopback(host: str) -> bool:
-    """Return whether a bind address can only be reached from this machine."""
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
 
 
 class Guard:

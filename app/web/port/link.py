@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import TextIO
 from urllib.parse import quote
 
+from app.loopback import is_loopback
 from app.web.port.address import listening_at
 from app.web.port.admissions import Admissions
-from app.web.port.guard import Guard, is_address, is_loopback
+from app.web.port.guard import Guard, is_address
 from app.web.port.hand_over import HandOver
 from app.web.port.unix_socket import forwarding_command, listening_socket, remove_socket
 

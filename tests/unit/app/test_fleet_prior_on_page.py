@@ -2,7 +2,6 @@
 
 import asyncio
 import threading
-from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -17,27 +16,14 @@ from app.solving import calibration_text, solve_clicks
 from app.view import view
 from app.web.port.routes import Routes
 from calib_core.fleet_prior import FleetPrior
-from calib_core.interchange import read_clicks
 from calib_core.interchange.own.fleet_prior_json import write_fleet_prior
 from calib_core.measurements import ReflectorClick, Unsolvable
 from calib_core.options import CalibrationOptions
-from calib_core.recordings import Recording, open_recording
+from calib_core.recordings import Recording
 from calib_core.results import Calibration
 
 DEFAULTS = CalibrationOptions()
 SCATTER = np.diag([5e-3] * 3 + [np.deg2rad(0.3)] * 3) ** 2
-
-
-@pytest.fixture(scope="module")
-def recording(project_root: Path) -> Iterator[Recording]:
-    sample = project_root / "sample_data" / "rooftop"
-    with open_recording([sample / "camera.bag", sample / "radar.bag"]) as opened:
-        yield opened
-
-
-@pytest.fixture(scope="module")
-def clicks(project_root: Path) -> tuple[ReflectorClick, ...]:
-    return read_clicks((project_root / "sample_data" / "rooftop" / "clicks.json").read_text(encoding="utf-8"))
 
 
 @pytest.fixture(scope="module")

@@ -1,9 +1,7 @@
 """The page, `evaluate`, `compare` and `check --against` state the same figures of the same calibration."""
 
 import json
-from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,24 +15,12 @@ from app.view.number_format import plain, with_sigma
 from app.web.messages import encode
 from calib_core.evaluation import box_figures, moving_targets
 from calib_core.geometry import RigidTransform, rotation_exp
-from calib_core.interchange import CalibrationFile, check, compare, imported, read_clicks
+from calib_core.interchange import CalibrationFile, check, compare, imported
 from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
-from calib_core.recordings import Recording, open_recording
+from calib_core.recordings import Recording
 from calib_core.results import Calibration
 from tests.street_recording import StreetRecording, reference_calibration
-
-
-@pytest.fixture(scope="module")
-def recording(project_root: Path) -> Iterator[Recording]:
-    sample = project_root / "sample_data" / "rooftop"
-    with open_recording([sample / "camera.bag", sample / "radar.bag"]) as opened:
-        yield opened
-
-
-@pytest.fixture(scope="module")
-def clicks(project_root: Path) -> tuple[ReflectorClick, ...]:
-    return read_clicks((project_root / "sample_data" / "rooftop" / "clicks.json").read_text(encoding="utf-8"))
 
 
 @pytest.fixture(scope="module")

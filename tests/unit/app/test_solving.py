@@ -2,7 +2,7 @@
 
 import json
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
@@ -24,7 +24,7 @@ from app.solving import (
 from app.workspace import open_workspace
 from calib_core.camera import Camera
 from calib_core.errors import InputError, OptionError
-from calib_core.interchange import CameraFile, camera_info_text, read_calibration, read_clicks
+from calib_core.interchange import CameraFile, camera_info_text, read_calibration
 from calib_core.measurements import RadarScans, ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions, LocatingOptions
 from calib_core.recordings import Recording, RecordingOptions, open_recording
@@ -49,17 +49,6 @@ class Radar:
 @pytest.fixture(scope="module")
 def sample(project_root: Path) -> Path:
     return project_root / "sample_data" / "rooftop"
-
-
-@pytest.fixture(scope="module")
-def recording(sample: Path) -> Iterator[Recording]:
-    with open_recording([sample / "camera.bag", sample / "radar.bag"]) as opened:
-        yield opened
-
-
-@pytest.fixture(scope="module")
-def clicks(sample: Path) -> tuple[ReflectorClick, ...]:
-    return read_clicks((sample / "clicks.json").read_text(encoding="utf-8"))
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,7 @@
 import pytest
 
 from app.web.port.admissions import MAX_IDLE_S, Admissions
-from app.web.port.guard import Admitted, Allowed, Guard, Refused, Request, is_loopback
+from app.web.port.guard import Admitted, Allowed, Guard, Refused, Request
 
 
 def request(path: str = "/", **headers: str | list[str]) -> Request:
@@ -198,22 +198,6 @@ def test_bound_to_the_network_it_answers_to_addresses_but_not_to_strange_names()
     assert allowed(door, request(host="192.168.0.7:8080", cookie=door.cookie))
     assert allowed(door, request(host="bench.local:8080", cookie=door.cookie))
     assert status(door.check(request(host="evil.example:8080", cookie=door.cookie))) == 421
-
-
-@pytest.mark.parametrize(
-    ("host", "expected"),
-    [
-        ("127.0.0.1", True),
-        ("127.9.9.9", True),
-        ("localhost", True),
-        ("::1", True),
-        ("0.0.0.0", False),
-        ("10.0.0.1", False),
-        ("x", False),
-    ],
-)
-def test_loopback_is_recognised(host: str, expected: bool) -> None:
-    assert is_loopback(host) is expected
 
 
 def test_only_tokens_that_may_be_guessed_wait_for_their_turn() -> None:
