@@ -462,6 +462,7 @@ def _described(
         systematic_errors=uncertainty.systematic_errors,
         given_camera=task.camera if camera is not None else None,
         fleet=task.fleet,
+        covariance_parts=uncertainty.parts,
     )
     return replace(calibration, pairs=click_results(calibration, groups, task.shown))
 

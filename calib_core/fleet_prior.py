@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from calib_core.arrays import Matrix66, frozen_array
+from calib_core.covariance_parts import CovarianceParts
 from calib_core.geometry import RigidTransform
 
 __all__ = ["DataAlone", "FleetAnswer", "FleetPrior"]
@@ -44,12 +45,14 @@ class DataAlone:
         covariance: (6, 6) of its error, as `Calibration.covariance`.
         covariance_quantile: the factor on covariance that gives the 95 % ellipsoid.
         verdict: the level of the verdict on it, such as "usable"; "" if nobody judged it.
+        covariance_parts: what of the covariance rests on stated standard deviations; None if unknown.
     """
 
     camera_from_radar: RigidTransform
     covariance: Matrix66
     covariance_quantile: float
     verdict: str = ""
+    covariance_parts: CovarianceParts | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "covariance", frozen_array(self.covariance, (6, 6)))

@@ -4,11 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Matrix66
-from calib_core.geometry import RigidTransform, skew
+from calib_core.geometry import skew
 from calib_core.results import Calibration
 
-__all__ = ["StatedError", "degrees_of_freedom", "pose_error", "stated_error"]
+__all__ = ["StatedError", "degrees_of_freedom", "stated_error"]
 
 _BEYOND = 0.05 / 3.0  # rotation, position and picture hold together, so each may fail in a third of the 5 %
 _LEAST_FREEDOM, _MOST_FREEDOM = 0.5, 1e5
@@ -52,43 +51,26 @@ def stated_error(calibration: Calibration) -> StatedError:
     Args:
         calibration: with a finite covariance.
     """
-    in_plane = not calibration.sees_elevation
+    pose, in_plane = calibration.camera_from_radar, not calibration.sees_elevation
     freedom = degrees_of_freedom(calibration.covariance_quantile)
-    rotation_deg, position_cm = pose_error(
-        calibration.camera_from_radar, calibration.covariance, freedom, in_plane=in_plane
-    )
+    turned = pose.rotation.T
+    to_centre = np.concatenate([-turned, -turned @ skew(pose.translation_m)], axis=1)
+    about_axes = np.concatenate([np.zeros((3, 3)), turned], axis=1)[2 if in_plane else 0 :]
+    with np.errstate(over="ignore", invalid="ignore"):  # a file may state any number: beyond all numbers is infinite
+        of_centre = to_centre @ calibration.covariance @ to_centre.T
+        of_axes = about_axes @ calibration.covariance @ about_axes.T
+    position_m = _radius(of_centre, freedom)
     common_px = calibration.options.reflector.click_offset_sigma_px  # the pose follows what all clicks are off by
     picture_px2 = (np.float64(calibration.metrics.picture_sigma_px) ** 2 + common_px**2) * np.eye(2)
     ranges_m = [float(np.linalg.norm(pair.point_radar_m)) for pair in calibration.pairs if pair.inlier]
     known = bool(ranges_m) and bool(np.isfinite(picture_px2).all())
     return StatedError(
-        rotation_deg=rotation_deg,
-        position_cm=float("nan") if in_plane else position_cm,
+        rotation_deg=_rounded_up(np.rad2deg(_radius(of_axes, freedom))),
+        position_cm=float("nan") if in_plane else _rounded_up(100.0 * position_m),
         picture_px=_rounded_up(_radius(picture_px2, freedom)) if known else float("nan"),
         range_m=float(np.median(ranges_m)) if known else float("nan"),
         in_plane=in_plane,
     )
-
-
-def pose_error(
-    camera_from_radar: RigidTransform, covariance: Matrix66, freedom: float, *, in_plane: bool = False
-) -> tuple[float, float]:
-    """Return the error of a pose, rotation [deg] and camera position [cm], of which each fails in a third of 5 %.
-
-    Args:
-        camera_from_radar: the pose.
-        covariance: (6, 6) of its error [m, rad].
-        freedom: degrees of freedom of the covariance.
-        in_plane: judge the rotation about the radar's up axis only.
-    """
-    turned = camera_from_radar.rotation.T
-    to_centre = np.concatenate([-turned, -turned @ skew(camera_from_radar.translation_m)], axis=1)
-    about_axes = np.concatenate([np.zeros((3, 3)), turned], axis=1)[2 if in_plane else 0 :]
-    with np.errstate(over="ignore", invalid="ignore"):  # a file may state any number: beyond all numbers is infinite
-        of_centre = to_centre @ covariance @ to_centre.T
-        of_axes = about_axes @ covariance @ about_axes.T
-    rotation_deg, position_m = np.rad2deg(_radius(of_axes, freedom)), _radius(of_centre, freedom)
-    return _rounded_up(rotation_deg), _rounded_up(100.0 * position_m)
 
 
 def degrees_of_freedom(quantile_95: float) -> float:

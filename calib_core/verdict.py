@@ -159,13 +159,14 @@ def _judged(calibration: Calibration, error: StatedError, warning: DataWarning |
     small = error.rotation_deg <= GOOD_DEG and error.position_cm <= GOOD_CM and steady
     if small and consequence == "note":
         return Verdict("good", error.text, _when_good(calibration, left))
-    if warning is not None and warning.code == _PRIOR_DECIDES:  # it hides what further placements would tell
-        action = _click_the_rest(left) if left else _capitalized(warning.hint)
-        return Verdict("usable", f"{error.text}, if it is mounted like the others of its type", action)
+    decides = next((one for one in calibration.warnings if one.code == _PRIOR_DECIDES), None)
+    reason = error.text if decides is None else f"{error.text}, if it is mounted like the others of its type"
+    if decides is not None and decides == warning:  # it hides what further placements would tell
+        return Verdict("usable", reason, _click_the_rest(left) if left else _capitalized(decides.hint))
     better = (
         _capitalized(warning.hint) if small and warning is not None and not left else _most_helpful(calibration, left)
     )
-    return Verdict("usable", error.text, f"{ALL_CLICKED}. {better}" if left == 0 else better)
+    return Verdict("usable", reason, f"{ALL_CLICKED}. {better}" if left == 0 else better)
 
 
 def _click_the_rest(left: int) -> str:

@@ -1,13 +1,13 @@
 """What a fleet's prior did to a calibration: the fleet, the data alone and the answer side by side."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from app.view.number_format import plain, with_sigma
 from calib_core.arrays import Matrix66, Values
 from calib_core.fleet.mounting_coordinates import coordinate_jacobian, coordinates
-from calib_core.fleet_prior import DataAlone, FleetAnswer
+from calib_core.fleet_prior import FleetAnswer
 from calib_core.geometry import RigidTransform
 from calib_core.pose_difference import pose_difference
 from calib_core.results import Calibration
@@ -64,7 +64,7 @@ def fleet_sentences(calibration: Calibration) -> tuple[str, ...]:
     if not fleet.used:
         return (f"Not used, as the data contradict {named}: {_distance(fleet)}.",)
     away = pose_difference(fleet.data_alone.camera_from_radar, calibration.camera_from_radar, np.full((6, 6), np.nan))
-    with_prior, alone = stated_error(calibration), _stated_alone(calibration, fleet.data_alone)
+    with_prior, alone = stated_error(calibration), stated_error(calibration.of_data_alone(fleet.data_alone))
     return (
         f"The pose rests on the data and on {named}: {_error(with_prior)} (95 %).",
         f"The data alone: {_error(alone)} (95 %), {plain(away.rotation_deg, 2)} deg and {plain(away.position_cm, 2)} cm from "
@@ -82,17 +82,6 @@ def _column(pose: RigidTransform, covariance: Matrix66, mean: RigidTransform) ->
 
 def _distance(fleet: FleetAnswer) -> str:
     return f"squared distance {plain(fleet.squared)}, 1-in-10,000 point {plain(fleet.limit)}"
-
-
-def _stated_alone(calibration: Calibration, alone: DataAlone) -> StatedError:
-    return stated_error(
-        replace(
-            calibration,
-            camera_from_radar=alone.camera_from_radar,
-            covariance=alone.covariance,
-            covariance_quantile=alone.covariance_quantile,
-        )
-    )
 
 
 def _error(error: StatedError) -> str:

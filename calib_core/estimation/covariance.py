@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.arrays import Matrix66, Values
+from calib_core.covariance_parts import CovarianceParts
 from calib_core.estimation.correlated_angle_errors import pose_spread
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.gnc import normal_equations
@@ -31,6 +32,7 @@ class PoseCovariance:
         quantile: the factor on the covariance that gives the 95 % ellipsoid.
         condition: condition number of the information of the pairs alone, after scaling each unknown.
         growth: factor by which smooth angle errors of the radar widen the rotation's standard deviation; 1 without them.
+        parts: what of the covariance rests on stated standard deviations.
         systematic_errors: what each of them contributes.
         lens: (r, r) covariance of refined intrinsics along the axes of their prior; None if they were not refined.
     """
@@ -40,6 +42,7 @@ class PoseCovariance:
     quantile: float
     condition: float
     growth: float
+    parts: CovarianceParts
     systematic_errors: tuple[SystematicErrorResult, ...] = ()
     lens: np.ndarray | None = None
 
@@ -75,10 +78,11 @@ def pose_covariance(
     covariance = independent if spread is None else _widened(independent, plain, spread)
     growth = float(np.sqrt(np.trace(covariance[3:6, 3:6]) / np.trace(independent[3:6, 3:6])))
     shared = _shared_errors(refined, plain, covariance)
-    pose = covariance[:6, :6] + shared.pose
+    pose, assumed = covariance[:6, :6] + shared.pose, shared.pose
     if refined.measurements.flat:
         moves = mounting_moves(refined.camera_from_radar, refined.placements_z_m, radar or RadarOptions())
         pose = pose + moves @ moves.T
+        assumed = assumed + moves @ moves.T
     noise = (independent @ (information - prior_information) @ independent)[:6, :6]
     from_pairs = float(np.trace(np.linalg.solve(pose, noise))) / 6.0
     return PoseCovariance(
@@ -87,6 +91,7 @@ def pose_covariance(
         quantile=_quantile(refined.degrees_of_freedom, min(max(from_pairs, 0.0), 1.0)),
         condition=_scaled_condition(plain - prior_information),
         growth=growth,
+        parts=_parts(refined, plain, assumed),
         systematic_errors=tuple(_result(one, pose) for one in shared.found),
         lens=shared.lens,
     )
@@ -154,6 +159,24 @@ def _shared_errors(refined: ErrorsInVariablesFit, plain: np.ndarray, covariance:
         known = _suggested_lens(refined, whitened[:, :, lens], mixed[:, lens], solved[:, lens])
         found += _of_lens(errors.lens, *known, moves[:, lens], np.eye(int(lens.sum())), estimated=False)
     return _with_refined_lens(_Shared(np.asarray(moves @ moves.T), found), errors, covariance, solved * sigma)
+
+
+def _parts(refined: ErrorsInVariablesFit, plain: np.ndarray, assumed: Matrix66) -> CovarianceParts:
+    """Return what of the covariance rests on stated standard deviations.
+
+    The estimate of pose and errors x is off by H^-1 J^T r, with r the whitened errors of pairs and priors and H = J^T J. So a
+    prior with rows J_p gives it the covariance H^-1 J_p^T J_p H^-1, and all of them together with the pairs give H^-1.
+
+    Args:
+        refined: the fit.
+        plain: H, (6 + k, 6 + k).
+        assumed: (6, 6) of the errors that are not estimated.
+    """
+    to_pose = _symmetric_inverse(plain)[:6]
+    of_errors = to_pose[:, 6:] / refined.measurements.errors.sigma
+    prior = refined.measurements.prior
+    of_position = to_pose[:, :6] @ prior.centre_rows(refined.camera_from_radar)[1].T * float(prior.measured)
+    return CovarianceParts(of_errors @ of_errors.T + assumed, of_position @ of_position.T)
 
 
 def _with_refined_lens(

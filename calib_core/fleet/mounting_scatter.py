@@ -98,7 +98,7 @@ class MountingScatter:
 
     def deviation_of(self, mounting: Mounting) -> Deviation:
         """Compare a mounting that was not counted with those that were."""
-        return deviation(self.effects, *_measured(mounting, self.common), freedom=mounting.freedom)
+        return _Measured.of([mounting], self.common).deviation(0, self.effects)
 
     def without(self, vehicle: str) -> "MountingScatter | Unsolvable":
         """Estimate the scatter again without one vehicle's mountings; others that were left out stay so."""
@@ -107,10 +107,8 @@ class MountingScatter:
             return self
         if len(rest) < _FEWEST_FITTED:
             return _too_few(len(rest), 0)
-        measured = [_measured(one, self.common) for one in rest]
-        effects = random_effects(np.array([row[0] for row in measured]), np.array([row[1] for row in measured]))
         shared = _shared_tape(rest)
-        effects = _widened(effects, shared)
+        effects = _widened(_Measured.of(rest, self.common).effects(np.arange(len(rest))), shared)
         others = tuple(one for one in self.left_out if one.mounting.vehicle != vehicle)
         return MountingScatter(self.vehicle_type, self.common, effects, rest, others, shared)
 
@@ -130,18 +128,16 @@ def mounting_scatter(mountings: Sequence[Mounting], *, vehicle_type: str) -> Mou
     if count < MIN_MOUNTINGS:
         return _too_few(count, 0)
     common = common_mounting([one.camera_from_radar for one in mountings])
-    measured = [_measured(one, common) for one in mountings]
-    vectors, covariances = np.array([row[0] for row in measured]), np.array([row[1] for row in measured])
-    freedoms = np.array([one.freedom for one in mountings])
-    kept = _agreeing(vectors, covariances, freedoms)
+    measured = _Measured.of(mountings, common)
+    kept = _agreeing(measured)
     if kept.sum() < MIN_MOUNTINGS:
         return _too_few(int(kept.sum()), int((~kept).sum()))
     counted = tuple(one for one, counts in zip(mountings, kept.tolist(), strict=True) if counts)
     shared = _shared_tape(counted)
-    effects = _widened(random_effects(vectors[kept], covariances[kept]), shared)
+    effects = _widened(measured.effects(kept), shared)
     left_out = []
     for k in np.flatnonzero(~kept).tolist():
-        away = deviation(effects, vectors[k], covariances[k], freedom=freedoms[k])
+        away = measured.deviation(k, effects)
         reason = f"off its kind: {away.text}, beyond the 1-in-10,000 point of the other mountings"
         left_out.append(LeftOut(mountings[k], away, reason))
     return MountingScatter(vehicle_type, common, effects, counted, tuple(left_out), shared)
@@ -178,48 +174,72 @@ def _too_few(count: int, left_out: int) -> Unsolvable:
     )
 
 
-def _measured(mounting: Mounting, common: RigidTransform) -> tuple[np.ndarray, np.ndarray]:
-    """Return a mounting's coordinates (6,) and their covariance (6, 6)."""
-    jacobian = coordinate_jacobian(mounting.camera_from_radar, common)
-    return coordinates(mounting.camera_from_radar, common), jacobian @ mounting.covariance @ jacobian.T
+@dataclass(frozen=True, slots=True, eq=False)
+class _Measured:
+    """Mountings in the coordinates of `mounting_coordinates`.
+
+    Attributes:
+        vectors: (n, 6).
+        covariances: (n, 6, 6).
+        stated: (n, 6, 6) what of these rests on stated sigmas.
+        freedoms: degrees of freedom of the noise levels.
+    """
+
+    vectors: np.ndarray
+    covariances: np.ndarray
+    stated: np.ndarray
+    freedoms: tuple[float, ...]
+
+    @classmethod
+    def of(cls, mountings: Sequence[Mounting], common: RigidTransform) -> "_Measured":
+        """Return mountings relative to a common one."""
+        jacobians = np.array([coordinate_jacobian(one.camera_from_radar, common) for one in mountings])
+        turned = jacobians.swapaxes(1, 2)
+        return cls(
+            np.array([coordinates(one.camera_from_radar, common) for one in mountings]),
+            jacobians @ np.array([one.covariance for one in mountings]) @ turned,
+            jacobians @ np.array([one.stated for one in mountings]) @ turned,
+            tuple(one.freedom for one in mountings),
+        )
+
+    def effects(self, kept: np.ndarray) -> RandomEffects:
+        """Estimate the distribution of those that are kept: flags (n,) or places (k,)."""
+        return random_effects(self.vectors[kept], self.covariances[kept], self.stated[kept])
+
+    def deviation(self, k: int, effects: RandomEffects) -> Deviation:
+        """Compare one with the distribution of others."""
+        return deviation(effects, self.vectors[k], self.covariances[k], freedom=self.freedoms[k])
 
 
-def _agreeing(vectors: np.ndarray, covariances: np.ndarray, freedoms: np.ndarray) -> np.ndarray:
+def _agreeing(measured: _Measured) -> np.ndarray:
     """Return which mountings (n,) agree with each other."""
-    count = len(vectors)
-    squared = robust_distances(vectors, covariances)
+    count = len(measured.vectors)
+    squared = robust_distances(measured.vectors, measured.covariances)
     fewest = max(_FEWEST_FITTED, count // 2 + 1)
     kept = squared <= max(_CANDIDATE, float(np.sort(squared)[fewest - 1]))
     while not kept.all():
-        effects = random_effects(vectors[kept], covariances[kept])
-        taken = [
-            k
-            for k in np.flatnonzero(~kept)
-            if not deviation(effects, vectors[k], covariances[k], freedom=freedoms[k]).is_beyond
-        ]
+        effects = measured.effects(kept)
+        taken = [k for k in np.flatnonzero(~kept).tolist() if not measured.deviation(k, effects).is_beyond]
         if not taken:
             break
         kept[taken] = True
     while kept.sum() > fewest:
-        worst = _worst(vectors, covariances, freedoms, np.flatnonzero(kept))
+        worst = _worst(measured, np.flatnonzero(kept))
         if worst is None:
             break
         kept[worst] = False
     return kept
 
 
-def _worst(vectors: np.ndarray, covariances: np.ndarray, freedoms: np.ndarray, kept: np.ndarray) -> int | None:
+def _worst(measured: _Measured, kept: np.ndarray) -> int | None:
     """Return which of the kept ones is farthest beyond what the others of them predict; None if none is."""
-    effects = random_effects(vectors[kept], covariances[kept])
+    effects = measured.effects(kept)
     worst: int | None = None
     least = 1.0
     for place, k in enumerate(kept.tolist()):
-        inside = deviation(effects, vectors[k], covariances[k], freedom=freedoms[k])
-        if len(kept) > _FEW and inside.squared <= _USUAL:
+        if len(kept) > _FEW and measured.deviation(k, effects).squared <= _USUAL:
             continue
-        others = np.delete(kept, place)
-        outside = random_effects(vectors[others], covariances[others])
-        away = deviation(outside, vectors[k], covariances[k], freedom=freedoms[k])
+        away = measured.deviation(k, measured.effects(np.delete(kept, place)))
         if away.is_beyond and away.probability < least:
             worst, least = k, away.probability
     return worst

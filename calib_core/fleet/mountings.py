@@ -1,7 +1,7 @@
 """The mountings of a vehicle: its sessions in order of time, parted where the radar was remounted, and averaged in between."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -14,7 +14,7 @@ from calib_core.options import CameraPositionPrior
 
 __all__ = ["Mounting", "mounting_of", "mountings_of", "transitions_of"]
 
-_NOT_SYSTEMATIC = 1e-6  # least share of a covariance that counts as a session's own
+_OF_PAIRS = 1e-6  # least share of a covariance that counts as the scatter of the pairs
 _ROUNDS = 3
 
 
@@ -31,6 +31,8 @@ class Mounting:
         radar_serial: of the radar; None if unknown.
         camera_serial: of the camera; None if unknown.
         measured: the camera positions that its sessions were given as measured with a tape, each once.
+        stated: (6, 6) the part of the covariance that rests on stated sigmas, of shared errors and of the tape, and not on how
+            pairs scatter; zeros if none does.
     """
 
     vehicle: str
@@ -41,9 +43,11 @@ class Mounting:
     radar_serial: str | None = None
     camera_serial: str | None = None
     measured: tuple[CameraPositionPrior, ...] = ()
+    stated: Matrix66 = field(default_factory=lambda: np.zeros((6, 6)))
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "covariance", frozen_array(self.covariance, (6, 6)))
+        object.__setattr__(self, "stated", frozen_array(self.stated, (6, 6)))
 
 
 def transitions_of(
@@ -82,21 +86,24 @@ def mountings_of(sessions: Iterable[SessionPose]) -> tuple[Mounting, ...]:
 def mounting_of(sessions: Sequence[SessionPose]) -> Mounting:
     """Average the sessions of one mounting.
 
-    Each weighs as its covariance says. Their own errors average out; the systematic ones are taken to be the same in all.
+    Each weighs as its covariance says. The scatter of the pairs averages out; errors that pairs share are taken to be the same
+    in all sessions, and so is that of a camera position that several of them state to the last digit: it was measured once.
 
     Args:
         sessions: at least one, of one vehicle with one mounting.
     """
     pose = sessions[0].camera_from_radar
-    own = [one.covariance - (1.0 - _NOT_SYSTEMATIC) * one.systematic for one in sessions]
     information = np.linalg.inv([one.covariance for one in sessions])
     gains = np.linalg.inv(information.sum(axis=0)) @ information
     for _ in range(_ROUNDS):
         errors = np.array([one.camera_from_radar.error_from(pose) for one in sessions])
         pose = pose.perturbed(np.einsum("nij,nj->i", gains, errors))
-    shared = np.sum([gain @ _root(one.systematic) for gain, one in zip(gains, sessions, strict=True)], axis=0)
-    averaged = np.sum([gain @ part @ gain.T for gain, part in zip(gains, own, strict=True)], axis=0)
-    covariance = averaged + (1.0 - _NOT_SYSTEMATIC) * shared @ shared.T
+    own = np.array([one.covariance - (1.0 - _OF_PAIRS) * (one.systematic + one.of_tape) for one in sessions])
+    averaged = (gains @ own @ gains.swapaxes(1, 2)).sum(axis=0)
+    stated = (1.0 - _OF_PAIRS) * sum(
+        (_common(gains[rows], [part[k] for k in rows]) for part, rows in _common_errors(sessions)), np.zeros((6, 6))
+    )
+    covariance = averaged + stated
     return Mounting(
         vehicle=sessions[0].vehicle,
         sessions=tuple(one.session for one in sessions),
@@ -106,7 +113,24 @@ def mounting_of(sessions: Sequence[SessionPose]) -> Mounting:
         radar_serial=sessions[-1].radar_serial,
         camera_serial=sessions[-1].camera_serial,
         measured=tuple(dict.fromkeys(one.measured for one in sessions if one.measured is not None)),
+        stated=(stated + stated.T) / 2.0,
     )
+
+
+def _common_errors(sessions: Sequence[SessionPose]) -> Iterator[tuple[list[Matrix66], list[int]]]:
+    """Yield which part (6, 6) of every session's covariance comes from one and the same error, and the sessions that have it."""
+    yield [one.systematic for one in sessions], list(range(len(sessions)))
+    measured: dict[tuple[float, ...] | int, list[int]] = {}
+    for k, one in enumerate(sessions):
+        measured.setdefault(k if one.measured is None else one.measured.position_m, []).append(k)
+    of_tape = [one.of_tape for one in sessions]
+    yield from ((of_tape, rows) for rows in measured.values())
+
+
+def _common(gains: np.ndarray, parts: Sequence[Matrix66]) -> Matrix66:
+    """Return what an error that several sessions have in common leaves in their mean, weighed with gains (n, 6, 6)."""
+    root = np.sum([gain @ _root(part) for gain, part in zip(gains, parts, strict=True)], axis=0)
+    return np.asarray(root @ root.T)
 
 
 def _by_vehicle(sessions: Iterable[SessionPose]) -> list[list[SessionPose]]:

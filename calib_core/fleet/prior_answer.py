@@ -1,7 +1,5 @@
 """What a fleet's prior does to a calibration: the test of the data alone against it, and what the user must know."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from calib_core.fleet.deviation import Deviation
@@ -31,7 +29,9 @@ def fleet_answer(prior: FleetPrior, alone: Calibration | Unsolvable, verdict: st
     """
     if isinstance(alone, Unsolvable) or not np.isfinite(alone.covariance).all():
         return FleetAnswer(prior, used=True, data_alone=None)
-    data = DataAlone(alone.camera_from_radar, alone.covariance, alone.covariance_quantile, verdict)
+    data = DataAlone(
+        alone.camera_from_radar, alone.covariance, alone.covariance_quantile, verdict, alone.covariance_parts
+    )
     away = prior_test(prior, data)
     return FleetAnswer(prior, not away.is_beyond, data, away.squared, away.limit)
 
@@ -84,7 +84,7 @@ def _far(fleet: FleetAnswer, away: Deviation) -> tuple[DataWarning, ...]:
 
 def _decides(fleet: FleetAnswer, alone: DataAlone, calibration: Calibration) -> tuple[DataWarning, ...]:
     """Say that the data alone are much less certain, so that a mounting unlike the others would be pulled to them."""
-    without = stated_error(_with(calibration, alone))
+    without = stated_error(calibration.of_data_alone(alone))
     with_prior = stated_error(calibration)
     rotation = without.rotation_deg >= _DECIDES * with_prior.rotation_deg
     position = without.position_cm >= _DECIDES * with_prior.position_cm
@@ -107,14 +107,4 @@ def _decides(fleet: FleetAnswer, alone: DataAlone, calibration: Calibration) -> 
             "differs by less would be drawn to the others' unnoticed",
             "add placements: with enough of them the data decide",
         ),
-    )
-
-
-def _with(calibration: Calibration, alone: DataAlone) -> Calibration:
-    """Return a calibration with the pose of the data alone, as far as its stated error needs it."""
-    return replace(
-        calibration,
-        camera_from_radar=alone.camera_from_radar,
-        covariance=alone.covariance,
-        covariance_quantile=alone.covariance_quantile,
     )

@@ -1,11 +1,17 @@
 """The mean and the scatter of vectors that are each known with a covariance of their own: a random-effects model.
 
-    y_k = mu + b_k + e_k,   b_k ~ N(0, S),   e_k ~ N(0, C_k),   k = 1 .. n;   C_k known, mu and S unknown.
+    y_k = mu + b_k + e_k,   b_k ~ N(0, S),   e_k ~ N(0, N_k + q T_k),   k = 1 .. n;
+    N_k and T_k known, mu, S and q unknown, 0 < q <= 1.
 
-The level of S is integrated out: over S_0 = diag(p^2 I, r^2 I), p of the positions and r of the rotations, with a flat prior on p
-and r and the restricted likelihood of the data, on a grid; S_0 is its posterior mean. Its shape follows by EM: restricted
-maximum likelihood with an inverse-Wishart prior that counts as `PRIOR_VECTORS` vectors scattered by S_0. Where the C_k hide
-the scatter, S stays at S_0, which the flat prior keeps from collapsing to zero.
+N_k was estimated from data. T_k rests on what somebody stated of the errors of instruments, such as "1 cm", which is an upper
+limit rather than a measurement: q is how much of that variance there is. If q were taken for 1, vectors whose errors are
+smaller than stated would show too little scatter.
+
+The level of S is integrated out, and q with it: over S_0 = diag(p^2 I, r^2 I), p of the positions and r of the rotations, with a
+flat prior on p, r and the root of q and the restricted likelihood of the data, on a grid; S_0 is its posterior mean. Its shape
+follows by EM: restricted maximum likelihood with an inverse-Wishart prior that counts as `PRIOR_VECTORS` vectors scattered by
+S_0, q at its posterior mean. Where the errors hide the scatter, S stays at S_0, which the flat prior keeps from collapsing to
+zero.
 
 A further vector is farther out than S + cov(mu) says, for two reasons. Given the data, it is a mixture of normal vectors, one for
 each level, with wider tails than one normal vector with the mixture's covariance. And the shape of S is a guess: with exactly
@@ -25,7 +31,7 @@ __all__ = ["PRIOR_VECTORS", "RandomEffects", "random_effects"]
 PRIOR_VECTORS = 8.0
 """Vectors that the prior on the shape of the scatter counts for."""
 
-_NODES = 12
+_NODES, _PARTS = 12, 4
 _PASSES = 3
 _REACH = 5.0  # times the root mean square of the vectors
 _NEGLIGIBLE = 1e-5
@@ -48,6 +54,7 @@ class RandomEffects:
         level_widened: the 95 % quantile of a further vector's squared distance with all levels that the data allow, over that
             with one level: the covariance is wider by that much because the level is not known.
         shape_freedom: degrees of freedom with which the shape of `covariance` varies.
+        of_stated: how much of the stated variances there is, 0 to 1: the posterior mean; 1 if nothing was stated.
     """
 
     mean: Values
@@ -56,6 +63,7 @@ class RandomEffects:
     informative: float
     level_widened: float = 1.0
     shape_freedom: float = float("inf")
+    of_stated: float = 1.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "mean", frozen_array(self.mean, (6,)))
@@ -79,15 +87,18 @@ class RandomEffects:
         return self.level_widened * quantile(_INSIDE, self.shape_freedom, whole=DIMENSIONS - 1.0) / known
 
 
-def random_effects(vectors: np.ndarray, covariances: np.ndarray) -> RandomEffects:
+def random_effects(vectors: np.ndarray, covariances: np.ndarray, stated: np.ndarray | None = None) -> RandomEffects:
     """Estimate mean and scatter.
 
     Args:
         vectors: (n, 6) [m, rad], n at least 3; positions first.
         covariances: (n, 6, 6) of each.
+        stated: (n, 6, 6) what of it is an upper limit that somebody stated; None if nothing is.
     """
-    variances, level_widened = _levels(vectors, covariances)
-    level = np.repeat(variances, 3)
+    levels = _levels(vectors, covariances, np.zeros((1, 6, 6)) if stated is None else stated)
+    if stated is not None:
+        covariances = covariances - (1.0 - levels.of_stated) * stated
+    level = np.repeat(levels.variances, 3)
     prior = np.diag(level)
     scatter, count = prior, len(vectors)
     for _ in range(_ITERATIONS):
@@ -111,8 +122,9 @@ def random_effects(vectors: np.ndarray, covariances: np.ndarray) -> RandomEffect
         mean_covariance=(mean_covariance + mean_covariance.T) / 2.0,
         scatter=scatter,
         informative=float(np.einsum("nij,nji->", shares, shares)) / vectors.shape[1],
-        level_widened=level_widened,
+        level_widened=levels.widened,
         shape_freedom=_shape_freedom(scatter, weights),
+        of_stated=levels.of_stated,
     )
 
 
@@ -137,30 +149,46 @@ def _shape_freedom(scatter: np.ndarray, weights: np.ndarray) -> float:
     return DIMENSIONS * (DIMENSIONS + 1) / max(float(grown.sum()), _LEAST_GROWN)
 
 
-def _levels(vectors: np.ndarray, covariances: np.ndarray) -> tuple[np.ndarray, float]:
-    """Integrate over the level by a grid that zooms in.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Levels:
+    """What the data say of the level.
 
-    Returns:
-        the posterior means (2,) of the variances per axis of position and rotation, and by how much the tails are wider.
+    Attributes:
+        variances: (2,) per axis of position and rotation, posterior means.
+        of_stated: how much of the stated variances there is, posterior mean.
+        widened: by how much the tails of a further vector are wider.
     """
+
+    variances: np.ndarray
+    of_stated: float
+    widened: float
+
+
+def _levels(vectors: np.ndarray, covariances: np.ndarray, stated: np.ndarray) -> _Levels:
+    """Integrate over the level and the part of the stated variances by a grid that zooms in on the level."""
     count = len(vectors)
+    parts = ((np.arange(_PARTS) + 0.5) / _PARTS) ** 2 if stated.any() else np.ones(1)
     centred = vectors - vectors.mean(axis=0)
     spread = np.array([np.sqrt((centred[:, block] ** 2).mean() * count / (count - 1)) for block in _BLOCKS])
     low, high = np.zeros(2), _REACH * np.maximum(spread, _LEAST_SPREAD)
     for _ in range(_PASSES):
         steps = (high - low) / _NODES
         axes = low[:, None] + steps[:, None] * (np.arange(_NODES) + 0.5)
-        grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-        nodes = _Nodes.at(centred, covariances, grid.reshape(-1, 2))
-        likelihood = nodes.log_likelihood.reshape(_NODES, _NODES)
+        grid = np.stack(np.meshgrid(*axes, parts, indexing="ij"), axis=-1)
+        nodes = _Nodes.at(centred, covariances, stated, grid.reshape(-1, 3))
+        likelihood = nodes.log_likelihood.reshape(grid.shape[:3])
         density = np.exp(likelihood - likelihood.max())
         for block in range(2):
-            marginal = density.sum(axis=1 - block)
+            marginal = density.sum(axis=(1 - block, 2))
             kept = np.flatnonzero(marginal > _NEGLIGIBLE * marginal.max())
             low[block] = max(0.0, axes[block, kept[0]] - steps[block])
             high[block] = axes[block, kept[-1]] + steps[block]
     density /= density.sum()
-    return (density[..., None] * grid**2).sum(axis=(0, 1)), nodes.widened(density.ravel())
+    return _Levels(
+        variances=(density[..., None] * grid[..., :2] ** 2).sum(axis=(0, 1, 2)),
+        of_stated=float((density * grid[..., 2]).sum()),
+        widened=nodes.widened(density.ravel()),
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -180,10 +208,11 @@ class _Nodes:
     mean_covariances: np.ndarray
 
     @classmethod
-    def at(cls, vectors: np.ndarray, covariances: np.ndarray, levels: np.ndarray) -> "_Nodes":
-        """Weigh scatters with these standard deviations of position and rotation (g, 2)."""
-        variances = np.repeat(levels**2, 3, axis=1)
-        total = covariances + variances[:, None, :, None] * np.eye(6)
+    def at(cls, vectors: np.ndarray, covariances: np.ndarray, stated: np.ndarray, levels: np.ndarray) -> "_Nodes":
+        """Weigh (g, 3): standard deviations of position and rotation, and how much of the stated variances there is."""
+        variances = np.repeat(levels[:, :2] ** 2, 3, axis=1)
+        unused = (1.0 - levels[:, 2])[:, None, None, None] * stated
+        total = covariances - unused + variances[:, None, :, None] * np.eye(6)
         weights = np.linalg.inv(total)
         information = weights.sum(axis=1)
         weighted = np.einsum("gnij,nj->gi", weights, vectors)

@@ -1,11 +1,12 @@
 """What the fleet needs of one calibration: whose it is, its pose, and which part of its uncertainty does not average out."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from calib_core.arrays import Matrix66, Vector3, frozen_array
 from calib_core.camera import Camera
+from calib_core.covariance_parts import CovarianceParts
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import TimeNs
@@ -34,6 +35,7 @@ class SessionPose:
         covariance: (6, 6) of the error (dt, dtheta) [m, rad], as `Calibration.covariance`.
         systematic: (6, 6) the part of the covariance that further sessions with the same sensors do not average out; the
             whole covariance if nothing was stated.
+        of_tape: (6, 6) the part that the stated sigma of the measured camera position makes up; zeros without one.
         quantile: the factor on covariance that gives its 95 % ellipsoid.
         time_ns: of the session; None if unknown.
         radar_serial: of the radar; None if unknown.
@@ -62,11 +64,13 @@ class SessionPose:
     angle_scales: tuple[SystematicErrorResult, ...] = ()
     measured: CameraPositionPrior | None = None
     of_data_alone: bool = False
+    of_tape: Matrix66 = field(default_factory=lambda: np.zeros((6, 6)))
 
     def __post_init__(self) -> None:
         systematic = self.covariance if self.systematic is None else self.systematic
         object.__setattr__(self, "covariance", frozen_array(self.covariance, (6, 6)))
         object.__setattr__(self, "systematic", frozen_array(systematic, (6, 6)))
+        object.__setattr__(self, "of_tape", frozen_array(self.of_tape, (6, 6)))
         if self.reference_radar_m is not None:
             object.__setattr__(self, "reference_radar_m", frozen_array(self.reference_radar_m, (3,)))
         _check(self)
@@ -84,15 +88,18 @@ class SessionPose:
 
 def _check(pose: SessionPose) -> None:
     where = f"vehicle {pose.vehicle!r}, session {pose.session!r}"
-    if not (np.isfinite(pose.covariance).all() and np.isfinite(pose.systematic).all()):
+    stated = pose.systematic + pose.of_tape
+    if not (np.isfinite(pose.covariance).all() and np.isfinite(stated).all()):
         raise InputError(
             f"{where}: the calibration states no uncertainty, so it cannot be weighed; solve it with the default method"
         )
     scale = np.sqrt(np.maximum(np.diag(pose.covariance), 1e-300))
     if np.linalg.eigvalsh(pose.covariance / np.outer(scale, scale))[0] <= _ROUNDING:
         raise InputError(f"{where}: the covariance is singular; export the calibration again with all digits")
-    if np.linalg.eigvalsh((pose.covariance - pose.systematic) / np.outer(scale, scale))[0] < -_EXCESS:
-        raise InputError(f"{where}: the systematic part exceeds the covariance; give the part that sessions share")
+    if np.linalg.eigvalsh((pose.covariance - stated) / np.outer(scale, scale))[0] < -_EXCESS:
+        raise InputError(
+            f"{where}: the parts of the covariance that rest on stated sigmas exceed it; solve the session again"
+        )
 
 
 def session_pose(
@@ -107,12 +114,11 @@ def session_pose(
     """Take from a calibration what the fleet needs.
 
     Errors that all pairs share (the radar's scales and range, the lens, clicks and reflector) are the same ones in the next
-    session with these sensors, so further sessions do not average them out. A calibration states their shares of the variance
-    of position and rotation, not their (6, 6). The larger of the two shares is taken of the whole firm covariance, and what a
-    radar without elevation leaves to assumptions is added: at least the true part, never more than the covariance.
+    session with these sensors, so further sessions do not average them out; `Calibration.covariance_parts` says what they come
+    to. Where a file does not state that, all of its covariance is taken.
 
     Of a calibration that rests on a fleet's prior it is the answer of the data alone: its pose is drawn to the fleet's mean,
-    which would hide scatter and remounts. What further sessions do not average out is not known of it: all of it is taken.
+    which would hide scatter and remounts.
 
     Args:
         calibration: with a covariance.
@@ -127,16 +133,14 @@ def session_pose(
     """
     if calibration.fleet_prior is not None:
         calibration = _of_data_alone(calibration, f"vehicle {vehicle!r}, session {session!r}")
-    firm, errors = calibration.firm_covariance, calibration.errors_of_firm
-    shares = [sum(one.position_share for one in errors), sum(one.rotation_share for one in errors)]
-    share = min(max(0.0, *np.nan_to_num(shares).tolist()), 1.0) if errors else 1.0
+    parts = calibration.covariance_parts or CovarianceParts(calibration.covariance, np.zeros((6, 6)))
     places_m = [pair.point_radar_m for pair in calibration.pairs if pair.inlier]
     return SessionPose(
         vehicle=vehicle,
         session=session,
         camera_from_radar=calibration.camera_from_radar,
         covariance=calibration.covariance,
-        systematic=calibration.covariance - (1.0 - share) * firm,
+        systematic=parts.systematic,
         quantile=calibration.covariance_quantile,
         time_ns=time_ns,
         radar_serial=radar_serial,
@@ -146,6 +150,7 @@ def session_pose(
         angle_scales=tuple(one for one in calibration.systematic_errors if one.name in _SCALES and one.estimated),
         measured=calibration.options.solving.camera_position,
         of_data_alone=calibration.fleet_prior is not None,
+        of_tape=parts.camera_position,
     )
 
 
@@ -158,10 +163,4 @@ def _of_data_alone(calibration: Calibration, where: str) -> Calibration:
     alone = calibration.fleet.data_alone if calibration.fleet is not None else None
     if alone is None:
         raise InputError(f"{where}: only the fleet's prior closes what its placements leave open; add placements")
-    return replace(
-        calibration,
-        camera_from_radar=alone.camera_from_radar,
-        covariance=alone.covariance,
-        covariance_quantile=alone.covariance_quantile,
-        systematic_errors=(),
-    )
+    return calibration.of_data_alone(alone)

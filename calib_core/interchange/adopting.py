@@ -215,6 +215,7 @@ def _as_calibration(found: ImportedCalibration, source: str, *, camera: Camera) 
         options=CalibrationOptions(),
         radar_errors=found.file.calibration.radar_errors if found.file else RadarErrors(),
         systematic_errors=found.file.calibration.systematic_errors if found.file else (),
+        covariance_parts=found.file.calibration.covariance_parts if found.file else None,
     )
 
 

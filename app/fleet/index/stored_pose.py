@@ -28,7 +28,7 @@ def insert_pose(connection: sqlite3.Connection, digest: str, pose: SessionPose) 
     """Write the pose of a result."""
     place = pose.reference_radar_m
     connection.execute(
-        "INSERT INTO poses VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        "INSERT INTO poses VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
         (
             digest,
             _text(pose.camera_from_radar.rotation),
@@ -41,6 +41,7 @@ def insert_pose(connection: sqlite3.Connection, digest: str, pose: SessionPose) 
             msgspec.json.encode(pose.angle_scales).decode(),
             pose.of_data_alone,
             None if pose.measured is None else msgspec.json.encode(pose.measured).decode(),
+            _text(pose.of_tape),
         ),
     )
 
@@ -67,6 +68,7 @@ def pose_of(row: sqlite3.Row, outcome: Outcome) -> SessionPose:
         angle_scales=msgspec.json.decode(row["angle_scales"], type=tuple[SystematicErrorResult, ...]),
         of_data_alone=bool(row["of_data_alone"]),
         measured=None if row["measured"] is None else msgspec.json.decode(row["measured"], type=CameraPositionPrior),
+        of_tape=_array(row["of_tape"]),
     )
 
 

@@ -23,6 +23,7 @@ from calib_core.interchange.own import documents
 from calib_core.interchange.own.angle_map_document import angle_map_document, angle_map_of
 from calib_core.interchange.own.camera_document import camera_document, camera_of
 from calib_core.interchange.own.clicks_json import refuse_repeated_ids
+from calib_core.interchange.own.covariance_parts_document import covariance_parts_document, covariance_parts_of
 from calib_core.interchange.own.fleet_answer_document import fleet_answer_document, fleet_answer_of
 from calib_core.interchange.own.numbers import finite_or_none, nan_if_none, nested
 from calib_core.interchange.own.pair_document import SOLVED_FROM_KEYS, solved_pair_document, solved_pair_of
@@ -129,6 +130,7 @@ def write_calibration(file: CalibrationFile) -> str:
         covariance=nested(calibration.covariance),
         covariance_convention=COVARIANCE_CONVENTION,
         covariance_quantile=finite_or_none(calibration.covariance_quantile),
+        covariance_parts=covariance_parts_document(calibration.covariance_parts),
         sigma=documents.SigmaDocument(*map(finite_or_none, sigma)),
         check_point=documents.CheckPointDocument(nested(check.radar_m), nested(check.pixel_px)) if check else None,
         metrics=_metrics_document(calibration.metrics),
@@ -165,6 +167,7 @@ def write_calibration(file: CalibrationFile) -> str:
     absent |= {"given_camera"} if calibration.given_camera is None else set()
     absent |= {"fleet_prior"} if calibration.fleet is None else set()
     absent |= {"vehicle"} if document.vehicle is None else set()
+    absent |= {"covariance_parts"} if document.covariance_parts is None else set()
     if not calibration.systematic_errors and calibration.radar_errors == RadarErrors():
         absent |= {"radar_errors", "systematic_errors"}
     known = encodable({key: content[key] for key in _KEY_ORDER if key not in absent})
@@ -185,8 +188,19 @@ _KEY_ORDER = (
         "sigma",
         "covariance",
     ),
-    *("covariance_convention", "covariance_quantile", "metrics", "noise_scale", "radar_errors", "systematic_errors"),
-    *("radar_angle_map", "paper", "warnings", "unpaired", "pairs", "camera", "given_camera", "fleet_prior", "options"),
+    *("covariance_convention", "covariance_quantile", "covariance_parts", "metrics", "noise_scale", "radar_errors"),
+    *(
+        "systematic_errors",
+        "radar_angle_map",
+        "paper",
+        "warnings",
+        "unpaired",
+        "pairs",
+        "camera",
+        "given_camera",
+        "fleet_prior",
+        "options",
+    ),
     "provenance",
 )
 
@@ -246,6 +260,7 @@ def calibration_file_of(
         radar_errors=radar_errors_of(document.radar_errors),
         systematic_errors=tuple(map(systematic_error_of, document.systematic_errors)),
         fleet=fleet_answer_of(document.fleet_prior, source=source),
+        covariance_parts=covariance_parts_of(document.covariance_parts, source=source),
     )
     try:
         frames = FrameNames(document.frames.radar, document.frames.camera)

@@ -407,6 +407,13 @@ class VehicleDocument(Struct, frozen=True, omit_defaults=True):
     camera_serial: Label | None = None
 
 
+class CovariancePartsDocument(Struct, frozen=True, omit_defaults=True):
+    """What of the covariance rests on stated standard deviations: of errors that all pairs share, of a measured position."""
+
+    systematic: Matrix66
+    camera_position: Matrix66 | None = None
+
+
 class DataAloneDocument(Struct, frozen=True, omit_defaults=True):
     """The answer of the pairs without the fleet's prior, with the level of the verdict on it."""
 
@@ -414,6 +421,7 @@ class DataAloneDocument(Struct, frozen=True, omit_defaults=True):
     covariance: Matrix66
     covariance_quantile: float | None = None
     verdict: VerdictLevel | None = None
+    covariance_parts: CovariancePartsDocument | None = None
 
 
 class FleetAnswerDocument(Struct, frozen=True, omit_defaults=True):
@@ -448,6 +456,7 @@ class CalibrationDocument(Struct, frozen=True):
     covariance: Matrix66 | None = None
     covariance_convention: str = ""
     covariance_quantile: float | None = None
+    covariance_parts: CovariancePartsDocument | None = None
     sigma: SigmaDocument = field(default_factory=SigmaDocument)
     check_point: CheckPointDocument | None = None
     metrics: MetricsDocument = field(default_factory=MetricsDocument)

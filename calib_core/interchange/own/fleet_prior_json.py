@@ -5,9 +5,7 @@ import msgspec
 from calib_core.errors import InputError
 from calib_core.fleet_prior import FleetPrior
 from calib_core.interchange.own.fleet_prior_document import FLEET_PRIOR_SCHEMA, FleetPriorDocument
-from calib_core.interchange.own.numbers import finite_or_none, nested
-from calib_core.interchange.own.stated_covariance import stated_covariance
-from calib_core.interchange.own.transform_document import transform_document, transform_of
+from calib_core.interchange.own.fleet_prior_fields import fleet_prior_fields, fleet_prior_of_fields
 from calib_core.interchange.syntax.json_text import json_text
 from calib_core.interchange.syntax.strict_json import parse_document
 
@@ -16,16 +14,7 @@ __all__ = ["read_fleet_prior", "write_fleet_prior"]
 
 def write_fleet_prior(prior: FleetPrior) -> str:
     """Write fleet-prior-1 text; the same prior gives the same bytes."""
-    document = FleetPriorDocument(
-        schema=FLEET_PRIOR_SCHEMA,
-        vehicle_type=prior.vehicle_type,
-        camera_from_radar=transform_document(prior.camera_from_radar),
-        covariance=nested(0.5 * (prior.covariance + prior.covariance.T) + 0.0),
-        vehicles=list(prior.vehicles),
-        left_out=list(prior.left_out),
-        widened=prior.widened if prior.widened != 1.0 else None,
-        freedom=finite_or_none(prior.freedom),
-    )
+    document = FleetPriorDocument(schema=FLEET_PRIOR_SCHEMA, **fleet_prior_fields(prior))
     content = msgspec.to_builtins(document)
     return json_text({key: value for key, value in content.items() if value is not None})
 
@@ -42,15 +31,7 @@ def read_fleet_prior(text: str, source: str = "fleet prior") -> FleetPrior:
     """
     document = parse_document(text, FleetPriorDocument, source=source)
     _refuse_repeated(document, source=source)
-    return FleetPrior(
-        vehicle_type=document.vehicle_type,
-        camera_from_radar=transform_of(document.camera_from_radar, source=source, place="camera_from_radar"),
-        covariance=stated_covariance(document.covariance, source=source),
-        vehicles=tuple(document.vehicles),
-        left_out=tuple(document.left_out),
-        widened=1.0 if document.widened is None else document.widened,
-        freedom=float("inf") if document.freedom is None else document.freedom,
-    )
+    return fleet_prior_of_fields(document, source=source)
 
 
 def _refuse_repeated(document: FleetPriorDocument, *, source: str) -> None:

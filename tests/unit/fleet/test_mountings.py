@@ -9,6 +9,7 @@ from benchmarks.fleet.simulated_poses import NOMINAL
 from calib_core.fleet import SessionPose, mounting_of, mountings_of
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import TimeNs
+from calib_core.options import CameraPositionPrior
 
 COVARIANCE = np.diag(np.repeat([1e-4, 4e-6], 3))
 
@@ -25,6 +26,20 @@ def test_own_errors_average_out_and_systematic_ones_stay() -> None:
     four = mounting_of([session(k, share=0.36) for k in range(4)])
     np.testing.assert_allclose(four.covariance, (0.36 + 0.64 / 4.0) * COVARIANCE, rtol=1e-5)
     assert four.sessions == ("s0", "s1", "s2", "s3")
+
+
+def test_a_tape_that_is_read_anew_averages_out_and_one_that_was_copied_does_not() -> None:
+    def measured(number: int, forward_m: float) -> SessionPose:
+        of_tape = np.diag([1e-4, 1e-4, 1e-4, 0.0, 0.0, 0.0])
+        tape = CameraPositionPrior((forward_m, 0.0, 0.0), 0.01)
+        whole = COVARIANCE + of_tape
+        return SessionPose("van", f"s{number}", NOMINAL, whole, np.zeros((6, 6)), measured=tape, of_tape=of_tape)
+
+    anew = mounting_of([measured(k, 0.1 + 0.001 * k) for k in range(4)])
+    copied = mounting_of([measured(k, 0.1) for k in range(4)])
+    np.testing.assert_allclose(np.diag(anew.covariance)[:3], (1e-4 + 1e-4) / 4.0, rtol=1e-4)
+    np.testing.assert_allclose(np.diag(copied.covariance)[:3], 1e-4 / 4.0 + 1e-4, rtol=1e-4)
+    np.testing.assert_allclose(np.diag(copied.stated), [1e-4] * 3 + [0.0] * 3, rtol=1e-4, atol=1e-12)
 
 
 def test_what_nobody_stated_to_be_a_sessions_own_counts_as_systematic() -> None:

@@ -66,6 +66,14 @@ def test_few_placements_of_a_vehicle_of_its_kind_give_a_pose_to_use_and_the_data
     assert verdict_on(found, left=3).action == "Click the 3 placements that are left"
 
 
+def test_that_it_must_be_mounted_like_the_others_is_said_whatever_else_is_warned_of() -> None:
+    found = solved(6, prior(6))
+    more = DataWarning("angle-scale", "the radar's angles are off", "state its scale")
+    for warnings in ((more, *found.warnings), (*found.warnings, more)):
+        said = verdict_on(replace(found, warnings=warnings))
+        assert (said.level, said.reason) == (verdict_on(found).level, verdict_on(found).reason)
+
+
 def test_the_answer_lies_where_prior_and_data_balance() -> None:
     found, data, given = solved(20, prior(20)), alone(20), prior(20)
     to_prior, to_data = np.linalg.inv(given.covariance), np.linalg.inv(data.covariance)

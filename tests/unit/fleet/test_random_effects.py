@@ -48,6 +48,37 @@ def test_errors_twice_as_large_as_the_scatter_do_not_make_it_overconfident(count
     assert covered(count, 30, EQUAL, ROUGH) >= 0.93
 
 
+def covered_with_stated(there: float, share: float, sigma: np.ndarray) -> float:
+    """Return the share of new vectors inside, if a share of the covariance is stated and only some of that is there."""
+    stated, count, rng, inside = share * (1.0 - 1e-9) * ROUGH, 30, np.random.default_rng(5), []
+    error = ROUGH - (1.0 - there) * stated
+    for _ in range(12):
+        vectors = sigma * rng.standard_normal((count, 6)) + rng.multivariate_normal(np.zeros(6), error, count)
+        effects = random_effects(vectors, np.tile(ROUGH, (count, 1, 1)), np.tile(stated, (count, 1, 1)))
+        limit = effects.widened * quantile(0.95, 1e7)
+        inside.append((squared_of_new(effects, sigma, rng) <= limit).mean())
+    return float(np.mean(inside))
+
+
+@pytest.mark.parametrize("share", [0.3, 1.0])
+@pytest.mark.parametrize("sigma", [EQUAL, 2.0 * EQUAL], ids=["half the errors", "as large as the errors"])
+def test_errors_smaller_than_stated_do_not_make_it_overconfident(share: float, sigma: np.ndarray) -> None:
+    shares = [covered_with_stated(there, share, sigma) for there in (0.0, 0.3, 0.6, 1.0)]
+    assert np.mean(shares) >= 0.93
+    assert min(shares) >= 0.85
+
+
+def test_what_was_stated_is_found_to_be_there_or_not_where_it_decides() -> None:
+    rng = np.random.default_rng(6)
+    of_rotation = np.diag(np.repeat([1e-8, 1e-4], 3))
+    stated = np.where(np.arange(60)[:, None, None] % 2, of_rotation, 0.0)  # of every other vector only
+    whole = stated + 1e-6 * np.eye(6)
+    vectors = 1e-3 * rng.standard_normal((60, 6))
+    assert random_effects(vectors, whole, stated).of_stated < 0.2
+    there = vectors + np.sqrt(np.diagonal(stated, axis1=1, axis2=2)) * rng.standard_normal((60, 6))
+    assert random_effects(there, whole, stated).of_stated > 0.7
+
+
 def test_many_exact_vectors_give_the_sample_covariance_and_a_little_of_the_prior() -> None:
     rng, count = np.random.default_rng(3), 300
     vectors = UNEQUAL * rng.standard_normal((count, 6))

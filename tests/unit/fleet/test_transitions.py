@@ -143,6 +143,8 @@ def test_a_covariance_that_cannot_weigh_anything_is_refused_with_what_to_do(numb
         SessionPose("van", "s", NOMINAL, covariance)
 
 
-def test_a_systematic_part_beyond_the_covariance_is_refused() -> None:
-    with pytest.raises(InputError, match="systematic part exceeds the covariance"):
+def test_stated_parts_beyond_the_covariance_are_refused() -> None:
+    with pytest.raises(InputError, match="rest on stated sigmas exceed it; solve the session again"):
         SessionPose("van", "s", NOMINAL, np.eye(6), 2.0 * np.eye(6))
+    with pytest.raises(InputError, match="rest on stated sigmas exceed it"):
+        SessionPose("van", "s", NOMINAL, np.eye(6), 0.6 * np.eye(6), of_tape=0.6 * np.eye(6))

@@ -49,6 +49,11 @@ def test_reading_and_writing_it_again_gives_the_same_bytes_and_the_same_numbers(
     assert np.array_equal(wrote.data_alone.covariance, read.data_alone.covariance)
     assert wrote.data_alone.covariance_quantile == read.data_alone.covariance_quantile
     assert wrote.data_alone.verdict == read.data_alone.verdict == "usable"
+    assert wrote.data_alone.covariance_parts is not None
+    assert read.data_alone.covariance_parts is not None
+    np.testing.assert_allclose(
+        read.data_alone.covariance_parts.systematic, wrote.data_alone.covariance_parts.systematic, rtol=1e-12
+    )
     for one in ("vehicle_type", "vehicles", "left_out", "widened", "freedom"):
         assert getattr(wrote.prior, one) == getattr(read.prior, one)
     assert (wrote.used, wrote.squared, wrote.limit) == (read.used, read.squared, read.limit)

@@ -1,0 +1,26 @@
+"""What of a pose's covariance rests on stated standard deviations, and not on how the pairs scatter."""
+
+from dataclasses import dataclass
+
+from calib_core.arrays import Matrix66, frozen_array
+
+__all__ = ["CovarianceParts"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CovarianceParts:
+    """Two parts of a pose's covariance; what is left over is the scatter of the pairs. Their sum is at most the covariance.
+
+    Attributes:
+        systematic: (6, 6) from the errors that all pairs share, of radar, lens and clicks: another session with these sensors
+            has them again.
+        camera_position: (6, 6) from the measured camera position: another session has it again only if it is not measured anew;
+            zeros without one.
+    """
+
+    systematic: Matrix66
+    camera_position: Matrix66
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "systematic", frozen_array(self.systematic, (6, 6)))
+        object.__setattr__(self, "camera_position", frozen_array(self.camera_position, (6, 6)))
