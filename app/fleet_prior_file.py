@@ -62,8 +62,10 @@ class FleetPriorFile:
         Raises:
             InputError: it does.
         """
-        if vehicle is not None and vehicle in self.prior.vehicles:
+        same = {name for name in self.prior.vehicles if vehicle and name.casefold() == vehicle.strip().casefold()}
+        if same:
+            name = vehicle if vehicle in same else f"{vehicle} ({sorted(same)[0]})"
             raise InputError(
-                f"{self.file.name}: the prior rests on {vehicle} itself, so that its earlier calibrations would count twice; "
-                f"write one without it (cocalib fleet prior {self.prior.vehicle_type} OUT --without {vehicle} --out FILE)"
+                f"{self.file.name}: the prior rests on {name} itself, so that its earlier calibrations would count twice; "
+                f"write one without it (cocalib fleet prior {self.prior.vehicle_type} OUT --without {sorted(same)[0]} --out FILE)"
             )

@@ -265,7 +265,9 @@ def _with_clock_warnings(calibration: Calibration, warnings: Sequence[DataWarnin
     fleet = calibration.fleet
     if not warnings or fleet is None or fleet.data_alone is None or fleet.data_alone.verdict not in ("good", "usable"):
         return warned
-    return replace(warned, fleet=replace(fleet, data_alone=replace(fleet.data_alone, verdict="weak")))
+    return replace(
+        warned, fleet=replace(fleet, data_alone=replace(fleet.data_alone, verdict="weak", reason=warnings[0].message))
+    )
 
 
 def _with_noise(pair: Pair, options: CalibrationOptions) -> Pair:
@@ -361,7 +363,8 @@ def _with_fleet(
     """
     if isinstance(alone, Unsolvable) and alone.code != DEGENERATE:
         return alone
-    fleet = fleet_answer(prior, alone, verdict_on(alone).level)
+    judged = verdict_on(alone)
+    fleet = fleet_answer(prior, alone, judged.level, judged.reason)
     if not fleet.used and isinstance(alone, Calibration):
         return replace(alone, fleet=fleet, warnings=(*fleet_warnings(fleet, alone), *alone.warnings))
     informed = replace(task, fleet=fleet)

@@ -35,6 +35,12 @@ class FleetPrior:
     def __post_init__(self) -> None:
         object.__setattr__(self, "covariance", frozen_array(self.covariance, (6, 6)))
 
+    @property
+    def named(self) -> str:
+        """Which prior it is, within a sentence: "prior of type van (5 vehicles)"."""
+        count = len(self.vehicles)
+        return f"prior of type {self.vehicle_type} ({count} {'vehicle' if count == 1 else 'vehicles'})"
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DataAlone:
@@ -45,6 +51,7 @@ class DataAlone:
         covariance: (6, 6) of its error, as `Calibration.covariance`.
         covariance_quantile: the factor on covariance that gives the 95 % ellipsoid.
         verdict: the level of the verdict on it, such as "usable"; "" if nobody judged it.
+        reason: why it is of that level, or the error that it states; "" if unknown.
         covariance_parts: what of the covariance rests on stated standard deviations; None if unknown.
     """
 
@@ -52,6 +59,7 @@ class DataAlone:
     covariance: Matrix66
     covariance_quantile: float
     verdict: str = ""
+    reason: str = ""
     covariance_parts: CovarianceParts | None = None
 
     def __post_init__(self) -> None:

@@ -5,7 +5,7 @@ each warning decide the level; docs/warnings.md lists both, and the measured sha
 """
 
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
@@ -26,6 +26,7 @@ __all__ = [
     "USABLE_DEG",
     "Verdict",
     "VerdictLevel",
+    "level_named",
     "placement_words",
     "verdict_on",
 ]
@@ -80,6 +81,11 @@ class Verdict:
 
     def __str__(self) -> str:
         return f"{self.line}\n  {self.action}"
+
+
+def level_named(name: str) -> VerdictLevel | None:
+    """Return the level with a name; None if there is none."""
+    return next((level for level in get_args(VerdictLevel) if level == name), None)
 
 
 def verdict_on(outcome: Calibration | Unsolvable | None, *, left: int | None = None, unconfirmed: int = 0) -> Verdict:

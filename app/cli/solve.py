@@ -189,6 +189,12 @@ class Solve:
         require_default(self.options, fleet.prior)
         fleet.require_of_type(self.vehicle.vehicle_type)
         fleet.require_not_of(self.vehicle.vehicle)
+        if self.vehicle.vehicle is None:
+            print(
+                f"{self.fleet_prior}: a prior must not rest on the vehicle that it is used for, and nobody said which this is: "
+                "name it with --vehicle",
+                file=sys.stderr,
+            )
         return fleet
 
     def _placed(

@@ -74,6 +74,8 @@ def compare_sessions(fleet: FleetRecord, a: str, b: str) -> ComparedSessions:
     types = [vehicle.vehicle_type for vehicle, _ in (first, second)]
     if first[0].name != second[0].name and None not in types and types[0] != types[1]:
         raise InputError(f"{a} is of type {types[0]} and {b} of type {types[1]}; compare vehicles of one type")
+    if first[1] is second[1]:
+        raise InputError(f"{a} and {b} are the same session; name two, as cocalib fleet history lists them")
     pose_a, pose_b = _pose(first[1], a), _pose(second[1], b)
     if first[0].name != second[0].name:
         return _of_two_vehicles(pose_a, pose_b)

@@ -7,11 +7,12 @@ import numpy as np
 from app.view.number_format import plain, with_sigma
 from calib_core.arrays import Matrix66, Values
 from calib_core.fleet.mounting_coordinates import coordinate_jacobian, coordinates
-from calib_core.fleet_prior import FleetAnswer
+from calib_core.fleet_prior import DataAlone, FleetAnswer
 from calib_core.geometry import RigidTransform
 from calib_core.pose_difference import pose_difference
 from calib_core.results import Calibration
 from calib_core.stated_error import StatedError, stated_error
+from calib_core.verdict import Verdict, level_named
 
 __all__ = ["FleetAxis", "fleet_axes", "fleet_sentences"]
 
@@ -57,19 +58,32 @@ def fleet_sentences(calibration: Calibration) -> tuple[str, ...]:
     fleet = calibration.fleet
     if fleet is None:
         return ()
-    count = len(fleet.prior.vehicles)
-    named = f"the prior of type {fleet.prior.vehicle_type} ({count} {'vehicle' if count == 1 else 'vehicles'})"
+    named = f"the {fleet.prior.named}"
     if fleet.data_alone is None:
         return (f"The pose rests on {named}; the data alone give no pose, so it is not tested.",)
     if not fleet.used:
         return (f"Not used, as the data contradict {named}: {_distance(fleet)}.",)
     away = pose_difference(fleet.data_alone.camera_from_radar, calibration.camera_from_radar, np.full((6, 6), np.nan))
-    with_prior, alone = stated_error(calibration), stated_error(calibration.of_data_alone(fleet.data_alone))
     return (
-        f"The pose rests on the data and on {named}: {_error(with_prior)} (95 %).",
-        f"The data alone: {_error(alone)} (95 %), {plain(away.rotation_deg, 2)} deg and {plain(away.position_cm, 2)} cm from "
-        f"this pose; they agree with the prior: {_distance(fleet)}.",
+        f"The pose rests on the data and on {named}: {_error(stated_error(calibration))} (95 %).",
+        f"The data alone{_alone(calibration, fleet.data_alone)}.",
+        f"They are {plain(away.rotation_deg, 2)} deg and {plain(away.position_cm, 2)} cm from this pose, and "
+        f"{_agreement(calibration)}: {_distance(fleet)}.",
     )
+
+
+def _alone(calibration: Calibration, alone: DataAlone) -> str:
+    """Return what the data alone would come to."""
+    level = level_named(alone.verdict)
+    if level is not None and alone.reason:
+        return f" would be {Verdict(level, alone.reason, '').line}"
+    return f": {_error(stated_error(calibration.of_data_alone(alone)))} (95 %)"
+
+
+def _agreement(calibration: Calibration) -> str:
+    if any(warning.code == "far-from-its-kind" for warning in calibration.warnings):
+        return "far from the prior, though not beyond the point where they contradict it"
+    return "agree with the prior"
 
 
 def _column(pose: RigidTransform, covariance: Matrix66, mean: RigidTransform) -> tuple[str, ...]:

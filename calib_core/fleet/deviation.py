@@ -12,7 +12,7 @@ __all__ = ["Deviation", "departure", "deviation"]
 
 _WHOLE = 5.0
 _MOST_OF_FREEDOM = 0.8
-_AXES = ("forward", "left", "up", "roll", "pitch", "yaw")
+_AXES = ("camera forward", "camera left", "camera up", "roll", "pitch", "yaw")
 _MOST_KNOWN = 1e7
 _NAMED, _MOST_NAMED = 3.0, 3
 _TO_SHOWN = np.array([100.0] * 3 + [180.0 / np.pi] * 3)
@@ -53,9 +53,14 @@ class Deviation:
         named = [axis for axis in order if abs(self.coordinates[axis]) >= _NAMED * sigma[axis]] or order[:1]
         shown = [(axis, self.coordinates[axis] * _TO_SHOWN[axis], sigma[axis] * _TO_SHOWN[axis]) for axis in named]
         return ", ".join(
-            f"{'camera ' if axis < 3 else ''}{_AXES[axis]} {value:+.2g} {'cm' if axis < 3 else 'deg'} (± {spread:.2g})"
+            f"{_AXES[axis]} {_figure(value, '+')} {'cm' if axis < 3 else 'deg'} (± {_figure(spread)})"
             for axis, value, spread in shown
         )
+
+
+def _figure(value: float, sign: str = "") -> str:
+    """Return two digits, or all before the point."""
+    return f"{value:{sign}.2g}" if abs(value) < 99.5 else f"{value:{sign}.0f}"
 
 
 def deviation(effects: RandomEffects, vector: Values, covariance: Matrix66, *, freedom: float) -> Deviation:

@@ -35,7 +35,8 @@ def test_a_recording_is_solved_with_it_and_again_from_its_file(
     answer = cocalib("solve", made(), "--clicks", clicks_file, "--fleet-prior", prior, "--out", out)
     assert answer.code == 0, answer.err
     assert "fleet: The pose rests on the data and on the prior of type van (20 vehicles): " in answer.out
-    assert "fleet: The data alone: " in answer.out
+    assert "fleet: The data alone would be " in answer.out
+    assert "nobody said which this is: name it with --vehicle" in answer.err
     document = json.loads(out.read_text())
     assert document["fleet_prior"]["used"] is True
     assert document["provenance"]["inputs"][-1] == {
@@ -80,6 +81,8 @@ def test_the_prior_of_another_type_or_of_the_vehicle_itself_is_refused(
     assert "the prior is of vehicles of type van, and this vehicle is of type truck" in answer.err
     answer = cocalib(*solve, "--vehicle", "V3", "--vehicle-type", "van")
     assert (answer.code, "the prior rests on V3 itself" in answer.err) == (2, True)
+    answer = cocalib(*solve, "--vehicle", "v3")
+    assert (answer.code, "the prior rests on v3 (V3) itself" in answer.err) == (2, True)
 
 
 def test_another_file_in_its_place_is_named(cocalib: Cocalib, pairs_file: Callable[..., Path], tmp_path: Path) -> None:

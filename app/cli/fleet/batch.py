@@ -69,12 +69,14 @@ class Batch:
 
     def _calibrate(self, manifest: "Manifest") -> int:
         from app.batch.driving import chosen_engine, drive, shard_of
+        from app.batch.fleet_priors import require_priors_of_others
         from app.batch.job import jobs_of
         from app.batch.plan import write_plan
         from app.batch.results_folder import ResultsFolder
         from app.cli.fleet.batch_text import batch_lines, exit_code, shown_batch
 
         shard = None if self.shard is None else _shard(self.shard)
+        require_priors_of_others(manifest)
         results = ResultsFolder(self.out or manifest.source.with_suffix(""))
         try:
             results.remove_leftovers()

@@ -415,12 +415,13 @@ class CovariancePartsDocument(Struct, frozen=True, omit_defaults=True):
 
 
 class DataAloneDocument(Struct, frozen=True, omit_defaults=True):
-    """The answer of the pairs without the fleet's prior, with the level of the verdict on it."""
+    """The answer of the pairs without the fleet's prior, with level and reason of the verdict on it."""
 
     camera_from_radar: TransformDocument
     covariance: Matrix66
     covariance_quantile: float | None = None
     verdict: VerdictLevel | None = None
+    reason: str | None = None
     covariance_parts: CovariancePartsDocument | None = None
 
 

@@ -1,7 +1,5 @@
 """What a fleet's prior did to a calibration, in a calibration-1 file."""
 
-from typing import get_args
-
 from calib_core.fleet_prior import DataAlone, FleetAnswer
 from calib_core.interchange.own.covariance_parts_document import covariance_parts_document, covariance_parts_of
 from calib_core.interchange.own.documents import DataAloneDocument, FleetAnswerDocument
@@ -9,7 +7,7 @@ from calib_core.interchange.own.fleet_prior_fields import fleet_prior_fields, fl
 from calib_core.interchange.own.numbers import finite_or_none, nan_if_none, nested
 from calib_core.interchange.own.stated_covariance import stated_covariance
 from calib_core.interchange.own.transform_document import transform_document, transform_of
-from calib_core.verdict import VerdictLevel
+from calib_core.verdict import level_named
 
 __all__ = ["fleet_answer_document", "fleet_answer_of"]
 
@@ -48,7 +46,8 @@ def _alone_document(alone: DataAlone) -> DataAloneDocument:
         camera_from_radar=transform_document(alone.camera_from_radar),
         covariance=nested(alone.covariance + 0.0),
         covariance_quantile=finite_or_none(alone.covariance_quantile),
-        verdict=_level(alone.verdict),
+        verdict=level_named(alone.verdict),
+        reason=alone.reason or None,
         covariance_parts=covariance_parts_document(alone.covariance_parts),
     )
 
@@ -60,9 +59,6 @@ def _alone_of(document: DataAloneDocument, *, source: str) -> DataAlone:
         stated_covariance(document.covariance, source=source, place=f"{place}.covariance"),
         nan_if_none(document.covariance_quantile),
         document.verdict or "",
+        document.reason or "",
         covariance_parts_of(document.covariance_parts, source=source, place=f"{place}.covariance_parts"),
     )
-
-
-def _level(verdict: str) -> VerdictLevel | None:
-    return next((level for level in get_args(VerdictLevel) if level == verdict), None)

@@ -48,6 +48,14 @@ def _no_variance(document: dict[str, Any]) -> None:
     document["covariance"][5][5] = 0.0
 
 
+def _in_millimetres(document: dict[str, Any]) -> None:
+    document["covariance"] = (25.0 * np.eye(6)).tolist()
+
+
+def _pinned(document: dict[str, Any]) -> None:
+    document["covariance"] = (1e-12 * np.eye(6)).tolist()
+
+
 def _mirrored(document: dict[str, Any]) -> None:
     document["camera_from_radar"] = {"rotation": [[-1, 0, 0], [0, 1, 0], [0, 0, 1]], "translation_m": [0, 0, 0]}
 
@@ -77,6 +85,11 @@ def _misspelt(document: dict[str, Any]) -> None:
     [
         (_asymmetric, r"fleet\.json: covariance: is not symmetric"),
         (_indefinite, r"fleet\.json: covariance: is not positive definite"),
+        (
+            _in_millimetres,
+            r"covariance: a standard deviation of 5 rad is not how vehicles are mounted \(1e-05 to 1.6 rad\)",
+        ),
+        (_pinned, r"covariance: a standard deviation of 1e-06 m is not how vehicles are mounted \(0.0001 to 10 m\)"),
         (_no_variance, r"fleet\.json: covariance: a variance .* not positive"),
         (_mirrored, r"fleet\.json: camera_from_radar\.rotation"),
         (_twice, r"fleet\.json: .*'van 1' occurs twice"),

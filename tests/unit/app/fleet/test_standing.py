@@ -79,7 +79,8 @@ def test_two_sessions_of_a_vehicle_are_compared(fleet: FleetRecord) -> None:
     compared = compare_sessions(fleet, "V002/s0", "V002/s1")
     assert compared.outcome == "differs"
     assert compared.words.startswith("this radar was remounted")
-    assert compare_sessions(fleet, "V001/s1", "V001/s1").change.rotation_deg == 0.0
+    with pytest.raises(InputError, match="V001 and V001/s1 are the same session; name two"):
+        compare_sessions(fleet, "V001", "V001/s1")
 
 
 def test_two_vehicles_differ_without_a_remount(fleet: FleetRecord) -> None:
@@ -96,7 +97,8 @@ def test_a_vehicle_is_compared_by_its_last_session_that_can_be(fleet: FleetRecor
 
 
 def test_names_with_slashes_are_found(fleet: FleetRecord) -> None:
-    assert compare_sessions(fleet, "truck/1", "truck/1/s/0").a.session == "s/0"
+    with pytest.raises(InputError, match="are the same session"):
+        compare_sessions(fleet, "truck/1", "truck/1/s/0")
 
 
 @pytest.mark.parametrize(

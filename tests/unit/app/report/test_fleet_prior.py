@@ -8,7 +8,7 @@ import numpy as np
 from app.report import report_html
 from app.view.fleet_answer import fleet_axes, fleet_sentences
 from calib_core.fleet_prior import DataAlone, FleetAnswer, FleetPrior
-from calib_core.results import Calibration
+from calib_core.results import Calibration, DataWarning
 from tests.unit.app.report.planted import golden, subject_for
 
 _SCATTER = np.diag([0.02] * 3 + [0.01] * 3) ** 2
@@ -34,9 +34,19 @@ def test_the_three_stand_side_by_side_with_their_sigmas(project_root: Path) -> N
 def test_the_words_say_whether_it_was_used_and_tested(project_root: Path) -> None:
     known = golden(project_root)
     assert fleet_sentences(known) == ()
-    used, data = fleet_sentences(_with_fleet(known))
+    used, data, away = fleet_sentences(_with_fleet(known))
     assert used.startswith("The pose rests on the data and on the prior of type <van> (20 vehicles): ")
-    assert "1.1 deg" in data
+    assert data.startswith("The data alone: ")
+    assert away.startswith("They are 1.1 deg and ")
+    assert "and agree with the prior: squared distance" in away
+    judged = _with_fleet(known)
+    assert judged.fleet is not None
+    assert judged.fleet.data_alone is not None
+    few = replace(judged.fleet.data_alone, verdict="weak", reason="uncertain to 4 deg, 50 cm (95 %), from only 6 pairs")
+    said = fleet_sentences(replace(judged, fleet=replace(judged.fleet, data_alone=few)))[1]
+    assert said == "The data alone would be weak: uncertain to 4 deg, 50 cm (95 %), from only 6 pairs."
+    far = replace(judged, warnings=(DataWarning("far-from-its-kind", "far", "look"),))
+    assert "and far from the prior, though not beyond the point where they contradict it: " in fleet_sentences(far)[2]
     assert fleet_sentences(_with_fleet(known, used=False))[0].startswith("Not used, as the data contradict the prior")
     assert "not tested" in fleet_sentences(_with_fleet(known, tested=False))[0]
 
