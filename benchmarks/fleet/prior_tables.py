@@ -13,7 +13,21 @@ from calib_core.verdict import VerdictLevel
 if TYPE_CHECKING:
     from benchmarks.fleet.prior_value import FleetFigures, OffKindTrial
 
-__all__ = ["answers_table", "gain_table", "off_kind_table", "prior_table", "share_by_fleet"]
+__all__ = [
+    "ANSWER_HEADINGS",
+    "answer_cells",
+    "answers_table",
+    "gain_table",
+    "off_kind_table",
+    "prior_table",
+    "share_by_fleet",
+]
+
+ANSWER_HEADINGS = (
+    "solved | sigma | true error over sigma | coverage of the answer | good, usable, weak, contradictory, none | "
+    "good or usable: outside the stated error | off-its-kind | fleet-prior-decides"
+)
+"""Columns of `answer_cells`."""
 
 _Rows = Mapping[Setting, "Sequence[FleetFigures]"]
 _STATED: tuple[VerdictLevel, ...] = ("good", "usable")
@@ -39,11 +53,7 @@ def prior_table(rows: _Rows) -> Iterator[str]:
 def answers_table(rows: _Rows) -> Iterator[str]:
     """Say what the prior does to sound vehicles: sigma, true error, coverage, verdicts."""
     yield ""
-    yield (
-        "| scatter | placements | solved | sigma | true error over sigma | coverage of the answer | "
-        "good, usable, weak, contradictory, none | good or usable: outside the stated error | off-its-kind | "
-        "fleet-prior-decides |"
-    )
+    yield f"| scatter | placements | {ANSWER_HEADINGS} |"
     yield "|---|---|---|---|---|---|---|---|---|---|"
     for setting, fleets in rows.items():
         for column in ((6, False), (6, True), (20, False), (20, True)):
@@ -51,7 +61,7 @@ def answers_table(rows: _Rows) -> Iterator[str]:
             answers = [one for row in by_fleet for one in row]
             name = f"{column[0]}{' and the prior' if column[1] else ''}"
             if answers:
-                yield f"| {setting.text} | {name} | {_answers(answers, by_fleet)} |"
+                yield f"| {setting.text} | {name} | {answer_cells(answers, by_fleet)} |"
 
 
 def off_kind_table(rows: "Mapping[Setting, Sequence[OffKindTrial]]") -> Iterator[str]:
@@ -93,7 +103,8 @@ def share_by_fleet(flags: Sequence[Sequence[bool]]) -> str:
     return f"{100.0 * shares.mean():.1f} ± {100.0 * error:.1f} %"
 
 
-def _answers(answers: Sequence[Answer], by_fleet: Sequence[Sequence[Answer]]) -> str:
+def answer_cells(answers: Sequence[Answer], by_fleet: Sequence[Sequence[Answer]]) -> str:
+    """Return what came of answers, all and by fleet, as the cells under `ANSWER_HEADINGS`."""
     solved = [one for one in answers if np.isfinite(one.sigma_cm)]
     cm, deg, error_cm, error_deg = np.array(
         [[one.sigma_cm, one.sigma_deg, one.error_cm, one.error_deg] for one in solved]

@@ -4,6 +4,11 @@ import json
 from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from calib_core.geometry import RigidTransform
 
 __all__ = ["FleetTruth", "TrueSession", "read_truth"]
 
@@ -19,12 +24,14 @@ class TrueSession:
         session: its name.
         remounted: the camera was mounted again since the session before.
         fault: what is wrong; None if nothing is.
+        camera_from_radar: the true pose.
     """
 
     vehicle: str
     session: str
     remounted: bool
     fault: str | None
+    camera_from_radar: RigidTransform
 
     @property
     def name(self) -> str:
@@ -73,6 +80,10 @@ class FleetTruth:
 def read_truth(fleet: Path) -> FleetTruth:
     """Read the truth of a fleet from its folder."""
     rows = json.loads((fleet / "truth.json").read_text(encoding="utf-8"))["sessions"]
-    return FleetTruth(
-        tuple(TrueSession(one["vehicle"], one["session"], one["remounted"], one["fault"]) for one in rows)
-    )
+    return FleetTruth(tuple(_session(one) for one in rows))
+
+
+def _session(row: dict[str, Any]) -> TrueSession:
+    pose = row["camera_from_radar"]
+    camera_from_radar = RigidTransform(np.array(pose["rotation"]), np.array(pose["translation_m"]))
+    return TrueSession(row["vehicle"], row["session"], row["remounted"], row["fault"], camera_from_radar)

@@ -7,10 +7,14 @@ import pytest
 
 from app.fleet.index import read_fleet
 from benchmarks.fleet.judging import judge, main
+from benchmarks.fleet.recorded_priors import held_by
 from benchmarks.fleet.truth import FleetTruth, TrueSession
+from calib_core.fleet_prior import FleetPrior
+from calib_core.geometry import RigidTransform
 from tests.unit.app.fleet.made_results import make_fleet, make_result
 
 _TURNED = np.array([0.0, 0.0, 0.0, 0.1, 0.0, 0.0])
+_POSE = RigidTransform(np.eye(3), np.zeros(3))
 _QUESTIONS = ("accounted", "remounts", "wrong radars", "spoilt", "unchanged", "of their kind", "trusted")
 
 
@@ -21,8 +25,8 @@ def _truth(vehicles: int = 6, **faults: str) -> FleetTruth:
         fault = faults.get(name)
         said = None if fault == "remounted" else fault
         rows += [
-            TrueSession(name, "s0", False, said),
-            TrueSession(name, "s1", fault == "remounted", said),
+            TrueSession(name, "s0", False, said, _POSE),
+            TrueSession(name, "s1", fault == "remounted", said, _POSE),
         ]
     return FleetTruth(tuple(rows))
 
@@ -80,7 +84,7 @@ def test_a_session_without_a_result_or_without_a_reason_is_not_accounted_for(tmp
     make_fleet(tmp_path, 2)
     make_result(tmp_path, "V000", "s2", status="failed")
     make_result(tmp_path, "V000", "s3", status="refused", reason="nothing was clicked")
-    more = tuple(TrueSession("V000", name, False, None) for name in ("s2", "s3", "s4"))
+    more = tuple(TrueSession("V000", name, False, None, _POSE) for name in ("s2", "s3", "s4"))
     truth = FleetTruth((*_truth(2).sessions, *more))
     assert _wrong(truth, tmp_path) == {"accounted": 2, "trusted": 2}
 
@@ -92,8 +96,9 @@ def test_a_broken_recording_has_to_fail(sound: Path) -> None:
 def test_the_exit_code_says_whether_anything_is_wrong(
     sound: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    pose = '"camera_from_radar": {"rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "translation_m": [0, 0, 0]}'
     rows = [
-        f'{{"vehicle": "{one.vehicle}", "session": "{one.session}", "remounted": false, "fault": null}}'
+        f'{{"vehicle": "{one.vehicle}", "session": "{one.session}", "remounted": false, "fault": null, {pose}}}'
         for one in _truth().sessions
     ]
     truth = tmp_path / "truth.json"
@@ -102,3 +107,11 @@ def test_the_exit_code_says_whether_anything_is_wrong(
     truth.write_text(f'{{"sessions": [{", ".join([*rows, rows[0].replace("s0", "s9")])}]}}')
     assert main([str(tmp_path), str(sound)]) == 1
     assert "wrong: V000/s9: no result" in capsys.readouterr().out
+
+
+def test_a_true_mounting_is_held_by_a_prior_around_it_and_not_by_one_beside_it() -> None:
+    prior = FleetPrior("van", _POSE, np.diag([0.01] * 3 + [0.005] * 3) ** 2, ("V1",))
+    one = TrueSession("V2", "s1", False, None, _POSE.perturbed(np.array([0.01, 0.0, 0.0, 0.0, 0.0, 0.0])))
+    assert held_by(prior, one) == {"all": True, "position": True, "rotation": True}
+    turned = TrueSession("V2", "s1", False, None, _POSE.perturbed(np.array([0.0, 0.0, 0.0, 0.0, 0.03, 0.0])))
+    assert held_by(prior, turned) == {"all": False, "position": True, "rotation": False}
