@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import psutil
+from distributed import Client, Nanny
 
 __all__ = ["scheduler_process", "worker_process", "worker_processes"]
 
@@ -28,11 +29,23 @@ def worker_process(
     address: str, *, count: int = 1, environment: Mapping[str, str] | None = None
 ) -> Iterator["subprocess.Popen[str]"]:
     """Start workers, as children of the given process, which starts them again when they are killed."""
-    arguments = ("--nworkers", str(count), "--nthreads", "1", "--no-dashboard", "--death-timeout", "5")
+    arguments = ("--nworkers", str(count), "--nthreads", "1", "--no-dashboard", "--death-timeout", "60")
     with _process("distributed.cli.dask_worker", address, *arguments, environment=environment) as process:
         for _ in range(count):
             _said(process, r"(Registered to)")
+        _wait_for_nannies(address)
         yield process
+
+
+def _wait_for_nannies(address: str) -> None:
+    """Wait until the parents of the workers have noticed that these run: a worker killed before ends its parent, too."""
+    with Client(address) as client:
+        while set(client.run(_status, nanny=True).values()) != {"running"}:
+            pass
+
+
+def _status(dask_worker: Nanny) -> str:
+    return dask_worker.status.name
 
 
 def worker_processes(parent: int) -> list[psutil.Process]:

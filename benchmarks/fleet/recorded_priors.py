@@ -20,6 +20,7 @@ from app.fleet.index import read_fleet
 from app.fleet.kinds import prior_of_type
 from app.fleet.records import FleetRecord
 from app.recorded_clicks import clicks_in_recording, file_of_clicks
+from app.required_camera import required_camera
 from app.solving import solve_clicks
 from benchmarks.fleet.paired_fleet import Answer, answered, sigmas
 from benchmarks.fleet.prior_tables import ANSWER_HEADINGS, answer_cells
@@ -90,7 +91,7 @@ def _answer(row: ManifestRow, truth: TrueSession, prior: FleetPrior, given: Give
         options = replace(options, solving=replace(options.solving, camera_position=None))
     assert row.clicks is not None
     with open_recording(row.recording, row.topics) as recording:
-        camera = recording.camera()
+        camera = required_camera(recording, None)
         clicks = clicks_in_recording(file_of_clicks(row.clicks).clicks, recording, camera, source=row.clicks).clicks
         chosen = clicks[:: given.every]
         outcome = solve_clicks(recording, chosen, camera, options, prior if given.prior else None)
