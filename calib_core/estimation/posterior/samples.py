@@ -35,6 +35,8 @@ _MOST_PEAKS = 8
 _SAME = 4.0  # squared distance, in standard deviations
 _REFINING_ROUNDS = 8
 _LEAST_DEGREES = 3.0  # of each noise scale
+_SINGULAR, _LEAST_INFORMATION = 1e-12, 1e-12
+"""The smallest eigenvalue of a Hessian with a unit diagonal that is more than rounding, and the least entry of a diagonal."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,7 +125,7 @@ class _Peaks:
 
     Attributes:
         poses: k of them.
-        covariances: (k, 6, 6) of (dt, dtheta).
+        covariances: (k, 6, 6) of (dt, dtheta); zeros where there is no peak.
         log_scales: (k, 4) of the noise; (k, 0) if it is known.
     """
 
@@ -156,9 +158,19 @@ def _peaks(
     log_scales = np.concatenate([log_scales[:1], log_scales])
     return _Peaks(
         joined_poses([batch_of(others[:1]), modes.poses]),
-        np.concatenate([covariance[None], np.linalg.pinv(modes.hessians, hermitian=True)]),
+        np.concatenate([covariance[None], _covariances(modes.hessians)]),
         log_scales if refined.degrees_of_freedom > 0 else log_scales[:, :0],
     )
+
+
+def _covariances(hessians: np.ndarray) -> np.ndarray:
+    """Return the inverses (k, 6, 6) of Hessians; zeros for one that is singular to rounding: no peak is there."""
+    scale = np.sqrt(np.maximum(np.diagonal(hessians, axis1=1, axis2=2), _LEAST_INFORMATION))
+    scaled = hessians / (scale[:, :, None] * scale[:, None, :])
+    values, vectors = np.linalg.eigh(scaled)
+    peaked = values[:, 0] > _SINGULAR
+    inverse = (vectors / np.where(peaked[:, None], values, 1.0)[:, None, :]) @ vectors.swapaxes(1, 2)
+    return np.where(peaked[:, None, None], inverse / (scale[:, :, None] * scale[:, None, :]), 0.0)
 
 
 def _likeliest(posterior: PosePosterior, peaks: _Peaks) -> _Peaks:
