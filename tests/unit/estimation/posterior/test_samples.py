@@ -1,8 +1,13 @@
 """Posterior samples agree with the local covariance where it holds, and find what it cannot describe."""
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 
+from calib_core.estimation.posterior import samples
+from calib_core.estimation.posterior.modes import Modes, refine_poses
 from calib_core.estimation.posterior.pose_batch import batch_of
 from calib_core.estimation.posterior.pose_posterior import pose_posterior
 from calib_core.estimation.posterior.samples import PosteriorSamples, sample_posterior
@@ -122,3 +127,22 @@ def test_the_posterior_falls_away_from_the_truth_and_does_not_care_about_outlier
     assert (np.diff(costs) > 0.0).all() or costs[3] > costs[1] > costs[0]
     terms = posterior.pair_terms(batch_of([truth]), np.zeros((1, 4)))
     assert (terms.outlier_probabilities(0.7)[0][~simulated.outlier] < 0.5).all()
+
+
+def test_a_start_whose_pose_is_not_determined_is_not_sampled(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its Hessian is singular, and rounding may turn the zero into a small negative number."""
+
+    def with_one_undetermined(*arguments: Any, **options: Any) -> Modes:
+        modes = refine_poses(*arguments, **options)
+        values, vectors = np.linalg.eigh(modes.hessians[-1])
+        values[:2] = -1e-14 * values[-1], 1e-14 * values[-1]
+        hessians = modes.hessians.copy()
+        hessians[-1] = (vectors * values) @ vectors.T
+        return replace(modes, hessians=hessians)
+
+    solved = solve_draw(simulate_pairs(20, rng=np.random.default_rng(4), noise="ti"))
+    plain = sampled(solved)
+    monkeypatch.setattr(samples, "refine_poses", with_one_undetermined)
+    drawn = sampled(solved)
+    assert np.isfinite(drawn.samples.states).all()
+    assert drawn.mean().translation_m == pytest.approx(plain.mean().translation_m, abs=0.02)
