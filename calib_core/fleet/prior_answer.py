@@ -1,16 +1,13 @@
 """What a fleet's prior does to a calibration: the test of the data alone against it, and what the user must know."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from calib_core.fleet.deviation import Deviation
 from calib_core.fleet.prior_test import prior_test
-from calib_core.fleet.session_pose import CHI2_95
 from calib_core.fleet_prior import DataAlone, FleetAnswer, FleetPrior
 from calib_core.measurements import Unsolvable
 from calib_core.results import Calibration, DataWarning
-from calib_core.stated_error import StatedError, stated_error
+from calib_core.stated_error import stated_error
 
 __all__ = ["fleet_answer", "fleet_warnings"]
 
@@ -96,7 +93,10 @@ def _far(fleet: FleetAnswer, away: Deviation) -> tuple[DataWarning, ...]:
 def _decides(fleet: FleetAnswer, alone: DataAlone, calibration: Calibration) -> tuple[DataWarning, ...]:
     """Say that the data alone are much less certain, so that a mounting unlike the others would be pulled to them."""
     without = stated_error(calibration.of_data_alone(alone))
-    if not _is_larger(without, stated_error(calibration)):
+    with_prior = stated_error(calibration)
+    rotation = without.rotation_deg >= _DECIDES * with_prior.rotation_deg
+    position = without.position_cm >= _DECIDES * with_prior.position_cm
+    if not (rotation or position):
         return ()
     if without.rotation_deg > _UNTESTED_DEG:
         return (
@@ -107,38 +107,13 @@ def _decides(fleet: FleetAnswer, alone: DataAlone, calibration: Calibration) -> 
                 "add placements: near and far, left and right",
             ),
         )
+    tape = "" if calibration.options.solving.camera_position else ", or measure this vehicle's camera position"
     return (
         DataWarning(
             "fleet-prior-decides",
             f"the pose rests on the fleet's {fleet.prior.named}: the "
             f"data alone are uncertain to {without.rotation_deg:g} deg, {without.position_cm:g} cm (95 %), so a mounting that "
             "differs by less would be drawn to the others' unnoticed",
-            _what_would_decide(fleet.prior, alone, calibration),
+            f"add placements{tape}: the more the data know, the more they decide",
         ),
-    )
-
-
-def _is_larger(without: StatedError, with_prior: StatedError) -> bool:
-    """Return whether an error without the prior is so much larger that the prior decides."""
-    return (
-        without.rotation_deg > _DECIDES * with_prior.rotation_deg
-        or without.position_cm > _DECIDES * with_prior.position_cm
-    )
-
-
-def _what_would_decide(prior: FleetPrior, alone: DataAlone, calibration: Calibration) -> str:
-    """Say what would let the data decide: placements, unless the errors that they all share outweigh the prior."""
-    enough = "add placements: with enough of them the data decide"
-    if alone.covariance_parts is None:
-        return enough
-    left = alone.covariance_parts.systematic
-    with_prior = left - left @ np.linalg.solve(left + prior.covariance, left)
-    many = replace(alone, covariance=left, covariance_quantile=CHI2_95)
-    error = stated_error(calibration.of_data_alone(many))
-    if not _is_larger(error, stated_error(calibration.of_data_alone(replace(many, covariance=with_prior)))):
-        return enough
-    tape = "" if calibration.options.solving.camera_position else ", and measure this vehicle's camera position"
-    return (
-        f"add placements to test it{tape}: what radar, lens and clicks may be off by leaves {error.rotation_deg:g} deg, "
-        f"{error.position_cm:g} cm (95 %) however many there are"
     )
