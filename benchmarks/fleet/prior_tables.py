@@ -99,8 +99,9 @@ def gain_table(gains: "Sequence[tuple[Spread, dict[int, list[tuple[Answer, Answe
 def share_by_fleet(flags: Sequence[Sequence[bool]]) -> str:
     """Return a share with its standard error, in percent: vehicles of one fleet are not independent of each other."""
     shares = np.array([np.mean(row) for row in flags])
-    error = shares.std(ddof=1) / np.sqrt(len(shares)) if len(shares) > 1 else float("nan")
-    return f"{100.0 * shares.mean():.1f} ± {100.0 * error:.1f} %"
+    if len(shares) == 1:
+        return f"{100.0 * shares[0]:.1f} %"
+    return f"{100.0 * shares.mean():.1f} ± {100.0 * shares.std(ddof=1) / np.sqrt(len(shares)):.1f} %"
 
 
 def answer_cells(answers: Sequence[Answer], by_fleet: Sequence[Sequence[Answer]]) -> str:

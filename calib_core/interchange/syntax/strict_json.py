@@ -7,6 +7,8 @@ import re
 import types
 from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
+from functools import cache
+from types import MappingProxyType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import msgspec
@@ -177,15 +179,21 @@ def _variants(annotation: Any) -> list[Any]:
     return [annotation]
 
 
-def fields_of(annotation: Any) -> dict[str, Any] | None:
+def fields_of(annotation: Any) -> Mapping[str, Any] | None:
     """Return the keys of a type that represents a JSON object, each with its own type; None for other types."""
-    for part in _variants(annotation):
-        if isinstance(part, type) and issubclass(part, msgspec.Struct):
-            hints = get_type_hints(part)
-            return {field.encode_name: hints[field.name] for field in msgspec.structs.fields(part)}
-        if isinstance(part, type) and dataclasses.is_dataclass(part):
-            hints = get_type_hints(part)
-            return {field.name: hints[field.name] for field in dataclasses.fields(part)}
+    found = (_fields_of_type(part) for part in _variants(annotation) if isinstance(part, type))
+    return next((fields for fields in found if fields is not None), None)
+
+
+@cache
+def _fields_of_type(part: type) -> Mapping[str, Any] | None:
+    """Return the same of a class; looking up the names in its annotations takes longer than reading a file."""
+    if issubclass(part, msgspec.Struct):
+        hints = get_type_hints(part)
+        return MappingProxyType({field.encode_name: hints[field.name] for field in msgspec.structs.fields(part)})
+    if dataclasses.is_dataclass(part):
+        hints = get_type_hints(part)
+        return MappingProxyType({field.name: hints[field.name] for field in dataclasses.fields(part)})
     return None
 
 
