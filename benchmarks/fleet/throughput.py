@@ -11,7 +11,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -33,6 +33,7 @@ from benchmarks.fleet.simulated_fleet import write_fleet
 __all__ = ["killing", "main"]
 
 _LONGEST_PAUSE_S = 3.0
+_LOOK_EVERY_S = 0.1
 _RUNS = ("loop", "none", "dask", "killed")
 
 
@@ -43,6 +44,7 @@ class _Measured:
     processor_seconds: float
     outcomes: tuple[Outcome, ...]
     results: ResultsFolder
+    largest_mb: float
     kills: int = 0
 
 
@@ -73,6 +75,26 @@ def killing(count: int, seed: int) -> Iterator[list[int]]:
         thread.join()
 
 
+@contextmanager
+def _watching() -> Iterator[list[float]]:
+    """Give the memory of the largest process so far [MB]: of a worker, or of this process as long as there is none."""
+    sizes_mb, ended = [0.0], threading.Event()
+
+    def watch() -> None:
+        while not ended.wait(_LOOK_EVERY_S):
+            for process in _workers() or [psutil.Process()]:
+                with suppress(psutil.NoSuchProcess):
+                    sizes_mb[0] = max(sizes_mb[0], process.memory_info().rss / 1e6)
+
+    thread = threading.Thread(target=watch, daemon=True)
+    thread.start()
+    try:
+        yield sizes_mb
+    finally:
+        ended.set()
+        thread.join()
+
+
 def _workers() -> list[psutil.Process]:
     found = []
     for child in psutil.Process(os.getpid()).children():
@@ -88,9 +110,10 @@ def _measured(name: str, folder: Path, run: Callable[[Path], Sequence[Outcome]])
     results = folder / f"results-{name.replace(' ', '-')}"
     shutil.rmtree(results, ignore_errors=True)
     begin_s, begin_processor_s = time.monotonic(), _processor_s()
-    outcomes = tuple(run(results))
+    with _watching() as largest_mb:
+        outcomes = tuple(run(results))
     passed_s, processor_s = time.monotonic() - begin_s, _processor_s() - begin_processor_s
-    return _Measured(name, passed_s, processor_s, outcomes, ResultsFolder(results))
+    return _Measured(name, passed_s, processor_s, outcomes, ResultsFolder(results), largest_mb[0])
 
 
 def _processor_s() -> float:
@@ -144,8 +167,8 @@ def _measured_runs(
 def _table(measured: Sequence[_Measured]) -> str:
     lines = [
         "| run | workers killed | outcomes | solved / weak / refused / failed "
-        "| time | to the first | processor time | jobs that differ |",
-        "|---|---|---|---|---|---|---|---|",
+        "| time | to the first | processor time | largest process | jobs that differ |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     first = measured[0]
     for one in measured:
@@ -153,7 +176,8 @@ def _table(measured: Sequence[_Measured]) -> str:
         counts = " / ".join(str(status[name]) for name in ("solved", "weak", "refused", "failed"))
         lines.append(
             f"| {one.name} | {one.kills} | {len(one.outcomes)} | {counts} | {one.seconds:.0f} s "
-            f"| {one.seconds / first.seconds:.2f} | {one.processor_seconds:.0f} s | {_differences(first, one)} |"
+            f"| {one.seconds / first.seconds:.2f} | {one.processor_seconds:.0f} s | {one.largest_mb:.0f} MB "
+            f"| {_differences(first, one)} |"
         )
     return "\n".join(lines)
 
