@@ -1,6 +1,8 @@
 """A first manifest from a folder of recordings: what belongs together by where it lies, for a person to complete."""
 
 import json
+import os
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +15,9 @@ from calib_core.interchange.own.documents import CLICKS_SCHEMA
 __all__ = ["first_manifest"]
 
 _SUFFIXES = (".bag", ".mcap", ".db3")
+_PLAIN_SUFFIXES = (".avi", ".csv", ".jpeg", ".jpg", ".jsonl", ".mp4", ".pcd", ".png")
+"""Of recordings without ROS: what belongs to one is not to be seen from the names."""
+_MOST_LEFT_OUT = 20
 _BAG_FOLDER = "metadata.yaml"
 _SENSORS = ("radar", "camera", "cam", "image", "images", "video")
 """Words of file names that tell the recordings of one session apart."""
@@ -65,7 +70,25 @@ def first_manifest(folder: Path, manifest: Path) -> tuple[str, int]:
             "yourself if the recordings are pictures and tables"
         )
     home = manifest.absolute().parent
-    return "\n".join([_HEAD, *(_text(one, home) for one in found)]), len(found)
+    left_out = list(_left_out(folder, found))
+    if len(left_out) > _MOST_LEFT_OUT:
+        left_out = [*left_out[:_MOST_LEFT_OUT], f"# and {len(left_out) - _MOST_LEFT_OUT} more folders"]
+    return "\n".join([_HEAD, *(_text(one, home) for one in found), *left_out, *[""] * bool(left_out)]), len(found)
+
+
+def _left_out(folder: Path, found: Sequence[_Found]) -> Iterator[str]:
+    """Yield a comment for each folder of pictures, tables or videos beside which there is no recording."""
+    taken = {path.parent for one in found for path in one.recording} - {folder}
+    for where, inside, names in os.walk(folder):
+        inside[:] = sorted(name for name in inside if not name.startswith(".") and Path(where, name) not in taken)
+        kinds = Counter(suffix for name in names if (suffix := Path(name).suffix.lower()) in _PLAIN_SUFFIXES)
+        if kinds:
+            counts = ", ".join(f"{count} {suffix}" for suffix, count in sorted(kinds.items()))
+            yield f"# left out: {_as_comment(Path(where))} ({counts}); if it is a recording, give it a [[session]] of its own"
+
+
+def _as_comment(path: Path) -> str:
+    return "".join(one if one.isprintable() else "_" for one in path.as_posix())
 
 
 def _sessions(folder: Path) -> Iterator[_Found]:

@@ -81,6 +81,29 @@ def test_a_manifest_elsewhere_names_whole_paths(tmp_path: Path) -> None:
     assert row.recording == (tmp_path / "data" / "van.bag",)
 
 
+def test_folders_of_pictures_and_tables_are_named_as_left_out(tmp_path: Path) -> None:
+    lay(
+        tmp_path,
+        "van 1/drive.mcap",
+        "van 1/thumbs/1.png",
+        "van 2/frames/1.png",
+        "van 2/frames/2.png",
+        "van 2/radar.csv",
+    )
+    text, count = first_manifest(tmp_path, tmp_path / "fleet.toml")
+    assert count == 1
+    left_out = [line for line in text.splitlines() if line.startswith("# left out: ")]
+    assert [line.partition(" (")[2].partition(")")[0] for line in left_out] == ["1 .csv", "2 .png"]
+    assert set(read_back(tmp_path)) == {("van 1", "drive")}
+
+
+def test_of_many_left_out_folders_some_are_named_and_the_rest_counted(tmp_path: Path) -> None:
+    lay(tmp_path, "van/drive.mcap", *(f"p{k:02}/1.png" for k in range(25)))
+    text, _ = first_manifest(tmp_path, tmp_path / "fleet.toml")
+    assert text.count("# left out: ") == 20
+    assert text.endswith("# and 5 more folders\n")
+
+
 def test_a_folder_without_recordings_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no recording in it"):
         first_manifest(tmp_path, tmp_path / "x.toml")
