@@ -47,6 +47,7 @@ def status_document(
         "unread": [_unread(one) for one in fleet.unread],
         "missing": [list(one) for one in fleet.missing],
         "unlisted": [list(one) for one in fleet.unlisted],
+        "shared_serials": list(fleet.shared_serials),
     }
 
 

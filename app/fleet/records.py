@@ -7,6 +7,7 @@ from calib_core.fleet import SessionPose, Transition
 
 __all__ = ["FleetRecord", "SessionRecord", "UnreadResult", "VehicleRecord", "is_compared"]
 
+_MOST_NAMED = 5
 _NO_POSE_OF = frozenset({"contradictory", "nothing"})
 
 
@@ -136,6 +137,24 @@ class FleetRecord:
     def types(self) -> tuple[str, ...]:
         """The names of the vehicle types, in order."""
         return tuple(sorted({one.vehicle_type for one in self.vehicles if one.vehicle_type}))
+
+    @property
+    def shared_serials(self) -> tuple[str, ...]:
+        """Which serials the last sessions of several vehicles state, in words: one of them is mistyped, or the sensor moved."""
+        said = []
+        for sensor in ("radar", "camera"):
+            vehicles: dict[str, list[str]] = {}
+            for one in self.vehicles:
+                serial = getattr(one.last.outcome, f"{sensor}_serial")
+                if serial:
+                    vehicles.setdefault(serial, []).append(one.name)
+            said += [
+                f"{sensor} {serial} is in the last sessions of {len(names)} vehicles: {', '.join(names[:_MOST_NAMED])}"
+                f"{', …' if len(names) > _MOST_NAMED else ''}; correct the serial, or the manifest of the vehicle it left"
+                for serial, names in sorted(vehicles.items())
+                if len(names) > 1
+            ]
+        return tuple(said)
 
     def of_type(self, vehicle_type: str) -> tuple[VehicleRecord, ...]:
         """Return the vehicles of a type."""

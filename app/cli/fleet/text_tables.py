@@ -49,7 +49,7 @@ def status_lines(standings: Sequence[VehicleStanding], *, now_ns: int, troubled:
 
 
 def plan_lines(fleet: FleetRecord) -> Iterator[str]:
-    """Return which sessions of the manifests have no result, and which results no manifest names."""
+    """Return which sessions of the manifests have no result, which results no manifest names, and serials that cannot be."""
     for names, words in (
         (fleet.missing, "in the manifest without a result: run the batch again"),
         (
@@ -61,6 +61,7 @@ def plan_lines(fleet: FleetRecord) -> Iterator[str]:
             shown = ", ".join(f"{vehicle}/{session}" for vehicle, session in names[:_MOST_NAMED])
             more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
             yield f"{len(names)} session{'' if len(names) == 1 else 's'} {words}: {shown}{more}"
+    yield from fleet.shared_serials
 
 
 def kind_lines(kinds: Sequence[Kind]) -> Iterator[str]:

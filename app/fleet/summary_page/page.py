@@ -56,7 +56,7 @@ def _sections(fleet: FleetRecord, standings: Sequence[VehicleStanding], kinds: S
         _look(standings),
         _unread(fleet.unread),
         _missing(fleet.missing),
-        _section("Vehicles", vehicle_table(standings)),
+        _section("Vehicles", vehicle_table(standings), _serials(fleet.shared_serials)),
         _section("Mounting scatter of the vehicle types", type_table(kinds), _left_out(kinds)) if kinds else None,
         _section("Sessions", session_table(fleet)),
     ]
@@ -115,6 +115,11 @@ def _missing(missing: Sequence[tuple[str, str]]) -> Markup | None:
         return None
     items = (tag("li", f"{vehicle} / {session}") for vehicle, session in missing)
     return _section("Sessions without a result: run the batch again", tag("ul", *items, class_="look"))
+
+
+def _serials(shared: Sequence[str]) -> Markup | None:
+    """Return the serials that several vehicles state."""
+    return tag("ul", *(tag("li", sentence(one)) for one in shared), class_="look note") if shared else None
 
 
 def _left_out(kinds: Sequence[Kind]) -> Markup | None:

@@ -6,11 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.cli.fleet.text_tables import plan_lines
 from app.fleet.choosing import compare_sessions, vehicle_named
 from app.fleet.index import read_fleet
+from app.fleet.json_documents import status_document
 from app.fleet.kinds import PriorOfType, kinds_of, prior_of_type
 from app.fleet.records import FleetRecord
 from app.fleet.standing import age_days, standings_of
+from app.fleet.summary_page import summary_html
 from calib_core.errors import InputError
 from calib_core.measurements import Unsolvable
 from tests.unit.app.fleet.made_results import DAY_NS, FIRST_NS, make_fleet, make_result, session_error
@@ -123,3 +126,17 @@ def test_a_fleet_of_one_or_two_has_no_kind_to_be_off(tmp_path: Path, count: int)
     (kind,) = kinds_of(fleet)
     assert kind.judged == {}
     assert all(one.needs == () for one in standings_of(fleet, [kind]))
+
+
+def test_a_serial_in_the_last_sessions_of_two_vehicles_is_named(tmp_path: Path) -> None:
+    make_fleet(tmp_path, 3, 2)
+    assert read_fleet(tmp_path).shared_serials == ()
+    make_result(
+        tmp_path, "V000", "s9", radar_serial="R-V002", camera_serial="C-V000", recorded_ns=FIRST_NS + 90 * DAY_NS
+    )
+    fleet = read_fleet(tmp_path)
+    (said,) = fleet.shared_serials
+    assert said.startswith("radar R-V002 is in the last sessions of 2 vehicles: V000, V002; correct the serial")
+    assert said in [*plan_lines(fleet)]
+    assert status_document(fleet, (), (), now_ns=0)["shared_serials"] == [said]
+    assert said.removeprefix("radar ") in summary_html(fleet)
