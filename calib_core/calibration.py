@@ -465,7 +465,7 @@ def _described(
         systematic_errors=uncertainty.systematic_errors,
         given_camera=task.camera if camera is not None else None,
         fleet=task.fleet,
-        covariance_parts=uncertainty.parts,
+        covariance_parts=uncertainty.parts.within(uncertainty.covariance),
     )
     return replace(calibration, pairs=click_results(calibration, groups, task.shown))
 

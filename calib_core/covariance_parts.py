@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from calib_core.arrays import Matrix66, frozen_array
 
 __all__ = ["CovarianceParts"]
@@ -24,3 +26,15 @@ class CovarianceParts:
     def __post_init__(self) -> None:
         object.__setattr__(self, "systematic", frozen_array(self.systematic, (6, 6)))
         object.__setattr__(self, "camera_position", frozen_array(self.camera_position, (6, 6)))
+
+    def within(self, covariance: Matrix66) -> "CovarianceParts":
+        """Return the parts, made smaller by one factor if together they exceed a covariance (6, 6) along any axis.
+
+        They are those of the fit; of a posterior that is not normal, the covariance is another one.
+        """
+        scale = np.sqrt(np.diag(covariance))
+        inverse = np.linalg.inv(np.linalg.cholesky(covariance / np.outer(scale, scale))) / scale
+        largest = float(np.linalg.eigvalsh(inverse @ (self.systematic + self.camera_position) @ inverse.T)[-1])
+        if largest <= 1.0:
+            return self
+        return CovarianceParts(self.systematic / largest, self.camera_position / largest)

@@ -8,6 +8,8 @@ import pytest
 
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
+from calib_core.covariance_parts import CovarianceParts
+from calib_core.fleet import session_pose
 from calib_core.measurements import Pair
 from calib_core.options import (
     CalibrationOptions,
@@ -124,3 +126,21 @@ def test_without_a_tape_its_part_is_nothing() -> None:
     assert parts is not None
     assert not parts.camera_position.any()
     assert parts.systematic.any()
+
+
+def test_of_few_pairs_with_a_posterior_that_is_not_normal_they_are_made_to_fit() -> None:
+    rng = np.random.default_rng(1926)
+    noise, count = str(rng.choice(["ti", "imaging", "ti_aisle"])), int(rng.integers(4, 16))
+    made = simulate_pairs(count, rng=rng, noise=noise, outlier_share=float(rng.choice([0, 0, 0.2, 0.4])))  # type: ignore[arg-type]
+    found = calibrate_pairs(made.pairs, made.camera).unwrap()
+    pose = session_pose(found, vehicle="van", session="spring")  # refuses parts that exceed the covariance
+    assert np.trace(pose.systematic) > 0.0
+
+
+def test_parts_that_fit_stay_and_others_shrink_by_one_factor() -> None:
+    whole = np.diag([1e-4] * 3 + [1e-6] * 3)
+    parts = CovarianceParts(0.5 * whole, 0.25 * whole)
+    assert parts.within(whole) is parts
+    smaller = parts.within(0.5 * whole)
+    np.testing.assert_allclose(smaller.systematic, whole / 3.0, rtol=1e-12, atol=1e-20)
+    np.testing.assert_allclose(smaller.camera_position, whole / 6.0, rtol=1e-12, atol=1e-20)
