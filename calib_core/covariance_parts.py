@@ -8,6 +8,8 @@ from calib_core.arrays import Matrix66, frozen_array
 
 __all__ = ["CovarianceParts"]
 
+_ROUNDING = 1e-12
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CovarianceParts:
@@ -33,8 +35,9 @@ class CovarianceParts:
         They are those of the fit; of a posterior that is not normal, the covariance is another one.
         """
         scale = np.sqrt(np.diag(covariance))
-        inverse = np.linalg.inv(np.linalg.cholesky(covariance / np.outer(scale, scale))) / scale
-        largest = float(np.linalg.eigvalsh(inverse @ (self.systematic + self.camera_position) @ inverse.T)[-1])
+        values, axes = np.linalg.eigh(covariance / np.outer(scale, scale))
+        whitening = (axes / np.sqrt(np.maximum(values, _ROUNDING))).T / scale
+        largest = float(np.linalg.eigvalsh(whitening @ (self.systematic + self.camera_position) @ whitening.T)[-1])
         if largest <= 1.0:
             return self
         return CovarianceParts(self.systematic / largest, self.camera_position / largest)
