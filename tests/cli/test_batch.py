@@ -63,7 +63,7 @@ def test_what_is_done_is_not_done_again(fleet: Path, capsys: pytest.CaptureFixtu
     capsys.readouterr()
     assert run(["batch", str(manifest), "--out", str(fleet / "out")]) == 0
     assert calibration.stat().st_mtime_ns == written
-    assert "1 of 1 sessions are done already" in capsys.readouterr().err
+    assert "1 of 1 session done already" in capsys.readouterr().err
     solved = fleet / "solved.json"
     clicked = fleet / "van" / "clicked"
     recordings = [str(clicked / "radar.bag"), str(clicked / "camera.bag")]

@@ -92,7 +92,7 @@ def _left_words(left_s: float | None) -> str:
 def _tell(now: "BatchProgress") -> None:
     if now.latest is None:
         words = f"{now.count} session{'' if now.count == 1 else 's'}"
-        words = f"{now.done} of {words} are done already" if now.done else words
+        words = f"{now.done} of {words} done already" if now.done else words
     else:
         words = f"{now.done} of {now.count}: {now.latest.vehicle} / {now.latest.session}: {now.latest.status}"
         words += f" ({left})" if (left := _left_words(now.left_s)) else ""
