@@ -11,6 +11,7 @@ from calib_core.fleet.deviation import Deviation, deviation
 from calib_core.fleet.mounting_coordinates import coordinate_jacobian, coordinates, pose_from_coordinates
 from calib_core.fleet.mountings import Mounting
 from calib_core.fleet.random_effects import RandomEffects, random_effects
+from calib_core.fleet.tails import FALSE_RATE
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import Unsolvable
 
@@ -42,23 +43,31 @@ class LeftOut:
 
 @dataclass(frozen=True, slots=True)
 class SharedTape:
-    """A camera position that several vehicles state, to the last digit: one measurement that was copied.
+    """A measured camera position that several vehicles have in common: copied, or off by the same error.
 
     Each calibration is drawn to it, so their agreement says nothing of how they are mounted: it counts as one measurement.
 
     Attributes:
-        vehicles: how many state a position that another one states, too.
+        vehicles: how many have it in common.
         mountings: of how many mountings.
         sigma_m: its standard deviation; the largest if there are several.
+        spread_m: by how much they differ, per axis; 0 if they are the same to the last digit.
     """
 
     vehicles: int
     mountings: int
     sigma_m: float
+    spread_m: float = 0.0
 
     @property
     def words(self) -> str:
         """What it means, without a full stop."""
+        if self.spread_m:
+            return (
+                f"the measured camera positions of {self.vehicles} vehicles differ by ± {100.0 * self.spread_m:.2g} cm, less "
+                f"than single measurements with their stated ± {100.0 * self.sigma_m:.2g} cm would: they count as one, and that "
+                "is added to the scatter; if each vehicle was measured by itself, state the sigma that this has"
+            )
         return (
             f"{self.vehicles} vehicles state a measured camera position that another one states, too: it counts as one "
             f"measurement, so that ± {100.0 * self.sigma_m:.2g} cm are added to the scatter; measure each vehicle by itself"
@@ -152,9 +161,34 @@ def _shared_tape(mountings: Sequence[Mounting]) -> SharedTape | None:
     shared = {position for position, vehicles in stated.items() if len(vehicles) > 1}
     rows = [one for one in mountings if any(measured.position_m in shared for measured in one.measured)]
     if not rows:
-        return None
+        return _too_alike(mountings)
     sigma_m = max(measured.sigma_m for one in rows for measured in one.measured if measured.position_m in shared)
     return SharedTape(len({one.vehicle for one in rows}), len(rows), sigma_m)
+
+
+def _too_alike(mountings: Sequence[Mounting]) -> SharedTape | None:
+    """Return what the measured positions have in common if they differ by less than measurements with their sigma would.
+
+    Positions that are measured one by one differ by their errors at least, so that the sum of squares over sigma^2 follows chi2
+    if all vehicles are mounted alike. Below its 1-in-10,000 point, of one axis or of all, sigma is not that of single readings.
+    """
+    from scipy.special import chdtri
+
+    taped = [one for one in mountings if one.measured]
+    if len({one.vehicle for one in taped}) < MIN_MOUNTINGS:
+        return None
+    positions_m = np.array([np.mean([measured.position_m for measured in one.measured], axis=0) for one in taped])
+    sigmas_m = np.array(
+        [min(measured.sigma_m for measured in one.measured) / len(one.measured) ** 0.5 for one in taped]
+    )
+    away_m = positions_m - np.average(positions_m, axis=0, weights=sigmas_m**-2.0)
+    squares = ((away_m / sigmas_m[:, None]) ** 2).sum(axis=0)
+    freedom = len(taped) - 1
+    if squares.min() >= chdtri(freedom, 1.0 - FALSE_RATE) and squares.sum() >= chdtri(3 * freedom, 1.0 - FALSE_RATE):
+        return None
+    sigma_m = max(measured.sigma_m for one in taped for measured in one.measured)
+    spread_m = float(np.sqrt((away_m**2).sum() / (3 * freedom)))
+    return SharedTape(len({one.vehicle for one in taped}), len(taped), sigma_m, max(spread_m, 1e-9))
 
 
 def _widened(effects: RandomEffects, shared: SharedTape | None) -> RandomEffects:

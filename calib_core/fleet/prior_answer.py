@@ -15,7 +15,7 @@ _RARE = 0.01
 """A sound vehicle is this far from the prior, or farther, less often than this: the prior then draws the pose of an odd one."""
 _UNTESTED_DEG = 9.0
 """Three times what is usable: data that state more do not test the prior."""
-_DECIDES = 2.0
+_DECIDES = 1.25
 """The prior decides if the data alone state an error this many times as large, of rotation or position."""
 
 

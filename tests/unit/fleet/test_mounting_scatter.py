@@ -24,8 +24,9 @@ from calib_core.fleet import (
     off_kinds,
 )
 from calib_core.fleet.mounting_coordinates import pose_from_coordinates
+from calib_core.fleet.mounting_scatter import SharedTape
 from calib_core.fleet.mountings import Mounting
-from calib_core.fleet.session_pose import CHI2_95
+from calib_core.fleet.session_pose import CHI2_95, SessionPose
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import Unsolvable
 from calib_core.options import CameraPositionPrior
@@ -180,7 +181,7 @@ def test_without_enough_others_there_is_no_test() -> None:
 
 def test_a_measured_position_that_several_vehicles_state_is_one_measurement() -> None:
     rng = np.random.default_rng(12)
-    copied, own = CameraPositionPrior((0.0, 0.05, 0.12), 0.01), (0.0, 0.05, 0.13)
+    copied = CameraPositionPrior((0.0, 0.05, 0.12), 0.01)
     rows, inside, narrow = 20, 0, 0
     for _ in range(40):
         common = np.concatenate([rng.normal(0.0, 0.01, 3), np.zeros(3)])  # what the copied measurement is off by
@@ -196,8 +197,28 @@ def test_a_measured_position_that_several_vehicles_state_is_one_measurement() ->
         inside += away @ np.linalg.solve(fleet_prior_of(scatter).covariance, away) <= CHI2_95
     assert narrow == 0
     assert inside >= 36
-    each = [
-        replace(one, measured=CameraPositionPrior((own[0], own[1], own[2] + 1e-4 * k), 0.01))
-        for k, one in enumerate(sessions)
-    ]
-    assert scattered([mounting_of([one]) for one in each]).shared_tape is None
+
+
+def test_measured_positions_that_differ_less_than_their_sigma_are_one_measurement() -> None:
+    """A drawing with a little jitter, or a tape that is held to the same wrong edge of every vehicle."""
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        sessions = [
+            simulated_session(simulated_mounting(NARROW, rng), Accuracy(0.01, 0.05), rng, vehicle=f"v{k}")
+            for k in range(20)
+        ]
+
+        def told(jitter_m: np.ndarray, rng: np.random.Generator, sessions: list[SessionPose]) -> SharedTape | None:
+            rows = []
+            for one in sessions:
+                forward, left, up = (np.array([0.0, 0.05, 0.12]) + jitter_m * rng.standard_normal(3)).tolist()
+                rows.append(mounting_of([replace(one, measured=CameraPositionPrior((forward, left, up), 0.01))]))
+            return scattered(rows).shared_tape
+
+        assert told(np.full(3, 0.01), rng, sessions) is None
+        alike = told(np.full(3, 0.0003), rng, sessions)
+        assert alike is not None
+        assert (alike.vehicles, alike.sigma_m) == (20, 0.01)
+        assert 0.0002 < alike.spread_m < 0.0004
+        assert "20 vehicles differ by ± 0.0" in alike.words
+        assert told(np.array([0.01, 0.01, 0.0003]), rng, sessions) is not None  # one axis from the drawing
