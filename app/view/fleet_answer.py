@@ -7,6 +7,7 @@ import numpy as np
 from app.view.number_format import plain, with_sigma
 from calib_core.arrays import Matrix66, Values
 from calib_core.fleet.mounting_coordinates import coordinate_jacobian, coordinates
+from calib_core.fleet.prior_test import prior_test
 from calib_core.fleet_prior import DataAlone, FleetAnswer
 from calib_core.geometry import RigidTransform
 from calib_core.pose_difference import pose_difference
@@ -16,6 +17,7 @@ from calib_core.verdict import Verdict, level_named
 
 __all__ = ["FleetAxis", "fleet_axes", "fleet_sentences"]
 
+_UNUSUAL = 0.05
 _AXES = ("camera forward", "camera left", "camera up", "roll", "pitch", "yaw")
 _TO_SHOWN = np.array([100.0] * 3 + [180.0 / np.pi] * 3)
 
@@ -68,7 +70,7 @@ def fleet_sentences(calibration: Calibration) -> tuple[str, ...]:
         f"The pose rests on the data and on {named}: {_error(stated_error(calibration))} (95 %).",
         f"The data alone{_alone(calibration, fleet.data_alone)}.",
         f"They are {plain(away.rotation_deg, 2)} deg and {plain(away.position_cm, 2)} cm from this pose, and "
-        f"{_agreement(calibration)}: {_distance(fleet)}.",
+        f"{_agreement(calibration, fleet.data_alone)}: {_distance(fleet)}.",
     )
 
 
@@ -80,9 +82,12 @@ def _alone(calibration: Calibration, alone: DataAlone) -> str:
     return f": {_error(stated_error(calibration.of_data_alone(alone)))} (95 %)"
 
 
-def _agreement(calibration: Calibration) -> str:
+def _agreement(calibration: Calibration, alone: DataAlone) -> str:
+    fleet = calibration.fleet
     if any(warning.code == "far-from-its-kind" for warning in calibration.warnings):
         return "far from the prior, though not beyond the point where they contradict it"
+    if fleet is not None and prior_test(fleet.prior, alone).probability < _UNUSUAL:
+        return "farther from the prior than 19 of 20 sound vehicles"
     return "agree with the prior"
 
 

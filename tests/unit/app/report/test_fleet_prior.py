@@ -45,6 +45,11 @@ def test_the_words_say_whether_it_was_used_and_tested(project_root: Path) -> Non
     few = replace(judged.fleet.data_alone, verdict="weak", reason="uncertain to 4 deg, 50 cm (95 %), from only 6 pairs")
     said = fleet_sentences(replace(judged, fleet=replace(judged.fleet, data_alone=few)))[1]
     assert said == "The data alone would be weak: uncertain to 4 deg, 50 cm (95 %), from only 6 pairs."
+    away = judged.camera_from_radar.perturbed(np.array([0.0, 0.0, 0.0, 0.11, 0.0, 0.0]))
+    odd = replace(
+        judged, fleet=replace(judged.fleet, data_alone=replace(judged.fleet.data_alone, camera_from_radar=away))
+    )
+    assert "and farther from the prior than 19 of 20 sound vehicles: " in fleet_sentences(odd)[2]
     far = replace(judged, warnings=(DataWarning("far-from-its-kind", "far", "look"),))
     assert "and far from the prior, though not beyond the point where they contradict it: " in fleet_sentences(far)[2]
     assert fleet_sentences(_with_fleet(known, used=False))[0].startswith("Not used, as the data contradict the prior")
