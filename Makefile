@@ -20,7 +20,7 @@ dev: $(VENV)/.dev  ## The same, with the tools for tests and checks.
 $(BIN)/python:
 	@PYTHON="$(PYTHON)" VENV="$(VENV)" sh .ci/make_venv
 
-$(VENV)/.runtime: requirements/runtime.txt pyproject.toml app/launcher.py | $(BIN)/python
+$(VENV)/.runtime: requirements/runtime.txt pyproject.toml | $(BIN)/python
 	@VENV="$(VENV)" sh .ci/install requirements/runtime.txt
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@touch $@

@@ -11,16 +11,16 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-PACKAGES = ("calib_core", "app")
+PACKAGES = {"calib_core": "calib_core", "cocalib": "app/cocalib"}  # import name: folder
 WIDTH = 118
 
 
 def modules(root: Path) -> dict[str, Path]:
     """Return the path of every module by its dotted name; a package is listed under its own name."""
     found = {}
-    for package in PACKAGES:
-        for path in sorted((root / package).rglob("*.py")):
-            parts = path.relative_to(root).with_suffix("").parts
+    for package, folder in PACKAGES.items():
+        for path in sorted((root / folder).rglob("*.py")):
+            parts = (package, *path.relative_to(root / folder).with_suffix("").parts)
             found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
     return found
 

@@ -18,9 +18,9 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from app.web.port.server import RunningServer, ServerOptions, start
-from app.workspace import open_workspace
 from calib_core.recordings import AwaitedRecording, FollowedRecording
+from cocalib.web.port.server import RunningServer, ServerOptions, start
+from cocalib.workspace import open_workspace
 
 _FLAGS = ["--no-sandbox", "--disable-gpu", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 _NOTE = """() => {

@@ -30,7 +30,7 @@ CELLS: tuple[tuple[str, str], ...] = (
     ),
     (
         "code",
-        "import numpy as np\n\nimport calib_core as cc\nfrom calib_core.synthetic import simulate_pairs\n\n"
+        "import numpy as np\n\nimport cocalib as cc\nfrom calib_core.synthetic import simulate_pairs\n\n"
         'simulated = simulate_pairs(20, rng=np.random.default_rng(1), noise="ti")\n'
         "points_radar_m = np.array([pair.candidates[0].position_radar_m for pair in simulated.pairs])\n"
         "pixels_px = np.array([pair.pixel_px for pair in simulated.pairs])\n"
@@ -93,8 +93,8 @@ CELLS: tuple[tuple[str, str], ...] = (
     ),
     (
         "code",
-        "from pathlib import Path\n\n"
-        'folder = Path(cc.__file__).resolve().parents[1] / "sample_data" / "rooftop"\n'
+        "from pathlib import Path\n\nfrom cocalib.resources import sample_folder\n\n"
+        'folder = sample_folder() / "rooftop"\n'
         'clicks = cc.read_clicks(folder / "clicks.json")\n'
         'with cc.open_recording([folder / "radar.bag", folder / "camera.bag"]) as recording:\n'
         "    print(recording.radar_topic, len(recording.radar_times), recording.image_topic, len(recording.image_times))\n"

@@ -16,9 +16,9 @@ from playwright.sync_api import Browser, sync_playwright
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from app.web.port.server import RunningServer, ServerOptions, start  # noqa: E402
-from app.workspace import open_workspace  # noqa: E402
 from calib_core.recordings import open_recording  # noqa: E402
+from cocalib.web.port.server import RunningServer, ServerOptions, start  # noqa: E402
+from cocalib.workspace import open_workspace  # noqa: E402
 from tests.browser.driving import FLAGS, Driver  # noqa: E402
 from tests.find_browser import find_browser  # noqa: E402
 

@@ -1,5 +1,5 @@
 // @ts-check
-/** Colours of amplitudes, the same as in the 3D view (app/web/view3d/looking.py): from most returns to the strongest of the recording. */
+/** Colours of amplitudes, the same as in the 3D view (app/cocalib/web/view3d/looking.py): from most returns to the strongest of the recording. */
 
 import { state } from "./state.js";
 

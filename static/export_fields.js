@@ -3,7 +3,7 @@
 
 import { make } from "./notices.js";
 
-/** @typedef {Record<string, any>} Preview ExportPreview of app/web/channel/export_preview.py */
+/** @typedef {Record<string, any>} Preview ExportPreview of app/cocalib/web/channel/export_preview.py */
 const TYPING_MS = 250;
 const RECTIFIED = "cocalib-rectified";
 export const PARENT = ["x", "y", "z", "qx", "qy", "qz", "qw"];

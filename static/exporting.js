@@ -12,7 +12,7 @@ import { saveFile } from "./saving.js";
 import { on, state } from "./state.js";
 
 /** @typedef {import("./export_list.js").Format} Format */
-/** The server's preview of a format: ExportPreview in app/web/channel/export_preview.py. @typedef {Record<string, any>} Preview */
+/** The server's preview of a format: ExportPreview in app/cocalib/web/channel/export_preview.py. @typedef {Record<string, any>} Preview */
 const KEPT = "cocalib-export";
 const CLICKS = "clicks";
 const REPORT = "report";

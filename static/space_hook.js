@@ -7,7 +7,7 @@
 /** How long the 3D view may take to start [ms]. */
 const PATIENCE = 60000;
 const LOOK_EVERY = 100;
-/** A node at the origin of the radar frame, and one whose position is the frame and the number that are shown (app/web/view3d/scene.py). */
+/** A node at the origin of the radar frame, and one whose position is the frame and the number that are shown (app/cocalib/web/view3d/scene.py). */
 const [RADAR, SHOWN] = ["/radar", "/shown"];
 
 /** @type {any} */

@@ -6,10 +6,10 @@ import sys
 import threading
 from pathlib import Path
 
-from app.batch.job import Job
-from app.batch.manifest import ManifestRow
-from app.batch.outcome import Outcome, read_outcome
-from app.batch.results_folder import OUTCOME_FILE, ResultsFolder
+from cocalib.batch.job import Job
+from cocalib.batch.manifest import ManifestRow
+from cocalib.batch.outcome import Outcome, read_outcome
+from cocalib.batch.results_folder import OUTCOME_FILE, ResultsFolder
 
 __all__ = ["attempts", "dying", "dying_job", "endless", "failing", "quick_jobs", "squared", "written"]
 
@@ -48,7 +48,7 @@ def dying(folder: str, name: str, times: int) -> str:
 
 def dying_job(job: Job, results: Path, _: str) -> Outcome:
     """Kill this worker whenever it runs the job of vehicle v001, as one that needs too much memory does."""
-    from app.batch.engines.one_job import run_once
+    from cocalib.batch.engines.one_job import run_once
 
     (results / f"{job.row.vehicle}.{attempts(results, job.row.vehicle)}").touch()
     if job.row.vehicle == "v001":

@@ -2,8 +2,8 @@
 
 import signal
 
-from app.batch.engines.dask_cluster import DaskCluster
-from app.signals import stop_on_signals
+from cocalib.batch.engines.dask_cluster import DaskCluster
+from cocalib.signals import stop_on_signals
 from tests.batch_calls import endless
 
 if __name__ == "__main__":

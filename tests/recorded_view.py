@@ -6,8 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from app.recorded_view import RecordedView, recorded_view
-from app.solving import solve_clicks
 from calib_core.detections import Box, Boxes, FrameBoxes
 from calib_core.interchange import read_clicks
 from calib_core.measurements import TimeNs
@@ -15,6 +13,8 @@ from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording, open_recording
 from calib_core.recordings.containers.writing import write_ros2
 from calib_core.results import Calibration
+from cocalib.recorded_view import RecordedView, recorded_view
+from cocalib.solving import solve_clicks
 from tests.cli.conftest import Made
 
 __all__ = ["boxes_around", "nearest_rows", "opened_view"]

@@ -50,9 +50,7 @@ def served_process(*arguments: object, state: Path) -> Iterator[ServedProcess]:
         arguments: those after `cocalib open`.
         state: the folder for its state.
     """
-    program = (
-        "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\nfrom app.__main__ import main\nmain()"
-    )
+    program = "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\nfrom cocalib.__main__ import main\nmain()"
     command = [
         sys.executable,
         "-c",

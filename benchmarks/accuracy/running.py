@@ -4,11 +4,11 @@ import sys
 import time
 from collections.abc import Sequence
 
-from app.batch.engines.dask_cluster import DaskCluster
-from app.batch.engines.engine import Engine
-from app.batch.engines.in_process import InProcess
 from benchmarks.accuracy.keeping import Keeper
 from benchmarks.accuracy.rows import Figures, Kept, Row
+from cocalib.batch.engines.dask_cluster import DaskCluster
+from cocalib.batch.engines.engine import Engine
+from cocalib.batch.engines.in_process import InProcess
 
 __all__ = ["kept_figures", "run"]
 

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from app.fleet.index import read_fleet
-from app.fleet.kinds import Kind, kinds_of
-from app.fleet.records import FleetRecord, SessionRecord, VehicleRecord
-from app.fleet.standing import VehicleStanding, standings_of
 from benchmarks.fleet.truth import FleetTruth, read_truth
 from calib_core.fleet import MountingScatter, Transition
+from cocalib.fleet.index import read_fleet
+from cocalib.fleet.kinds import Kind, kinds_of
+from cocalib.fleet.records import FleetRecord, SessionRecord, VehicleRecord
+from cocalib.fleet.standing import VehicleStanding, standings_of
 
 __all__ = ["Judged", "judge", "judge_results", "main"]
 

@@ -14,14 +14,6 @@ from pathlib import Path
 
 import numpy as np
 
-from app.batch.manifest import ManifestRow
-from app.batch.manifest_files.reading import read_manifest
-from app.fleet.index import read_fleet
-from app.fleet.kinds import prior_of_type
-from app.fleet.records import FleetRecord
-from app.recorded_clicks import clicks_in_recording, file_of_clicks
-from app.required_camera import required_camera
-from app.solving import solve_clicks
 from benchmarks.fleet.paired_fleet import Answer, answered, sigmas
 from benchmarks.fleet.prior_tables import ANSWER_HEADINGS, answer_cells
 from benchmarks.fleet.truth import FleetTruth, TrueSession, read_truth
@@ -30,6 +22,14 @@ from calib_core.fleet.tails import quantile
 from calib_core.fleet_prior import FleetPrior
 from calib_core.measurements import Unsolvable
 from calib_core.recordings import open_recording
+from cocalib.batch.manifest import ManifestRow
+from cocalib.batch.manifest_files.reading import read_manifest
+from cocalib.fleet.index import read_fleet
+from cocalib.fleet.kinds import prior_of_type
+from cocalib.fleet.records import FleetRecord
+from cocalib.recorded_clicks import clicks_in_recording, file_of_clicks
+from cocalib.required_camera import required_camera
+from cocalib.solving import solve_clicks
 
 __all__ = ["Given", "held_by", "main"]
 

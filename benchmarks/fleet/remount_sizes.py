@@ -15,12 +15,6 @@ from pathlib import Path
 
 import numpy as np
 
-from app.batch.driving import drive
-from app.batch.engines.in_process import InProcess
-from app.batch.job import jobs_of
-from app.batch.manifest_files.reading import read_manifest
-from app.batch.results_folder import ResultsFolder
-from app.fleet.index import read_fleet
 from benchmarks.fleet.plan import Remount, plan_fleet
 from benchmarks.fleet.simulated_fleet import write_fleet
 from benchmarks.fleet.simulated_session import RECORDING
@@ -29,6 +23,12 @@ from calib_core.fleet import SessionPose, Transition, transition
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.pose_difference import camera_position_jacobian
 from calib_core.synthetic import RadarName
+from cocalib.batch.driving import drive
+from cocalib.batch.engines.in_process import InProcess
+from cocalib.batch.job import jobs_of
+from cocalib.batch.manifest_files.reading import read_manifest
+from cocalib.batch.results_folder import ResultsFolder
+from cocalib.fleet.index import read_fleet
 
 __all__ = ["main", "recorded", "remounted_pose", "unchanged_transitions"]
 

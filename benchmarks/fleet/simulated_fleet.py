@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from app.batch.engines.dask_cluster import DaskCluster
-from app.batch.engines.engine import Engine
-from app.batch.engines.in_process import InProcess
 from benchmarks.fleet.plan import TAPE_SIGMA_M, FleetPlan, PlannedSession, plan_fleet
 from benchmarks.fleet.simulated_session import Mounting
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.synthetic import simulate, write_recording
 from calib_core.synthetic.rig import nominal_rotation
+from cocalib.batch.engines.dask_cluster import DaskCluster
+from cocalib.batch.engines.engine import Engine
+from cocalib.batch.engines.in_process import InProcess
 
 __all__ = ["RECORDING", "main", "write_fleet"]
 

@@ -19,16 +19,16 @@ import msgspec
 import numpy as np
 import psutil
 
-from app.batch.driving import drive
-from app.batch.engines.dask_cluster import DaskCluster
-from app.batch.engines.in_process import InProcess
-from app.batch.job import Job, jobs_of
-from app.batch.manifest_files.reading import read_manifest
-from app.batch.outcome import Outcome
-from app.batch.results_folder import OUTCOME_FILE, ResultsFolder
-from app.batch.running import run_job
 from benchmarks.fleet.plan import plan_fleet
 from benchmarks.fleet.simulated_fleet import write_fleet
+from cocalib.batch.driving import drive
+from cocalib.batch.engines.dask_cluster import DaskCluster
+from cocalib.batch.engines.in_process import InProcess
+from cocalib.batch.job import Job, jobs_of
+from cocalib.batch.manifest_files.reading import read_manifest
+from cocalib.batch.outcome import Outcome
+from cocalib.batch.results_folder import OUTCOME_FILE, ResultsFolder
+from cocalib.batch.running import run_job
 
 __all__ = ["killing", "main"]
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from app.evaluating import evaluate_recording
 from benchmarks.paper.settings import Settings, options_of
 from calib_core.arrays import TimesNs
 from calib_core.evaluation import BoxFigures
@@ -13,6 +12,7 @@ from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 from calib_core.results import Calibration
 from calib_core.synthetic import PRESETS, PresetName, simulate
 from calib_core.synthetic.annotations import true_boxes, true_labels
+from cocalib.evaluating import evaluate_recording
 
 __all__ = ["MOVING", "Judged", "acc_of"]
 

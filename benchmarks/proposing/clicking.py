@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.proposing.finding import proposed_again
 from benchmarks.proposing.drawn import Drawn, true_placement
 from calib_core.association.placements import Placement
 from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
 from calib_core.proposing import DwellView, Proposals
+from cocalib.proposing.finding import proposed_again
 
 __all__ = ["Clicked", "after_one_click"]
 

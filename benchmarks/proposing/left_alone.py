@@ -8,7 +8,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from app.automatic_solving import refusal_of
 from benchmarks.accuracy.rows import Figures
 from benchmarks.proposing.cases import case_of
 from benchmarks.proposing.drawn import Drawn, draw, true_placement
@@ -19,6 +18,7 @@ from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.proposing import DwellView, Proposals, dwell_views, proposals_of
 from calib_core.proposing.automatic import automatic_clicks
+from cocalib.automatic_solving import refusal_of
 
 __all__ = ["automatic_figures", "measure_mismatched"]
 

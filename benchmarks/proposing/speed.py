@@ -10,7 +10,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from app.proposing.finding import find_proposals
 from benchmarks.intrinsics.tables import Table
 from benchmarks.proposing.cases import Case
 from benchmarks.proposing.drawn import Drawn, draw
@@ -19,6 +18,7 @@ from calib_core.measurements import NS_PER_S, RadarScans, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.proposing import ViewProgress
 from calib_core.synthetic.options import SimulationOptions, Surroundings
+from cocalib.proposing.finding import find_proposals
 
 __all__ = ["speed_table"]
 

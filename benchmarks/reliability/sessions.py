@@ -13,13 +13,13 @@ from pathlib import Path
 
 import numpy as np
 
-from app.session import ClickMoved, ClickPlaced, ClickRemoved, History, RecordingFacts, Step, Undo, advance
-from app.session.file import SessionFileError, open_session_file
-from app.session.file.guarded_folder import GuardedFolder
-from app.session.file.journal_reading import JOURNAL
-from app.session.file.reconciling import read_contents
-from app.session.file.snapshot import SNAPSHOT
 from calib_core.measurements import TimeNs
+from cocalib.session import ClickMoved, ClickPlaced, ClickRemoved, History, RecordingFacts, Step, Undo, advance
+from cocalib.session.file import SessionFileError, open_session_file
+from cocalib.session.file.guarded_folder import GuardedFolder
+from cocalib.session.file.journal_reading import JOURNAL
+from cocalib.session.file.reconciling import read_contents
+from cocalib.session.file.snapshot import SNAPSHOT
 
 __all__ = ["Made", "every_bit", "every_kill", "every_length", "made_session", "sampled_bits"]
 

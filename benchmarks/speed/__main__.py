@@ -4,7 +4,6 @@ import sys
 import tempfile
 from pathlib import Path
 
-from app.resources import sample_folder
 from benchmarks.speed.board_search import measure_board_search
 from benchmarks.speed.channel import measure_channel
 from benchmarks.speed.paging import measure_page
@@ -14,6 +13,7 @@ from benchmarks.speed.serving import measure_serving
 from benchmarks.speed.showing import measure_showing
 from benchmarks.speed.solving import measure_solving
 from benchmarks.speed.starting import measure_starting
+from cocalib.resources import sample_folder
 
 _PAGE = Path(__file__).resolve().parents[2] / "docs" / "speed.md"
 

@@ -9,14 +9,14 @@ from typing import TypeVar
 
 import numpy as np
 
-from app.session import History, RecordingFacts, Session
-from app.view import View, view
-from app.web.channel.view_feed import ViewFeed
-from app.web.messages import encode
 from benchmarks.speed.rows import Row, Table, section
 from calib_core.calibration import calibrate_pairs, preview_pairs
 from calib_core.measurements import ReflectorClick, TimeNs
 from calib_core.synthetic import FIELD, SimulatedPairs, simulate_pairs
+from cocalib.session import History, RecordingFacts, Session
+from cocalib.view import View, view
+from cocalib.web.channel.view_feed import ViewFeed
+from cocalib.web.messages import encode
 
 __all__ = ["measure_channel"]
 

@@ -100,7 +100,7 @@ def _served(arguments: list[str], session: Path) -> Iterator[_Serving]:
     environment |= {"PYTHONUNBUFFERED": "1", "PYTHONPYCACHEPREFIX": str(session.with_name("bytecode"))}
     started = time.perf_counter()
     server = subprocess.Popen(
-        [sys.executable, "-m", "app", *arguments, "--session", str(session), "--port", "0", "--no-browser"],
+        [sys.executable, "-m", "cocalib", *arguments, "--session", str(session), "--port", "0", "--no-browser"],
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         text=True,

@@ -13,8 +13,8 @@ _FRAMES = 2_000
 _SHOW = """
 import pathlib, sys, time
 import numpy as np
-from app.memory import keep_freed_memory
-from app.recorded_view import recorded_view
+from cocalib.memory import keep_freed_memory
+from cocalib.recorded_view import recorded_view
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
 from calib_core.options import CalibrationOptions
@@ -36,11 +36,11 @@ with open_recording(path) as recording:
     if kind == "rrd":
         import rerun
         import rerun.blueprint
-        from app.rerun import write_view
+        from cocalib.rerun import write_view
         work = lambda: write_view(view, pathlib.Path(out))
     else:
         import av
-        from app.overlay_video import OverlayOptions, write_overlay
+        from cocalib.overlay_video import OverlayOptions, write_overlay
         work = lambda: write_overlay(view, pathlib.Path(out), OverlayOptions(("calibration.json",)))
     before, start = peak(), time.process_time()
     work()

@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.batch.driving import drive
-from app.batch.engines.in_process import InProcess
-from app.batch.job import jobs_of
-from app.batch.manifest_files.reading import read_manifest
-from app.batch.results_folder import ResultsFolder
-from app.fleet.index import read_fleet
 from benchmarks.fleet.judging import judge
 from benchmarks.fleet.plan import REMOUNTS, FleetPlan, PlannedSession, Remount, plan_fleet
 from benchmarks.fleet.simulated_fleet import write_fleet
 from benchmarks.fleet.simulated_session import RECORDING
 from benchmarks.fleet.truth import read_truth
+from cocalib.batch.driving import drive
+from cocalib.batch.engines.in_process import InProcess
+from cocalib.batch.job import jobs_of
+from cocalib.batch.manifest_files.reading import read_manifest
+from cocalib.batch.results_folder import ResultsFolder
+from cocalib.fleet.index import read_fleet
 
 _SMALL = replace(RECORDING, width_px=240, height_px=150, placements=10, radar_rate_hz=2.0)
 _TURNED = Remount(12.0, 0.05)  # what 10 placements in pictures of 240 px show for certain

@@ -52,7 +52,7 @@ def test_a_verdict_needs_no_optimizer_of_scipy() -> None:
 
 
 def test_session_and_view_import_nothing_heavy() -> None:
-    assert heavy_modules_after("import app.session\nimport app.view") == ""
+    assert heavy_modules_after("import cocalib.session\nimport cocalib.view") == ""
 
 
 @pytest.mark.parametrize("package", ["calib_core.interchange", "calib_core.synthetic", "calib_core.recordings"])

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from app.cli.commands import COMMANDS
-from app.cli.tyro_hook import flags_of
+from cocalib.cli.commands import COMMANDS
+from cocalib.cli.tyro_hook import flags_of
 
 PROSE = {"again", "boxes-1", "cookie", "reads", "therefore", "wrote"}
 """Words that follow the program's name in sentences that do not name a command."""
@@ -23,7 +23,7 @@ _DASK = ("death-timeout", "nthreads")
 OTHER_PROGRAMS = {f"--{name}" for name in (*_TRANSFORM_PUBLISHER, *_RERUN, *_CHROMIUM, *_DASK)}
 """Options of other programs that ours names or starts."""
 
-_COMMAND = re.compile(r"(?<![\w/.-])cocalib[ \t]+(?P<command>[a-z][\w-]*)(?P<rest>[^\n`;()]*)")
+_COMMAND = re.compile(r"(?<![\w/.-])(?<!import )cocalib[ \t]+(?P<command>[a-z][\w-]*)(?P<rest>[^\n`;()]*)")
 _FLAG = re.compile(r"(?<![\w-])--[a-z][a-z0-9.-]*[a-z0-9]")
 
 FLAGS = {name: {*flags_of(command.load()), "--help"} for name, command in COMMANDS.items()}

@@ -8,16 +8,16 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 MODULES = sorted(
-    ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
-    for folder in ("app", "calib_core")
-    for path in (ROOT / folder).rglob("*.py")
+    ".".join(path.relative_to(home).with_suffix("").parts).removesuffix(".__init__")
+    for home, package in ((ROOT / "app", "cocalib"), (ROOT, "calib_core"))
+    for path in (home / package).rglob("*.py")
     if not path.stem.startswith("_") or path.stem == "__init__"
 )
 
 
 def defined_by(module: str) -> list[str]:
     """Return the public classes and functions that a module itself defines."""
-    path = ROOT.joinpath(*module.split("."))
+    path = (ROOT / "app" if module.startswith("cocalib") else ROOT).joinpath(*module.split("."))
     file = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
     body = ast.parse(file.read_text(encoding="utf-8")).body
     kinds = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)

@@ -1,6 +1,5 @@
 """The wheel can be built, installed into an empty environment and run there."""
 
-import ast
 import json
 import os
 import re
@@ -57,21 +56,24 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_wheel_contains_the_page_the_sample_and_the_code_of_the_pack(wheel: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
-    assert {"app/static/index.html", "app/sample_data/rooftop/radar.bag", "app/sample_data/rooftop/camera.bag"} <= names
+    assert {
+        "cocalib/static/index.html",
+        "cocalib/sample_data/rooftop/radar.bag",
+        "cocalib/sample_data/rooftop/camera.bag",
+    } <= names
     assert "calib_core/interchange/published/calibration-1.schema.json" in names
     delivered = "calib_core/interchange/formats/pack/delivered"
     assert {f"{delivered}/{name}" for name in ("selftest.cpp", "selftest.py", "radar_correction.hpp")} <= names
-    assert {"app/py.typed", "calib_core/py.typed"} <= names
+    assert {"cocalib/py.typed", "calib_core/py.typed"} <= names
     assert {name.split("/")[0] for name in names if ".dist-info" not in name} == {
-        "app",
         "calib_core",
-        "cocalib_launcher.py",
+        "cocalib",
     }
     assert not any("__pycache__" in name or "/tests/" in name for name in names)
 
 
 def test_the_installed_command_finds_its_own_page_and_sample(installed: Path, tmp_path: Path) -> None:
-    code = "from app import resources; print(resources.static_folder()); print(resources.sample_folder())"
+    code = "from cocalib import resources; print(resources.static_folder()); print(resources.sample_folder())"
     printed = subprocess.run(
         [installed / "bin" / "python", "-c", code],
         cwd=tmp_path,
@@ -85,33 +87,24 @@ def test_the_installed_command_finds_its_own_page_and_sample(installed: Path, tm
         assert Path(line).is_relative_to(installed), "found in the checkout, not in the wheel"
 
 
-@pytest.mark.parametrize("rival", ["app.py", "app/__init__.py", "calib_core.py", "calib_core/__init__.py"])
-@pytest.mark.parametrize("kind", ["wheel", "editable"])
-def test_another_module_called_app_does_not_stop_the_command(
-    kind: str, rival: str, installed: Path, tmp_path: Path
-) -> None:
-    command = installed / "bin" / "cocalib" if kind == "wheel" else Path(sys.executable).with_name("cocalib")
-    assert command.is_file(), "cocalib is not installed in the test environment: run make dev"
-    (tmp_path / rival).parent.mkdir(exist_ok=True)
-    (tmp_path / rival).write_text("raise SystemExit('another program')\n")
-    for path in (str(tmp_path), ".", ""):  # an empty entry is the current folder
-        done = subprocess.run(
-            [command, "check", "absent.json"],
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join([path, str(tmp_path / "elsewhere")])},
-        )
-        assert done.stderr.startswith("cocalib: absent.json"), (path, done.stderr)
-        assert done.returncode == 2
-
-
-def test_the_launcher_imports_only_the_standard_library_at_the_top(project_root: Path) -> None:
-    tree = ast.parse((project_root / "app" / "launcher.py").read_text(encoding="utf-8"))
-    at_the_top = [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
-    names = {name.name for node in at_the_top if isinstance(node, ast.Import) for name in node.names}
-    names |= {str(node.module) for node in at_the_top if isinstance(node, ast.ImportFrom)}
-    assert {name.split(".")[0] for name in names} <= set(sys.stdlib_module_names)
+def test_a_foreign_package_called_app_is_left_alone(wheel: Path, tmp_path: Path) -> None:
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", tmp_path], check=True)
+    python = tmp_path / "bin" / "python"
+    ask = "import sysconfig; print(sysconfig.get_path('purelib'))"
+    site = Path(subprocess.run([python, "-c", ask], check=True, capture_output=True, text=True).stdout.strip())
+    (site / "app").mkdir()
+    (site / "app" / "__init__.py").write_text("WHOSE = 'another program'\n")
+    (site / "zz_borrowed.pth").write_text(sysconfig.get_path("purelib") + "\n")
+    pip = [sys.executable, "-m", "pip", "--python", str(python), "--disable-pip-version-check"]
+    subprocess.run([*pip, "install", "--quiet", "--no-index", "--no-deps", wheel], check=True)
+    code = "import app, cocalib as cc; print(app.WHOSE, cc.aed.__module__, cc.__file__)"
+    said = subprocess.run([python, "-c", code], cwd=tmp_path, check=True, capture_output=True, text=True).stdout
+    assert said.startswith("another program calib_core.metrics ")
+    assert str(site) in said
+    assert subprocess.run([tmp_path / "bin" / "cocalib", "--version"], capture_output=True).returncode == 0
+    subprocess.run([*pip, "uninstall", "--quiet", "--yes", "cocalib"], check=True)
+    assert (site / "app" / "__init__.py").read_text() == "WHOSE = 'another program'\n"
+    assert not (site / "cocalib").exists()
 
 
 def test_the_installed_command_serves_its_page(installed: Path, tmp_path: Path) -> None:
@@ -137,7 +130,7 @@ def test_the_installed_command_serves_its_page(installed: Path, tmp_path: Path) 
 
 
 def test_the_installed_command_solves_its_sample_and_packs_it(installed: Path, tmp_path: Path) -> None:
-    code = "from app import resources; print(resources.sample_folder() / 'rooftop')"
+    code = "from cocalib import resources; print(resources.sample_folder() / 'rooftop')"
     sample = Path(
         subprocess.run(
             [installed / "bin" / "python", "-c", code], cwd=tmp_path, check=True, capture_output=True, text=True

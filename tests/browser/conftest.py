@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Playwright, sync_playwright
 
-from app.web.port.server import RunningServer, ServerOptions, start
-from app.workspace import Workspace, open_workspace
 from calib_core.recordings import Recording, open_recording
+from cocalib.web.port.server import RunningServer, ServerOptions, start
+from cocalib.workspace import Workspace, open_workspace
 from tests.browser.driving import FLAGS, Driver
 from tests.find_browser import find_browser
 

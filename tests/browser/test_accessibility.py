@@ -6,10 +6,10 @@ from typing import Any
 import pytest
 from playwright.sync_api import expect
 
-from app.web.messages import Opening
-from app.web.port.server import RunningServer, ServerOptions
-from app.web.port.serving import Service
 from calib_core.recordings import Recording
+from cocalib.web.messages import Opening
+from cocalib.web.port.server import RunningServer, ServerOptions
+from cocalib.web.port.serving import Service
 from tests.browser.accessibility import violations
 from tests.browser.driving import Driver
 

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from playwright.sync_api import expect
 
-from app.web.port.server import RunningServer, ServerOptions, start
-from app.workspace import open_workspace
+from cocalib.web.port.server import RunningServer, ServerOptions, start
+from cocalib.workspace import open_workspace
 from tests.browser.accessibility import violations
 from tests.browser.driving import Driver
 from tests.street_recording import StreetRecording, reference_calibration, true_edges

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect
 
-from app.workspace import Workspace
 from calib_core.interchange import FORMATS, check, format_named, read_any, read_any_file
+from cocalib.workspace import Workspace
 from tests.browser.driving import Driver
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]

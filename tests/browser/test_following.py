@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from app.web.port.server import RunningServer, ServerOptions, start
-from app.workspace import Workspace, open_workspace
 from calib_core.recordings import AwaitedRecording, FollowedRecording, open_recording
+from cocalib.web.port.server import RunningServer, ServerOptions, start
+from cocalib.workspace import Workspace, open_workspace
 from tests.browser.driving import Driver
 from tests.growing_recording import SampleWriter
 

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.session import History, RecordingFacts
-from app.view import ClickRow, View, view
-from app.view.model import Ellipse
-from app.web.channel.view_feed import ViewFeed
-from app.web.messages import encode
-from app.workspace import Workspace
 from calib_core.measurements import Stamp
+from cocalib.session import History, RecordingFacts
+from cocalib.view import ClickRow, View, view
+from cocalib.view.model import Ellipse
+from cocalib.web.channel.view_feed import ViewFeed
+from cocalib.web.messages import encode
+from cocalib.workspace import Workspace
 from tests.browser.driving import Driver
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]

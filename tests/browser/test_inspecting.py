@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from app.web.port.server import ServerOptions, start
-from app.workspace import open_workspace
 from calib_core.recordings import RecordingOptions, open_recording
+from cocalib.web.port.server import ServerOptions, start
+from cocalib.workspace import open_workspace
 from tests.browser.driving import Driver
 from tests.vendor_recording import vendor_sample
 

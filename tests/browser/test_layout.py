@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from app.web.port.server import RunningServer
+from cocalib.web.port.server import RunningServer
 from tests.browser.driving import Driver
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]

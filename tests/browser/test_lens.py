@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect
 
-from app.intrinsics import RecordedPictures
-from app.web.port.server import RunningServer, ServerOptions, start
-from app.workspace import Workspace, open_workspace
 from calib_core.interchange import read_camera_file
 from calib_core.interchange.rectification import rectified_camera
 from calib_core.recordings import Recording, open_recording
 from calib_core.synthetic import PRESETS, WavedBoard, simulate, write_recording
+from cocalib.intrinsics import RecordedPictures
+from cocalib.web.port.server import RunningServer, ServerOptions, start
+from cocalib.workspace import Workspace, open_workspace
 from tests.browser.accessibility import violations
 from tests.browser.driving import Driver
 
@@ -68,7 +68,7 @@ def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
                 opened.wait(60)
             return super().picture(index)
 
-    monkeypatch.setattr("app.web.channel.lens.RecordedPictures", Held)
+    monkeypatch.setattr("cocalib.web.channel.lens.RecordedPictures", Held)
     yield opened
     opened.set()
 

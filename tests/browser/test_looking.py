@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from app.web.port.server import RunningServer, ServerOptions, start
-from app.workspace import open_workspace
 from calib_core.recordings import open_recording
+from cocalib.web.port.server import RunningServer, ServerOptions, start
+from cocalib.workspace import open_workspace
 from tests.browser.driving import Driver
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
-from app.web.port.server import RunningServer, ServerOptions, start
-from app.workspace import open_workspace
+from cocalib.web.port.server import RunningServer, ServerOptions, start
+from cocalib.workspace import open_workspace
 from tests.browser.driving import Driver
 from tests.picture_recording import PictureRecording
 

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
-from app.web.messages import Opening
-from app.web.port.hand_over import HandOver
-from app.web.port.server import RunningServer, ServerOptions
-from app.web.port.serving import Service
-from app.workspace import Workspace
 from calib_core.recordings import Recording, first_picture
+from cocalib.web.messages import Opening
+from cocalib.web.port.hand_over import HandOver
+from cocalib.web.port.server import RunningServer, ServerOptions
+from cocalib.web.port.serving import Service
+from cocalib.workspace import Workspace
 from tests.browser.driving import Driver
 
 pytestmark = pytest.mark.browser

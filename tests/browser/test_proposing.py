@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.web.port.server import RunningServer, ServerOptions, start
-from app.workspace import Workspace, open_workspace
 from calib_core.association.placements import Placement
 from calib_core.camera import Camera
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.proposing import DwellView, FrameSource, PictureCandidate, ViewProgress
 from calib_core.recordings import Recording
+from cocalib.web.port.server import RunningServer, ServerOptions, start
+from cocalib.workspace import Workspace, open_workspace
 from tests.browser.accessibility import violations
 from tests.browser.driving import Driver
 
@@ -72,10 +72,10 @@ class Pictures:
 @pytest.fixture
 def pictures(monkeypatch: pytest.MonkeyPatch, truth: Any) -> Iterator[Pictures]:
     fake = Pictures(truth)
-    monkeypatch.setattr("app.proposing.finding.dwell_views", fake)
-    monkeypatch.setattr("app.proposing.job.looks_of", lambda *_: iter([object()]))
+    monkeypatch.setattr("cocalib.proposing.finding.dwell_views", fake)
+    monkeypatch.setattr("cocalib.proposing.job.looks_of", lambda *_: iter([object()]))
     monkeypatch.setattr(
-        "app.proposing.job.with_look",
+        "cocalib.proposing.job.with_look",
         lambda views, *_: tuple(
             replace(view, candidates=tuple(replace(one, likeness=0.5) for one in view.candidates)) for view in views
         ),

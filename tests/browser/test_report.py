@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, expect
 
-from app.report import print_pdf, report_html
-from app.workspace import Workspace
+from cocalib.report import print_pdf, report_html
+from cocalib.workspace import Workspace
 from tests.browser.accessibility import page_violations
 from tests.browser.driving import Driver
 from tests.find_browser import find_browser

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page
 
-from app.rerun import write_view
-from app.rerun.web_viewer import serve_view
+from cocalib.rerun import write_view
+from cocalib.rerun.web_viewer import serve_view
 from tests.recorded_view import nearest_rows, opened_view
 
 pytest.importorskip("rerun", reason="there is no wheel of rerun-sdk for this machine")

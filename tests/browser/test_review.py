@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from app.session import ClickExcluded, ClicksImported
-from app.web.port.server import RunningServer
-from app.workspace import Workspace
 from calib_core.measurements import ReflectorClick, time_from_parts
+from cocalib.session import ClickExcluded, ClicksImported
+from cocalib.web.port.server import RunningServer
+from cocalib.workspace import Workspace
 from tests.browser.driving import Driver
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
@@ -76,7 +76,7 @@ def figures(page: Driver) -> list[str]:
 
 def printed(calibration: Path, against: Path) -> list[str]:
     """Return the figures that `cocalib check` prints."""
-    command = [sys.executable, "-m", "app", "check", str(calibration), "--against", str(against)]
+    command = [sys.executable, "-m", "cocalib", "check", str(calibration), "--against", str(against)]
     lines = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60).stdout.splitlines()
     told = [line.strip().removeprefix("compared with the other: ") for line in lines]
     return [line for line in told if line.startswith(("rotation:", "camera position:", "at ", "overall:"))]

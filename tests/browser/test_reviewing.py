@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.opening.reference import reference_from
-from app.web.port.server import ServerOptions, start
-from app.workspace import open_workspace
 from calib_core.recordings import Recording
+from cocalib.opening.reference import reference_from
+from cocalib.web.port.server import ServerOptions, start
+from cocalib.workspace import open_workspace
 from tests.browser.driving import Driver
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.web.port.server import RunningServer, ServerOptions, start
-from app.web.radar_sight import RadarSight
-from app.workspace import Workspace, open_workspace
 from calib_core.measurements import TimeNs
 from calib_core.recordings import Recording, open_recording
 from calib_core.results import Calibration
+from cocalib.web.port.server import RunningServer, ServerOptions, start
+from cocalib.web.radar_sight import RadarSight
+from cocalib.workspace import Workspace, open_workspace
 from tests.browser.driving import Driver
 
 pytestmark = pytest.mark.browser

@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from app.web.port.server import ServerOptions, start
-from app.workspace import open_workspace
+from cocalib.web.port.server import ServerOptions, start
+from cocalib.workspace import open_workspace
 from tests.browser.driving import Driver
 from tests.picture_recording import PictureRecording, grey_pictures
 
@@ -27,7 +27,7 @@ class Process:
         command = [
             sys.executable,
             "-m",
-            "app",
+            "cocalib",
             "demo",
             "--no-browser",
             "--port",

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.web.port.server import RunningServer, ServerOptions, start
-from app.workspace import open_workspace
 from calib_core.measurements import NS_PER_S
+from cocalib.web.port.server import RunningServer, ServerOptions, start
+from cocalib.workspace import open_workspace
 from tests.browser.driving import Driver
 from tests.picture_recording import START, PictureRecording, grey_pictures
 

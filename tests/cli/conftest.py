@@ -9,7 +9,6 @@ import cv2
 import numpy as np
 import pytest
 
-from app.cli import run
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.measurements import NS_PER_S, TimeNs, time_parts
@@ -20,6 +19,7 @@ from calib_core.recordings.containers.recorded_messages import (
     RecordedMessage,
 )
 from calib_core.recordings.containers.writing import write_ros2
+from cocalib.cli import run
 
 START = TimeNs(1_700_000_000 * NS_PER_S)
 DWELL_S = 4

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from app.opening.choice import Choice
-from app.opening.opened import with_remembered
 from calib_core.recordings import RecordingOptions
+from cocalib.opening.choice import Choice
+from cocalib.opening.opened import with_remembered
 from tests.vendor_recording import STATED, vendor_sample
 
 Cocalib = Callable[..., Any]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from app.cli import run
+from cocalib.cli import run
 
 SAMPLE = Path(__file__).resolve().parents[2] / "sample_data" / "rooftop"
 

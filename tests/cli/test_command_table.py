@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 
-from app.cli import tyro_hook
-from app.cli.commands import COMMANDS, Command
-from app.option_changes import option_groups
 from calib_core.recordings import RecordingOptions
+from cocalib.cli import tyro_hook
+from cocalib.cli.commands import COMMANDS, Command
+from cocalib.option_changes import option_groups
 
 Cocalib = Callable[..., Any]
 
@@ -60,7 +60,7 @@ def test_the_help_has_the_text_of_every_option(cocalib: Cocalib, command: str) -
 
 def test_tyro_still_has_the_private_events_that_our_usage_errors_need() -> None:
     assert tyro_hook.missing_parts() == (), (
-        "this version of tyro has changed its private events; adapt app/cli/tyro_hook.py, or lower the upper bound of "
+        "this version of tyro has changed its private events; adapt app/cocalib/cli/tyro_hook.py, or lower the upper bound of "
         "tyro in pyproject.toml. Until then tyro prints its own messages for wrong usage."
     )
 
@@ -80,7 +80,7 @@ def test_a_tyro_without_those_events_still_runs_commands_and_prints_its_own_erro
 def imported_after(*arguments: str) -> set[str]:
     """Run the command in a fresh interpreter and return what it imported."""
     code = (
-        "import sys\nfrom app.cli import run\n"
+        "import sys\nfrom cocalib.cli import run\n"
         f"try:\n    run({list(arguments)!r})\nexcept SystemExit:\n    pass\n"
         "print('imported', *sys.modules)"
     )

@@ -13,11 +13,11 @@ import cv2
 import numpy as np
 import pytest
 
-from app.cli import demo
-from app.cli.serving_flags import ServingFlags
-from app.opening import Choice, Serving
 from calib_core.geometry import rotation_angle_rad
 from calib_core.interchange import read_calibration
+from cocalib.cli import demo
+from cocalib.cli.serving_flags import ServingFlags
+from cocalib.opening import Choice, Serving
 from tests.cli.conftest import Made
 from tests.corpus_calibrations.data_sets import DATA_SETS
 from tests.corpus_calibrations.tools import TOOLS
@@ -426,7 +426,7 @@ def test_the_demo_of_another_version_has_a_session_of_its_own(tmp_path: Path, mo
         sessions.append(choice.session)
         return 0
 
-    monkeypatch.setattr("app.opening.serve", serve)
+    monkeypatch.setattr("cocalib.opening.serve", serve)
     for sample in ("first", "first", "second"):
         (tmp_path / sample / "rooftop").mkdir(parents=True, exist_ok=True)
         for bag in ("radar.bag", "camera.bag"):

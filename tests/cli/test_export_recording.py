@@ -11,13 +11,13 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
-import app.cli.export_recording as command
+import cocalib.cli.export_recording as command
 
 
 @pytest.fixture(scope="module")
 def calibration(project_root, tmp_path_factory):
     """Return the calibration of the sample's own clicks."""
-    from app.cli import run
+    from cocalib.cli import run
 
     path = tmp_path_factory.mktemp("calibration") / "calibration.json"
     sample = project_root / "sample_data" / "rooftop"
@@ -33,7 +33,7 @@ def sample(project_root):
 @pytest.fixture(scope="module")
 def exported(project_root, calibration, tmp_path_factory):
     """Return the new recording."""
-    from app.cli import run
+    from cocalib.cli import run
 
     out = tmp_path_factory.mktemp("exported") / "new.mcap"
     sample = project_root / "sample_data" / "rooftop"

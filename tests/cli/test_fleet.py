@@ -10,9 +10,9 @@ import numpy as np
 import pyarrow.parquet
 import pytest
 
-from app.batch.results_folder import ResultsFolder
-from app.fleet.index import index_path
 from calib_core.interchange.own.fleet_prior_json import read_fleet_prior
+from cocalib.batch.results_folder import ResultsFolder
+from cocalib.fleet.index import index_path
 from tests.unit.app.fleet.made_results import digest_of, make_fleet, make_result
 
 Cocalib = Callable[..., Any]

@@ -15,7 +15,7 @@ def served(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Recording, int]]:
     """Return the recordings that would be served, each with its number of frames."""
     found: list[tuple[Recording, int]] = []
     monkeypatch.setattr(
-        "app.web.port.serving.Service.serve",
+        "cocalib.web.port.serving.Service.serve",
         lambda _service, _workspace, recording: found.append((recording, len(recording.image_times))),
     )
     return found
@@ -36,7 +36,7 @@ def test_a_recording_that_has_not_been_begun_is_waited_for(
         else:
             writers[0].write_until(8.0)
 
-    monkeypatch.setattr("app.opening.opened.sleep", write_on)
+    monkeypatch.setattr("cocalib.opening.opened.sleep", write_on)
     answer = cocalib("open", "--follow", path, "--no-browser", "--port", 0, "--session", tmp_path / "session")
     writers[0].stop()
     assert answer.code == 0, answer.err

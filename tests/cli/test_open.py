@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from app.__main__ import run
-from app.workspace import Workspace
 from calib_core.recordings import Recording
 from calib_core.synthetic import SimulationOptions, simulate, write_recording
+from cocalib.__main__ import run
+from cocalib.workspace import Workspace
 
 
 @pytest.fixture
@@ -20,7 +20,7 @@ def served(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Workspace]:
     def serve(_service: object, workspace: Workspace, _recording: Recording) -> None:
         workspaces.append(workspace)
 
-    monkeypatch.setattr("app.web.port.serving.Service.serve", serve)
+    monkeypatch.setattr("cocalib.web.port.serving.Service.serve", serve)
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     return workspaces
 

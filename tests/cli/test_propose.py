@@ -10,11 +10,10 @@ import msgspec
 import numpy as np
 import pytest
 
-import app.proposing.finding
-from app.cli import run
 from calib_core.geometry import rotation_angle_rad
 from calib_core.interchange.own.proposal_documents import ProposalsDocument
 from calib_core.recordings.containers.writing import write_ros2
+from cocalib.cli import run
 from tests.cli.conftest import DWELL_S, START, Made
 
 Cocalib = Callable[..., Any]
@@ -264,7 +263,7 @@ def test_an_interrupt_leaves_no_file_and_no_traceback(
     def interrupted(*_: object, **__: object) -> NoReturn:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(app.proposing.finding, "dwell_views", interrupted)
+    monkeypatch.setattr("cocalib.proposing.finding.dwell_views", interrupted)
     answer = cocalib(*command, recording, "--out", tmp_path / "made.json")
     assert answer.code == 130
     assert "Traceback" not in answer.out + answer.err

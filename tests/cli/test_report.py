@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from app.cli import run
+from cocalib.cli import run
 
 
 @pytest.fixture(scope="module")

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.session import ClickPlaced, RecordingFacts, advance
-from app.session.file import open_session_file
 from calib_core.interchange import read_clicks
 from calib_core.measurements import TimeNs
+from cocalib.session import ClickPlaced, RecordingFacts, advance
+from cocalib.session.file import open_session_file
 
 Cocalib = Callable[..., Any]
 FACTS = RecordingFacts("drive.bag", 1_700_000_000_123_456_789 + 100_000_000 * np.arange(50), 640, 480)

@@ -123,7 +123,7 @@ def fuzz(
         folder: an empty folder for the target's files.
         rng: the source of randomness; the same one gives the same run.
         go_on: whether to try another input, given the report so far.
-        lines: what counts as reached; all of calib_core and app by default.
+        lines: what counts as reached; all of calib_core and cocalib by default.
     """
     lines = lines or ReachedLines()
     report = Report()

@@ -11,7 +11,7 @@ OURS = tuple(f"{ROOT / name}/" for name in ("calib_core", "app"))
 
 
 class ReachedLines:
-    """Collects the lines of calib_core and app that run inside the `with` block and were not reached before.
+    """Collects the lines of calib_core and cocalib that run inside the `with` block and were not reached before.
 
     Attributes:
         seen: every line reached so far, as (file, line).

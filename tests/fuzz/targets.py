@@ -8,12 +8,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from app.session import ClickExcluded, ClickPlaced, ClicksImported, History, RecordingFacts, Undo, advance, settled
-from app.session.file import SessionFileError, open_session_file
-from app.view import view
-from app.web.messages.incoming import CursorMoved, FrameWanted, Hello, ImportWanted, ViewpointWanted, parse
-from app.web.port import guard
-from app.web.port.admissions import Admissions
 from calib_core.deployment.recorded_frames import read_frames
 from calib_core.errors import CalibrationError
 from calib_core.interchange import (
@@ -38,6 +32,12 @@ from calib_core.recordings.messages.definitions import parse_definition
 from calib_core.recordings.radar.axes import parse_radar_axes
 from calib_core.recordings.radar.layouts import recognise
 from calib_core.recordings.time.written_times import read_time, time_from_name
+from cocalib.session import ClickExcluded, ClickPlaced, ClicksImported, History, RecordingFacts, Undo, advance, settled
+from cocalib.session.file import SessionFileError, open_session_file
+from cocalib.view import view
+from cocalib.web.messages.incoming import CursorMoved, FrameWanted, Hello, ImportWanted, ViewpointWanted, parse
+from cocalib.web.port import guard
+from cocalib.web.port.admissions import Admissions
 from tests.fuzz.box_targets import FILE_SEEDS, FILE_TOKENS, MESSAGE_SEEDS, box_file_reader, box_message_reader
 from tests.fuzz.fuzzing import Target
 from tests.fuzz.tree_target import SEEDS, tree_reader

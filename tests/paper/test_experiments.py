@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.cli import run as cocalib
 from benchmarks.paper.fit import AZIMUTHS_DEG, ELEVATIONS_DEG, mismatch_of, read_fit
 from benchmarks.paper.limits import PAPER, missed, order_kept, verdict_of
 from benchmarks.paper.measured import AccRow, Measured, read_measured, write_measured
@@ -28,6 +27,7 @@ from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
 from calib_core.synthetic import SimulatedScans, simulate, simulate_scans, write_recording
+from cocalib.cli import run as cocalib
 
 SMALL = dataclasses.replace(FITTED, width_px=480, placements=5)
 

@@ -11,8 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
-from app.option_changes import OptionChange
-from app.session import (
+from calib_core.errors import CalibrationError
+from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
+from calib_core.options import CalibrationOptions
+from cocalib.option_changes import OptionChange
+from cocalib.session import (
     BoxDrawn,
     BoxesLoaded,
     BoxHidden,
@@ -39,12 +42,9 @@ from app.session import (
     advance,
     settled,
 )
-from app.session.file import SessionFileError, open_session_file
-from app.view import View, view
-from app.workspace import Workspace
-from calib_core.errors import CalibrationError
-from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
-from calib_core.options import CalibrationOptions
+from cocalib.session.file import SessionFileError, open_session_file
+from cocalib.view import View, view
+from cocalib.workspace import Workspace
 
 FACTS = RecordingFacts("drive", 1_700_000_000_123_456_789 + 33_333_333 * np.arange(8), width_px=64, height_px=48)
 

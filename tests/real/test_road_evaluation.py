@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.cli import run
 from calib_core.boxes import boxes_text
 from calib_core.detections import Box, Boxes, FrameBoxes
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import TimeNs
 from calib_core.recordings import open_recording
+from cocalib.cli import run
 
 pytestmark = pytest.mark.real
 

@@ -7,14 +7,14 @@ import cv2
 import numpy as np
 import pytest
 
-from app.session import Session
-from app.web.radar_sight import RadarSight, overlay_of
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import TimeNs
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import open_recording
 from calib_core.results import Calibration, Metrics
+from cocalib.session import Session
+from cocalib.web.radar_sight import RadarSight, overlay_of
 
 pytestmark = pytest.mark.real
 

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.cli import run
 from calib_core.geometry import rotation_angle_rad
+from cocalib.cli import run
 
 pytestmark = pytest.mark.real
 

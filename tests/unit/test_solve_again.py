@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.solving import calibration_text_of_pairs, solve_pairs
 from calib_core.calibration import calibrate, calibrate_pairs, solve_again
 from calib_core.errors import InputError, OptionError
 from calib_core.interchange import calibration_text, read_calibration
@@ -16,6 +15,7 @@ from calib_core.measurements import RadarScans, Unsolvable
 from calib_core.options import CalibrationOptions, CameraPositionPrior, NoiseOptions, SolvingOptions
 from calib_core.results import Calibration
 from calib_core.synthetic import simulate_pairs
+from cocalib.solving import calibration_text_of_pairs, solve_pairs
 from tests.rooftop import read_rooftop
 
 OPTIONS = {

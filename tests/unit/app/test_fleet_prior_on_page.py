@@ -9,18 +9,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.fleet_prior_file import FleetPriorFile
-from app.session import History, RecordingFacts, Session, Solved
-from app.solver_worker import SolverWorker
-from app.solving import calibration_text, solve_clicks
-from app.view import view
-from app.web.port.routes import Routes
 from calib_core.fleet_prior import FleetPrior
 from calib_core.interchange.own.fleet_prior_json import write_fleet_prior
 from calib_core.measurements import ReflectorClick, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording
 from calib_core.results import Calibration
+from cocalib.fleet_prior_file import FleetPriorFile
+from cocalib.session import History, RecordingFacts, Session, Solved
+from cocalib.solver_worker import SolverWorker
+from cocalib.solving import calibration_text, solve_clicks
+from cocalib.view import view
+from cocalib.web.port.routes import Routes
 
 DEFAULTS = CalibrationOptions()
 SCATTER = np.diag([5e-3] * 3 + [np.deg2rad(0.3)] * 3) ** 2

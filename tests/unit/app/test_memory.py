@@ -9,7 +9,7 @@ import pytest
 _FAULTS = """
 import resource, sys
 import numpy as np
-from app.memory import keep_freed_memory
+from cocalib.memory import keep_freed_memory
 if "keep" in sys.argv:
     keep_freed_memory()
 def faults():
@@ -25,7 +25,7 @@ print(faults())
 
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="the C library is not glibc")
 def test_the_c_library_takes_every_setting() -> None:
-    code = "import sys; from app.memory import keep_freed_memory; sys.exit(not keep_freed_memory())"
+    code = "import sys; from cocalib.memory import keep_freed_memory; sys.exit(not keep_freed_memory())"
     subprocess.run([sys.executable, "-c", code], check=True)
 
 

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from app.session import BoxDrawn
-from app.view import AccPanel
-from app.view.figure import Figure
-from app.workspace import Workspace, open_workspace
 from calib_core.measurements import TimeNs
+from cocalib.session import BoxDrawn
+from cocalib.view import AccPanel
+from cocalib.view.figure import Figure
+from cocalib.workspace import Workspace, open_workspace
 from tests.street_recording import StreetRecording, reference_calibration
 
 FIGURES = (Figure("acc", "in their boxes (Acc)", "86.4", "%", ""),)

@@ -6,19 +6,19 @@ import inspect
 import msgspec
 import pytest
 
-from app import option_changes
-from app.option_changes import (
+from calib_core.errors import OptionError
+from calib_core.option_checks import RANGES, checked_options
+from calib_core.options import CalibrationOptions, CameraPositionPrior, GatingOptions, PaperOptions, SolvingOptions
+from calib_core.recordings import RecordingOptions
+from calib_core.synthetic import RigOptions, SimulationOptions
+from cocalib import option_changes
+from cocalib.option_changes import (
     OptionChange,
     changed_options,
     changes_from_tree,
     option_groups,
     options_from_tree,
 )
-from calib_core.errors import OptionError
-from calib_core.option_checks import RANGES, checked_options
-from calib_core.options import CalibrationOptions, CameraPositionPrior, GatingOptions, PaperOptions, SolvingOptions
-from calib_core.recordings import RecordingOptions
-from calib_core.synthetic import RigOptions, SimulationOptions
 
 DESCRIPTIONS = {option.path: option for group in option_groups() for option in group.options}
 

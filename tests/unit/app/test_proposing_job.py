@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
-from app.proposing import ProposingJob, ProposingSnapshot, ProposingStage, ProposingWish
 from calib_core.errors import RecordingError
 from calib_core.measurements import ReflectorClick, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.proposing import DwellView, ViewProgress
+from cocalib.proposing import ProposingJob, ProposingSnapshot, ProposingStage, ProposingWish
 from tests.drawn_views import draw_views
 
 DRAWN = draw_views(3)
@@ -57,9 +57,9 @@ class Finding:
 @pytest.fixture
 def finding(monkeypatch: pytest.MonkeyPatch) -> Finding:
     fake = Finding()
-    monkeypatch.setattr("app.proposing.job.find_proposals", fake.find)
-    monkeypatch.setattr("app.proposing.job.looks_of", fake.look)
-    monkeypatch.setattr("app.proposing.job.with_look", fake.carry)
+    monkeypatch.setattr("cocalib.proposing.job.find_proposals", fake.find)
+    monkeypatch.setattr("cocalib.proposing.job.looks_of", fake.look)
+    monkeypatch.setattr("cocalib.proposing.job.with_look", fake.carry)
     return fake
 
 

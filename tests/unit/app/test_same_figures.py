@@ -6,13 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.evaluating import evaluate_recording
-from app.session import History, RecordingFacts, Session
-from app.solving import solve_clicks
-from app.view import Reference, view
-from app.view.acc import acc_panel
-from app.view.number_format import plain, with_sigma
-from app.web.messages import encode
 from calib_core.evaluation import box_figures, moving_targets
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.interchange import CalibrationFile, check, compare, imported
@@ -20,6 +13,13 @@ from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording
 from calib_core.results import Calibration
+from cocalib.evaluating import evaluate_recording
+from cocalib.session import History, RecordingFacts, Session
+from cocalib.solving import solve_clicks
+from cocalib.view import Reference, view
+from cocalib.view.acc import acc_panel
+from cocalib.view.number_format import plain, with_sigma
+from cocalib.web.messages import encode
 from tests.street_recording import StreetRecording, reference_calibration
 
 

@@ -5,7 +5,7 @@ import sys
 
 _ENDS = """
 import os, signal, threading
-from app.signals import stop_on_signals
+from cocalib.signals import stop_on_signals
 
 class Deleted:
     def __del__(self):

@@ -9,8 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.session import Solved
-from app.solver_worker import SolverWorker
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
 from calib_core.errors import RecordingError
@@ -18,6 +16,8 @@ from calib_core.measurements import RadarScans, ReflectorClick, TimeNs, Unsolvab
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
 from calib_core.synthetic import simulate_pairs
+from cocalib.session import Solved
+from cocalib.solver_worker import SolverWorker
 
 CAMERA = Camera("pinhole", 640, 480, np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]]))
 CLICK = ReflectorClick(TimeNs(10**18), "c1", 1.0, 2.0)
@@ -145,7 +145,7 @@ def test_the_preview_is_delivered_before_the_answer_and_the_next_one_starts_from
         yield replace(answer, checking=True)
         yield answer
 
-    monkeypatch.setattr("app.solver_worker.solve_in_steps", steps)
+    monkeypatch.setattr("cocalib.solver_worker.solve_in_steps", steps)
     answers = Answers()
     worker = SolverWorker(Radar(), CAMERA)
     for revision in (1, 2):

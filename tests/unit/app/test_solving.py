@@ -10,9 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.resources import version
-from app.session import ClicksImported, OptionsChanged
-from app.solving import (
+from calib_core.camera import Camera
+from calib_core.errors import InputError, OptionError
+from calib_core.interchange import CameraFile, camera_info_text, read_calibration
+from calib_core.measurements import RadarScans, ReflectorClick, TimeNs, Unsolvable
+from calib_core.options import CalibrationOptions, LocatingOptions
+from calib_core.recordings import Recording, RecordingOptions, open_recording
+from calib_core.results import Calibration, DataWarning
+from cocalib.resources import version
+from cocalib.session import ClicksImported, OptionsChanged
+from cocalib.solving import (
     calibration_text,
     calibration_text_of_pairs,
     camera_for,
@@ -21,14 +28,7 @@ from app.solving import (
     solve_in_steps,
     solve_pairs,
 )
-from app.workspace import open_workspace
-from calib_core.camera import Camera
-from calib_core.errors import InputError, OptionError
-from calib_core.interchange import CameraFile, camera_info_text, read_calibration
-from calib_core.measurements import RadarScans, ReflectorClick, TimeNs, Unsolvable
-from calib_core.options import CalibrationOptions, LocatingOptions
-from calib_core.recordings import Recording, RecordingOptions, open_recording
-from calib_core.results import Calibration, DataWarning
+from cocalib.workspace import open_workspace
 
 CAMERA = Camera("pinhole", 640, 480, np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]]))
 CLICK = ReflectorClick(TimeNs(10**18), "c1", 1.0, 2.0)

@@ -7,8 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.option_changes import OptionChange
-from app.session import (
+from calib_core.errors import InputError
+from calib_core.interchange import read_clicks
+from calib_core.measurements import RadarScans, TimeNs, Unsolvable
+from cocalib.option_changes import OptionChange
+from cocalib.session import (
     ClickPlaced,
     ClickRemoved,
     EventError,
@@ -20,12 +23,9 @@ from app.session import (
     Step,
     Undo,
 )
-from app.session.file import Closed, Restored, SessionFileError
-from app.view import View, view
-from app.workspace import Workspace, open_workspace, recording_facts
-from calib_core.errors import InputError
-from calib_core.interchange import read_clicks
-from calib_core.measurements import RadarScans, TimeNs, Unsolvable
+from cocalib.session.file import Closed, Restored, SessionFileError
+from cocalib.view import View, view
+from cocalib.workspace import Workspace, open_workspace, recording_facts
 
 FACTS = RecordingFacts("drive", 1_700_000_000_123_456_789 + 100_000_000 * np.arange(50), width_px=640, height_px=480)
 TIMES = [TimeNs(int(time)) for time in FACTS.image_times]

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.board_search import find_board
 from calib_core.baselines.checkerboard import calibrate_on_board
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
@@ -14,6 +13,7 @@ from calib_core.measurements import Candidate, Pair, Unsolvable
 from calib_core.options import BoardOptions, CalibrationOptions
 from calib_core.results import Calibration
 from calib_core.vision.checkerboard import board_corners, find_corners, view_of_board
+from cocalib.board_search import find_board
 
 CAMERA = Camera(
     "plumb_bob",

@@ -6,7 +6,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from app.view.systematic_errors import refined_sentences
 from benchmarks.accuracy.defects.wrong_lens import WrongLens, board_covariance, draw_wrong_lens, measure_wrong_lens
 from calib_core.calibration import calibrate_pairs, preview_pairs, solve_again
 from calib_core.camera import Camera, CameraCovariance
@@ -16,6 +15,7 @@ from calib_core.measurements import Pair, Unsolvable
 from calib_core.options import CalibrationOptions, RefiningOptions
 from calib_core.residual_test import residual_test
 from calib_core.results import Calibration
+from cocalib.view.systematic_errors import refined_sentences
 
 TOLD = WrongLens("focal 2 %", refined=True, scale_told=True, alone=True)
 UNTOLD = WrongLens("focal 2 %", refined=True)

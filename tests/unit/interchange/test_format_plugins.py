@@ -8,8 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from app.cli import run
-from app.web.channel.export_preview import export_preview, format_rows
 from calib_core.errors import InputError
 from calib_core.interchange import (
     CAMERA_ONLY,
@@ -24,6 +22,8 @@ from calib_core.interchange import (
     written_formats,
 )
 from calib_core.interchange.formats.plugins import GROUP, plugin_formats
+from cocalib.cli import run
+from cocalib.web.channel.export_preview import export_preview, format_rows
 from tests.fake_distribution import install
 
 PARAMETERS = '''
@@ -266,7 +266,7 @@ def test_a_module_in_the_current_folder_does_not_take_the_place_of_the_package_s
 
 def test_a_broken_package_says_so_on_stderr_and_the_command_goes_on(installed: Install, tmp_path: Path) -> None:
     installed(module="raise RuntimeError('worn out')")
-    program = f"import sys; sys.path.insert(0, {str(tmp_path / 'site-packages')!r}); from app.cli import run; "
+    program = f"import sys; sys.path.insert(0, {str(tmp_path / 'site-packages')!r}); from cocalib.cli import run; "
     command = [sys.executable, "-c", program + "sys.exit(run(['export', '--to', 'list']))"]
 
     done = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -10,7 +10,6 @@ import cv2
 import numpy as np
 import pytest
 
-from app.web.channel.export_preview import export_preview, exported, format_rows
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange import (
@@ -25,6 +24,7 @@ from calib_core.interchange import (
     read_calibration,
 )
 from calib_core.interchange.own.calibration_json import calibration_sha256
+from cocalib.web.channel.export_preview import export_preview, exported, format_rows
 
 MATRIX_ONLY = [known.name for known in FORMATS if known.camera == "matrix"]
 OTHERS = [known.name for known in FORMATS if known.camera != "matrix"]

@@ -6,7 +6,6 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from app.cli.simulate import SimulationFlags
 from calib_core.camera import CAMERA_MODELS, CameraModel
 from calib_core.errors import InputError
 from calib_core.interchange import camera_info_text, read_camera
@@ -14,6 +13,7 @@ from calib_core.interchange.own.documents import CameraDocument
 from calib_core.lens_models.lens_model import LensModel
 from calib_core.lens_models.registry import LENS_MODELS
 from calib_core.synthetic import typical_camera
+from cocalib.cli.simulate import SimulationFlags
 
 LENSES = list(LENS_MODELS.values())
 each_lens = pytest.mark.parametrize("lens", LENSES, ids=list(LENS_MODELS))

@@ -9,10 +9,10 @@ import cv2
 import numpy as np
 import pytest
 
-from app.cli import run
 from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S
 from calib_core.recordings import inspect_recording, verification_text, verify_recording
+from cocalib.cli import run
 from tests.unit.recordings.containers.damage import KINDS, damaged, read_by_us, records, sound
 
 START_NS = 1_700_000_000 * NS_PER_S

@@ -8,16 +8,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.batch import driving
-from app.batch.driving import BatchProgress, chosen_engine, drive, shard_of
-from app.batch.engines.dask_cluster import DaskCluster
-from app.batch.engines.in_process import InProcess
-from app.batch.engines.one_job import run_once
-from app.batch.job import Job
-from app.batch.manifest import ManifestRow
-from app.batch.outcome import Outcome
-from app.batch.results_folder import ResultsFolder
 from calib_core.errors import InputError, OptionError
+from cocalib.batch import driving
+from cocalib.batch.driving import BatchProgress, chosen_engine, drive, shard_of
+from cocalib.batch.engines.dask_cluster import DaskCluster
+from cocalib.batch.engines.in_process import InProcess
+from cocalib.batch.engines.one_job import run_once
+from cocalib.batch.job import Job
+from cocalib.batch.manifest import ManifestRow
+from cocalib.batch.outcome import Outcome
+from cocalib.batch.results_folder import ResultsFolder
 from tests.batch_calls import quick_jobs
 
 

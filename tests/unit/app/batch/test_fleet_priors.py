@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.batch.fleet_priors import require_priors_of_others
-from app.batch.manifest import Manifest, ManifestRow
 from calib_core.errors import InputError
 from calib_core.fleet_prior import FleetPrior
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.own.fleet_prior_json import write_fleet_prior
+from cocalib.batch.fleet_priors import require_priors_of_others
+from cocalib.batch.manifest import Manifest, ManifestRow
 
 
 def manifest(*rows: ManifestRow) -> Manifest:

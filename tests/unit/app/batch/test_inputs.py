@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from app.batch.inputs import InputPath
-from app.batch.job import jobs_of
-from app.batch.manifest import ManifestRow
-from app.batch.running import run_job
+from cocalib.batch.inputs import InputPath
+from cocalib.batch.job import jobs_of
+from cocalib.batch.manifest import ManifestRow
+from cocalib.batch.running import run_job
 
 _OPENED = """
 import os, sys

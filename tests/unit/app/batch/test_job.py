@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from app.batch import input_digests
-from app.batch.input_digests import InputDigests
-from app.batch.inputs import inputs_of, state_of
-from app.batch.job import Job, jobs_of
-from app.batch.manifest import ManifestRow
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 from calib_core.recordings import RecordingOptions
+from cocalib.batch import input_digests
+from cocalib.batch.input_digests import InputDigests
+from cocalib.batch.inputs import inputs_of, state_of
+from cocalib.batch.job import Job, jobs_of
+from cocalib.batch.manifest import ManifestRow
 
 
 def put(path: Path, content: str = "content", age_s: float = 60.0) -> Path:
@@ -82,7 +82,7 @@ def test_another_version_of_the_program_makes_another_digest(
     row: ManifestRow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before = job_of(row, tmp_path).digest
-    monkeypatch.setattr("app.batch.job.version", lambda: "9.9.9")
+    monkeypatch.setattr("cocalib.batch.job.version", lambda: "9.9.9")
     assert job_of(row, tmp_path).digest != before
 
 

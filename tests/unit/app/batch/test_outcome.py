@@ -5,8 +5,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from app.batch.outcome import OUTCOME_SCHEMA, Outcome, OutcomeFile, OutcomeRun, outcome_text, read_outcome
-from app.batch.outcome_schema import write_outcome_schema
+from cocalib.batch.outcome import OUTCOME_SCHEMA, Outcome, OutcomeFile, OutcomeRun, outcome_text, read_outcome
+from cocalib.batch.outcome_schema import write_outcome_schema
 
 OUTCOME = Outcome(
     OUTCOME_SCHEMA,
@@ -54,5 +54,5 @@ def test_the_published_schema_is_that_of_the_type(tmp_path: Path, project_root: 
     written = write_outcome_schema(tmp_path)
     published = project_root / "docs" / "schemas" / written.name
     assert published.read_text(encoding="utf-8") == written.read_text(encoding="utf-8"), (
-        "run: python -m app.batch.outcome_schema docs/schemas"
+        "run: python -m cocalib.batch.outcome_schema docs/schemas"
     )

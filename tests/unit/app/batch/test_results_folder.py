@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from app.batch.outcome import OUTCOME_SCHEMA, Outcome, outcome_text
-from app.batch.results_folder import LOG_FILE, OUTCOME_FILE, ResultsFolder, listed_files
-from app.batch.writers import Writer
+from cocalib.batch.outcome import OUTCOME_SCHEMA, Outcome, outcome_text
+from cocalib.batch.results_folder import LOG_FILE, OUTCOME_FILE, ResultsFolder, listed_files
+from cocalib.batch.writers import Writer
 
 DIGEST = "0123456789abcdef0123456789abcdef"
 
@@ -99,7 +99,7 @@ _KILLED = """
     from pathlib import Path
     sys.path[:0] = sys.argv[2:4]
     from test_results_folder import DIGEST, write
-    from app.batch.results_folder import ResultsFolder
+    from cocalib.batch.results_folder import ResultsFolder
 
     def killing(moment):
         left = moment
@@ -156,7 +156,7 @@ _AT_ONCE = """
     from pathlib import Path
     sys.path[:0] = sys.argv[2:4]
     from test_results_folder import DIGEST, write
-    from app.batch.results_folder import ResultsFolder
+    from cocalib.batch.results_folder import ResultsFolder
 
     folder = ResultsFolder(Path(sys.argv[1]))
     children = []

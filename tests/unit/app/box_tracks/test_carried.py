@@ -5,10 +5,10 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from app.box_tracks.carried import Followed, PlacedBox, carried_boxes, carried_tracks
-from app.box_tracks.stretches import MOST_FRAMES, Start, stretches_of
-from app.session import BoxEdges, BoxKeyframe, BoxTrack, RecordingFacts, Session
 from calib_core.measurements import TimeNs
+from cocalib.box_tracks.carried import Followed, PlacedBox, carried_boxes, carried_tracks
+from cocalib.box_tracks.stretches import MOST_FRAMES, Start, stretches_of
+from cocalib.session import BoxEdges, BoxKeyframe, BoxTrack, RecordingFacts, Session
 
 FACTS = RecordingFacts("drive", 1_700_000_000_000_000_000 + 100_000_000 * np.arange(30), width_px=640, height_px=480)
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from app.box_tracks.following import BoxFollower
-from app.box_tracks.stretches import Start, Stretch
 from calib_core.errors import InputError
+from cocalib.box_tracks.following import BoxFollower
+from cocalib.box_tracks.stretches import Start, Stretch
 from tests.unit.vision.test_box_tracking import edges, picture
 
 WAY = [(60 + 3.0 * step, 100.0) for step in range(60)]

@@ -5,13 +5,13 @@ import json
 import numpy as np
 import pytest
 
-from app.box_tracks.carried import carried_boxes, carried_tracks
-from app.box_tracks.loading import boxes_loaded, read_sent_boxes
-from app.session import RecordingFacts, Session, apply
 from calib_core.boxes import boxes_text
 from calib_core.detections import Box, Boxes, FrameBoxes
 from calib_core.errors import InputError
 from calib_core.measurements import TimeNs
+from cocalib.box_tracks.carried import carried_boxes, carried_tracks
+from cocalib.box_tracks.loading import boxes_loaded, read_sent_boxes
+from cocalib.session import RecordingFacts, Session, apply
 
 FACTS = RecordingFacts("drive", 1_700_000_000_000_000_000 + 100_000_000 * np.arange(6), width_px=640, height_px=480)
 

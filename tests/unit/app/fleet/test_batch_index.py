@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from app.batch.driving import BatchProgress
-from app.batch.job import Job
-from app.batch.manifest import ManifestRow
-from app.batch.plan import write_plan
-from app.fleet.batch_index import indexed_batch
-from app.fleet.index import index_path, read_fleet
+from cocalib.batch.driving import BatchProgress
+from cocalib.batch.job import Job
+from cocalib.batch.manifest import ManifestRow
+from cocalib.batch.plan import write_plan
+from cocalib.fleet.batch_index import indexed_batch
+from cocalib.fleet.index import index_path, read_fleet
 from tests.unit.app.fleet.made_results import make_result
 
 

@@ -12,14 +12,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.batch.job import Job
-from app.batch.manifest import ManifestRow
-from app.batch.outcome import read_outcome
-from app.batch.plan import write_plan
-from app.batch.results_folder import OUTCOME_FILE, ResultsFolder
-from app.fleet.index import INDEX_VERSION, FleetIndex, index_path, read_fleet, rebuild_index
-from app.fleet.records import FleetRecord
 from calib_core.errors import InputError
+from cocalib.batch.job import Job
+from cocalib.batch.manifest import ManifestRow
+from cocalib.batch.outcome import read_outcome
+from cocalib.batch.plan import write_plan
+from cocalib.batch.results_folder import OUTCOME_FILE, ResultsFolder
+from cocalib.fleet.index import INDEX_VERSION, FleetIndex, index_path, read_fleet, rebuild_index
+from cocalib.fleet.records import FleetRecord
 from tests.unit.app.fleet.made_results import DAY_NS, FIRST_NS, digest_of, make_fleet, make_result
 
 _TABLES = ("sessions", "poses", "transitions", "files")

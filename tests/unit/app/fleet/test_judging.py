@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.fleet.index import read_fleet
 from benchmarks.fleet.judging import judge, main
 from benchmarks.fleet.recorded_priors import held_by
 from benchmarks.fleet.truth import FleetTruth, TrueSession
 from calib_core.fleet_prior import FleetPrior
 from calib_core.geometry import RigidTransform
+from cocalib.fleet.index import read_fleet
 from tests.unit.app.fleet.made_results import make_fleet, make_result
 
 _TURNED = np.array([0.0, 0.0, 0.0, 0.1, 0.0, 0.0])

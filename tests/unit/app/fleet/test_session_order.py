@@ -5,8 +5,8 @@ import random
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.batch.outcome import OUTCOME_SCHEMA, Outcome, OutcomeRun
-from app.fleet.session_order import current_and_superseded, in_order
+from cocalib.batch.outcome import OUTCOME_SCHEMA, Outcome, OutcomeRun
+from cocalib.fleet.session_order import current_and_superseded, in_order
 
 _TIMES = st.none() | st.integers(0, 20)
 _ROWS = st.lists(st.tuples(_TIMES, st.none() | st.integers(0, 20)), min_size=1, max_size=8)

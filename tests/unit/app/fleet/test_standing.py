@@ -6,16 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.cli.fleet.text_tables import plan_lines
-from app.fleet.choosing import compare_sessions, vehicle_named
-from app.fleet.index import read_fleet
-from app.fleet.json_documents import status_document
-from app.fleet.kinds import PriorOfType, kinds_of, prior_of_type
-from app.fleet.records import FleetRecord
-from app.fleet.standing import age_days, standings_of
-from app.fleet.summary_page import summary_html
 from calib_core.errors import InputError
 from calib_core.measurements import Unsolvable
+from cocalib.cli.fleet.text_tables import plan_lines
+from cocalib.fleet.choosing import compare_sessions, vehicle_named
+from cocalib.fleet.index import read_fleet
+from cocalib.fleet.json_documents import status_document
+from cocalib.fleet.kinds import PriorOfType, kinds_of, prior_of_type
+from cocalib.fleet.records import FleetRecord
+from cocalib.fleet.standing import age_days, standings_of
+from cocalib.fleet.summary_page import summary_html
 from tests.unit.app.fleet.made_results import DAY_NS, FIRST_NS, make_fleet, make_result, session_error
 
 _TURNED = np.array([0.0, 0.0, 0.0, 0.0, 0.12, 0.0])

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.fleet.index import read_fleet
-from app.fleet.records import FleetRecord
-from app.fleet.summary_page import summary_html
+from cocalib.fleet.index import read_fleet
+from cocalib.fleet.records import FleetRecord
+from cocalib.fleet.summary_page import summary_html
 from tests.unit.app.fleet.made_results import digest_of, make_fleet, make_result
 
 _HTML = "{http://www.w3.org/1999/xhtml}"

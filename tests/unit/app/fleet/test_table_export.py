@@ -9,10 +9,10 @@ import numpy as np
 import pyarrow.parquet
 import pytest
 
-from app.fleet.index import read_fleet
-from app.fleet.records import FleetRecord
-from app.fleet.table_export import csv_bytes, parquet_bytes
 from calib_core.errors import InputError
+from cocalib.fleet.index import read_fleet
+from cocalib.fleet.records import FleetRecord
+from cocalib.fleet.table_export import csv_bytes, parquet_bytes
 from tests.unit.app.fleet.made_results import make_fleet, make_result
 
 

@@ -7,17 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.cli.fleet.text_tables import history_lines, status_lines
-from app.fleet.choosing import compare_sessions
-from app.fleet.index import read_fleet, rebuild_index
-from app.fleet.json_documents import comparison_document, history_document
-from app.fleet.kinds import kinds_of
-from app.fleet.records import FleetRecord
-from app.fleet.standing import standings_of
-from app.fleet.summary_page import write_summary
-from app.fleet.table_export import csv_bytes
 from calib_core.errors import InputError
 from calib_core.fleet_prior import DataAlone, FleetAnswer, FleetPrior
+from cocalib.cli.fleet.text_tables import history_lines, status_lines
+from cocalib.fleet.choosing import compare_sessions
+from cocalib.fleet.index import read_fleet, rebuild_index
+from cocalib.fleet.json_documents import comparison_document, history_document
+from cocalib.fleet.kinds import kinds_of
+from cocalib.fleet.records import FleetRecord
+from cocalib.fleet.standing import standings_of
+from cocalib.fleet.summary_page import write_summary
+from cocalib.fleet.table_export import csv_bytes
 from tests.unit.app.fleet.made_results import DAY_NS, FIRST_NS, calibration, make_fleet, make_result
 
 TURNED = np.array([0.0, 0.0, 0.0, 0.0, 0.1, 0.0])

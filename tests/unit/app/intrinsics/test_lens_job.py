@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.intrinsics import LensJob, LensSnapshot, LensStage
 from calib_core.camera import Camera
 from calib_core.errors import InputError, RecordingError
 from calib_core.intrinsics import (
@@ -19,6 +18,7 @@ from calib_core.intrinsics import (
     SearchProgress,
 )
 from calib_core.measurements import Unsolvable
+from cocalib.intrinsics import LensJob, LensSnapshot, LensStage
 
 BOARD = Board("checkerboard", 9, 6, 0.025)
 OPTIONS = IntrinsicsOptions()
@@ -80,7 +80,7 @@ class Search:
 @pytest.fixture
 def search(monkeypatch: pytest.MonkeyPatch) -> Search:
     fake = Search()
-    monkeypatch.setattr("app.intrinsics.job.calibrate_from", fake)
+    monkeypatch.setattr("cocalib.intrinsics.job.calibrate_from", fake)
     return fake
 
 

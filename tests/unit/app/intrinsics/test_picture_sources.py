@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
-from app.intrinsics import open_pictures
-from app.intrinsics.picture_files import pictures_in
 from calib_core.errors import InputError
+from cocalib.intrinsics import open_pictures
+from cocalib.intrinsics.picture_files import pictures_in
 
 
 def grey(value: int) -> np.ndarray:

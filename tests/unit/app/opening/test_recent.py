@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from app.opening.recent import RecentRecordings
+from cocalib.opening.recent import RecentRecordings
 
 
 @pytest.fixture

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from app.opening.root_folder import RootFolder
 from calib_core.errors import InputError
+from cocalib.opening.root_folder import RootFolder
 
 POSIX = pytest.mark.skipif(sys.platform == "win32", reason="links and pipes need POSIX")
 

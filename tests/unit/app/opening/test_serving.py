@@ -10,7 +10,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection
 
-from app.cli import run
+from cocalib.cli import run
 from tests.port_client import channel, come_in, get, wanted
 from tests.served_process import served_process
 

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from app.opening.choice import Choice
-from app.opening.sessions import fitting_clicks, session_folder, session_offer
-from app.session import ClickPlaced, RecordingFacts
-from app.session.file import SessionFileError, has_session_of, open_session_file
-from app.workspace import open_workspace, recording_facts
 from calib_core.measurements import TimeNs
+from cocalib.opening.choice import Choice
+from cocalib.opening.sessions import fitting_clicks, session_folder, session_offer
+from cocalib.session import ClickPlaced, RecordingFacts
+from cocalib.session.file import SessionFileError, has_session_of, open_session_file
+from cocalib.workspace import open_workspace, recording_facts
 from tests.picture_recording import PictureRecording, grey_pictures
 
 

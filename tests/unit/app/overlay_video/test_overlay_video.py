@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.overlay_video import OverlayOptions, encoding, write_overlay
-from app.overlay_video.footer import time_text
-from app.overlay_video.marks import draw_boxes, draw_clicks, draw_returns
-from app.overlay_video.panels import Panels
-from app.recorded_view import RecordedView
-from app.seen_returns import frame_blocks
 from calib_core.detections import Box
 from calib_core.errors import InputError
 from calib_core.measurements import NS_PER_S, TimeNs
+from cocalib.overlay_video import OverlayOptions, encoding, write_overlay
+from cocalib.overlay_video.footer import time_text
+from cocalib.overlay_video.marks import draw_boxes, draw_clicks, draw_returns
+from cocalib.overlay_video.panels import Panels
+from cocalib.recorded_view import RecordedView
+from cocalib.seen_returns import frame_blocks
 from tests.recorded_view import boxes_around, nearest_rows, opened_view
 
 GREY = 90

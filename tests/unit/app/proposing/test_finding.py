@@ -5,13 +5,13 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-import app.proposing.finding as finding
-from app.proposing import find_proposals, proposed_again
+import cocalib.proposing.finding as finding
 from calib_core.association.placements import Placement
 from calib_core.camera import Camera
 from calib_core.measurements import NS_PER_S, RadarScans, ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.proposing import DwellView, PictureCandidate, ViewProgress
+from cocalib.proposing import find_proposals, proposed_again
 
 CAMERA = Camera("pinhole", 64, 48, np.array([[60.0, 0, 32], [0, 60, 24], [0, 0, 1]]), np.zeros(0))
 OPTIONS = CalibrationOptions()

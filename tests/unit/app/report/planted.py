@@ -6,14 +6,14 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from app.report.making import subject_of
-from app.report.residual_rows import ResidualRows
-from app.report.subject import Against, Judged, Picture, ReportSubject, Watched
 from calib_core.camera import Camera
 from calib_core.evaluation import BoxFigures, ClassFigure, Evaluation, FrameFigure, Sensitivity, Share
 from calib_core.interchange import compare, imported, read_calibration
 from calib_core.measurements import TimeNs
 from calib_core.results import Calibration, DataWarning, InputFile
+from cocalib.report.making import subject_of
+from cocalib.report.residual_rows import ResidualRows
+from cocalib.report.subject import Against, Judged, Picture, ReportSubject, Watched
 
 __all__ = [
     "FILE",

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from app.report import report_html
-from app.view.fleet_answer import fleet_axes, fleet_sentences
 from calib_core.fleet_prior import DataAlone, FleetAnswer, FleetPrior
 from calib_core.results import Calibration, DataWarning
+from cocalib.report import report_html
+from cocalib.view.fleet_answer import fleet_axes, fleet_sentences
 from tests.unit.app.report.planted import golden, subject_for
 
 _SCATTER = np.diag([0.02] * 3 + [0.01] * 3) ** 2

@@ -5,7 +5,7 @@ import xml.etree.ElementTree as ElementTree
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.report.markup import number, tag
+from cocalib.report.markup import number, tag
 
 
 @given(st.text(max_size=50), st.text(max_size=50))

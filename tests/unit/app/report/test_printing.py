@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from app.report.printing import PrintingError, find_browser, print_pdf
+from cocalib.report.printing import PrintingError, find_browser, print_pdf
 
 
 def _program(path: Path, script: str) -> Path:
@@ -17,7 +17,7 @@ def _program(path: Path, script: str) -> Path:
 @pytest.fixture
 def nowhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Hide every browser of this machine."""
-    monkeypatch.setattr("app.report.printing._PLACES", ())
+    monkeypatch.setattr("cocalib.report.printing._PLACES", ())
     monkeypatch.delenv("COCALIB_BROWSER", raising=False)
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setenv("PLAYWRIGHT_BROWSERS_PATH", str(tmp_path / "playwright"))

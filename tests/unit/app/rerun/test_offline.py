@@ -13,10 +13,10 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from app.rerun import require_display
-from app.rerun.sdk import offline_environment
-from app.rerun.web_viewer import POLICY, serve_view
 from calib_core.errors import InputError
+from cocalib.rerun import require_display
+from cocalib.rerun.sdk import offline_environment
+from cocalib.rerun.web_viewer import POLICY, serve_view
 
 BLOCKED = """
 import sys
@@ -28,7 +28,7 @@ sys.meta_path.insert(0, Absent())
 import importlib.util
 found = importlib.util.find_spec
 importlib.util.find_spec = lambda name, package=None: None if name.startswith("rerun") else found(name, package)
-from app.cli import run
+from cocalib.cli import run
 sys.exit(run(sys.argv[1:]))
 """
 

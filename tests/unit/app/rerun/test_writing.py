@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.recorded_view import RecordedView
-from app.rerun import write_view
-from app.rerun.summary import summary_text
-from app.rerun.writing import _require_complete
 from calib_core.errors import InputError
+from cocalib.recorded_view import RecordedView
+from cocalib.rerun import write_view
+from cocalib.rerun.summary import summary_text
+from cocalib.rerun.writing import _require_complete
 from tests.recorded_view import boxes_around, nearest_rows, opened_view
 
 pytest.importorskip("rerun", reason="there is no wheel of rerun-sdk for this machine")

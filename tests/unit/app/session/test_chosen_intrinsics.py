@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.session import (
+from calib_core.camera import Camera, CameraCovariance
+from cocalib.session import (
     ChosenIntrinsics,
     EventError,
     History,
@@ -18,8 +19,7 @@ from app.session import (
     advance,
     apply,
 )
-from app.session.file import open_session_file
-from calib_core.camera import Camera, CameraCovariance
+from cocalib.session.file import open_session_file
 
 FACTS = RecordingFacts("a.bag", np.array([0, 10**9]), 640, 480)
 CAMERA = Camera(

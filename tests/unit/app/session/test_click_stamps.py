@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from app.session.click_stamps import clicks_at_frames
 from calib_core.errors import InputError
 from calib_core.measurements import ReflectorClick, TimeNs
+from cocalib.session.click_stamps import clicks_at_frames
 
 START_NS = 1_700_000_000_123_456_789
 IMAGE_TIMES = START_NS + 100_000_000 * np.array([0, 1, 2, 3, 50, 51, 52, 53])

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.session import ClickPlaced, RecordingFacts, advance
-from app.session.file import SessionFileError, find_session_folder, open_session_file
 from calib_core.measurements import TimeNs
+from cocalib.session import ClickPlaced, RecordingFacts, advance
+from cocalib.session.file import SessionFileError, find_session_folder, open_session_file
 
 START_NS = 1_700_000_000_123_456_789
 IMAGE_TIMES = START_NS + 100_000_000 * np.arange(50)
@@ -150,8 +150,8 @@ def test_a_session_that_cannot_be_written_is_named_with_the_way_to_its_clicks(
     home: Path, state_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = clicked(home / "drive.bag.cocalib-session")
-    monkeypatch.setattr("app.session.file.folders.is_writable", lambda place: state_folder in (place, place.parent))
-    monkeypatch.setattr("app.session.file.finding.is_writable", lambda place: False)
+    monkeypatch.setattr("cocalib.session.file.folders.is_writable", lambda place: state_folder in (place, place.parent))
+    monkeypatch.setattr("cocalib.session.file.finding.is_writable", lambda place: False)
     found = find_session_folder([home / "drive.bag"], FACTS)
     assert found.path.parent == state_folder
     (warning,) = found.warnings
@@ -166,7 +166,7 @@ def test_another_users_session_next_to_the_recording_is_named(
 ) -> None:
     folder = clicked(home / "drive.bag.cocalib-session")
     os.chown(folder, 12345, -1)
-    monkeypatch.setattr("app.session.file.folders.is_writable", lambda place: state_folder in (place, place.parent))
+    monkeypatch.setattr("cocalib.session.file.folders.is_writable", lambda place: state_folder in (place, place.parent))
     found = find_session_folder([home / "drive.bag"], FACTS)
     assert found.path.parent == state_folder
     (warning,) = found.warnings

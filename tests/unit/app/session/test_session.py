@@ -5,8 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.option_changes import OptionChange
-from app.session import (
+from calib_core.errors import CalibrationError, OptionError
+from calib_core.measurements import ChosenReturn, ReflectorClick, Stamp, TimeNs, Unsolvable
+from calib_core.options import CalibrationOptions, NoiseOptions
+from cocalib.option_changes import OptionChange
+from cocalib.session import (
     Cleared,
     ClickExcluded,
     ClickMoved,
@@ -30,9 +33,6 @@ from app.session import (
     apply,
     settled,
 )
-from calib_core.errors import CalibrationError, OptionError
-from calib_core.measurements import ChosenReturn, ReflectorClick, Stamp, TimeNs, Unsolvable
-from calib_core.options import CalibrationOptions, NoiseOptions
 
 START_NS = 1_700_000_000_123_456_789
 FACTS = RecordingFacts("drive", START_NS + 100_000_000 * np.arange(50), width_px=640, height_px=480)

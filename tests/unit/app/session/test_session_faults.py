@@ -11,19 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.session import ClickPlaced, History, OptionsChanged, RecordingFacts, advance
-from app.session.file import (
-    SessionFile,
-    SessionFileError,
-    inspect_session,
-    open_session_file,
-    repair_session,
-    set_aside,
-)
-from app.session.file.checksums import line_bytes, sealed, taken_apart
-from app.session.file.guarded_folder import GuardedFolder
-from app.session.file.journal_reading import JOURNAL
-from app.session.file.snapshot import SNAPSHOT
 from benchmarks.reliability.sessions import (
     FACTS as MADE_FACTS,
 )
@@ -37,6 +24,19 @@ from benchmarks.reliability.sessions import (
 )
 from calib_core.measurements import TimeNs
 from calib_core.options import CalibrationOptions
+from cocalib.session import ClickPlaced, History, OptionsChanged, RecordingFacts, advance
+from cocalib.session.file import (
+    SessionFile,
+    SessionFileError,
+    inspect_session,
+    open_session_file,
+    repair_session,
+    set_aside,
+)
+from cocalib.session.file.checksums import line_bytes, sealed, taken_apart
+from cocalib.session.file.guarded_folder import GuardedFolder
+from cocalib.session.file.journal_reading import JOURNAL
+from cocalib.session.file.snapshot import SNAPSHOT
 
 START_NS = 1_700_000_000_123_456_789
 FACTS = RecordingFacts("drive", START_NS + 100_000_000 * np.arange(50), width_px=640, height_px=480)

@@ -14,7 +14,9 @@ import msgspec
 import numpy as np
 import pytest
 
-from app.session import (
+from calib_core.measurements import ChosenReturn, ReflectorClick, TimeNs, Unsolvable
+from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
+from cocalib.session import (
     Cleared,
     ClickExcluded,
     ClickMoved,
@@ -33,7 +35,7 @@ from app.session import (
     WarningsAcknowledged,
     advance,
 )
-from app.session.file import (
+from cocalib.session.file import (
     SessionFile,
     SessionFileError,
     open_session_file,
@@ -41,10 +43,8 @@ from app.session.file import (
     set_aside,
     user_session_folder,
 )
-from app.session.file.checksums import line_bytes, sealed, taken_apart
-from app.session.file.step_json import StepForm, form_of_step, step_from_form
-from calib_core.measurements import ChosenReturn, ReflectorClick, TimeNs, Unsolvable
-from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
+from cocalib.session.file.checksums import line_bytes, sealed, taken_apart
+from cocalib.session.file.step_json import StepForm, form_of_step, step_from_form
 
 START_NS = 1_700_000_000_123_456_789
 FACTS = RecordingFacts("drive", START_NS + 100_000_000 * np.arange(50), width_px=640, height_px=480)
@@ -143,8 +143,8 @@ def test_a_process_killed_outright_loses_nothing_that_was_confirmed(tmp_path: Pa
         import os, signal
         import numpy as np
         from pathlib import Path
-        from app.session import ClickPlaced, History, RecordingFacts, advance
-        from app.session.file import open_session_file
+        from cocalib.session import ClickPlaced, History, RecordingFacts, advance
+        from cocalib.session.file import open_session_file
         facts = RecordingFacts("drive", {START_NS} + 100_000_000 * np.arange(50), 640, 480)
         session_file, history = open_session_file(Path({str(tmp_path)!r}), facts), History()
         for frame in range(13):

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from app.view.advice import advice_for
-from app.view.model import Advice
 from calib_core.calibration import calibrate_pairs
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
 from calib_core.synthetic import simulate_pairs
 from calib_core.verdict import verdict_on
+from cocalib.view.advice import advice_for
+from cocalib.view.model import Advice
 
 
 def solved(count: int, options: CalibrationOptions | None = None) -> Calibration:

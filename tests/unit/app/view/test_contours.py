@@ -4,10 +4,10 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.view.contours import contour_lines, contour_maps
 from calib_core.calibration import calibrate_pairs
 from calib_core.results import Calibration
 from calib_core.synthetic import simulate_pairs
+from cocalib.view.contours import contour_lines, contour_maps
 
 COLUMNS, ROWS = np.linspace(0.0, 60.0, 31), np.linspace(0.0, 40.0, 21)
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from app.view import Pace, advice_words, pace_words
 from calib_core.advice.coverage import Coverage, Place
 from calib_core.results import NextPlacement
+from cocalib.view import Pace, advice_words, pace_words
 
 
 @pytest.mark.parametrize(

@@ -7,11 +7,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from app.opening.reference import camera_in, reference_from
-from app.session import History, RecordingFacts, Session
-from app.solving import check_clicks
-from app.view import Reference, shown_calibration, view
-from app.web.radar_sight import overlay_of
 from calib_core.errors import InputError
 from calib_core.interchange import (
     FORMATS,
@@ -32,6 +27,11 @@ from calib_core.measurements import (
     Unsolvable,
 )
 from calib_core.radar import RadarErrors
+from cocalib.opening.reference import camera_in, reference_from
+from cocalib.session import History, RecordingFacts, Session
+from cocalib.solving import check_clicks
+from cocalib.view import Reference, shown_calibration, view
+from cocalib.web.radar_sight import overlay_of
 
 FEW = Unsolvable("too-few-pairs", "1 of 4 pairs", "click more placements")
 

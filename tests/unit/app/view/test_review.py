@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.session import ClickPlaced, History, RecordingFacts, Solved, advance
-from app.view.review import review_of
-from app.view.review_pair import pair_review
-from app.view.review_solutions import compared, previous_calibration, solution_of
 from calib_core.calibration import calibrate_pairs, preview_pairs
 from calib_core.interchange import CalibrationFile, check, imported
 from calib_core.measurements import ChosenReturn, TimeNs
 from calib_core.results import Calibration
 from calib_core.synthetic import SimulatedPairs, simulate_pairs
+from cocalib.session import ClickPlaced, History, RecordingFacts, Solved, advance
+from cocalib.view.review import review_of
+from cocalib.view.review_pair import pair_review
+from cocalib.view.review_solutions import compared, previous_calibration, solution_of
 
 
 @pytest.fixture(scope="module")

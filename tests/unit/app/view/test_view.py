@@ -5,13 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.session import ClickExcluded, ClickMoved, ClickPlaced, History, RecordingFacts, Solved, Undo, advance
-from app.view import View, summary_lines, view
-from app.view.figures import pose_figures
-from app.view.mounting import OPTICAL_FROM_BODY, mounting_of
-from app.view.number_format import plain, with_sigma
-from app.view.reprojections import ellipses_of, reprojections
-from app.view.wording import sentence
 from calib_core.association.clustering import candidate_at
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
@@ -22,6 +15,13 @@ from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration, DataWarning, Metrics, PairResult
 from calib_core.synthetic import NoiseProfile, simulate_pairs
 from calib_core.verdict import verdict_on
+from cocalib.session import ClickExcluded, ClickMoved, ClickPlaced, History, RecordingFacts, Solved, Undo, advance
+from cocalib.view import View, summary_lines, view
+from cocalib.view.figures import pose_figures
+from cocalib.view.mounting import OPTICAL_FROM_BODY, mounting_of
+from cocalib.view.number_format import plain, with_sigma
+from cocalib.view.reprojections import ellipses_of, reprojections
+from cocalib.view.wording import sentence
 
 FACTS = RecordingFacts("drive", 1_700_000_000_123_456_789 + 100_000_000 * np.arange(50), width_px=640, height_px=480)
 TIMES = [TimeNs(int(time)) for time in FACTS.image_times]

@@ -11,9 +11,9 @@ import cv2
 import numpy as np
 import pytest
 
-from app.web.frames import FrameStore
 from calib_core.camera import Camera
 from calib_core.errors import InputError
+from cocalib.web.frames import FrameStore
 
 
 @dataclass(frozen=True)

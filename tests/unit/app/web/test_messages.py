@@ -13,8 +13,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.option_changes import OptionChange
-from app.session import (
+from calib_core.errors import CalibrationError, InputError, OptionError
+from calib_core.measurements import Stamp, TimeNs
+from cocalib.option_changes import OptionChange
+from cocalib.session import (
     Cleared,
     ClickExcluded,
     ClickMoved,
@@ -27,8 +29,8 @@ from app.session import (
     Undo,
     advance,
 )
-from app.view import View, view
-from app.web.messages import (
+from cocalib.view import View, view
+from cocalib.web.messages import (
     MAX_TEXT_BYTES,
     CursorMoved,
     Done,
@@ -53,9 +55,7 @@ from app.web.messages import (
     parse,
     request_of,
 )
-from app.web.messages.typescript import declarations
-from calib_core.errors import CalibrationError, InputError, OptionError
-from calib_core.measurements import Stamp, TimeNs
+from cocalib.web.messages.typescript import declarations
 
 FACTS = RecordingFacts("drive", 1_700_000_000_123_456_789 + 100_000_000 * np.arange(3), width_px=640, height_px=480)
 
@@ -285,10 +285,10 @@ def test_a_picture_travels_with_its_header_before_its_bytes() -> None:
 
 def test_the_types_of_the_page_are_those_of_the_program(project_root: Path) -> None:
     kept = (project_root / "static" / "messages.d.ts").read_text(encoding="utf-8")
-    assert kept == declarations(), "run: python -m app.web.messages > static/messages.d.ts"
+    assert kept == declarations(), "run: python -m cocalib.web.messages > static/messages.d.ts"
 
 
 def test_the_types_of_the_page_are_printed_by_one_command(project_root: Path) -> None:
-    command = [sys.executable, "-m", "app.web.messages"]
+    command = [sys.executable, "-m", "cocalib.web.messages"]
     done = subprocess.run(command, cwd=project_root, capture_output=True, check=True, timeout=60)
     assert done.stdout.decode() == declarations()

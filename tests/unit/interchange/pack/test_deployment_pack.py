@@ -215,7 +215,7 @@ def test_the_code_in_the_pack_has_a_licence_and_names_no_other_package(members) 
     for name in ("radar_correction.py", "selftest.py", "radar_correction.hpp", "selftest.cpp"):
         text = members[name].decode()
         assert text.startswith(("# SPDX-License-Identifier: Apache-2.0\n", "// SPDX-License-Identifier: Apache-2.0\n"))
-        assert not re.search(r"^\s*(import|from) (calib_core|app)", text, re.MULTILINE)
+        assert not re.search(r"^\s*(import|from) (calib_core|cocalib)", text, re.MULTILINE)
 
 
 def test_the_code_in_the_pack_is_the_installed_files(project_root: Path, members) -> None:

@@ -10,13 +10,13 @@ import msgspec
 import numpy as np
 import pytest
 
-from app.batch.driving import drive
-from app.batch.engines import dask_cluster, local_cluster
-from app.batch.engines.dask_cluster import DaskCluster
-from app.batch.engines.in_process import InProcess
-from app.batch.outcome import Outcome
-from app.batch.results_folder import ResultsFolder
 from calib_core.errors import InputError
+from cocalib.batch.driving import drive
+from cocalib.batch.engines import dask_cluster, local_cluster
+from cocalib.batch.engines.dask_cluster import DaskCluster
+from cocalib.batch.engines.in_process import InProcess
+from cocalib.batch.outcome import Outcome
+from cocalib.batch.results_folder import ResultsFolder
 from tests.batch_calls import attempts, dying, dying_job, failing, quick_jobs, squared, written
 from tests.dask_processes import worker_processes
 

@@ -8,13 +8,13 @@ import msgspec
 import numpy as np
 import pytest
 
-from app.batch.driving import drive
-from app.batch.engines import dask_connection, worker_checks
-from app.batch.engines.dask_cluster import DaskCluster
-from app.batch.engines.in_process import InProcess
-from app.batch.results_folder import ResultsFolder
-from app.resources import version
 from calib_core.errors import InputError
+from cocalib.batch.driving import drive
+from cocalib.batch.engines import dask_connection, worker_checks
+from cocalib.batch.engines.dask_cluster import DaskCluster
+from cocalib.batch.engines.in_process import InProcess
+from cocalib.batch.results_folder import ResultsFolder
+from cocalib.resources import version
 from tests.batch_calls import quick_jobs, squared
 from tests.dask_processes import scheduler_process, worker_process, worker_processes
 

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from app.batch.engines import one_job
-from app.batch.engines.in_process import InProcess
-from app.batch.engines.one_job import failed_outcome, run_once
-from app.batch.job import Job
-from app.batch.outcome import Outcome
-from app.batch.results_folder import ResultsFolder
 from calib_core.errors import InputError
+from cocalib.batch.engines import one_job
+from cocalib.batch.engines.in_process import InProcess
+from cocalib.batch.engines.one_job import failed_outcome, run_once
+from cocalib.batch.job import Job
+from cocalib.batch.outcome import Outcome
+from cocalib.batch.results_folder import ResultsFolder
 from tests.batch_calls import quick_jobs, squared, written
 
 

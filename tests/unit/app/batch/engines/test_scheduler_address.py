@@ -2,8 +2,8 @@
 
 import pytest
 
-from app.batch.engines.scheduler_address import checked_address
 from calib_core.errors import InputError
+from cocalib.batch.engines.scheduler_address import checked_address
 
 
 @pytest.mark.parametrize(

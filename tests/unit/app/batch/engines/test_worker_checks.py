@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from app.batch.engines.worker_checks import dask_trouble, version_trouble
+from cocalib.batch.engines.worker_checks import dask_trouble, version_trouble
 
 
 def _part(version: str) -> dict[str, Any]:

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from app.batch.manifest import ManifestRow
-from app.batch.manifest_files.first_manifest import first_manifest
-from app.batch.manifest_files.reading import read_manifest
 from calib_core.errors import InputError
+from cocalib.batch.manifest import ManifestRow
+from cocalib.batch.manifest_files.first_manifest import first_manifest
+from cocalib.batch.manifest_files.reading import read_manifest
 
 CLICKS = '{"schema": "cocalib/clicks-1", "clicks": []}'
 

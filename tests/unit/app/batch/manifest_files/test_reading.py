@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from app.batch.manifest import ManifestRow
-from app.batch.manifest_files.reading import read_manifest
 from calib_core.errors import InputError
+from cocalib.batch.manifest import ManifestRow
+from cocalib.batch.manifest_files.reading import read_manifest
 
 TOML = """
 [defaults]

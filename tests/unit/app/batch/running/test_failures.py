@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.batch.job import Job, jobs_of
-from app.batch.manifest import ManifestRow
-from app.batch.outcome import Outcome
-from app.batch.results_folder import LOG_FILE, ResultsFolder
-from app.batch.running import run_job, running_job, steps
 from calib_core.errors import InputError, RecordingError
 from calib_core.measurements import Unsolvable
+from cocalib.batch.job import Job, jobs_of
+from cocalib.batch.manifest import ManifestRow
+from cocalib.batch.outcome import Outcome
+from cocalib.batch.results_folder import LOG_FILE, ResultsFolder
+from cocalib.batch.running import run_job, running_job, steps
 
 SAMPLE = Path(__file__).resolve().parents[5] / "sample_data" / "rooftop"
 

@@ -5,18 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.batch.job import Job
-from app.batch.manifest import ManifestRow
-from app.batch.outcome import Outcome
-from app.batch.running.outcome_of import outcome_of
-from app.batch.running.solving import SolvedSession
-from app.batch.running.steps import SessionResult
 from calib_core.calibration import calibrate_pairs
 from calib_core.fleet_prior import FleetPrior
 from calib_core.interchange import calibration_text, imported, read_calibration
 from calib_core.results import Calibration
 from calib_core.synthetic.pairs.simulated import simulate_pairs
 from calib_core.verdict import verdict_on
+from cocalib.batch.job import Job
+from cocalib.batch.manifest import ManifestRow
+from cocalib.batch.outcome import Outcome
+from cocalib.batch.running.outcome_of import outcome_of
+from cocalib.batch.running.solving import SolvedSession
+from cocalib.batch.running.steps import SessionResult
 
 SCATTER = np.diag([5e-3] * 3 + [np.deg2rad(0.3)] * 3) ** 2
 

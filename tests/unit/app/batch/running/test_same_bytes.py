@@ -7,19 +7,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app import automatic_solving
-from app.automatic_solving import PlacedClicks
-from app.batch.job import jobs_of
-from app.batch.manifest import ManifestRow
-from app.batch.outcome import Outcome
-from app.batch.results_folder import OUTCOME_FILE, ResultsFolder
-from app.batch.running import run_job, solving
-from app.cli import run
 from calib_core.fleet_prior import FleetPrior
 from calib_core.interchange import read_calibration
 from calib_core.interchange.own.fleet_prior_json import write_fleet_prior
 from calib_core.options import CalibrationOptions, CameraPositionPrior, RefiningOptions, SolvingOptions
 from calib_core.results import UnconfirmedClicks
+from cocalib import automatic_solving
+from cocalib.automatic_solving import PlacedClicks
+from cocalib.batch.job import jobs_of
+from cocalib.batch.manifest import ManifestRow
+from cocalib.batch.outcome import Outcome
+from cocalib.batch.results_folder import OUTCOME_FILE, ResultsFolder
+from cocalib.batch.running import run_job, solving
+from cocalib.cli import run
 
 SAMPLE = Path(__file__).resolve().parents[5] / "sample_data" / "rooftop"
 BAGS = (SAMPLE / "radar.bag", SAMPLE / "camera.bag")

@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.session import RecordingFacts
-from app.session.file import open_session_file
-from app.web.channel.lens import LensDesk
-from app.web.channel.outbox import Outbox
-from app.web.messages import LensCalibrate, LensCancel, LensResult, LensState, LensUse, Outgoing, encode, parse
-from app.workspace import GivenIntrinsics, Workspace
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange import read_camera
 from calib_core.intrinsics import Board, BoardSearch, CalibratedLens, SearchProgress
+from cocalib.session import RecordingFacts
+from cocalib.session.file import open_session_file
+from cocalib.web.channel.lens import LensDesk
+from cocalib.web.channel.outbox import Outbox
+from cocalib.web.messages import LensCalibrate, LensCancel, LensResult, LensState, LensUse, Outgoing, encode, parse
+from cocalib.workspace import GivenIntrinsics, Workspace
 
 FACTS = RecordingFacts("a.bag", np.arange(1, 5) * 10**9, 640, 480)
 GIVEN = Camera("pinhole", 640, 480, np.array([[600.0, 0, 320], [0, 600, 240], [0, 0, 1]]))
@@ -57,7 +57,7 @@ def found(monkeypatch: pytest.MonkeyPatch) -> None:
             FOUND, board, board.corners_m, (), (), 0.1, 0.12
         )
 
-    monkeypatch.setattr("app.intrinsics.job.calibrate_from", calibrate)
+    monkeypatch.setattr("cocalib.intrinsics.job.calibrate_from", calibrate)
 
 
 def at_desk(workspace: Workspace, visit: Callable[[LensDesk, list[Outgoing]], Any]) -> list[Outgoing]:

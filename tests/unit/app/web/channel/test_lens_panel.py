@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from app.web.channel.lens_panel import camera_table, lens_result, view_corners
-from app.web.messages import encode
 from calib_core.camera import Camera, CameraCovariance
 from calib_core.geometry import RigidTransform
 from calib_core.intrinsics import Board, BoardCorners, CalibratedLens, LeftOutPicture, LensView, ModelTrial
 from calib_core.results import DataWarning
+from cocalib.web.channel.lens_panel import camera_table, lens_result, view_corners
+from cocalib.web.messages import encode
 
 MATRIX = np.array([[500.0, 0.0, 319.5], [0.0, 500.0, 239.5], [0.0, 0.0, 1.0]])
 NAMES = ("fx_px", "fy_px", "cx_px", "cy_px")

@@ -8,16 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.session import ClickPlaced, RecordingFacts
-from app.session.file import open_session_file
-from app.web.channel.live_edge import LiveEdge
-from app.web.channel.radar_survey import GrowingSurvey, Survey, survey_of
-from app.web.messages import FollowNote, FramesAdded, Outgoing
-from app.workspace import Workspace
 from calib_core.association.placements import Placement
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.options import GatingOptions
 from calib_core.recordings import AwaitedRecording, FollowedRecording, open_recording
+from cocalib.session import ClickPlaced, RecordingFacts
+from cocalib.session.file import open_session_file
+from cocalib.web.channel.live_edge import LiveEdge
+from cocalib.web.channel.radar_survey import GrowingSurvey, Survey, survey_of
+from cocalib.web.messages import FollowNote, FramesAdded, Outgoing
+from cocalib.workspace import Workspace
 from tests.growing_recording import SampleWriter
 
 DEADLINE_S = 60.0
@@ -143,7 +143,7 @@ def test_a_file_that_was_truncated_ends_the_following_in_words(tmp_path: Path) -
 
 
 def test_a_writer_that_stops_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("app.web.channel.live_edge._QUIET_AFTER_S", 0.05)
+    monkeypatch.setattr("cocalib.web.channel.live_edge._QUIET_AFTER_S", 0.05)
 
     async def story(writer: SampleWriter, pages: ToldPages, workspace: Workspace, recording: FollowedRecording) -> None:
         writer.write_until(14.0)

@@ -2,7 +2,7 @@
 
 import asyncio
 
-from app.web.channel.newest import NewestWins
+from cocalib.web.channel.newest import NewestWins
 
 
 def test_an_item_that_comes_between_the_end_of_the_last_one_and_its_callback_is_processed() -> None:

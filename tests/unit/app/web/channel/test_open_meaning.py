@@ -8,14 +8,14 @@ import cv2
 import numpy as np
 import pytest
 
-from app.hypothesis_sheet import OpenMeaning
-from app.opening.choice import MeaningPick
-from app.opening.reference import about_calibration, meaning_of, reference_from
-from app.view import Reference
-from app.web.channel.open_meaning import drawn_meaning, meaning_rows
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.recordings import Recording, open_recording
+from cocalib.hypothesis_sheet import OpenMeaning
+from cocalib.opening.choice import MeaningPick
+from cocalib.opening.reference import about_calibration, meaning_of, reference_from
+from cocalib.view import Reference
+from cocalib.web.channel.open_meaning import drawn_meaning, meaning_rows
 
 POSE = RigidTransform(np.eye(3), [0.4, 0.1, -0.2])
 """Of a camera's body frame in the radar, or the other way round."""

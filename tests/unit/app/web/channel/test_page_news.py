@@ -6,13 +6,13 @@ import logging
 import numpy as np
 import pytest
 
-from app.session import Session
-from app.web.channel.newest import NewestWins
-from app.web.channel.outbox import Outbox
-from app.web.channel.radar_survey import placements_at, survey_of
-from app.web.radar_sight import RadarSight, overlay_of
 from calib_core.measurements import RadarScan, RadarScans, TimeNs
 from calib_core.options import GatingOptions
+from cocalib.session import Session
+from cocalib.web.channel.newest import NewestWins
+from cocalib.web.channel.outbox import Outbox
+from cocalib.web.channel.radar_survey import placements_at, survey_of
+from cocalib.web.radar_sight import RadarSight, overlay_of
 
 
 def delivered(outbox: Outbox, count: int) -> list[str | bytes]:

@@ -5,8 +5,8 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from app.web.channel.picture_changes import PictureChanges, changes_of, comparison_order
 from calib_core.measurements import NS_PER_S
+from cocalib.web.channel.picture_changes import PictureChanges, changes_of, comparison_order
 from tests.picture_recording import START, PictureRecording
 
 

@@ -10,13 +10,13 @@ import cv2
 import numpy as np
 import pytest
 
-from app.session import PlacementDismissed, RecordingFacts
-from app.session.file import open_session_file
-from app.web.channel.proposing import ProposingDesk
-from app.web.messages import Outgoing, ProposalNews, ProposingSwitch, SnapWanted
-from app.workspace import GivenIntrinsics, Workspace
 from calib_core.measurements import TimeNs
 from calib_core.proposing import ViewProgress
+from cocalib.session import PlacementDismissed, RecordingFacts
+from cocalib.session.file import open_session_file
+from cocalib.web.channel.proposing import ProposingDesk
+from cocalib.web.messages import Outgoing, ProposalNews, ProposingSwitch, SnapWanted
+from cocalib.workspace import GivenIntrinsics, Workspace
 from tests.drawn_views import draw_views
 
 DRAWN = draw_views(3)
@@ -55,7 +55,7 @@ def found(monkeypatch: pytest.MonkeyPatch) -> None:
         progress(ViewProgress(len(PLACEMENTS), len(PLACEMENTS), DRAWN.views))
         return DRAWN.views, None
 
-    monkeypatch.setattr("app.proposing.job.find_proposals", find)
+    monkeypatch.setattr("cocalib.proposing.job.find_proposals", find)
 
 
 class Cameras(Sensors):
@@ -123,7 +123,7 @@ def test_a_click_is_averaged_over_the_frames_of_its_placement(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     views = tuple(replace(view, width_px=28.0) for view in DRAWN.views)
-    monkeypatch.setattr("app.proposing.job.find_proposals", lambda *_, **__: (views, None))
+    monkeypatch.setattr("cocalib.proposing.job.find_proposals", lambda *_, **__: (views, None))
     time = views[1].image_time
 
     async def visit(desk: ProposingDesk, told: list[Any]) -> None:

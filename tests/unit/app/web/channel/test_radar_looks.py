@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from app.web.channel.placement_words import placement_figures, placement_note, placement_summary
-from app.web.channel.radar_map import RadarMapSum
-from app.web.channel.radar_survey import survey_of
-from app.web.channel.space_feed import surveyed_extent
-from app.web.messages import PlacementRow
-from app.web.radar_sight import RadarSight, look_of, shown_rows
-from app.web.view3d.returns import Returns
 from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs
 from calib_core.options import GatingOptions
+from cocalib.web.channel.placement_words import placement_figures, placement_note, placement_summary
+from cocalib.web.channel.radar_map import RadarMapSum
+from cocalib.web.channel.radar_survey import survey_of
+from cocalib.web.channel.space_feed import surveyed_extent
+from cocalib.web.messages import PlacementRow
+from cocalib.web.radar_sight import RadarSight, look_of, shown_rows
+from cocalib.web.view3d.returns import Returns
 
 NAN = float("nan")
 
@@ -79,7 +79,7 @@ def test_a_reflector_that_does_not_stand_out_is_named() -> None:
 
 
 def test_a_recording_shorter_than_a_placement_is_not_searched(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("app.web.channel.radar_survey.find_placements", None)
+    monkeypatch.setattr("cocalib.web.channel.radar_survey.find_placements", None)
     scans = recorded().between(TimeNs(0), TimeNs(NS_PER_S))
     assert survey_of([scans], scans.times_ns, GatingOptions()).rows == ()
 

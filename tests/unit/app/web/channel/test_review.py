@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.session import History, Session
-from app.web.channel.outbox import Outbox
-from app.web.channel.review import ReviewDesk
-from app.web.messages.review_messages import CompareForm, ReviewForm, ReviewRequest, UncertaintyForm
 from calib_core.calibration import calibrate_pairs
 from calib_core.measurements import RadarScans, ReflectorClick, TimeNs
 from calib_core.results import Calibration
 from calib_core.synthetic import simulate_pairs
+from cocalib.session import History, Session
+from cocalib.web.channel.outbox import Outbox
+from cocalib.web.channel.review import ReviewDesk
+from cocalib.web.messages.review_messages import CompareForm, ReviewForm, ReviewRequest, UncertaintyForm
 
 
 @dataclass

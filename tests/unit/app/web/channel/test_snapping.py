@@ -8,12 +8,12 @@ import cv2
 import numpy as np
 import pytest
 
-from app.web.channel.snapping import snapped
-from app.web.frames import FrameStore
-from app.web.messages import Snapped, SnapWanted, encode, parse
 from calib_core.errors import InputError
 from calib_core.measurements import TimeNs
 from calib_core.recordings.camera.images import EncodedImage
+from cocalib.web.channel.snapping import snapped
+from cocalib.web.frames import FrameStore
+from cocalib.web.messages import Snapped, SnapWanted, encode, parse
 from tests.unit.vision.trihedral import draw_look, picture
 
 _RNG = np.random.default_rng(5)

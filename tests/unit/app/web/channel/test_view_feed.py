@@ -7,12 +7,12 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.session import ClickPlaced, History, RecordingFacts, advance
-from app.view import ClickRow, View, view
-from app.view.model import Ellipse, Figure
-from app.web.channel.view_feed import Shown, ViewFeed
-from app.web.messages import encode
 from calib_core.measurements import Stamp, TimeNs
+from cocalib.session import ClickPlaced, History, RecordingFacts, advance
+from cocalib.view import ClickRow, View, view
+from cocalib.view.model import Ellipse, Figure
+from cocalib.web.channel.view_feed import Shown, ViewFeed
+from cocalib.web.messages import encode
 from tests.page_view import applied
 
 FACTS = RecordingFacts("drive", 1_700_000_000_000_000_000 + 100_000_000 * np.arange(10_000), 640, 480)

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.web.channel import export_preview as panel
-from app.web.exports.format_list import format_rows
 from calib_core.interchange import CAMERA_ONLY, FORMATS, CalibrationFile, read_calibration
 from calib_core.radar import AngleMap
+from cocalib.web.channel import export_preview as panel
+from cocalib.web.exports.format_list import format_rows
 
 
 @pytest.fixture

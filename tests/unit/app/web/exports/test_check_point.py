@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.web.channel.export_preview import export_preview
-from app.web.exports.check_point import picture_of
 from calib_core.camera import Camera
 from calib_core.interchange import CalibrationFile, choose_check_point, read_calibration
 from calib_core.results import CheckPoint
+from cocalib.web.channel.export_preview import export_preview
+from cocalib.web.exports.check_point import picture_of
 
 
 @pytest.fixture

@@ -6,8 +6,6 @@ import re
 import numpy as np
 import pytest
 
-from app.web.channel.export_preview import export_preview
-from app.web.exports.file_numbers import our_numbers, pose_in_file
 from calib_core.interchange import (
     FORMATS,
     CalibrationFile,
@@ -16,6 +14,8 @@ from calib_core.interchange import (
     WrittenPose,
     read_calibration,
 )
+from cocalib.web.channel.export_preview import export_preview
+from cocalib.web.exports.file_numbers import our_numbers, pose_in_file
 
 NAMES = FrameNames("front_radar", "front_camera_optical")
 

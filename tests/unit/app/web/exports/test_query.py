@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from app.web.channel.export_preview import export_preview, exported
-from app.web.exports.query import FieldError, fields_in
 from calib_core.interchange import CalibrationFile, FrameNames, export, read_any, read_calibration
 from calib_core.interchange.own.calibration_json import calibration_sha256
+from cocalib.web.channel.export_preview import export_preview, exported
+from cocalib.web.exports.query import FieldError, fields_in
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from app.web.port.address import AddressError, require_address, require_one_address, require_token
+from cocalib.web.port.address import AddressError, require_address, require_one_address, require_token
 
 
 @pytest.mark.parametrize("port", [-1, 65536, 99999])

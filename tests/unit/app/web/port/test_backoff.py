@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from app.web.port import backoff as module
-from app.web.port.backoff import Backoff
-from app.web.port.server import RunningServer, ServerOptions, start
-from app.workspace import open_workspace
+from cocalib.web.port import backoff as module
+from cocalib.web.port.backoff import Backoff
+from cocalib.web.port.server import RunningServer, ServerOptions, start
+from cocalib.workspace import open_workspace
 from tests.picture_recording import PictureRecording, grey_pictures
 from tests.port_client import come_in, get
 

@@ -11,8 +11,6 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from app.session import Session
-from app.web.port.routes import Reply, Routes
 from calib_core.errors import InputError
 from calib_core.interchange import (
     FORMATS,
@@ -26,6 +24,8 @@ from calib_core.interchange import (
 )
 from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
 from calib_core.results import Calibration
+from cocalib.session import Session
+from cocalib.web.port.routes import Reply, Routes
 from tests.picture_recording import PictureRecording, grey_pictures
 
 

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from app.web.messages import Opening
-from app.web.port import hand_over as module
-from app.web.port.hand_over import HandOver
-from app.web.port.server import ServerOptions
-from app.web.port.serving import Service
+from cocalib.web.messages import Opening
+from cocalib.web.port import hand_over as module
+from cocalib.web.port.hand_over import HandOver
+from cocalib.web.port.server import ServerOptions
+from cocalib.web.port.serving import Service
 from tests.port_client import come_in
 
 

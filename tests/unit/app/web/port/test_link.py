@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from app.web.port.address import AddressError, listening_at
-from app.web.port.link import Link, ServerOptions
-from app.web.port.server import RunningServer
-from app.web.port.waiting import WaitingRoom
+from cocalib.web.port.address import AddressError, listening_at
+from cocalib.web.port.link import Link, ServerOptions
+from cocalib.web.port.server import RunningServer
+from cocalib.web.port.waiting import WaitingRoom
 from tests.port_client import come_in, get
 
 

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from app.resources import static_folder
-from app.web.port.preloading import with_preloaded_modules
+from cocalib.resources import static_folder
+from cocalib.web.port.preloading import with_preloaded_modules
 
 PAGE = '<head><script type="module" src="a.js"></script></head><body></body>'
 

@@ -12,9 +12,9 @@ from urllib.parse import urlencode
 
 import pytest
 
-from app.web.port.resumption import Resumption, Ticket
-from app.web.port.server import RunningServer, ServerOptions, start
-from app.workspace import Workspace, open_workspace
+from cocalib.web.port.resumption import Resumption, Ticket
+from cocalib.web.port.server import RunningServer, ServerOptions, start
+from cocalib.workspace import Workspace, open_workspace
 from tests.picture_recording import PictureRecording, grey_pictures
 from tests.port_client import come_in, get
 

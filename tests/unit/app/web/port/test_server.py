@@ -14,9 +14,9 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from app.web.port.entrance import MAX_SOCKETS
-from app.web.port.server import RunningServer, ServerOptions, start
-from app.workspace import Workspace, open_workspace
+from cocalib.web.port.entrance import MAX_SOCKETS
+from cocalib.web.port.server import RunningServer, ServerOptions, start
+from cocalib.workspace import Workspace, open_workspace
 from tests.page_view import PageView
 from tests.picture_recording import START, PictureRecording, grey_pictures
 from tests.port_client import channel, come_in, get, wanted
@@ -122,7 +122,7 @@ def test_a_websocket_without_the_cookie_is_refused(server: RunningServer) -> Non
 @pytest.mark.parametrize(
     "path",
     ["/../pyproject.toml", "/..%2fpyproject.toml", "/%2e%2e/pyproject.toml", "/..\\pyproject.toml", "//etc/passwd",
-     "/static/main.js", "/viser/../../app/web/server.py", "/viser/", "/viser/a/b/", "/viser/%2e%2e/", "/api/",
+     "/static/main.js", "/viser/../../app/cocalib/web/server.py", "/viser/", "/viser/a/b/", "/viser/%2e%2e/", "/api/",
      "/api/export/nothing", "/api/export/../clicks.json"],
 )  # fmt: skip
 def test_no_other_path_exists(server: RunningServer, cookie: str, path: str) -> None:

@@ -16,15 +16,15 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection
 
-from app.cli import run
-from app.session import ClickPlaced
-from app.web.messages import Opening
-from app.web.port import serving
-from app.web.port.server import RunningServer, ServerOptions
-from app.web.port.serving import Service
-from app.workspace import Workspace, open_workspace
 from calib_core.errors import RecordingError
 from calib_core.measurements import TimeNs
+from cocalib.cli import run
+from cocalib.session import ClickPlaced
+from cocalib.web.messages import Opening
+from cocalib.web.port import serving
+from cocalib.web.port.server import RunningServer, ServerOptions
+from cocalib.web.port.serving import Service
+from cocalib.workspace import Workspace, open_workspace
 from tests.picture_recording import START, PictureRecording, grey_pictures
 from tests.port_client import channel, come_in, get, wanted
 
@@ -291,7 +291,7 @@ import calib_core.recordings as recordings
 recordings.open_recording = lambda *_, **_options: threading.Event().wait()
 """
 PRINTS_WHEN_IT_SERVES = """
-from app.web.port.server import RunningServer
+from cocalib.web.port.server import RunningServer
 admit = RunningServer.admit
 RunningServer.admit = lambda *arguments: (admit(*arguments), print("serving"))
 """
@@ -355,7 +355,7 @@ def test_a_signal_while_serving_closes_the_session(tmp_path: Path, sigint: str, 
 
 SLOW_TO_CLOSE = f"""{PRINTS_WHEN_IT_SERVES}
 import os, sys, time
-from app.session.file import SessionFile
+from cocalib.session.file import SessionFile
 close = SessionFile.close
 def close_slowly(session):
     sys.stdout.write("closing\\n")

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from app.cli import run
-from app.web.port.address import AddressError
-from app.web.port.server import ServerOptions, start
-from app.web.port.unix_socket import forwarding_command, listening_socket, remove_socket
-from app.workspace import open_workspace
+from cocalib.cli import run
+from cocalib.web.port.address import AddressError
+from cocalib.web.port.server import ServerOptions, start
+from cocalib.web.port.unix_socket import forwarding_command, listening_socket, remove_socket
+from cocalib.workspace import open_workspace
 from tests.picture_recording import PictureRecording, grey_pictures
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no Unix sockets")

@@ -10,12 +10,12 @@ import msgspec
 import pytest
 import viser
 
-from app.resources import InstallationError
-from app.web.port import viser_hook
-from app.web.port.websockets_hook import ProcessRequest, SocketHandler
+from cocalib.resources import InstallationError
+from cocalib.web.port import viser_hook
+from cocalib.web.port.websockets_hook import ProcessRequest, SocketHandler
 
 CHANGED = (
-    "this version of viser has changed its private API; adapt app/web/port/viser_hook.py, or lower the upper bound "
+    "this version of viser has changed its private API; adapt app/cocalib/web/port/viser_hook.py, or lower the upper bound "
     "of viser in pyproject.toml"
 )
 

@@ -14,11 +14,11 @@ from websockets.asyncio import server as websocket_server
 from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
-from app.web.port import websockets_hook
-from app.web.port.websockets_hook import SocketHandler, wrapped_serve
+from cocalib.web.port import websockets_hook
+from cocalib.web.port.websockets_hook import SocketHandler, wrapped_serve
 
 CHANGED = (
-    "this version of websockets has changed; adapt app/web/port/websockets_hook.py, or lower the upper bound of "
+    "this version of websockets has changed; adapt app/cocalib/web/port/websockets_hook.py, or lower the upper bound of "
     "websockets in pyproject.toml"
 )
 
@@ -114,7 +114,7 @@ SHORT_OF_FILES = """
 import asyncio, resource, sys
 from websockets.asyncio import server
 from tests.unit.app.web.port.test_websockets_hook import echo, kept, serve_nobody
-from app.web.port.websockets_hook import wrapped_serve
+from cocalib.web.port.websockets_hook import wrapped_serve
 
 async def main():
     with wrapped_serve(lambda _given: serve_nobody, kept):

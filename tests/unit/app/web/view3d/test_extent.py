@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.web.messages import Viewpoint
-from app.web.view3d.extent import UNKNOWN, Extent, extent_of, fitted_stand, ring_ranges_m
+from cocalib.web.messages import Viewpoint
+from cocalib.web.view3d.extent import UNKNOWN, Extent, extent_of, fitted_stand, ring_ranges_m
 
 NO_POINTS = np.zeros((0, 3))
 

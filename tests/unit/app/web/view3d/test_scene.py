@@ -10,24 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.colours import residual_colours
-from app.session import DismissedPlacement, History, RecordingFacts, Session
-from app.view import Advice, view
-from app.web.frames import Frame
-from app.web.messages import Viewpoint
-from app.web.view3d.extent import UNKNOWN, Extent
-from app.web.view3d.returns import Returns
-from app.web.view3d.scene import TabScene
-from app.web.view3d.shapes import (
-    ellipsoids,
-    next_place,
-    nominal_camera_from_radar,
-    range_rings,
-    rays_to,
-    vertical_field_of_view_rad,
-)
-from app.web.view3d.sight import Sight
-from app.web.view3d.space_look import space_look
 from calib_core.association.placements import Placement
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
@@ -35,6 +17,24 @@ from calib_core.measurements import RadarScan, ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions, NoiseOptions
 from calib_core.radar import RadarErrors, cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration, Metrics, PairResult
+from cocalib.colours import residual_colours
+from cocalib.session import DismissedPlacement, History, RecordingFacts, Session
+from cocalib.view import Advice, view
+from cocalib.web.frames import Frame
+from cocalib.web.messages import Viewpoint
+from cocalib.web.view3d.extent import UNKNOWN, Extent
+from cocalib.web.view3d.returns import Returns
+from cocalib.web.view3d.scene import TabScene
+from cocalib.web.view3d.shapes import (
+    ellipsoids,
+    next_place,
+    nominal_camera_from_radar,
+    range_rings,
+    rays_to,
+    vertical_field_of_view_rad,
+)
+from cocalib.web.view3d.sight import Sight
+from cocalib.web.view3d.space_look import space_look
 
 CAMERA = Camera("pinhole", 640, 480, np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]]))
 FACTS = RecordingFacts("made", np.arange(4, dtype=np.int64) * 1000, 640, 480)

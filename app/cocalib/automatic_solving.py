@@ -1,0 +1,174 @@
+"""Solve a recording without a person: clicks are placed where pictures and radar agree, or there is no calibration."""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from calib_core.camera import Camera
+from calib_core.diagnostics.confirmation import nobody_confirmed
+from calib_core.fleet_prior import FleetPrior
+from calib_core.measurements import ReflectorClick, Unpaired, Unsolvable
+from calib_core.options import CalibrationOptions
+from calib_core.pose_difference import camera_position_jacobian
+from calib_core.proposing import ViewProgress
+from calib_core.proposing.automatic import automatic_clicks
+from calib_core.results import Calibration, UnconfirmedClicks
+from calib_core.verdict import verdict_on
+from cocalib.proposing import REFLECTOR_M, RecordedFrames, find_proposals
+from cocalib.solving import RadarSource, solve_clicks
+
+__all__ = ["PlacedClicks", "is_doubtful", "place_clicks", "refusal_of", "solve_placed_clicks"]
+
+_FARTHEST_M = 0.3
+"""Without a measured position, a camera that is certainly farther from the radar than this is not believed: whatever is carried
+from place to place beside the reflector looks like a camera so far away."""
+_BY_PERSON = "open the recording on the page and confirm what it proposes, from one click on"
+_BY_TAPE = "if it is, measure its position with a tape (--camera-position-m X Y Z); else look at the clicks on the page"
+
+
+class RecordedSensors(RecordedFrames, RadarSource, Protocol):
+    """The part of a Recording that is needed."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedClicks:
+    """Clicks to solve with.
+
+    Attributes:
+        clicks: those that a person confirmed, and those that were placed automatically.
+        unconfirmed: the latter.
+        words: what their confidence rests on, as a clause.
+    """
+
+    clicks: tuple[ReflectorClick, ...]
+    unconfirmed: UnconfirmedClicks | None
+    words: str = ""
+
+
+def place_clicks(
+    recording: RecordedFrames,
+    camera: Camera | None,
+    options: CalibrationOptions,
+    *,
+    confirmed: Sequence[ReflectorClick] = (),
+    reflector_m: float = REFLECTOR_M,
+    progress: Callable[[ViewProgress | str], None] | None = None,
+    stopped: Callable[[], bool] = lambda: False,
+) -> PlacedClicks | Unsolvable:
+    """Click a recording without a person.
+
+    Args:
+        recording: with a radar and a camera.
+        camera: the intrinsics.
+        options: of the calibration.
+        confirmed: clicks that a person placed; they stay as they are.
+        reflector_m: width of the reflector [m].
+        progress: called with what is done next, in words, and while the pictures are looked at.
+        stopped: asked often; once it is true there are no clicks.
+
+    Raises:
+        CalibrationError: the recording cannot be read.
+    """
+    found = find_proposals(
+        recording,
+        camera,
+        options,
+        confirmed=confirmed,
+        reflector_m=reflector_m,
+        progress=progress,
+        stopped=stopped,
+    )
+    if isinstance(found, Unsolvable):
+        return found
+    assert camera is not None, "without a camera there are no proposals"
+    views, proposals = found
+    if not proposals.ranked and any(click.counts for click in confirmed):
+        return PlacedClicks(tuple(confirmed), None, "no placement is left to propose")
+    placed = automatic_clicks(proposals, views, camera, options)
+    if isinstance(placed, Unsolvable):
+        return placed
+    clicks = _with_own_ids(placed.clicks, confirmed)
+    unconfirmed = UnconfirmedClicks(tuple(click.id for click in clicks), placed.confidence)
+    return PlacedClicks((*confirmed, *clicks), unconfirmed, placed.words)
+
+
+def solve_placed_clicks(
+    recording: RadarSource,
+    placed: PlacedClicks,
+    camera: Camera | None,
+    options: CalibrationOptions,
+    fleet_prior: FleetPrior | None = None,
+) -> Calibration | Unsolvable:
+    """Solve with clicks that nobody may have confirmed: a pose that these contradict is refused.
+
+    Args:
+        recording: where the radar scans come from.
+        placed: the clicks.
+        camera: the intrinsics.
+        options: of the calibration.
+        fleet_prior: what the fleet says of this vehicle; optional. A far camera is believed if its kind is mounted so.
+
+    Raises:
+        OptionError: an option is out of range.
+        CalibrationError: the recording cannot be read at the clicks, or the method takes no fleet's prior.
+    """
+    outcome = solve_clicks(recording, placed.clicks, camera, options, fleet_prior)
+    if isinstance(outcome, Unsolvable) or placed.unconfirmed is None:
+        return outcome
+    count = sum(click.counts for click in placed.clicks)
+    warned = dataclasses.replace(outcome, warnings=(*outcome.warnings, nobody_confirmed(placed.unconfirmed, count)))
+    refusal = refusal_of(warned, outcome.unpaired)
+    return warned if refusal is None else refusal
+
+
+def refusal_of(calibration: Calibration, unpaired: tuple[Unpaired, ...] = ()) -> Unsolvable | None:
+    """Say why a pose from clicks that nobody confirmed is not believed; None if it is.
+
+    Args:
+        calibration: from such clicks.
+        unpaired: clicks without a radar position.
+    """
+    verdict = verdict_on(calibration)
+    if verdict.level == "contradictory":
+        reason = f"nobody confirmed the clicks, and the pose from them is contradictory: {verdict.reason}"
+        return Unsolvable("not-confident", reason, _BY_PERSON, unpaired)
+    away_m = _least_distance_m(calibration)
+    expected = calibration.options.solving.camera_position is not None or calibration.fleet_prior is not None
+    if not expected and away_m > _FARTHEST_M:
+        reason = (
+            f"nobody confirmed the clicks, and by them the camera is at least {away_m:.1f} m from the radar: something that was "
+            "carried along with the reflector would look the same"
+        )
+        return Unsolvable("not-confident", reason, _BY_TAPE, unpaired)
+    return None
+
+
+def _least_distance_m(calibration: Calibration) -> float:
+    """Return how far the camera is from the radar at least [m], two standard deviations below the estimate."""
+    pose = calibration.camera_from_radar
+    centre_m = -pose.rotation.T @ pose.translation_m
+    away_m = max(float(np.linalg.norm(centre_m)), 1e-9)
+    along = camera_position_jacobian(pose).T @ (centre_m / away_m)
+    return away_m - 2.0 * float(np.sqrt(along @ calibration.covariance @ along))
+
+
+def is_doubtful(calibration: Calibration) -> bool:
+    """Return whether a calibration from clicks that nobody confirmed is not to be relied on as it is."""
+    unconfirmed = any(warning.code == "nobody-confirmed" for warning in calibration.warnings)
+    return unconfirmed and verdict_on(calibration).level not in ("good", "usable")
+
+
+def _with_own_ids(clicks: Sequence[ReflectorClick], others: Sequence[ReflectorClick]) -> list[ReflectorClick]:
+    """Rename the clicks whose id another one has."""
+    taken = {click.id for click in others}
+    renamed = []
+    for click in clicks:
+        name = click.id
+        while name in taken:
+            name = f"{name}-auto"
+        taken.add(name)
+        renamed.append(dataclasses.replace(click, id=name))
+    return renamed

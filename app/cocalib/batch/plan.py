@@ -1,0 +1,102 @@
+"""What the latest batch of each manifest wanted: its sessions in order, each with the digest of its job; beside the results.
+
+Results alone do not say which of two jobs of a session counts (the inputs may have been changed and changed back), which
+sessions have no result yet, and which results belong to a name that was mistyped once.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Final, Literal
+
+import msgspec
+from msgspec import Struct
+
+from cocalib.batch.job import Job
+from cocalib.whole_file import write_whole
+
+__all__ = ["PLANS", "Plan", "Wanted", "read_plans", "write_plan"]
+
+PLANS: Final = "manifests"
+_SCHEMA: Final = "cocalib/batch-plan-1"
+
+
+class PlannedSession(Struct, frozen=True, forbid_unknown_fields=True):
+    """A session of a manifest."""
+
+    vehicle: str
+    session: str
+    digest: str
+
+
+class PlanDocument(Struct, frozen=True, forbid_unknown_fields=True):
+    """The sessions of a manifest, in its order, when a batch was last started with it."""
+
+    schema: Literal["cocalib/batch-plan-1"]
+    started: str
+    """ISO 8601, UTC."""
+    sessions: list[PlannedSession]
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What is wanted of one session.
+
+    Attributes:
+        place: in its manifest, from 0.
+        digest: of its job; None if that is not known.
+    """
+
+    place: int
+    digest: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What all manifests want together.
+
+    Attributes:
+        sessions: by vehicle and session; of one that several manifests name, as the latest batch wants it.
+        manifests: their names, in order.
+    """
+
+    sessions: Mapping[tuple[str, str], Wanted]
+    manifests: tuple[str, ...] = ()
+
+
+def write_plan(folder: Path, manifest: Path, jobs: Sequence[Job]) -> None:
+    """Write what a batch wants; the parts of a batch all write the same.
+
+    Args:
+        folder: of the results.
+        manifest: its name tells it from others.
+        jobs: of all its sessions.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    sessions = [PlannedSession(job.row.vehicle, job.row.session, job.digest) for job in jobs]
+    document = PlanDocument(_SCHEMA, datetime.now(UTC).isoformat(), sessions)
+    place = folder / PLANS / f"{manifest.name}.json"
+    place.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(place, msgspec.json.format(msgspec.json.encode(document), indent=1) + b"\n")
+
+
+def read_plans(folder: Path) -> Plan:
+    """Return what all manifests of a folder want; a file that is none of ours is passed over.
+
+    Args:
+        folder: of the results.
+    """
+    found = []
+    for path in sorted((folder / PLANS).glob("*.json")):
+        try:
+            found.append((msgspec.json.decode(path.read_bytes(), type=PlanDocument), path.name.removesuffix(".json")))
+        except (OSError, msgspec.DecodeError):
+            continue
+    sessions: dict[tuple[str, str], Wanted] = {}
+    for document, _ in sorted(found, key=lambda one: one[0].started):
+        for place, one in enumerate(document.sessions):
+            sessions[(one.vehicle, one.session)] = Wanted(place, one.digest)
+    return Plan(sessions, tuple(name for _, name in found))

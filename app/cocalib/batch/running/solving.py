@@ -1,0 +1,160 @@
+"""Solve a session as `cocalib solve` does, from its clicks, without a person, or both."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from calib_core.calibration import require_default
+from calib_core.camera import Camera
+from calib_core.errors import InputError
+from calib_core.interchange import CameraFile, ImportedCalibration, VehicleNote, imported, read_calibration
+from calib_core.interchange.own.clicks_json import ClicksFile, read_clicks_file, write_clicks
+from calib_core.measurements import ReflectorClick, Unsolvable
+from calib_core.recordings import Recording
+from calib_core.results import Calibration
+from cocalib.automatic_solving import PlacedClicks, is_doubtful, place_clicks, solve_placed_clicks
+from cocalib.batch.manifest import ManifestRow
+from cocalib.fleet_prior_file import FleetPriorFile
+from cocalib.recorded_clicks import clicks_in_recording, file_of_clicks, require_confirmed
+from cocalib.required_camera import required_camera
+from cocalib.solving import calibration_text
+
+__all__ = ["CALIBRATION_FILE", "CLICKS_FILE", "GivenFiles", "SolvedSession", "given_files", "solve_session"]
+
+CALIBRATION_FILE = "calibration.json"
+CLICKS_FILE = "clicks.json"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GivenFiles:
+    """The small files of a row, read before the recording is opened.
+
+    Attributes:
+        camera: intrinsics; None for the recording's own.
+        clicks: None without.
+        fleet_prior: None without.
+    """
+
+    camera: CameraFile | None
+    clicks: ClicksFile | None
+    fleet_prior: FleetPriorFile | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SolvedSession:
+    """A session with its calibration.
+
+    Attributes:
+        calibration: as it was solved.
+        is_weak: nobody confirmed its clicks, and it is doubtful.
+        found: the calibration as it is read from its file.
+        clicks: that it was solved from, at the frames of the recording.
+        files: calibration.json, and clicks.json if some were placed automatically.
+        notes: for the user.
+    """
+
+    calibration: Calibration
+    is_weak: bool
+    found: ImportedCalibration
+    clicks: tuple[ReflectorClick, ...]
+    files: dict[str, bytes]
+    notes: tuple[str, ...]
+
+
+def given_files(row: ManifestRow) -> GivenFiles:
+    """Read the intrinsics, the clicks and the fleet's prior of a row.
+
+    Raises:
+        InputError: one cannot be read, or they contradict the row.
+    """
+    if row.auto and row.options.method == "ccm":
+        raise InputError("method ccm takes clicks on the corners of a checkerboard, and auto finds a reflector")
+    camera = None if row.camera is None else CameraFile.read(row.camera, rescale=row.rescale_camera)
+    clicks = None if row.clicks is None else file_of_clicks(row.clicks)
+    if row.auto and clicks is not None and clicks.unconfirmed is not None:
+        raise InputError(
+            f"{row.clicks}: nobody confirmed {len(clicks.unconfirmed.ids)} of its clicks; with auto give only clicks that a "
+            "person placed"
+        )
+    return GivenFiles(camera, clicks, _fleet_prior(row))
+
+
+def _fleet_prior(row: ManifestRow) -> FleetPriorFile | None:
+    """Read the fleet's prior of a row.
+
+    Raises:
+        InputError: it cannot be read, or used for this vehicle or with this method.
+    """
+    if row.fleet_prior is None:
+        return None
+    found = FleetPriorFile.read(row.fleet_prior)
+    require_default(row.options, found.prior)
+    found.require_of_type(row.vehicle_type)
+    found.require_not_of(row.vehicle)
+    return found
+
+
+def solve_session(row: ManifestRow, given: GivenFiles, recording: Recording) -> SolvedSession | Unsolvable:
+    """Solve a session.
+
+    Args:
+        row: of the manifest.
+        given: its small files.
+        recording: open.
+
+    Raises:
+        CalibrationError: the recording cannot be read, states too little, or the clicks are of another one.
+    """
+    require_confirmed(recording)
+    if given.clicks is None and not row.auto:
+        return Unsolvable("no-clicks", "nothing was clicked", "click the recording on the page, or set auto = true")
+    camera = required_camera(recording, given.camera)
+    notes = [f"radar: {recording.radar_choice}"] if recording.radar_choice else []
+    placed = _placed(row, given.clicks, recording, camera, notes)
+    if isinstance(placed, Unsolvable):
+        return placed
+    prior = given.fleet_prior.prior if given.fleet_prior is not None else None
+    outcome = solve_placed_clicks(recording, placed, camera, row.options, prior)
+    if isinstance(outcome, Unsolvable):
+        return outcome
+    text = _calibration_text(row, outcome, recording, given, placed)
+    files, clicks = {CALIBRATION_FILE: text.encode()}, placed.clicks
+    if row.auto:
+        clicks_text = write_clicks(clicks, radar_topics=recording.radar_topics, unconfirmed=placed.unconfirmed)
+        files[CLICKS_FILE] = clicks_text.encode()
+        clicks = clicks_in_recording(
+            read_clicks_file(clicks_text, CLICKS_FILE).clicks, recording, camera, source=Path(CLICKS_FILE)
+        ).clicks
+    found = imported(read_calibration(text, CALIBRATION_FILE))
+    return SolvedSession(outcome, is_doubtful(outcome), found, clicks, files, tuple(notes))
+
+
+def _placed(
+    row: ManifestRow, file: ClicksFile | None, recording: Recording, camera: Camera, notes: list[str]
+) -> PlacedClicks | Unsolvable:
+    """Return the clicks to solve with: those of the file, and with auto the ones that are placed automatically."""
+    clicks: tuple[ReflectorClick, ...] = ()
+    if file is not None and row.clicks is not None:
+        at_frames = clicks_in_recording(file.clicks, recording, camera, source=row.clicks)
+        notes.extend(at_frames.moved)
+        clicks = at_frames.clicks
+    if not row.auto:
+        return PlacedClicks(clicks, file.unconfirmed if file is not None else None)
+    placed = place_clicks(recording, camera, row.options, confirmed=clicks, reflector_m=row.reflector_m)
+    if not isinstance(placed, Unsolvable):
+        notes.append(f"automatic: {placed.words}")
+    return placed
+
+
+def _calibration_text(
+    row: ManifestRow, calibration: Calibration, recording: Recording, given: GivenFiles, placed: PlacedClicks
+) -> str:
+    """Write calibration.json, with what the row says of vehicle and sensors."""
+    vehicle = VehicleNote(row.vehicle, row.vehicle_type, row.session, row.radar_serial, row.camera_serial)
+    return calibration_text(
+        calibration,
+        recording,
+        camera_file=given.camera,
+        unconfirmed=placed.unconfirmed,
+        fleet_prior=given.fleet_prior.file if given.fleet_prior is not None else None,
+        vehicle=vehicle,
+    )

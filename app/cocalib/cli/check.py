@@ -1,0 +1,182 @@
+"""`cocalib check`: check calibration files, compare them, and hold them against a recording."""
+
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from calib_core.errors import CalibrationError, InputError
+from cocalib.cli.flags import File, Switch, called
+from cocalib.cli.output import read_text, told_clicks_at_frames, write_whole
+from cocalib.cli.recording_flags import TopicFlags, Topics
+from cocalib.cli.tree_flags import FrameFlags, Frames
+from cocalib.terminal import print_exactly
+
+if TYPE_CHECKING:
+    from calib_core.camera import Camera
+    from calib_core.interchange import AgreementLimits, CheckedFile, CheckPairs, CheckReport, ImportedCalibration
+    from calib_core.measurements import ReflectorClick
+    from calib_core.recordings import Recording
+
+__all__ = ["Check"]
+
+
+@dataclass(frozen=True, slots=True)
+class Against:
+    """What calibrations are compared with, read once for all files."""
+
+    of: "ImportedCalibration | None"
+    against: "ImportedCalibration | None"
+    limits: "AgreementLimits"
+    camera: "Camera | None"
+    pairs: "CheckPairs | None"
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """Check calibration files for errors, or compare them. Exit code 1: wrong; 3: looks wrong, not proven.
+
+    Exit codes: 0 nothing is wrong; 1 a file is wrong, or differs; 2 a file cannot be read; 3 a file is doubtful.
+    """
+
+    calibration: Annotated[tuple[Path, ...], tyro.conf.Positional, called("CALIBRATION...")] = ()
+    """Calibrations in any format that export writes; of several, each gets one line."""
+    of: File = None
+    """Is it this calibration's file? Same pose up to the digits written, same lens and frames, not stale."""
+    against: File = None
+    """Does it agree with this other calibration? Judged by the covariances, or by the limits below."""
+    max_deg: Annotated[float | None, called("DEG")] = None
+    """Largest angle between the rotations that is agreement."""
+    max_cm: Annotated[float | None, called("CM")] = None
+    """Largest distance between the camera positions that is agreement."""
+    max_px: Annotated[float | None, called("PX")] = None
+    """Largest distance in the picture that is agreement: rms at each of 5, 20 and 60 m, and by the lens alone."""
+    max_sigma: Annotated[float | None, called("SIGMA")] = None
+    """Largest difference under the covariances that is agreement, in standard deviations (p = 5 % is 1.96)."""
+    camera: File = None
+    """Intrinsics to use if the file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
+    pairs: File = None
+    """Pairs to test it with: a pairs-1 file, or a calibration-1 file with pairs."""
+    recording: Annotated[tuple[Path, ...], called("RECORDING...")] = ()
+    """Does it still hold on this recording? Needs clicks: --clicks, those of its session, or those in the calibration."""
+    clicks: File = None
+    """With --recording: clicks in this recording (cocalib/clicks-1 JSON)."""
+    json: Switch = False
+    """Print one JSON object instead of text."""
+    junit: File = None
+    """Also write the results as JUnit XML: one test case per result."""
+    topics: Topics = field(default_factory=TopicFlags)
+    frames: Frames = field(default_factory=FrameFlags)
+
+    def run(self) -> int:
+        """Print the results; return the exit code."""
+        from calib_core.interchange import check_json, check_junit, exit_code
+
+        self._require_fitting()
+        context = self._against()
+        checked = [self._checked(path, context) for path in self.calibration]
+        if self.junit is not None:
+            write_whole(self.junit, check_junit(checked))
+        if self.json:
+            print_exactly(check_json(checked))
+        else:
+            _tell(checked)
+        return exit_code(checked)
+
+    def _require_fitting(self) -> None:
+        """Refuse options that say nothing without another one.
+
+        Raises:
+            InputError: one is given alone, or no file is.
+        """
+        if not self.calibration:
+            raise InputError("CALIBRATION is missing; see cocalib check --help")
+        limited = any(limit is not None for limit in (self.max_deg, self.max_cm, self.max_px, self.max_sigma))
+        if limited and self.against is None:
+            raise InputError("--max-deg, --max-cm, --max-px and --max-sigma are limits for --against FILE; give it too")
+        if self.clicks is not None and not self.recording:
+            raise InputError("--clicks are those of a recording; give it with --recording RECORDING")
+        if self.topics != TopicFlags() and not self.recording:
+            raise InputError(
+                "the options of a recording apply with --recording RECORDING only; see cocalib check --help"
+            )
+
+    def _against(self) -> Against:
+        from calib_core.interchange import AgreementLimits, read_any_file, read_camera_file, read_check_pairs_file
+
+        return Against(
+            of=read_any_file(self.of) if self.of else None,
+            against=read_any_file(self.against) if self.against else None,
+            limits=AgreementLimits(self.max_deg, self.max_cm, self.max_px, self.max_sigma),
+            camera=read_camera_file(self.camera) if self.camera else None,
+            pairs=read_check_pairs_file(self.pairs) if self.pairs else None,
+        )
+
+    def _checked(self, path: Path, context: Against) -> "CheckedFile":
+        """Check one file; if it cannot be read, say so instead."""
+        from calib_core.interchange import CheckedFile, check
+
+        try:
+            found, _ = self.frames.read([path])
+            report = check(
+                found,
+                of=context.of,
+                against=context.against,
+                limits=context.limits,
+                camera=context.camera,
+                pairs=context.pairs,
+            )
+            return CheckedFile(str(path), self._on_recording(report, path, context) if self.recording else report)
+        except CalibrationError as error:
+            return CheckedFile(str(path), unreadable=str(error))
+
+    def _on_recording(self, report: "CheckReport", path: Path, context: Against) -> "CheckReport":
+        from dataclasses import replace
+
+        from calib_core.recordings import open_recording
+        from cocalib.recording_check import other_camera, stale_inputs, with_recording
+
+        with open_recording(self.recording, self.topics) as recording:
+            clicks = self._clicks(report, recording)
+            stale = stale_inputs(report.imported, recording.fingerprint())
+            lens = other_camera(report.imported, recording.camera())
+            known = replace(report, results=(*report.results, *stale, *lens))
+            return with_recording(known, str(path), recording, clicks, camera=context.camera or recording.camera())
+
+    def _clicks(self, report: "CheckReport", recording: "Recording") -> "tuple[ReflectorClick, ...]":
+        """Return the clicks: of the file given, else of the recording's session, else those in the calibration.
+
+        Raises:
+            InputError: there are none.
+        """
+        from calib_core.interchange import read_clicks
+        from cocalib.recording_check import clicks_in
+        from cocalib.session.file import inspect_session, recording_session_folder
+
+        if self.clicks is not None:
+            clicks = read_clicks(read_text(self.clicks), source=str(self.clicks))
+            return told_clicks_at_frames(clicks, recording, source=str(self.clicks))
+        folder = recording_session_folder(self.recording)
+        if folder.is_dir():
+            return tuple(inspect_session(folder).clicks)
+        kept = clicks_in(report.imported, int(recording.image_times[0]), int(recording.image_times[-1]))
+        if not kept:
+            raise InputError(
+                f"{self.recording[0]}: no clicks in this recording: the calibration keeps none within it, and it has no session; "
+                "click reflectors with cocalib open RECORDING --calibration FILE, or give --clicks CLICKS.json"
+            )
+        return kept
+
+
+def _tell(checked: "list[CheckedFile]") -> None:
+    """Print the report of one file, or one line for each of several."""
+    if len(checked) == 1 and checked[0].report is not None:
+        print("\n".join(checked[0].report.lines()))
+        return
+    for file in checked:
+        if file.report is None:
+            print(f"cocalib: {' '.join(file.unreadable.split())}", file=sys.stderr)
+        else:
+            print(file.line)

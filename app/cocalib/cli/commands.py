@@ -1,0 +1,173 @@
+"""The table of commands: each one's name, the summary that the overview prints, and the class that implements it.
+
+A test compares every summary with the first sentence of the command's own docstring.
+"""
+
+import importlib
+import textwrap
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Protocol, Self, cast, runtime_checkable
+
+__all__ = ["COMMANDS", "PROGRAM", "Command", "HasFileDefaults", "Runnable", "overview"]
+
+PROGRAM = "cocalib"
+_DESCRIPTION = "Radar-camera calibration: click the corner reflector, get camera_from_radar and its uncertainty."
+_WIDTH = 80
+
+
+class Runnable(Protocol):
+    """A command whose arguments have been parsed."""
+
+    def run(self) -> int:
+        """Run the command; return the exit code."""
+        ...
+
+
+@runtime_checkable
+class HasFileDefaults(Protocol):
+    """A command whose defaults may come from a file or a preset that its arguments name."""
+
+    def file_defaults(self) -> Self | None:
+        """Return the command with those defaults; None to keep its own."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """One command.
+
+    Attributes:
+        name: as typed.
+        where: its module and class, such as "cocalib.cli.info:Info"; imported only when this command is used.
+        summary: the first paragraph of the class's docstring, on one line.
+    """
+
+    name: str
+    where: str
+    summary: str
+
+    def load(self) -> type[Runnable]:
+        """Import the command's class."""
+        module, _, name = self.where.partition(":")
+        return cast(type[Runnable], getattr(importlib.import_module(module), name))
+
+
+COMMANDS: Mapping[str, Command] = {
+    command.name: command
+    for command in (
+        Command("demo", "cocalib.cli.demo:Demo", "Open the sample recording in the browser."),
+        Command("open", "cocalib.cli.open:Open", "Calibrate your own recording in the browser."),
+        Command(
+            "info",
+            "cocalib.cli.info:Info",
+            "Show what a recording contains: files, topics, types, rates, stamps, overlap, camera, warnings.",
+        ),
+        Command(
+            "intrinsics",
+            "cocalib.cli.intrinsics.command:Intrinsics",
+            "Calibrate a camera's lens from pictures of a board, or convert a file with intrinsics.",
+        ),
+        Command(
+            "propose",
+            "cocalib.cli.proposing.command:Propose",
+            "Find where the reflector probably stands in the pictures, for a person or a script to confirm.",
+        ),
+        Command(
+            "solve",
+            "cocalib.cli.solve:Solve",
+            "Compute a calibration from a recording and its clicks, or from a file of pairs.",
+        ),
+        Command(
+            "export",
+            "cocalib.cli.export:Export",
+            "Write a calibration in the format of another tool; `--to list` lists the formats.",
+        ),
+        Command(
+            "check",
+            "cocalib.cli.check:Check",
+            "Check calibration files for errors, or compare them. Exit code 1: wrong; 3: looks wrong, not proven.",
+        ),
+        Command(
+            "evaluate",
+            "cocalib.cli.evaluation.evaluate:Evaluate",
+            "Judge a calibration on a recording: residuals at clicks (AED, CDSD), radar returns in boxes (Acc).",
+        ),
+        Command(
+            "compare",
+            "cocalib.cli.evaluation.compare:Compare",
+            "Compare two calibrations; with a recording, say which is better there, and whether that is more than noise.",
+        ),
+        Command(
+            "report",
+            "cocalib.cli.evaluation.report:Report",
+            "Write a report on a calibration: one HTML file, and a PDF if wanted: how good, where, and how one knows.",
+        ),
+        Command(
+            "import",
+            "cocalib.cli.import_file:Import",
+            "Convert a calibration from any known format to cocalib/calibration-1 JSON.",
+        ),
+        Command(
+            "video",
+            "cocalib.cli.video:Video",
+            "Write the camera's frames to a video, each at its recorded time; recorded JPEG is not re-encoded.",
+        ),
+        Command(
+            "record-rrd",
+            "cocalib.cli.evaluation.record_rrd:RecordRrd",
+            "Write a recording with its calibration to an .rrd file for the Rerun viewer.",
+        ),
+        Command(
+            "rerun",
+            "cocalib.cli.evaluation.rerun:Rerun",
+            "Show a recording with its calibration in the Rerun viewer.",
+        ),
+        Command(
+            "batch",
+            "cocalib.cli.fleet.batch:Batch",
+            "Calibrate many sessions: solve, evaluate, report and export each; what is done already is not done again.",
+        ),
+        Command(
+            "session",
+            "cocalib.cli.session:Session",
+            "List the sessions of recordings, repair a damaged one, or export its clicks.",
+        ),
+        Command(
+            "fleet",
+            "cocalib.cli.fleet.fleet:Fleet",
+            "Tell how a fleet is calibrated, from the results of a batch: status, history, comparisons, prior, summary page.",
+        ),
+        Command(
+            "simulate",
+            "cocalib.cli.simulate:Simulate",
+            "Simulate a recording: radar, camera, and the ground truth (truth.json).",
+        ),
+    )
+}
+
+
+def overview() -> str:
+    """Return what `cocalib --help` prints."""
+    lines = [
+        f"usage: {PROGRAM} COMMAND ...",
+        "",
+        *textwrap.wrap(_DESCRIPTION, _WIDTH),
+        "",
+        "commands:",
+        *_columns({command.name: command.summary for command in COMMANDS.values()}),
+        "",
+        "options:",
+        *_columns(
+            {"-h, --help": "Show this help; after a command, show its options.", "--version": "Print the version."}
+        ),
+    ]
+    return "\n".join(lines)
+
+
+def _columns(rows: Mapping[str, str]) -> Iterator[str]:
+    """Lay out names and their texts in two columns, with the texts wrapped."""
+    width = max(map(len, rows)) + 4
+    for name, text in rows.items():
+        indent = f"{f'  {name}':<{width}}"
+        yield from textwrap.wrap(text, _WIDTH, initial_indent=indent, subsequent_indent=" " * width)

@@ -1,0 +1,141 @@
+"""`cocalib compare`: which of two calibrations is better, by how much, and is it more than noise?"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+from calib_core.errors import InputError
+from cocalib.cli.evaluation.evidence_flags import EvidenceFlags, EvidenceUsed
+from cocalib.cli.flags import File, Switch, called
+from cocalib.cli.output import progress_bar
+from cocalib.cli.recording_flags import Recordings, TopicFlags, Topics
+from cocalib.cli.tree_flags import FrameFlags, Frames
+from cocalib.terminal import print_exactly
+
+if TYPE_CHECKING:
+    from calib_core.camera import Camera
+    from calib_core.evaluation import PairedDifference
+    from cocalib.comparing import ComparedOnRecording
+
+__all__ = ["COMPARISON_SCHEMA", "Compare"]
+
+COMPARISON_SCHEMA = "cocalib/comparison-1"
+
+
+@dataclass(frozen=True, slots=True)
+class Compare:
+    """Compare two calibrations; with a recording, say which is better there, and whether that is more than noise.
+
+    Exit codes: 0 compared; 2 a file cannot be read, or there is nothing to judge the two by.
+    """
+
+    a: Annotated[Path | None, tyro.conf.Positional, called("A")] = None
+    """A calibration in any format that import reads."""
+    b: Annotated[Path | None, tyro.conf.Positional, called("B")] = None
+    """Another calibration of the same sensors."""
+    recording: Recordings = ()
+    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several are read as one recording."""
+    evidence: EvidenceUsed = field(default_factory=EvidenceFlags)
+    camera: File = None
+    """Intrinsics to use if a file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
+    json: Switch = False
+    """Print one JSON object instead of text."""
+    topics: Topics = field(default_factory=TopicFlags)
+    frames: Frames = field(default_factory=FrameFlags)
+
+    def run(self) -> int:
+        """Print the comparison; return the exit code."""
+        from calib_core.interchange import compare, read_camera_file
+
+        if self.a is None or self.b is None:
+            raise InputError("compare needs two calibrations; see cocalib compare --help")
+        if not self.recording and self.evidence != EvidenceFlags():
+            raise InputError("clicks and boxes are those of a recording; give it too: cocalib compare A B RECORDING")
+        camera = None if self.camera is None else read_camera_file(self.camera)
+        found_a, found_b = (self.frames.read([path])[0] for path in (self.a, self.b))
+        compared = None
+        if self.recording:
+            compared, camera = self._on_recording(self.a, self.b, camera)
+        both = compare(found_a, found_b, camera=camera)
+        figures = [(row.label, row.text) for row in both.figures]
+        verdict = both.verdict(self.a.name, self.b.name)
+        if self.json:
+            print_exactly(_json(self.a.name, self.b.name, figures, verdict, compared))
+            return 0
+        if compared is not None:
+            from cocalib.comparing import comparison_lines
+
+            print("\n".join(comparison_lines(compared)))
+        print("\n".join([*(f"{label}: {text}" for label, text in figures), verdict]))
+        return 0
+
+    def _on_recording(self, a: Path, b: Path, camera: "Camera | None") -> "tuple[ComparedOnRecording, Camera]":
+        """Judge both on the recording; also return the lens to compare their poses through."""
+        from calib_core.recordings import open_recording
+        from cocalib.comparing import compare_on_recording
+        from cocalib.judged_calibration import judged_calibration
+
+        options = self.evidence.options()
+        with open_recording(self.recording, self.topics, require=("radar",)) as recording:
+            of_a, of_b = (
+                judged_calibration(self.frames.read([one])[0], one, recording, camera=camera) for one in (a, b)
+            )
+            clicks = self.evidence.clicks_in(recording, self.recording, [of_a.found, of_b.found])
+            boxes, labels = self.evidence.boxes_in(recording)
+            if not clicks and boxes is None:
+                raise InputError(
+                    f"{self.recording[0]}: nothing to judge the two by: no clicks (--clicks CLICKS.json) and no boxes "
+                    "(--boxes FILE_OR_TOPIC)"
+                )
+            with progress_bar("comparing") as progress:
+                compared = compare_on_recording(
+                    (of_a.calibration, of_b.calibration),
+                    recording,
+                    names=(a.name, b.name),
+                    clicks=clicks,
+                    boxes=boxes,
+                    labels=labels,
+                    progress=progress,
+                    options=options,
+                )
+            return compared, of_a.calibration.camera
+
+
+def _json(a: str, b: str, figures: list[tuple[str, str]], verdict: str, compared: "ComparedOnRecording | None") -> str:
+    from calib_core.evaluation import evaluation_document
+    from calib_core.interchange.syntax.json_text import json_text
+
+    document: dict[str, Any] = {
+        "schema": COMPARISON_SCHEMA,
+        "a": a,
+        "b": b,
+        "figures": [{"label": label, "text": text} for label, text in figures],
+        "verdict": verdict,
+        "on_recording": None,
+    }
+    if compared is not None:
+        document["on_recording"] = {
+            "winner": compared.winner,
+            "residuals_px": _difference(compared.residuals),
+            "acc": _difference(compared.acc),
+            "solved_from_these_clicks": list(compared.fitted),
+            "evaluation_a": evaluation_document(compared.a),
+            "evaluation_b": evaluation_document(compared.b),
+        }
+    return json_text(document)
+
+
+def _difference(found: "PairedDifference | None") -> dict[str, Any] | None:
+    if found is None:
+        return None
+    return {
+        "b_minus_a": found.mean,
+        "standard_error": found.standard_error,
+        "low": found.low,
+        "high": found.high,
+        "p_value": found.p_value,
+        "groups": found.groups,
+        "winner": found.winner,
+    }

@@ -1,0 +1,93 @@
+"""`cocalib evaluate`: judge a calibration on a recording."""
+
+import sys
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from calib_core.errors import InputError
+from cocalib.cli.evaluation.evidence_flags import EvidenceFlags, EvidenceUsed
+from cocalib.cli.flags import File, Switch, called
+from cocalib.cli.output import progress_bar
+from cocalib.cli.recording_flags import Recordings, TopicFlags, Topics
+from cocalib.cli.tree_flags import FrameFlags, Frames
+from cocalib.terminal import print_exactly
+
+if TYPE_CHECKING:
+    from calib_core.evaluation import Evaluation
+
+__all__ = ["Evaluate"]
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluate:
+    """Judge a calibration on a recording: residuals at clicks (AED, CDSD), radar returns in boxes (Acc).
+
+    Exit codes: 0 judged; 1 the recording has nothing to judge it by; 2 a file cannot be read; 3 judged, with doubts.
+    """
+
+    calibration: Annotated[Path | None, tyro.conf.Positional, called("CALIBRATION")] = None
+    """A calibration in any format that import reads."""
+    recording: Recordings = ()
+    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several are read as one recording."""
+    evidence: EvidenceUsed = field(default_factory=EvidenceFlags)
+    camera: File = None
+    """Intrinsics to use if the file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
+    no_held_out: Switch = False
+    """Leave out the held-out figures, which take a solve per placement."""
+    json: Switch = False
+    """Print one JSON object instead of text."""
+    topics: Topics = field(default_factory=TopicFlags)
+    frames: Frames = field(default_factory=FrameFlags)
+
+    def run(self) -> int:
+        """Print the figures; return the exit code."""
+        from calib_core.evaluation import evaluation_json, evaluation_lines
+        from cocalib.evaluating import evaluation_exit_code
+
+        if self.calibration is None or not self.recording:
+            raise InputError("evaluate needs a calibration and a recording; see cocalib evaluate --help")
+        evaluation = self._evaluation(self.calibration)
+        code = evaluation_exit_code(evaluation)
+        if self.json:
+            names = [path.name for path in self.recording]
+            print_exactly(
+                evaluation_json(evaluation, calibration=self.calibration.name, recording=names, exit_code=code)
+            )
+        else:
+            print("\n".join(evaluation_lines(evaluation)))
+        return code
+
+    def _evaluation(self, path: Path) -> "Evaluation":
+        from calib_core.interchange import read_camera_file
+        from calib_core.recordings import open_recording
+        from cocalib.evaluating import evaluate_recording
+        from cocalib.judged_calibration import judged_calibration
+
+        options = self.evidence.options()
+        camera = None if self.camera is None else read_camera_file(self.camera)
+        with open_recording(self.recording, self.topics, require=("radar",)) as recording:
+            judged = judged_calibration(self.frames.read([path])[0], path, recording, camera=camera)
+            clicks = self.evidence.clicks_in(recording, self.recording, [judged.found])
+            boxes, labels = self.evidence.boxes_in(recording)
+            if not clicks and boxes is None:
+                raise InputError(
+                    f"{self.recording[0]}: nothing to judge {path.name} by: no clicks (--clicks CLICKS.json; click reflectors "
+                    "with cocalib open RECORDING --calibration FILE) and no boxes (--boxes FILE_OR_TOPIC)"
+                )
+            with progress_bar("evaluating") as progress:
+                evaluation = evaluate_recording(
+                    judged.calibration,
+                    recording,
+                    clicks=clicks,
+                    boxes=boxes,
+                    labels=labels,
+                    held_out=not self.no_held_out,
+                    progress=progress,
+                    options=options,
+                )
+            if recording.radar_choice:
+                print(f"radar: {recording.radar_choice}", file=sys.stderr)
+            return replace(evaluation, warnings=(*judged.warnings, *evaluation.warnings))

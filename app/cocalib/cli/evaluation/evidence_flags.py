@@ -1,0 +1,128 @@
+"""Flags of what a recording is searched for: clicks, boxes, and how moving targets are found."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
+
+import tyro
+
+from calib_core.errors import InputError
+from cocalib.cli.flags import File, called
+from cocalib.cli.output import progress_bar, read_text, told_clicks_at_frames
+
+if TYPE_CHECKING:
+    from calib_core.detections import Boxes, ReturnLabels
+    from calib_core.interchange import ImportedCalibration
+    from calib_core.measurements import ReflectorClick
+    from calib_core.recordings import Recording
+    from cocalib.evaluating import EvidenceOptions
+
+__all__ = ["EvidenceFlags", "EvidenceUsed"]
+
+
+@dataclass(frozen=True, slots=True)
+class EvidenceFlags:
+    """What speaks for or against a calibration in a recording."""
+
+    clicks: File = None
+    """Clicks in this recording (cocalib/clicks-1 JSON); by default those of its session, or those kept in the calibration."""
+    boxes: Annotated[str | None, called("FILE_OR_TOPIC")] = None
+    """Boxes around moving objects, from a file or a topic of the recording: returns in them give Acc."""
+    labels: File = None
+    """With --boxes: the true origin of each return (cocalib/labels-1 JSON of a simulation), which then decides."""
+    classes: Annotated[str | None, called("NAME,...")] = None
+    """Count only targets whose boxes are of these classes, such as person,car."""
+    class_map: Annotated[tuple[str, ...], called("FROM=TO"), tyro.conf.UseAppendAction] = ()
+    """Rename a class of the boxes, such as pedestrian=person; may be given several times."""
+    max_time_gap_s: Annotated[float | None, called("SECONDS")] = None
+    """Longest time between an annotated frame and its scan; by default half the period of the scans."""
+    min_speed_mps: Annotated[float, tyro.conf.arg(metavar="SPEED")] = 0.3
+    """Least Doppler speed over ground of a moving target's return [m/s]."""
+    sensors: Literal["auto", "still", "moving"] = "auto"
+    """Whether the sensors stood still or moved; auto finds out from the returns' Doppler speeds."""
+
+    def options(self) -> "EvidenceOptions":
+        """Return the options of the search.
+
+        Raises:
+            InputError: one is out of range.
+        """
+        from calib_core.evaluation import TargetOptions
+        from cocalib.evaluating import EvidenceOptions
+
+        if not 0.0 < self.min_speed_mps <= 100.0:
+            raise InputError(f"--min-speed-mps: is {self.min_speed_mps:g}; give a speed from 0.01 to 100 m/s")
+        if self.max_time_gap_s is not None and not 0.0 <= self.max_time_gap_s <= 60.0:
+            raise InputError(f"--max-time-gap-s: is {self.max_time_gap_s:g}; give 0 to 60 s")
+        names = tuple(name.strip() for name in (self.classes or "").split(",") if name.strip())
+        targets = TargetOptions(min_speed_mps=self.min_speed_mps, sensors=self.sensors)
+        return EvidenceOptions(classes=names, max_gap_s=self.max_time_gap_s, targets=targets)
+
+    def boxes_in(self, recording: "Recording") -> "tuple[Boxes | None, ReturnLabels | None]":
+        """Return the boxes and labels that were asked for.
+
+        Raises:
+            InputError: they cannot be read, no class matches, or options of boxes are given without any.
+        """
+        if self.boxes is None:
+            for name, given in (
+                ("--labels", self.labels),
+                ("--classes", self.classes),
+                ("--class-map", self.class_map),
+            ):
+                if given:
+                    raise InputError(f"{name} applies to boxes; give them with --boxes FILE_OR_TOPIC")
+            return None, None
+        from calib_core.evaluation import renamed_classes
+        from cocalib.boxes import find_boxes, find_labels
+
+        with progress_bar("reading boxes") as progress:
+            boxes = find_boxes(self.boxes, recording, progress=progress)
+        if self.class_map:
+            boxes = renamed_classes(boxes, dict(map(_renaming, self.class_map)))
+        return boxes, None if self.labels is None else find_labels(self.labels)
+
+    def clicks_in(
+        self, recording: "Recording", paths: Sequence[Path], calibrations: "Sequence[ImportedCalibration]"
+    ) -> "tuple[ReflectorClick, ...]":
+        """Return the clicks: of the file given, else of the recording's session, else those kept in a calibration.
+
+        Args:
+            recording: that they are in.
+            paths: of it.
+            calibrations: that are judged; the first that keeps clicks within the recording gives them.
+
+        Raises:
+            InputError: they cannot be read.
+        """
+        from calib_core.interchange import read_clicks
+        from cocalib.recording_check import clicks_in
+        from cocalib.session.file import inspect_session, recording_session_folder
+
+        if self.clicks is not None:
+            clicks = read_clicks(read_text(self.clicks), source=str(self.clicks))
+            return told_clicks_at_frames(clicks, recording, source=str(self.clicks))
+        folder = recording_session_folder(paths)
+        if folder.is_dir():
+            return tuple(inspect_session(folder).clicks)
+        times = recording.image_times if len(recording.image_times) else recording.radar_times
+        if not len(times):
+            return ()
+        kept = (clicks_in(found, int(times[0]), int(times[-1])) for found in calibrations)
+        return next((clicks for clicks in kept if clicks), ())
+
+
+def _renaming(text: str) -> tuple[str, str]:
+    """Return the two classes of FROM=TO.
+
+    Raises:
+        InputError: it is not of this form.
+    """
+    old, equals, new = (part.strip() for part in text.partition("="))
+    if not (old and equals and new):
+        raise InputError(f"--class-map {text}: expected FROM=TO, such as pedestrian=person")
+    return old, new
+
+
+EvidenceUsed: TypeAlias = Annotated[EvidenceFlags, tyro.conf.arg(name="")]

@@ -1,0 +1,152 @@
+"""`cocalib report`: one HTML file that says how good a calibration is, where, and how one knows."""
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from calib_core.errors import InputError
+from cocalib.cli.evaluation.evidence_flags import EvidenceFlags, EvidenceUsed
+from cocalib.cli.flags import File, Switch, called
+from cocalib.cli.output import progress_bar, write_whole
+from cocalib.cli.recording_flags import Recordings, TopicFlags, Topics
+from cocalib.cli.tree_flags import FrameFlags, Frames
+
+if TYPE_CHECKING:
+    from calib_core.camera import Camera
+    from calib_core.interchange import ImportedCalibration
+    from calib_core.recordings import Recording
+    from calib_core.results import Calibration
+    from cocalib.report import ReportSubject
+
+__all__ = ["Report"]
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """Write a report on a calibration: one HTML file, and a PDF if wanted: how good, where, and how one knows."""
+
+    calibration: Annotated[Path | None, tyro.conf.Positional, called("CALIBRATION")] = None
+    """A calibration in any format that import reads."""
+    recording: Recordings = ()
+    """Judge it on this recording as well: bags, folders of pictures, radar CSV, videos; several are read as one."""
+    out: File = None
+    """Output file (.html)."""
+    pdf: Switch = False
+    """Also print it to a PDF beside the HTML, with the same name, by Chrome, Chromium, Edge or Brave."""
+    evidence: EvidenceUsed = field(default_factory=EvidenceFlags)
+    against: File = None
+    """Compare it with this other calibration of the same sensors."""
+    camera: File = None
+    """Intrinsics to use if the file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
+    topics: Topics = field(default_factory=TopicFlags)
+    frames: Frames = field(default_factory=FrameFlags)
+
+    def run(self) -> int:
+        """Write the report; return the exit code."""
+        from cocalib.report import print_pdf, report_html
+
+        out = self._required_out()
+        html = report_html(self._subject())
+        write_whole(out, html)
+        print(f"written to {out}")
+        if self.pdf:
+            printed = out.with_suffix(".pdf")
+            write_whole(printed, print_pdf(html))
+            print(f"printed to {printed}")
+        return 0
+
+    def _required_out(self) -> Path:
+        """Return the output file.
+
+        Raises:
+            InputError: a file is missing or has another suffix, or an option says nothing without another one.
+        """
+        if self.calibration is None:
+            raise InputError("CALIBRATION is missing; see cocalib report --help")
+        if self.out is None:
+            raise InputError("report writes a file: give its name with --out FILE.html")
+        if self.out.suffix.lower() not in (".html", ".htm"):  # such as that of the calibration itself
+            raise InputError(f"{self.out}: the report is an .html file; name it NAME.html")
+        if not self.recording and (self.evidence != EvidenceFlags() or self.topics != TopicFlags()):
+            raise InputError(
+                "clicks, boxes, and the options of a recording apply with a RECORDING only; give it after the calibration"
+            )
+        return self.out
+
+    def _subject(self) -> "ReportSubject":
+        from calib_core.interchange import read_camera_file
+        from cocalib.report import against_of, known_calibration, subject_of
+
+        assert self.calibration is not None
+        name = self.calibration.name
+        found, inputs = self.frames.read([self.calibration])
+        camera = read_camera_file(self.camera) if self.camera is not None else None
+        other, others = self.frames.read([self.against]) if self.against is not None else (None, ())
+        if self.recording:
+            subject, better = self._on_recording(found, other, camera)
+        else:
+            subject, better = subject_of(found, known_calibration(found, name, camera=camera), name), ()
+        subject = replace(subject, inputs=inputs)
+        if other is None or self.against is None:
+            return subject
+        lens = subject.calibration.camera if subject.calibration is not None else camera
+        return replace(subject, against=against_of(self.against.name, others, other, found, camera=lens, judged=better))
+
+    def _on_recording(
+        self, found: "ImportedCalibration", other: "ImportedCalibration | None", camera: "Camera | None"
+    ) -> "tuple[ReportSubject, tuple[str, ...]]":
+        """Return what is reported with what the recording says of it, and which of two calibrations is better on it."""
+        from calib_core.recordings import open_recording
+        from cocalib.judged_calibration import require_size
+        from cocalib.recording_check import other_camera
+        from cocalib.report import known_calibration, subject_of, watched
+
+        assert self.calibration is not None
+        name = self.calibration.name
+        with open_recording(self.recording, self.topics, require=("radar",)) as recording:
+            recorded = recording.camera()
+            calibration = known_calibration(found, name, camera=camera or recorded)
+            if calibration is not None:
+                require_size(calibration.camera, recording, self.calibration)
+            with progress_bar("hashing") as progress:
+                hashes = recording.fingerprint(progress)
+            seen = watched(recording, calibration, hashes, other_camera(found, recorded))
+            subject = replace(subject_of(found, calibration, name), recording=seen)
+            if calibration is None:
+                return subject, ()
+            return self._judged(subject, calibration, other, recording)
+
+    def _judged(
+        self,
+        subject: "ReportSubject",
+        calibration: "Calibration",
+        other: "ImportedCalibration | None",
+        recording: "Recording",
+    ) -> "tuple[ReportSubject, tuple[str, ...]]":
+        """Judge the calibration by clicks and boxes, if there are any, and compare it with the other one by them."""
+        from cocalib.comparing import compare_on_recording, comparison_lines
+        from cocalib.evaluating import evaluate_recording
+        from cocalib.report import Judged, known_calibration
+
+        options = self.evidence.options()
+        clicks = self.evidence.clicks_in(recording, self.recording, [subject.found])
+        boxes, labels = self.evidence.boxes_in(recording)
+        if not clicks and boxes is None:
+            return subject, ()
+        with progress_bar("evaluating") as progress:
+            evaluation = evaluate_recording(
+                calibration, recording, clicks=clicks, boxes=boxes, labels=labels, progress=progress, options=options
+            )
+        subject = replace(subject, judged=Judged(evaluation, clicks))
+        if other is None or self.against is None:
+            return subject, ()
+        rival = known_calibration(other, self.against.name, camera=calibration.camera)
+        assert rival is not None  # a camera is given
+        names = self.against.name, subject.name
+        compared = compare_on_recording(
+            (rival, calibration), recording, names=names, clicks=clicks, boxes=boxes, labels=labels, options=options
+        )
+        lines = comparison_lines(compared)
+        return subject, tuple(line for line in lines if not line.startswith("warning:"))

@@ -1,0 +1,207 @@
+"""`cocalib fleet`: what the results of many sessions say of a fleet."""
+
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeAlias
+
+import tyro
+
+from calib_core.errors import InputError
+from cocalib.cli.flags import File, Switch, called
+from cocalib.cli.output import write_whole
+from cocalib.terminal import print_exactly
+
+if TYPE_CHECKING:
+    from cocalib.fleet.records import FleetRecord
+
+__all__ = ["Fleet"]
+
+_Action: TypeAlias = Literal["status", "history", "compare", "prior", "export", "summary", "rebuild"]
+_NAMES: Final[dict[str, tuple[str, ...]]] = {
+    "status": (),
+    "history": ("VEHICLE",),
+    "compare": ("A", "B"),
+    "prior": ("TYPE",),
+    "export": (),
+    "summary": (),
+    "rebuild": (),
+}
+_FLAG_OF = {
+    "--json": ("status", "history", "compare", "prior"),
+    "--parquet": ("export",),
+    "--csv": ("export",),
+    "--out": ("prior",),
+    "--without": ("prior",),
+}
+_LOOK: Final = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Fleet:
+    """Tell how a fleet is calibrated, from the results of a batch: status, history, comparisons, prior, summary page.
+
+    OUT is the folder that batch wrote to. `status OUT`: where each vehicle stands. `history VEHICLE OUT`: its sessions and what
+    changed in between. `compare A B OUT`: two sessions VEHICLE/SESSION, or two vehicles of one type. `prior TYPE OUT`: what the
+    vehicles of a type say of the next one. `export OUT`: all sessions as a table. `summary OUT`: write
+    OUT/summary.html. `rebuild OUT`: write index and summary page from the results.
+
+    Exit codes: 0 done, and nothing to look at; 1 too few vehicles for a prior; 2 nothing can be read; 3 something needs a look:
+    a vehicle without a calibration to rely on, remounted, or off its kind; or two that differ.
+    """
+
+    action: Annotated[_Action, tyro.conf.Positional, called("ACTION")]
+    """What to do: status, history, compare, prior, export, summary or rebuild."""
+    given: Annotated[tuple[str, ...], tyro.conf.Positional, called("NAME... OUT")] = ()
+    """Names that the action takes, then the folder that batch wrote to."""
+    json: Switch = False
+    """With status, history, compare, prior: print one JSON object instead of text."""
+    parquet: File = None
+    """With export: Parquet file to write."""
+    csv: File = None
+    """With export: CSV file to write."""
+    out: File = None
+    """With prior: file to write it to (cocalib/fleet-prior-1 JSON), for solve, open and batch."""
+    without: Annotated[tuple[str, ...], called("VEHICLE..."), tyro.conf.UseAppendAction] = ()
+    """With prior: leave a vehicle out, such as the one that it is for; repeat it for several."""
+
+    def run(self) -> int:
+        """Run the action; return the exit code."""
+        folder = self._fitting_folder()
+        names = self.given[:-1]
+        if self.action == "rebuild":
+            return _rebuild(folder)
+        from cocalib.fleet.index import read_fleet
+
+        fleet = read_fleet(folder)
+        for unread in fleet.unread:
+            print(f"note: {unread.place} {unread.reason}", file=sys.stderr)
+        if self.action == "status":
+            return self._status(fleet)
+        if self.action == "history":
+            return self._history(fleet, names[0])
+        if self.action == "compare":
+            return self._compare(fleet, *names)
+        if self.action == "prior":
+            return self._prior(fleet, names[0])
+        return self._export(fleet) if self.action == "export" else _summary(folder, fleet)
+
+    def _fitting_folder(self) -> Path:
+        """Refuse options of another action, and a wrong number of names; return the folder.
+
+        Raises:
+            InputError: they do not fit.
+        """
+        options: dict[str, object] = {
+            "--json": self.json,
+            "--parquet": self.parquet,
+            "--csv": self.csv,
+            "--out": self.out,
+            "--without": self.without,
+        }
+        for name, given in options.items():
+            if given and self.action not in _FLAG_OF[name]:
+                raise InputError(f"{name} applies to fleet {', '.join(_FLAG_OF[name])} only; see cocalib fleet --help")
+        wanted = (*_NAMES[self.action], "OUT")
+        if len(self.given) != len(wanted):
+            raise InputError(
+                f"fleet {self.action} takes {' '.join(wanted)}; {len(self.given)} given; OUT is the folder that batch wrote to"
+            )
+        if self.action == "export" and self.parquet is None and self.csv is None:
+            raise InputError("fleet export needs the name of the new file: --parquet FILE or --csv FILE")
+        folder = Path(self.given[-1])
+        if not folder.is_dir():
+            raise InputError(f"{folder}: no such folder; give the one that batch wrote to")
+        return folder
+
+    def _status(self, fleet: "FleetRecord") -> int:
+        from cocalib.cli.fleet.text_tables import kind_lines, plan_lines, status_lines
+        from cocalib.fleet.json_documents import status_document
+        from cocalib.fleet.kinds import kinds_of
+        from cocalib.fleet.standing import standings_of
+
+        kinds, now_ns = kinds_of(fleet), time.time_ns()
+        standings = standings_of(fleet, kinds)
+        if self.json:
+            _print_json(status_document(fleet, standings, kinds, now_ns=now_ns))
+        else:
+            troubled = bool(fleet.unread or fleet.missing)
+            lines = [*status_lines(standings, now_ns=now_ns, troubled=troubled), *plan_lines(fleet)]
+            print("\n".join([*lines, *kind_lines(kinds)]))
+        return _LOOK if fleet.unread or fleet.missing or any(one.needs for one in standings) else 0
+
+    def _history(self, fleet: "FleetRecord", name: str) -> int:
+        from cocalib.cli.fleet.text_tables import history_lines
+        from cocalib.fleet.choosing import vehicle_named
+        from cocalib.fleet.json_documents import history_document
+
+        vehicle = vehicle_named(fleet, name)
+        superseded = [one for one in fleet.superseded if one.outcome.vehicle == name]
+        if self.json:
+            _print_json(history_document(vehicle, superseded))
+        else:
+            print("\n".join(history_lines(vehicle, superseded)))
+        return 0
+
+    def _compare(self, fleet: "FleetRecord", a: str, b: str) -> int:
+        from cocalib.fleet.choosing import compare_sessions
+        from cocalib.fleet.json_documents import comparison_document
+
+        compared = compare_sessions(fleet, a, b)
+        if self.json:
+            _print_json(comparison_document(compared))
+        else:
+            print("\n".join([compared.words, *compared.notes]))
+        return _LOOK if compared.outcome == "differs" else 0
+
+    def _prior(self, fleet: "FleetRecord", vehicle_type: str) -> int:
+        from calib_core.interchange.own.fleet_prior_json import write_fleet_prior
+        from calib_core.measurements import Unsolvable
+        from cocalib.cli.fleet.text_tables import prior_lines
+        from cocalib.cli.output import explain_unsolvable
+        from cocalib.fleet.json_documents import prior_document
+        from cocalib.fleet.kinds import prior_of_type
+
+        found = prior_of_type(fleet, vehicle_type, self.without)
+        if isinstance(found, Unsolvable):
+            return explain_unsolvable(found, what=f"no prior for {vehicle_type}")
+        if self.json:
+            _print_json(prior_document(found))
+        else:
+            print("\n".join(prior_lines(found)))
+        if self.out is not None:
+            write_whole(self.out, write_fleet_prior(found.prior))
+            print(f"{self.out} written: solve --fleet-prior takes it", file=sys.stderr)
+        return 0
+
+    def _export(self, fleet: "FleetRecord") -> int:
+        from cocalib.fleet.table_export import csv_bytes, parquet_bytes
+
+        for path, write in ((self.parquet, parquet_bytes), (self.csv, csv_bytes)):
+            if path is not None:
+                write_whole(path, write(fleet))
+                print(f"{path} written", file=sys.stderr)
+        return 0
+
+
+def _rebuild(folder: Path) -> int:
+    from cocalib.fleet.index import index_path, read_fleet, rebuild_index
+
+    for unread in rebuild_index(folder):
+        print(f"note: {unread.place} {unread.reason}", file=sys.stderr)
+    print(f"{index_path(folder)} written", file=sys.stderr)
+    return _summary(folder, read_fleet(folder))
+
+
+def _summary(folder: Path, fleet: "FleetRecord") -> int:
+    from cocalib.fleet.summary_page import write_summary
+
+    print(f"{write_summary(folder, fleet)} written", file=sys.stderr)
+    return 0
+
+
+def _print_json(document: dict[str, Any]) -> None:
+    import msgspec
+
+    print_exactly(msgspec.json.format(msgspec.json.encode(document), indent=2).decode())

@@ -1,0 +1,214 @@
+"""`cocalib intrinsics`: calibrate a lens from pictures of a board, or convert a file with intrinsics."""
+
+import re
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from calib_core.errors import InputError
+from calib_core.input_files import name_text
+from calib_core.intrinsics.options import IntrinsicsOptions
+from calib_core.recordings import RecordingOptions
+from cocalib.cli.flags import File, Folder, Switch, called, same
+from cocalib.cli.intrinsics.board_flags import BoardFlags, BoardUsed
+from cocalib.cli.output import explain_unsolvable, write_whole
+from cocalib.terminal import print_exactly
+
+if TYPE_CHECKING:
+    from calib_core.intrinsics import BoardSearch, CalibratedLens
+    from calib_core.intrinsics.searching.coverage import Coverage
+    from calib_core.results import DataWarning
+    from cocalib.intrinsics import OpenPictures
+    from cocalib.intrinsics.resumed_search import ResumedSearch
+
+__all__ = ["Intrinsics"]
+
+
+@dataclass(frozen=True, slots=True)
+class Intrinsics:
+    """Calibrate a camera's lens from pictures of a board, or convert a file with intrinsics.
+
+    Exit code 1: the pictures cannot give a calibration; 3: there is one, but a warning says that it is doubtful.
+    """
+
+    source: Annotated[tuple[Path, ...], tyro.conf.Positional, called("SOURCE...")] = ()
+    """A recording, a video, a folder of pictures or picture files of one camera; or a file with intrinsics."""
+    image_topic: Annotated[str | None, called("TOPIC")] = same(RecordingOptions, "image_topic")
+    board: BoardUsed = field(default_factory=BoardFlags)
+    out: File = None
+    """Write the intrinsics to this file (ROS camera_info YAML unless --to or the suffix says otherwise)."""
+    to: Annotated[str | None, called("FORMAT")] = None
+    """Format of the intrinsics: ros, kalibr, opencv, opencv-xml, opencv-json, mrcal, colmap, kitti, matlab, json."""
+    rescale: Annotated[str | None, called("WIDTHxHEIGHT")] = None
+    """With a file with intrinsics: convert them to the same pictures, resized to this size [px]."""
+    views: File = None
+    """File of the views found (cocalib/board-views-1 JSON): read if it is there, to resume a search; written at the end."""
+    report: File = None
+    """Write a report on the lens to this file (.html)."""
+    rectified: Folder = None
+    """Write the used pictures without the distortion into this folder, with straight lines to judge it by."""
+    json: Switch = False
+    """Print everything as JSON (cocalib/intrinsics-1)."""
+    verbose: Switch = False
+    """List every view and every picture that was left out."""
+    options: Annotated[IntrinsicsOptions, tyro.conf.arg(name=""), tyro.conf.FlagConversionOff] = field(
+        default_factory=IntrinsicsOptions
+    )
+
+    def run(self) -> int:
+        """Calibrate or convert; return the exit code."""
+        if not self.source:
+            raise InputError(
+                "SOURCE is missing: give a recording, a video, a folder of pictures or picture files; "
+                "see cocalib intrinsics --help"
+            )
+        if self._is_camera_file():
+            return self._convert()
+        self._require_fitting()
+        return self._calibrate()
+
+    def _is_camera_file(self) -> bool:
+        from cocalib.cli.intrinsics.camera_files import CAMERA_SUFFIXES
+
+        path = Path(str(self.source[0]).partition("#")[0])
+        return len(self.source) == 1 and not path.is_dir() and path.suffix.lower() in CAMERA_SUFFIXES
+
+    def _convert(self) -> int:
+        from cocalib.cli.intrinsics.camera_files import convert_camera, require_format, size_of
+
+        unused = (self.views, self.report, self.rectified)
+        if any(unused) or self.json or self.board != BoardFlags() or self.image_topic:
+            raise InputError(
+                f"{self.source[0]} is a file with intrinsics, which is printed or converted (--to, --out); the other options "
+                "apply to pictures of a board"
+            )
+        require_format(self.to)
+        size_px = size_of(self.rescale) if self.rescale is not None else None
+        return convert_camera(self.source[0], to=self.to, out=self.out, size_px=size_px)
+
+    def _require_fitting(self) -> None:
+        """Refuse files that could not be written, before the search.
+
+        Raises:
+            InputError: one has another suffix than its content, or a folder is missing.
+        """
+        if self.report is not None and self.report.suffix.lower() not in (".html", ".htm"):
+            raise InputError(f"{self.report}: the report is an .html file; name it NAME.html")
+        for path in (self.out, self.views, self.report):
+            if path is not None and not path.absolute().parent.is_dir():
+                raise InputError(f"{path}: the folder {path.parent} does not exist; create it first")
+        from cocalib.cli.intrinsics.camera_files import require_format
+
+        require_format(self.to)
+        if self.rescale is not None:
+            raise InputError(f"--rescale {self.rescale} applies to a file with intrinsics; give it as the source")
+        if self.to is not None and self.out is None:
+            raise InputError(f"--to {self.to}: give the file to write with --out FILE")
+
+    def _calibrate(self) -> int:
+        from calib_core.intrinsics import calibrate_lens
+        from calib_core.measurements import Unsolvable
+        from cocalib.cli.intrinsics.lens_text import left_out_lines
+        from cocalib.cli.intrinsics.searching import kept_on_interruption, search_for, searched
+        from cocalib.intrinsics import open_pictures
+
+        board = self.board.required()
+        with open_pictures(self.source, RecordingOptions(image_topic=self.image_topic)) as pictures:
+            search = search_for(pictures, board, _source_name(self.source), self.views)
+            with kept_on_interruption(search, self.views):
+                found = searched(search, self.views)
+                lens = found if isinstance(found, Unsolvable) else calibrate_lens(found, self.options)
+                if isinstance(lens, Unsolvable) or isinstance(found, Unsolvable):
+                    assert isinstance(lens, Unsolvable)
+                    code = explain_unsolvable(lens)
+                    lines = () if isinstance(found, Unsolvable) else left_out_lines(found.left_out)
+                    print("".join(f"  {line}\n" for line in lines), end="", file=sys.stderr)
+                    return code
+                lens = replace(lens, warnings=(*lens.warnings, *_about_series(pictures)))
+                return self._deliver(lens, found, search, pictures)
+
+    def _deliver(
+        self, lens: "CalibratedLens", found: "BoardSearch", search: "ResumedSearch", pictures: "OpenPictures"
+    ) -> int:
+        """Write and print the lens; return the exit code."""
+        from calib_core.interchange.own.intrinsics_json import write_intrinsics
+        from calib_core.intrinsics.searching.coverage import view_coverage
+        from cocalib.cli.intrinsics.camera_files import write_camera
+        from cocalib.cli.intrinsics.lens_text import DOUBTFUL, lens_lines
+        from cocalib.intrinsics.field_of_view import field_of_view_deg
+
+        coverage = view_coverage([view.corners for view in lens.views], lens.board, found.size_px)
+        told = sys.stderr if self.json else sys.stdout
+        if self.json:
+            text = write_intrinsics(
+                lens,
+                search.source,
+                searched=found.searched,
+                field_of_view_deg=field_of_view_deg(lens.camera),
+                coverage=coverage,
+            )
+            print_exactly(text)
+        else:
+            print("\n".join(lens_lines(lens, found, coverage, verbose=self.verbose)))
+        if self.out is not None:
+            write_camera(lens.camera, self.to, self.out, told=told)
+            print(f"use it: cocalib open RECORDING --camera {self.out}", file=told)
+        elif not self.json:
+            print("use it: write it with --out camera.yaml, then cocalib open RECORDING --camera camera.yaml")
+        self._write_pictures(lens, found, coverage, pictures, search)
+        return 3 if any(warning.code in DOUBTFUL for warning in lens.warnings) else 0
+
+    def _write_pictures(
+        self,
+        lens: "CalibratedLens",
+        found: "BoardSearch",
+        coverage: "Coverage",
+        pictures: "OpenPictures",
+        search: "ResumedSearch",
+    ) -> None:
+        """Write the report and the rectified pictures, if they are asked for."""
+        told = sys.stderr if self.json else sys.stdout
+        if self.report is not None:
+            from cocalib.report.lens import lens_report_html
+
+            write_whole(self.report, lens_report_html(lens, search.source, coverage, searched=found.searched))
+            print(f"report written to {self.report}", file=told)
+        if self.rectified is not None:
+            from cocalib.intrinsics.rectified_pictures import rectified_pictures
+
+            self.rectified.mkdir(parents=True, exist_ok=True)
+            count = 0
+            for name, content in rectified_pictures(pictures, lens):
+                count += 1
+                write_whole(self.rectified / f"{count:03d}_{_file_name(name)}.png", content)
+            print(f"{count} rectified pictures written to {self.rectified}", file=told)
+
+
+def _source_name(paths: tuple[Path, ...]) -> str:
+    """Return what messages call the source."""
+    names = [name_text(path.name or str(path)) for path in paths]
+    return " + ".join(names) if len(names) < 3 else f"{names[0]} to {names[-1]}"
+
+
+def _file_name(name: str) -> str:
+    """Return a picture's name as part of a file's name."""
+    return re.sub(r"[^A-Za-z0-9._-]+", "_", Path(name).stem).strip("_") or "picture"
+
+
+def _about_series(pictures: "OpenPictures") -> "Iterator[DataWarning]":
+    """Warn if the files given are perhaps of several cameras."""
+    from calib_core.results import DataWarning
+    from cocalib.intrinsics.picture_files import FilePictures, series_of
+
+    series = series_of(pictures.paths) if isinstance(pictures, FilePictures) else {}
+    if len(series) > 1:
+        named = " and ".join(f"{name} ({len(found)})" for name, found in series.items())
+        yield DataWarning(
+            "several-series",
+            f"the names of the pictures form {len(series)} series: {named}",
+            "if they are of different cameras, calibrate each with its own pictures",
+        )

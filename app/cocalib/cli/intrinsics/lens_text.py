@@ -1,0 +1,108 @@
+"""A calibrated lens in words, for the terminal."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+
+from calib_core.camera import Camera
+from calib_core.intrinsics import (
+    MODEL_ERRORS_UNSEEN,
+    BoardSearch,
+    CalibratedLens,
+    LeftOutPicture,
+    projection_uncertainty,
+    residual_field,
+    split_difference,
+)
+from calib_core.intrinsics.searching.coverage import Coverage
+from calib_core.measurements import Unsolvable
+from cocalib.intrinsics.field_of_view import field_of_view_text
+from cocalib.view.number_format import plain, with_sigma
+from cocalib.view.wording import sentence
+
+__all__ = ["DOUBTFUL", "camera_lines", "left_out_lines", "lens_lines"]
+
+DOUBTFUL = frozenset(
+    {
+        "large-residuals",
+        "lens-folds-back",
+        "little-covered",
+        "principal-point-far",
+        "several-series",
+        "unequal-focal-lengths",
+        "weak-focal-length",
+    }
+)
+"""Warnings after which a lens should not be used unseen: the exit code is 3."""
+_MOST_LEFT_OUT = 12
+_ORDINARY = ("the same view as", "not needed")
+
+
+def camera_lines(camera: Camera) -> Iterator[str]:
+    """Yield the parameters of a camera, one a line, with their standard deviations if they are known."""
+    yield f"model          {camera.model}, pictures of {camera.width_px} x {camera.height_px} px"
+    known = camera.covariance
+    for name, value in zip(camera.parameter_names, camera.parameters.tolist(), strict=True):
+        unit = " px" if name.endswith("_px") else ""
+        shown = plain(value, 6) if known is None else with_sigma(value, known.sigma(name))
+        yield f"{name.removesuffix('_px'):<14} {shown}{unit}"
+    yield f"field of view  {field_of_view_text(camera)}"
+
+
+def lens_lines(lens: CalibratedLens, search: BoardSearch, coverage: Coverage, *, verbose: bool) -> Iterator[str]:
+    """Yield what is known about a calibrated lens.
+
+    Args:
+        lens: with its views.
+        search: in which they were found.
+        coverage: of the used views.
+        verbose: whether to list every view.
+    """
+    yield from camera_lines(lens.camera)
+    yield f"choice         {sentence(lens.choice)}"
+    yield f"RMS            {lens.rms_px:.3f} px in the used views, {lens.held_out_rms_px:.3f} px in views left out in turn"
+    yield f"views          {len(lens.views)} used, {len(lens.left_out)} left out, {search.searched} pictures searched"
+    yield from _uncertainty_lines(lens)
+    yield from _coverage_lines(coverage)
+    if verbose:
+        yield from _view_lines(lens)
+    yield from left_out_lines(lens.left_out, most=len(lens.left_out) if verbose else _MOST_LEFT_OUT)
+    yield from (f"warning: {sentence(one.message)} {sentence(one.hint)} [{one.code}]" for one in lens.warnings)
+
+
+def left_out_lines(left_out: Sequence[LeftOutPicture], *, most: int = _MOST_LEFT_OUT) -> Iterator[str]:
+    """Yield the pictures that were not used, with the reasons; beyond so many lines, how many there are for each reason."""
+    whole = most >= len(left_out)
+    told = [one for one in left_out if whole or not one.reason.startswith(_ORDINARY)]
+    yield from (f"left out: {one.name}: {one.reason}" for one in told[:most])
+    others = Counter(one.reason.partition(":")[0] for one in told[most:])
+    yield from (f"left out: {count} more: {reason} (--verbose names them)" for reason, count in others.most_common(5))
+    if len(told) < len(left_out):
+        yield f"left out: {len(left_out) - len(told)} good views that others make unnecessary (--verbose names them)"
+
+
+def _uncertainty_lines(lens: CalibratedLens) -> Iterator[str]:
+    sigmas = projection_uncertainty(lens).sigma_px
+    middle = sigmas[sigmas.shape[0] // 2, sigmas.shape[1] // 2]
+    corners = sigmas[[0, 0, -1, -1], [0, -1, 0, -1]].max()
+    yield f"projection     known to {plain(middle, 2)} px in the middle of the picture, {plain(corners, 2)} px in a corner"
+    yield f"               {MODEL_ERRORS_UNSEEN}"
+    halves = split_difference(lens)
+    yield f"cross-check    {sentence(halves.reason) if isinstance(halves, Unsolvable) else halves.sentence}"
+    yield f"residuals      {residual_field(lens).sentence}"
+
+
+def _coverage_lines(coverage: Coverage) -> Iterator[str]:
+    parts = [f"{100.0 * coverage.share:.0f} % of the picture"]
+    parts += [f"{name} {count}" for name, count in (*coverage.tilts.items(), *coverage.distances.items())]
+    yield f"coverage       {', '.join(parts)}"
+    yield from (f"film next      {sentence(one)}" for one in coverage.missing)
+
+
+def _view_lines(lens: CalibratedLens) -> Iterator[str]:
+    width = max(len(view.corners.name) for view in lens.views)
+    yield f"{'view':<{width}}  corners  used  RMS px  held out px"
+    for view in lens.views:
+        used = int(view.used.sum())
+        yield (
+            f"{view.corners.name:<{width}}  {len(view.used):7d}  {used:4d}  {view.rms_px:6.3f}  {view.held_out_rms_px:11.3f}"
+        )

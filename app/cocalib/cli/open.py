@@ -1,0 +1,106 @@
+"""`cocalib open`: calibrate in the browser."""
+
+import contextlib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from calib_core.errors import InputError
+from calib_core.options import CalibrationOptions
+from cocalib.cli.flags import File, Folder, Switch
+from cocalib.cli.output import read_text
+from cocalib.cli.recording_flags import CameraPosition, MeasuredCamera, Options, Recordings, TopicFlags, Topics
+from cocalib.cli.serving_flags import ServingFlags
+
+if TYPE_CHECKING:
+    from cocalib.opening import Choice
+
+__all__ = ["Open"]
+
+
+@dataclass(frozen=True, slots=True)
+class Open:
+    """Calibrate your own recording in the browser."""
+
+    recording: Recordings
+    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several are read as one recording.
+    Without one, it is chosen in the page."""
+    camera: File = None
+    """Intrinsics to use if the recording has none, or instead of its own: any format that `cocalib intrinsics` writes."""
+    rescale_camera: Switch = False
+    """With --camera: scale its intrinsics to the recorded pictures, if these are the calibrated ones resized."""
+    calibration: File = None
+    """A calibration to show, in any format: drawn until the clicks give a new one, then compared with it."""
+    fleet_prior: File = None
+    """What the fleet says of this vehicle (cocalib/fleet-prior-1 JSON, written by fleet prior); the data alone are shown, too."""
+    clicks: File = None
+    """Clicks to start a new session with (cocalib/clicks-1 JSON)."""
+    session: Folder = None
+    """Session folder; by default the one with this recording's frames, next to it or in your user folder, else a new one."""
+    fresh: Switch = False
+    """Start without the previous clicks (a backup is kept)."""
+    follow: Switch = False
+    """Open a recording that is still being written (.bag, .mcap, .db3, folders): frames and placements appear as they come."""
+    root: Folder = None
+    """Folder in which recordings can be chosen in the page; none by default, so that only recent ones can be chosen."""
+    measured: CameraPosition = field(default_factory=MeasuredCamera)
+    topics: Topics = field(default_factory=TopicFlags)
+    options: Options = field(default_factory=CalibrationOptions)
+    serving: Annotated[ServingFlags, tyro.conf.arg(name="")] = field(default_factory=ServingFlags)
+
+    def run(self) -> int:
+        """Serve until Ctrl+C, SIGTERM or SIGHUP; return the exit code."""
+        from calib_core.interchange import CameraFile
+        from calib_core.recordings import require_files
+        from cocalib.fleet_prior_file import FleetPriorFile
+        from cocalib.opening import Choice, GivenClicks
+
+        if not self.recording:
+            return _serve(None, self.serving, self.root)
+        paths = self.recording if self.follow else require_files(self.recording)
+        _require_given(self.camera, self.calibration, self.clicks)
+        choice = Choice(
+            paths,
+            topics=self.topics,
+            camera_file=None if self.camera is None else CameraFile.read(self.camera, rescale=self.rescale_camera),
+            fleet_prior=None if self.fleet_prior is None else FleetPriorFile.read(self.fleet_prior),
+            calibration_file=self.calibration,
+            clicks=None if self.clicks is None else GivenClicks(read_text(self.clicks), str(self.clicks)),
+            options=self.measured.over(self.options),
+            session=self.session,
+            fresh=self.fresh,
+            follow=self.follow,
+        )
+        return _serve(choice, self.serving, self.root)
+
+
+def _serve(choice: "Choice | None", flags: ServingFlags, root: Path | None = None) -> int:
+    """Serve from a link that is printed when the recording is open, or when that takes long.
+
+    Raises:
+        CalibrationError: the address, the token or the folder cannot be used; or the recording, and nothing is to be asked.
+    """
+    from cocalib.opening import Serving, serve
+    from cocalib.opening.root_folder import RootFolder
+    from cocalib.session.file import recording_session_folder
+
+    folder = None if root is None else RootFolder(root)
+    if choice is None:
+        served = f"choosing: {'no recording' if folder is None else folder.path}"
+    else:
+        served = str((choice.session or recording_session_folder(choice.paths)).absolute())
+    with contextlib.closing(flags.link(served)) as link:
+        return serve(choice, Serving(link, asks=flags.asks, root=folder))
+
+
+def _require_given(*files: Path | None) -> None:
+    """Refuse missing files before anything is read or served.
+
+    Raises:
+        InputError: a file is missing.
+    """
+    for path in files:
+        if path is not None and not path.exists():
+            raise InputError(f"{path}: no such file; check the path")

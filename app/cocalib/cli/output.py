@@ -1,0 +1,92 @@
+"""Shared by the commands: reading and writing files, what is printed to stderr, progress."""
+
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from calib_core.errors import InputError
+from cocalib import whole_file
+from cocalib.terminal import terminal_stream
+from cocalib.text_files import read_text
+
+if TYPE_CHECKING:
+    from calib_core.measurements import ReflectorClick, Unsolvable
+    from calib_core.recordings import Recording
+
+__all__ = [
+    "explain_unsolvable",
+    "progress_bar",
+    "read_text",
+    "tell_notes",
+    "told_clicks_at_frames",
+    "write_whole",
+]
+
+
+def explain_unsolvable(outcome: "Unsolvable", *, what: str = "no calibration") -> int:
+    """Print to stderr why there is no calibration, what would help, and which clicks are unpaired; return 1.
+
+    Args:
+        outcome: of the solver, or of the search for proposals.
+        what: is missing.
+    """
+    from cocalib.view import sentence
+
+    print(f"cocalib: {what}: {sentence(outcome.reason)} {sentence(outcome.hint)}", file=sys.stderr)
+    for click in outcome.unpaired:
+        print(f"  click {click.id}: {sentence(click.reason)} {sentence(click.hint)}", file=sys.stderr)
+    return 1
+
+
+def write_whole(path: Path, content: str | bytes) -> None:
+    """Write a file atomically: a reader finds the old or the new content, never a part.
+
+    Raises:
+        InputError: the folder is missing or not writable.
+    """
+    try:
+        whole_file.write_whole(path, content.encode("utf-8") if isinstance(content, str) else content)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {(error.strerror or str(error)).lower()}") from error
+
+
+@contextmanager
+def progress_bar(label: str) -> Iterator[Callable[[int, int], None]]:
+    """Show a progress bar on stderr; nothing if stderr is not a terminal.
+
+    Args:
+        label: what is being done.
+
+    Yields:
+        a function that takes the amount done and the total.
+    """
+    from rich.console import Console
+    from rich.progress import Progress
+
+    console = Console(file=terminal_stream(sys.stderr))
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task(label, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+def told_clicks_at_frames(
+    clicks: "Sequence[ReflectorClick]", recording: "Recording", *, source: str
+) -> "tuple[ReflectorClick, ...]":
+    """Move the clicks of a file to the nearest frames, and print to stderr which ones had the stamp of no frame.
+
+    Raises:
+        InputError: a click is far from every frame.
+    """
+    from cocalib.session.click_stamps import clicks_at_frames
+
+    found = clicks_at_frames(clicks, recording.image_times, source=source)
+    tell_notes(found.moved)
+    return found.clicks
+
+
+def tell_notes(notes: Sequence[str]) -> None:
+    """Print what a user may want to know to stderr, a line for each."""
+    for line in notes:
+        print(f"note: {line}", file=sys.stderr)

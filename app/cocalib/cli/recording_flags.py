@@ -1,0 +1,104 @@
+"""Flags of the commands that read a recording: which files and topics, and the options of a calibration."""
+
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, TypeAlias
+
+import tyro
+
+from calib_core.options import CalibrationOptions, CameraPositionPrior
+from calib_core.recordings import RecordingOptions
+from cocalib.cli.flags import called, same
+
+if TYPE_CHECKING:
+    from calib_core.interchange import VehicleNote
+
+__all__ = [
+    "CameraPosition",
+    "MeasuredCamera",
+    "Options",
+    "Recordings",
+    "TopicFlags",
+    "Topics",
+    "Vehicle",
+    "VehicleFlags",
+]
+
+Recordings: TypeAlias = Annotated[tuple[Path, ...], tyro.conf.Positional, called("RECORDING...")]
+
+
+@dataclass(frozen=True, slots=True)
+class TopicFlags(RecordingOptions):
+    """RecordingOptions with names for their values in the help; their texts are defined there."""
+
+    radar_topic: Annotated[str | None, called("TOPIC")] = same(RecordingOptions, "radar_topic")
+    image_topic: Annotated[str | None, called("TOPIC")] = same(RecordingOptions, "image_topic")
+    camera_info_topic: Annotated[str | None, called("TOPIC")] = same(RecordingOptions, "camera_info_topic")
+    radar_axes: Annotated[str | None, called("AXES")] = same(RecordingOptions, "radar_axes")
+    map: Annotated[tuple[str, ...], called("QUANTITY=COLUMN:UNIT"), tyro.conf.UseAppendAction] = same(
+        RecordingOptions, "map"
+    )
+    confirm_assumptions: Annotated[bool, called()] = same(RecordingOptions, "confirm_assumptions")
+    video_start: Annotated[str | None, called("TIME")] = same(RecordingOptions, "video_start")
+    time_zone: Annotated[str | None, called("OFFSET")] = same(RecordingOptions, "time_zone")
+    radar_start: Annotated[str | None, called("TIME[,SECONDS]")] = same(RecordingOptions, "radar_start")
+
+
+Topics: TypeAlias = Annotated[TopicFlags, tyro.conf.arg(name="")]
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredCamera:
+    """A tape-measured camera position; no other extra measurement helps as much."""
+
+    camera_position_m: Annotated[tuple[float, float, float] | None, called("X Y Z")] = None
+    """Measured position of the camera's lens in the radar frame: forward, left, up [m]."""
+    camera_position_sigma_m: float = 0.01
+    """Standard deviation of that position, per axis [m]."""
+
+    def over(self, options: CalibrationOptions) -> CalibrationOptions:
+        """Return the options with the measured position, if there is one."""
+        if self.camera_position_m is None:
+            return options
+        prior = CameraPositionPrior(self.camera_position_m, self.camera_position_sigma_m)
+        return dataclasses.replace(options, solving=dataclasses.replace(options.solving, camera_position=prior))
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleFlags:
+    """Which vehicle it is; the calibration names it, and so does the report."""
+
+    vehicle: Annotated[str | None, called("NAME")] = None
+    """Name of the vehicle."""
+    vehicle_type: Annotated[str | None, called("TYPE")] = None
+    """Its type: vehicles of one type are mounted alike."""
+    session_name: Annotated[str | None, called("NAME")] = None
+    """Name of this session with it, such as a date."""
+    radar_serial: Annotated[str | None, called("SERIAL")] = None
+    """Serial number of the radar."""
+    camera_serial: Annotated[str | None, called("SERIAL")] = None
+    """Serial number of the camera."""
+
+    def note(self) -> "VehicleNote":
+        """Return what is stated.
+
+        Raises:
+            InputError: a text is empty, too long or not printable, or a name has a slash; the message names the flag.
+        """
+        from calib_core.interchange.vehicle_note import VehicleNote, require_label, require_name
+
+        for one in dataclasses.fields(self):
+            if (text := getattr(self, one.name)) is not None:
+                require = require_name if one.name in ("vehicle", "session_name") else require_label
+                require(text, f"--{one.name.replace('_', '-')}")
+        return VehicleNote(self.vehicle, self.vehicle_type, self.session_name, self.radar_serial, self.camera_serial)
+
+
+# Without a prefix, but in a group of their own in the help.
+Vehicle: TypeAlias = Annotated[VehicleFlags, tyro.conf.OmitArgPrefixes]
+CameraPosition: TypeAlias = Annotated[MeasuredCamera, tyro.conf.arg(name="")]
+# The camera position has its own flags; here it would become a subcommand.
+Options: TypeAlias = Annotated[
+    CalibrationOptions, tyro.conf.arg(name=""), tyro.conf.AvoidSubcommands, tyro.conf.FlagConversionOff
+]

@@ -1,0 +1,192 @@
+"""`cocalib session`: list, repair and export sessions."""
+
+import sys
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+from calib_core.errors import InputError
+from cocalib.cli.flags import File, Switch, called
+from cocalib.cli.output import write_whole
+
+if TYPE_CHECKING:
+    from cocalib.session.file import Repair, SessionSummary
+
+__all__ = ["Session"]
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    """List the sessions of recordings, repair a damaged one, or export its clicks.
+
+    Exit codes: 0 done; 1 repair found damage and has changed nothing; 2 nothing can be read; 3 exported, but not all is proven.
+    """
+
+    action: Annotated[Literal["list", "repair", "export"], tyro.conf.Positional, called("ACTION")]
+    """What to do: list, repair or export."""
+    place: Annotated[tuple[Path, ...], tyro.conf.Positional, called("FOLDER...")] = ()
+    """Session folders (.cocalib-session), recordings, or folders that hold them; for `list` the current folder if omitted."""
+    json: Switch = False
+    """With list: print JSON instead of text."""
+    yes: Switch = False
+    """With repair: write what can be kept; the old files are kept as backups."""
+    out: File = None
+    """With export: output file (cocalib/clicks-1 JSON)."""
+
+    def run(self) -> int:
+        """Run the action; return the exit code."""
+        self._require_fitting()
+        if self.action == "list":
+            return self._list()
+        folder = _session_folder(self.place[0])
+        return self._repair(folder) if self.action == "repair" else self._export(folder)
+
+    def _require_fitting(self) -> None:
+        """Refuse options of another action, and a wrong number of places.
+
+        Raises:
+            InputError: they do not fit.
+        """
+        for name, given, action in (
+            ("--json", self.json, "list"),
+            ("--yes", self.yes, "repair"),
+            ("--out", self.out is not None, "export"),
+        ):
+            if given and self.action != action:
+                raise InputError(f"{name} applies to session {action} only; see cocalib session --help")
+        if self.action != "list" and len(self.place) != 1:
+            raise InputError(
+                f"session {self.action} takes one session folder, or its recording; {len(self.place)} given"
+            )
+        if self.action == "export" and self.out is None:
+            raise InputError("session export needs the name of the new file: --out clicks.json")
+
+    def _list(self) -> int:
+        from cocalib.session.file import session_summaries
+
+        for place in self.place:
+            if not place.exists():
+                raise InputError(f"{place}: no such file or folder; check the path")
+        found = session_summaries(self.place or (Path(),))
+        if self.json:
+            import msgspec
+
+            print(msgspec.json.format(msgspec.json.encode([_document(each) for each in found]), indent=2).decode())
+        else:
+            print(_printable("\n".join(_table(found))) if found else "no sessions here or in your user folder")
+        return 0
+
+    def _repair(self, folder: Path) -> int:
+        from cocalib.session.file import inspect_session, repair_session
+
+        found = repair_session(folder) if self.yes else inspect_session(folder)
+        print(_printable("\n".join(_findings(found))))
+        if not found.faults:
+            print("Sound; nothing to repair.")
+            return 0
+        if self.yes:
+            print(f"Repaired. The old files are kept as {' and '.join(found.backups)}.")
+            return 0
+        print(
+            f"Nothing was changed. To write this and keep the old files as backups: cocalib session repair {folder} --yes"
+        )
+        return 1
+
+    def _export(self, folder: Path) -> int:
+        from calib_core.interchange import write_clicks
+        from cocalib.session.file import inspect_session
+
+        assert self.out is not None
+        found = inspect_session(folder)
+        write_whole(self.out, write_clicks(found.clicks))
+        print(_printable(f"{len(found.clicks)} clicks of {found.recording} written to {self.out}"))
+        if found.is_complete:
+            return 0
+        print(_printable("\n".join(f"cocalib: {line}" for line in _findings(found))), file=sys.stderr)
+        return 3
+
+
+def _session_folder(place: Path) -> Path:
+    """Return a session folder as given, or the one of a recording.
+
+    Raises:
+        InputError: there is none.
+    """
+    from cocalib.session.file import recording_session_folder
+
+    if not place.exists() and not place.is_symlink():
+        raise InputError(f"{place}: no such folder; find sessions with cocalib session list FOLDER")
+    if ".cocalib-session" in place.name or any((place / name).exists() for name in ("journal.jsonl", "session.json")):
+        return place
+    folder = recording_session_folder([place])
+    if not folder.is_dir():
+        raise InputError(
+            f"{place}: has no session next to it or in your user folder; find sessions with cocalib session list"
+        )
+    return folder
+
+
+def _findings(found: "Repair") -> list[str]:
+    """Return what a session proves and what is wrong with it, line by line."""
+    source = "the snapshot and the steps after it" if found.from_snapshot else f"{found.steps} steps of the journal"
+    lines = [f"{found.folder}: session of {found.recording}", *(f"  {fault}" for fault in found.faults)]
+    lines.append(f"  proven: {len(found.clicks)} clicks, from {source}")
+    if found.from_snapshot:
+        lines.append("  what was done before the snapshot can no longer be undone")
+    if found.unproven:
+        lines.append(f"  not proven, and left out: {found.unproven} lines of the journal")
+    elif found.faults and found.is_complete:
+        lines.append("  as far as the files show, no click is missing")
+    elif found.faults:
+        lines.append("  which of the two files is right cannot be proven; the other one stays as a backup")
+    if found.torn_bytes:
+        lines.append(f"  a last step of {found.torn_bytes} bytes was never confirmed and is left out")
+    return lines
+
+
+def _table(sessions: "tuple[SessionSummary, ...]") -> list[str]:
+    rows = [("state", "clicks", "steps", "last change", "recording", "folder")]
+    rows += [
+        (
+            each.state,
+            str(each.clicks),
+            str(each.steps),
+            _when(each.changed_at_s),
+            each.recording or "?",
+            str(each.folder),
+        )
+        for each in sessions
+    ]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+    for index, each in reversed(list(enumerate(sessions, start=1))):
+        if each.about:
+            lines.insert(index + 1, f"  {each.about}")
+    return lines
+
+
+def _document(session: "SessionSummary") -> dict[str, object]:
+    changed = session.changed_at_s
+    return {
+        "folder": str(session.folder),
+        "recording": session.recording,
+        "clicks": session.clicks,
+        "steps": session.steps,
+        "changed": None
+        if changed is None
+        else datetime.fromtimestamp(changed).astimezone().isoformat(timespec="seconds"),
+        "state": session.state,
+        "about": session.about,
+    }
+
+
+def _printable(text: str) -> str:
+    """Replace what a terminal would act on: names in a session file are whatever was written there."""
+    return "".join(letter if letter.isprintable() or letter == "\n" else "?" for letter in text)
+
+
+def _when(changed_at_s: float | None) -> str:
+    return "?" if changed_at_s is None else f"{datetime.fromtimestamp(changed_at_s):%Y-%m-%d %H:%M:%S}"

@@ -1,0 +1,87 @@
+"""Shared by `video --overlay`, `record-rrd` and `rerun`: open a recording with what is to be drawn over it."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
+
+import tyro
+
+from calib_core.errors import InputError
+from cocalib.cli.flags import File, Switch, called
+from cocalib.cli.output import progress_bar, read_text, told_clicks_at_frames
+from cocalib.cli.recording_flags import TopicFlags
+
+if TYPE_CHECKING:
+    from cocalib.recorded_view import RecordedView
+
+__all__ = ["Shown", "ShownFlags", "shown_recording"]
+
+
+@dataclass(frozen=True, slots=True)
+class ShownFlags:
+    """What is drawn over a recording."""
+
+    calibration: File = None
+    """Calibration to project the returns with, in any format that export writes."""
+    camera: File = None
+    """Intrinsics to use if the calibration has none, or instead of the recording's: camera_info YAML, OpenCV, Kalibr, JSON."""
+    rescale_camera: Switch = False
+    """With --camera: scale its intrinsics to the recorded pictures, if these are the calibrated ones resized."""
+    clicks: File = None
+    """Clicks in this recording (cocalib/clicks-1 JSON); by default those in the calibration, if they are of this recording."""
+    boxes: Annotated[str | None, called("FILE_OR_TOPIC")] = None
+    """Boxes around objects, drawn with their classes and evaluated (Acc): a file of a labelling tool, or a topic."""
+    against: File = None
+    """Another calibration, whose returns are shown too."""
+    colour: Literal["range", "speed"] = "range"
+    """What the colours of returns show."""
+
+
+Shown: TypeAlias = Annotated[ShownFlags, tyro.conf.arg(name="")]
+
+
+@contextmanager
+def shown_recording(paths: Sequence[Path], topics: TopicFlags, files: ShownFlags) -> "Iterator[RecordedView]":
+    """Open the recording and read everything that is to be drawn over it.
+
+    Args:
+        paths: of the recording.
+        topics: of the recording.
+        files: what is drawn.
+
+    Raises:
+        InputError: a file cannot be read, or is not of this recording.
+        RecordingError: the recording cannot be opened.
+    """
+    from calib_core.interchange import CameraFile, read_any_file, read_clicks
+    from calib_core.recordings import open_recording
+    from cocalib.boxes import find_boxes
+    from cocalib.recorded_view import recorded_view
+    from cocalib.recording_check import calibration_of
+    from cocalib.solving import camera_for
+
+    if not paths:
+        raise InputError("RECORDING is missing; name one or more files or folders")
+    if files.calibration is None:
+        raise InputError("--calibration FILE is missing: the calibration that the returns are projected with")
+    camera_file = None if files.camera is None else CameraFile.read(files.camera, rescale=files.rescale_camera)
+    with open_recording(tuple(paths), topics) as recording:
+        camera = camera_for(recording, camera_file)
+        calibration = calibration_of(read_any_file(files.calibration), str(files.calibration), camera)
+        against = None
+        if files.against is not None:
+            against = calibration_of(read_any_file(files.against), str(files.against), camera)
+        clicks = () if files.clicks is None else read_clicks(read_text(files.clicks), source=str(files.clicks))
+        if clicks:
+            clicks = told_clicks_at_frames(clicks, recording, source=str(files.clicks))
+        boxes = None
+        if files.boxes is not None:
+            with progress_bar("reading boxes") as progress:
+                boxes = find_boxes(files.boxes, recording, progress=progress)
+        with progress_bar("evaluating") as progress:
+            view = recorded_view(
+                recording, calibration, files.colour, clicks=clicks, boxes=boxes, against=against, progress=progress
+            )
+        yield view

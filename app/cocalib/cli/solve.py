@@ -1,0 +1,269 @@
+"""`cocalib solve`: calibrate without a browser."""
+
+import dataclasses
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Self
+
+import tyro
+
+from calib_core.camera import Camera
+from calib_core.errors import InputError
+from calib_core.input_files import name_text
+from calib_core.measurements import Unsolvable
+from calib_core.options import CalibrationOptions
+from calib_core.results import Calibration
+from cocalib.cli.flags import File, Switch
+from cocalib.cli.output import explain_unsolvable, read_text, write_whole
+from cocalib.cli.recording_flags import (
+    CameraPosition,
+    MeasuredCamera,
+    Options,
+    Recordings,
+    TopicFlags,
+    Topics,
+    Vehicle,
+    VehicleFlags,
+)
+from cocalib.terminal import print_exactly
+from cocalib.view import summary_lines
+
+if TYPE_CHECKING:
+    from calib_core.interchange import VehicleNote
+    from calib_core.interchange.own.clicks_json import ClicksFile
+    from calib_core.recordings import Recording
+    from cocalib.automatic_solving import PlacedClicks
+    from cocalib.fleet_prior_file import FleetPriorFile
+
+__all__ = ["Solve"]
+
+_REFLECTOR_M = 0.24
+
+
+@dataclass(frozen=True, slots=True)
+class Solve:
+    """Compute a calibration from a recording and its clicks, or from a file of pairs.
+
+    The same clicks give the same file as the page's download, byte for byte.
+    Exit code 1: no calibration; 3: there is one, but nobody confirmed its clicks, and it is weak.
+    """
+
+    recording: Recordings = ()
+    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several are read as one recording."""
+    clicks: File = None
+    """Clicks in this recording (cocalib/clicks-1 JSON)."""
+    auto: Switch = False
+    """Click without a person where pictures and radar agree; with --clicks, only placements without a click."""
+    clicks_out: File = None
+    """With --auto: write the clicks to this file (cocalib/clicks-1 JSON), to look at on the page."""
+    reflector_m: float = _REFLECTOR_M
+    """With --auto: width of the reflector as the camera sees it [m]."""
+    pairs: File = None
+    """Instead of a recording: radar positions and pixels (cocalib/pairs-1 JSON), or a calibration to solve again."""
+    camera: File = None
+    """Intrinsics to use if the recording has none, or instead of its own: any format that `cocalib intrinsics` writes."""
+    rescale_camera: Switch = False
+    """With --camera: scale its intrinsics to the recorded pictures, if these are the calibrated ones resized."""
+    out: File = None
+    """Output file (cocalib/calibration-1 JSON); stdout if omitted."""
+    refine_intrinsics: Switch = False
+    """Estimate focal length, principal point and k1 with the pose; their covariance or the refining options say how sure."""
+    fleet_prior: File = None
+    """What the fleet says of this vehicle (cocalib/fleet-prior-1 JSON, written by fleet prior); the data alone are shown, too."""
+    measured: CameraPosition = field(default_factory=MeasuredCamera)
+    vehicle: Vehicle = field(default_factory=VehicleFlags)
+    topics: Topics = field(default_factory=TopicFlags)
+    options: Options = field(default_factory=CalibrationOptions)
+    pairs_text: Annotated[str | None, tyro.conf.Suppress] = None
+    """What the file of pairs holds, once it has been read: a pipe can be read only once."""
+
+    def file_defaults(self) -> Self | None:
+        """Take the options of a calibration that is to be solved again; typed options replace them."""
+        if self.pairs is None or self.recording or self.clicks:
+            return None
+        from calib_core.interchange import CALIBRATION_SCHEMA, names_schema, read_calibration
+
+        text = read_text(self.pairs)
+        if not names_schema(text, CALIBRATION_SCHEMA):
+            return type(self)(pairs_text=text)
+        options = read_calibration(text, str(self.pairs)).calibration.options
+        position = options.solving.camera_position
+        measured = MeasuredCamera(position.position_m, position.sigma_m) if position else MeasuredCamera()
+        free = dataclasses.replace(options, solving=dataclasses.replace(options.solving, camera_position=None))
+        return type(self)(options=free, measured=measured, pairs_text=text)
+
+    def run(self) -> int:
+        """Solve, write the calibration, print its summary; return the exit code."""
+        if self.pairs is not None and (self.recording or self.clicks or self.auto):
+            raise InputError("solve takes either a recording with --clicks or --auto, or --pairs, not both")
+        vehicle = self.vehicle.note()
+        if not self.auto and (self.clicks_out is not None or self.reflector_m != _REFLECTOR_M):
+            raise InputError("--clicks-out and --reflector-m apply with --auto only; add it")
+        if self.auto and self.options.method == "ccm":
+            raise InputError("--method ccm takes clicks on the corners of a checkerboard, and --auto finds a reflector")
+        if self.pairs is not None and (self.camera or self.topics != TopicFlags()):
+            raise InputError(
+                "--camera and the options of a recording do not apply to --pairs, which brings its own camera"
+            )
+        if self.pairs is not None:
+            return self._solve_pairs(self.pairs, vehicle)
+        if not self.recording:
+            raise InputError("solve needs a recording and --clicks CLICKS.json or --auto, or --pairs PAIRS.json")
+        if self.clicks is None and not self.auto:
+            raise InputError(
+                "solve needs the clicks of this recording: --clicks CLICKS.json (the page exports them), or --auto to do "
+                "without a person"
+            )
+        return self._solve_recording(vehicle)
+
+    def _all_options(self) -> CalibrationOptions:
+        """Return the options with what has a flag of its own."""
+        options = self.measured.over(self.options)
+        if not self.refine_intrinsics:
+            return options
+        return dataclasses.replace(options, refining=dataclasses.replace(options.refining, intrinsics=True))
+
+    def _solve_recording(self, vehicle: "VehicleNote") -> int:
+        from calib_core.interchange import CameraFile
+        from calib_core.recordings import open_recording
+        from cocalib.automatic_solving import solve_placed_clicks
+        from cocalib.recorded_clicks import require_confirmed
+        from cocalib.required_camera import required_camera
+        from cocalib.solving import calibration_text
+
+        self._require_folders()
+        camera_file = None if self.camera is None else CameraFile.read(self.camera, rescale=self.rescale_camera)
+        options = self._all_options()
+        file, fleet = self._clicks_file(), self._fleet_prior_file()
+        with open_recording(self.recording, self.topics) as recording:
+            require_confirmed(recording)
+            if recording.radar_choice:
+                print(f"radar: {recording.radar_choice}", file=sys.stderr)
+            camera = required_camera(recording, camera_file)
+            placed = self._placed(file, recording, camera, options)
+            if isinstance(placed, Unsolvable):
+                return explain_unsolvable(placed)
+            outcome = solve_placed_clicks(recording, placed, camera, options, fleet.prior if fleet else None)
+            if isinstance(outcome, Unsolvable):
+                return explain_unsolvable(outcome)
+            self._write_clicks(placed, recording)
+            text = calibration_text(
+                outcome,
+                recording,
+                camera_file=camera_file,
+                unconfirmed=placed.unconfirmed,
+                fleet_prior=fleet.file if fleet else None,
+                vehicle=vehicle,
+            )
+            return self._deliver(outcome, text)
+
+    def _require_folders(self) -> None:
+        """Refuse output files that cannot be written, before a search that takes long.
+
+        Raises:
+            InputError: a folder is missing.
+        """
+        for path in (self.out, self.clicks_out):
+            if self.auto and path is not None and not path.absolute().parent.is_dir():
+                raise InputError(f"{path}: the folder {path.parent} does not exist; create it first")
+
+    def _clicks_file(self) -> "ClicksFile":
+        from calib_core.interchange.own.clicks_json import ClicksFile
+        from cocalib.recorded_clicks import file_of_clicks
+
+        return ClicksFile(()) if self.clicks is None else file_of_clicks(self.clicks)
+
+    def _fleet_prior_file(self) -> "FleetPriorFile | None":
+        """Read the fleet's prior, unless the method cannot use it; None without.
+
+        Raises:
+            InputError: it cannot be read, or used.
+        """
+        if self.fleet_prior is None:
+            return None
+        from calib_core.calibration import require_default
+        from cocalib.fleet_prior_file import FleetPriorFile
+
+        fleet = FleetPriorFile.read(self.fleet_prior)
+        require_default(self.options, fleet.prior)
+        fleet.require_of_type(self.vehicle.vehicle_type)
+        fleet.require_not_of(self.vehicle.vehicle)
+        if self.vehicle.vehicle is None:
+            print(
+                f"{self.fleet_prior}: a prior must not rest on the vehicle that it is used for, and nobody said which this is: "
+                "name it with --vehicle",
+                file=sys.stderr,
+            )
+        return fleet
+
+    def _placed(
+        self, file: "ClicksFile", recording: "Recording", camera: Camera, options: CalibrationOptions
+    ) -> "PlacedClicks | Unsolvable":
+        """Return the clicks to solve with: those of the file, and with --auto the ones that are placed automatically."""
+        from cocalib.automatic_solving import PlacedClicks, place_clicks
+        from cocalib.cli.proposing.flags import checked_reflector_m, shown_progress
+        from cocalib.cli.recorded_clicks import recorded_clicks
+
+        clicks = file.clicks
+        if self.clicks is not None:
+            clicks = recorded_clicks(clicks, recording, camera, source=self.clicks)
+        if not self.auto:
+            return PlacedClicks(clicks, file.unconfirmed)
+        if file.unconfirmed is not None:
+            raise InputError(
+                f"{self.clicks}: nobody confirmed {len(file.unconfirmed.ids)} of its clicks; with --auto give only clicks that a "
+                "person placed"
+            )
+        reflector_m = checked_reflector_m(self.reflector_m)
+        with shown_progress() as progress:
+            placed = place_clicks(
+                recording, camera, options, confirmed=clicks, reflector_m=reflector_m, progress=progress
+            )
+        if not isinstance(placed, Unsolvable):
+            print(f"automatic: {_placed_words(placed)}", file=sys.stderr)
+        return placed
+
+    def _write_clicks(self, placed: "PlacedClicks", recording: "Recording") -> None:
+        if self.clicks_out is None:
+            return
+        from calib_core.interchange.own.clicks_json import write_clicks
+
+        text = write_clicks(placed.clicks, radar_topics=recording.radar_topics, unconfirmed=placed.unconfirmed)
+        write_whole(self.clicks_out, text)
+        print(f"clicks written to {self.clicks_out}", file=sys.stderr)
+
+    def _solve_pairs(self, path: Path, vehicle: "VehicleNote") -> int:
+        from cocalib.solving import calibration_text_of_pairs, solve_pairs
+
+        text = read_text(path) if self.pairs_text is None else self.pairs_text
+        fleet = self._fleet_prior_file()
+        outcome = solve_pairs(text, str(path), self._all_options(), fleet.prior if fleet else None)
+        if isinstance(outcome, Unsolvable):
+            return explain_unsolvable(outcome)
+        given = fleet.file if fleet else None
+        return self._deliver(outcome, calibration_text_of_pairs(outcome, text, name_text(path.name), given, vehicle))
+
+    def _deliver(self, calibration: Calibration, text: str) -> int:
+        from cocalib.automatic_solving import is_doubtful
+
+        code = 3 if is_doubtful(calibration) else 0
+        if self.out is None:
+            print_exactly(text)
+            return code
+        write_whole(self.out, text)
+        print("\n".join([*summary_lines(calibration), f"written to {self.out}"]))
+        return code
+
+
+def _placed_words(placed: "PlacedClicks") -> str:
+    """Say how many clicks were placed, and how sure they are."""
+    if placed.unconfirmed is None:
+        return placed.words
+    from calib_core.diagnostics.confirmation import probability_text
+
+    count = len(placed.unconfirmed.ids)
+    return (
+        f"{count} {'click' if count == 1 else 'clicks'} placed that nobody confirmed (confidence "
+        f"{probability_text(placed.unconfirmed.confidence)}): {placed.words}"
+    )

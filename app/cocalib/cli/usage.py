@@ -1,0 +1,84 @@
+"""Parse a command's arguments; report wrong usage in one line that suggests a correction."""
+
+from collections.abc import Sequence
+from difflib import get_close_matches
+from typing import NoReturn
+
+from calib_core.errors import InputError
+from cocalib.cli.commands import PROGRAM, Command, HasFileDefaults, Runnable
+from cocalib.cli.tyro_hook import (
+    Argument,
+    BadValue,
+    Fault,
+    MissingArguments,
+    MissingValue,
+    UnknownArgument,
+    WrongChoice,
+    flags_of,
+    parse,
+)
+from cocalib.terminal import with_colours
+
+__all__ = ["read_command"]
+
+_NUMBERS = {"INT": "a whole number", "FLOAT": "a number"}
+
+
+def read_command(command: Command, arguments: Sequence[str]) -> Runnable:
+    """Parse the arguments of a command.
+
+    Args:
+        command: from the table of commands.
+        arguments: the command-line arguments after it.
+
+    Raises:
+        InputError: they are invalid.
+        SystemExit: the help was requested and printed.
+    """
+    kind, program = command.load(), f"{PROGRAM} {command.name}"
+
+    def refuse(fault: Fault) -> NoReturn:
+        raise InputError(f"{_reason(fault, kind)}; see {program} --help")
+
+    with with_colours():  # of the help
+        parsed = parse(kind, arguments, program=program, refuse=refuse)
+        default = parsed.file_defaults() if isinstance(parsed, HasFileDefaults) else None
+        return parsed if default is None else parse(kind, arguments, program=program, refuse=refuse, default=default)
+
+
+def _reason(fault: Fault, kind: type[Runnable]) -> str:
+    """Return what is wrong."""
+    match fault:
+        case UnknownArgument(token):
+            return _unknown(token, kind)
+        case MissingArguments(arguments):
+            return f"{' and '.join(map(_typed, arguments))} {'is' if len(arguments) == 1 else 'are'} missing"
+        case MissingValue(argument):
+            return f"{argument.name} needs a value: {_typed(argument)}"
+        case WrongChoice(argument, value, choices):
+            return f"{argument.name} takes {_alternatives(choices)}, not '{value}'"
+        case BadValue(argument, typed):
+            what = _NUMBERS.get(argument.value, argument.value)
+            if typed is not None and argument.value in _NUMBERS:
+                return f"{argument.name} takes {what}, not '{typed}'"
+            return f"{argument.name} takes {what}; the given value is invalid"
+
+
+def _typed(argument: Argument) -> str:
+    """Return an argument as typed: `--out FILE`, or `RECORDING...`."""
+    return f"{argument.name} {argument.value}".rstrip()
+
+
+def _alternatives(words: Sequence[str]) -> str:
+    return " or ".join(filter(None, [", ".join(words[:-1]), words[-1]]))
+
+
+def _unknown(token: str, kind: type[Runnable]) -> str:
+    """Return a message about an unknown argument, with suggestions."""
+    if not token.startswith("-"):
+        return f"unexpected argument '{token}'"
+    flag = token.split("=")[0].replace("_", "-")
+    known = sorted({"--help", *flags_of(kind)})
+    near = [other for other in known if flag.strip("-") and other.endswith(flag.lstrip("-"))]
+    near = near or get_close_matches(flag, known, n=2)
+    return f"unknown option {token.split('=')[0]}" + (f"; did you mean {_alternatives(near[:3])}?" if near else "")

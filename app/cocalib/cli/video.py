@@ -1,0 +1,104 @@
+"""`cocalib video`: write a recording's camera frames to a video file, as they are or with what the radar saw."""
+
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
+
+from calib_core.errors import InputError
+from cocalib.cli.flags import File, NewFile, Switch, called
+from cocalib.cli.output import progress_bar
+from cocalib.cli.recording_flags import Recordings, TopicFlags, Topics
+from cocalib.cli.shown_recording import ShownFlags, shown_recording
+
+__all__ = ["Video"]
+
+_TRAIL_SCANS, _MOST_TRAIL_SCANS = 5, 100
+
+
+@dataclass(frozen=True, slots=True)
+class Video:
+    """Write the camera's frames to a video, each at its recorded time; recorded JPEG is not re-encoded.
+
+    With --overlay, the frames are drawn over and encoded: radar returns, clicks, boxes, Acc.
+    """
+
+    recording: Recordings
+    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several are read as one recording."""
+    out: NewFile
+    """Output video: .mp4 or .mov (times to a microsecond), or .mkv (to a millisecond)."""
+    overlay: Switch = False
+    """Draw what the radar saw over the frames, through a calibration."""
+    calibration: File = None
+    """With --overlay: calibration to project the returns with, in any format that export writes."""
+    against: File = None
+    """With --overlay: another calibration, drawn side by side."""
+    camera: File = None
+    """With --overlay: intrinsics to use if the calibration has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
+    clicks: File = None
+    """With --overlay: clicks (cocalib/clicks-1 JSON); by default the calibration's own, if they are of this recording."""
+    boxes: Annotated[str | None, called("FILE_OR_TOPIC")] = None
+    """With --overlay: boxes, drawn with their classes and evaluated (Acc): a file of a labelling tool, or a topic."""
+    colour: Literal["range", "speed"] = "range"
+    """With --overlay: what the colours of returns show."""
+    trail: int = _TRAIL_SCANS
+    """With --overlay: number of earlier scans whose returns stay, smaller the older they are; 0 for none."""
+    topics: Topics = field(default_factory=TopicFlags)
+
+    def run(self) -> int:
+        """Write the video; return the exit code."""
+        if self.overlay:
+            return self._write_overlay()
+        if any((self.calibration, self.against, self.camera, self.clicks, self.boxes)):
+            raise InputError(
+                "--calibration, --against, --camera, --clicks and --boxes apply with --overlay only; add it"
+            )
+        if self.colour != "range" or self.trail != _TRAIL_SCANS:
+            raise InputError("--trail and --colour apply with --overlay only; add it")
+        from calib_core.recordings import open_recording, write_video
+
+        with (
+            open_recording(self.recording, self.topics, require=("image",)) as recording,
+            progress_bar("writing frames") as progress,
+        ):
+            written = write_video(recording, self.out, progress=progress)
+        from cocalib.recorded_clicks import seconds_text
+
+        print(f"{self.out}: {written.frames} frames, {written.duration_s:.3f} s, from {seconds_text(written.start)}")
+        for warning in recording.warnings:
+            if warning.code in ("picture-sizes", "unreadable-pictures"):
+                print(f"{warning.message}")
+        _tell_left_out(written.other_size, written.unreadable, written.fault)
+        return 0
+
+    def _write_overlay(self) -> int:
+        from calib_core.input_files import name_text
+        from calib_core.recordings import video_format
+        from cocalib.overlay_video import OverlayOptions, write_overlay
+
+        if not 0 <= self.trail <= _MOST_TRAIL_SCANS:
+            raise InputError(f"--trail {self.trail}: give a number of scans from 0 to {_MOST_TRAIL_SCANS}")
+        video_format(self.out)
+        shown = ShownFlags(
+            calibration=self.calibration,
+            camera=self.camera,
+            clicks=self.clicks,
+            boxes=self.boxes,
+            against=self.against,
+            colour=self.colour,
+        )
+        titles = tuple(name_text(path.name) for path in (self.calibration, self.against) if path is not None)
+        with shown_recording(self.recording, self.topics, shown) as view, progress_bar("drawing frames") as progress:
+            written = write_overlay(view, self.out, OverlayOptions(titles, self.trail), progress=progress)
+        width, height = written.size_px
+        print(
+            f"{self.out}: {written.frames} frames, {written.duration_s:.3f} s, {width} x {height} px, encoded as {written.codec}"
+        )
+        _tell_left_out(written.other_size, written.unreadable, written.fault)
+        return 0
+
+
+def _tell_left_out(other_size: int, unreadable: int, fault: str) -> None:
+    """Print how many frames the video lacks, and why."""
+    if other_size:
+        print(f"{other_size} frames are left out: their size differs from the first frame's")
+    if unreadable:
+        print(f"{unreadable} frames are left out because they cannot be read: {fault}")

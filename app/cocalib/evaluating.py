@@ -1,0 +1,304 @@
+"""Judge a calibration on a recording: what `evaluate`, `compare`, the report, the page and the exports all call."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from calib_core.arrays import TimesNs
+from calib_core.association.pairing import pair_clicks
+from calib_core.camera import Camera
+from calib_core.detections import Boxes, ReturnLabels
+from calib_core.errors import InputError
+from calib_core.evaluation import (
+    AssociatedPairs,
+    CountedReturns,
+    Evaluation,
+    TargetOptions,
+    associated_pairs,
+    counted_returns,
+    find_targets,
+    judged_by_boxes,
+    residual_figures,
+)
+from calib_core.evaluation.frame_scans import longest_gap_s
+from calib_core.measurements import NS_PER_S, RadarScans, ReflectorClick, TimeNs, Unpaired
+from calib_core.options import CalibrationOptions
+from calib_core.results import Calibration, DataWarning
+from cocalib.solving import half_window_s
+
+__all__ = [
+    "Evidence",
+    "EvidenceOptions",
+    "RadarRecording",
+    "evaluate_recording",
+    "evaluation_exit_code",
+    "evidence_in",
+    "judged",
+]
+
+_AROUND_S = 3.0
+"""Scans before the first and after the last annotated frame, for targets to be followed into the frames."""
+
+_DOUBTFUL = frozenset({"other-lens", "no-target-in-a-box", "turned-from-boxes", "mostly-moving"})
+_TURNED_RAD = np.deg2rad(4.0)
+
+
+class RadarRecording(Protocol):
+    """The part of a Recording that an evaluation needs: its radar, and none of its pictures."""
+
+    @property
+    def radar_times(self) -> TimesNs:
+        """The stamps of the scans, ascending."""
+
+    def radar_windows(self) -> Iterator[RadarScans]:
+        """Yield all scans in order of time, a bounded number of returns at a time."""
+
+    def radar_scans_around(self, times: Sequence[TimeNs], half_window_s: float, /) -> RadarScans:
+        """Return the scans within the half window of any of the times, each once, in order of time."""
+
+
+@dataclass(frozen=True, slots=True)
+class EvidenceOptions:
+    """How a recording is searched for what speaks for or against calibrations.
+
+    Attributes:
+        classes: count only targets whose boxes are of these classes; all if empty.
+        max_gap_s: longest time between a frame and its scan; None takes half the period of the scans.
+        targets: how moving targets are found.
+        solving: options of the solves that associate clicks and returns.
+    """
+
+    classes: tuple[str, ...] = ()
+    max_gap_s: float | None = None
+    targets: TargetOptions = field(default_factory=TargetOptions)
+    solving: CalibrationOptions = field(default_factory=CalibrationOptions)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Evidence:
+    """What a recording says, before any calibration is judged by it.
+
+    Attributes:
+        clicks: with their returns; None without clicks.
+        unpaired: clicks without a radar position.
+        returns: of moving targets, with their boxes; None without boxes.
+        warnings: about the recording.
+    """
+
+    clicks: AssociatedPairs | None
+    unpaired: tuple[Unpaired, ...]
+    returns: CountedReturns | None
+    warnings: tuple[DataWarning, ...]
+
+
+def evaluate_recording(
+    calibration: Calibration,
+    recording: RadarRecording,
+    *,
+    clicks: Sequence[ReflectorClick] = (),
+    boxes: Boxes | None = None,
+    labels: ReturnLabels | None = None,
+    held_out: bool = True,
+    progress: Callable[[int, int], None] | None = None,
+    options: EvidenceOptions | None = None,
+) -> Evaluation:
+    """Judge a calibration on a recording; no picture is decoded.
+
+    Args:
+        calibration: in whatever way it was made.
+        recording: with a radar.
+        clicks: on the reflector, in this recording.
+        boxes: around moving objects, in this recording.
+        labels: the true origin of each return, of a simulation; they then decide instead of the radar's own targets.
+        held_out: also predict the clicks of each placement from the others.
+        progress: called with the amount done and the total, of one step after the other.
+        options: of the search; None takes the defaults.
+
+    Raises:
+        InputError: boxes or labels are of another recording or another camera, or no class matches.
+    """
+    found = evidence_in(
+        recording, calibration.camera, clicks=clicks, boxes=boxes, labels=labels, progress=progress, options=options
+    )
+    return judged(calibration, found, held_out=held_out, progress=progress)
+
+
+def evidence_in(
+    recording: RadarRecording,
+    camera: Camera,
+    *,
+    clicks: Sequence[ReflectorClick] = (),
+    boxes: Boxes | None = None,
+    labels: ReturnLabels | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    options: EvidenceOptions | None = None,
+) -> Evidence:
+    """Find what speaks for or against calibrations in a recording; the pose of none of them has a say in it.
+
+    Args:
+        recording: with a radar.
+        camera: the lens.
+        clicks: on the reflector.
+        boxes: around moving objects.
+        labels: the true origin of each return.
+        progress: called with the scans done and their number.
+        options: of the search; None takes the defaults.
+
+    Raises:
+        InputError: boxes or labels are of another recording or another camera, or no class matches.
+    """
+    options = options or EvidenceOptions()
+    pairs, unpaired = _pairs(recording, clicks, camera, options.solving)
+    lost = _lost(unpaired) if pairs is None and clicks else ()
+    if boxes is None:
+        return Evidence(pairs, unpaired, None, lost)
+    _require_camera(boxes, camera)
+    lost = (*lost, *_taken(boxes))
+    if labels is not None:
+        reach_s = options.max_gap_s or longest_gap_s(recording.radar_times)
+        scans = recording.radar_scans_around(boxes.times_ns.tolist(), reach_s + 1e-3)
+        returns = counted_returns(
+            camera, scans, boxes, labels, classes=options.classes, max_gap_s=options.max_gap_s or reach_s
+        )
+        return Evidence(pairs, unpaired, returns, (*lost, *_about(returns)))
+    found = find_targets(_windows(recording, boxes), options.targets, progress=progress)
+    stamps = RadarScans(found.moving.scans.times_ns, np.zeros(len(found.moving.scans) + 1, dtype=np.int64))
+    returns = counted_returns(camera, stamps, boxes, found.tracks, classes=options.classes, max_gap_s=options.max_gap_s)
+    return Evidence(pairs, unpaired, returns, (*lost, *found.moving.warnings, *_about(returns)))
+
+
+def judged(
+    calibration: Calibration,
+    found: Evidence,
+    *,
+    held_out: bool = True,
+    progress: Callable[[int, int], None] | None = None,
+) -> Evaluation:
+    """Judge a calibration by what was found in a recording.
+
+    Args:
+        calibration: with the lens that the evidence was found with.
+        found: in the recording.
+        held_out: also predict the clicks of each placement from the others.
+        progress: called with the steps done and their number.
+    """
+    residuals = boxes = None
+    warnings = list(found.warnings)
+    if found.clicks is not None:
+        residuals = residual_figures(
+            found.clicks, calibration, unpaired=found.unpaired, with_held_out=held_out, progress=progress
+        )
+    if found.returns is not None:
+        pose, lens = calibration.camera_from_radar, calibration.camera
+        boxes = judged_by_boxes(pose, lens, found.returns, radar_errors=calibration.radar_errors, progress=progress)
+        warnings += _turned(calibration, found.returns)
+    return Evaluation(residuals, boxes, tuple(warnings))
+
+
+def evaluation_exit_code(evaluation: Evaluation) -> int:
+    """Return 0 if a calibration was judged, 1 if there was nothing to judge it by, 3 if there are doubts."""
+    residuals, boxes = evaluation.residuals, evaluation.boxes
+    if residuals is None and (boxes is None or boxes.acc is None):
+        return 1
+    return 3 if any(one.code in _DOUBTFUL for one in evaluation.warnings) else 0
+
+
+def _pairs(
+    recording: RadarRecording, clicks: Sequence[ReflectorClick], camera: Camera, options: CalibrationOptions
+) -> tuple[AssociatedPairs | None, tuple[Unpaired, ...]]:
+    counting = [click for click in clicks if click.counts]
+    if not counting:
+        return None, ()
+    scans = recording.radar_scans_around(sorted({click.image_time for click in counting}), half_window_s(options))
+    pairing = pair_clicks(counting, scans, options)
+    if not pairing.pairs:
+        return None, pairing.unpaired
+    return associated_pairs(pairing.pairs, camera, options), pairing.unpaired
+
+
+def _windows(recording: RadarRecording, boxes: Boxes) -> Iterator[RadarScans]:
+    """Yield the scans of the annotated part of a recording, a bounded number of returns at a time."""
+    if not len(boxes):
+        return
+    around_ns = round(_AROUND_S * NS_PER_S)
+    start, end = int(boxes.times_ns[0]) - around_ns, int(boxes.times_ns[-1]) + around_ns
+    overlap = bool(((recording.radar_times >= start) & (recording.radar_times <= end)).any())
+    for window in recording.radar_windows():
+        if not overlap or (int(window.times_ns[-1]) >= start and int(window.times_ns[0]) <= end):
+            yield window.between(TimeNs(start), TimeNs(end)) if overlap else window
+
+
+def _require_camera(boxes: Boxes, camera: Camera) -> None:
+    """Refuse boxes of pictures of another size.
+
+    Raises:
+        InputError: the sizes differ.
+    """
+    size = (camera.width_px, camera.height_px)
+    if boxes.image_size_px is not None and boxes.image_size_px != size:
+        raise InputError(
+            f"{boxes.source}: made on pictures of {boxes.image_size_px[0]} x {boxes.image_size_px[1]} px, but the "
+            f"calibration's camera has {size[0]} x {size[1]} px; give the boxes and the calibration of one camera"
+        )
+
+
+def _lost(unpaired: Sequence[Unpaired]) -> tuple[DataWarning, ...]:
+    """Warn that clicks gave no residual."""
+    if not unpaired:
+        return (
+            DataWarning(
+                "no-paired-clicks", "all clicks are excluded or untouched, so there are no residuals", "include clicks"
+            ),
+        )
+    first = unpaired[0]
+    message = f"none of {len(unpaired)} clicks has a radar position, so there are no residuals: {first.reason}"
+    return (DataWarning("no-paired-clicks", message, first.hint),)
+
+
+def _taken(boxes: Boxes) -> tuple[DataWarning, ...]:
+    """Pass on what reading the boxes took for granted or left out."""
+    hint = "check that this is so: boxes of other frames or other objects give a wrong Acc"
+    return tuple(DataWarning("boxes-note", f"{boxes.source}: {note}", hint) for note in boxes.notes)
+
+
+def _about(returns: CountedReturns) -> tuple[DataWarning, ...]:
+    if not len(returns.frames):
+        return (
+            DataWarning(
+                "no-targets",
+                "no moving target was found in the scans of the annotated frames, so there is no Acc",
+                f"record people, cars or robots that move within {TargetOptions().max_range_m:g} m of the radar, or lower "
+                "--min-speed-mps; what stands still has no Doppler speed",
+            ),
+        )
+    if not returns.matched_targets:
+        return (
+            DataWarning(
+                "no-target-in-a-box",
+                f"none of {returns.found_targets} moving targets could be matched to a box by bearing and time, so every "
+                "return counts as outside",
+                "are the boxes of this recording, around what moves, and on one clock with the radar?",
+            ),
+        )
+    return ()
+
+
+def _turned(calibration: Calibration, returns: CountedReturns) -> list[DataWarning]:
+    """Warn if targets and boxes agree on another direction than the calibration."""
+    if returns.bearings is None:
+        return []
+    ahead = calibration.camera_from_radar.rotation @ np.array([1.0, 0.0, 0.0])
+    expected = -float(np.arctan2(ahead[0], ahead[2]))
+    off = (returns.bearings.turn_rad - expected + np.pi) % (2.0 * np.pi) - np.pi
+    if abs(off) < _TURNED_RAD:
+        return []
+    return [
+        DataWarning(
+            "turned-from-boxes",
+            f"targets and boxes agree best with a camera turned by {np.rad2deg(off):+.0f} deg from the calibration about the "
+            "vertical (positive to the left)",
+            "the calibration, or the match of targets and boxes, is wrong; look at the overlay",
+        )
+    ]

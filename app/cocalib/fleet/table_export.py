@@ -1,0 +1,120 @@
+"""All sessions as one flat table: Parquet for programs, CSV for spreadsheets."""
+
+import csv
+import importlib
+import io
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from calib_core.errors import InputError
+from calib_core.fleet import Transition
+from calib_core.geometry import quaternion_wxyz_from_matrix
+from cocalib.fleet.records import FleetRecord, SessionRecord
+
+__all__ = ["csv_bytes", "parquet_bytes"]
+
+_TEXT = (
+    "vehicle",
+    "session",
+    "vehicle_type",
+    "status",
+    "reason",
+    "verdict",
+    "radar_serial",
+    "camera_serial",
+    "fleet_prior",
+    "alone_verdict",
+    "digest",
+)
+_REAL = (
+    "sigma_deg",
+    "sigma_cm",
+    "alone_sigma_deg",
+    "alone_sigma_cm",
+    "aed_px",
+    "qw",
+    "qx",
+    "qy",
+    "qz",
+    "x_m",
+    "y_m",
+    "z_m",
+)
+_CHANGE = (
+    *("rotation_deg", "rotation_sigma_deg", "position_cm", "position_sigma_cm", "picture_px", "picture_sigma_px"),
+    *("squared", "limit"),
+)
+_LISTS = ("covariance", "change", "change_covariance")
+
+
+def csv_bytes(fleet: FleetRecord) -> bytes:
+    """Write a row for each result, the superseded ones last; lists are numbers with spaces in between."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, _columns(), lineterminator="\n")
+    writer.writeheader()
+    for row in _rows(fleet):
+        writer.writerow({name: _cell(value) for name, value in row.items()})
+    return text.getvalue().encode()
+
+
+def parquet_bytes(fleet: FleetRecord) -> bytes:
+    """Write the same as Parquet; covariances are lists of 36 numbers, row by row.
+
+    Raises:
+        InputError: pyarrow is not installed.
+    """
+    try:
+        arrow, parquet = importlib.import_module("pyarrow"), importlib.import_module("pyarrow.parquet")
+    except ImportError as error:
+        raise InputError(
+            f"Parquet needs pyarrow, which cannot be loaded ({error}): pip install pyarrow, or write CSV with --csv"
+        ) from error
+    text, real = arrow.string(), arrow.float64()
+    kinds = {name: text for name in _TEXT} | {name: real for name in (*_REAL, *(f"change_{one}" for one in _CHANGE))}
+    kinds |= {name: arrow.list_(real) for name in _LISTS}
+    kinds |= {"recorded_ns": arrow.int64(), "pairs": arrow.int64(), "superseded": arrow.bool_()}
+    kinds |= {"pose_of_data_alone": arrow.bool_()}
+    kinds |= {"change_from": text, "change_outcome": text}
+    schema = arrow.schema([(name, kinds[name]) for name in _columns()])
+    table = arrow.Table.from_pylist(list(_rows(fleet)), schema=schema)
+    buffer = io.BytesIO()
+    parquet.write_table(table, buffer)
+    return buffer.getvalue()
+
+
+def _columns() -> list[str]:
+    change = ("change_from", "change_outcome", *(f"change_{one}" for one in _CHANGE))
+    before = (*_TEXT, "recorded_ns", "pairs", "superseded", *_REAL, "covariance", "pose_of_data_alone")
+    return [*before, *change, "change", "change_covariance"]
+
+
+def _rows(fleet: FleetRecord) -> Iterator[dict[str, Any]]:
+    for vehicle in fleet.vehicles:
+        for record in vehicle.sessions:
+            yield _row(record, vehicle.transition_to(record.name))
+    for record in fleet.superseded:
+        yield _row(record, None) | {"superseded": True}
+
+
+def _row(record: SessionRecord, change: Transition | None) -> dict[str, Any]:
+    """Return every column of a result; None where nothing is known."""
+    outcome = record.outcome
+    names = (*_TEXT, "recorded_ns", "pairs", "sigma_deg", "sigma_cm", "alone_sigma_deg", "alone_sigma_cm", "aed_px")
+    row: dict[str, Any] = dict.fromkeys(_columns())
+    row |= {name: getattr(outcome, name) for name in names} | {"superseded": False}
+    if record.pose is not None:
+        pose = record.pose.camera_from_radar
+        numbers = [*quaternion_wxyz_from_matrix(pose.rotation).tolist(), *pose.translation_m.tolist()]
+        row |= dict(zip(("qw", "qx", "qy", "qz", "x_m", "y_m", "z_m"), numbers, strict=True))
+        row |= {"covariance": record.pose.covariance.ravel().tolist(), "pose_of_data_alone": record.pose.of_data_alone}
+    if change is not None:
+        figures = {f"change_{one}": getattr(change, one) for one in _CHANGE}
+        row |= {name: value if math.isfinite(value) else None for name, value in figures.items()}
+        row |= {"change_from": change.before.session, "change_outcome": change.outcome}
+        row |= {"change": change.change.tolist(), "change_covariance": change.covariance.ravel().tolist()}
+    return row
+
+
+def _cell(value: Any) -> Any:
+    return " ".join(map(repr, value)) if isinstance(value, list) else value

@@ -1,0 +1,170 @@
+"""Hold a calibration against the returns of a recording: do its residuals at the clicks fit what it states?"""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from calib_core.association.pairing import pair_clicks
+from calib_core.camera import Camera
+from calib_core.errors import InputError
+from calib_core.interchange import CheckReport, CheckResult, ImportedCalibration, adopted_calibration
+from calib_core.interchange.check.pixel_differences import LOST_TEXT, far_outside, lenses_of
+from calib_core.measurements import MIN_PAIRS, ReflectorClick
+from calib_core.residual_test import ResidualTest, residual_test
+from calib_core.results import Calibration, InputFile
+from cocalib.solving import RadarSource, half_window_s
+
+__all__ = ["calibration_of", "clicks_in", "other_camera", "stale_inputs", "with_recording"]
+
+_LEAST_P = 0.01
+_MOST_MISFITS = 0.2
+_NEAR_PX = 10.0
+_NAMED = 5
+
+
+def clicks_in(found: ImportedCalibration, first_ns: int, last_ns: int) -> tuple[ReflectorClick, ...]:
+    """Return the clicks that a calibration-1 file keeps in its pairs, if all of them are within a recording; else none.
+
+    Args:
+        found: what was read.
+        first_ns: stamp of the recording's first frame.
+        last_ns: of its last.
+    """
+    pairs = [pair for pair in found.file.calibration.pairs if pair.measured is not None] if found.file else []
+    clicks = [
+        ReflectorClick(
+            pair.image_time, pair.id, float(pair.pixel_px[0]), float(pair.pixel_px[1]), chosen=pair.measured.chosen
+        )
+        for pair in pairs
+        if pair.image_time is not None and pair.measured is not None and not pair.excluded
+    ]
+    within = all(first_ns <= click.image_time <= last_ns for click in clicks)
+    return tuple(clicks) if within else ()
+
+
+def stale_inputs(found: ImportedCalibration, inputs: Sequence[InputFile]) -> tuple[CheckResult, ...]:
+    """Say which files of a recording are not those that the calibration names as its inputs, though they have their names."""
+    named = {one.name: one for one in found.file.provenance.inputs} if found.file else {}
+    return tuple(
+        CheckResult(
+            "warning",
+            "other-input",
+            f"the calibration was made from another {one.name} (sha256 {named[one.name].sha256[:12]}..., this one's is "
+            f"{one.sha256[:12]}...)",
+            "right if this is another recording of the same name",
+        )
+        for one in inputs
+        if one.name in named and named[one.name].sha256 != one.sha256
+    )
+
+
+def other_camera(found: ImportedCalibration, camera: Camera | None) -> tuple[CheckResult, ...]:
+    """Say that a recording states another lens than the calibration, which is projected through its own."""
+    if found.camera is None or camera is None:
+        return ()
+    lenses = lenses_of(found, dataclasses.replace(found, camera=camera), None)
+    lens = lenses.difference if lenses else None
+    if lens is None or lens.same or _was_refined_from(found, camera):
+        return ()
+    message = f"the recording states other intrinsics than the calibration: {lens.text}"
+    return (CheckResult("warning", "other-lens", message, "the residuals are through the calibration's own"),)
+
+
+def _was_refined_from(found: ImportedCalibration, camera: Camera) -> bool:
+    """Return whether a calibration's intrinsics are refined ones, and a recording states those they were refined from."""
+    given = found.file.calibration.given_camera if found.file is not None else None
+    if given is None:
+        return False
+    lenses = lenses_of(dataclasses.replace(found, camera=given), dataclasses.replace(found, camera=camera), None)
+    return lenses is not None and lenses.difference is not None and lenses.difference.same
+
+
+def with_recording(
+    report: CheckReport,
+    source: str,
+    recording: RadarSource,
+    clicks: Sequence[ReflectorClick],
+    *,
+    camera: Camera | None = None,
+) -> CheckReport:
+    """Add to a report whether the calibration holds on a recording; a file of another format that is wrong stays that.
+
+    Args:
+        report: of the calibration.
+        source: its file's name, for error messages.
+        recording: where the radar scans come from.
+        clicks: in this recording.
+        camera: the intrinsics, if the file has none.
+
+    Raises:
+        InputError: there are no intrinsics, or too few of the clicks have radar returns.
+    """
+    if report.imported.file is None and not report.ok:
+        return report
+    calibration = calibration_of(report.imported, source, camera)
+    times = sorted({click.image_time for click in clicks})
+    scans = recording.radar_scans_around(times, half_window_s(calibration.options))
+    pairs = pair_clicks([click for click in clicks if click.counts], scans, calibration.options).pairs
+    if len(pairs) < MIN_PAIRS:
+        raise InputError(
+            f"{source}: {len(pairs)} clicks have radar returns in this recording; the comparison needs at least {MIN_PAIRS}"
+        )
+    result = _result(residual_test(pairs, calibration), calibration)
+    if report.imported.camera is None:
+        message = f"{result.message}; through the given intrinsics or the recording's, because the file has none"
+        result = dataclasses.replace(result, message=message)
+    return dataclasses.replace(report, results=(*report.results, result))
+
+
+def calibration_of(found: ImportedCalibration, source: str, camera: Camera | None) -> Calibration:
+    """Return what was read as a calibration.
+
+    Args:
+        found: what was read.
+        source: the file's name, for error messages.
+        camera: the intrinsics, if the file has none.
+
+    Raises:
+        InputError: there are none, or the file contradicts itself.
+    """
+    if found.file is not None:
+        return found.file.calibration
+    known = found.camera or camera
+    if known is None:
+        raise InputError(
+            f"{source}: neither the file nor the recording has intrinsics to project with; give --camera FILE"
+        )
+    return adopted_calibration(found, source, camera=known)
+
+
+def _result(test: ResidualTest, calibration: Calibration) -> CheckResult:
+    count, misfits = len(test.ids), int(test.misfits.sum())
+    median_px = float(np.median(test.distances_px))
+    lost = far_outside(np.array([median_px]), calibration.camera)[0]
+    seen = f"most of them {LOST_TEXT}" if lost else f"{median_px:.3g} px in the middle"
+    if np.isfinite(calibration.metrics.aed_px):
+        seen += f" (AED when it was solved {calibration.metrics.aed_px:.3g} px)"
+    residuals = f"residuals of {count} clicks on this recording: {seen}"
+    if not np.isfinite(calibration.firm_covariance).all():
+        holds, judged = median_px <= _NEAR_PX, f"the file states no uncertainty, so {_NEAR_PX:g} px decide"
+    else:
+        holds = misfits <= _MOST_MISFITS * count and test.p_value >= _LEAST_P
+        together = f", chi2 {test.chi2:.3g} for {test.degrees_of_freedom} degrees of freedom, p = {test.p_value:.2g}"
+        if misfits == count:
+            together = ""
+        judged = f"{int(test.outside.sum())} outside their stated 95 %{together}{_named(test)}"
+    if holds:
+        return CheckResult("good", "holds", f"holds: {residuals}; {judged}")
+    return CheckResult(
+        "error",
+        "does-not-hold",
+        f"{residuals}; {judged}",
+        "the sensors moved, the clicks are wrong, or the calibration is; solve this recording",
+    )
+
+
+def _named(test: ResidualTest) -> str:
+    misfits = [name for name, misfit in zip(test.ids, test.misfits, strict=True) if misfit]
+    more = ", ..." if len(misfits) > _NAMED else ""
+    return f"; far off: {', '.join(misfits[:_NAMED])}{more}" if misfits else ""

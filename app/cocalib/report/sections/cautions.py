@@ -1,0 +1,65 @@
+"""What the reader must know before using the calibration: warnings with what to do, clicks without a pair, assumptions."""
+
+from collections.abc import Iterator
+
+from calib_core.diagnostics.consequence import by_consequence, consequence_of
+from calib_core.results import DataWarning
+from cocalib.report.markup import Markup, tag
+from cocalib.report.subject import ReportSubject
+from cocalib.view.wording import sentence
+
+__all__ = ["cautions"]
+
+_MOST, _MOST_UNPAIRED = 10, 5
+_SIGNS = {"contradictory": "✕", "weak": "▲", "limited": "△", "note": "·"}
+
+
+def cautions(subject: ReportSubject) -> Markup:
+    """Return the warnings, gravest first, then the rest."""
+    found = list(_all_warnings(subject))
+    items = [_item(one) for one in found[:_MOST]]
+    if len(found) > _MOST:
+        codes = ", ".join(dict.fromkeys(one.code for one in found[_MOST:]))
+        items.append(tag("li", f"{len(found) - _MOST} more: {codes}."))
+    unpaired = subject.calibration.unpaired if subject.calibration is not None else ()
+    items += [
+        tag("li", _sign("·"), tag("b", f"{row.id} has no pair. "), f"{sentence(row.reason)} {sentence(row.hint)}")
+        for row in unpaired[:_MOST_UNPAIRED]
+    ]
+    if len(unpaired) > _MOST_UNPAIRED:
+        items.append(tag("li", f"{len(unpaired) - _MOST_UNPAIRED} more clicks have no pair."))
+    body = tag("ul", *items, class_="cautions") if items else tag("p", _no_warnings(subject), class_="note")
+    return tag("section", tag("h2", "Cautions"), body, id="cautions")
+
+
+def _no_warnings(subject: ReportSubject) -> str:
+    if subject.judged is None and (subject.calibration is None or not subject.calibration.pairs):
+        return "No warnings; but without pairs, and without clicks or boxes in a recording, hardly anything could be checked."
+    return "No warnings."
+
+
+def _all_warnings(subject: ReportSubject) -> Iterator[DataWarning]:
+    """Yield each warning once: of the calibration, of the judgement on the recording, of the recording."""
+    own = by_consequence(subject.calibration.warnings) if subject.calibration is not None else _assumed(subject)
+    judged = subject.judged.evaluation.warnings if subject.judged is not None else ()
+    recorded = subject.recording.warnings if subject.recording is not None else ()
+    seen = set()
+    for one in (*own, *judged, *recorded):
+        if (one.code, one.message) not in seen:
+            seen.add((one.code, one.message))
+            yield one
+
+
+def _assumed(subject: ReportSubject) -> tuple[DataWarning, ...]:
+    return tuple(DataWarning("assumed", note, "verify this assumption") for note in subject.found.assumptions)
+
+
+def _item(warning: DataWarning) -> Markup:
+    sign = tag("span", _SIGNS[consequence_of(warning.code)], class_="sign", aria_hidden="true")
+    return tag(
+        "li", sign, tag("code", warning.code), " ", sentence(warning.message), " ", tag("b", sentence(warning.hint))
+    )
+
+
+def _sign(shape: str) -> Markup:
+    return tag("span", shape, class_="sign", aria_hidden="true")

@@ -1,0 +1,73 @@
+"""The map of uncertainty over the picture: how far from its drawn place a point may appear at 5, 20 and 60 m."""
+
+from calib_core.results import Calibration
+from cocalib.report.markup import Child, Markup, number, tag
+from cocalib.report.plots import captioned, drawing, polyline, text
+from cocalib.report.subject import ReportSubject
+from cocalib.view.contours import ContourMap, contour_maps
+
+__all__ = ["picture_layer", "uncertainty"]
+
+_WIDTH = 320.0
+_LINES = ("contour a", "contour b", "contour c")
+
+
+def uncertainty(subject: ReportSubject) -> Markup | None:
+    """Return the three maps; None without a camera."""
+    calibration = subject.calibration
+    if calibration is None:
+        return None
+    maps = contour_maps(calibration)
+    if not any(one.contours for one in maps) and calibration.metrics.n == 0:
+        words = tag("p", "This calibration states no uncertainty, so there is no map of it.", class_="note")
+        return tag("section", tag("h2", "Uncertainty in the picture"), words, id="uncertainty")
+    picture = subject.recording.picture if subject.recording is not None else None
+    behind = f" Drawn over {picture.words}." if picture is not None else ""
+    return tag(
+        "section",
+        tag("h2", "Uncertainty in the picture"),
+        tag(
+            "p",
+            "Lines of equal 95 % uncertainty of a reprojected point, by its distance from the camera; pose only, without the "
+            f"noise of a single radar position.{behind}",
+            class_="note",
+        ),
+        tag("div", *(_map(calibration, one, with_picture=picture is not None) for one in maps), class_="three"),
+        id="uncertainty",
+    )
+
+
+def picture_layer(calibration: Calibration, *, with_picture: bool) -> list[Child]:
+    """Return the outline of the picture, 320 wide, with the frame if there is one; its definition is in the page's head."""
+    height = _height(calibration)
+    frame = tag("use", href="#picture", class_="picture") if with_picture else None
+    return [tag("rect", x=0.0, y=0.0, width=_WIDTH, height=height, class_="frame"), frame]
+
+
+def _height(calibration: Calibration) -> float:
+    return _WIDTH * calibration.camera.height_px / calibration.camera.width_px
+
+
+def _map(calibration: Calibration, found: ContourMap, *, with_picture: bool) -> Markup:
+    scale, height = _WIDTH / calibration.camera.width_px, _height(calibration)
+    levels = list(dict.fromkeys(one.label for one in found.contours))
+    lines: list[Child] = []
+    for contour in found.contours:
+        places = [((u + 0.5) * scale, (v + 0.5) * scale) for u, v in contour.points_px]
+        lines += [polyline(places, class_="halo"), polyline(places, class_=_LINES[levels.index(contour.label) % 3])]
+    named: set[str] = set()
+    for contour in found.contours:
+        if contour.label not in named and len(contour.points_px) > 4:
+            named.add(contour.label)
+            u, v = contour.points_px[len(contour.points_px) // 2]
+            x = min(max((u + 0.5) * scale, 18.0), _WIDTH - 18.0)
+            y = min(max((v + 0.5) * scale + 3.0, 11.0), height - 4.0)
+            lines.append(text(x, y, contour.label, class_="middle label"))
+    drawn = drawing(
+        f"Map of the uncertainty at {found.label}. {found.words}",
+        *picture_layer(calibration, with_picture=with_picture),
+        *lines,
+        width=_WIDTH,
+        height=float(number(height)),
+    )
+    return captioned(f"at {found.label}", drawn, found.words)

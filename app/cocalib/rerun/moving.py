@@ -1,0 +1,237 @@
+"""What changes with time: the radar cloud, the pictures with the returns in them, boxes, clicks at their frames, figures."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import rerun as rr
+
+from calib_core.arrays import Indices, TimesNs
+from calib_core.detections import Box
+from calib_core.errors import InputError, MessageError
+from calib_core.measurements import TimeNs
+from calib_core.results import PairResult
+from cocalib.colours import residual_colours
+from cocalib.recorded_view import RecordedView, box_words
+from cocalib.rerun.entities import (
+    ACC,
+    AED,
+    AGAINST_RETURNS,
+    BOXES,
+    CLICKED_NOW,
+    PICTURE,
+    RESIDUALS,
+    RETURNS,
+    RETURNS_SEEN,
+    SEEN_RETURNS,
+    TIMELINE,
+)
+from cocalib.rerun.unmoving import HALF_PIXEL_PX, LARGE_PX, ellipse_strips
+from cocalib.seen_returns import FrameBlock, SeenReturns, frame_blocks, seen_in
+
+__all__ = ["Streamed", "flush", "stream_cloud", "stream_figures", "stream_frames"]
+
+_AGAINST = (230, 120, 230)
+_CHUNK_BYTES = 4 << 20
+_PATIENCE_S = 60.0
+_HUES = ((255, 210, 80), (110, 220, 130), (90, 190, 255), (255, 140, 120), (200, 160, 255), (240, 240, 240))
+
+
+@dataclass(slots=True)
+class Streamed:
+    """What was written so far.
+
+    Attributes:
+        frames: number of pictures.
+        unreadable: number of frames left out because they cannot be read.
+        fault: why the first of those cannot be read.
+    """
+
+    frames: int = 0
+    unreadable: int = 0
+    fault: str = ""
+
+
+def stream_cloud(stream: rr.RecordingStream, view: RecordedView) -> Iterator[TimesNs]:
+    """Write every scan's returns in the radar's frame, coloured; yield the stamps of what was written."""
+    for window in view.recording.radar_windows():
+        known = np.flatnonzero(np.isfinite(window.points_radar_m).all(axis=1))
+        scans = window.take(known)
+        if len(scans):
+            columns = rr.Points3D.columns(positions=scans.points_radar_m, colors=view.colours.of(scans))
+            stream.send_columns(
+                RETURNS, [_times(scans.times_ns)], columns.partition(np.diff(scans.first_return).tolist())
+            )
+            flush(stream)
+        yield scans.times_ns
+
+
+def stream_frames(stream: rr.RecordingStream, view: RecordedView, streamed: Streamed) -> Iterator[int]:
+    """Write the pictures with everything that is drawn over them; yield the number of frames done."""
+    pairs, boxes = view.pairs_by_frame(), view.boxes_by_frame()
+    labels = view.boxes.labels if view.boxes else ()
+    for block in frame_blocks(view.recording):
+        yield from _stream_pictures(stream, view, block, streamed)
+        _stream_returns(stream, view, block, streamed)
+        if pairs:
+            _stream_clicks(stream, block, pairs)
+        if view.boxes is not None:
+            _stream_boxes(stream, block, boxes, labels)
+
+
+def _stream_pictures(
+    stream: rr.RecordingStream, view: RecordedView, block: FrameBlock, streamed: Streamed
+) -> Iterator[int]:
+    """Write the recorded pictures, untouched, some megabytes at a time."""
+    pictures: list[bytes] = []
+    formats: list[str] = []
+    times: list[int] = []
+    for place, time in enumerate(block.times_ns.tolist()):
+        try:
+            picture = view.recording.image_bytes(block.first + place)
+        except MessageError as error:
+            streamed.unreadable, streamed.fault = streamed.unreadable + 1, streamed.fault or str(error)
+            continue
+        pictures.append(picture.data)
+        formats.append(f"image/{picture.format}")
+        times.append(time)
+        if sum(map(len, pictures)) >= _CHUNK_BYTES:
+            _send_pictures(stream, pictures, formats, times, streamed)
+            pictures, formats, times = [], [], []
+            yield block.first + place
+    if pictures:
+        _send_pictures(stream, pictures, formats, times, streamed)
+    yield block.first + len(block.times_ns)
+
+
+def _send_pictures(
+    stream: rr.RecordingStream, pictures: list[bytes], formats: list[str], times: list[int], streamed: Streamed
+) -> None:
+    columns = rr.EncodedImage.columns(blob=pictures, media_type=formats)
+    stream.send_columns(PICTURE, [_times(np.array(times, dtype=np.int64))], columns)
+    flush(stream)
+    streamed.frames += len(pictures)
+
+
+def _stream_returns(stream: rr.RecordingStream, view: RecordedView, block: FrameBlock, streamed: Streamed) -> None:
+    """Write the returns of each frame's nearest scan where our lens projects them."""
+    returns = seen_in(view.calibration, block.scans)
+    rows = _rows_of_frames(returns, block.times_ns)
+    colours = view.colours.of(block.scans, np.concatenate(rows))
+    _send_points(stream, SEEN_RETURNS, block.times_ns, returns, rows, colours)
+    counts = [len(own) for own in rows]
+    stream.send_columns(
+        RETURNS_SEEN, [_times(block.times_ns)], rr.Scalars.columns(scalars=np.array(counts, dtype=float))
+    )
+    if view.against is not None:
+        others = seen_in(view.against, block.scans)
+        rows = _rows_of_frames(others, block.times_ns)
+        plain = np.tile(np.array(_AGAINST, dtype=np.uint8), (sum(map(len, rows)), 1))
+        _send_points(stream, AGAINST_RETURNS, block.times_ns, others, rows, plain)
+
+
+def _rows_of_frames(returns: SeenReturns, times_ns: TimesNs) -> list[Indices]:
+    return [returns.near(TimeNs(time)) for time in times_ns.tolist()]
+
+
+def _send_points(
+    stream: rr.RecordingStream,
+    entity: str,
+    times_ns: TimesNs,
+    returns: SeenReturns,
+    rows: Sequence[Indices],
+    colours: np.ndarray,
+) -> None:
+    positions = returns.pixels_px[np.concatenate(rows)] + HALF_PIXEL_PX
+    columns = rr.Points2D.columns(positions=positions, colors=colours)
+    stream.send_columns(entity, [_times(times_ns)], columns.partition([len(own) for own in rows]))
+
+
+def _stream_boxes(
+    stream: rr.RecordingStream,
+    block: FrameBlock,
+    boxes: dict[TimeNs, tuple[Box, ...]],
+    labels: Sequence[str],
+) -> None:
+    """Write the boxes of each frame; a frame without any clears those before it."""
+    own = [boxes.get(TimeNs(time), ()) for time in block.times_ns.tolist()]
+    all_boxes = [box for frame in own for box in frame]
+    edges = np.array([(box.left_px, box.top_px, box.right_px, box.bottom_px) for box in all_boxes]).reshape(-1, 4)
+    columns = rr.Boxes2D.columns(
+        centers=(edges[:, :2] + edges[:, 2:]) / 2.0 + HALF_PIXEL_PX,
+        half_sizes=(edges[:, 2:] - edges[:, :2]) / 2.0,
+        labels=[box_words(box) or "object" for box in all_boxes],
+        colors=[_HUES[labels.index(box.label) % len(_HUES)] for box in all_boxes],
+    )
+    stream.send_columns(BOXES, [_times(block.times_ns)], columns.partition([len(frame) for frame in own]))
+
+
+def _stream_clicks(stream: rr.RecordingStream, block: FrameBlock, pairs: dict[TimeNs, tuple[PairResult, ...]]) -> None:
+    """Write the clicks of a frame, their reprojections and ellipses; the next frame without clicks clears them."""
+    shown = True
+    for time in block.times_ns.tolist():
+        own = pairs.get(TimeNs(time))
+        if own is None and not shown:
+            continue
+        stream.set_time(TIMELINE, timestamp=np.datetime64(time, "ns"))
+        if own is None:
+            stream.log(CLICKED_NOW, rr.Clear(recursive=True))
+        else:
+            _log_clicks(stream, own)
+        shown = own is not None
+
+
+def _log_clicks(stream: rr.RecordingStream, pairs: Sequence[PairResult]) -> None:
+    seen = [pair for pair in pairs if np.isfinite(pair.projected_px).all()]
+    clicks = np.array([pair.pixel_px for pair in pairs]) + HALF_PIXEL_PX
+    labels = [f"{pair.id}: {pair.distance_px:.1f} px" for pair in pairs]
+    white = rr.Points2D(
+        clicks, colors=(255, 255, 255), radii=rr.Radius.ui_points(4.0), labels=labels, draw_order=50.0, show_labels=True
+    )
+    stream.log(f"{CLICKED_NOW}/click", white)
+    colours = residual_colours(np.array([pair.distance_px for pair in seen]), LARGE_PX)
+    places = np.array([pair.projected_px for pair in seen]).reshape(-1, 2) + HALF_PIXEL_PX
+    lines = [np.array([pair.pixel_px, pair.projected_px]) + HALF_PIXEL_PX for pair in seen]
+    stream.log(f"{CLICKED_NOW}/reprojection", rr.Points2D(places, colors=colours, radii=rr.Radius.ui_points(5.0)))
+    stream.log(f"{CLICKED_NOW}/residual", rr.LineStrips2D(lines, colors=colours, radii=rr.Radius.ui_points(1.5)))
+    outlines = rr.LineStrips2D(ellipse_strips(seen), colors=(255, 255, 255, 160), radii=rr.Radius.ui_points(1.0))
+    stream.log(f"{CLICKED_NOW}/ellipse_95", outlines)
+
+
+def stream_figures(stream: rr.RecordingStream, view: RecordedView) -> None:
+    """Write the residual of each clicked frame, AED as a line, and Acc of each frame that counts."""
+    stream.log(RETURNS_SEEN, rr.SeriesLines(names="returns in the picture", colors=(108, 199, 255)), static=True)
+    known = [(pair.image_time, pair.distance_px) for pair in view.pairs if np.isfinite(pair.distance_px)]
+    residuals = sorted((time, length_px) for time, length_px in known if time is not None)
+    if residuals:
+        stream.log(
+            RESIDUALS, rr.SeriesPoints(names="residual [px]", colors=(255, 180, 84), marker_sizes=4.0), static=True
+        )
+        stream.log(AED, rr.SeriesLines(names="AED [px]", colors=(154, 166, 178)), static=True)
+        times = np.array([time for time, _ in residuals], dtype=np.int64)
+        lengths_px = np.array([length_px for _, length_px in residuals])
+        stream.send_columns(RESIDUALS, [_times(times)], rr.Scalars.columns(scalars=lengths_px))
+        ends = view.recording.image_times[[0, -1]]
+        stream.send_columns(AED, [_times(ends)], rr.Scalars.columns(scalars=np.full(2, lengths_px.mean())))
+    acc = sorted(view.acc_by_frame().items())
+    if acc:
+        stream.log(ACC, rr.SeriesPoints(names="Acc [%]", colors=(110, 220, 130), marker_sizes=3.0), static=True)
+        times = np.array([time for time, _ in acc], dtype=np.int64)
+        shares = 100.0 * np.array([share for _, share in acc])
+        stream.send_columns(ACC, [_times(times)], rr.Scalars.columns(scalars=shares))
+
+
+def flush(stream: rr.RecordingStream) -> None:
+    """Wait until all is written: what is not on the disk yet stays in memory.
+
+    Raises:
+        InputError: it is not written in time; once Rerun's writer has failed, it never is.
+    """
+    try:
+        stream.flush(timeout_sec=_PATIENCE_S)
+    except RuntimeError as error:
+        raise InputError(f"Rerun's writer does not go on ({error}); write to another disk") from error
+
+
+def _times(times_ns: TimesNs) -> rr.TimeColumn:
+    return rr.TimeColumn(TIMELINE, timestamp=times_ns.astype("datetime64[ns]"))

@@ -1,0 +1,159 @@
+"""What holds for the whole recording: transforms, the frustum, reflectors, all clicks, uncertainty, the summary."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import rerun as rr
+
+from calib_core.arrays import Points2
+from calib_core.camera import Camera
+from calib_core.geometry import RigidTransform, skew
+from calib_core.radar import covariance_from_sigma_polar
+from calib_core.results import Calibration, PairResult
+from cocalib.colours import residual_colours
+from cocalib.recorded_view import RecordedView
+from cocalib.rerun.entities import (
+    AGAINST_CAMERA,
+    AGAINST_RETURNS,
+    CAMERA,
+    CAMERA_POSITION,
+    PAIRS,
+    PICTURE,
+    RADAR,
+    REFLECTORS,
+    RETURNS,
+    SEEN_RETURNS,
+    SUMMARY,
+)
+from cocalib.rerun.summary import summary_text
+
+__all__ = ["HALF_PIXEL_PX", "LARGE_PX", "ellipse_strips", "log_unmoving"]
+
+HALF_PIXEL_PX = 0.5
+"""Rerun's (0, 0) is the corner of the top-left pixel, ours its centre."""
+LARGE_PX = 30.0
+"""Residuals from here on have the last colour, as on the page."""
+_AGAINST = (230, 120, 230)
+_CAMERA = (87, 182, 242)
+_FRUSTUM_SHARE = 0.06
+_CIRCLE = np.stack([np.cos(np.linspace(0, 2 * np.pi, 49)), np.sin(np.linspace(0, 2 * np.pi, 49))])
+_CHI2_95_2D, _CHI2_95_3D, _CHI2_95_6D = 5.991464547107979, 7.814727903251178, 12.591587243743977
+
+
+def log_unmoving(stream: rr.RecordingStream, view: RecordedView) -> None:
+    """Write everything that has no time."""
+    far_m = view.colours.high if view.colours.quantity == "range" else 30.0
+    stream.log(RADAR, rr.ViewCoordinates.FLU, static=True)
+    stream.log(RADAR, rr.TransformAxes3D(1.0), static=True)
+    stream.log(RETURNS, rr.Points3D.from_fields(radii=rr.Radius.ui_points(2.5)), static=True)
+    stream.log(SEEN_RETURNS, rr.Points2D.from_fields(radii=rr.Radius.ui_points(4.0), draw_order=30.0), static=True)
+    _log_camera(stream, CAMERA, PICTURE, view.calibration, _FRUSTUM_SHARE * far_m, _CAMERA)
+    if view.against is not None:
+        stream.log(AGAINST_RETURNS, rr.Points2D.from_fields(radii=rr.Radius.ui_points(3.0)), static=True)
+        _log_camera(stream, AGAINST_CAMERA, f"{AGAINST_CAMERA}/frustum", view.against, _FRUSTUM_SHARE * far_m, _AGAINST)
+    _log_camera_position(stream, view.calibration)
+    if view.pairs:
+        _log_pairs(stream, view)
+    stream.log(SUMMARY, rr.TextDocument(summary_text(view), media_type=rr.MediaType.TEXT), static=True)
+
+
+def _log_camera(
+    stream: rr.RecordingStream,
+    entity: str,
+    picture: str,
+    calibration: Calibration,
+    depth_m: float,
+    colour: tuple[int, int, int],
+) -> None:
+    """Write the camera's pose in the radar's frame, and its frustum: of the camera matrix, as Rerun knows no distortion."""
+    radar_from_camera = calibration.camera_from_radar.inverse()
+    pose = rr.Transform3D(translation=radar_from_camera.translation_m, mat3x3=radar_from_camera.rotation)
+    stream.log(entity, pose, static=True)
+    stream.log(picture, _pinhole(calibration.camera, depth_m, colour), static=True)
+
+
+def _pinhole(camera: Camera, depth_m: float, colour: tuple[int, int, int]) -> rr.Pinhole:
+    matrix = camera.matrix_px.copy()
+    matrix[:2, 2] += HALF_PIXEL_PX
+    return rr.Pinhole(
+        image_from_camera=matrix,
+        resolution=[camera.width_px, camera.height_px],
+        camera_xyz=rr.ViewCoordinates.RDF,
+        image_plane_distance=depth_m,
+        color=colour,
+    )
+
+
+def _log_camera_position(stream: rr.RecordingStream, calibration: Calibration) -> None:
+    """Write the ellipsoid that contains the camera's lens with 95 % probability, if the method states an uncertainty."""
+    covariance = calibration.covariance
+    if not np.isfinite(covariance).all():
+        return
+    pose: RigidTransform = calibration.camera_from_radar
+    turned = pose.rotation.T
+    moves = np.concatenate([-turned, -turned @ skew(pose.translation_m)], axis=1)
+    heavier = max(1.0, float(np.nan_to_num(calibration.covariance_quantile)) / _CHI2_95_6D)
+    position_m2 = (moves @ covariance @ moves.T)[None] * heavier
+    centre = pose.inverse().translation_m[None]
+    stream.log(
+        CAMERA_POSITION,
+        _ellipsoids(centre, position_m2, np.array([_CAMERA], dtype=np.uint8), ["camera, 95 %"]),
+        static=True,
+    )
+
+
+def _log_pairs(stream: rr.RecordingStream, view: RecordedView) -> None:
+    """Write all clicks over the picture, and the reflectors with their 95 % ellipsoids in the radar's frame."""
+    pairs = [pair for pair in view.pairs if np.isfinite(pair.projected_px).all()]
+    colours = residual_colours(np.array([pair.distance_px for pair in pairs]), LARGE_PX)
+    lines = [np.array([pair.pixel_px, pair.projected_px]) + HALF_PIXEL_PX for pair in pairs]
+    clicked = np.array([pair.pixel_px for pair in pairs]).reshape(-1, 2) + HALF_PIXEL_PX
+    ids = [pair.id for pair in pairs]
+    stream.log(
+        f"{PAIRS}/residuals", rr.LineStrips2D(lines, colors=colours, radii=rr.Radius.ui_points(1.0)), static=True
+    )
+    dots = rr.Points2D(clicked, colors=colours, radii=rr.Radius.ui_points(2.0), labels=ids, show_labels=False)
+    stream.log(f"{PAIRS}/clicks", dots, static=True)
+    stream.log(
+        f"{PAIRS}/ellipses_95",
+        rr.LineStrips2D(ellipse_strips(pairs), colors=(154, 166, 178, 110), radii=rr.Radius.ui_points(0.5)),
+        static=True,
+    )
+    points = np.array([pair.point_radar_m for pair in pairs]).reshape(-1, 3)
+    noise, scale = view.calibration.options.noise, view.calibration.noise_scale
+    sigma = np.array(
+        [noise.sigma_range_m, np.deg2rad(noise.sigma_azimuth_deg), np.deg2rad(noise.sigma_elevation_deg)]
+    ) * np.array(scale[1:])
+    covariances = covariance_from_sigma_polar(points, np.broadcast_to(sigma, points.shape))
+    stream.log(f"{REFLECTORS}/ellipsoids_95", _ellipsoids(points, covariances, colours, ids), static=True)
+    stream.log(REFLECTORS, rr.Points3D(points, colors=colours, radii=rr.Radius.ui_points(4.0)), static=True)
+
+
+def ellipse_strips(pairs: Sequence[PairResult]) -> list[Points2]:
+    """Return the outline around each reprojection that contains 95 % of the clicks of good pairs, where it is known."""
+    strips = []
+    for pair in pairs:
+        covariance = pair.expected_covariance_px2
+        if np.isfinite(covariance).all() and np.isfinite(pair.projected_px).all():
+            squares, axes = np.linalg.eigh((covariance + covariance.T) / 2.0)
+            half_axes = axes * np.sqrt(np.maximum(squares, 0.0) * _CHI2_95_2D)
+            strips.append(pair.projected_px + (half_axes @ _CIRCLE).T + HALF_PIXEL_PX)
+    return strips
+
+
+def _ellipsoids(
+    centres_m: np.ndarray, covariances_m2: np.ndarray, colours: np.ndarray, labels: Sequence[str]
+) -> rr.Ellipsoids3D:
+    squares, axes = np.linalg.eigh(covariances_m2)
+    axes[:, :, 0] *= np.sign(np.linalg.det(axes))[:, None]
+    from scipy.spatial.transform import Rotation
+
+    return rr.Ellipsoids3D(
+        centers=centres_m,
+        half_sizes=np.sqrt(np.maximum(squares, 0.0) * _CHI2_95_3D),
+        quaternions=Rotation.from_matrix(axes).as_quat(),
+        colors=colours,
+        line_radii=rr.Radius.ui_points(0.6),
+        labels=list(labels),
+        show_labels=False,
+    )

@@ -1,0 +1,224 @@
+"""How each event changes the session: `apply`, and one rule per event."""
+
+import math
+from dataclasses import replace
+from functools import singledispatch
+from typing import TypeAlias
+
+from calib_core.measurements import Mark, ReflectorClick
+from calib_core.option_checks import checked_options
+from cocalib.option_changes import changed_options
+from cocalib.session.box_applying import BoxEvent, apply_to_boxes
+from cocalib.session.event_checks import EventError, require_camera, require_frame, require_pixel
+from cocalib.session.events import (
+    AssumptionsConfirmed,
+    Cleared,
+    ClickExcluded,
+    ClickMoved,
+    ClickPlaced,
+    ClickRemoved,
+    ClicksImported,
+    ColumnsMapped,
+    Event,
+    IntrinsicsChosen,
+    OptionsChanged,
+    OptionsEdited,
+    PlacementDismissed,
+    ReturnChosen,
+    ScansAdded,
+    Solved,
+    WarningsAcknowledged,
+)
+from cocalib.session.state import DismissedPlacement, RecordingFacts, Session
+
+__all__ = ["EventError", "apply"]
+
+_Aside: TypeAlias = BoxEvent | ColumnsMapped | AssumptionsConfirmed | WarningsAcknowledged | PlacementDismissed
+"""Events that no pose depends on."""
+
+
+def apply(session: Session, event: Event, facts: RecordingFacts) -> Session:
+    """Return the session after an event; the same object if the event changes nothing.
+
+    Raises:
+        EventError: the event does not fit the session or the recording.
+        OptionError: an option is unknown or out of range.
+    """
+    if isinstance(event, Solved):
+        if event.revision != session.revision:
+            return session
+        return replace(session, outcome=event.outcome, outcome_revision=event.revision, checked=event.checked)
+    if isinstance(event, ScansAdded):
+        return replace(session, revision=session.revision + 1)
+    if isinstance(event, _Aside):
+        aside = _aside(event, session, facts)
+        return session if aside == session else aside
+    changed = _changed(event, session, facts)
+    if (changed.clicks, changed.options, changed.intrinsics) == (session.clicks, session.options, session.intrinsics):
+        return session
+    return replace(changed, revision=session.revision + 1)
+
+
+def _aside(event: _Aside, session: Session, facts: RecordingFacts) -> Session:
+    """Return the session after an event that no pose depends on; answers in progress stay valid."""
+    if isinstance(event, WarningsAcknowledged):
+        return _acknowledged(event, session)
+    if isinstance(event, PlacementDismissed):
+        return _dismissed(event, session)
+    if isinstance(event, ColumnsMapped | AssumptionsConfirmed):
+        return _about_reading(event, session)
+    return apply_to_boxes(event, session, facts)
+
+
+def _about_reading(event: ColumnsMapped | AssumptionsConfirmed, session: Session) -> Session:
+    """Return the session with what the user states about the recording; answers in progress stay valid."""
+    if isinstance(event, ColumnsMapped):
+        return session if event.column_map == session.column_map else replace(session, column_map=event.column_map)
+    confirmed = tuple(dict.fromkeys((*session.confirmed, *event.texts)))
+    return session if confirmed == session.confirmed else replace(session, confirmed=confirmed)
+
+
+def _acknowledged(event: WarningsAcknowledged, session: Session) -> Session:
+    """Return the session with warnings folded away or shown again; answers in progress stay valid."""
+    others = tuple(code for code in session.acknowledged if code not in event.codes)
+    codes = tuple(dict.fromkeys((*session.acknowledged, *event.codes))) if event.acknowledged else others
+    return session if codes == session.acknowledged else replace(session, acknowledged=codes)
+
+
+def _dismissed(event: PlacementDismissed, session: Session) -> Session:
+    """Return the session with a placement dismissed or offered again; answers in progress stay valid."""
+    if not all(map(math.isfinite, event.position_m)):
+        raise EventError("the position of the placement is not finite; give it in metres")
+    placement = DismissedPlacement(event.time, event.position_m)
+    others = tuple(one for one in session.dismissed if one != placement)
+    dismissed = (*others, placement) if event.dismissed else others
+    return session if set(dismissed) == set(session.dismissed) else replace(session, dismissed=dismissed)
+
+
+@singledispatch
+def _changed(event: Event, session: Session, facts: RecordingFacts) -> Session:
+    """Return the session with the event applied; `apply` increments the revision."""
+    raise TypeError(f"not an event of the session: {event!r}")
+
+
+@_changed.register
+def _placed(event: ClickPlaced, session: Session, facts: RecordingFacts) -> Session:
+    require_frame(event.image_time, facts)
+    require_pixel(event.u_px, event.v_px, facts)
+    for click in session.clicks:
+        if click.image_time != event.image_time:
+            continue
+        if event.mark is None:
+            return _with_click(session, replace(click, u_px=event.u_px, v_px=event.v_px))
+        if (click.u_px, click.v_px) == (event.u_px, event.v_px):
+            return _with_click(session, _marked(click, event.mark, event.sigma_px))
+    click = ReflectorClick(
+        event.image_time,
+        f"c{session.next_click}",
+        event.u_px,
+        event.v_px,
+        sigma_px=event.sigma_px,
+        mark=event.mark or "clicked",
+    )
+    _require_sigma(click)
+    return replace(_with_click(session, click), next_click=session.next_click + 1)
+
+
+def _marked(click: ReflectorClick, mark: Mark, sigma_px: float | None) -> ReflectorClick:
+    """Return a click that was marked again at its pixel: a guess becomes a measurement; what a person marked stays as it is."""
+    marked = replace(click, mark=mark, sigma_px=sigma_px) if click.mark == "untouched" or mark == "snapped" else click
+    _require_sigma(marked)
+    return marked
+
+
+@_changed.register
+def _moved(event: ClickMoved, session: Session, facts: RecordingFacts) -> Session:
+    require_pixel(event.u_px, event.v_px, facts)
+    click = _click(session, event.id)
+    if (click.u_px, click.v_px) == (event.u_px, event.v_px) and event.mark == "moved":
+        return session
+    moved = replace(click, u_px=event.u_px, v_px=event.v_px, mark=event.mark, sigma_px=event.sigma_px)
+    _require_sigma(moved)
+    return _with_click(session, moved)
+
+
+@_changed.register
+def _chosen(event: ReturnChosen, session: Session, facts: RecordingFacts) -> Session:
+    if event.chosen is not None and not all(map(math.isfinite, event.chosen.position_m)):
+        raise EventError("the position of the chosen return is not finite; give it in metres")
+    return _with_click(session, replace(_click(session, event.id), chosen=event.chosen))
+
+
+@_changed.register
+def _removed(event: ClickRemoved, session: Session, facts: RecordingFacts) -> Session:
+    gone = _click(session, event.id)
+    return replace(session, clicks=tuple(click for click in session.clicks if click is not gone))
+
+
+@_changed.register
+def _excluded(event: ClickExcluded, session: Session, facts: RecordingFacts) -> Session:
+    return _with_click(session, replace(_click(session, event.id), excluded=event.excluded))
+
+
+@_changed.register
+def _options_changed(event: OptionsChanged, session: Session, facts: RecordingFacts) -> Session:
+    return replace(session, options=checked_options(event.options))
+
+
+@_changed.register
+def _options_edited(event: OptionsEdited, session: Session, facts: RecordingFacts) -> Session:
+    return replace(session, options=changed_options(session.options, event.changes))
+
+
+@_changed.register
+def _intrinsics_chosen(event: IntrinsicsChosen, session: Session, facts: RecordingFacts) -> Session:
+    if event.intrinsics is not None:
+        require_camera(event.intrinsics, facts)
+    return replace(session, intrinsics=event.intrinsics)
+
+
+@_changed.register
+def _cleared(event: Cleared, session: Session, facts: RecordingFacts) -> Session:
+    return replace(session, clicks=(), outcome=None, outcome_revision=-1, checked=())
+
+
+@_changed.register
+def _imported(event: ClicksImported, session: Session, facts: RecordingFacts) -> Session:
+    for click in event.clicks:
+        require_frame(click.image_time, facts)
+        require_pixel(click.u_px, click.v_px, facts)
+        _require_sigma(click)
+    times = {click.image_time for click in event.clicks}
+    clicks = [click for click in session.clicks if click.image_time not in times]
+    taken = {click.id for click in clicks}
+    number = max([session.next_click, *(_number(click.id) + 1 for click in event.clicks)])
+    for click in sorted(event.clicks):
+        if click.id in taken:
+            click, number = replace(click, id=f"c{number}"), number + 1
+        taken.add(click.id)
+        clicks.append(click)
+    return replace(session, clicks=tuple(sorted(clicks)), next_click=number)
+
+
+def _with_click(session: Session, click: ReflectorClick) -> Session:
+    others = (other for other in session.clicks if other.id != click.id)
+    return replace(session, clicks=tuple(sorted((*others, click))))
+
+
+def _click(session: Session, click_id: str) -> ReflectorClick:
+    for click in session.clicks:
+        if click.id == click_id:
+            return click
+    raise EventError(f"there is no click '{click_id}'; it may have been removed in another tab")
+
+
+def _require_sigma(click: ReflectorClick) -> None:
+    if click.sigma_px is not None and not 0.0 < click.sigma_px < math.inf:
+        raise EventError(
+            f"click '{click.id}' has a sigma_px of {click.sigma_px:g}; give a number above 0, or leave it out"
+        )
+
+
+def _number(click_id: str) -> int:
+    digits = click_id[1:]
+    return int(digits) if click_id.startswith("c") and digits.isascii() and digits.isdigit() and len(digits) < 10 else 0

@@ -1,0 +1,148 @@
+"""Find the session of a recording that was renamed or moved: by its content, next to it and in the user's folder."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from calib_core.results import DataWarning
+from cocalib.resources import state_folder
+from cocalib.session import RecordingFacts
+from cocalib.session.file.errors import SessionFileError
+from cocalib.session.file.folders import is_writable, recording_session_folder, session_folders_in
+from cocalib.session.file.guarded_folder import GuardedFolder
+from cocalib.session.file.identity import RecordingForm, has_dates, is_same_recording
+from cocalib.session.file.journal_reading import JOURNAL, read_journal
+from cocalib.session.file.snapshot import SNAPSHOT, read_snapshot
+
+__all__ = ["FoundFolder", "find_session_folder", "has_session_of"]
+
+_HEAD_BYTES = 1 << 16
+
+
+@dataclass(frozen=True, slots=True)
+class FoundFolder:
+    """Where the session of a recording is, or starts.
+
+    Attributes:
+        path: of the folder.
+        warnings: what the user must know about this choice.
+    """
+
+    path: Path
+    warnings: tuple[DataWarning, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class _Candidate:
+    path: Path
+    recording: RecordingForm
+    changed_at_s: float
+
+
+def find_session_folder(paths: Sequence[Path], facts: RecordingFacts) -> FoundFolder:
+    """Return the folder named after a recording if it has the session, else one whose session has the same stamps.
+
+    Args:
+        paths: the files or folders of the recording, at least one; the first names the session.
+        facts: the open recording.
+    """
+    named = recording_session_folder(paths)
+    own = _candidate(named)
+    if named.is_symlink() or (own is None and _has_files(named)):
+        return FoundFolder(named)  # opening it says what is wrong
+    if own is not None and is_same_recording(own.recording, facts):
+        return FoundFolder(named)
+    places = dict.fromkeys([*(path.resolve().parent for path in paths), state_folder() / "sessions"])
+    folders = [folder for place in places for folder in session_folders_in(place) if folder != named]
+    same = [
+        candidate
+        for folder in folders
+        if (candidate := _candidate(folder)) is not None and is_same_recording(candidate.recording, facts)
+    ]
+    found = _chosen(named, sorted(same, key=lambda candidate: -candidate.changed_at_s), facts)
+    return FoundFolder(
+        found.path, (*found.warnings, *_about_closed([each for each in folders if _is_of(each, paths[0])]))
+    )
+
+
+def has_session_of(folder: Path, facts: RecordingFacts) -> bool:
+    """Return whether a folder has a session that can be read, of a recording with these frames."""
+    candidate = _candidate(folder)
+    return candidate is not None and is_same_recording(candidate.recording, facts)
+
+
+def _chosen(named: Path, same: Sequence[_Candidate], facts: RecordingFacts) -> FoundFolder:
+    """Choose the newest session that can be continued, and tell about all others."""
+    usable = [candidate for candidate in same if has_dates(candidate.recording) and is_writable(candidate.path)]
+    chosen = usable[0] if usable else None
+    warnings = [_about(candidate, facts) for candidate in same if candidate is not chosen]
+    if chosen is None:
+        return FoundFolder(named, tuple(warnings))
+    of = "" if chosen.recording.name == facts.name else f" of '{chosen.recording.name}'"
+    message = f"continuing the session{of} in {chosen.path}, which has the frames of {facts.name}"
+    hint = f"to start a new session instead, give another folder: --session {named}"
+    return FoundFolder(chosen.path, (DataWarning("session-of-other-name", message, hint), *warnings))
+
+
+def _about(candidate: _Candidate, facts: RecordingFacts) -> DataWarning:
+    """Tell about a session of the same stamps that is not continued."""
+    of = f"the session of '{candidate.recording.name}' in {candidate.path}"
+    message = f"{of} has the same frames as {facts.name} and is not used"
+    if not has_dates(candidate.recording):
+        message += ", since the stamps are no dates and another recording may have the same"
+    if not is_writable(candidate.path):
+        export = f"cocalib session export {candidate.path} --out clicks.json"
+        hint = f"it cannot be written; take its clicks over: {export}, then start again with --clicks clicks.json"
+    else:
+        hint = f"to continue it, start again with --session {candidate.path}"
+    return DataWarning("session-not-used", message, hint)
+
+
+def _is_of(folder: Path, recording: Path) -> bool:
+    """Return whether a session folder next to a recording is named after it."""
+    recording = recording.resolve()
+    return folder.parent == recording.parent and folder.name.startswith(f"{recording.name}.")
+
+
+def _about_closed(folders: Sequence[Path]) -> tuple[DataWarning, ...]:
+    """Tell about folders with the recording's name that may not be looked into, such as another user's."""
+    faults = []
+    for folder in folders:
+        try:
+            GuardedFolder(folder).close()
+        except SessionFileError as error:
+            faults.append(str(error))
+    hint = "to continue with its clicks, do that; a new session is started otherwise"
+    return tuple(
+        DataWarning("session-not-used", f"a session next to the recording is not used: {fault}", hint)
+        for fault in faults
+    )
+
+
+def _candidate(path: Path) -> _Candidate | None:
+    """Return what a folder's session says about its recording; None if there is none or it cannot be read."""
+    try:
+        folder = GuardedFolder(path)
+    except SessionFileError:
+        return None
+    try:
+        recording = _recording(folder)
+        changed = max((folder.changed_at_s(name) or 0.0 for name in (JOURNAL, SNAPSHOT)), default=0.0)
+        return None if recording is None else _Candidate(path, recording, changed)
+    except (SessionFileError, OSError):
+        return None
+    finally:
+        folder.close()
+
+
+def _recording(folder: GuardedFolder) -> RecordingForm | None:
+    head = (folder.read(JOURNAL, at_most=_HEAD_BYTES) or b"").partition(b"\n")[0]
+    recording = read_journal(head + b"\n", str(folder.path / JOURNAL)).recording if head else None
+    if recording is not None:
+        return recording
+    data = folder.read(SNAPSHOT)
+    return None if data is None else read_snapshot(data, SNAPSHOT).recording
+
+
+def _has_files(folder: Path) -> bool:
+    return any((folder / name).exists() or (folder / name).is_symlink() for name in (JOURNAL, SNAPSHOT))

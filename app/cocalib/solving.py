@@ -1,0 +1,381 @@
+"""From clicks or pairs to an answer and its file: the functions that the page and the command line share."""
+
+import dataclasses
+import hashlib
+import logging
+from collections.abc import Iterator, Sequence
+from operator import attrgetter
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from calib_core.association.pairing import pair_clicks
+from calib_core.calibration import calibrate_pairs, calibration_steps, require_default, solve_again
+from calib_core.camera import Camera
+from calib_core.errors import InputError, OptionError
+from calib_core.fleet_prior import FleetPrior
+from calib_core.input_files import name_text
+from calib_core.interchange import (
+    CALIBRATION_SCHEMA,
+    AssumptionNote,
+    CameraFile,
+    FrameNames,
+    Provenance,
+    VehicleNote,
+    names_schema,
+    read_calibration,
+    read_pairs,
+)
+from calib_core.interchange import calibration_text as interchange_text
+from calib_core.measurements import Candidate, Pair, RadarScans, ReflectorClick, TimeNs, Unsolvable
+from calib_core.option_checks import checked_options
+from calib_core.options import CalibrationOptions
+from calib_core.recordings import Recording, about_assumptions
+from calib_core.results import Calibration, InputFile, PairResult, UnconfirmedClicks
+from cocalib.board_search import find_board
+from cocalib.resources import version
+from cocalib.session import Outcome
+
+__all__ = [
+    "RadarSource",
+    "calibration_text",
+    "calibration_text_of_pairs",
+    "camera_for",
+    "check_clicks",
+    "half_window_s",
+    "intrinsics_near",
+    "solve_clicks",
+    "solve_in_steps",
+    "solve_pairs",
+    "window_candidates",
+]
+
+_MOST_CANDIDATES = 50
+"""As many as the option allows."""
+
+_KEPT_WARNINGS = ("assumed", "nobody-confirmed")
+"""What solving the same pairs again cannot change."""
+
+_log = logging.getLogger(__name__)
+
+
+class RadarSource(Protocol):
+    """The part of a Recording that a solve needs."""
+
+    def radar_scans_around(self, times: Sequence[TimeNs], half_window_s: float, /) -> RadarScans:
+        """Return the scans within the half window of any of the times, each once, in order of time."""
+
+
+def solve_clicks(
+    recording: RadarSource,
+    clicks: Sequence[ReflectorClick],
+    camera: Camera | None,
+    options: CalibrationOptions,
+    fleet_prior: FleetPrior | None = None,
+) -> Outcome:
+    """Solve for camera_from_radar.
+
+    Args:
+        recording: where the radar scans come from.
+        clicks: in any order; excluded ones are paired and shown, but not used.
+        camera: the intrinsics; without them, the outcome says that they are missing.
+        options: of the calibration.
+        fleet_prior: what the fleet says of this vehicle; optional.
+
+    Raises:
+        OptionError: an option is out of range.
+        CalibrationError: the recording cannot be read at the clicks, or the method takes no fleet's prior.
+    """
+    *_, outcome = solve_in_steps(recording, clicks, camera, options, preview=False, fleet_prior=fleet_prior)
+    return outcome
+
+
+def solve_in_steps(
+    recording: RadarSource,
+    clicks: Sequence[ReflectorClick],
+    camera: Camera | None,
+    options: CalibrationOptions,
+    *,
+    previous: Calibration | None = None,
+    preview: bool = True,
+    fleet_prior: FleetPrior | None = None,
+) -> Iterator[Outcome]:
+    """Solve, with a preview of the answer first if there can be one; the last step is what `solve_clicks` returns.
+
+    Args:
+        recording: where the radar scans come from.
+        clicks: in any order.
+        camera: the intrinsics.
+        options: of the calibration.
+        previous: the answer to nearly the same clicks.
+        preview: make one.
+        fleet_prior: what the fleet says of this vehicle; optional.
+
+    Raises:
+        OptionError: an option is out of range.
+        CalibrationError: the recording cannot be read at the clicks, or the method takes no fleet's prior.
+    """
+    require_default(options, fleet_prior)
+    checked_options(options)
+    if camera is None:
+        yield Unsolvable(
+            "no-camera",
+            "the camera intrinsics are missing: the recording contains none that can be used",
+            "calibrate the lens from a board in a recording (tab Lens, or cocalib intrinsics), or drop a camera file on the "
+            "page, or start again with --camera FILE",
+        )
+        return
+    times = sorted({click.image_time for click in clicks})
+    scans = recording.radar_scans_around(times, half_window_s(options))
+    if options.method == "ccm":
+        yield _solved_on_board(recording, clicks, scans, camera, options)
+        return
+    yield from calibration_steps(
+        clicks, scans, camera, options, previous=previous, preview=preview, fleet_prior=fleet_prior
+    )
+
+
+def _solved_on_board(
+    recording: RadarSource,
+    clicks: Sequence[ReflectorClick],
+    scans: RadarScans,
+    camera: Camera,
+    options: CalibrationOptions,
+) -> Outcome:
+    """Solve by the checkerboard that the recording's pictures show."""
+    from calib_core.baselines.checkerboard import calibrate_on_board
+
+    pairing = pair_clicks(clicks, scans, options)
+    excluded = frozenset(click.id for click in clicks if not click.counts)
+    corners_px = find_board(recording, options.board)
+    if isinstance(corners_px, Unsolvable):
+        return dataclasses.replace(corners_px, unpaired=pairing.unpaired, pairs=pairing.pairs)
+    return calibrate_on_board(pairing.pairs, corners_px, camera, options, excluded=excluded, unpaired=pairing.unpaired)
+
+
+def check_clicks(
+    recording: RadarSource, clicks: Sequence[ReflectorClick], reference: Calibration, options: CalibrationOptions
+) -> tuple[PairResult, ...]:
+    """Evaluate clicks under a calibration that was solved without them; each is marked as excluded.
+
+    Of a click's radar positions, the one reprojected nearest to it is used, which makes the residual slightly too small.
+
+    Raises:
+        CalibrationError: the recording cannot be read at the clicks.
+    """
+    times = sorted({click.image_time for click in clicks})
+    scans = recording.radar_scans_around(times, half_window_s(options))
+    return tuple(_under(pair, reference) for pair in pair_clicks(clicks, scans, options).pairs)
+
+
+def _under(pair: Pair, reference: Calibration) -> PairResult:
+    points_radar_m = np.array([candidate.position_radar_m for candidate in pair.candidates])
+    pixels_px = reference.reproject(points_radar_m)
+    distances_px = np.linalg.norm(pixels_px - pair.pixel_px, axis=1)
+    nearest = int(np.argmin(np.where(np.isfinite(distances_px), distances_px, np.inf)))
+    return PairResult(
+        pair.id, pair.pixel_px, pixels_px[nearest], points_radar_m[nearest], False, True, image_time=pair.image_time
+    )
+
+
+def window_candidates(
+    recording: RadarSource, click: ReflectorClick, options: CalibrationOptions
+) -> tuple[Candidate, ...]:
+    """Return every static return of a click's window as a candidate, also those that were too implausible for its pair.
+
+    Raises:
+        CalibrationError: the recording cannot be read at the click.
+    """
+    scans = recording.radar_scans_around([click.image_time], half_window_s(options))
+    all_of_them = dataclasses.replace(
+        options, locating=dataclasses.replace(options.locating, max_candidates=_MOST_CANDIDATES)
+    )
+    alone = dataclasses.replace(click, chosen=None, mark="clicked")
+    return tuple(one for pair in pair_clicks([alone], scans, all_of_them).pairs for one in pair.candidates)
+
+
+def half_window_s(options: CalibrationOptions) -> float:
+    """Return how far from a click radar scans can matter [s].
+
+    A window is centred on a scan up to `max_time_gap_s` away; the paper's may begin at a whole second instead.
+    """
+    longest_s = max(options.locating.window_s, options.paper.window_s)
+    return longest_s / 2 + options.locating.max_time_gap_s + 1.0
+
+
+_OPTIONS_OF_PAIRING = (
+    *("gating.max_speed_mps", "gating.min_range_m", "gating.max_range_m"),
+    *("locating.window_s", "locating.max_candidates", "locating.max_time_gap_s"),
+    *("paper.z_score_threshold", "paper.window_s", "paper.max_range_m", "paper.max_speed_mps"),
+)
+"""Options that choose radar returns: they cannot change pairs that exist already."""
+
+
+def solve_pairs(
+    text: str, source: str, options: CalibrationOptions | None = None, fleet_prior: FleetPrior | None = None
+) -> Outcome:
+    """Solve for camera_from_radar from the text of a pairs-1 file, or again from that of a calibration-1 file.
+
+    Args:
+        text: the file's content.
+        source: its name, for error messages.
+        options: for the solver; None takes those of a calibration-1 file, and the defaults for a pairs-1 file, whose
+            own statements about noise replace the options.
+        fleet_prior: what the fleet says of this vehicle; None takes that of a calibration-1 file, if it has one.
+
+    Raises:
+        InputError: the text is neither, the method takes no fleet's prior, or a calibration without the candidates of its pairs.
+        OptionError: an option, or what the file says about noise, is out of range or cannot apply.
+    """
+    if names_schema(text, CALIBRATION_SCHEMA):
+        calibration = read_calibration(text, source).calibration
+        if options is not None:
+            _require_same_pairing(calibration.options, options, source)
+        try:
+            return solve_again(calibration, options, fleet_prior)
+        except InputError as error:
+            raise InputError(f"{source}: {error}") from None
+    options = checked_options(options or CalibrationOptions())
+    pairs_file = read_pairs(text, source, noise=options.noise)
+    return calibrate_pairs(pairs_file.pairs, pairs_file.camera, pairs_file.options(options), fleet_prior=fleet_prior)
+
+
+def _require_same_pairing(kept: CalibrationOptions, given: CalibrationOptions, source: str) -> None:
+    """Refuse options that chose the radar returns of a calibration and now differ.
+
+    Raises:
+        OptionError: names the first such option.
+    """
+    for path in _OPTIONS_OF_PAIRING:
+        value_of = attrgetter(path)
+        if value_of(kept) != value_of(given):
+            raise OptionError(
+                f"{source}: {path} chooses radar returns, and the pairs of this calibration were made with "
+                f"{value_of(kept):g}; to change it, solve from the recording"
+            )
+
+
+def camera_for(recording: Recording, camera_file: CameraFile | None) -> Camera | None:
+    """Return the intrinsics to solve with: the file's if one is given, else the recording's, else None.
+
+    Raises:
+        InputError: the file contains no camera, or one with an image size other than the recording's.
+    """
+    if camera_file is None:
+        return recording.camera()
+    picture = recording.image_bytes(0)
+    camera = camera_file.camera(image_size_px=(picture.width_px, picture.height_px))
+    if (camera.width_px, camera.height_px) != (picture.width_px, picture.height_px):
+        raise InputError(
+            f"{camera_file.source}: calibrated for {camera.width_px} x {camera.height_px} px, but the frames have "
+            f"{picture.width_px} x {picture.height_px} px; give the intrinsics of these frames, or "
+            "--rescale-camera if they are the calibrated ones resized"
+        )
+    return camera
+
+
+def intrinsics_near(paths: Sequence[Path]) -> Path | None:
+    """Return a file of intrinsics in or next to a recording, by its name; None if there is none."""
+    folders = dict.fromkeys(path if path.is_dir() else path.parent for path in paths)
+    names = ("*camera*.y*ml", "*intrinsic*.y*ml", "*camchain*.y*ml", "*calib*.y*ml")
+    found = (file for folder in folders for name in names for file in sorted(folder.glob(name)))
+    return next((file for file in found if file.is_file()), None)
+
+
+def calibration_text(
+    calibration: Calibration,
+    recording: Recording,
+    confirmed: Sequence[str] = (),
+    camera_file: CameraFile | None = None,
+    unconfirmed: UnconfirmedClicks | None = None,
+    fleet_prior: InputFile | None = None,
+    vehicle: VehicleNote | None = None,
+) -> str:
+    """Write a calibration-1 file; the page and the command line give the same bytes for the same clicks.
+
+    Args:
+        calibration: what was solved.
+        recording: what it was solved from; assumptions about it that nobody has confirmed become warnings of the file.
+        confirmed: texts of the assumptions that were confirmed after the recording was opened.
+        camera_file: the file whose intrinsics were used; None for the recording's own.
+        unconfirmed: clicks that nobody confirmed.
+        fleet_prior: the file of the fleet's prior; None without.
+        vehicle: which vehicle it is of; None if nobody said.
+    """
+    assumed = [
+        (one.assumption, one.confirmed or one.assumption.words in confirmed) for one in recording.stated_assumptions
+    ]
+    unsure = about_assumptions([assumption for assumption, sure in assumed if not sure])
+    if unsure:
+        calibration = dataclasses.replace(calibration, warnings=(*calibration.warnings, *unsure))
+    provenance = Provenance(
+        inputs=(
+            *recording.fingerprint(),
+            *([] if camera_file is None else [_input_file(camera_file)]),
+            *([] if fleet_prior is None else [fleet_prior]),
+        ),
+        radar_topic=recording.radar_topic,
+        radar_topics=recording.radar_topics,
+        radar_choice=recording.radar_choice,
+        image_topic=recording.image_topic,
+        camera_info_topic=recording.camera_info_topic,
+        radar_clock=recording.radar_clock,
+        image_clock=recording.image_clock,
+        radar_axes=recording.radar_axes,
+        video_start=recording.video_start,
+        version=version(),
+        column_map=recording.column_map,
+        assumptions=tuple(AssumptionNote(assumption.words, sure) for assumption, sure in assumed),
+        unconfirmed=unconfirmed,
+    )
+    return interchange_text(calibration, _frame_names(recording), provenance, vehicle=vehicle)
+
+
+def _input_file(camera_file: CameraFile) -> InputFile:
+    """Identify a file of intrinsics by its content."""
+    name, data = name_text(Path(camera_file.source).name), camera_file.data
+    return InputFile(name, len(data), hashlib.sha256(data).hexdigest())
+
+
+def _frame_names(recording: Recording) -> FrameNames:
+    """Return the recording's frame names, or the defaults if these are unusable: that must not cost the calibration."""
+    usual = FrameNames()
+    try:
+        return FrameNames(recording.radar_frame or usual.radar, recording.camera_frame or usual.camera)
+    except InputError as error:
+        _log.warning(
+            "the recording's frame names cannot be used; using %s and %s: %s", usual.radar, usual.camera, error
+        )
+        return usual
+
+
+def calibration_text_of_pairs(
+    calibration: Calibration,
+    text: str,
+    name: str,
+    fleet_prior: InputFile | None = None,
+    vehicle: VehicleNote | None = None,
+) -> str:
+    """Write a calibration-1 file for a calibration solved from a pairs-1 file, or again from a calibration-1 file.
+
+    Args:
+        calibration: what was solved.
+        text: the content of the file of pairs.
+        name: its name without the folder.
+        fleet_prior: the file of the fleet's prior, if one was given.
+        vehicle: which vehicle it is of; what it leaves out is taken from a calibration-1 file.
+    """
+    vehicle = vehicle or VehicleNote()
+    data = text.encode()
+    inputs = (
+        InputFile(name, len(data), hashlib.sha256(data).hexdigest()),
+        *([] if fleet_prior is None else [fleet_prior]),
+    )
+    if names_schema(text, CALIBRATION_SCHEMA):
+        file = read_calibration(text, name)
+        provenance = dataclasses.replace(file.provenance, inputs=inputs, version=version())
+        kept = tuple(warning for warning in file.calibration.warnings if warning.code in _KEPT_WARNINGS)
+        calibration = dataclasses.replace(calibration, warnings=(*calibration.warnings, *kept))
+        return interchange_text(calibration, file.frames, provenance, vehicle=vehicle.over(file.vehicle))
+    return interchange_text(calibration, provenance=Provenance(inputs=inputs, version=version()), vehicle=vehicle)

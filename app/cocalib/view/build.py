@@ -1,0 +1,168 @@
+"""Build the View of a session, in one pure call."""
+
+from collections.abc import Sequence
+
+from calib_core.association.placements import Placement
+from calib_core.diagnostics.consequence import by_consequence
+from calib_core.measurements import MIN_PAIRS, Stamp, Unpaired, Unsolvable
+from calib_core.results import Calibration, DataWarning
+from calib_core.verdict import Verdict
+from cocalib.box_tracks.carried import CarriedTrack, carried_tracks
+from cocalib.session import History, RecordingFacts, Session
+from cocalib.view.advice import advice_for
+from cocalib.view.box_panel import AccPanel
+from cocalib.view.box_rows import box_rows, known_labels
+from cocalib.view.click_rows import click_rows
+from cocalib.view.figures import assumed_figures, firm_text, metric_figures, pose_figures, residual_limit_px
+from cocalib.view.fleet_answer import fleet_sentences
+from cocalib.view.model import AssumptionRow, DismissedRow, Stage, SystematicErrorTable, View
+from cocalib.view.reference import Reference, comparison_figures, reference_words, shown_calibration
+from cocalib.view.systematic_errors import systematic_errors
+from cocalib.view.verdict_row import shown_verdict, verdict_row
+from cocalib.view.wording import sentence, warning_in_sentences
+
+__all__ = ["view"]
+
+_WITHOUT_PICTURES = (
+    "No camera in this recording: nothing can be clicked",
+    "Add the camera's file to calibrate: cocalib open RADAR CAMERA.",
+)
+
+
+def view(
+    history: History,
+    facts: RecordingFacts,
+    reference: Reference | None = None,
+    placements: Sequence[Placement] | None = None,
+    carried: Sequence[CarriedTrack] | None = None,
+    acc: AccPanel | None = None,
+) -> View:
+    """Return everything there is to draw about the current session.
+
+    Args:
+        history: the session with what can be undone and redone.
+        facts: the recording's frames.
+        reference: a calibration to review; None if there is none.
+        placements: found in the radar data; None before they have been looked for.
+        carried: the session's boxes through the frames; None as long as they have not been followed.
+        acc: what the boxes say about the calibration; None before they have been judged.
+    """
+    session = history.present
+    outcome = session.outcome
+    calibration = outcome if isinstance(outcome, Calibration) else None
+    shown = shown_calibration(session, reference)
+    stage = _stage(session)
+    verdict = shown_verdict(session, facts, placements)
+    status, hint = _words(session, stage, reference, verdict) if facts.has_pictures else _WITHOUT_PICTURES
+    if stage == "solved" and facts.unconfirmed(session):
+        status += "; unconfirmed assumptions"
+    return View(
+        revision=session.revision,
+        stage=stage,
+        status=status,
+        hint=hint,
+        solving=session.needs_solving,
+        checking=session.is_checking,
+        solved_revision=session.outcome_revision if outcome is not None else -1,
+        can_undo=bool(history.past),
+        can_redo=bool(history.future),
+        has_calibration=calibration is not None,
+        method=session.options.method,
+        clicks=click_rows(session, facts),
+        metrics=metric_figures(calibration) if calibration else (),
+        pose=pose_figures(shown) if shown else (),
+        pose_assumed=assumed_figures(shown) if shown else (),
+        systematic_errors=systematic_errors(shown) if shown else SystematicErrorTable(),
+        fleet=fleet_sentences(calibration) if calibration else (),
+        warnings=_warnings(calibration) if calibration else (),
+        options=session.options,
+        residual_limit_px=residual_limit_px(calibration) if calibration else None,
+        advice=advice_for(calibration, verdict) if calibration else None,
+        reference=reference.name if reference else "",
+        comparison=comparison_figures(reference, calibration) if reference and calibration else (),
+        assumptions=_assumptions(session, facts),
+        verdict=verdict_row(verdict, session, placements),
+        dismissed=tuple(DismissedRow(Stamp.of(one.time), one.position_m) for one in session.dismissed),
+        acknowledged=session.acknowledged,
+        boxes=box_rows(session.boxes, carried_tracks(session.boxes, facts) if carried is None else carried, facts),
+        box_labels=known_labels(session.boxes),
+        acc=acc or AccPanel(),
+    )
+
+
+def _assumptions(session: Session, facts: RecordingFacts) -> tuple[AssumptionRow, ...]:
+    return tuple(AssumptionRow(one.text, sentence(one.text), sentence(one.hint)) for one in facts.unconfirmed(session))
+
+
+def _stage(session: Session) -> Stage:
+    if not session.clicks:
+        return "collecting"
+    if session.needs_solving:
+        return "solving"
+    if isinstance(session.outcome, Calibration):
+        return "solved"
+    return "collecting" if _waits_for_clicks(session) else "unsolvable"
+
+
+def _missing(session: Session) -> int:
+    """Return how many placements are still needed to solve; clicks without a radar position do not count."""
+    unseen = {row.id for row in _unpaired(session)}
+    usable = sum(click.counts and click.id not in unseen for click in session.clicks)
+    return max(0, MIN_PAIRS - usable)
+
+
+def _unpaired(session: Session) -> tuple[Unpaired, ...]:
+    """Return the current clicks without a radar position, according to the latest outcome."""
+    here = {click.id for click in session.clicks}
+    return tuple(row for row in session.outcome.unpaired if row.id in here) if session.outcome else ()
+
+
+def _waits_for_clicks(session: Session) -> bool:
+    """Return whether more placements are all that is missing, according to the latest outcome."""
+    blocked = isinstance(session.outcome, Unsolvable) and session.outcome.code != "too-few-pairs"
+    return _missing(session) > 0 and not blocked
+
+
+def _words(session: Session, stage: Stage, reference: Reference | None, verdict: Verdict) -> tuple[str, str]:
+    """Return the status line and the next thing to do."""
+    missing, outcome = _missing(session), session.outcome
+    if reference is not None and _waits_for_clicks(session) and not isinstance(outcome, Calibration):
+        return reference_words(session, reference), _still_missing(session, missing, verdict)
+    if _waits_for_clicks(session):
+        return f"{missing} more placement{'s' if missing > 1 else ''} needed", _next_click(session, verdict)
+    if session.is_checking and isinstance(outcome, Calibration):
+        return _agreement(outcome, "Checking…"), ""
+    if stage == "solving":
+        return "Solving…", ""
+    if isinstance(outcome, Unsolvable):
+        return sentence(outcome.reason), sentence(outcome.hint)
+    if isinstance(outcome, Calibration):
+        return _agreement(outcome, f"{verdict.level.capitalize()}:"), sentence(verdict.action)
+    return "", ""
+
+
+def _still_missing(session: Session, missing: int, verdict: Verdict) -> str:
+    """Return what a new calibration still needs, once there is a click."""
+    if _unpaired(session):
+        return _next_click(session, verdict)
+    return f"{missing} more placement{'s' if missing > 1 else ''} for a new calibration." if session.clicks else ""
+
+
+def _next_click(session: Session, verdict: Verdict) -> str:
+    unpaired = _unpaired(session)
+    if not unpaired:
+        return sentence(verdict.action)
+    count = "The click has" if len(session.clicks) == 1 else f"{len(unpaired)} of {len(session.clicks)} clicks have"
+    return f"{count} no radar position: {unpaired[0].reason}. {sentence(unpaired[0].hint)}"
+
+
+def _agreement(calibration: Calibration, word: str) -> str:
+    used = [pair for pair in calibration.pairs if not pair.excluded]
+    agreeing = sum(pair.inlier for pair in used)
+    agreed = f"all {len(used)}" if agreeing == len(used) else f"{agreeing} of {len(used)}"
+    firm = "" if calibration.sees_elevation else f"; {firm_text(calibration)}"
+    return f"{word} {agreed} pairs agree{firm}"
+
+
+def _warnings(calibration: Calibration) -> tuple[DataWarning, ...]:
+    return tuple(map(warning_in_sentences, by_consequence(calibration.warnings)))

@@ -1,0 +1,164 @@
+"""The radar returns that may belong to a click: where each is, how well it fits, and which one would fit better."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.estimation.candidate_fit import CandidateFit, candidate_fits
+from calib_core.measurements import Candidate, Pair
+from calib_core.radar import polar_from_cartesian
+from calib_core.results import Calibration
+from cocalib.session import Session
+from cocalib.view.direction import position_words
+
+__all__ = ["CandidateRow", "PairCandidates", "click_candidates", "pair_of_click"]
+
+_FITS = 9.21  # 99 % quantile of chi-squared with 2 degrees of freedom
+_BETTER = 0.5  # probability from which on another return is suggested
+_SAME_M = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class CandidateRow:
+    """One radar return that may belong to a click.
+
+    Attributes:
+        position_m: (x, y, z) as the radar reports it.
+        range_m: from the radar.
+        azimuth_deg: positive to the left.
+        elevation_deg: positive upwards.
+        snr_db: mean of its returns; None if the radar has none.
+        scans: in how many scans of the window it was seen.
+        probability: that it is the reflector, 0 to 1; before there is a pose, its plausibility among the others.
+        u_px: column of its reprojection; None without a pose, or if the camera does not see it.
+        v_px: row.
+        distance_px: from the click to the reprojection; None likewise.
+        used: the pair has this return now.
+        chosen: because a person chose it.
+        words: where it is, as text: "20.0 m, 2.5° right, 0.4° down".
+    """
+
+    position_m: tuple[float, float, float]
+    range_m: float
+    azimuth_deg: float
+    elevation_deg: float
+    snr_db: float | None
+    scans: int
+    probability: float | None
+    u_px: float | None
+    v_px: float | None
+    distance_px: float | None
+    used: bool
+    chosen: bool
+    words: str
+
+
+@dataclass(frozen=True, slots=True)
+class PairCandidates:
+    """The candidates of the selected click.
+
+    Attributes:
+        click: its id.
+        revision: of the session that they belong to.
+        rows: the most probable first.
+        suggested: index of the row that would fit better than the one in use; -1 if there is none.
+        suggestion: the same as a sentence; "" if there is none.
+    """
+
+    click: str
+    revision: int
+    rows: tuple[CandidateRow, ...]
+    suggested: int = -1
+    suggestion: str = ""
+
+
+def pair_of_click(session: Session, click_id: str) -> Pair | None:
+    """Return the pair of a click in the latest outcome, with all its candidates; None if it has none."""
+    outcome = session.outcome
+    if outcome is None:
+        return None
+    if isinstance(outcome, Calibration):
+        return next((pair.measured for pair in outcome.pairs if pair.id == click_id), None)
+    return next((pair for pair in outcome.pairs if pair.id == click_id), None)
+
+
+def click_candidates(session: Session, pair: Pair, more: Sequence[Candidate] = ()) -> PairCandidates:
+    """List the returns that may belong to a click.
+
+    Args:
+        session: with the latest outcome.
+        pair: of the click, from that outcome.
+        more: further returns of the window that may fit the pose.
+    """
+    calibration = session.outcome if isinstance(session.outcome, Calibration) else None
+    candidates = _distinct((*pair.candidates, *pair.set_aside, *more))
+    used = _used(calibration, pair, candidates)
+    fits = candidate_fits(calibration, pair, candidates) if calibration else ()
+    rows = [
+        _row(one, fits[i] if fits else None, used=i == used, chosen=i == used and pair.chosen is not None)
+        for i, one in enumerate(candidates)
+    ]
+    order = sorted(range(len(rows)), key=lambda i: (-(rows[i].probability or 0.0), i))
+    better = _better(fits, used)
+    ordered = tuple(rows[i] for i in order)
+    if better < 0:
+        return PairCandidates(pair.id, session.revision, ordered)
+    words = f"The return at {rows[better].words} fits this click: C takes it"
+    return PairCandidates(pair.id, session.revision, ordered, order.index(better), words)
+
+
+def _distinct(candidates: Sequence[Candidate]) -> list[Candidate]:
+    kept: list[Candidate] = []
+    for one in candidates:
+        if all(np.abs(one.position_radar_m - other.position_radar_m).max() > _SAME_M for other in kept):
+            kept.append(one)
+    return kept
+
+
+def _used(calibration: Calibration | None, pair: Pair, candidates: Sequence[Candidate]) -> int:
+    """Return the index of the candidate in use; -1 before there is a pose."""
+    if calibration is None:
+        return 0 if pair.chosen is not None else -1
+    point = next(one.point_radar_m for one in calibration.pairs if one.id == pair.id)
+    away = [float(np.abs(one.position_radar_m - point).max()) for one in candidates]
+    return int(np.argmin(away)) if away and min(away) <= _SAME_M else -1
+
+
+def _better(fits: Sequence[CandidateFit], used: int) -> int:
+    """Return the index of a candidate that fits where the one in use does not; -1 if there is none."""
+    if not fits:
+        return -1
+    probability = [0.0 if math.isnan(fit.probability) else fit.probability for fit in fits]
+    best = int(np.argmax(probability))
+    in_use_fits = 0 <= used < len(fits) and fits[used].squared <= _FITS
+    good = probability[best] >= _BETTER and fits[best].squared <= _FITS
+    return best if good and best != used and not in_use_fits else -1
+
+
+def _row(candidate: Candidate, fit: CandidateFit | None, *, used: bool, chosen: bool) -> CandidateRow:
+    x_m, y_m, z_m = candidate.position_radar_m.tolist()
+    range_m, azimuth, elevation = polar_from_cartesian(candidate.position_radar_m[None])[0].tolist()
+    seen = fit is not None and bool(np.isfinite(fit.projected_px).all())
+    u_px, v_px = fit.projected_px.tolist() if fit is not None and seen else (None, None)
+    probability = candidate.score if fit is None else fit.probability
+    return CandidateRow(
+        position_m=(x_m, y_m, z_m),
+        range_m=round(range_m, 3),
+        azimuth_deg=round(math.degrees(azimuth), 3),
+        elevation_deg=round(math.degrees(elevation), 3),
+        snr_db=_number(candidate.snr_db, 1),
+        scans=candidate.scans,
+        probability=_number(probability, 3),
+        u_px=u_px,
+        v_px=v_px,
+        distance_px=_number(fit.distance_px, 2) if fit is not None and seen else None,
+        used=used,
+        chosen=chosen,
+        words=position_words(candidate.position_radar_m),
+    )
+
+
+def _number(value: float, digits: int) -> float | None:
+    return round(float(value), digits) if math.isfinite(value) else None

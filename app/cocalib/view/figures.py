@@ -1,0 +1,183 @@
+"""The figures next to the picture, each with one sentence that explains it."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from calib_core.radar_axes import sigma_in_radar_axes
+from calib_core.results import Calibration
+from cocalib.view.model import Figure
+from cocalib.view.mounting import mounting_of
+from cocalib.view.number_format import plain, with_sigma
+from cocalib.view.reprojections import reprojections
+from cocalib.view.wording import sentence
+
+__all__ = ["assumed_figures", "firm_text", "metric_figures", "pose_figures", "residual_limit_px"]
+
+_HELD_OUT_RATIO = 1.5
+"""A higher ratio of held-out to fitted error means that the pose depends too much on single pairs."""
+
+
+def metric_figures(calibration: Calibration) -> tuple[Figure, ...]:
+    """Return the figures that say how well the pairs agree."""
+    metrics = calibration.metrics
+    used = sum(not pair.excluded for pair in calibration.pairs)
+    agreeing = sum(pair.inlier and not pair.excluded for pair in calibration.pairs)
+    over = f"over {metrics.n} pairs"
+    return (
+        _figure(
+            "aed",
+            "average distance (AED)",
+            metrics.aed_px,
+            f"Mean distance between click and reprojection {over} (paper: AED).",
+        ),
+        _held_out_figure(calibration),
+        _figure(
+            "cdsd",
+            "spread (CDSD)",
+            metrics.cdsd_px,
+            "Standard deviation of these distances, with divisor N - 1 (paper: CDSD).",
+        ),
+        _figure(
+            "rms",
+            "root mean square (RMS)",
+            metrics.rms_px,
+            "Root mean square of these distances: large ones count more than in AED.",
+        ),
+        Figure(
+            "inliers",
+            "pairs that agree",
+            f"{agreeing} of {used}",
+            "",
+            "Pairs that agree on the pose, out of all that you have not excluded.",
+            "good" if agreeing == used else "plain",
+        ),
+    )
+
+
+def _figure(key: str, label: str, value_px: float, hint: str) -> Figure:
+    return Figure(key, label, plain(value_px), "px", hint)
+
+
+def _held_out_figure(calibration: Calibration) -> Figure:
+    """Return the held-out error, with a warning if it is far above the fitted one."""
+    metrics = calibration.metrics
+    hint = "Mean distance when each pair is predicted from all the others: the error to expect at a new placement."
+    figure = _figure("held_out_aed", "new placement (held-out AED)", metrics.held_out_aed_px, hint)
+    if metrics.held_out_aed_px > _HELD_OUT_RATIO * metrics.aed_px:
+        warning = "It is well above the mean residual, so the pose depends on single pairs: add placements."
+        return replace(figure, hint=f"{hint} {warning}", level="warning")
+    return figure
+
+
+def pose_figures(calibration: Calibration) -> tuple[Figure, ...]:
+    """Return the camera's position and angles relative to the radar, with one standard deviation, and that in the picture.
+
+    For a radar without elevation only what the pairs determine; `assumed_figures` returns the rest.
+    """
+    figures = _mounting_figures(calibration)
+    shown = figures if calibration.sees_elevation else tuple(one for one in figures if one.key in _FIRM)
+    return (*shown, *_picture_figures(calibration), *_radar_figures(calibration))
+
+
+def assumed_figures(calibration: Calibration) -> tuple[Figure, ...]:
+    """Return what a radar without elevation leaves to assumptions: height, roll and pitch; empty for other radars."""
+    if calibration.sees_elevation:
+        return ()
+    why = " This radar measures no elevation: the value holds if it is level and at the height of the placements."
+    return tuple(replace(one, hint=one.hint + why) for one in _mounting_figures(calibration) if one.key not in _FIRM)
+
+
+def firm_text(calibration: Calibration) -> str:
+    """Return what a radar without elevation determines, in one line."""
+    figures = [one for one in pose_figures(calibration) if one.key in (*_FIRM, "picture")]
+    return ", ".join(f"{one.label} {one.value} {one.unit}" for one in figures)
+
+
+def _mounting_figures(calibration: Calibration) -> tuple[Figure, ...]:
+    mounting = mounting_of(calibration)
+    position_sigma_m, angle_sigma_rad = mounting.position_sigma_m.copy(), mounting.roll_pitch_yaw_sigma_rad.copy()
+    if not calibration.sees_elevation:
+        firm = sigma_in_radar_axes(calibration.camera_from_radar, calibration.firm_covariance)
+        position_sigma_m[:2], angle_sigma_rad[2] = firm.position_m[:2], firm.rotation_rad[2]
+    causes = calibration.dominant_errors()
+    of_position, of_rotation = (
+        "".join(f" {sentence(one.sentence)}" for one in causes if getattr(one, f"{part}_share"))
+        for part in ("position", "rotation")
+    )
+    centimetres, sigmas_cm = 100 * mounting.position_m, 100 * position_sigma_m
+    degrees, sigmas_deg = np.rad2deg(mounting.roll_pitch_yaw_rad), np.rad2deg(angle_sigma_rad)
+    return (
+        *(_directed(*row, "cm", of_position) for row in zip(_POSITION, centimetres, sigmas_cm, strict=True)),
+        *(_directed(*row, "deg", of_rotation) for row in zip(_ANGLES, degrees, sigmas_deg, strict=True)),
+    )
+
+
+def _directed(what: tuple[str, str, str, str], value: float, sigma: float, unit: str, causes: str) -> Figure:
+    """Return a value without its sign, which its label says: "camera down 4.0", not "camera up -4.0"."""
+    key, positive, negative, hint = what
+    return Figure(
+        key, negative if value < 0 else positive, with_sigma(abs(float(value)), float(sigma)), unit, hint + causes
+    )
+
+
+def _picture_figures(calibration: Calibration) -> tuple[Figure, ...]:
+    """Return how far off a reprojection may be, if that is known."""
+    sigma_px = calibration.metrics.picture_sigma_px
+    if not np.isfinite(sigma_px):
+        return ()
+    hint = (
+        "One standard deviation, per axis, of where a radar position at the placements reprojects. Errors of pose and radar "
+        "mostly cancel there; the noise of a single radar position is not included."
+    )
+    return (Figure("picture", "in the picture", f"± {plain(sigma_px, 2)}", "px", hint),)
+
+
+def _radar_figures(calibration: Calibration) -> tuple[Figure, ...]:
+    """Return the error of the radar's own angles, if correcting it would help."""
+    angle_map = calibration.angle_map
+    if angle_map is None:
+        return ()
+    hint = (
+        "The radar's angle errors vary smoothly with direction, so no pose can remove them. Correcting them with the map "
+        f"in calibration.json (radar_angle_map) reduces the mean residual from {plain(angle_map.raw_aed_px)} to "
+        f"{plain(angle_map.corrected_aed_px)} px, each pair being corrected from the other pairs only."
+    )
+    return (
+        Figure("radar_angles", "radar angle error", f"up to {plain(np.rad2deg(angle_map.largest_rad))}", "deg", hint),
+    )
+
+
+def residual_limit_px(calibration: Calibration) -> float | None:
+    """Return the length above which a residual should be checked [px].
+
+    With the paper's method, RANSAC's threshold; otherwise the median of the 95 % ellipses' semi-major axes.
+    """
+    if calibration.options.method == "paper":
+        return calibration.options.paper.ransac_threshold_px
+    ellipses = (pair.ellipse for pair in reprojections(calibration.pairs).values())
+    lengths = [ellipse.semi_major_px for ellipse in ellipses if ellipse is not None]
+    return float(np.median(lengths)) if lengths else None
+
+
+_FIRM = ("camera_x", "camera_y", "yaw")
+"""What a radar without elevation determines."""
+
+_SIGMA = "± one standard deviation."
+_AHEAD = "relative to looking along the radar's x axis"
+_POSITION = (
+    (
+        "camera_x",
+        "camera forward",
+        "camera back",
+        f"Camera centre ahead of the radar or behind it, along its x axis, {_SIGMA}",
+    ),
+    ("camera_y", "camera left", "camera right", f"Camera centre to the side of the radar, along its y axis, {_SIGMA}"),
+    ("camera_z", "camera up", "camera down", f"Camera centre above or below the radar, along its z axis, {_SIGMA}"),
+)
+_ANGLES = (
+    ("roll", "roll to the right", "roll to the left", f"Camera tilted to its side, {_AHEAD}, {_SIGMA}"),
+    ("pitch", "pitch down", "pitch up", f"Camera looking down or up, {_AHEAD}, {_SIGMA}"),
+    ("yaw", "yaw left", "yaw right", f"Camera looking to the side, {_AHEAD}, {_SIGMA}"),
+)
+"""Key, label of a positive value, label of a negative one, explanation."""

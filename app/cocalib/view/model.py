@@ -1,0 +1,271 @@
+"""What a client draws: plain numbers and final text, with nothing left to decide."""
+
+from dataclasses import dataclass, field
+from typing import Literal, TypeAlias
+
+import msgspec
+
+from calib_core.measurements import Mark, Stamp
+from calib_core.options import CalibrationOptions, Method
+from calib_core.results import DataWarning
+from calib_core.verdict import VerdictLevel
+from cocalib.view.box_panel import AccPanel, BoxTrackRow
+from cocalib.view.figure import Figure, Level
+
+__all__ = [
+    "Advice",
+    "ClickRow",
+    "ClickState",
+    "DismissedRow",
+    "Ellipse",
+    "Figure",
+    "Level",
+    "Stage",
+    "SystematicErrorRow",
+    "SystematicErrorTable",
+    "VerdictRow",
+    "View",
+]
+
+ClickState: TypeAlias = Literal["pending", "inlier", "outlier", "excluded", "unpaired", "untouched"]
+Stage: TypeAlias = Literal["collecting", "solving", "solved", "unsolvable"]
+
+
+class Ellipse(msgspec.Struct, frozen=True, array_like=True):
+    """The region around a reprojection that contains 95 % of the residuals of a good pair; written as an array.
+
+    Attributes:
+        semi_major_px: semi-major axis.
+        semi_minor_px: semi-minor axis.
+        angle_rad: from the image's x axis (right) towards its y axis (down) to the longer axis.
+    """
+
+    semi_major_px: float
+    semi_minor_px: float
+    angle_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class ClickRow:
+    """One click: its mark on the picture and its row in the table.
+
+    Attributes:
+        id: the click's id.
+        image_time: stamp of its frame.
+        frame: index of its frame.
+        u_px: column of the click.
+        v_px: row of the click.
+        state: according to the latest outcome; "pending" if that does not cover it; "untouched" is a guess that does not count.
+        projected_px: reprojection of its radar position (u, v), rounded to 1 % of the ellipse or finer; None if it has none.
+        residual_px: length of projected_px minus the current click, rounded likewise; None without projected_px.
+        ellipse: None if the method has no noise model.
+        range_m: of its radar position; None without one.
+        azimuth_deg: of its radar position, positive to the left.
+        elevation_deg: of its radar position, positive upwards.
+        returns: how many radar returns the position averages; None if unknown.
+        outlier_probability: 0 to 1; None if the method has none.
+        note: text for the user; "" when there is nothing to say.
+        mark: how it came to its pixel.
+        sigma_px: its own standard deviation per axis; None if it has the options' value.
+        chosen: a person said which return belongs to it.
+    """
+
+    id: str
+    image_time: Stamp
+    frame: int
+    u_px: float
+    v_px: float
+    state: ClickState
+    projected_px: tuple[float, float] | None = None
+    residual_px: float | None = None
+    ellipse: Ellipse | None = None
+    range_m: float | None = None
+    azimuth_deg: float | None = None
+    elevation_deg: float | None = None
+    returns: int | None = None
+    outlier_probability: float | None = None
+    note: str = ""
+    mark: Mark = "clicked"
+    sigma_px: float | None = None
+    chosen: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class DismissedRow:
+    """A placement that the user dismissed.
+
+    Attributes:
+        time: a stamp within it.
+        position_m: (x, y, z) in the radar frame.
+    """
+
+    time: Stamp
+    position_m: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class SystematicErrorRow:
+    """One error that all pairs share, as a row of a table.
+
+    Attributes:
+        key: its name in files.
+        label: for display.
+        value: with its standard deviation; a dash if the pairs do not determine it.
+        prior: its standard deviation before any pair.
+        unit: of both; "" if it has none.
+        position_percent: its part of the variance of the position.
+        rotation_percent: the same of the rotation.
+        hint: what it is and what would reduce it, shown on hover.
+        level: "warning" if it makes up a third or more of either.
+    """
+
+    key: str
+    label: str
+    value: str
+    prior: str
+    unit: str
+    position_percent: int
+    rotation_percent: int
+    hint: str
+    level: Level = "plain"
+
+
+@dataclass(frozen=True, slots=True)
+class SystematicErrorTable:
+    """The errors that all pairs share.
+
+    Attributes:
+        rows: those that matter, the largest first.
+        note: on those left out; "" if there are none.
+        sentences: what the largest of them mean, and what would reduce them.
+    """
+
+    rows: tuple[SystematicErrorRow, ...] = ()
+    note: str = ""
+    sentences: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """Where to put the reflector next.
+
+    Attributes:
+        u_px: column where it would appear.
+        v_px: row.
+        range_m: how far from the radar.
+        gain: present uncertainty divided by the one expected afterwards, at least 1.
+        may_stop: no further placement would help noticeably.
+        position_radar_m: (x, y, z) in the radar frame.
+        words: the same as text, one or two sentences.
+    """
+
+    u_px: float
+    v_px: float
+    range_m: float
+    gain: float
+    may_stop: bool
+    position_radar_m: tuple[float, ...]
+    words: str
+
+
+@dataclass(frozen=True, slots=True)
+class VerdictRow:
+    """How far the calibration can be trusted, in one line, and what to do.
+
+    Attributes:
+        level: decides word, colour and shape.
+        line: level and reason: "usable to 0.5 deg, 6 cm (95 %); 7 px at 20 m".
+        action: the one thing that helps most, as a sentence.
+        key: of the page, that does or begins it; "" if there is none.
+        done: nothing more is needed.
+    """
+
+    level: VerdictLevel
+    line: str
+    action: str
+    key: Literal["", "N", "E", "J"] = ""
+    done: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class AssumptionRow:
+    """An assumption about the recording that waits for the user's confirmation.
+
+    Attributes:
+        text: identifies it, also in the page's confirmation.
+        words: the same as a sentence.
+        hint: what to do if it is right, and if it is not.
+    """
+
+    text: str
+    words: str
+    hint: str
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """Everything a client draws about the session.
+
+    Attributes:
+        revision: of the session; grows with every change.
+        stage: how far the session has come.
+        status: the same in a few words: "4 more placements needed", "Solving…", "Usable: 18 of 20 pairs agree".
+        hint: the next thing to do; "" when there is none.
+        solving: this revision is being solved; what is shown belongs to an older one, unless it is being checked.
+        checking: what is shown is a preview of this revision's answer; warnings and advice are still the previous ones.
+        solved_revision: the revision that the figures belong to; -1 without figures.
+        can_undo: whether there is a change to undo.
+        can_redo: whether there is a change to redo.
+        has_calibration: whether there is a calibration to download.
+        method: the one in the options.
+        clicks: in order of image time.
+        metrics: how well the pairs agree.
+        pose: the camera's position and angles relative to the radar, and the uncertainty in the picture.
+        pose_assumed: the part of the pose that a radar without elevation does not show; empty for others.
+        systematic_errors: the errors that all pairs share, and their parts in the uncertainty.
+        fleet: what the fleet's prior did, in sentences; empty without one.
+        warnings: of the latest outcome, the gravest first.
+        options: the current ones; changes are sent as a part of this tree.
+        residual_limit_px: residuals above this should be checked; None without a calibration.
+        advice: where to put the reflector next; None without a calibration.
+        reference: file name of the calibration under review; "" if there is none.
+        comparison: how far the solved calibration is from the reference; empty if either is missing.
+        assumptions: what the recording does not state, reading it takes for granted, and nobody has confirmed.
+        verdict: how far the calibration can be trusted, and what to do next.
+        dismissed: the placements that the user dismissed.
+        acknowledged: the codes of the warnings that the user has read.
+        boxes: around moving objects, one row per object.
+        box_labels: the classes to choose from.
+        acc: what the boxes say about the calibration.
+    """
+
+    revision: int
+    stage: Stage
+    status: str
+    hint: str
+    solving: bool
+    checking: bool
+    solved_revision: int
+    can_undo: bool
+    can_redo: bool
+    has_calibration: bool
+    method: Method
+    clicks: tuple[ClickRow, ...]
+    metrics: tuple[Figure, ...]
+    pose: tuple[Figure, ...]
+    warnings: tuple[DataWarning, ...]
+    options: CalibrationOptions
+    residual_limit_px: float | None
+    advice: Advice | None = None
+    reference: str = ""
+    comparison: tuple[Figure, ...] = ()
+    pose_assumed: tuple[Figure, ...] = ()
+    assumptions: tuple[AssumptionRow, ...] = ()
+    dismissed: tuple[DismissedRow, ...] = ()
+    acknowledged: tuple[str, ...] = ()
+    boxes: tuple[BoxTrackRow, ...] = ()
+    box_labels: tuple[str, ...] = ()
+    acc: AccPanel = field(default_factory=AccPanel)
+    systematic_errors: SystematicErrorTable = field(default_factory=SystematicErrorTable)
+    fleet: tuple[str, ...] = ()
+    verdict: VerdictRow = VerdictRow("nothing", "nothing yet", "")

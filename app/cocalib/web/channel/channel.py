@@ -1,0 +1,308 @@
+"""One page's channel: reads its messages and answers them in order, without waiting for other pages."""
+
+import asyncio
+from functools import partial
+from typing import Protocol
+
+from calib_core.errors import CalibrationError
+from calib_core.measurements import RadarScan, RadarScans, TimeNs
+from cocalib.error_boundary import error_boundary
+from cocalib.session import Step
+from cocalib.view import sentence
+from cocalib.view.box_rows import boxes_in_frame
+from cocalib.web.channel.click_candidates import candidates_of
+from cocalib.web.channel.desk import answer_of
+from cocalib.web.channel.hub import Hub
+from cocalib.web.channel.newest import NewestWins
+from cocalib.web.channel.outbox import Outbox
+from cocalib.web.channel.radar_survey import placements_at
+from cocalib.web.channel.review import ReviewDesk
+from cocalib.web.channel.snapping import snapped
+from cocalib.web.channel.space_feed import SpaceFeed
+from cocalib.web.channel.view_feed import Shown
+from cocalib.web.messages import (
+    BoxesWanted,
+    Command,
+    CursorMoved,
+    Done,
+    FollowingStopped,
+    FrameBoxes,
+    FrameHeader,
+    FrameWanted,
+    Hello,
+    ImportWanted,
+    Incoming,
+    LensRequest,
+    OpeningCommand,
+    Problem,
+    ProposingSwitch,
+    ReviewRequest,
+    Snapped,
+    SnapWanted,
+    ViewpointWanted,
+    ViewWanted,
+    encode,
+    encode_frame,
+    parse,
+    request_of,
+)
+from cocalib.web.radar_sight import look_of, overlay_of
+from cocalib.web.view3d.scene import TabScene
+
+__all__ = ["Channel", "Socket"]
+
+_GREET_EVERY_S = 0.25
+"""Minimum time between two greetings of one page, and between two whole Views that it asks for [s]."""
+
+
+class Socket(Protocol):
+    """The part of a WebSocket that a channel needs."""
+
+    async def recv(self) -> str | bytes: ...  # noqa: D102
+    async def send(self, message: str | bytes, /) -> None: ...  # noqa: D102
+
+
+class Channel:
+    """One page. Runs on the event loop."""
+
+    def __init__(self, hub: Hub) -> None:
+        self.outbox = Outbox()
+        self.scene: TabScene | None = None
+        self._hub = hub
+        self._cursor = CursorMoved(0)
+        self._shown: Shown | None = None
+        self._greetings = NewestWins(self._greet, self._report)
+        self._views = NewestWins(self._show_whole, self._report)
+        self._frames = NewestWins(self._send_frame, self._report)
+        self._overlay = NewestWins(self._send_overlay, self._report)
+        self._space = NewestWins(self._draw_space, self._report)
+        self._review = ReviewDesk(hub.workspace, hub.recording, lambda: hub.camera, self.outbox, self._report)
+        self._space_feed = SpaceFeed(hub)
+        self._candidates = NewestWins(self._send_candidates, self._report)
+        self._forward = True
+        self._has_candidates = False
+        self._has_boxes = False
+
+    async def run(self, socket: Socket) -> None:
+        """Serve the page until it disconnects; the socket's exception is then raised to the caller."""
+        self._hub.tabs.add(self)
+        sending = asyncio.create_task(self.outbox.deliver(socket.send))
+        reading = asyncio.create_task(self._read(socket))
+        try:
+            done, _ = await asyncio.wait({sending, reading}, return_when=asyncio.FIRST_COMPLETED)
+            for task in done:
+                task.result()
+        finally:
+            self._hub.tabs.discard(self)
+            for worker in (self._greetings, self._views, self._frames, self._overlay, self._space, self._candidates):
+                worker.close()
+            self._review.close()
+            for task in (sending, reading):
+                task.cancel()
+            await asyncio.gather(sending, reading, return_exceptions=True)
+
+    @property
+    def is_playing(self) -> bool:
+        """Whether the page plays now."""
+        return self._cursor.playing
+
+    def show(self) -> None:
+        """Send the newest View, or what differs from the one that the page has."""
+        self.outbox.put(self._view_text, kind="view")
+
+    def refresh(self) -> None:
+        """Draw again, after a change of the session or once the 3D view is connected."""
+        self._overlay.give(self._cursor)
+        self._space.give(self._cursor)
+        if not self._cursor.playing:
+            self._candidates.give(self._cursor)
+
+    def show_boxes(self) -> None:
+        """Send the boxes of the frame on the page; nothing as long as there are none, as before."""
+        carried = self._hub.workspace.carried
+        if carried or self._has_boxes:
+            self._has_boxes = bool(carried)
+            index = self._cursor.index
+            returns = self._hub.box_judging.returns(index)
+            self.outbox.put(encode(FrameBoxes(index, boxes_in_frame(carried, index), returns)), kind="boxes")
+
+    async def _read(self, socket: Socket) -> None:
+        while True:
+            text = await socket.recv()
+            with error_boundary("a page's message", partial(self._refuse, text)):
+                try:
+                    await self._take(parse(text))
+                except CalibrationError as error:
+                    self._refuse(text, str(error))
+
+    def _report(self, line: str) -> None:
+        self.outbox.put(encode(Problem(sentence(line))))
+
+    def _refuse(self, text: str | bytes, reason: str) -> None:
+        self.outbox.put(encode(Problem(sentence(reason), request=request_of(text))))
+
+    async def _take(self, incoming: Incoming) -> None:
+        """Carry out a command, or answer a message about the choice of a recording."""
+        if not isinstance(incoming.command, OpeningCommand):
+            await self._obey(incoming.command)
+            if incoming.request is not None:
+                self.outbox.put(encode(Done(incoming.request)))
+            return
+        for text in await answer_of(self._hub.desk, incoming):
+            self.outbox.put(text)
+
+    async def _obey(self, command: Command) -> None:
+        """Carry out a command of the page.
+
+        Raises:
+            CalibrationError: it cannot be done; nothing changed.
+        """
+        if isinstance(command, FrameWanted | Hello | ViewWanted | ReviewRequest):
+            self._give(command)
+        elif isinstance(command, CursorMoved):
+            self._move(command)
+        elif isinstance(command, ViewpointWanted):
+            if self.scene is not None:
+                self.scene.look_from(command.viewpoint)
+        elif isinstance(command, FollowingStopped | ProposingSwitch):
+            self._switch(command)
+        elif isinstance(command, SnapWanted):
+            self.outbox.put(encode(await self._snapped(command)))
+        elif isinstance(command, LensRequest):
+            await self._hub.lens.obey(command)
+        else:
+            await self._change(command)
+
+    async def _snapped(self, wanted: SnapWanted) -> Snapped:
+        """Search for an apex in one frame, or in those of its placement.
+
+        Raises:
+            CalibrationError: the frame cannot be read.
+        """
+        hub = self._hub
+        if wanted.over_dwell:
+            return await hub.proposing.averaged(wanted)
+        return await snapped(wanted, hub.moments, hub.frames, hub.executor)
+
+    def _switch(self, command: FollowingStopped | ProposingSwitch) -> None:
+        """Start or stop what goes on in the background."""
+        if isinstance(command, ProposingSwitch):
+            self._hub.proposing.switch(command)
+        else:
+            self._hub.box_following.stop()
+
+    def _give(self, command: FrameWanted | Hello | ViewWanted | ReviewRequest) -> None:
+        """Hand over what a newer request of the same kind supersedes."""
+        if isinstance(command, FrameWanted):
+            self._frames.give(command)
+        elif isinstance(command, Hello):
+            self._greetings.give(command)
+        elif isinstance(command, ViewWanted):
+            self._views.give(command)
+        else:
+            self._review.give(command)
+
+    async def _change(self, command: Step | ImportWanted | BoxesWanted) -> None:
+        """Change the session, off the event loop.
+
+        Raises:
+            CalibrationError: it cannot be done; nothing changed.
+        """
+        workspace = self._hub.workspace
+        if isinstance(command, ImportWanted):
+            change = partial(workspace.import_clicks, command.text, command.name)
+        elif isinstance(command, BoxesWanted):
+            change = partial(workspace.load_boxes, command.content, command.name)
+        else:
+            change = partial(workspace.dispatch, command)
+        await asyncio.get_running_loop().run_in_executor(self._hub.steps, change)
+
+    def _view_text(self) -> str:
+        """Write the message that makes the page show the newest View; called when the page can take it."""
+        text, self._shown = self._hub.feed.message(self._shown)
+        return text
+
+    def _move(self, command: CursorMoved) -> None:
+        if not 0 <= command.index < len(self._hub.moments):
+            return
+        self._cursor = command
+        self.show_boxes()
+        self.refresh()
+
+    async def _greet(self, _wanted: Hello) -> None:
+        """Greet the page, at most so often: a greeting costs more than asking for it."""
+        self._shown = None
+        self._hub.greet(self)
+        await asyncio.sleep(_GREET_EVERY_S)
+
+    async def _show_whole(self, _wanted: ViewWanted) -> None:
+        """Send the whole View, at most as often as a greeting."""
+        self._shown = None
+        self.show()
+        await asyncio.sleep(_GREET_EVERY_S)
+
+    async def _send_frame(self, wanted: FrameWanted) -> None:
+        store, size = self._hub.frames, wanted.size
+        try:
+            frame = await store.get(wanted.index, size)
+        except (CalibrationError, ValueError, IndexError) as error:
+            self.outbox.put(
+                encode(Problem(f"Frame {wanted.index + 1} cannot be shown: {error}", request=wanted.request))
+            )
+            return
+        shape = (frame.width_px, frame.height_px, frame.scale, frame.format, size == "rectified")
+        header = FrameHeader(frame.index, wanted.request, *shape)
+        self.outbox.put(encode_frame(header, frame.data), kind="frame")
+        self._prefetch(wanted)
+
+    def _prefetch(self, wanted: FrameWanted) -> None:
+        if wanted.index != self._cursor.index:
+            self._forward = wanted.index > self._cursor.index
+        self._hub.frames.prefetch(wanted.index, wanted.size, 1 if self._forward or wanted.playing else -1)
+
+    async def _send_overlay(self, cursor: CursorMoved) -> None:
+        stamp = TimeNs(int(self._hub.moments[cursor.index]))
+        session = self._hub.workspace.session
+        if not self._hub.workspace.facts.has_pictures:
+            trail = await self._trail(stamp, cursor.trail_s)
+            look = look_of(cursor.index, stamp, trail, session.options.gating)
+            self.outbox.put(encode(look), kind="overlay")
+            return
+        scan = await self._scan(stamp)
+        overlay = overlay_of(
+            cursor.index, session, scan, placements_at(self._hub.survey, stamp), self._hub.workspace.reference
+        )
+        self.outbox.put(encode(overlay), kind="overlay")
+
+    async def _send_candidates(self, cursor: CursorMoved) -> None:
+        """Send the returns that may belong to the selected click; nothing if none is selected, as before."""
+        if cursor.selected is None and not self._has_candidates:
+            return
+        self._has_candidates = cursor.selected is not None
+        session = self._hub.workspace.session
+        find = partial(candidates_of, session, cursor.selected, self._hub.recording)
+        found = await asyncio.get_running_loop().run_in_executor(self._hub.executor, find)
+        self.outbox.put(encode(found), kind="candidates")
+
+    async def _draw_space(self, cursor: CursorMoved) -> None:
+        """Draw the 3D view, and send what the page draws over it."""
+        if self.scene is None:
+            return
+        look = await self._space_feed.draw(cursor, self.scene)
+        if look is not None:
+            self.outbox.put(encode(look), kind="space")
+
+    async def _scan(self, stamp: TimeNs) -> RadarScan | None:
+        """Return the scan at a time; None if it cannot be read."""
+        try:
+            return await asyncio.get_running_loop().run_in_executor(self._hub.executor, self._hub.radar.scan_at, stamp)
+        except CalibrationError:
+            return None
+
+    async def _trail(self, stamp: TimeNs, length_s: float) -> RadarScans:
+        """Return the scans of the last seconds; none if they cannot be read."""
+        try:
+            look = partial(self._hub.radar.trail, stamp, length_s)
+            return await asyncio.get_running_loop().run_in_executor(self._hub.executor, look)
+        except CalibrationError:
+            return RadarScans()

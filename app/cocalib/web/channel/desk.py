@@ -1,0 +1,44 @@
+"""Where the messages about the choice of a recording are answered, whether one is open or not."""
+
+import asyncio
+from typing import Protocol
+
+from calib_core.errors import InputError
+from cocalib.web.messages import Done, Incoming, OpeningCommand, Outgoing, encode
+
+__all__ = ["ClosedDesk", "Desk", "answer_of"]
+
+
+class Desk(Protocol):
+    """Answers what pages ask about the choice of a recording."""
+
+    def answer(self, command: OpeningCommand) -> Outgoing | None:
+        """Answer a message; may read files, so it is called outside the event loop.
+
+        Raises:
+            CalibrationError: it cannot be done; nothing changed.
+        """
+        ...
+
+
+class ClosedDesk:
+    """Answers for a server that was started with one recording and keeps it."""
+
+    def answer(self, command: OpeningCommand) -> Outgoing | None:
+        """Refuse."""
+        raise InputError("this server keeps its recording; start cocalib open to choose another one")
+
+
+async def answer_of(desk: Desk, incoming: Incoming) -> list[str]:
+    """Return the texts that answer a message about the choice of a recording.
+
+    Raises:
+        CalibrationError: it cannot be done; nothing changed.
+    """
+    assert isinstance(incoming.command, OpeningCommand)
+    try:
+        answer = await asyncio.get_running_loop().run_in_executor(None, desk.answer, incoming.command)
+    except OSError as error:
+        raise InputError(f"{error.filename or 'a file'}: {(error.strerror or str(error)).lower()}") from error
+    texts = [] if answer is None else [encode(answer)]
+    return texts if incoming.request is None else [*texts, encode(Done(incoming.request))]

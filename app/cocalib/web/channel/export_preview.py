@@ -1,0 +1,184 @@
+"""What the export panel shows of one format: the file's text, what its numbers mean, and the result of reading it back."""
+
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from calib_core.errors import InputError
+from calib_core.interchange import (
+    CalibrationFile,
+    CheckReport,
+    Export,
+    check,
+    contents_text,
+    export,
+    format_named,
+    imported,
+    missing_map,
+    read_any,
+)
+from calib_core.interchange.evidence import Evidence
+from calib_core.results import DataWarning
+from cocalib.view import sentence, warning_in_sentences
+from cocalib.web.exports.check_point import CheckPointRow, check_point_row
+from cocalib.web.exports.file_numbers import FileNumbers, PoseInFile, our_numbers, pose_in_file
+from cocalib.web.exports.format_list import FormatRow, format_rows
+from cocalib.web.exports.query import Field, FieldError, Fields, fields_in
+
+__all__ = ["ExportPreview", "FormatRow", "NoPreview", "export_preview", "exported", "format_rows"]
+
+_EVIDENCE: dict[Evidence, str] = {
+    "clicked": "Rests on clicks",
+    "imported_proven": "Imported; a check point, pairs or another calibration proved what its numbers mean",
+    "imported_assumed": "Imported; what its numbers mean was assumed, nothing proves it",
+    "automatic": "Rests on clicks that were placed automatically; nobody confirmed them",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ExportPreview:
+    """One format, before it is saved.
+
+    Attributes:
+        key: of the format.
+        file_name: what to call the file: recording, then format.
+        text: the file, or its contents as text if it is binary.
+        is_binary: the file itself is not text.
+        size_bytes: of the file.
+        numbers: what the file's numbers mean.
+        notes: what a user of the file must know.
+        is_for_rectified: it is for rectified pictures: those that the user declared rectified, or those that its maps make.
+        pose: the pose in the file, as read back: its direction, its frames and its numbers; None if it holds none.
+        our_pose: camera_from_radar of the calibration.
+        check_point: what a reader of the file must get; None if the calibration has none, or the file no pose.
+        check: what `cocalib check` says about the file.
+        check_is_good: whether it found no problem.
+        radar_frame: the calibration's name of the radar's frame.
+        camera_frame: its name of the camera's optical frame.
+        names_frames: the file holds frame names.
+        evidence: what the pose rests on.
+        missing: what the calibration has and this file cannot hold; "" if nothing.
+        warnings: of the calibration.
+    """
+
+    key: str
+    file_name: str
+    text: str
+    is_binary: bool
+    size_bytes: int
+    numbers: str
+    notes: tuple[str, ...]
+    is_for_rectified: bool
+    pose: PoseInFile | None
+    our_pose: FileNumbers
+    check_point: CheckPointRow | None
+    check: str
+    check_is_good: bool
+    radar_frame: str
+    camera_frame: str
+    names_frames: bool
+    evidence: str
+    missing: str
+    warnings: tuple[DataWarning, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class NoPreview:
+    """Why there is nothing to save yet, and what to do.
+
+    Attributes:
+        reason: in sentences.
+        field: the part of the panel that the user has to fill in or correct; "" if none.
+    """
+
+    reason: str
+    field: Field | None = None
+
+
+def exported(file: CalibrationFile, key: str, query: str) -> Export:
+    """Write a calibration in a format, with what the user filled in, from a URL's query.
+
+    Raises:
+        FieldError: a field cannot be used, or the format needs it.
+        InputError: the format cannot hold this calibration, or has no third frame.
+    """
+    return _exported(file, key, fields_in(query, file.frames))
+
+
+def export_preview(file: CalibrationFile, key: str, query: str, recording_name: str) -> ExportPreview:
+    """Show a calibration in a format before it is saved.
+
+    Args:
+        file: the calibration.
+        key: of the format.
+        query: of the URL, with what the user filled in.
+        recording_name: what the user calls the recording.
+
+    Raises:
+        FieldError: a field cannot be used, or the format needs it.
+        InputError: the format cannot hold this calibration, or has no third frame.
+    """
+    fields = fields_in(query, file.frames)
+    written, form = _exported(file, key, fields), format_named(key)
+    named = replace(file, frames=fields.frames)
+    whole = imported(named)
+    report = check(read_any(written.data, written.file_name) if form.reads else whole, against=whole)
+    saved = written.download
+    lost = () if form.holds_angle_map else missing_map(file.calibration)
+    return ExportPreview(
+        key=key,
+        file_name=f"{_slug(recording_name)}_{saved.file_name}",
+        text=contents_text(written),
+        is_binary=isinstance(written.content, bytes) or bool(written.extra_files),
+        size_bytes=len(saved.data),
+        numbers=sentence(form.numbers),
+        notes=tuple(sentence(note) for note in written.notes if note not in lost),
+        is_for_rectified=form.is_for_rectified and file.calibration.camera.is_distorted,
+        pose=pose_in_file(report.imported, fields.frames) if form.reads else None,
+        our_pose=our_numbers(file.calibration.camera_from_radar),
+        check_point=check_point_row(named, form, report.imported) if form.reads else None,
+        check=_read_back(report) if form.reads else "Not read back: this format has no pose to read.",
+        check_is_good=report.ok,
+        radar_frame=file.frames.radar,
+        camera_frame=file.frames.camera,
+        names_frames=report.imported.frames is not None,
+        evidence=_evidence(file),
+        missing=" ".join(map(sentence, lost)),
+        warnings=tuple(map(warning_in_sentences, file.calibration.warnings)),
+    )
+
+
+def _exported(file: CalibrationFile, key: str, fields: Fields) -> Export:
+    form = format_named(key)
+    try:
+        return export(
+            file,
+            key,
+            parent_from_radar=fields.parent_from_radar,
+            rectified=fields.rectified,
+            frames=fields.frames,
+        )
+    except InputError as error:
+        if form.is_for_rectified and file.calibration.camera.is_distorted and not fields.rectified:
+            raise FieldError("rectified", str(error)) from None
+        raise
+
+
+def _evidence(file: CalibrationFile) -> str:
+    """Return what the pose rests on, with the verdict, in one or two sentences."""
+    pairs = sum(1 for pair in file.calibration.pairs if pair.inlier)
+    count = f" ({pairs} pairs)" if file.rests_on == "clicked" and pairs else ""
+    verdict = f" Verdict: {file.verdict.line}." if file.verdict is not None else ""
+    return f"{_EVIDENCE[file.rests_on]}{count}.{verdict}"
+
+
+def _read_back(report: CheckReport) -> str:
+    """Return the result of reading the file back, in one line."""
+    first = report.results[0]
+    return "Read back: the pose matches the solved one." if first.code == "agrees" else f"Read back: {first.message}."
+
+
+def _slug(name: str) -> str:
+    """Return a recording's name as the start of a file name: letters, digits and underscores."""
+    stem = Path(name).stem if re.search(r"\.\w{2,6}$", name) else name
+    return re.sub(r"\W+", "_", stem.removeprefix("the ")).strip("_") or "recording"

@@ -1,0 +1,292 @@
+"""What all tabs share: the latest View, the survey of the radar, and the frames."""
+
+import asyncio
+import logging
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
+from dataclasses import replace
+from functools import partial
+from typing import Protocol
+
+from calib_core.camera import Camera
+from calib_core.errors import CalibrationError
+from calib_core.measurements import Stamp, TimeNs
+from calib_core.recordings import FollowedRecording, Recording, TopicSummary, clock_lines
+from calib_core.results import DataWarning
+from cocalib.error_boundary import error_boundary
+from cocalib.resources import version
+from cocalib.view import AccPanel, View, warning_in_sentences
+from cocalib.web.channel.box_following import BoxFollowing
+from cocalib.web.channel.box_judging import BoxJudging
+from cocalib.web.channel.desk import ClosedDesk, Desk
+from cocalib.web.channel.lens import LensDesk
+from cocalib.web.channel.live_edge import LiveEdge
+from cocalib.web.channel.outbox import Outbox
+from cocalib.web.channel.picture_changes import PictureChanges, changes_of
+from cocalib.web.channel.proposing import ProposingDesk
+from cocalib.web.channel.radar_survey import Survey, survey_of
+from cocalib.web.channel.view_feed import ViewFeed
+from cocalib.web.frames import FrameStore
+from cocalib.web.messages import (
+    Outgoing,
+    Placements,
+    Progress,
+    RecordingNote,
+    SensorNote,
+    SessionNote,
+    StampColumns,
+    encode,
+)
+from cocalib.web.radar_sight import RadarSight
+from cocalib.workspace import Workspace
+
+__all__ = ["Hub", "Tab"]
+
+_SEARCHING = "Searching the radar data for placements"
+_log = logging.getLogger(__name__)
+
+
+class Tab(Protocol):
+    """One open page."""
+
+    outbox: Outbox
+
+    @property
+    def is_playing(self) -> bool:
+        """Whether the page plays now."""
+
+    def show(self) -> None:
+        """Send the newest View, or what differs from the one that the page has."""
+
+    def show_boxes(self) -> None:
+        """Send the boxes of the frame on the page."""
+
+    def refresh(self) -> None:
+        """Draw the overlay and the 3D view again, after a change of the session."""
+
+
+class Hub:
+    """Runs on viser's event loop, except for the workspace's callback."""
+
+    def __init__(
+        self,
+        workspace: Workspace,
+        recording: Recording,
+        executor: Executor,
+        *,
+        desk: Desk | None = None,
+        opening: int = 1,
+        proposes: bool = False,
+    ) -> None:
+        self.desk: Desk = desk or ClosedDesk()
+        self._opening = opening
+        self.workspace = workspace
+        self.recording = recording
+        self.executor = executor
+        self.frames = FrameStore(recording, len(recording.image_times), executor, camera=lambda: workspace.camera)
+        self.radar = RadarSight(recording)
+        self.moments = workspace.facts.moments
+        self.survey: Survey | None = None
+        self.picture_changes = PictureChanges()
+        self.tabs: set[Tab] = set()
+        self.steps = ThreadPoolExecutor(max_workers=1, thread_name_prefix="steps")
+        self.feed = ViewFeed(workspace.view)
+        self.box_following = BoxFollowing(
+            workspace, recording, executor, lambda progress: self.broadcast(progress, "progress")
+        )
+        self.box_judging = BoxJudging(workspace, recording, executor, lambda: self.box_following.is_busy)
+        self.lens = LensDesk(workspace, recording, self.broadcast)
+        self.proposing = ProposingDesk(workspace, recording, self.broadcast, on=proposes)
+        self._searching: asyncio.Task[None] | None = None
+        self._edge = (
+            LiveEdge(self, workspace, recording, workspace.camera) if isinstance(recording, FollowedRecording) else None
+        )
+
+    async def start(self) -> None:
+        """Subscribe to the workspace, and start searching the radar."""
+        loop = asyncio.get_running_loop()
+        self.lens.start()
+        self.proposing.start()
+        self._end_subscription = self.workspace.subscribe(
+            lambda view: None if loop.is_closed() else _soon(loop, partial(self._take, view))
+        )
+        self._searching = loop.create_task(self._edge.run() if self._edge else self._search())
+
+    async def end(self) -> None:
+        """Unsubscribe, and cancel pending work."""
+        self._end_subscription()
+        if self._searching is not None:
+            self._searching.cancel()
+            await asyncio.gather(self._searching, return_exceptions=True)
+        await self.lens.close()
+        await self.proposing.close()
+        await self.box_following.close()
+        await self.box_judging.close()
+        await self.frames.close()
+
+    @property
+    def camera(self) -> Camera | None:
+        """The intrinsics in use; None if there are none."""
+        return self.workspace.camera
+
+    @property
+    def view(self) -> View:
+        """The latest View of the workspace."""
+        return self.feed.newest
+
+    def greet(self, tab: Tab) -> None:
+        """Send the current state to a page that has just opened."""
+        outbox = tab.outbox
+        outbox.put(encode(self._recording_note()), kind="recording")
+        tab.show()
+        self.lens.greet(outbox)
+        self.proposing.greet(outbox)
+        if self.survey is not None:
+            for kind, message in self._found(self.survey):
+                outbox.put(encode(message), kind=kind)
+        else:
+            outbox.put(encode(Progress(_SEARCHING, 0, 1)), kind="progress")
+        if self._edge is not None:
+            outbox.put(encode(self._edge.note), kind="following")
+
+    def grown(self, count: int) -> None:
+        """Take note of the number of frames of a recording that is still being written."""
+        self.frames.extend(count)
+
+    def concluded(self) -> None:
+        """Show what is known of the recording now that it is complete: its warnings, and how its sensors are read."""
+        self.broadcast(self._recording_note(), "recording")
+        self.proposing.follow()
+
+    def surveyed(self, survey: Survey) -> None:
+        """Show what the radar alone says, as far as it is known."""
+        before, self.survey = self.survey, survey
+        self.workspace.show_placements(survey.placements)
+        for kind, message in self._found(survey):
+            self.broadcast(message, kind)
+        self.proposing.surveyed(survey.placements)
+        if before is None:
+            self.broadcast(Progress(_SEARCHING, 1, 1), "progress")
+
+    def broadcast(self, message: Outgoing, kind: str) -> None:
+        """Send a message to all pages; it is encoded once."""
+        text = encode(message)
+        for tab in self.tabs:
+            tab.outbox.put(text, kind=kind)
+
+    def _take(self, view: View) -> None:
+        only_boxes = _without_boxes(view) == _without_boxes(self.feed.newest)
+        self.feed.take(view)
+        self.box_following.follow()
+        self.box_judging.judge()
+        self.lens.follow()
+        self.proposing.follow()
+        for tab in self.tabs:
+            tab.show()
+            tab.show_boxes()
+        if view.solving or only_boxes:
+            return  # overlay and 3D view show the last answer until the next one; redrawing would only slow the solver
+        for tab in self.tabs:
+            tab.refresh()
+
+    async def _search(self) -> None:
+        """Survey the radar once, off the event loop."""
+        options = self.workspace.session.options.gating
+        with error_boundary("searching the radar for placements", _log.error):
+            try:
+                self.survey = await asyncio.get_running_loop().run_in_executor(
+                    self.executor, lambda: survey_of(self.recording.radar_windows(), self.moments, options)
+                )
+            except CalibrationError as error:
+                _log.warning("the radar could not be searched for placements: %s", error)
+        if self.survey is not None:
+            self.workspace.show_placements(self.survey.placements)
+        self.broadcast(Progress(_SEARCHING, 1, 1), "progress")
+        for kind, message in self._found(self.survey):
+            self.broadcast(message, kind)
+        for tab in self.tabs:
+            tab.refresh()
+        self.proposing.surveyed(self.survey.placements if self.survey else ())
+        if self.workspace.facts.has_pictures:
+            with error_boundary("comparing the pictures", _log.error):
+                await changes_of(self.recording, self.moments, self.executor, self._compared, self._is_playing)
+
+    def _compared(self, changes: PictureChanges) -> None:
+        self.picture_changes = changes
+
+    def _is_playing(self) -> bool:
+        return any(tab.is_playing for tab in self.tabs)
+
+    def _found(self, survey: Survey | None) -> Iterator[tuple[str, Outgoing]]:
+        """Yield the messages about the whole radar recording, each with its kind; the map is drawn only without pictures."""
+        if survey is not None and not self.workspace.facts.has_pictures:
+            yield "radar_map", survey.map
+        yield "placements", survey.message if survey else Placements(())
+
+    def _recording_note(self) -> RecordingNote:
+        facts, recording, restored = self.workspace.facts, self.recording, self.workspace.restored
+        return RecordingNote(
+            name=facts.name,
+            radar_topic=recording.radar_topic or "none",
+            image_topic=recording.image_topic or "none",
+            width_px=facts.width_px,
+            height_px=facts.height_px,
+            has_pictures=facts.has_pictures,
+            frame_times=StampColumns.of(facts.moments),
+            start=Stamp.of(TimeNs(int(facts.moments[0]))),
+            radar=StampColumns.of(recording.radar_times),
+            warnings=tuple(map(warning_in_sentences, (*restored.warnings, *_settled(recording)))),
+            sensors=(
+                _radar_sensor(recording),
+                _sensor("camera", recording.image_topic, recording.topics),
+            ),
+            session=SessionNote(str(restored.folder), len(restored.history.present.clicks), restored.note),
+            version=version(),
+            opening=self._opening,
+            intrinsics=self.workspace.intrinsics,
+        )
+
+
+def _without_boxes(view: View) -> View:
+    """Return what the overlay and the 3D view depend on."""
+    return replace(view, boxes=(), box_labels=(), acc=AccPanel(), can_undo=False, can_redo=False)
+
+
+def _settled(recording: Recording) -> list[DataWarning]:
+    """Return the warnings about a recording, without its assumptions: those are in the view until they are confirmed."""
+    return [warning for warning in recording.warnings if warning.code != "assumed"]
+
+
+def _readings(recording: Recording) -> tuple[str, ...]:
+    """Say what was taken for what in the radar's messages, one quantity a line, and what else they hold."""
+    rows = [
+        f"{one.quantity} from {one.column}{f' [{one.unit}]' if one.unit else ''}{f', {one.sign}' if one.sign else ''} ({one.why})"
+        for one in recording.radar_columns
+    ]
+    return (*rows, *recording.radar_notes)
+
+
+def _radar_sensor(recording: Recording) -> SensorNote:
+    """Describe how the radar is read, and why this one."""
+    note = _sensor("radar", recording.radar_topic, recording.topics, _readings(recording))
+    if not recording.radar_choice:
+        return note
+    return replace(note, topic=" + ".join(recording.radar_topics), about=(recording.radar_choice, *note.about))
+
+
+def _sensor(name: str, chosen: str | None, topics: Sequence[TopicSummary], readings: Sequence[str] = ()) -> SensorNote:
+    """Describe how a sensor is read."""
+    topic = next((topic for topic in topics if topic.name == chosen), None)
+    if topic is None:
+        return SensorNote(name, chosen or "none")
+    clocks = () if topic.clocks is None else clock_lines(topic.clocks)
+    about = tuple(line for line in (topic.layout, *readings, *clocks) if line)
+    return SensorNote(name, topic.name, topic.clock if topic.clocks else "", about)
+
+
+def _soon(loop: asyncio.AbstractEventLoop, call: "partial[None]") -> None:
+    """Run on the loop; if it is closing, no page is left to notify."""
+    try:
+        loop.call_soon_threadsafe(call)
+    except RuntimeError:
+        _log.debug("a view came after the server had stopped")

@@ -1,0 +1,179 @@
+"""The tab Lens: the intrinsics in use, a calibration of the lens in the background, and its result, for all pages."""
+
+import asyncio
+import logging
+from collections.abc import Callable
+from functools import partial
+
+from calib_core.camera import Camera
+from calib_core.errors import InputError
+from calib_core.interchange import camera_info_text
+from calib_core.intrinsics import Board, CalibratedLens, IntrinsicsOptions, board_of_size
+from calib_core.recordings import Recording
+from cocalib.error_boundary import error_boundary
+from cocalib.intrinsics import LensJob, LensSnapshot, RecordedPictures
+from cocalib.session import ChosenIntrinsics, IntrinsicsChosen
+from cocalib.view import sentence
+from cocalib.web.channel.lens_panel import camera_table, coverage_of, lens_result, view_corners
+from cocalib.web.channel.outbox import Outbox
+from cocalib.web.messages import LensCalibrate, LensCancel, LensRequest, LensResult, LensState, Outgoing, encode
+from cocalib.workspace import Workspace
+
+__all__ = ["LensDesk"]
+
+_TELL_EVERY_S = 0.2
+"""Pages are told of the progress no more often [s]."""
+_log = logging.getLogger(__name__)
+
+
+class LensDesk:
+    """Calibrates the lens for the pages of a recording. Runs on the event loop, except where it says otherwise."""
+
+    def __init__(self, workspace: Workspace, recording: Recording, tell: Callable[[Outgoing, str], None]) -> None:
+        """Set up the desk.
+
+        Args:
+            workspace: has the intrinsics in use.
+            recording: has the pictures.
+            tell: sends a message of a kind to all pages.
+        """
+        self._workspace = workspace
+        self._pictures = RecordedPictures(recording)
+        self._tell = tell
+        self._job = LensJob(self._changed)
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._is_due = False
+        self._result: LensResult | None = None
+        self._result_of: CalibratedLens | None = None
+        self._number = 0
+        self._shown_camera: Camera | None = None
+        self._state: LensState | None = None
+
+    def start(self) -> None:
+        """Begin to tell the pages, on the running loop."""
+        self._loop = asyncio.get_running_loop()
+
+    def greet(self, outbox: Outbox) -> None:
+        """Send the present state to a page that has just opened."""
+        outbox.put(encode(self._present()), kind="lens")
+        if self._result is not None:
+            outbox.put(encode(self._result), kind="lens_result")
+
+    def follow(self) -> None:
+        """Tell the pages if other intrinsics are in use."""
+        if self._workspace.camera is not self._shown_camera:
+            self._tell(self._present(), "lens")
+
+    async def obey(self, request: LensRequest) -> None:
+        """Do what a page asks for.
+
+        Raises:
+            CalibrationError: it cannot be done, in words.
+        """
+        if isinstance(request, LensCalibrate):
+            self._job.start(self._pictures, _board(request), IntrinsicsOptions(request.model))
+        elif isinstance(request, LensCancel):
+            self._job.cancel()
+        else:
+            lens = self._job.snapshot.lens
+            if lens is None:
+                raise InputError("there is no calibrated lens to use yet; calibrate it first")
+            step = IntrinsicsChosen(ChosenIntrinsics.of(lens.camera, _about(lens)))
+            await asyncio.get_running_loop().run_in_executor(None, partial(self._workspace.dispatch, step))
+
+    async def close(self) -> None:
+        """Stop the calibration, and tell the pages nothing more."""
+        self._loop = None
+        await asyncio.to_thread(self._job.close)
+
+    def corners(self, frame: int) -> tuple[tuple[float, float, float, float, bool], ...]:
+        """Return the corners found in a frame, with their residuals. May be called from any thread."""
+        lens = self._job.snapshot.lens
+        return () if lens is None else view_corners(lens, frame)
+
+    def camera_yaml(self, *, calibrated: bool) -> str:
+        """Return the calibrated lens, or the intrinsics in use, as a ROS camera_info file. May be called from any thread.
+
+        Raises:
+            InputError: there are none.
+        """
+        lens = self._job.snapshot.lens
+        camera = (lens.camera if lens else None) if calibrated else self._workspace.camera
+        if camera is None:
+            raise InputError("there are no intrinsics to save yet; calibrate the lens first")
+        return camera_info_text(camera, "camera")
+
+    def _changed(self) -> None:
+        """Take note of progress, in the thread of the calibration; the pages are told shortly afterwards."""
+        loop = self._loop
+        if loop is None or self._is_due:
+            return
+        self._is_due = True
+        try:
+            loop.call_soon_threadsafe(loop.call_later, _TELL_EVERY_S, self._show)
+        except RuntimeError:
+            _log.debug("progress came after the server had stopped")
+
+    def _show(self) -> None:
+        self._is_due = False
+        if self._loop is not None:
+            self._loop.create_task(self._show_all())
+
+    async def _show_all(self) -> None:
+        """Tell the pages the state, after the result that it speaks of."""
+        with error_boundary("showing the calibrated lens", _log.error):
+            lens = self._job.snapshot.lens
+            if lens is not None and lens is not self._result_of:
+                self._result_of = lens
+                self._number += 1
+                work = partial(lens_result, self._number, lens, _about(lens))
+                self._result = await asyncio.to_thread(work)
+                self._tell(self._result, "lens_result")
+            if self._loop is not None:
+                self._tell(self._present(), "lens")
+
+    def _present(self) -> LensState:
+        now, workspace = self._job.snapshot, self._workspace
+        camera = self._shown_camera = workspace.camera
+        chosen = workspace.session.intrinsics
+        return LensState(
+            intrinsics=None if camera is None else camera_table(camera, workspace.intrinsics),
+            chosen=chosen is not None,
+            pictures=len(self._pictures),
+            stage=now.stage,
+            searched=now.progress.searched if now.progress else 0,
+            total=now.progress.total if now.progress else 0,
+            views=len(now.progress.views) if now.progress else 0,
+            left_out=len(now.progress.left_out) if now.progress else 0,
+            doing=now.doing,
+            problem=sentence(now.problem),
+            hint=sentence(now.hint),
+            can_resume=now.can_resume,
+            coverage=coverage_of(now),
+            result=self._result.number if self._result else 0,
+            in_use=_is_in_use(now, chosen),
+        )
+
+
+def _is_in_use(now: LensSnapshot, chosen: ChosenIntrinsics | None) -> bool:
+    return now.lens is not None and chosen == ChosenIntrinsics.of(now.lens.camera, _about(now.lens))
+
+
+def _about(lens: CalibratedLens) -> str:
+    """Say where a calibrated lens comes from."""
+    return f"the board in this recording ({lens.board.text}, {len(lens.views)} views)"
+
+
+def _board(form: LensCalibrate) -> Board:
+    """Return the board that a page describes.
+
+    Raises:
+        InputError: its size, the side of a square or what its markers are is not valid.
+    """
+    if form.kind == "checkerboard":
+        return board_of_size(form.size, form.square_mm)
+    dictionary = form.dictionary or None
+    if form.kind == "charuco":
+        return board_of_size(form.size, form.square_mm, form.kind, marker_mm=form.marker_mm, dictionary=dictionary)
+    spacing = form.marker_mm / form.square_mm if form.square_mm > 0 else 0.0
+    return board_of_size(form.size, form.square_mm, form.kind, tag_spacing=spacing, dictionary=dictionary)

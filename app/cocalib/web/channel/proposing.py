@@ -1,0 +1,199 @@
+"""Proposals for the pages of a recording: made in the background, and anew with each click."""
+
+import asyncio
+import logging
+from collections.abc import Callable
+
+import numpy as np
+
+from calib_core.association.placements import Placement
+from calib_core.measurements import NS_PER_S, Stamp
+from calib_core.proposing import DwellView, Proposal
+from calib_core.proposing.dwell_average import averaged_over_dwell
+from calib_core.recordings import FollowedRecording, Recording
+from cocalib.proposing import ProposingJob, ProposingSnapshot, ProposingWish, view_at
+from cocalib.view import is_dismissed, sentence
+from cocalib.web.channel.outbox import Outbox
+from cocalib.web.messages import (
+    Outgoing,
+    ProposalNews,
+    ProposalPlace,
+    ProposalRow,
+    ProposingSwitch,
+    Snapped,
+    SnapWanted,
+    UnproposedRow,
+    encode,
+)
+from cocalib.workspace import Workspace
+
+__all__ = ["ProposingDesk"]
+
+_TELL_EVERY_S = 0.2
+"""Pages are told of changes no more often [s]."""
+_SHORTEST_S = 2.0
+"""A target that stands still for less is not looked for in the pictures."""
+_GROWING = (
+    "the recording is still being written: what changed in the pictures shows once it is complete",
+    "click the reflector, or wait until the recording is complete",
+)
+_NO_PICTURES = ("there are no pictures to look at", "open the camera's recording, too")
+_NO_RADAR = (
+    "there are no radar scans, so nothing says when the reflector stood still",
+    "open the radar's recording, too",
+)
+_log = logging.getLogger(__name__)
+
+
+class ProposingDesk:
+    """Proposes for all pages of a recording. Runs on the event loop, except where it says otherwise."""
+
+    def __init__(
+        self, workspace: Workspace, recording: Recording, tell: Callable[[Outgoing, str], None], *, on: bool
+    ) -> None:
+        """Set up the desk.
+
+        Args:
+            workspace: has the clicks, the options and the intrinsics.
+            recording: has the pictures.
+            tell: sends a message of a kind to all pages.
+            on: whether to propose without being asked.
+        """
+        self._workspace = workspace
+        self._recording = recording
+        self._tell = tell
+        self._on = on
+        self._job = ProposingJob(recording, self._changed)
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._is_due = False
+        self._numbers: tuple[int, ...] = ()
+        self._placements: tuple[Placement, ...] | None = None
+        self._asked: tuple[object, ...] = ()
+
+    def start(self) -> None:
+        """Begin to tell the pages, on the running loop."""
+        self._loop = asyncio.get_running_loop()
+
+    def greet(self, outbox: Outbox) -> None:
+        """Send the present state to a page that has just opened."""
+        outbox.put(encode(self._news()), kind="proposals")
+
+    def surveyed(self, placements: tuple[Placement, ...]) -> None:
+        """Propose for these placements from now on."""
+        long = [number for number, one in enumerate(placements) if one.end - one.start >= _SHORTEST_S * NS_PER_S]
+        found = tuple(placements[number] for number in long)
+        if self._placements is None or _times(found) != _times(self._placements):
+            self._numbers, self._placements = tuple(long), found
+        self.follow()
+
+    def follow(self) -> None:
+        """Propose anew if the clicks, the options, the intrinsics or the dismissed placements changed."""
+        if not self._on or self._placements is None or self._obstacle() is not None:
+            return
+        session, camera = self._workspace.session, self._workspace.camera
+        asked = (session.clicks, session.options, session.dismissed, camera, self._placements)
+        if len(asked) == len(self._asked) and all(one is old for one, old in zip(asked, self._asked, strict=True)):
+            return
+        self._asked = asked
+        gone = frozenset(number for number, one in enumerate(self._placements) if is_dismissed(one, session))
+        self._job.ask(ProposingWish(camera, session.options, self._placements, session.clicks, gone))
+
+    async def averaged(self, wanted: SnapWanted) -> Snapped:
+        """Average a click over the frames of its placement, off the event loop.
+
+        Args:
+            wanted: by a page, for a click that is not placed yet.
+
+        Raises:
+            CalibrationError: the clicked frame cannot be read.
+        """
+        return await asyncio.to_thread(self._averaged, wanted)
+
+    def _averaged(self, wanted: SnapWanted) -> Snapped:
+        pixel_px = np.array(wanted.pixel_px)
+        frame = self._workspace.facts.frame_at(wanted.image_time)
+        view = view_at(wanted.image_time, pixel_px, self._job.snapshot.views)
+        if frame is None or view is None:
+            return Snapped(None, None, "The pictures of this placement were not looked at.", wanted.id)
+        found = averaged_over_dwell(view, self._recording, frame, pixel_px)
+        if found is None:
+            return Snapped(None, None, "The pictures of this placement show no apex there.", wanted.id)
+        column, row = (float(value) for value in found.pixel_px)
+        words = f"Averaged over {found.frames} frames, with a standard deviation of {found.sigma_px:.2f} px."
+        return Snapped((column, row), found.sigma_px, words, wanted.id)
+
+    def switch(self, switch: ProposingSwitch) -> None:
+        """Propose, or propose nothing any more."""
+        self._on, self._asked = switch.on, ()
+        if not self._on:
+            self._job.stop()
+        self.follow()
+        self._changed()
+
+    async def close(self) -> None:
+        """Stop proposing, and tell the pages nothing more."""
+        self._loop = None
+        await asyncio.to_thread(self._job.close)
+
+    def _obstacle(self) -> tuple[str, str] | None:
+        """Say why there can be no proposals, and what to do about it; None if there can."""
+        if not self._workspace.facts.has_pictures:
+            return _NO_PICTURES
+        if not len(self._recording.radar_times):
+            return _NO_RADAR
+        if isinstance(self._recording, FollowedRecording) and not self._recording.is_complete:
+            return _GROWING
+        return None
+
+    def _changed(self) -> None:
+        """Take note of progress, in any thread; the pages are told shortly afterwards."""
+        loop = self._loop
+        if loop is None or self._is_due:
+            return
+        self._is_due = True
+        try:
+            loop.call_soon_threadsafe(loop.call_later, _TELL_EVERY_S, self._show)
+        except RuntimeError:
+            _log.debug("proposals came after the server had stopped")
+
+    def _show(self) -> None:
+        self._is_due = False
+        if self._loop is not None:
+            self._tell(self._news(), "proposals")
+
+    def _news(self) -> ProposalNews:
+        now = self._job.snapshot
+        problem, hint = self._obstacle() or (now.problem, now.hint)
+        if not self._on:
+            return ProposalNews(False, "off", 0, 0, sentence(problem), sentence(hint))
+        stage = "failed" if problem else now.stage
+        number = {id(one): self._numbers[at] for at, one in enumerate(self._placements or ())}
+        rows = tuple(
+            self._row(one, number[id(one.placement)], now)
+            for one in now.proposals.ranked
+            if id(one.placement) in number
+        )
+        without = tuple(
+            UnproposedRow(number[id(one)], reason) for one, reason in now.proposals.unproposed if id(one) in number
+        )
+        return ProposalNews(True, stage, now.done, now.count, sentence(problem), sentence(hint), rows, without)
+
+    def _row(self, proposal: Proposal, placement: int, now: ProposingSnapshot) -> ProposalRow:
+        view: DwellView = next(one for one in now.views if one.placement is proposal.placement)
+        places = tuple(
+            ProposalPlace(*(round(float(value), 3) for value in (*one.pixel_px, one.sigma_px)))
+            for one in proposal.candidates
+        )
+        return ProposalRow(
+            placement=placement,
+            frame=self._workspace.facts.frame_at(proposal.image_time) or 0,
+            image_time=Stamp.of(proposal.image_time),
+            width_px=round(view.width_px, 1),
+            confidence=round(proposal.confidence, 3),
+            reason=proposal.reason,
+            places=places,
+        )
+
+
+def _times(placements: tuple[Placement, ...]) -> list[tuple[int, int]]:
+    return [(int(one.start), int(one.end)) for one in placements]

@@ -1,0 +1,219 @@
+"""Camera frames for the page and the 3D view: untouched bytes, half-size proxies, thumbnails; decoded off the event loop."""
+
+import asyncio
+from collections import OrderedDict
+from collections.abc import Callable
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from functools import partial
+from typing import Literal
+
+import numpy as np
+
+from calib_core.camera import Camera
+from calib_core.recordings import Recording
+from cocalib.web.rectified_frames import FrameRectifier
+
+__all__ = ["Frame", "FrameStore", "Size"]
+
+Size = Literal["full", "half", "thumbnail", "rectified"]
+
+HALF_ABOVE_PX = 2_500_000
+"""Pictures with more pixels than this are sent at half size while playing [px]."""
+THUMBNAIL_WIDTH_PX = 480
+BUDGET_BYTES = 16 << 20
+"""Enough for the frames read ahead and those just shown: the recording's file, which the system caches, has all the others."""
+_PROXY_QUALITY, _THUMBNAIL_QUALITY, _RECTIFIED_QUALITY = 85, 80, 92
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One compressed picture.
+
+    Attributes:
+        index: place of the frame in the recording.
+        data: JPEG or PNG bytes.
+        format: which of the two.
+        width_px: columns of the recorded picture, whatever the size of this one.
+        height_px: rows of the recorded picture.
+        scale: size of this picture relative to the recorded one: 1, 0.5 or less.
+    """
+
+    index: int
+    data: bytes
+    format: Literal["jpeg", "png"]
+    width_px: int
+    height_px: int
+    scale: float
+
+
+class FrameStore:
+    """Frames by index and size, cached by last use; concurrent requests share one read. Runs on one event loop."""
+
+    def __init__(
+        self,
+        source: Recording,
+        count: int,
+        executor: Executor,
+        *,
+        budget_bytes: int = BUDGET_BYTES,
+        camera: Callable[[], Camera | None] = lambda: None,
+    ) -> None:
+        self._source = source
+        self._count = count
+        self._executor = executor
+        self._budget_bytes = budget_bytes
+        self._kept: OrderedDict[tuple[int, Size], Frame] = OrderedDict()
+        self._kept_bytes = 0
+        self._coming: dict[tuple[int, Size], asyncio.Task[Frame]] = {}
+        self._closed = False
+        self._camera = camera
+        self._rectified_with: Camera | None = None
+        self._rectifier = FrameRectifier()
+
+    def __len__(self) -> int:
+        return self._count
+
+    def extend(self, count: int) -> None:
+        """Take note of the number of frames that there are now; those before keep their indices."""
+        self._count = max(self._count, count)
+
+    @property
+    def kept_bytes(self) -> int:
+        """Size of the frames in memory [bytes]."""
+        return self._kept_bytes
+
+    async def get(self, index: int, size: Size = "full") -> Frame:
+        """Return a frame, from memory or made in the executor.
+
+        Raises:
+            IndexError: there is no such frame, or the store is closed.
+        """
+        if self._closed:
+            raise IndexError("the server is stopping")
+        if not 0 <= index < self._count:
+            raise IndexError(f"frame {index} of {self._count}")
+        if size == "rectified":
+            self._forget_others(self._camera())
+        key = (index, size)
+        if key in self._kept:
+            self._kept.move_to_end(key)
+            return self._kept[key]
+        task = self._coming.get(key)
+        if task is None:
+            task = asyncio.get_running_loop().create_task(self._make(key))
+            self._coming[key] = task
+        return await asyncio.shield(task)  # a client that leaves must not cancel the frame for the others
+
+    def prefetch(self, index: int, size: Size, step: int, *, ahead: int = 3) -> None:
+        """Start reading the next frames in the direction of playback."""
+        for next_index in range(index + step, index + step * (ahead + 1), step) if step and not self._closed else ():
+            key: tuple[int, Size] = (next_index, size)
+            if 0 <= next_index < self._count and key not in self._kept and key not in self._coming:
+                task = asyncio.get_running_loop().create_task(self._make(key))
+                task.add_done_callback(_retrieve)
+                self._coming[key] = task
+
+    async def close(self) -> None:
+        """Cancel pending reads and start no more, so that the event loop can end."""
+        self._closed = True
+        coming = list(self._coming.values())
+        for task in coming:
+            task.cancel()
+        await asyncio.gather(*coming, return_exceptions=True)
+
+    async def _make(self, key: tuple[int, Size]) -> Frame:
+        index, size = key
+        make = partial(self._rectified, self._camera()) if size == "rectified" else partial(_MAKERS[size], self._source)
+        try:
+            frame = await asyncio.get_running_loop().run_in_executor(self._executor, make, index)
+        finally:
+            self._coming.pop(key, None)
+        self._keep(key, frame)
+        return frame
+
+    def _rectified(self, camera: Camera | None, index: int) -> Frame:
+        """Make a rectified frame.
+
+        Raises:
+            InputError: there are no intrinsics, or they cannot rectify it.
+        """
+        full = _full(self._source, index)
+        return _encoded(full, self._rectifier.rectified(_decoded(full.data, 1), camera), 1.0, _RECTIFIED_QUALITY)
+
+    def _forget_others(self, camera: Camera | None) -> None:
+        """Forget the frames that were rectified with another camera."""
+        if camera is self._rectified_with:
+            return
+        self._rectified_with = camera
+        for table in (self._kept, self._coming):
+            for key in [key for key in table if key[1] == "rectified"]:
+                dropped = table.pop(key)
+                self._kept_bytes -= len(dropped.data) if isinstance(dropped, Frame) else 0
+
+    def _keep(self, key: tuple[int, Size], frame: Frame) -> None:
+        self._kept[key] = frame
+        self._kept_bytes += len(frame.data)
+        while self._kept_bytes > self._budget_bytes and len(self._kept) > 1:
+            _, dropped = self._kept.popitem(last=False)
+            self._kept_bytes -= len(dropped.data)
+
+
+def _retrieve(task: "asyncio.Task[Frame]") -> None:
+    """Consume the outcome of a prefetch that nobody awaits; a later request for the frame raises its error."""
+    if not task.cancelled():
+        task.exception()
+
+
+def _full(source: Recording, index: int) -> Frame:
+    picture = source.image_bytes(index)
+    return Frame(index, picture.data, picture.format, picture.width_px, picture.height_px, 1.0)
+
+
+def _half(source: Recording, index: int) -> Frame:
+    """Halve a large picture; return a small one as it is."""
+    full = _full(source, index)
+    if full.width_px * full.height_px <= HALF_ABOVE_PX:
+        return full
+    return _encoded(full, _decoded(full.data, 2), 0.5, _PROXY_QUALITY)
+
+
+def _thumbnail(source: Recording, index: int) -> Frame:
+    """Shrink a picture for the frustum of the 3D view."""
+    import cv2
+
+    full = _full(source, index)
+    if full.width_px <= THUMBNAIL_WIDTH_PX and full.format == "jpeg":
+        return full
+    shrink = next((factor for factor in (8, 4, 2) if full.width_px >= factor * THUMBNAIL_WIDTH_PX), 1)
+    pixels = _decoded(full.data, shrink)
+    scale = min(1.0, THUMBNAIL_WIDTH_PX / full.width_px)
+    size = (max(1, round(full.width_px * scale)), max(1, round(full.height_px * scale)))
+    return _encoded(full, cv2.resize(pixels, size, interpolation=cv2.INTER_AREA), scale, _THUMBNAIL_QUALITY)
+
+
+def _decoded(data: bytes, shrink: int) -> np.ndarray:
+    import cv2
+
+    flags = {
+        1: cv2.IMREAD_COLOR,
+        2: cv2.IMREAD_REDUCED_COLOR_2,
+        4: cv2.IMREAD_REDUCED_COLOR_4,
+        8: cv2.IMREAD_REDUCED_COLOR_8,
+    }
+    pixels = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), flags[shrink] | cv2.IMREAD_IGNORE_ORIENTATION)
+    if pixels is None:
+        raise ValueError("the picture cannot be decoded")
+    return np.asarray(pixels)
+
+
+def _encoded(full: Frame, pixels: np.ndarray, scale: float, quality: int) -> Frame:
+    import cv2
+
+    done, data = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    if not done:
+        raise ValueError("the picture cannot be encoded")
+    return Frame(full.index, data.tobytes(), "jpeg", full.width_px, full.height_px, scale)
+
+
+_MAKERS: dict[str, Callable[[Recording, int], Frame]] = {"full": _full, "half": _half, "thumbnail": _thumbnail}

@@ -1,0 +1,329 @@
+"""Responses to GET: the page's files, downloads and viser's own page; any other path is a 404."""
+
+import asyncio
+import gzip
+import http
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache, partial
+from pathlib import Path
+from typing import Protocol
+
+import msgspec
+import numpy as np
+
+from calib_core.boxes import boxes_text
+from calib_core.errors import CalibrationError
+from calib_core.interchange import CalibrationFile, read_calibration, written_formats
+from calib_core.measurements import MIN_PAIRS, Unsolvable
+from calib_core.recordings import Recording
+from calib_core.results import Calibration
+from cocalib.report import current_report
+from cocalib.session import Session
+from cocalib.solving import calibration_text
+from cocalib.view import sentence
+from cocalib.web.channel.export_preview import NoPreview, export_preview, exported, format_rows
+from cocalib.web.channel.lens import LensDesk
+from cocalib.web.channel.open_meaning import drawn_meaning, meaning_rows
+from cocalib.web.channel.picture_changes import PictureChanges
+from cocalib.web.channel.radar_survey import Survey
+from cocalib.web.exports.check_point import picture_of
+from cocalib.web.exports.query import FieldError
+from cocalib.web.port.preloading import with_preloaded_modules
+from cocalib.web.port.viser_hook import client_page
+from cocalib.workspace import Workspace
+
+__all__ = ["Reply", "Routes", "json_reply", "landing", "refusal"]
+
+_TYPES = {
+    ".html": "text/html; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".svg": "image/svg+xml",
+    ".json": "application/json",
+    ".jpg": "image/jpeg",
+}
+_PICTURE_TYPES = {"jpeg": "image/jpeg", "png": "image/png"}
+_ALWAYS = (
+    ("X-Content-Type-Options", "nosniff"),
+    ("X-Frame-Options", "SAMEORIGIN"),
+    ("Referrer-Policy", "no-referrer"),
+    ("Cross-Origin-Resource-Policy", "same-origin"),
+    ("Cross-Origin-Opener-Policy", "same-origin"),
+    ("Cache-Control", "no-cache"),
+)
+_OWN_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; "
+    "frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
+)
+_VISER_POLICY = (
+    "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:; worker-src blob: data: 'self'; base-uri 'none'; "
+    "form-action 'none'; frame-ancestors 'self'"
+)
+_LANDING = (
+    b'<!doctype html><meta charset="utf-8"><title>cocalib</title><link rel="icon" href="/icon.svg">'
+    b'<p><a href="/">Open the page</a>'
+)
+_PAGE = "index.html"
+_INDEX = re.compile(r"[0-9]{1,9}")
+_VISER_PAGE = re.compile(r"/viser/[0-9a-z]{1,40}/")
+
+
+class Surveyor(Protocol):
+    """Provides the radar survey once it is complete, how much the pictures change, and the lens, as far as they are known."""
+
+    @property
+    def survey(self) -> Survey | None: ...
+    @property
+    def picture_changes(self) -> PictureChanges: ...
+    @property
+    def lens(self) -> LensDesk: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """An HTTP response.
+
+    Attributes:
+        status: such as 200.
+        headers: all except Content-Length.
+        body: the content.
+        length: of the content, even if it is not sent [bytes].
+    """
+
+    status: http.HTTPStatus
+    headers: tuple[tuple[str, str], ...]
+    body: bytes
+    length: int
+
+
+def _reply(
+    body: bytes,
+    content_type: str,
+    *,
+    status: int = 200,
+    policy: str = _OWN_POLICY,
+    more: tuple[tuple[str, str], ...] = (),
+) -> Reply:
+    named = {name for name, _ in more}
+    always = (header for header in _ALWAYS if header[0] not in named)
+    headers = (("Content-Type", content_type), *always, ("Content-Security-Policy", policy), *more)
+    return Reply(http.HTTPStatus(status), headers, body, len(body))
+
+
+def refusal(status: int, reason: str, *, more: tuple[tuple[str, str], ...] = ()) -> Reply:
+    """Return a refusal in plain text, with further headers."""
+    return _reply(f"{reason}\n".encode(), "text/plain; charset=utf-8", status=status, more=more)
+
+
+def json_reply(body: bytes, *, more: tuple[tuple[str, str], ...] = ()) -> Reply:
+    """Return JSON that no cache may keep."""
+    return _reply(body, _TYPES[".json"], more=(("Cache-Control", "no-store"), *more))
+
+
+def landing(set_cookie: str) -> Reply:
+    """Return the page behind a link, which goes on to the page itself.
+
+    It is a page and not a redirect: a browser that came here from a file or a message sends no SameSite=Strict cookie along
+    a redirect, but does once our own page goes on.
+    """
+    more = (("Refresh", "0; url=/"), ("Set-Cookie", set_cookie), ("Cache-Control", "no-store"))
+    return _reply(_LANDING, _TYPES[".html"], more=more)
+
+
+class Routes:
+    """Answers GET requests by path; every path that is served is listed explicitly."""
+
+    def __init__(self, static: Path) -> None:
+        self._files = {f"/{path.name}": path for path in static.iterdir() if path.suffix in _TYPES and path.is_file()}
+        self._files["/"] = self._files[f"/{_PAGE}"]
+        self._made: Mapping[str, Callable[[str], Reply]] | None = None
+
+    def admit(self, workspace: Workspace, recording: Recording, hub: Surveyor) -> None:
+        """Serve this recording from now on."""
+        self._made = _Downloads(workspace, recording, hub).by_path()
+
+    def withdraw(self) -> None:
+        """Serve no recording until another one is admitted."""
+        self._made = None
+
+    async def answer(self, address: str) -> Reply:
+        """Answer a GET; files and exports are produced outside the event loop.
+
+        Args:
+            address: path and query, as sent.
+        """
+        path, _, query = address.partition("?")
+        if path.startswith("/api/") and self._made is None:
+            return refusal(503, "The recording is still being opened; try again in a moment.")
+        make = self._made.get(path) if self._made is not None else None
+        if path in self._files:
+            file = self._files[path]
+            make = lambda _query: _page(file) if file.name == _PAGE else _file(file)  # noqa: E731
+        elif _VISER_PAGE.fullmatch(path):
+            make = lambda _query: _viser_page()  # noqa: E731
+        if make is None:
+            return refusal(404, "Not found.")
+        return await asyncio.get_running_loop().run_in_executor(None, make, query)
+
+
+class _Downloads:
+    """Responses generated from the session of a recording."""
+
+    def __init__(self, workspace: Workspace, recording: Recording, hub: Surveyor) -> None:
+        self._workspace = workspace
+        self._recording = recording
+        self._hub = hub
+
+    def by_path(self) -> Mapping[str, Callable[[str], Reply]]:
+        """Return the function for each path; each takes the query."""
+        formats = written_formats()
+        return {
+            "/api/calibration.json": self._calibration,
+            "/api/clicks.json": self._clicks,
+            "/api/report.html": self._report,
+            "/api/boxes.json": self._boxes,
+            "/api/formats.json": _formats,
+            "/api/activity.json": self._activity,
+            "/api/camera.yaml": self._camera,
+            "/api/board_corners.json": self._board_corners,
+            "/api/picture_changes.json": self._picture_changes,
+            "/api/check_point_picture": self._check_point_picture,
+            "/api/meanings.json": self._meanings,
+            "/api/meaning.jpg": self._meaning,
+            **{f"/api/export/{form.name}": partial(self._export, form.name) for form in formats},
+            **{f"/api/preview/{form.name}": partial(self._preview, form.name) for form in formats},
+        }
+
+    def _calibration(self, _query: str) -> Reply:
+        return self._of_calibration(lambda text: _download(text.encode(), "calibration.json"))
+
+    def _report(self, _query: str) -> Reply:
+        return self._of_calibration(
+            lambda text: _download(current_report(text, self._recording).encode(), "report.html")
+        )
+
+    def _export(self, name: str, query: str) -> Reply:
+        def make(text: str) -> Reply:
+            written = exported(_file_of(text), name, query).download
+            return _download(written.data, written.file_name)
+
+        return self._of_calibration(make)
+
+    def _preview(self, name: str, query: str) -> Reply:
+        def make(text: str) -> Reply:
+            try:
+                preview = export_preview(_file_of(text), name, query, self._workspace.facts.name)
+            except FieldError as error:
+                return _reply(msgspec.json.encode(NoPreview(sentence(str(error)), error.field)), _TYPES[".json"])
+            return _reply(msgspec.json.encode(preview), _TYPES[".json"])
+
+        reply = self._of_calibration(make)
+        if reply.status != 409:
+            return reply
+        return _reply(msgspec.json.encode(NoPreview(reply.body.decode().strip())), _TYPES[".json"])
+
+    def _check_point_picture(self, _query: str) -> Reply:
+        """Return the frame in which the check point was clicked; the query only tells one calibration's from another's."""
+
+        def make(text: str) -> Reply:
+            stamp, times = picture_of(_file_of(text)), self._recording.image_times
+            index = -1 if stamp is None else int(np.searchsorted(times, stamp))
+            if not 0 <= index < len(times) or times[index] != stamp:
+                return refusal(404, "No picture shows the check point.")
+            picture = self._recording.image_bytes(index)
+            return _reply(picture.data, _PICTURE_TYPES[picture.format], more=(("Cache-Control", "no-store"),))
+
+        return self._of_calibration(make)
+
+    def _of_calibration(self, make: Callable[[str], Reply]) -> Reply:
+        """Make a reply from the current calibration-1 text, or say why there is none; never from an outdated calibration."""
+        session, camera_file = self._workspace.session, self._workspace.camera_file
+        if not session.is_solved or not isinstance(session.outcome, Calibration):
+            return refusal(409, _why_none(session))
+        given = self._workspace.fleet_prior
+        fleet_prior = given.file if given is not None and session.outcome.fleet is not None else None
+        try:
+            text = calibration_text(
+                session.outcome, self._recording, session.confirmed, camera_file, fleet_prior=fleet_prior
+            )
+            return make(text)
+        except CalibrationError as error:
+            return refusal(409, sentence(str(error)))
+
+    def _clicks(self, _query: str) -> Reply:
+        return _download(self._workspace.clicks_text().encode(), "clicks.json")
+
+    def _boxes(self, _query: str) -> Reply:
+        return _download(boxes_text(self._workspace.boxes).encode(), "boxes.json")
+
+    def _camera(self, query: str) -> Reply:
+        """Return the calibrated lens, or with the query "in_use" the intrinsics that the session is solved with."""
+        try:
+            return _download(self._hub.lens.camera_yaml(calibrated=query != "in_use").encode(), "camera.yaml")
+        except CalibrationError as error:
+            return refusal(409, sentence(str(error)))
+
+    def _board_corners(self, query: str) -> Reply:
+        """Return the corners that were found in the frame whose index is the query."""
+        if not _INDEX.fullmatch(query):
+            return refusal(400, "Name the frame by its index.")
+        return json_reply(msgspec.json.encode(self._hub.lens.corners(int(query))))
+
+    def _activity(self, _query: str) -> Reply:
+        survey = self._hub.survey
+        if survey is None:
+            return refusal(409, "The radar data are still being read.")
+        return _reply(msgspec.json.encode(survey.activity), _TYPES[".json"])
+
+    def _meanings(self, _query: str) -> Reply:
+        return json_reply(msgspec.json.encode(meaning_rows(self._workspace.open_meaning)))
+
+    def _meaning(self, query: str) -> Reply:
+        try:
+            picture = drawn_meaning(self._workspace.open_meaning, self._recording, query)
+        except CalibrationError as error:
+            return refusal(409, sentence(str(error)))
+        return _reply(picture, _TYPES[".jpg"])
+
+    def _picture_changes(self, _query: str) -> Reply:
+        return _reply(msgspec.json.encode(self._hub.picture_changes), _TYPES[".json"])
+
+
+def _file(path: Path) -> Reply:
+    return _reply(path.read_bytes(), _TYPES[path.suffix])
+
+
+def _page(path: Path) -> Reply:
+    page = with_preloaded_modules(path.read_text(encoding="utf-8"), path.parent)
+    return _reply(page.encode(), _TYPES[path.suffix])
+
+
+def _download(data: bytes, name: str) -> Reply:
+    kind = _TYPES.get(Path(name).suffix, "application/octet-stream")
+    return _reply(data, kind, more=(("Content-Disposition", f'attachment; filename="{name}"'),))
+
+
+def _formats(_query: str) -> Reply:
+    return _reply(msgspec.json.encode(format_rows()), _TYPES[".json"])
+
+
+def _file_of(text: str) -> CalibrationFile:
+    return read_calibration(text, "the calibration")
+
+
+@cache
+def _viser_page() -> Reply:
+    """Return viser's own client with a limited drawing rate (static/pace.js)."""
+    page = client_page("../../pace.js")
+    body = gzip.compress(page, mtime=0)
+    return _reply(body, _TYPES[".html"], policy=_VISER_POLICY, more=(("Content-Encoding", "gzip"),))
+
+
+def _why_none(session: Session) -> str:
+    if session.needs_solving and len(session.clicks) >= MIN_PAIRS:
+        return "The latest change is still being solved; try again in a moment."
+    if session.is_solved and isinstance(session.outcome, Unsolvable):
+        return f"{sentence(session.outcome.reason)} {sentence(session.outcome.hint)}"
+    return "There is no calibration yet. Click the reflector in at least four placements."

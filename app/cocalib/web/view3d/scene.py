@@ -1,0 +1,246 @@
+"""The 3D view of one tab, in viser: radar axes, the scan of the frame, chosen returns, and the camera with its live picture."""
+
+import threading
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
+from calib_core.results import Calibration, PairResult
+from cocalib.colours import residual_colours
+from cocalib.web.messages import Viewpoint
+from cocalib.web.view3d.extent import UNKNOWN, Extent, fitted_stand, ring_ranges_m
+from cocalib.web.view3d.nodes import add_cloud, add_lines, fill_cloud, fill_lines
+from cocalib.web.view3d.returns import SizedClouds, size_classes
+from cocalib.web.view3d.shapes import (
+    DARK,
+    LIGHT,
+    ellipsoids,
+    next_place,
+    nominal_camera_from_radar,
+    range_rings,
+    rays_to,
+    vertical_field_of_view_rad,
+)
+from cocalib.web.view3d.sight import Sight, true_positions
+from cocalib.web.view3d.space_look import ground_m
+from cocalib.web.view3d.surveyed import SurveyNodes
+
+if TYPE_CHECKING:
+    import viser
+
+__all__ = ["FIELD_OF_VIEW_RAD", "LOOK_AT", "STAND_AT", "TabScene"]
+
+STAND_AT, LOOK_AT = (-5.0, 0.0, 3.6), (6.0, 0.0, -0.4)
+"""Initial position and target of the 3D view's camera, until the extent of the data is known."""
+
+FIELD_OF_VIEW_RAD = 0.75
+
+_MOST_ELLIPSOIDS = 200
+_LARGE_PX = 30.0  # as in static/colours.js: a colour means the same after every click
+"""More would be a cloud in which none can be told from the others, and 2 kB each for every answer."""
+_USUAL_RANGE_M, _USUAL_SIZE_M = 12.0, 0.12
+"""The size of a return of middle strength in data that reach so far [m]; farther data have larger returns, by the square root."""
+_DIM, _ORANGE = (112, 124, 136), (255, 180, 84)
+_USUAL_ASPECT = 1.4
+
+
+class TabScene:
+    """The nodes of one tab's 3D view: added once, then changed by assigning properties. To be used by one thread at a time."""
+
+    def __init__(self, client: "viser.ClientHandle") -> None:
+        self._client = client
+        self._lock = threading.Lock()
+        self._pictured: int | None = None
+        self._posed: object = self
+        self._paired: object = None
+        self._extent: Extent | None = None
+        self._viewpoint: Viewpoint = "behind"
+        self._stood_at = np.array(STAND_AT)
+        scene = client.scene
+        scene.configure_default_lights(
+            False
+        )  # nothing here needs light, and without it drawing takes less than half as long
+        scene.configure_environment_map(None)
+        self._axes = scene.add_frame("/radar", axes_length=0.6, axes_radius=0.018, origin_radius=0.03)
+        self._shown = scene.add_frame("/shown", show_axes=False)
+        self._palette = DARK
+        self._grid, self._rings = _ground(scene)
+        self._survey = SurveyNodes(scene)
+        self._returns = SizedClouds(scene, "/returns")
+        self._window = add_cloud(scene, "/window", 0.06)
+        self._chosen = add_cloud(scene, "/chosen", 0.24)
+        self._rays = add_lines(scene, "/rays", 1.0, (72, 110, 138))
+        self._ray = add_lines(scene, "/ray", 2.0, DARK.ray)
+        self._gap = add_lines(scene, "/gap", 3.0, _ORANGE)
+        self._ellipsoids = add_lines(scene, "/ellipsoids", 1.0, (96, 118, 140))
+        self._ellipsoid = add_lines(scene, "/ellipsoid", 1.5, _ORANGE)
+        self._next = add_lines(scene, "/next", 2.0, DARK.next)
+        self._frustum = scene.add_camera_frustum(
+            "/camera",
+            fov=0.9,
+            aspect=1.6,
+            scale=1.1,
+            thickness=1.5,
+            thickness_units="screen",
+            color=_DIM,
+            format="jpeg",
+        )
+
+    def show(self, sight: Sight) -> None:
+        """Draw a Sight."""
+        with self._lock, self._client.atomic():
+            self._show_theme(sight)
+            self._show_extent(sight)
+            self._show_returns(sight)
+            self._survey.show(sight)
+            self._frustum.visible = sight.has_pictures
+            if sight.has_pictures:
+                self._show_pose(sight)
+                self._show_pairs(sight)
+                self._show_advice(sight)
+                self._show_picture(sight)
+            self._shown.position = (float(sight.index), float(sight.number), 0.0)  # the page reads which frame this is
+        self._client.flush()
+
+    def look_from(self, viewpoint: Viewpoint) -> None:
+        """Move the view's own camera: "behind", "above" or "side", so that all of the data is in sight."""
+        with self._lock:
+            self._look_from(viewpoint)
+        self._client.flush()
+
+    def _look_from(self, viewpoint: Viewpoint) -> None:
+        camera = self._client.camera
+        stand = fitted_stand(self._extent or UNKNOWN, viewpoint, FIELD_OF_VIEW_RAD, _aspect_of(camera))
+        with self._client.atomic():
+            camera.up_direction = tuple(stand.up)
+            camera.position, camera.look_at = tuple(stand.position_m), tuple(stand.look_at_m)
+        self._viewpoint, self._stood_at = viewpoint, stand.position_m
+
+    def _show_extent(self, sight: Sight) -> None:
+        """Fit rings, grid, sizes and, unless the user has moved it, the viewpoint to the data once they are known."""
+        if sight.extent == self._extent:
+            return
+        self._extent = sight.extent
+        ranges_m = ring_ranges_m(sight.extent.range_m)
+        fill_lines(self._rings, range_rings(ranges_m))
+        step_m, across_m = ranges_m[0], 2.0 * ranges_m[-1]
+        self._grid.width = self._grid.height = across_m
+        self._grid.cell_size, self._grid.section_size = step_m / 5.0, step_m
+        self._grid.fade_distance = 3.0 * across_m
+        growth = _growth(sight.extent)
+        self._axes.axes_length, self._axes.axes_radius, self._axes.origin_radius = (
+            0.5 * growth,
+            0.012 * growth,
+            0.02 * growth,
+        )
+        self._frustum.scale = 0.9 * growth
+        self._window.point_size, self._chosen.point_size = 0.5 * growth * _USUAL_SIZE_M, 1.8 * growth * _USUAL_SIZE_M
+        if np.allclose(self._client.camera.position, self._stood_at, atol=1e-3):
+            self._look_from(self._viewpoint)
+
+    def _show_theme(self, sight: Sight) -> None:
+        """Recolour the single-colour nodes to suit the background."""
+        palette = LIGHT if sight.light else DARK
+        if palette is self._palette:
+            return
+        self._palette, self._posed = palette, self
+        for node, colour in ((self._ray, palette.ray), (self._next, palette.next), (self._rings, palette.rings)):
+            node.colors = np.array(colour, dtype=np.uint8)
+        self._grid.cell_color = self._grid.section_color = palette.cells
+
+    def _show_returns(self, sight: Sight) -> None:
+        returns, window = sight.returns, sight.window
+        colours = sight.colouring.of(returns, sight.trail_s)
+        classes = size_classes(returns.snr_db, sight.snr_db)
+        self._returns.fill(returns.points_m, colours, classes, _growth(sight.extent) * _USUAL_SIZE_M)
+        fill_cloud(
+            self._window, window.points_m, np.tile(np.array([self._palette.window], dtype=np.uint8), (len(window), 1))
+        )
+
+    def _show_pose(self, sight: Sight) -> None:
+        """Move the frustum, and the ground to the lowest chosen return, whenever the answer changes."""
+        outcome = sight.session.outcome
+        if outcome is self._posed:
+            return
+        self._posed = outcome
+        calibration = sight.calibration
+        camera = calibration.camera if calibration else sight.camera
+        camera_from_radar = calibration.camera_from_radar if calibration else nominal_camera_from_radar()
+        _place(self._frustum, camera_from_radar.inverse())
+        self._frustum.color = self._palette.solved if isinstance(outcome, Calibration) else _DIM
+        if camera is not None:
+            self._frustum.fov = vertical_field_of_view_rad(camera)
+            self._frustum.aspect = camera.width_px / camera.height_px
+        self._grid.position = (0.0, 0.0, ground_m(sight))
+
+    def _show_pairs(self, sight: Sight) -> None:
+        calibration = sight.session.outcome
+        drawn = (calibration, sight.selected)
+        if drawn == self._paired:  # a Calibration equals only itself; moving through the frames changes none of these
+            return
+        self._paired = drawn
+        if not isinstance(calibration, Calibration):
+            for node in (self._chosen, self._rays, self._ray, self._gap, self._ellipsoids, self._ellipsoid):
+                node.visible = False
+            return
+        points = true_positions(calibration, calibration.pairs)
+        residuals = np.array([pair.distance_px for pair in calibration.pairs])
+        fill_cloud(self._chosen, points, residual_colours(residuals, _LARGE_PX))
+        chosen = tuple(pair for pair in calibration.pairs if pair.id == sight.selected)
+        others = tuple(pair for pair in calibration.pairs if pair.inlier and pair.id != sight.selected)
+        fill_lines(self._rays, rays_to(calibration, others))
+        fill_lines(self._ellipsoids, _shells(calibration, others[:_MOST_ELLIPSOIDS]))
+        fill_lines(self._ellipsoid, _shells(calibration, chosen))
+        self._show_selected(calibration, chosen)
+
+    def _show_selected(self, calibration: Calibration, chosen: tuple[PairResult, ...]) -> None:
+        rays = rays_to(calibration, chosen)
+        fill_lines(self._ray, rays)
+        points = true_positions(calibration, chosen)
+        fill_lines(self._gap, np.stack([rays[0, 1], points[0]])[None] if len(rays) else rays)
+
+    def _show_advice(self, sight: Sight) -> None:
+        """Draw a ring around the best next placement."""
+        advice = sight.view.advice
+        if advice is None or advice.may_stop or sight.view.verdict.done:
+            self._next.visible = False
+            return
+        place = np.array(advice.position_radar_m)
+        fill_lines(self._next, next_place(place[None], radius_m=max(0.3, 0.04 * sight.extent.range_m)))
+
+    def _show_picture(self, sight: Sight) -> None:
+        picture = sight.picture
+        if picture is None or picture.index == self._pictured:
+            return
+        self._pictured = picture.index
+        self._frustum._format = "jpeg"
+        self._frustum._image_data = picture.data  # compressed bytes as they are; the public property encodes again
+
+
+def _ground(scene: "viser.SceneApi") -> tuple[Any, Any]:
+    """Add the grid with rings of equal range; return the node that moves both, and the rings."""
+    grid = scene.add_grid(
+        "/ground", width=60.0, height=60.0, cell_size=1.0, section_size=5.0, cell_color=DARK.cells,
+        section_color=(52, 62, 73), cell_thickness=0.6, section_thickness=0.8, shadow_opacity=0.0, fade_distance=40.0,
+    )  # fmt: skip
+    return grid, add_lines(scene, "/ground/rings", 1.2, DARK.rings)
+
+
+def _growth(extent: Extent) -> float:
+    """Return how much larger everything is drawn than in data of the usual extent."""
+    return float(np.sqrt(extent.range_m / _USUAL_RANGE_M))
+
+
+def _aspect_of(camera: Any) -> float:
+    """Return width divided by height of the view; a usual one before it has been drawn, or while it is hidden."""
+    return camera.image_width / camera.image_height if camera.image_width and camera.image_height else _USUAL_ASPECT
+
+
+def _shells(calibration: Calibration, pairs: tuple[PairResult, ...]) -> np.ndarray:
+    return ellipsoids(true_positions(calibration, pairs), calibration.options.noise, calibration.noise_scale)
+
+
+def _place(node: Any, target_from_node: RigidTransform) -> None:
+    node.wxyz = quaternion_wxyz_from_matrix(target_from_node.rotation)
+    node.position = target_from_node.translation_m

@@ -1,0 +1,461 @@
+"""The only mutable state of the program: the history of the session, and how every change is made."""
+
+import threading
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Protocol, TypeAlias
+
+from calib_core.arrays import TimesNs
+from calib_core.association.placements import Placement
+from calib_core.camera import Camera
+from calib_core.detections import Boxes
+from calib_core.errors import InputError
+from calib_core.input_files import name_text
+from calib_core.interchange import CameraFile, camera_info_text, read_clicks, write_clicks
+from calib_core.measurements import NS_PER_S, ReflectorClick, TimeNs
+from calib_core.options import CalibrationOptions
+from calib_core.recordings import Recording, assumption_hint
+from calib_core.results import Calibration, DataWarning
+from cocalib.box_tracks.carried import CarriedTrack, Followed, carried_boxes, carried_tracks
+from cocalib.box_tracks.loading import boxes_loaded, read_sent_boxes
+from cocalib.box_tracks.stretches import Start
+from cocalib.fleet_prior_file import FleetPriorFile
+from cocalib.hypothesis_sheet import OpenMeaning
+from cocalib.session import (
+    AssumedReading,
+    BoxTrack,
+    ChosenIntrinsics,
+    ClicksImported,
+    History,
+    RecordingFacts,
+    Redo,
+    ScansAdded,
+    Session,
+    Solved,
+    Step,
+    Undo,
+    advance,
+    settled,
+)
+from cocalib.session.file import Closed, Restored, open_session_file
+from cocalib.solver_worker import SolverWorker
+from cocalib.view import AccPanel, Reference, View, shown_calibration, view
+
+__all__ = [
+    "GivenIntrinsics",
+    "Journal",
+    "Judged",
+    "Solver",
+    "Subscriber",
+    "Workspace",
+    "open_workspace",
+    "recording_facts",
+]
+
+Subscriber: TypeAlias = Callable[[View], None]
+Judged: TypeAlias = tuple[tuple[CarriedTrack, ...], Calibration | None]
+"""Boxes and a calibration that they say something about."""
+
+
+class Journal(Protocol):
+    """Stores the steps: cocalib.session.file.SessionFile, or a list in a test."""
+
+    def append(self, step: Step, history: History) -> None:
+        """Store a step permanently before returning; `history` is the state after it."""
+
+    def close(self) -> Closed:
+        """Close the file; return whether everything is in it, also when called again."""
+
+
+class _Unstored:
+    """Stores nothing: changes of options while looking at a recording without pictures are not kept."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def append(self, step: Step, history: History) -> None:
+        """Forget the step."""
+
+    def close(self) -> Closed:
+        """Return that there was nothing to store."""
+        return Closed(self._folder, clicks=0)
+
+
+class Solver(Protocol):
+    """Solves revisions: cocalib.solver_worker.SolverWorker, or a fake in a test."""
+
+    def request(
+        self,
+        revision: int,
+        clicks: Sequence[ReflectorClick],
+        options: CalibrationOptions,
+        when_done: Callable[[Solved], None],
+        camera: Camera | None = None,
+    ) -> None:
+        """Solve this revision and drop older requests; must not block. A larger revision is a newer one.
+
+        Without a camera, it is solved with the intrinsics that the recording was opened with.
+        """
+
+    def close(self) -> None:
+        """Stop: no answer comes after this returns."""
+
+
+@dataclass(frozen=True, slots=True)
+class GivenIntrinsics:
+    """The intrinsics that a recording was opened with.
+
+    Attributes:
+        camera: None if there are none.
+        file: that they come from; None for the recording's own.
+        about: where they come from, in words; "" if there are none.
+    """
+
+    camera: Camera | None = None
+    file: CameraFile | None = None
+    about: str = ""
+
+
+class Workspace:
+    """Holds the session; every change is made by dispatching a step.
+
+    A step is journalled before the subscribers are notified. Views reach them in the order of the changes and outside the
+    lock, so a subscriber may dispatch; it must return quickly and must not raise.
+
+    Attributes:
+        facts: the recording's frames.
+        restored: what was found in the session's folder at the start.
+        reference: a calibration to show until the clicks give a new one; None if there is none.
+        given: the intrinsics that the recording was opened with.
+        fleet_prior: what the fleet says of this vehicle, with its file; None if none was given.
+        acc: what the boxes say about the calibration, as last judged.
+        open_meaning: a calibration that does not state what its numbers mean, for a person to pick; None if there is none.
+    """
+
+    open_meaning: OpenMeaning | None = None
+    acc: AccPanel = AccPanel()
+
+    def __init__(
+        self,
+        facts: RecordingFacts,
+        restored: Restored,
+        journal: Journal,
+        solver: Solver,
+        reference: Reference | None = None,
+        given: GivenIntrinsics | None = None,
+        fleet_prior: FleetPriorFile | None = None,
+    ) -> None:
+        self.facts = facts
+        self.restored = restored
+        self.reference = reference
+        self.given = given or GivenIntrinsics()
+        self.fleet_prior = fleet_prior
+        self._chosen: tuple[ChosenIntrinsics, Camera] | None = None
+        self._history = restored.history
+        self._placements: tuple[Placement, ...] | None = None
+        self._followed: Mapping[Start, Followed] = {}
+        self._judged: Judged = ((), None)
+        self._carried: tuple[CarriedTrack, ...] = ()
+        self._carried_from: tuple[tuple[BoxTrack, ...], RecordingFacts, Mapping[Start, Followed]] = ((), facts, {})
+        self._journal = journal
+        self._solver = solver
+        self._lock = threading.Lock()
+        self._subscribers: tuple[Subscriber, ...] = ()
+        self._pending: deque[tuple[View, tuple[Subscriber, ...]]] = deque()
+        self._notifying = False
+        self._ask_for_answer(restored.history.present)
+
+    @property
+    def history(self) -> History:
+        """The session, with what can be undone and redone."""
+        return self._history
+
+    @property
+    def session(self) -> Session:
+        """The current session."""
+        return self._history.present
+
+    @property
+    def view(self) -> View:
+        """The current View."""
+        return self._view_of(self._history)
+
+    @property
+    def camera(self) -> Camera | None:
+        """The intrinsics to solve with: those chosen in the session, else those it was opened with; None if there are none."""
+        return self._chosen_camera(self.session) or self.given.camera
+
+    @property
+    def camera_file(self) -> CameraFile | None:
+        """The file that they come from; None for the recording's own."""
+        chosen = self._chosen_camera(self.session)
+        if chosen is None:
+            return self.given.file
+        return CameraFile("camera.yaml", camera_info_text(chosen, "camera").encode())
+
+    @property
+    def intrinsics(self) -> str:
+        """Where they come from, in words; "" if there are none."""
+        chosen = self.session.intrinsics
+        return self.given.about if chosen is None else chosen.about
+
+    def _chosen_camera(self, session: Session) -> Camera | None:
+        """Return the camera chosen in a session, the same object each time; None if none was."""
+        chosen = session.intrinsics
+        if chosen is None:
+            return None
+        kept = self._chosen
+        if kept is None or kept[0] != chosen:
+            kept = self._chosen = (chosen, chosen.camera)
+        return kept[1]
+
+    def _view_of(self, history: History) -> View:
+        carried = self._carried_of(history.present)
+        is_old = bool(self.acc.figures) and self._judged != self._to_judge(history.present)
+        acc = replace(self.acc, judging=True) if is_old else self.acc
+        return view(history, self.facts, self.reference, self._placements, carried, acc)
+
+    def show_placements(self, placements: Sequence[Placement]) -> None:
+        """Take in the placements that were found in the radar data, so that the View says how many have no click."""
+        with self._lock:
+            self._placements = tuple(placements)
+            self._pending.append((self._view_of(self._history), self._subscribers))
+        self._notify()
+
+    @property
+    def carried(self) -> tuple[CarriedTrack, ...]:
+        """The boxes of the session in every frame, as far as they have been followed."""
+        return self._carried_of(self.session)
+
+    def _carried_of(self, session: Session) -> tuple[CarriedTrack, ...]:
+        """Return the boxes of a session in every frame; those of the last one are kept, since every View needs them."""
+        made_from = (session.boxes, self.facts, self._followed)
+        if any(one is not other for one, other in zip(made_from, self._carried_from, strict=True)):
+            self._carried, self._carried_from = carried_tracks(*made_from), made_from
+        return self._carried
+
+    @property
+    def boxes(self) -> Boxes:
+        """The same as a file of boxes would state them."""
+        return carried_boxes(self.carried, self.session, self.facts)
+
+    @property
+    def to_judge(self) -> Judged:
+        """The boxes and the calibration that they say something about: none while it is being checked."""
+        return self._to_judge(self.session)
+
+    def _to_judge(self, session: Session) -> Judged:
+        found = shown_calibration(session, self.reference)
+        return self._carried_of(session), None if found is None or found.checking else found
+
+    def show_acc(self, acc: AccPanel, judged: Judged) -> None:
+        """Take in what the boxes say about the calibration, and which boxes and calibration were judged."""
+        with self._lock:
+            self.acc, self._judged = acc, judged
+            self._pending.append((self._view_of(self._history), self._subscribers))
+        self._notify()
+
+    def show_followed(self, followed: Mapping[Start, Followed]) -> None:
+        """Take in what following the boxes through the pictures has given so far."""
+        with self._lock:
+            self._followed = dict(followed)
+            self._pending.append((self._view_of(self._history), self._subscribers))
+        self._notify()
+
+    def dispatch(self, step: Step) -> None:
+        """Apply one step, journal it, then notify the subscribers.
+
+        Raises:
+            EventError: the event does not fit; nothing changed.
+            OptionError: an option is unknown or out of range; nothing changed.
+            SessionFileError: the step could not be stored; nothing changed.
+        """
+        with self._lock:
+            step = settled(step, self._history.present)
+            after = advance(self._history, step, self.facts)
+            if after is self._history:
+                return
+            if not isinstance(step, Solved | ScansAdded):
+                self._journal.append(step, after)
+            self._history = after
+            self._pending.append((self._view_of(after), self._subscribers))
+        self._ask_for_answer(after.present)
+        self._notify()
+
+    def extend(self, image_times: TimesNs, scans_from: TimeNs | None) -> None:
+        """Take in frames and scans that have been written since; clicks with new scans in their window are solved again.
+
+        Args:
+            image_times: (m,) stamps of all frames; those before stay the first ones.
+            scans_from: stamp of the first new scan; None if there is none.
+        """
+        with self._lock:
+            self.facts = replace(self.facts, image_times=image_times)
+            session = self._history.present
+        locating = session.options.locating
+        reach_ns = round((locating.window_s / 2 + locating.max_time_gap_s) * NS_PER_S)
+        if scans_from is not None and any(click.image_time + reach_ns >= scans_from for click in session.clicks):
+            self.dispatch(ScansAdded())
+
+    def undo(self) -> None:
+        """Undo the last change, if there is one."""
+        self.dispatch(Undo())
+
+    def redo(self) -> None:
+        """Redo the change that was undone last, if there is one."""
+        self.dispatch(Redo())
+
+    def subscribe(self, subscriber: Subscriber) -> Callable[[], None]:
+        """Call the subscriber with the current View, and again after every change.
+
+        Returns:
+            a function that ends the subscription.
+        """
+        with self._lock:
+            self._subscribers = (*self._subscribers, subscriber)
+            self._pending.append((self._view_of(self._history), (subscriber,)))
+        self._notify()
+
+        def end() -> None:
+            with self._lock:
+                self._subscribers = tuple(other for other in self._subscribers if other is not subscriber)
+
+        return end
+
+    def clicks_text(self) -> str:
+        """Return the clicks as a clicks-1 file."""
+        return write_clicks(self.session.clicks, radar_topics=self.facts.radar_topics)
+
+    def import_clicks(self, text: str, source: str) -> None:
+        """Add the clicks of a clicks-1 file to the session.
+
+        Args:
+            text: the content of the file.
+            source: its name, for error messages.
+
+        Raises:
+            InputError: the text is not a file of clicks.
+            EventError: a click does not belong to a frame of this recording; nothing changed.
+        """
+        self.dispatch(ClicksImported(read_clicks(text, source)))
+
+    def load_boxes(self, data: bytes, name: str) -> None:
+        """Put the boxes of a file in the place of all boxes.
+
+        Args:
+            data: the content of the file, of any known format.
+            name: its name.
+
+        Raises:
+            InputError: it cannot be read, is of no known format, or belongs to another recording.
+            EventError: a box does not fit the recording; nothing changed.
+        """
+        self.dispatch(boxes_loaded(read_sent_boxes(data, name, self.facts), self.facts))
+
+    def close(self) -> Closed:
+        """Stop the solver, write the snapshot and close the session file; return whether all clicks are on the disk.
+
+        Safe to call again.
+        """
+        self._solver.close()
+        with self._lock:
+            return self._journal.close()
+
+    def _ask_for_answer(self, session: Session) -> None:
+        """Request a solve without holding the lock: the answer may come at once; older requests never replace newer ones."""
+        if session.needs_solving:
+            camera = self._chosen_camera(session)
+            self._solver.request(session.revision, session.clicks, session.options, self.dispatch, camera)
+
+    def _notify(self) -> None:
+        """Send pending Views to their subscribers, one thread at a time and in order."""
+        while True:
+            with self._lock:
+                if self._notifying or not self._pending:
+                    return
+                shown, subscribers = self._pending.popleft()
+                self._notifying = True
+            try:
+                for subscriber in subscribers:
+                    subscriber(shown)
+            finally:
+                with self._lock:
+                    self._notifying = False
+
+
+def recording_facts(recording: Recording, name: str) -> RecordingFacts:
+    """Return what clicks are checked against.
+
+    Args:
+        recording: the open recording.
+        name: what to call it.
+
+    Raises:
+        InputError: it has neither frames nor radar scans.
+    """
+    if not len(recording.image_times) and not len(recording.radar_times):
+        raise InputError(f"{name}: has neither pictures nor radar scans; give the files of the radar and of the camera")
+    picture = recording.image_bytes(0) if len(recording.image_times) else None
+    return RecordingFacts(
+        name,
+        recording.image_times,
+        picture.width_px if picture else 0,
+        picture.height_px if picture else 0,
+        recording.radar_axes,
+        recording.radar_times,
+        recording.radar_topics,
+        tuple(AssumedReading(one.words, assumption_hint(one.confirm)) for one in recording.assumptions),
+    )
+
+
+def open_workspace(
+    recording: Recording,
+    *,
+    camera: Camera | None,
+    session_folder: Path,
+    name: str,
+    reference: Reference | None = None,
+    warnings: tuple[DataWarning, ...] = (),
+    camera_file: CameraFile | None = None,
+    intrinsics: str = "",
+    fleet_prior: FleetPriorFile | None = None,
+) -> Workspace:
+    """Open or start the session of a recording, with its solver.
+
+    Args:
+        recording: the open recording.
+        camera: the intrinsics to solve with; None if there are none.
+        session_folder: where the session is stored.
+        name: what to call the recording.
+        reference: a calibration to review and to compare with; None if there is none.
+        warnings: what is known about the choice of the session folder.
+        camera_file: the file that the intrinsics come from; None for the recording's own.
+        intrinsics: where they come from, in words; by default, that file or the recording's topic.
+        fleet_prior: what the fleet says of this vehicle; optional.
+
+    Without pictures there is nothing to click and nothing to store: the session folder is not touched.
+
+    Raises:
+        InputError: the recording has neither frames nor radar scans.
+        SessionFileError: the session cannot be opened.
+    """
+    facts = recording_facts(recording, name)
+    if not facts.has_pictures:
+        nothing = _Unstored(session_folder)
+        return Workspace(facts, Restored(session_folder, History()), nothing, SolverWorker(recording, None))
+    session_file = open_session_file(session_folder, facts, warnings)
+    prior = fleet_prior.prior if fleet_prior else None
+    solver = SolverWorker(recording, camera, reference.calibration if reference else None, prior)
+    given = GivenIntrinsics(camera, camera_file, intrinsics or _source_of(camera, camera_file, recording))
+    return Workspace(facts, session_file.restored, session_file, solver, reference, given, fleet_prior)
+
+
+def _source_of(camera: Camera | None, camera_file: CameraFile | None, recording: Recording) -> str:
+    """Say where intrinsics come from; "" if there are none."""
+    if camera is None:
+        return ""
+    if camera_file is not None:
+        return name_text(Path(camera_file.source).name)
+    return recording.camera_info_topic or "the recording"
