@@ -19,7 +19,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from calib_core.recordings import AwaitedRecording, FollowedRecording
-from cocalib.web.port.server import RunningServer, ServerOptions, start
+from cocalib.web.port.link import ServerOptions
+from cocalib.web.port.server import RunningServer, start
 from cocalib.workspace import open_workspace
 
 _FLAGS = ["--no-sandbox", "--disable-gpu", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]

@@ -9,22 +9,6 @@ if TYPE_CHECKING:
 else:  # to type checkers jaxtyping's names are Annotated too, and importing it takes half as long as NumPy
     Bool = Float64 = Int64 = Annotated
 
-__all__ = [
-    "Flags",
-    "Indices",
-    "Matrix22",
-    "Matrix23",
-    "Matrix33",
-    "Matrix66",
-    "Points2",
-    "Points3",
-    "TimesNs",
-    "Values",
-    "Vector2",
-    "Vector3",
-    "frozen_array",
-]
-
 Vector2: TypeAlias = Float64[np.ndarray, "2"]
 Vector3: TypeAlias = Float64[np.ndarray, "3"]
 Matrix22: TypeAlias = Float64[np.ndarray, "2 2"]

@@ -40,8 +40,6 @@ from calib_core.results import Calibration, DataWarning
 from calib_core.unsolved import DEGENERATE
 from calib_core.verdict import verdict_on
 
-__all__ = ["calibrate", "calibrate_pairs", "calibration_steps", "preview_pairs", "require_default", "solve_again"]
-
 _UNDETERMINED_ROTATION_RAD = 0.5  # a larger standard deviation means that the pairs do not determine the rotation
 _AGREEING_SHARE = 0.9
 

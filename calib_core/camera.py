@@ -13,8 +13,6 @@ from calib_core.geometry import RigidTransform, rotation_jacobian
 from calib_core.lens_models.lens_model import LensModel
 from calib_core.lens_models.registry import LENS_MODELS
 
-__all__ = ["CAMERA_MODELS", "Camera", "CameraCovariance", "CameraModel"]
-
 CAMERA_MODELS: tuple[str, ...] = tuple(LENS_MODELS)
 if TYPE_CHECKING:
     CameraModel: TypeAlias = str

@@ -6,8 +6,6 @@ import numpy as np
 
 from calib_core.arrays import Matrix66, frozen_array
 
-__all__ = ["CovarianceParts"]
-
 _ROUNDING = 1e-12
 
 

@@ -8,8 +8,6 @@ import numpy as np
 from calib_core.arrays import TimesNs
 from calib_core.measurements import TimeNs
 
-__all__ = ["Box", "Boxes", "FrameBoxes", "LabelledScan", "ReturnLabels"]
-
 
 @dataclass(frozen=True, slots=True)
 class Box:

@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-__all__ = ["ERROR_WORDS", "ErrorWords", "error_words"]
-
 
 @dataclass(frozen=True, slots=True)
 class ErrorWords:

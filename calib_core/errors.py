@@ -8,8 +8,6 @@ CalibrationError
  └── UnsolvableError      a calibration was requested that the data cannot give
 """
 
-__all__ = ["CalibrationError", "InputError", "MessageError", "OptionError", "RecordingError", "UnsolvableError"]
-
 
 class CalibrationError(Exception):
     """Any input this package rejects; the message is one line and can be shown as it is."""

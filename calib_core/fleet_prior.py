@@ -6,8 +6,6 @@ from calib_core.arrays import Matrix66, frozen_array
 from calib_core.covariance_parts import CovarianceParts
 from calib_core.geometry import RigidTransform
 
-__all__ = ["DataAlone", "FleetAnswer", "FleetPrior"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FleetPrior:

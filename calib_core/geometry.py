@@ -8,21 +8,6 @@ import numpy as np
 
 from calib_core.arrays import Matrix33, Matrix66, Points3, Vector3, frozen_array
 
-__all__ = [
-    "OPTICAL_FROM_LINK",
-    "RigidTransform",
-    "euler_from_rotation",
-    "larger_eigenvalues",
-    "matrix_from_quaternion_wxyz",
-    "quaternion_wxyz_from_matrix",
-    "rotation_angle_rad",
-    "rotation_exp",
-    "rotation_from_euler",
-    "rotation_jacobian",
-    "rotation_log",
-    "skew",
-]
-
 OPTICAL_FROM_LINK = frozen_array(np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]), (3, 3))
 """Rotation from body axes (x forward, y left, z up) to a camera's optical axes (x right, y down, z forward)."""
 

@@ -8,8 +8,6 @@ from typing import Any
 
 from calib_core.errors import InputError
 
-__all__ = ["encodable", "file_text", "name_text", "read_input", "special_kind"]
-
 _SHELL_PIPES = ("/dev/fd/", "/proc/self/fd/", "/dev/stdin")
 """Where a shell puts what `<(command)` writes: there is a writer, so reading it ends."""
 _PIPE = "a named pipe (FIFO)"

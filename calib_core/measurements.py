@@ -9,24 +9,6 @@ import numpy as np
 from calib_core.arrays import Indices, Matrix33, Points3, TimesNs, Values, Vector2, Vector3, frozen_array
 from calib_core.errors import UnsolvableError
 
-__all__ = [
-    "MIN_PAIRS",
-    "NS_PER_S",
-    "Candidate",
-    "ChosenReturn",
-    "Mark",
-    "Pair",
-    "RadarScan",
-    "RadarScans",
-    "ReflectorClick",
-    "Stamp",
-    "TimeNs",
-    "Unpaired",
-    "Unsolvable",
-    "time_from_parts",
-    "time_parts",
-]
-
 TimeNs = NewType("TimeNs", int)
 """Nanoseconds since the epoch. Never a float: a float64 of the present time is off by up to 128 ns."""
 

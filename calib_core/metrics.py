@@ -12,8 +12,6 @@ import numpy as np
 from calib_core.arrays import Flags, Points2, Values
 from calib_core.results import Metrics
 
-__all__ = ["ZeroFrames", "acc", "aed", "cdsd", "distances", "inside_boxes", "metrics_of", "rms"]
-
 ZeroFrames = Literal["keep", "drop"]
 
 

@@ -12,17 +12,6 @@ from typing import Any, Literal, TypeAlias
 from calib_core.errors import OptionError
 from calib_core.options import CalibrationOptions, CameraPositionPrior
 
-__all__ = [
-    "RANGES",
-    "UNITS",
-    "OptionField",
-    "OptionKind",
-    "checked_options",
-    "kind_of",
-    "option_fields",
-    "unit_of_name",
-]
-
 OptionKind: TypeAlias = Literal["number", "integer", "yes-no", "choice", "camera-position"]
 
 UNITS = {"_mps": "m/s", "_px": "px", "_deg": "deg", "_rad": "rad", "_db": "dB", "_m": "m", "_s": "s"}

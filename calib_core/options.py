@@ -4,25 +4,6 @@ import math
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, Literal
 
-__all__ = [
-    "BoardOptions",
-    "CalibrationOptions",
-    "CameraPositionPrior",
-    "GatingOptions",
-    "LensOptions",
-    "LocatingOptions",
-    "Method",
-    "MountingOptions",
-    "NoiseOptions",
-    "PaperOptions",
-    "RadarOptions",
-    "RefiningOptions",
-    "ReflectorOptions",
-    "SolvingOptions",
-    "option",
-    "without_systematic_errors",
-]
-
 Method = Literal["default", "paper", "pmm", "ccm"]
 
 

@@ -8,8 +8,6 @@ import numpy as np
 from calib_core.errors import InputError
 from calib_core.measurements import Candidate, Pair
 
-__all__ = ["NEAREST_RETURN_M", "checked_pairs", "too_near"]
-
 NEAREST_RETURN_M = 0.1
 """A reflector nearer than this is not a return of its own; angles of such a position mean nothing."""
 

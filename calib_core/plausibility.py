@@ -14,8 +14,6 @@ from calib_core.camera import Camera
 from calib_core.options import CalibrationOptions
 from calib_core.results import DataWarning
 
-__all__ = ["PIXELS_SUSPECTED", "implausible_input"]
-
 PIXELS_SUSPECTED = "pixels-suspected"
 
 _FARTHEST_M = 100.0  # a reflector of a few decimetres is then a pixel or two wide

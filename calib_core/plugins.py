@@ -14,8 +14,6 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 if TYPE_CHECKING:
     from importlib.metadata import Distribution, EntryPoint
 
-__all__ = ["Plugin", "load_plugins", "warn_skipped"]
-
 _log = logging.getLogger(__name__)
 
 Value = TypeVar("Value")

@@ -7,8 +7,6 @@ import numpy as np
 from calib_core.arrays import Matrix66, Values, frozen_array
 from calib_core.geometry import RigidTransform, skew
 
-__all__ = ["PoseDifference", "camera_position_jacobian", "pose_difference", "squared_distance"]
-
 _ZERO_LENGTH = 1e-9
 
 

@@ -9,17 +9,6 @@ import numpy as np
 
 from calib_core.arrays import Points3, Values, frozen_array
 
-__all__ = [
-    "AngleMap",
-    "RadarErrors",
-    "cartesian_from_polar",
-    "cartesian_jacobian",
-    "covariance_from_sigma_polar",
-    "direction_cosines",
-    "polar_from_cartesian",
-    "position_planes",
-]
-
 _LEAST_SHARE_SQUARED = 0.25  # of the range that is left along the plane of the placements
 
 _LARGEST_AED_RATIO = 0.97

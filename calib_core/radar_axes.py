@@ -8,15 +8,6 @@ from calib_core.arrays import Matrix66, Vector3, frozen_array
 from calib_core.geometry import RigidTransform, skew
 from calib_core.options import RadarOptions
 
-__all__ = [
-    "RadarAxesSigma",
-    "bias_moves",
-    "camera_axes_text",
-    "mounting_moves",
-    "sigma_in_radar_axes",
-    "without_mounting",
-]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RadarAxesSigma:

@@ -14,8 +14,6 @@ from calib_core.options import without_systematic_errors
 from calib_core.radar import RadarErrors
 from calib_core.results import Calibration
 
-__all__ = ["ResidualTest", "residual_test"]
-
 _QUANTILE = 12.591587243743977  # the 95 % quantile of chi2 with 6 degrees of freedom
 _OUTSIDE = 5.991464547107979  # the 95 % quantile of chi2 with 2 degrees of freedom
 _MISFIT = 13.815510557964274  # its 99.9 % quantile: no noise of this pair explains it

@@ -17,18 +17,6 @@ from calib_core.radar import AngleMap, RadarErrors
 from calib_core.radar_axes import bias_moves, camera_axes_text, sigma_in_radar_axes, without_mounting
 from calib_core.systematic_errors import DominantError, SystematicErrorResult, dominance_text, dominant_errors, rescaled
 
-__all__ = [
-    "Calibration",
-    "CheckPoint",
-    "DataWarning",
-    "InputFile",
-    "Metrics",
-    "NextPlacement",
-    "PairResult",
-    "SystematicErrorResult",
-    "UnconfirmedClicks",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class DataWarning:

@@ -7,8 +7,6 @@ import numpy as np
 from calib_core.geometry import skew
 from calib_core.results import Calibration
 
-__all__ = ["StatedError", "degrees_of_freedom", "stated_error"]
-
 _BEYOND = 0.05 / 3.0  # rotation, position and picture hold together, so each may fail in a third of the 5 %
 _LEAST_FREEDOM, _MOST_FREEDOM = 0.5, 1e5
 _HALVINGS = 60

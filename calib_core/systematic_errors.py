@@ -11,17 +11,6 @@ import numpy as np
 from calib_core.arrays import Matrix66
 from calib_core.error_words import error_words
 
-__all__ = [
-    "DominantError",
-    "SystematicErrorResult",
-    "dominance_text",
-    "dominant_errors",
-    "is_beyond_its_prior",
-    "is_determined",
-    "knowledge_text",
-    "rescaled",
-]
-
 _DOMINANT_SHARE = 1.0 / 3.0
 _UNDETERMINED = 0.97  # of the prior's sigma: the pairs say nothing
 _BEYOND = 3.0  # standard deviations of the prior

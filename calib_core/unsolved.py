@@ -4,18 +4,6 @@ from calib_core.arrays import Vector3
 from calib_core.measurements import MIN_PAIRS, Pair, Unpaired, Unsolvable
 from calib_core.options import CameraPositionPrior
 
-__all__ = [
-    "DEGENERATE",
-    "contradicted",
-    "degenerate",
-    "mirrored",
-    "no_board_pictures",
-    "no_pose",
-    "one_place",
-    "too_few",
-]
-
-
 DEGENERATE = "degenerate-placements"
 """The code of placements that leave part of the pose open."""
 

@@ -14,23 +14,6 @@ from calib_core.measurements import Unsolvable
 from calib_core.results import Calibration, DataWarning, NextPlacement
 from calib_core.stated_error import StatedError, stated_error
 
-__all__ = [
-    "ALL_CLICKED",
-    "DONE",
-    "GOOD_CM",
-    "GOOD_DEG",
-    "HELD_OUT_RATIO",
-    "SURE_PAIRS",
-    "SURE_PAIRS_OF_KIND",
-    "USABLE_CM",
-    "USABLE_DEG",
-    "Verdict",
-    "VerdictLevel",
-    "level_named",
-    "placement_words",
-    "verdict_on",
-]
-
 VerdictLevel: TypeAlias = Literal["good", "usable", "weak", "contradictory", "nothing"]
 
 GOOD_DEG, GOOD_CM = 1.0, 10.0

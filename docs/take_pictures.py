@@ -17,7 +17,8 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from calib_core.recordings import open_recording  # noqa: E402
-from cocalib.web.port.server import RunningServer, ServerOptions, start  # noqa: E402
+from cocalib.web.port.link import ServerOptions  # noqa: E402
+from cocalib.web.port.server import RunningServer, start  # noqa: E402
 from cocalib.workspace import open_workspace  # noqa: E402
 from tests.browser.driving import FLAGS, Driver  # noqa: E402
 from tests.find_browser import find_browser  # noqa: E402

@@ -11,8 +11,6 @@ from cocalib.error_boundary import report_thread_errors
 from cocalib.memory import keep_freed_memory
 from cocalib.signals import stop_on_signals
 
-__all__ = ["main"]
-
 
 def main() -> None:
     """Run the command given on the command line and exit with its code."""

@@ -20,8 +20,6 @@ from calib_core.verdict import verdict_on
 from cocalib.proposing import REFLECTOR_M, RecordedFrames, find_proposals
 from cocalib.solving import RadarSource, solve_clicks
 
-__all__ = ["PlacedClicks", "is_doubtful", "place_clicks", "refusal_of", "solve_placed_clicks"]
-
 _FARTHEST_M = 0.3
 """Without a measured position, a camera that is certainly farther from the radar than this is not believed: whatever is carried
 from place to place beside the reflector looks like a camera so far away."""

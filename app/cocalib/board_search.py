@@ -10,8 +10,6 @@ from calib_core.measurements import Unsolvable
 from calib_core.options import BoardOptions
 from calib_core.vision.checkerboard import find_corners
 
-__all__ = ["PictureSource", "find_board"]
-
 _MOST_FRAMES = 40
 _STRIDE = 17
 """Coprime to the number of frames: frames far apart are searched first."""

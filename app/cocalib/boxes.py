@@ -9,8 +9,6 @@ from calib_core.errors import InputError, MessageError
 from calib_core.input_files import file_text, read_input
 from calib_core.recordings import Recording
 
-__all__ = ["find_boxes", "find_labels"]
-
 _MAX_LABELS_BYTES = 256 * 1024 * 1024
 
 

@@ -6,8 +6,6 @@ import numpy as np
 
 from calib_core.arrays import Values
 
-__all__ = ["RETURN_RAMPS", "STAYING", "Colour", "ramp_colours", "residual_colours"]
-
 Colour: TypeAlias = tuple[int, int, int]
 """Red, green and blue, 0 to 255."""
 

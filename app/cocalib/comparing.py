@@ -13,8 +13,6 @@ from calib_core.measurements import ReflectorClick
 from calib_core.results import Calibration, DataWarning
 from cocalib.evaluating import EvidenceOptions, RadarRecording, evidence_in, judged
 
-__all__ = ["ComparedOnRecording", "compare_on_recording", "comparison_lines"]
-
 _FITTED_SHARE = 0.5
 
 

@@ -22,8 +22,6 @@ from pathlib import Path
 from cocalib.resources import state_folder, version
 from cocalib.terminal import escaped
 
-__all__ = ["INTERNAL_ERROR", "error_boundary", "report_of", "report_thread_errors"]
-
 INTERNAL_ERROR = 70
 """The exit code of a command that ended in the boundary (EX_SOFTWARE)."""
 _MOST_REPORTS = 20

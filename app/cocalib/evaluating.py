@@ -28,16 +28,6 @@ from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, DataWarning
 from cocalib.solving import half_window_s
 
-__all__ = [
-    "Evidence",
-    "EvidenceOptions",
-    "RadarRecording",
-    "evaluate_recording",
-    "evaluation_exit_code",
-    "evidence_in",
-    "judged",
-]
-
 _AROUND_S = 3.0
 """Scans before the first and after the last annotated frame, for targets to be followed into the frames."""
 

@@ -11,8 +11,6 @@ from calib_core.interchange.own.fleet_prior_json import read_fleet_prior
 from calib_core.results import InputFile
 from cocalib.text_files import read_text
 
-__all__ = ["FleetPriorFile"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FleetPriorFile:

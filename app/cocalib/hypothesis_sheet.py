@@ -15,18 +15,6 @@ if TYPE_CHECKING:
     from calib_core.interchange.hypotheses.ranking import Hypothesis
     from calib_core.recordings import Recording
 
-__all__ = [
-    "FrameWithReturns",
-    "Offer",
-    "OpenMeaning",
-    "contact_sheet",
-    "frame_with_returns",
-    "jpeg",
-    "png",
-    "returns_in_picture",
-    "tile",
-]
-
 _TILE_WIDTH_PX = 560
 _CAPTION_PX, _LINE_PX = 58, 19
 _ACROSS = 3

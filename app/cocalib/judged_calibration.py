@@ -10,8 +10,6 @@ from calib_core.recordings import Recording
 from calib_core.results import Calibration, DataWarning
 from cocalib.recording_check import calibration_of, other_camera
 
-__all__ = ["JudgedCalibration", "judged_calibration", "require_size"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JudgedCalibration:

@@ -2,8 +2,6 @@
 
 import ipaddress
 
-__all__ = ["is_loopback"]
-
 
 def is_loopback(host: str) -> bool:
     """Return whether an address can only be reached from this machine."""

@@ -17,16 +17,6 @@ from calib_core.errors import OptionError
 from calib_core.option_checks import RANGES, UNITS, OptionKind, checked_options, kind_of, option_fields, unit_of_name
 from calib_core.options import CalibrationOptions, CameraPositionPrior
 
-__all__ = [
-    "OptionChange",
-    "OptionDescription",
-    "OptionGroup",
-    "changed_options",
-    "changes_from_tree",
-    "option_groups",
-    "options_from_tree",
-]
-
 OptionValue: TypeAlias = bool | int | float | str | CameraPositionPrior | None
 
 

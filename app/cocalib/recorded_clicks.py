@@ -13,8 +13,6 @@ from calib_core.recordings import Recording
 from cocalib.session.click_stamps import ClicksAtFrames, clicks_at_frames, half_interval_ns
 from cocalib.text_files import read_text
 
-__all__ = ["clicks_in_recording", "file_of_clicks", "require_confirmed", "seconds_text"]
-
 
 def file_of_clicks(path: Path) -> ClicksFile:
     """Read a clicks-1 file.

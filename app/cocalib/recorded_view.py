@@ -15,8 +15,6 @@ from cocalib.evaluating import evaluate_recording
 from cocalib.seen_returns import ReturnColours, ReturnQuantity, return_colours
 from cocalib.solving import check_clicks
 
-__all__ = ["RecordedView", "box_words", "recorded_view"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordedView:

@@ -15,8 +15,6 @@ from calib_core.residual_test import ResidualTest, residual_test
 from calib_core.results import Calibration, InputFile
 from cocalib.solving import RadarSource, half_window_s
 
-__all__ = ["calibration_of", "clicks_in", "other_camera", "stale_inputs", "with_recording"]
-
 _LEAST_P = 0.01
 _MOST_MISFITS = 0.2
 _NEAR_PX = 10.0

@@ -6,8 +6,6 @@ from calib_core.interchange import CameraFile
 from calib_core.recordings import Recording
 from cocalib.solving import camera_for, intrinsics_near
 
-__all__ = ["required_camera"]
-
 
 def required_camera(recording: Recording, camera_file: CameraFile | None) -> Camera:
     """Return the intrinsics: from the file if one is given, else from the recording.

@@ -8,16 +8,6 @@ from pathlib import Path
 
 from calib_core.errors import CalibrationError
 
-__all__ = [
-    "SESSION_SUFFIX",
-    "InstallationError",
-    "sample_folder",
-    "state_folder",
-    "static_folder",
-    "user_session_folder",
-    "version",
-]
-
 SESSION_SUFFIX = ".cocalib-session"
 _DISTRIBUTION = "cocalib"
 _PACKAGE_FOLDER = Path(__file__).resolve().parent

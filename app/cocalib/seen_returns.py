@@ -13,8 +13,6 @@ from calib_core.recordings import Recording
 from calib_core.results import Calibration
 from cocalib.colours import ramp_colours
 
-__all__ = ["FrameBlock", "ReturnColours", "ReturnQuantity", "SeenReturns", "frame_blocks", "return_colours", "seen_in"]
-
 ReturnQuantity: TypeAlias = Literal["range", "speed"]
 
 _NEAREST_WITHIN_S = 0.3

@@ -7,8 +7,6 @@ from collections.abc import Callable
 from functools import partial
 from types import FrameType
 
-__all__ = ["stop_on_signals"]
-
 _NAMES = ("SIGINT", "SIGTERM", "SIGHUP")  # Windows has no SIGHUP
 _AGAIN_S = 0.02
 

@@ -17,8 +17,6 @@ from cocalib.error_boundary import report_of
 from cocalib.session import Solved
 from cocalib.solving import RadarSource, check_clicks, solve_in_steps
 
-__all__ = ["SolverWorker"]
-
 _log = logging.getLogger(__name__)
 
 

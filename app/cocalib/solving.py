@@ -37,20 +37,6 @@ from cocalib.board_search import find_board
 from cocalib.resources import version
 from cocalib.session import Outcome
 
-__all__ = [
-    "RadarSource",
-    "calibration_text",
-    "calibration_text_of_pairs",
-    "camera_for",
-    "check_clicks",
-    "half_window_s",
-    "intrinsics_near",
-    "solve_clicks",
-    "solve_in_steps",
-    "solve_pairs",
-    "window_candidates",
-]
-
 _MOST_CANDIDATES = 50
 """As many as the option allows."""
 

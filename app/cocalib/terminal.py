@@ -11,8 +11,6 @@ import sys
 from collections.abc import Iterator
 from typing import TextIO
 
-__all__ = ["escaped", "escaped_output", "print_exactly", "terminal_stream", "with_colours"]
-
 _UNSAFE = re.compile(
     "["
     "\x00-\x08\x0b-\x1f\x7f-\x9f"  # C0 except tab and line feed, DEL, C1

@@ -5,8 +5,6 @@ from pathlib import Path
 from calib_core.errors import InputError
 from calib_core.input_files import file_text, read_input
 
-__all__ = ["read_text"]
-
 _MAX_TEXT_BYTES = 64 * 1024 * 1024
 
 

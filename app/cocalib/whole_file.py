@@ -9,8 +9,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-__all__ = ["whole_path", "write_whole", "writing_whole"]
-
 _PATIENCE_S = 2.0
 
 

@@ -43,17 +43,6 @@ from cocalib.session.file import Closed, Restored, open_session_file
 from cocalib.solver_worker import SolverWorker
 from cocalib.view import AccPanel, Reference, View, shown_calibration, view
 
-__all__ = [
-    "GivenIntrinsics",
-    "Journal",
-    "Judged",
-    "Solver",
-    "Subscriber",
-    "Workspace",
-    "open_workspace",
-    "recording_facts",
-]
-
 Subscriber: TypeAlias = Callable[[View], None]
 Judged: TypeAlias = tuple[tuple[CarriedTrack, ...], Calibration | None]
 """Boxes and a calibration that they say something about."""

@@ -22,8 +22,6 @@ from calib_core.geometry import RigidTransform
 from calib_core.radar import AngleMap, cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration, PairResult
 
-__all__ = ["learn_angle_map"]
-
 _LEAST_PAIRS = 8
 _MOST_PAIRS = 120
 """Beyond this many the pairs are thinned out, because neighbours are redundant."""

@@ -13,8 +13,6 @@ import numpy as np
 from calib_core.arrays import Points3
 from calib_core.radar import polar_from_cartesian
 
-__all__ = ["ENOUGH_PLACEMENTS", "Coverage", "Place", "placement_coverage"]
-
 ENOUGH_PLACEMENTS = 20
 """The number of placements that docs/tour.md advises to record."""
 

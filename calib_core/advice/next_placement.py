@@ -14,8 +14,6 @@ from calib_core.measurements import Pair
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration, NextPlacement
 
-__all__ = ["PlacementLimits", "next_placement"]
-
 _ENOUGH_GAIN = 1.04  # a placement that gains less is not worth the effort
 _MARGIN_SHARE = 0.04  # of the image, kept free at its edges
 

@@ -11,8 +11,6 @@ import numpy as np
 from calib_core.arrays import Flags, Indices
 from calib_core.measurements import RadarScans
 
-__all__ = ["alternative_rows", "cluster_alternatives", "first_rows", "joined_labels", "return_keys"]
-
 _LEAST_SHARE = 0.25  # of the larger one's returns: a third azimuth may take half of them, and noise some
 
 

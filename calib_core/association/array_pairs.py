@@ -12,8 +12,6 @@ from calib_core.options import NoiseOptions
 from calib_core.pair_checks import too_near
 from calib_core.radar import covariance_from_sigma_polar
 
-__all__ = ["pairs_from_arrays"]
-
 
 def pairs_from_arrays(
     points_radar_m: Points3,

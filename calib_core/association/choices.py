@@ -11,8 +11,6 @@ from calib_core.measurements import NS_PER_S, Candidate, RadarScans, ReflectorCl
 from calib_core.options import CalibrationOptions, LocatingOptions, NoiseOptions
 from calib_core.radar import polar_from_cartesian
 
-__all__ = ["CHOICE_GONE", "chosen_candidate", "no_chosen_return", "with_shared_choices"]
-
 CHOICE_GONE = "chosen-return-missing"
 _REACH = 8.0  # standard deviations of a click, from one click of a placement to another
 

@@ -14,8 +14,6 @@ from calib_core.association.clustering import CLUSTER_SCALE
 from calib_core.measurements import RadarScans
 from calib_core.radar import direction_cosines
 
-__all__ = ["cluster_scale", "report_spread"]
-
 _LARGEST = 5.0  # times CLUSTER_SCALE
 _STEPS_PER_SIGMA = 1.75  # a cluster reaches two steps, so three and a half standard deviations
 _STEPS_PER_BIN = 0.6  # so that a cluster holds two neighbouring bins

@@ -18,17 +18,6 @@ from calib_core.measurements import NS_PER_S, Candidate, RadarScans, TimeNs
 from calib_core.options import LocatingOptions, NoiseOptions
 from calib_core.radar import covariance_from_sigma_polar, direction_cosines
 
-__all__ = [
-    "Cluster",
-    "candidate_at",
-    "candidates_of",
-    "cluster_at",
-    "clusters_of",
-    "clusters_wanted",
-    "nearest_cluster",
-    "window_around",
-]
-
 CLUSTER_SCALE = np.array([0.06, np.deg2rad(1.2), np.deg2rad(2.5)])
 """The least step of distance in range [m], u and w: about a range bin, an angle bin, and an elevation error.
 

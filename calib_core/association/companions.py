@@ -16,8 +16,6 @@ from calib_core.association.clustering import CLUSTER_SCALE
 from calib_core.measurements import Candidate, Pair
 from calib_core.radar import direction_cosines
 
-__all__ = ["Companion", "balanced_pairs", "find_companion"]
-
 _LEAST_SCORE = 0.05  # relative to the best of the pair
 _LEAST_PAIRS = 4
 _LEAST_SHARE = 0.6  # of the pairs

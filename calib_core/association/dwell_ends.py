@@ -6,8 +6,6 @@ import numpy as np
 
 from calib_core.arrays import Flags, Values
 
-__all__ = ["FirmSpan", "firm_span"]
-
 _WEAKER_DB = 6.0
 _WEAKER_SCATTERS = 4.0
 """How far below the dwell's median an echo is weak: in decibels at least, and in standard deviations of its echoes."""

@@ -18,8 +18,6 @@ from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 from calib_core.options import GatingOptions
 from calib_core.radar import direction_cosines
 
-__all__ = ["Dwell", "find_dwells"]
-
 CELL = np.array([0.08, 0.04, 0.08])
 """Size of a cell in range [m], u = y / r and w = z / r: the reflector's returns scatter over a few of them.
 

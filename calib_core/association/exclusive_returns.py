@@ -12,8 +12,6 @@ from calib_core.association.clustering import CLUSTER_SCALE
 from calib_core.measurements import NS_PER_S, Pair
 from calib_core.radar import direction_cosines
 
-__all__ = ["exclusive_rows", "shared_returns"]
-
 _SAME_RETURN = 1.0  # steps between the positions of one return in two windows that overlap
 _SHARED_COST = 1e9  # of a return taken twice, where a pair has nothing else
 _MOST_EXACT = 4  # pairs in one moment; of more, the cheapest choose first

@@ -6,8 +6,6 @@ from calib_core.arrays import Flags
 from calib_core.measurements import RadarScans
 from calib_core.options import GatingOptions
 
-__all__ = ["static_returns"]
-
 
 def static_returns(scans: RadarScans, options: GatingOptions) -> RadarScans:
     """Keep the static returns in range (Algorithm 1: range filter and velocity filter).

@@ -13,8 +13,6 @@ from calib_core.association.alternatives import alternative_rows
 from calib_core.association.clustering import CLUSTER_SCALE, Cluster
 from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 
-__all__ = ["background_windows", "scores_of"]
-
 _SAME_PLACE = 1.5  # steps within which a cluster of another window is the same object
 _FLOOR = 1e-6
 _PSEUDO_EMPTY = 0.5  # windows, so that a few windows that all show a place do not rule it out

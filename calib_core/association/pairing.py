@@ -15,8 +15,6 @@ from calib_core.association.placement_groups import linked_clicks
 from calib_core.measurements import NS_PER_S, Candidate, Pair, RadarScans, ReflectorClick, TimeNs, Unpaired
 from calib_core.options import CalibrationOptions
 
-__all__ = ["Pairing", "pair_clicks"]
-
 
 @dataclass(frozen=True, slots=True)
 class Pairing:

@@ -18,8 +18,6 @@ from calib_core.options import CalibrationOptions
 from calib_core.radar import covariance_from_sigma_polar, direction_cosines, polar_from_cartesian
 from calib_core.results import Calibration, PairResult
 
-__all__ = ["PlacementGroup", "click_results", "linked_clicks", "placement_groups"]
-
 SHARED_SIGMA_PX = 1.0
 """Standard deviation per axis of what all clicks of one placement have in common: the lens, the reflector's look [px]."""
 

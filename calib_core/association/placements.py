@@ -17,8 +17,6 @@ from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 from calib_core.options import GatingOptions
 from calib_core.radar import direction_cosines
 
-__all__ = ["MOST_STATIC_RETURNS", "Placement", "find_placements", "in_stretches"]
-
 MOST_STATIC_RETURNS = 1_000_000
 """Limit of one stretch: more than an hour of 25 static returns in each of 10 scans a second; searching it takes about 200 MB."""
 

@@ -19,8 +19,6 @@ from calib_core.options import BoardOptions, CalibrationOptions
 from calib_core.results import Calibration, DataWarning
 from calib_core.vision.checkerboard import BoardView, view_of_board
 
-__all__ = ["CornerPairs", "calibrate_on_board", "pairs_on_corners"]
-
 _FEWEST_CORNERS = 3
 
 

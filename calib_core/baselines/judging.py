@@ -16,8 +16,6 @@ from calib_core.plausibility import implausible_input
 from calib_core.radar import polar_from_cartesian
 from calib_core.results import Calibration, DataWarning, PairResult
 
-__all__ = ["judged", "judged_again"]
-
 _EXPLAINED = 11.83  # chi2 of 2 degrees of freedom that noise exceeds in 0.27 % of the pairs
 
 

@@ -12,8 +12,6 @@ from calib_core.measurements import Pair, Unpaired, Unsolvable
 from calib_core.options import CalibrationOptions, MountingOptions
 from calib_core.results import Calibration
 
-__all__ = ["calibrate_by_mounting", "mounting_rotation"]
-
 
 def mounting_rotation(options: MountingOptions) -> Matrix33:
     """Return the rotation of camera_from_radar of a camera that is mounted at these angles."""

@@ -11,8 +11,6 @@ import numpy as np
 from calib_core.arrays import Points3
 from calib_core.geometry import RigidTransform, skew
 
-__all__ = ["Registration", "register", "register_linearly"]
-
 _FLATTEST = 1e-3  # of the longest extent: points nearer to one line leave the rotation about it open
 
 

@@ -7,8 +7,6 @@ from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.results import Calibration, DataWarning
 
-__all__ = ["swapped"]
-
 
 def swapped(rotation_of: Calibration, translation_of: Calibration) -> Calibration:
     """Combine two calibrations of one rig, and judge the result on the pairs of the first; no uncertainty is stated.

@@ -12,8 +12,6 @@ from calib_core.errors import InputError
 from calib_core.input_files import file_text, name_text, read_input
 from calib_core.interchange.syntax.strict_json import json_value
 
-__all__ = ["load_box_file"]
-
 _MAX_BYTES = 256 * 1024 * 1024
 _MAX_XML_BYTES = 64 * 1024 * 1024
 _MOST_MEMBERS = 200_000

@@ -5,8 +5,6 @@ from dataclasses import dataclass
 from calib_core.detections import Box
 from calib_core.measurements import TimeNs
 
-__all__ = ["FileBoxes", "FileFrame"]
-
 
 @dataclass(frozen=True, slots=True)
 class FileFrame:

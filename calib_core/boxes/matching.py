@@ -18,8 +18,6 @@ from calib_core.measurements import TimeNs
 from calib_core.recordings.boxes.stamp_matching import frames_of_stamps
 from calib_core.recordings.plain_files.name_times import times_in_names
 
-__all__ = ["matched_boxes"]
-
 _LEAST_INSIDE = 0.5
 _DIGITS = re.compile(r"[0-9]+")
 _OTHER = "is it of another recording?"

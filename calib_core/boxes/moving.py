@@ -17,8 +17,6 @@ from calib_core.detections import Box, Boxes, FrameBoxes
 from calib_core.errors import InputError, MessageError
 from calib_core.measurements import TimeNs
 
-__all__ = ["MOVING", "changed_boxes"]
-
 MOVING = "moving"
 """The label of every box, and the word for --boxes."""
 

@@ -5,8 +5,6 @@ from dataclasses import dataclass, replace
 
 from calib_core.detections import Box
 
-__all__ = ["tracked"]
-
 _LEAST_OVERLAP = 0.2
 _LONGEST_GAP = 3
 

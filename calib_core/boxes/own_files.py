@@ -21,8 +21,6 @@ from calib_core.interchange.syntax.json_text import json_text
 from calib_core.interchange.syntax.strict_json import checked, parse_document
 from calib_core.measurements import TimeNs, time_from_parts, time_parts
 
-__all__ = ["boxes_text", "labels_text", "own_boxes", "read_labels"]
-
 
 def boxes_text(boxes: Boxes) -> str:
     """Write boxes as boxes-1 text; the same boxes give the same bytes."""

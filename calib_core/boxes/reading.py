@@ -10,8 +10,6 @@ from calib_core.detections import Boxes
 from calib_core.errors import InputError
 from calib_core.input_files import name_text
 
-__all__ = ["read_boxes"]
-
 
 def read_boxes(path: str | Path, *, image_times: TimesNs, image_size_px: tuple[int, int] | None) -> Boxes:
     """Read boxes of any known format, recognised by content, and give them the stamps of recorded frames.

@@ -16,8 +16,6 @@ from calib_core.recordings.containers.recorded_messages import CameraInfoMessage
 from calib_core.recordings.containers.stored_channels import ChannelNotes, StoredChannel
 from calib_core.results import Calibration
 
-__all__ = ["TRANSFORM_TOPIC", "Additions", "Plan", "latched"]
-
 TRANSFORM_TOPIC = "/tf_static"
 _REPEAT_NS = 1_000_000_000
 """A player that starts in the middle sees the transform after a second at most."""

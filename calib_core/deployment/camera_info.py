@@ -14,8 +14,6 @@ from calib_core.recordings.containers.recorded_messages import CameraInfoMessage
 from calib_core.recordings.messages.decoding import Message
 from calib_core.recordings.topics import Topic, join_topics
 
-__all__ = ["OWN_TOPIC", "ChosenTopic", "InfoTemplate", "choose_topic", "topic_beside"]
-
 OWN_TOPIC = "/cocalib/camera_info"
 """Where the topic beside the pictures holds other intrinsics."""
 

@@ -3,8 +3,6 @@
 import json
 from collections.abc import Sequence
 
-__all__ = ["foxglove_layout"]
-
 _POINT_PX = 8
 _3D_POINT_PX = 5
 _NEAR_M, _FAR_M = 0, 60

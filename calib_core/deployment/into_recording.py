@@ -22,8 +22,6 @@ from calib_core.recordings.containers.stored_channels import StoredChannel
 from calib_core.recordings.messages.stored_definitions import with_definition
 from calib_core.recordings.topics import join_topics
 
-__all__ = ["RecordingWritten", "write_into_recording"]
-
 _PROGRESS_MESSAGES = 256
 _MEANING = "transforms are poses of the child in the parent, quaternion x y z w; calibration.json is attached"
 

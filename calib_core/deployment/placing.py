@@ -7,8 +7,6 @@ import numpy as np
 from calib_core.deployment.recorded_frames import Chain, Joint, RecordedFrames
 from calib_core.geometry import RigidTransform, rotation_angle_rad
 
-__all__ = ["OWN_RADAR_FRAME", "SensorFrames", "place_transform"]
-
 OWN_RADAR_FRAME = "cocalib_radar"
 """The radar's frame where its own cannot be used."""
 

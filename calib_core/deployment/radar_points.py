@@ -12,8 +12,6 @@ from calib_core.recordings import Recording
 from calib_core.recordings.containers.recorded_messages import CloudMessage
 from calib_core.results import Calibration
 
-__all__ = ["CORRECTED_TOPIC", "POINTS_TOPIC", "CloudTopic", "clouds", "has_corrections", "stampable"]
-
 POINTS_TOPIC = "/cocalib/radar_points"
 CORRECTED_TOPIC = "/cocalib/radar_points_corrected"
 _LAST_STAMP_NS = (2**31 - 1) * NS_PER_S

@@ -13,8 +13,6 @@ from calib_core.recordings.messages.decoding import Message
 from calib_core.recordings.messages.definitions import short_type
 from calib_core.recordings.topics import Topic, join_topics
 
-__all__ = ["Chain", "Joint", "RecordedFrames", "is_transforms", "read_frames"]
-
 _TYPES = ("tf2_msgs/TFMessage", "tf/tfMessage")
 _SAME = 1e-9
 

@@ -20,8 +20,6 @@ from calib_core.radar import cartesian_from_polar, direction_cosines
 from calib_core.radar_axes import without_mounting
 from calib_core.results import DataWarning
 
-__all__ = ["warnings_of"]
-
 _NARROW_CONDITION = 5e5
 _WEAK_ROTATION_RAD = np.deg2rad(2.5)
 _WEAK_POSITION_M = 0.3

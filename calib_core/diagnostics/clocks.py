@@ -20,8 +20,6 @@ from calib_core.options import GatingOptions
 from calib_core.radar import direction_cosines
 from calib_core.results import Calibration, DataWarning, PairResult
 
-__all__ = ["CLOCK_CODES", "ClockOffset", "clock_offset", "clocks"]
-
 CLOCK_CODES = ("clock-bias-suspected",)
 """Codes of the warnings that need the recording: pairs alone cannot show them."""
 

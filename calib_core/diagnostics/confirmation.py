@@ -2,8 +2,6 @@
 
 from calib_core.results import DataWarning, UnconfirmedClicks
 
-__all__ = ["nobody_confirmed", "probability_text"]
-
 _NEARLY_SURE = 0.995
 
 

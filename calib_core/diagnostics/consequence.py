@@ -5,8 +5,6 @@ from typing import Literal, TypeAlias
 
 from calib_core.results import DataWarning
 
-__all__ = ["Consequence", "by_consequence", "consequence_of"]
-
 Consequence: TypeAlias = Literal["contradictory", "weak", "limited", "note"]
 """What a warning says of the pose: another one is as likely or the input is not what it claims to be; it cannot be relied
 on; it rests on an assumption, so it cannot be called good; nothing."""

@@ -9,8 +9,6 @@ from calib_core.options import RadarOptions
 from calib_core.radar_axes import sigma_in_radar_axes, without_mounting
 from calib_core.results import DataWarning
 
-__all__ = ["flat_radar"]
-
 
 def flat_radar(refined: ErrorsInVariablesFit, uncertainty: PoseCovariance, radar: RadarOptions) -> list[DataWarning]:
     """Say what the pairs of a radar without elevation determine, and what depends on how it is mounted.

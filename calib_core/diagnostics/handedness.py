@@ -17,8 +17,6 @@ from calib_core.geometry import skew
 from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar
 from calib_core.results import DataWarning
 
-__all__ = ["GroundSides", "assumed_axes", "ground_sides", "mirrored_axes"]
-
 _PLANE_ROUNDS = 6
 _NORMAL_QUANTILE_99 = 2.33
 _WRONG_SHARE = 0.1  # of the inliers

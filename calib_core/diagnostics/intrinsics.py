@@ -23,8 +23,6 @@ from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.estimation.prior_rows import prior_rows
 from calib_core.results import DataWarning
 
-__all__ = ["LensError", "intrinsics", "lens_errors"]
-
 _LEVEL = 0.0025  # false-alarm probability of each unknown
 _LEAST_PAIRS = 10
 _LEAST_SQUARED = 8.0  # a smaller statistic is never significant, whatever the degrees of freedom

@@ -9,8 +9,6 @@ from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.estimation.gnc import associate, log_odds_of
 from calib_core.results import DataWarning
 
-__all__ = ["ambiguous_candidates", "contradicted_pairs", "decisive_pair", "listed"]
-
 _AMBIGUOUS_MARGIN = 4.0
 _DECISIVE_LOSS = 8.0  # ratio of the standard deviations without and with the pair, in the worst direction
 _LEAST_PAIRS = 6

@@ -5,8 +5,6 @@ import numpy as np
 from calib_core.estimation.covariance import PoseCovariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 
-__all__ = ["picture_sigma_px"]
-
 
 def picture_sigma_px(refined: ErrorsInVariablesFit, uncertainty: PoseCovariance) -> float:
     """Return the standard deviation per axis [px] of a reprojection, root mean square over the inlier placements.

@@ -12,8 +12,6 @@ from calib_core.estimation.gnc import GncSolution, associate, mixture_cost
 from calib_core.geometry import RigidTransform
 from calib_core.results import DataWarning
 
-__all__ = ["camera_position", "two_poses"]
-
 _ALMOST_AS_LIKELY = 6.0  # a difference of twice the log-likelihood
 _WORTH_REFINING = 40.0
 _OTHER_POSE_SIGMAS = 6.0

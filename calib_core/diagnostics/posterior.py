@@ -7,8 +7,6 @@ from calib_core.diagnostics.pairs import listed
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.results import DataWarning
 
-__all__ = ["agreeing_outliers", "pivotal_pair", "possible_poses"]
-
 _LEAST_PROBABILITY = 0.05
 _OTHER_POSE_SIGMAS = 4.0
 

@@ -19,8 +19,6 @@ from calib_core.estimation.lens_prior import LensPrior
 from calib_core.results import DataWarning
 from calib_core.systematic_errors import is_beyond_its_prior, knowledge_text
 
-__all__ = ["lens_or_scale", "refined_too_far"]
-
 _LENS = ("lens_", "principal_", "focal_length", "distortion")
 _SCALES = ("azimuth_scale", "elevation_scale")
 _UNTOLD_SHARE = 0.5  # of the focal length's variance

@@ -4,8 +4,6 @@ import numpy as np
 
 from calib_core.arrays import Values
 
-__all__ = ["expected_shares"]
-
 _ANGLES = 180
 
 

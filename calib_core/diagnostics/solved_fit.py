@@ -13,8 +13,6 @@ from calib_core.estimation.measurement_model import PairMeasurements
 from calib_core.estimation.posterior.beyond_the_fit import BeyondTheFit
 from calib_core.options import CalibrationOptions
 
-__all__ = ["SolvedFit"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SolvedFit:

@@ -3,9 +3,8 @@
 import numpy as np
 
 from calib_core.diagnostics.solved_fit import SolvedFit
-from calib_core.results import DataWarning, SystematicErrorResult
-
-__all__ = ["angle_scale", "clicks_off_centre"]
+from calib_core.results import DataWarning
+from calib_core.systematic_errors import SystematicErrorResult
 
 _CLEAR_SIGMAS = 3.0
 _NOTABLE_SCALE = 0.015

@@ -8,8 +8,6 @@ from calib_core.arrays import Values, frozen_array
 from calib_core.geometry import RigidTransform, larger_eigenvalues
 from calib_core.results import Calibration
 
-__all__ = ["MAP_DISTANCES_M", "UncertaintyMap", "pixel_quantile", "uncertainty_map"]
-
 MAP_DISTANCES_M = (5.0, 20.0, 60.0)
 """The distances from the camera that are shown; those at which two calibrations are compared as well."""
 

@@ -14,8 +14,6 @@ from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
 from calib_core.unsolved import degenerate, mirrored, no_pose
 
-__all__ = ["BestFit", "best_fit", "quick_fit"]
-
 _STARTS_MEASURED = 3
 _STARTS_FREE = 6
 _STARTS_QUICK = 3

@@ -10,8 +10,6 @@ from calib_core.measurements import Candidate, Pair
 from calib_core.radar import covariance_from_sigma_polar
 from calib_core.results import Calibration
 
-__all__ = ["CandidateFit", "candidate_fits"]
-
 _NONE_OF_THEM = 0.1
 """Probability, before the click is compared, that none of the candidates is the reflector."""
 

@@ -9,8 +9,6 @@ import numpy as np
 from calib_core.arrays import Points2, Values
 from calib_core.camera import Camera
 
-__all__ = ["click_density"]
-
 _ANYWHERE = 0.3  # share of the outliers whose click is anywhere on the image
 _LEAST_WIDTH = 5.0  # standard deviations of a click
 _ALL_OTHERS, _SOME_OTHERS = 300, 100  # of more clicks than the first, so many give the density: work grows linearly

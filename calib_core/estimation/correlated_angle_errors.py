@@ -18,8 +18,6 @@ from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.prior_rows import prior_rows
 from calib_core.radar import polar_from_cartesian
 
-__all__ = ["pose_spread"]
-
 _LENGTHS_RAD = (np.deg2rad(8.0), np.deg2rad(14.0), np.deg2rad(25.0))
 _INDEPENDENT = (1.0, 0.6, 0.35, 0.15, 0.06)  # tau^2
 _SMOOTH = (0.3, 1.0, 2.5, 6.0, 15.0)  # rho^2

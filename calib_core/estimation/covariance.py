@@ -14,9 +14,7 @@ from calib_core.estimation.prior_rows import prior_rows
 from calib_core.estimation.systematic_errors import SystematicErrors
 from calib_core.options import RadarOptions
 from calib_core.radar_axes import mounting_moves
-from calib_core.results import SystematicErrorResult
-
-__all__ = ["PoseCovariance", "pose_covariance"]
+from calib_core.systematic_errors import SystematicErrorResult
 
 _LEAST_SHARE = 0.25  # of the plain information that must remain after the correction for uncertain weights
 _CHI2_95_6 = 12.591587243743977

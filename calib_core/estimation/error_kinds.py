@@ -8,19 +8,6 @@ import numpy as np
 from calib_core.arrays import Values
 from calib_core.radar import RadarErrors
 
-__all__ = [
-    "Sensitivity",
-    "SystematicError",
-    "along_lens_axis",
-    "click_offset",
-    "focal_length",
-    "radial_distortion",
-    "range_bias",
-    "reflector_offset",
-    "scale",
-    "squared_height",
-]
-
 _RADAR_ERRORS = {one.name for one in fields(RadarErrors)}
 
 

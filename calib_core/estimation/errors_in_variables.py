@@ -32,8 +32,6 @@ from calib_core.estimation.linearization import Linearization, MeasurementPlanes
 from calib_core.estimation.measurement_model import PairMeasurements
 from calib_core.geometry import RigidTransform
 
-__all__ = ["ErrorsInVariablesFit", "fit_errors_in_variables"]
-
 _MOST_ROUNDS = 80
 _ROUNDS_BEFORE_SCALES = 3
 _ROUNDS_PER_WEIGHING = 3  # weights settle long before noise scales do

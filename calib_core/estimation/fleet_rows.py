@@ -8,8 +8,6 @@ from calib_core.arrays import Matrix66, Values, frozen_array
 from calib_core.fleet_prior import FleetPrior
 from calib_core.geometry import RigidTransform, rotation_log
 
-__all__ = ["FleetRows"]
-
 _NEAR_HALF_TURN = 1e-3  # below this sine the skew part of a rotation says too little of a large angle
 
 

@@ -16,8 +16,6 @@ from calib_core.estimation.linearization import Linearization, MeasurementPlanes
 from calib_core.estimation.measurement_model import PairMeasurements
 from calib_core.geometry import RigidTransform, rotation_exp
 
-__all__ = ["GncSolution", "associate", "log_odds_of", "mixture_cost", "normal_equations", "solve_gnc"]
-
 RADII = (12.0, 8.0, 5.5, 4.0, 3.0)
 """Radii of the Geman-McClure loss in standard deviations, in order of use."""
 

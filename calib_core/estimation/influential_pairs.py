@@ -17,8 +17,6 @@ from calib_core.estimation.gnc import GncSolution, associate
 from calib_core.estimation.leave_one_out_prediction import noise_parts, predict_left_out, tail_chance
 from calib_core.estimation.measurement_model import PairMeasurements
 
-__all__ = ["InfluentialPair", "average_over_influential_pairs", "find_influential_pairs"]
-
 _LEVEL = 0.055  # false-alarm probability per set of pairs
 _LARGEST_SHARE = 0.25  # of that level for one pair
 _SCREENING = 4.0  # factor by which the screening by one Newton step is more lenient

@@ -14,8 +14,6 @@ from calib_core.estimation.measurement_model import PairMeasurements
 from calib_core.geometry import RigidTransform
 from calib_core.radar import cartesian_from_polar
 
-__all__ = ["Hypotheses", "hypothesis_costs", "initial_poses", "three_point_poses", "two_point_poses"]
-
 _TWO_POINT_DRAWS = 800
 _THREE_POINT_DRAWS = 300
 _MOST_SCORED_ROWS = 400

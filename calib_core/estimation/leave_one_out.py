@@ -8,8 +8,6 @@ from calib_core.arrays import Matrix66, Points2, Points3, Values
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.radar import cartesian_from_polar
 
-__all__ = ["LeaveOneOut", "leave_one_out"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LeaveOneOut:

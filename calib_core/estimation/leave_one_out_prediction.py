@@ -22,18 +22,6 @@ from calib_core.estimation.linearization import Linearization
 from calib_core.estimation.measurement_model import PairMeasurements
 from calib_core.geometry import RigidTransform
 
-__all__ = [
-    "COMPONENTS",
-    "PSEUDO_SHARED",
-    "LeaveOneOutPrediction",
-    "NoiseParts",
-    "Symmetric",
-    "noise_parts",
-    "predict_left_out",
-    "shrunk_scales",
-    "tail_chance",
-]
-
 PSEUDO_REDUNDANCY = 6.0
 """Pseudo-degrees of freedom that shrink each noise scale towards its prior value."""
 

@@ -14,8 +14,6 @@ from calib_core.camera import Camera, CameraCovariance
 from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions
 
-__all__ = ["PRIOR_WIDTH_PX", "LensPrior", "lens_prior", "shared_out", "useless_covariance"]
-
 PRIOR_WIDTH_PX = 1920.0
 """Width of the picture that the priors of the principal point are stated for."""
 

@@ -23,8 +23,6 @@ from calib_core.estimation.systematic_errors import NO_ERRORS, SystematicErrors
 from calib_core.geometry import RigidTransform, rotation_jacobian
 from calib_core.radar import position_planes
 
-__all__ = ["Linearization", "MeasurementPlanes", "linearize"]
-
 _FAR = 1e6  # whitened residual of a position the camera cannot see
 
 

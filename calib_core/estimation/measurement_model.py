@@ -19,8 +19,6 @@ from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions
 from calib_core.radar import polar_from_cartesian
 
-__all__ = ["CameraPrior", "PairMeasurements", "pair_measurements"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraPrior:

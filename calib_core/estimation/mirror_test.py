@@ -7,8 +7,6 @@ from calib_core.estimation.gnc import GncSolution, mixture_cost, solve_gnc
 from calib_core.estimation.initialization import initial_poses
 from calib_core.estimation.measurement_model import PairMeasurements
 
-__all__ = ["MIRRORED_GAIN", "NOT_MIRRORED_GAIN", "mirror_gain"]
-
 MIRRORED_GAIN = 10.6
 """Gain in twice the log-likelihood above which the axes are taken as mirrored: right axes lose by a likelihood ratio of 200
 in less than one set of 200."""

@@ -17,8 +17,6 @@ from calib_core.options import CalibrationOptions
 from calib_core.radar import cartesian_from_polar
 from calib_core.results import Metrics, PairResult
 
-__all__ = ["excluded_pair_results", "fit_metrics", "residual_covariances", "used_pair_results"]
-
 
 def fit_metrics(measurements: PairMeasurements, refined: ErrorsInVariablesFit, left_out: LeaveOneOut) -> Metrics:
     """Compute the metrics of the inlier pairs; chi2 uses the assumed noise, so that a wrong assumption shows."""

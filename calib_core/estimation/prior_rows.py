@@ -6,8 +6,6 @@ from calib_core.arrays import Values
 from calib_core.estimation.measurement_model import PairMeasurements
 from calib_core.geometry import RigidTransform
 
-__all__ = ["prior_rows"]
-
 
 def prior_rows(measurements: PairMeasurements, camera_from_radar: RigidTransform) -> tuple[Values, np.ndarray]:
     """Return the whitened residuals (p + k,) and Jacobian (p + k, 6 + k) of the p rows of the pose's prior and k errors."""

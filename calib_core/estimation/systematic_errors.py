@@ -37,8 +37,6 @@ from calib_core.estimation.lens_prior import PRIOR_WIDTH_PX, LensPrior, lens_pri
 from calib_core.options import CalibrationOptions, RadarOptions
 from calib_core.radar import RadarErrors
 
-__all__ = ["NO_ERRORS", "SystematicErrors", "systematic_errors"]
-
 _EXACT = RadarErrors()
 _NONE = 1e-30  # a standard deviation up to this counts as 0; the square of its reciprocal must stay finite
 _SMALL = 1e-4  # standard deviations over which a derivative is taken

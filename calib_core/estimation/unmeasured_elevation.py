@@ -12,8 +12,6 @@ import numpy as np
 
 from calib_core.arrays import Points3, Values
 
-__all__ = ["OWN_SIGMA_RAD", "is_flat"]
-
 OWN_SIGMA_RAD = np.deg2rad(0.5)
 """Standard deviation of each placement's elevation above or below the common plane: uneven ground."""
 

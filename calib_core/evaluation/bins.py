@@ -7,8 +7,6 @@ import numpy as np
 from calib_core.arrays import Values
 from calib_core.evaluation.figures import Spread
 
-__all__ = ["edges_of", "spreads"]
-
 _MOST_BINS = 6
 
 

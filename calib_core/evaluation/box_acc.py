@@ -16,17 +16,6 @@ from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 from calib_core.radar import RadarErrors
 
-__all__ = [
-    "ANGLES_DEG",
-    "AXES",
-    "box_figures",
-    "frame_groups",
-    "grouped_error",
-    "inside_own_boxes",
-    "judged_by_boxes",
-    "seen_pixels",
-]
-
 ANGLES_DEG = (-1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0)
 AXES: dict[Axis, tuple[float, float, float]] = {
     "roll": (0.0, 0.0, 1.0),

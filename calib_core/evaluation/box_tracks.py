@@ -7,8 +7,6 @@ import numpy as np
 from calib_core.arrays import Indices, TimesNs, frozen_array
 from calib_core.detections import Box, Boxes
 
-__all__ = ["BoxTable", "box_table"]
-
 _LONGEST_STEP = 0.8  # widths or heights from where a box is expected, for a box of the same object
 _LONGEST_GAP = 3  # frames that an object may be missed in
 _NEW_SHARE = 0.3  # of the newest step in the mean step of a box

@@ -16,8 +16,6 @@ from calib_core.evaluation.sightings import labelled_sightings, tracked_sighting
 from calib_core.evaluation.targets.target_track import TargetTrack
 from calib_core.measurements import NS_PER_S, RadarScans
 
-__all__ = ["CountedReturns", "counted_returns", "renamed_classes"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CountedReturns:

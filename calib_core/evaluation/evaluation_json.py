@@ -10,8 +10,6 @@ from calib_core.input_files import encodable
 from calib_core.interchange.syntax.json_text import json_text
 from calib_core.measurements import Stamp, TimeNs
 
-__all__ = ["EVALUATION_SCHEMA", "evaluation_document", "evaluation_json"]
-
 EVALUATION_SCHEMA = "cocalib/evaluation-1"
 
 

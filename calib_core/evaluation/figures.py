@@ -9,21 +9,6 @@ from calib_core.arrays import Flags, Indices, Points2, Points3, Values, frozen_a
 from calib_core.measurements import TimeNs, Unpaired
 from calib_core.results import DataWarning, Metrics
 
-__all__ = [
-    "FLAT_SHARE",
-    "Axis",
-    "BoxFigures",
-    "BoxedReturns",
-    "ClassFigure",
-    "Evaluation",
-    "FrameFigure",
-    "HeldOut",
-    "ResidualFigures",
-    "Sensitivity",
-    "Share",
-    "Spread",
-]
-
 FLAT_SHARE = 0.01
 """Acc that changes by less than this within 1 deg about an axis does not see that axis."""
 

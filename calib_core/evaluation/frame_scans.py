@@ -5,8 +5,6 @@ import numpy as np
 from calib_core.arrays import Indices, TimesNs
 from calib_core.measurements import NS_PER_S
 
-__all__ = ["frame_scans", "longest_gap_s"]
-
 _USUAL_GAP_S = 0.05  # of a single scan
 
 

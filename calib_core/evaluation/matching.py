@@ -16,8 +16,6 @@ from calib_core.camera import Camera
 from calib_core.evaluation.box_tracks import BoxTable
 from calib_core.evaluation.sightings import Sightings
 
-__all__ = ["Bearings", "Matches", "match_by_bearing", "match_by_name"]
-
 _TOLERANCE_RAD = np.deg2rad(2.5)  # of a target's azimuth, beyond half the width of its box
 _TOLERANCE_M = 0.3  # across the line of sight
 _MOST_PARALLAX_M = 3.0  # distance between the sensors, across

@@ -9,8 +9,6 @@ from calib_core.arrays import Values
 from calib_core.evaluation.box_acc import grouped_error
 from calib_core.evaluation.figures import BoxFigures, ResidualFigures
 
-__all__ = ["PairedDifference", "Winner", "acc_difference", "residual_difference"]
-
 Winner: TypeAlias = Literal["A", "B", "equal", "unknown"]
 """The better one; "equal" if the two are the same there (residuals: to 0.01 px), "unknown" if the difference may be noise."""
 

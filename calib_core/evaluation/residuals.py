@@ -22,8 +22,6 @@ from calib_core.radar import polar_from_cartesian
 from calib_core.residual_test import residual_test
 from calib_core.results import Calibration
 
-__all__ = ["AssociatedPairs", "associated_pairs", "held_out", "residual_figures"]
-
 _FOLDS = 5
 _CHOSEN = "the return of each click was chosen by a person, or is the only one"
 _INDEPENDENT = (

@@ -4,8 +4,6 @@ import numpy as np
 
 from calib_core.evaluation.figures import BoxFigures, Evaluation, HeldOut, ResidualFigures, Sensitivity, Share, Spread
 
-__all__ = ["NOT_ACCURACY", "acc_sentence", "evaluation_lines", "residual_sentence", "sensitivity_sentences"]
-
 NOT_ACCURACY = (
     "Acc is not accuracy: a pose that is wrong by half a degree can score as well as the right one, or better; judge a pose "
     "by its residuals and error bars"

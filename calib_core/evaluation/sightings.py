@@ -11,8 +11,6 @@ from calib_core.errors import InputError
 from calib_core.evaluation.targets.target_track import TargetTrack
 from calib_core.measurements import NS_PER_S, RadarScans
 
-__all__ = ["Sightings", "labelled_sightings", "tracked_sightings"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sightings:

@@ -8,8 +8,6 @@ from calib_core.arrays import Values
 from calib_core.fleet.mounting_coordinates import coordinates, pose_from_coordinates
 from calib_core.geometry import RigidTransform
 
-__all__ = ["common_mounting", "robust_distances"]
-
 _STEPS = 30
 _MEDIAN_CHI2_3 = 2.365973884375338
 _LEAST_SPREAD = 1e-6  # m and rad

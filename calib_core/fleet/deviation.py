@@ -8,8 +8,6 @@ from calib_core.arrays import Matrix66, Values, frozen_array
 from calib_core.fleet.random_effects import RandomEffects
 from calib_core.fleet.tails import DIMENSIONS, FALSE_RATE, quantile, tail
 
-__all__ = ["Deviation", "departure", "deviation"]
-
 _WHOLE = 5.0
 _MOST_OF_FREEDOM = 0.8
 _AXES = ("camera forward", "camera left", "camera up", "roll", "pitch", "yaw")

@@ -14,8 +14,6 @@ from calib_core.arrays import Matrix66, Values
 from calib_core.geometry import RigidTransform, rotation_exp, rotation_log, skew
 from calib_core.pose_difference import camera_position_jacobian
 
-__all__ = ["coordinate_jacobian", "coordinates", "pose_covariance", "pose_from_coordinates"]
-
 _SMALL_RAD = 1e-4
 
 

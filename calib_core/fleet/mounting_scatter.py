@@ -15,8 +15,6 @@ from calib_core.fleet.tails import FALSE_RATE
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import Unsolvable
 
-__all__ = ["MIN_MOUNTINGS", "LeftOut", "MountingScatter", "SharedTape", "mounting_scatter"]
-
 MIN_MOUNTINGS = 5
 """The fewest mountings that a scatter is estimated from: fewer do not show how differently it spreads along the axes."""
 

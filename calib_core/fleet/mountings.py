@@ -12,8 +12,6 @@ from calib_core.fleet.transitions import RelevantChange, Transition, transition
 from calib_core.geometry import RigidTransform
 from calib_core.options import CameraPositionPrior
 
-__all__ = ["Mounting", "mounting_of", "mountings_of", "transitions_of"]
-
 _OF_PAIRS = 1e-6  # least share of a covariance that counts as the scatter of the pairs
 _ROUNDS = 3
 

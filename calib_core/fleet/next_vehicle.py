@@ -4,8 +4,6 @@ from calib_core.fleet.mounting_coordinates import pose_covariance
 from calib_core.fleet.mounting_scatter import MountingScatter
 from calib_core.fleet_prior import FleetPrior
 
-__all__ = ["fleet_prior_of"]
-
 
 def fleet_prior_of(scatter: MountingScatter) -> FleetPrior:
     """Return the distribution of a further vehicle's camera_from_radar.

@@ -7,8 +7,6 @@ from calib_core.fleet.mounting_scatter import MountingScatter
 from calib_core.fleet.mountings import Mounting
 from calib_core.measurements import Unsolvable
 
-__all__ = ["OffKind", "off_kind", "off_kinds"]
-
 _FEW = 12
 _USUAL = 12.591587243743977  # the 95 % quantile of chi2 with 6 degrees of freedom
 

@@ -9,8 +9,6 @@ from calib_core.measurements import Unsolvable
 from calib_core.results import Calibration, DataWarning
 from calib_core.stated_error import stated_error
 
-__all__ = ["fleet_answer", "fleet_warnings"]
-
 _RARE = 0.01
 """A sound vehicle is this far from the prior, or farther, less often than this: the prior then draws the pose of an odd one."""
 _UNTESTED_DEG = 9.0

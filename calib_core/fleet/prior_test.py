@@ -7,8 +7,6 @@ from calib_core.fleet.mounting_coordinates import coordinate_jacobian, coordinat
 from calib_core.fleet_prior import DataAlone, FleetPrior
 from calib_core.stated_error import degrees_of_freedom
 
-__all__ = ["prior_test"]
-
 
 def prior_test(prior: FleetPrior, alone: DataAlone) -> Deviation:
     """Test a calibration that was made without the prior against it.

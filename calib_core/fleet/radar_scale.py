@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from calib_core.fleet.session_pose import CHI2_95, SessionPose
 from calib_core.fleet.tails import FALSE_RATE
 
-__all__ = ["KnownScale", "RadarScale", "radar_scales"]
-
 _TOLD = 0.5  # of the prior's standard deviation: the sessions say three times as much as the prior
 
 

@@ -26,8 +26,6 @@ import numpy as np
 from calib_core.arrays import Matrix66, Values, frozen_array
 from calib_core.fleet.tails import DIMENSIONS, mixture_quantile, quantile
 
-__all__ = ["PRIOR_VECTORS", "RandomEffects", "random_effects"]
-
 PRIOR_VECTORS = 8.0
 """Vectors that the prior on the shape of the scatter counts for."""
 

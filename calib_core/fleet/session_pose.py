@@ -15,8 +15,6 @@ from calib_core.results import Calibration
 from calib_core.stated_error import degrees_of_freedom
 from calib_core.systematic_errors import SystematicErrorResult
 
-__all__ = ["CHI2_95", "SessionPose", "session_pose"]
-
 CHI2_95 = 12.591587243743977
 """The 95 % quantile of chi2 with 6 degrees of freedom: the quantile of a covariance whose noise level is known."""
 

@@ -2,8 +2,6 @@
 
 import numpy as np
 
-__all__ = ["DIMENSIONS", "FALSE_RATE", "mixture_quantile", "quantile", "tail"]
-
 DIMENSIONS = 6
 FALSE_RATE = 1e-4
 """How often a sound calibration is named by one test: the point beyond which a change or a vehicle is."""

@@ -10,8 +10,6 @@ from calib_core.fleet.session_pose import SessionPose
 from calib_core.fleet.tails import FALSE_RATE, quantile
 from calib_core.pose_difference import PoseDifference, camera_position_jacobian, pose_difference
 
-__all__ = ["Outcome", "RelevantChange", "Transition", "transition"]
-
 Outcome: TypeAlias = Literal["remounted", "unchanged", "cannot-tell"]
 _95 = 0.95
 

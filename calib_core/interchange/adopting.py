@@ -18,8 +18,6 @@ from calib_core.options import CalibrationOptions
 from calib_core.radar import RadarErrors
 from calib_core.results import Calibration, DataWarning, Metrics
 
-__all__ = ["Adoption", "adopt", "adopted_calibration", "adoption"]
-
 _UNKNOWN = float("nan")
 _SAME_LENS_PX = 0.5
 

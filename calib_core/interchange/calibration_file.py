@@ -10,15 +10,6 @@ from calib_core.interchange.vehicle_note import VehicleNote
 from calib_core.results import Calibration, CheckPoint, InputFile, PairResult, UnconfirmedClicks
 from calib_core.verdict import Verdict
 
-__all__ = [
-    "EQUATION",
-    "CalibrationFile",
-    "FrameNames",
-    "Provenance",
-    "UnknownResult",
-    "choose_check_point",
-]
-
 EQUATION = "p_camera = R p_radar + t"
 _OPTICAL_ENDINGS = ("_optical_frame", "_optical_link", "_optical")
 _FALLBACK_RANGE_M = 10.0

@@ -11,8 +11,6 @@ from calib_core.interchange.syntax.mat_file import load_mat
 from calib_core.interchange.syntax.mcap_file import MCAP_MAGIC, McapFile, load_mcap
 from calib_core.interchange.syntax.zip_archives import unpack
 
-__all__ = ["contents_text"]
-
 _MAT_TEXT_BYTES = 116
 
 

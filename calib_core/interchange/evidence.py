@@ -2,8 +2,6 @@
 
 from typing import Literal, TypeAlias, get_args
 
-__all__ = ["EVIDENCE_LEVELS", "Evidence", "stated_evidence"]
-
 Evidence: TypeAlias = Literal["clicked", "imported_proven", "imported_assumed", "automatic"]
 """Solved from clicks; read from another tool's file whose meaning a check point, pairs or another calibration proved; read from
 one whose meaning was assumed; solved from clicks of which some or all were placed automatically, and nobody confirmed them.

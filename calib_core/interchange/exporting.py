@@ -13,8 +13,6 @@ from calib_core.interchange.own.calibration_json import calibration_sha256
 from calib_core.interchange.rectification import maps_npz, rectified_camera, rectified_file
 from calib_core.interchange.syntax.zip_archives import pack
 
-__all__ = ["Export", "ExtraFile", "NotExported", "export", "export_all"]
-
 _MAPS_NAME = "rectification.npz"
 _SAME_MATRIX_NOTE = (
     "written for rectified pictures: undistorted with this same camera matrix, no distortion left; "

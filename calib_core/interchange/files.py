@@ -21,18 +21,6 @@ from calib_core.measurements import ReflectorClick
 from calib_core.options import NoiseOptions
 from calib_core.results import Calibration
 
-__all__ = [
-    "check",
-    "export",
-    "read_calibration",
-    "read_camera",
-    "read_clicks",
-    "read_pairs",
-    "write_calibration",
-    "write_clicks",
-    "write_pairs",
-]
-
 PathLike: TypeAlias = str | Path
 
 _MAX_TEXT_BYTES = 64 << 20

@@ -9,8 +9,6 @@ from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.imported import ImportedCalibration
 from calib_core.interchange.syntax.content import Content
 
-__all__ = ["CameraShare", "Comment", "Format", "Reads"]
-
 Comment = Literal["#", "<!-- -->", "keys", "numbers", "none"]
 CameraShare = Literal["none", "matrix", "lens"]
 """How much of the camera a format stores: nothing, its matrix without distortion, or the whole lens."""

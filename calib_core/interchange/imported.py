@@ -15,22 +15,6 @@ from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
 from calib_core.interchange.evidence import Evidence
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL, looks_forward, matrix_from_rpy, nearest_rotation
 
-__all__ = [
-    "TRUTH_FORMAT",
-    "AngleUnit",
-    "Axes",
-    "Direction",
-    "Form",
-    "ImportedCalibration",
-    "Roles",
-    "StatedCheckPoint",
-    "WrittenPose",
-    "imported",
-    "looks_like_camera",
-    "looks_like_radar",
-    "posed_between",
-]
-
 Form = Literal["matrix", "quaternion_xyzw", "quaternion_wxyz", "rpy"]
 Direction = Literal["camera_from_radar", "radar_from_camera"]
 Axes = Literal["optical", "link"]

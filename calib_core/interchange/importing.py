@@ -15,16 +15,6 @@ from calib_core.interchange.trees.frame_choice import WantedFrames
 from calib_core.interchange.trees.posed_in_tree import calibration_in_tree, chained_calibration
 from calib_core.interchange.trees.reading import TreeFile, files_of_trees, read_tree
 
-__all__ = [
-    "calibration_bytes",
-    "files_beside",
-    "read_any",
-    "read_any_file",
-    "read_any_files",
-    "read_together",
-    "tree_files",
-]
-
 _MAX_BYTES = 256 * 1024 * 1024
 _MAX_BESIDE_BYTES = 1024 * 1024
 _KNOWN = (

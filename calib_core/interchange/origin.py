@@ -10,8 +10,6 @@ from calib_core.interchange.evidence import Evidence, stated_evidence
 from calib_core.interchange.own.calibration_json import calibration_sha256
 from calib_core.results import Calibration
 
-__all__ = ["Origin", "missing_map", "origin_lines", "stated_origin"]
-
 _ORIGIN = re.compile(r"evidence: ([^;\s]+); from the calibration with sha256 ([0-9a-f]{64})")
 
 

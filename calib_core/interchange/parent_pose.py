@@ -9,8 +9,6 @@ from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.imported import WrittenPose
 
-__all__ = ["parent_pose"]
-
 _NAMES = "x y z qx qy qz qw"
 
 

@@ -13,8 +13,6 @@ from calib_core.interchange.own.calibration_json import calibration_sha256
 from calib_core.interchange.syntax.zip_archives import pack_arrays
 from calib_core.results import CheckPoint
 
-__all__ = ["RectificationMaps", "maps_npz", "rectification_maps", "rectified_camera", "rectified_file"]
-
 _WIDEST = np.tan(np.radians(75.0))
 """A rectified picture ends 75 degrees off the axis at the latest; beyond, a fisheye's pixels would be stretched without end."""
 _BLOCK_ROWS = 64

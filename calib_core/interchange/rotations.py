@@ -5,18 +5,6 @@ import numpy as np
 from calib_core.arrays import Matrix33, Vector3
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 
-__all__ = [
-    "LINK_FROM_OPTICAL",
-    "OPTICAL_RPY_RAD",
-    "looks_forward",
-    "matrix_from_rpy",
-    "nearest_rotation",
-    "off_forward_rad",
-    "quaternion_xyzw_from_matrix",
-    "rpy_from_matrix",
-    "upper_rows",
-]
-
 LINK_FROM_OPTICAL = RigidTransform(np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]), np.zeros(3))
 """From optical axes (x right, y down, z forward) to body axes (x forward, y left, z up), REP-103."""
 

@@ -4,8 +4,6 @@ from dataclasses import dataclass, fields, replace
 
 from calib_core.errors import InputError
 
-__all__ = ["MOST_CHARACTERS", "VehicleNote", "require_label", "require_name"]
-
 MOST_CHARACTERS = 120
 """The longest name or serial, in manifests, files and flags alike."""
 

@@ -10,8 +10,6 @@ import numpy as np
 from calib_core.arrays import Indices, Points3
 from calib_core.errors import InputError
 
-__all__ = ["Board", "BoardKind", "board_of_size"]
-
 BoardKind: TypeAlias = Literal["checkerboard", "charuco", "aprilgrid"]
 _MOST = 100
 _TAGS = "DICT_APRILTAG_36h11"

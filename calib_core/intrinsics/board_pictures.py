@@ -8,8 +8,6 @@ import numpy as np
 from calib_core.arrays import Indices, Points2, frozen_array
 from calib_core.measurements import TimeNs
 
-__all__ = ["BoardCorners", "BoardPictures", "LeftOutPicture"]
-
 
 class BoardPictures(Protocol):
     """Pictures in which a board may be: frames of a recording or a video, or a folder of pictures."""

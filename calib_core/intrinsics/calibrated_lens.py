@@ -9,8 +9,6 @@ from calib_core.intrinsics.board import Board
 from calib_core.intrinsics.board_pictures import BoardCorners, LeftOutPicture
 from calib_core.results import DataWarning
 
-__all__ = ["CalibratedLens", "LensView", "ModelTrial"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LensView:

@@ -26,8 +26,6 @@ from calib_core.intrinsics.solving.starting import start
 from calib_core.intrinsics.solving.view_stack import ViewStack, stack_views
 from calib_core.measurements import Unsolvable
 
-__all__ = ["calibrate_lens"]
-
 _LEAST_VIEWS = 3
 _LEAST_CORNERS = 6
 _LINE_SHARE = 0.01

@@ -13,8 +13,6 @@ from calib_core.intrinsics.solving.row_skew import RowSkew
 from calib_core.intrinsics.solving.view_stack import ViewStack
 from calib_core.results import DataWarning
 
-__all__ = ["lens_warnings", "shape_warnings", "skew_warnings", "worst_focal_sigma"]
-
 _LEAST_COVERED = 0.5
 _FOCAL_SIGMA = 0.01
 _FAR_PRINCIPAL_POINT = 0.15

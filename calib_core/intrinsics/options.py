@@ -5,8 +5,6 @@ from typing import Literal
 
 from calib_core.options import option
 
-__all__ = ["IntrinsicsOptions"]
-
 
 @dataclass(frozen=True, slots=True)
 class IntrinsicsOptions:

@@ -9,16 +9,6 @@ from calib_core.camera import Camera
 from calib_core.geometry import larger_eigenvalues, rotation_jacobian
 from calib_core.intrinsics.calibrated_lens import CalibratedLens
 
-__all__ = [
-    "MODEL_ERRORS_UNSEEN",
-    "PictureGrid",
-    "far_point_slopes",
-    "found_pixels",
-    "grid_covariance",
-    "picture_grid",
-    "projection_uncertainty",
-]
-
 MODEL_ERRORS_UNSEEN = (
     "The projection uncertainty follows from the scatter of the corners. It cannot see what the lens model itself gets wrong, "
     "which may be larger; calibrating halves of the views separately shows some of that."

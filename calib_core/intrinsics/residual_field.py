@@ -7,8 +7,6 @@ import numpy as np
 from calib_core.arrays import Points2, Values, frozen_array
 from calib_core.intrinsics.calibrated_lens import CalibratedLens
 
-__all__ = ["ResidualField", "residual_field"]
-
 _COLUMNS, _ROWS = 12, 8
 _SIGMAS = 3.0
 _CORRELATED = 0.3

@@ -15,8 +15,6 @@ from calib_core.intrinsics.solving.linearization import Freedom, LensState, line
 from calib_core.intrinsics.solving.view_stack import ViewStack, stack_views
 from calib_core.measurements import Unsolvable
 
-__all__ = ["SplitDifference", "split_difference"]
-
 _LEAST_VIEWS = 8
 _COLUMNS, _ROWS = 16, 10
 _TOO_FAR = 2.0  # times what is expected; chance reaches 1.5

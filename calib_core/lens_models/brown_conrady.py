@@ -6,8 +6,6 @@ from calib_core.arrays import Points2, Points3, Values
 from calib_core.lens_models.lens_model import LensModel, NameElsewhere, TypicalLens
 from calib_core.lens_models.perspective import project_distorted, unproject_distorted
 
-__all__ = ["PINHOLE", "PLUMB_BOB", "RATIONAL_POLYNOMIAL"]
-
 _COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 
 

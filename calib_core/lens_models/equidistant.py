@@ -5,8 +5,6 @@ import numpy as np
 from calib_core.arrays import Points2, Points3, Values
 from calib_core.lens_models.lens_model import LensModel, NameElsewhere, TypicalLens
 
-__all__ = ["EQUIDISTANT"]
-
 _NEWTON_STEPS = 60
 _NEWTON_TOLERANCE = 1e-13
 

@@ -8,8 +8,6 @@ import numpy as np
 
 from calib_core.arrays import Points2, Points3, Values
 
-__all__ = ["CoefficientJacobian", "Elsewhere", "LensModel", "NameElsewhere", "Project", "TypicalLens", "Unproject"]
-
 Elsewhere: TypeAlias = Literal["camera_info", "kalibr", "opencv", "colmap", "foxglove"]
 """Formats with their own names for lens models; `camera_info` is ROS's message and its YAML file."""
 

@@ -9,8 +9,6 @@ from calib_core.errors import InputError
 from calib_core.lens_models.lens_model import Elsewhere, LensModel
 from calib_core.lens_models.registry import LENS_MODELS
 
-__all__ = ["WrittenLens", "lenses_named", "lenses_of_opencv", "names_in", "opencv_lens", "written_lens"]
-
 _TITLES: dict[Elsewhere, str] = {
     "camera_info": "ROS",
     "kalibr": "Kalibr",

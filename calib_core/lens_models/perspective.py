@@ -10,8 +10,6 @@ import numpy as np
 
 from calib_core.arrays import Points2, Points3, Values
 
-__all__ = ["Distort", "project_distorted", "unproject_distorted"]
-
 Distort: TypeAlias = Callable[
     [Values, Values, list[float]], tuple[tuple[Values, Values], tuple[Values, Values, Values]]
 ]

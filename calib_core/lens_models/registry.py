@@ -6,8 +6,6 @@ from calib_core.lens_models.brown_conrady import PINHOLE, PLUMB_BOB, RATIONAL_PO
 from calib_core.lens_models.equidistant import EQUIDISTANT
 from calib_core.lens_models.lens_model import LensModel
 
-__all__ = ["LENS_MODELS"]
-
 _LENSES: tuple[LensModel, ...] = (
     PINHOLE,
     PLUMB_BOB,

@@ -29,23 +29,6 @@ from calib_core.paper.checks import unused_choices, warnings_as_printed
 from calib_core.paper.pnp import PnPSolver, refine_lm, solve_pnp_ransac, spans_a_plane
 from calib_core.results import Calibration, PairResult
 
-__all__ = [
-    "ScoredPose",
-    "calibrate_as_printed",
-    "clicks_by_time",
-    "mean_position",
-    "nearest_stamp",
-    "pair_as_printed",
-    "pose_by_iterative_ransac",
-    "pose_by_sqpnp_ransac",
-    "pose_of_smaller_error",
-    "refined_on_all_pairs",
-    "solve_pairs_as_printed",
-    "static_returns_as_printed",
-    "window_around",
-    "z_score_inliers",
-]
-
 _ROUNDING = 1e-9  # the z-scores of two returns are exactly 1, up to rounding
 
 

@@ -19,8 +19,6 @@ from calib_core.plausibility import implausible_input
 from calib_core.radar import polar_from_cartesian
 from calib_core.results import DataWarning
 
-__all__ = ["unused_choices", "warnings_as_printed"]
-
 _MOST_DISAGREEING = 0.35
 _NOISE_EXCESS = 2.5  # of the mean squared residual
 _FAR_CAMERA = 3.0  # expected distances

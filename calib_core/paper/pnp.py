@@ -14,16 +14,6 @@ from calib_core.arrays import Flags, Points2, Points3, Values, frozen_array
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, rotation_exp, rotation_log, skew
 
-__all__ = [
-    "PnPSolver",
-    "RansacSolution",
-    "project_points",
-    "refine_lm",
-    "solve_pnp",
-    "solve_pnp_ransac",
-    "spans_a_plane",
-]
-
 PnPSolver = Literal["iterative", "sqpnp"]
 
 _MINIMUM_POINTS = 4

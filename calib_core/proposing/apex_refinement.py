@@ -13,8 +13,6 @@ from calib_core.proposing.picture_candidates import PictureCandidate, surroundin
 from calib_core.proposing.stack_median import stack_median
 from calib_core.vision.apex import Apex, find_apex
 
-__all__ = ["full_picture", "with_apexes"]
-
 _REACHES = (0.45, 0.25)
 """How far from where it is expected an apex is searched, in widths of the reflector: the nearer where two corners rival."""
 _TRIED, _LEAST_SHARE = 5, 0.3

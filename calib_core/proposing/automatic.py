@@ -16,8 +16,6 @@ from calib_core.proposing.agreement.pose_agreement import pose_agreement
 from calib_core.proposing.dwell_views import DwellView
 from calib_core.proposing.proposals import Proposal, Proposals
 
-__all__ = ["LEAST_SCORE", "LEAST_WHOLE_CONFIDENCE", "AutomaticClicks", "automatic_clicks"]
-
 LEAST_WHOLE_CONFIDENCE = 0.9
 """Below this nothing is clicked."""
 LEAST_SCORE = 25.0

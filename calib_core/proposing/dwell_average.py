@@ -11,8 +11,6 @@ from calib_core.proposing.dwell_views import DwellView
 from calib_core.proposing.frame_source import FrameSource
 from calib_core.vision.apex import Apex, find_apex
 
-__all__ = ["DwellAverage", "averaged_over_dwell"]
-
 _REACH, _LEAST_REACH_PX = 0.1, 4.0
 """How far from a click an apex is still what was clicked: in widths of the reflector, and at least."""
 _HALF, _LEAST_HALF_PX = 0.75, 8

@@ -16,8 +16,6 @@ from calib_core.proposing.picture_changes import changed_places, least_others, n
 from calib_core.proposing.stack_median import stack_median
 from calib_core.proposing.still_pictures import StillPicture, frames_within, seen_frames, still_pictures
 
-__all__ = ["DwellView", "FrameSource", "ViewProgress", "dwell_views", "reflector_width_px"]
-
 _SETTLED = 9
 """Once so many dwells are seen, further ones hardly change what is said about one of them."""
 _EARLY = (3, 6)

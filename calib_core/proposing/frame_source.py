@@ -6,8 +6,6 @@ import numpy as np
 
 from calib_core.arrays import TimesNs
 
-__all__ = ["FrameSource"]
-
 
 class FrameSource(Protocol):
     """Camera frames by number; a `Recording` is one. Only the frames that are asked for are decoded."""

@@ -2,8 +2,6 @@
 
 import numpy as np
 
-__all__ = ["channel_gains", "in_light_of", "in_same_light", "local_light"]
-
 _EVERY = 6
 """A gain is fitted to one row and column in so many."""
 _DARK_GREY, _BRIGHT_GREY = 12, 243

@@ -13,8 +13,6 @@ from calib_core.proposing.frame_source import FrameSource
 from calib_core.proposing.picture_candidates import PictureCandidate, Surroundings
 from calib_core.vision.apex import Apex, find_apex
 
-__all__ = ["Look", "look_of", "with_look"]
-
 _HALF = 0.75
 """Half the side of the patch, in widths of the reflector."""
 _DISC = 0.62

@@ -6,8 +6,6 @@ import numpy as np
 
 from calib_core.arrays import Vector2, frozen_array
 
-__all__ = ["PictureCandidate", "Surroundings", "blobs", "surroundings_of"]
-
 _MOST = 12
 _APART = 0.8
 """Widths of the reflector between two blobs at least, in columns or in rows."""

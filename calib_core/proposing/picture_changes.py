@@ -10,8 +10,6 @@ from calib_core.proposing.light import channel_gains, in_same_light, local_light
 from calib_core.proposing.stack_median import stack_median
 from calib_core.proposing.still_pictures import StillPicture
 
-__all__ = ["changed_places", "least_others", "nearest_others"]
-
 _OTHERS = 9
 _LEAST_OTHERS = 2
 _LEVELS_PER_GREY = 64.0

@@ -10,8 +10,6 @@ from calib_core.geometry import RigidTransform
 from calib_core.measurements import TimeNs
 from calib_core.proposing.picture_candidates import PictureCandidate
 
-__all__ = ["Proposal", "Proposals"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Proposal:

@@ -25,8 +25,6 @@ from calib_core.proposing.dwell_views import DwellView
 from calib_core.proposing.picture_candidates import PictureCandidate
 from calib_core.proposing.proposals import Proposal, Proposals
 
-__all__ = ["ProposalSource", "named_proposals", "proposals_json"]
-
 
 @dataclass(frozen=True, slots=True)
 class ProposalSource:

@@ -17,8 +17,6 @@ from calib_core.proposing.agreement.pose_agreement import PoseAgreement, pose_ag
 from calib_core.proposing.dwell_views import DwellView
 from calib_core.proposing.proposals import Proposal, Proposals
 
-__all__ = ["LEAST_CONFIDENCE", "proposals_of"]
-
 LEAST_CONFIDENCE = 0.4
 """What is less probably the reflector is not proposed."""
 _WEAK, _UNSURE = 0.8, 0.9

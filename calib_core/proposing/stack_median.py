@@ -5,8 +5,6 @@ from functools import lru_cache
 
 import numpy as np
 
-__all__ = ["stack_median"]
-
 
 def stack_median(pictures: Sequence[np.ndarray]) -> np.ndarray:
     """Return the median of pictures of one shape and type; of an even number the mean of both middle ones.

@@ -17,8 +17,6 @@ from calib_core.proposing.frame_source import FrameSource
 from calib_core.proposing.light import in_light_of
 from calib_core.proposing.stack_median import stack_median
 
-__all__ = ["SeenFrames", "StillPicture", "frames_within", "seen_frames", "still_pictures"]
-
 _FRAMES = 7
 """Pictures whose median shows a dwell without whoever walks past."""
 _AT_ENDS_S = 0.6

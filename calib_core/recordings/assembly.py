@@ -41,8 +41,6 @@ from calib_core.recordings.topics import BOX_LAYOUT, Rhythm, Topic, TopicSummary
 from calib_core.recordings.usages import Usage, usage_of
 from calib_core.results import DataWarning
 
-__all__ = ["Assembly", "assemble"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Assembly:

@@ -5,9 +5,6 @@ from dataclasses import dataclass
 
 from calib_core.results import DataWarning
 
-__all__ = ["CONFIRM_ALL", "Assumption", "StatedAssumption", "about_assumptions", "assumption_hint"]
-
-
 CONFIRM_ALL = "--confirm-assumptions"
 """The option that confirms every assumption, and the only one for some."""
 

@@ -15,8 +15,6 @@ from calib_core.recordings.stamping import StampedTopic
 from calib_core.recordings.time.dates import utc
 from calib_core.results import DataWarning
 
-__all__ = ["about_images", "about_lost", "about_radar", "check_overlap", "without_certain_zone"]
-
 _SAMPLED_SCANS = 12
 _ZONES_S = range(-12 * 3600, 14 * 3600 + 1, 15 * 60)
 

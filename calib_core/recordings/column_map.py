@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from calib_core.errors import OptionError
 from calib_core.recordings.field_words.units import unit_of_word, units_for
 
-__all__ = ["QUANTITIES", "UNITS", "MappedColumn", "parse_column_map"]
-
 QUANTITIES: tuple[str, ...] = (
     "x", "y", "z", "range", "azimuth", "elevation", "doppler", "amplitude", "time", "sigma_range", "sigma_azimuth",
     "sigma_elevation",

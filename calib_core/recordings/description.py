@@ -15,8 +15,6 @@ from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis
 from calib_core.recordings.time.dates import span_text, utc
 from calib_core.recordings.topics import TopicSummary
 
-__all__ = ["clock_lines", "describe", "summary_text"]
-
 _CLOCKS = {"header": "stamps", "receive": "receive times"}
 _USE = {"radar": "radar", "image": "camera", "camera-info": "intrinsics"}
 

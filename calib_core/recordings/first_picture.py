@@ -17,8 +17,6 @@ from calib_core.recordings.selection import Inventory, RecordingOptions, select_
 from calib_core.recordings.topics import Topic, join_topics
 from calib_core.recordings.usages import Usage, usage_of
 
-__all__ = ["first_picture"]
-
 
 def first_picture(paths: Sequence[Path], options: RecordingOptions | None = None) -> EncodedImage | None:
     """Return a picture from the beginning of a recording, reading very little of it.

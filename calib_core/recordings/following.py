@@ -20,8 +20,6 @@ from calib_core.recordings.recording import Recording
 from calib_core.recordings.selection import RecordingOptions
 from calib_core.results import DataWarning
 
-__all__ = ["AwaitedRecording", "FollowedRecording", "Growth"]
-
 _ENOUGH_MESSAGES, _ENOUGH_S = 20, 3.0
 """With so many messages of each sensor, or messages over so many seconds, the clocks can be chosen."""
 

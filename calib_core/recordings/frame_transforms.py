@@ -12,8 +12,6 @@ from calib_core.recordings.containers.opening import open_sources
 from calib_core.recordings.messages.decoding import Message
 from calib_core.recordings.topics import Topic, join_topics
 
-__all__ = ["FrameTransform", "frame_transforms"]
-
 _TYPES = ("TFMessage", "tfMessage")
 _MOST_MESSAGES = 3000
 """Of one topic: /tf may have millions, and whether a joint moves shows in evenly spaced ones."""

@@ -14,8 +14,6 @@ from calib_core.recordings.time.clock_diagnosis import diagnose
 from calib_core.recordings.topics import Rhythm, TopicSummary, join_topics
 from calib_core.recordings.usages import usage_of
 
-__all__ = ["with_other_clocks"]
-
 _STAMP_BYTES = 12
 _KINDS = ("radar", "image")
 

@@ -8,8 +8,6 @@ from calib_core.recordings.radar.several_topics.sensors import Examined, Figures
 from calib_core.recordings.selection import Inventory, Selection, holds_objects, radar_rank, unknown_radar
 from calib_core.results import DataWarning
 
-__all__ = ["RadarChoice", "choose_radar", "figures_text"]
-
 _PLENTY = 0.25  # of the most static returns ahead: with fewer, a radar looks elsewhere
 _COMPARABLE = 0.5  # with more than this of them, another radar could be meant
 _NOTHING_STATIC = 1.0  # returns a scan: the recording was made on the move

@@ -39,8 +39,6 @@ from calib_core.recordings.time.written_dates import parse_zone
 from calib_core.recordings.topics import TopicSummary, join_topics
 from calib_core.results import DataWarning, InputFile
 
-__all__ = ["Recording", "inspect_recording", "open_recording", "require_files"]
-
 _HASH_BYTES = 1 << 22
 _STAMP_BYTES = 12
 

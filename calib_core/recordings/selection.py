@@ -11,18 +11,6 @@ from calib_core.recordings.time.clock_choice import Clock
 from calib_core.recordings.topics import Topic, TopicKind
 from calib_core.recordings.usages import Usage
 
-__all__ = [
-    "Inventory",
-    "Need",
-    "RecordingOptions",
-    "Selection",
-    "holds_objects",
-    "radar_rank",
-    "select",
-    "select_image",
-    "unknown_radar",
-]
-
 Need = Literal["radar", "image"]
 _WORDS = {"radar": "radar", "image": "camera image", "camera-info": "camera info"}
 _FLAGS = {"radar": "--radar-topic", "image": "--image-topic", "camera-info": "--camera-info-topic"}

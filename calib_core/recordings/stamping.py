@@ -9,8 +9,6 @@ from calib_core.arrays import TimesNs
 from calib_core.recordings.time.clock_faults import Stamps
 from calib_core.recordings.topics import Topic, read_heads
 
-__all__ = ["StampedTopic", "read_stamps"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StampedTopic:

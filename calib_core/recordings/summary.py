@@ -17,14 +17,6 @@ from calib_core.recordings.time.shared_time import SharedTime, shared_time
 from calib_core.recordings.topics import Rhythm, TopicSummary
 from calib_core.results import DataWarning
 
-__all__ = [
-    "CameraSummary",
-    "FileSummary",
-    "RadarSummary",
-    "RecordingSummary",
-    "recording_summary",
-]
-
 _SAMPLED_SCANS = 200
 
 

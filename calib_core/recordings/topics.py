@@ -14,8 +14,6 @@ from calib_core.recordings.messages.definitions import Definition, definition_of
 from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis, between_islands
 from calib_core.results import DataWarning
 
-__all__ = ["BOX_LAYOUT", "Rhythm", "Topic", "TopicKind", "TopicSummary", "join_topics", "read_heads"]
-
 TopicKind = Literal["radar", "image", "camera-info", "other"]
 BOX_LAYOUT = "boxes around objects"
 """How the layout of a topic with boxes begins."""

@@ -19,8 +19,6 @@ from calib_core.recordings.radar.message_layouts.struct_lists import struct_list
 from calib_core.recordings.time.clock_faults import HALF_DISTINCT, RETURNS_DISTINCT
 from calib_core.recordings.topics import Topic, TopicKind
 
-__all__ = ["Usage", "usage_of"]
-
 
 def _words(text: str) -> frozenset[str]:
     return frozenset(text.split())

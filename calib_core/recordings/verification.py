@@ -17,8 +17,6 @@ from calib_core.recordings.messages.definitions import Definition, definition_of
 from calib_core.recordings.recording import Recording
 from calib_core.results import DataWarning
 
-__all__ = ["FileCheck", "TopicCheck", "Verification", "verify_recording"]
-
 _LOSSES = frozenset({
     "checksum", "damaged-file", "definitions-damaged", "file-left-out", "messages-missing", "missing-file", "not-closed",
     "packed-file-damaged",

@@ -4,8 +4,6 @@ from collections.abc import Iterator
 
 from calib_core.recordings.verification import FileCheck, TopicCheck, Verification
 
-__all__ = ["verification_text"]
-
 _BYTES = {
     "messages": "messages and their chunks",
     "records": "other records",

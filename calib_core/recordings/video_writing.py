@@ -11,8 +11,6 @@ from calib_core.measurements import TimeNs
 from calib_core.recordings.camera.images import EncodedImage
 from calib_core.recordings.recording import Recording
 
-__all__ = ["LeftOut", "WrittenVideo", "video_format", "write_video"]
-
 _FORMATS = {".mp4": "mp4", ".mov": "mov", ".mkv": "matroska"}
 _TICK_NS = 1000
 _JPEG_QUALITY = 95

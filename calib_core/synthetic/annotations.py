@@ -13,8 +13,6 @@ from calib_core.synthetic.scene.stage import Stage
 from calib_core.synthetic.scene.traffic import Actor
 from calib_core.synthetic.scene.vehicles import VehicleState, hidden_by, outline_points
 
-__all__ = ["is_annotated", "true_boxes", "true_labels"]
-
 _LEAST_VISIBLE = 0.25
 """Least share of an object that must be visible for a box."""
 _LEAST_PX = 3.0

@@ -10,8 +10,6 @@ from calib_core.measurements import ReflectorClick, TimeNs
 from calib_core.synthetic.scene.placements import SimulatedPlacement, clear_frames
 from calib_core.synthetic.scene.stage import Stage, child_rng
 
-__all__ = ["ClickFault", "SimulatedClick", "clicks_of"]
-
 ClickFault = Literal["repeated", "low", "late", "hasty"]
 
 

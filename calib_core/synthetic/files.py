@@ -14,8 +14,6 @@ from calib_core.synthetic.plain_files import write_plain_files
 from calib_core.synthetic.recording import SimulatedFrame, SimulatedRecording
 from calib_core.synthetic.truth import clicks_text, truth_text
 
-__all__ = ["Progress", "write_recording"]
-
 Progress: TypeAlias = Callable[[int, int], None]
 """Called with the number done and the total."""
 

@@ -19,29 +19,11 @@ from calib_core.recordings.containers.recorded_messages import (
     VendorScanMessage,
 )
 from calib_core.recordings.radar.several_topics.merging import Spread, aligned, merged, moments_of
-from calib_core.synthetic.options import RadarDefects
 from calib_core.synthetic.radar.antennas import Antenna
 from calib_core.synthetic.radar.defects import second_azimuths
+from calib_core.synthetic.radar_options import RadarDefects
 from calib_core.synthetic.recording import SimulatedFrame, SimulatedRecording
 from calib_core.synthetic.scans import side_scans
-
-__all__ = [
-    "CAMERA_FRAME",
-    "CAMERA_INFO_TOPIC",
-    "CLOUD_TOPIC",
-    "IMAGE_TOPIC",
-    "RADAR_FRAME",
-    "RADAR_SCAN_TOPIC",
-    "RAW_IMAGE_TOPIC",
-    "SECOND_COLUMN",
-    "SECOND_SUFFIX",
-    "SIDE_FRAME",
-    "SIDE_TOPIC",
-    "VENDOR_TOPIC",
-    "all_messages",
-    "camera_messages",
-    "radar_messages",
-]
 
 RADAR_SCAN_TOPIC = "/ti_mmwave/radar_scan"
 CLOUD_TOPIC = RadarDefects().cloud_topic

@@ -8,26 +8,8 @@ from typing import Any, Literal
 from calib_core.camera import CameraModel
 from calib_core.errors import OptionError
 from calib_core.options import option
-from calib_core.synthetic.radar_options import RadarDefects, RadarMessage, RadarName, ReportedElevation, SecondAzimuth
+from calib_core.synthetic.radar_options import RadarDefects, RadarMessage, RadarName
 from calib_core.synthetic.rig import RigOptions
-
-__all__ = [
-    "Clicking",
-    "Clutter",
-    "Container",
-    "IntrinsicsErrors",
-    "RadarDefects",
-    "RadarMessage",
-    "RadarName",
-    "ReflectorDesign",
-    "ReportedElevation",
-    "SceneName",
-    "SecondAzimuth",
-    "SimulationOptions",
-    "Surroundings",
-    "Traffic",
-    "WavedBoard",
-]
 
 SceneName = Literal["rooftop", "field", "aisle", "checkerboard", "open-rooftop", "open-yard", "road"]
 Clutter = Literal["none", "scene", "heavy"]

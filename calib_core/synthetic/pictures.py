@@ -9,8 +9,6 @@ from calib_core.synthetic.recording import SimulatedRecording
 from calib_core.synthetic.rendering.frames import FrameRenderer
 from calib_core.synthetic.scene.stage import child_rng
 
-__all__ = ["SimulatedPictures"]
-
 _JPEG_QUALITY = 90
 
 

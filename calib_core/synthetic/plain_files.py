@@ -14,8 +14,6 @@ from calib_core.radar import polar_from_cartesian
 from calib_core.synthetic.radar.antennas import Antenna
 from calib_core.synthetic.recording import SimulatedFrame, SimulatedRecording
 
-__all__ = ["write_plain_files"]
-
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _HEADER = (
     "Timestamp",

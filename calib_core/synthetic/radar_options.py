@@ -5,8 +5,6 @@ from typing import Literal
 
 from calib_core.options import option
 
-__all__ = ["RadarDefects", "RadarMessage", "RadarName", "ReportedElevation", "SecondAzimuth"]
-
 RadarName = Literal["awr1843", "imaging"]
 RadarMessage = Literal["filled", "stock", "cloud", "vendor"]
 ReportedElevation = Literal["measured", "zero", "rounding"]

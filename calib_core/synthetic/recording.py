@@ -16,8 +16,6 @@ from calib_core.synthetic.scans import antenna_scans, radar_scans
 from calib_core.synthetic.scene.placements import SimulatedPlacement, placements_of
 from calib_core.synthetic.scene.stage import Stage, child_rng, set_stage
 
-__all__ = ["SimulatedFrame", "SimulatedRecording", "simulate"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SimulatedFrame:

@@ -13,18 +13,6 @@ from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.lens_models.registry import LENS_MODELS
 from calib_core.options import RadarOptions, option
 
-__all__ = [
-    "NOMINAL_ROTATION",
-    "Rig",
-    "RigOptions",
-    "draw_flat_radar_rig",
-    "nominal_rotation",
-    "radar_stand",
-    "random_rig",
-    "random_rig_apart",
-    "typical_camera",
-]
-
 NOMINAL_ROTATION = ((0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0))
 """Optical axes (right, down, forward) in radar axes (forward, left, up): a camera that looks in the radar's direction."""
 

@@ -10,8 +10,6 @@ from calib_core.synthetic.options import SimulationOptions
 from calib_core.synthetic.recording import simulate
 from calib_core.synthetic.rig import RigOptions
 
-__all__ = ["SAMPLE_NAME", "SAMPLE_OPTIONS", "main", "write_sample"]
-
 SAMPLE_NAME = "rooftop"
 SAMPLE_OPTIONS = SimulationOptions(
     scene="rooftop",

@@ -24,17 +24,6 @@ from calib_core.synthetic.scene.surroundings import cart_position
 from calib_core.synthetic.scene.traffic import Actor
 from calib_core.synthetic.scene.vehicles import VehicleState, echo_places, hidden_by
 
-__all__ = [
-    "SimulatedScans",
-    "antenna_scans",
-    "labelled_scans",
-    "radar_scans",
-    "side_scans",
-    "simulate_scans",
-    "targets_at",
-    "with_wrong_azimuths",
-]
-
 _REFLECTOR_DBSM = 12.0
 """Of a reflector of the usual size."""
 _CARRIED_DBSM = 0.0

@@ -7,8 +7,6 @@ import numpy as np
 from calib_core.arrays import Flags, TimesNs, Values, frozen_array
 from calib_core.measurements import NS_PER_S
 
-__all__ = ["Islands", "SensorTimes", "draw_islands", "draw_times"]
-
 _ISLAND_S = (2.0, 15.0)
 _GAP_S = (60.0, 300.0)
 

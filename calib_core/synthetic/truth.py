@@ -10,8 +10,6 @@ from calib_core.measurements import TimeNs, time_parts
 from calib_core.synthetic.options import Clicking
 from calib_core.synthetic.recording import SimulatedRecording
 
-__all__ = ["clicks_text", "truth_text"]
-
 _PIXEL_DECIMALS = 6
 """The last bits of a projection depend on the order of its sums; the file must not."""
 

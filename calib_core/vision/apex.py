@@ -15,8 +15,6 @@ from calib_core.vision.corner_checks import half_turn_correlation, has_angles_of
 from calib_core.vision.sector_fit import SectorFit, fit_sectors
 from calib_core.vision.sectors import score_sectors
 
-__all__ = ["Apex", "NoApex", "find_apex"]
-
 _PROPOSING = ((1, 3.5), (1, 5.0), (1, 7.0), (2, 5.0), (2, 7.0), (4, 5.0), (4, 7.0))
 """How much the picture is reduced, and the radius of the disc there [px]."""
 _GROWING = ((1, 3.5), (1, 5.0), (1, 7.0), (1, 10.0), (1, 14.0), (2, 10.0), (2, 14.0))

@@ -12,8 +12,6 @@ import numpy as np
 
 from calib_core.arrays import frozen_array
 
-__all__ = ["Edges", "LostBox", "TrackedBox", "follow_box"]
-
 Edges: TypeAlias = tuple[float, float, float, float]
 """Left, top, right and bottom edge of a box [px]; pixel (0, 0) is the centre of the top-left pixel."""
 

@@ -8,8 +8,6 @@ from calib_core.arrays import Points2, Points3, frozen_array
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, rotation_exp
 
-__all__ = ["BoardView", "board_corners", "find_corners", "view_of_board"]
-
 _LEAST_DEPTH = 1e-6
 
 

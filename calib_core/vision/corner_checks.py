@@ -6,8 +6,6 @@ import numpy as np
 
 from calib_core.vision.sector_fit import SectorFit
 
-__all__ = ["half_turn_correlation", "has_angles_of_corner", "is_corner", "may_be_corner"]
-
 
 @dataclass(frozen=True, slots=True)
 class _Limits:

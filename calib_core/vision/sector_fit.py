@@ -7,8 +7,6 @@ from scipy.special import ndtr
 
 from calib_core.arrays import Matrix22, Values, Vector2, Vector3, frozen_array
 
-__all__ = ["SectorFit", "fit_sectors"]
-
 _SLOPES_FROM_PX = 5.0
 """Smaller discs have too few pixels to tell a slope within a sector from the boundaries."""
 _FIRST_BLUR_PX = 0.7

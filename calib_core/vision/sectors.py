@@ -5,8 +5,6 @@ from functools import lru_cache
 
 import numpy as np
 
-__all__ = ["SectorScores", "score_sectors"]
-
 _WEDGES = 12
 _NARROWEST, _WIDEST = 2, 5
 """Wedges per sector: 60 to 150 deg. Seen from inside, each sheet of a trihedral spans less than 180 deg."""

@@ -1,4 +1,4 @@
-"""ARCHITECTURE.md draws the layers declared in pyproject.toml, and names folders that exist."""
+"""No circle of imports, and ARCHITECTURE.md names folders that exist."""
 
 import importlib.util
 import re
@@ -27,20 +27,6 @@ def graph(structure: ModuleType, project_root: Path) -> dict[str, set[str]]:
 @pytest.fixture(scope="module")
 def page(project_root: Path) -> str:
     return (project_root / "ARCHITECTURE.md").read_text(encoding="utf-8")
-
-
-def test_the_drawing_matches_the_contracts(structure: ModuleType, page: str, project_root: Path) -> None:
-    drawing = page.partition("## Layers")[2].split("```\n")[1]
-    assert drawing.splitlines() == list(structure.drawn(project_root)), "python .ci/structure.py draw"
-
-
-def test_every_folder_with_rooms_has_a_contract(
-    structure: ModuleType, graph: dict[str, set[str]], project_root: Path
-) -> None:
-    folders = {name.rpartition(".")[0] for name in graph} - {""}
-    rooms = {folder: structure.between_rooms(graph, folder) for folder in folders}
-    drawn = {line for line in structure.drawn(project_root) if not line.startswith(" ")}
-    assert {folder for folder, inside in rooms.items() if any(inside.values())} - drawn == set()
 
 
 def test_rooms_have_no_circular_imports(structure: ModuleType, graph: dict[str, set[str]]) -> None:

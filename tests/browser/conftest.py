@@ -9,7 +9,8 @@ import pytest
 from playwright.sync_api import Browser, Playwright, sync_playwright
 
 from calib_core.recordings import Recording, open_recording
-from cocalib.web.port.server import RunningServer, ServerOptions, start
+from cocalib.web.port.link import ServerOptions
+from cocalib.web.port.server import RunningServer, start
 from cocalib.workspace import Workspace, open_workspace
 from tests.browser.driving import FLAGS, Driver
 from tests.find_browser import find_browser

@@ -8,7 +8,8 @@ from playwright.sync_api import expect
 
 from calib_core.recordings import Recording
 from cocalib.web.messages import Opening
-from cocalib.web.port.server import RunningServer, ServerOptions
+from cocalib.web.port.link import ServerOptions
+from cocalib.web.port.server import RunningServer
 from cocalib.web.port.serving import Service
 from tests.browser.accessibility import violations
 from tests.browser.driving import Driver

@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 from playwright.sync_api import expect
 
-from cocalib.web.port.server import RunningServer, ServerOptions, start
+from cocalib.web.port.link import ServerOptions
+from cocalib.web.port.server import RunningServer, start
 from cocalib.workspace import open_workspace
 from tests.browser.accessibility import violations
 from tests.browser.driving import Driver

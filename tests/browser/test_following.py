@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from calib_core.recordings import AwaitedRecording, FollowedRecording, open_recording
-from cocalib.web.port.server import RunningServer, ServerOptions, start
+from cocalib.web.port.link import ServerOptions
+from cocalib.web.port.server import RunningServer, start
 from cocalib.workspace import Workspace, open_workspace
 from tests.browser.driving import Driver
 from tests.growing_recording import SampleWriter

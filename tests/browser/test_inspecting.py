@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from calib_core.recordings import RecordingOptions, open_recording
-from cocalib.web.port.server import ServerOptions, start
+from cocalib.web.port.link import ServerOptions
+from cocalib.web.port.server import start
 from cocalib.workspace import open_workspace
 from tests.browser.driving import Driver
 from tests.vendor_recording import vendor_sample

@@ -17,7 +17,8 @@ from calib_core.interchange.rectification import rectified_camera
 from calib_core.recordings import Recording, open_recording
 from calib_core.synthetic import PRESETS, WavedBoard, simulate, write_recording
 from cocalib.intrinsics import RecordedPictures
-from cocalib.web.port.server import RunningServer, ServerOptions, start
+from cocalib.web.port.link import ServerOptions
+from cocalib.web.port.server import RunningServer, start
 from cocalib.workspace import Workspace, open_workspace
 from tests.browser.accessibility import violations
 from tests.browser.driving import Driver

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from calib_core.recordings import open_recording
-from cocalib.web.port.server import RunningServer, ServerOptions, start
+from cocalib.web.port.link import ServerOptions
+from cocalib.web.port.server import RunningServer, start
 from cocalib.workspace import open_workspace
 from tests.browser.driving import Driver
 

@@ -14,7 +14,8 @@ from calib_core.camera import Camera
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.proposing import DwellView, FrameSource, PictureCandidate, ViewProgress
 from calib_core.recordings import Recording
-from cocalib.web.port.server import RunningServer, ServerOptions, start
+from cocalib.web.port.link import ServerOptions
+from cocalib.web.port.server import RunningServer, start
 from cocalib.workspace import Workspace, open_workspace
 from tests.browser.accessibility import violations
 from tests.browser.driving import Driver

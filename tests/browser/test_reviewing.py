@@ -9,7 +9,8 @@ import pytest
 
 from calib_core.recordings import Recording
 from cocalib.opening.reference import reference_from
-from cocalib.web.port.server import ServerOptions, start
+from cocalib.web.port.link import ServerOptions
+from cocalib.web.port.server import start
 from cocalib.workspace import open_workspace
 from tests.browser.driving import Driver
 

@@ -10,7 +10,8 @@ import pytest
 from calib_core.measurements import TimeNs
 from calib_core.recordings import Recording, open_recording
 from calib_core.results import Calibration
-from cocalib.web.port.server import RunningServer, ServerOptions, start
+from cocalib.web.port.link import ServerOptions
+from cocalib.web.port.server import RunningServer, start
 from cocalib.web.radar_sight import RadarSight
 from cocalib.workspace import Workspace, open_workspace
 from tests.browser.driving import Driver

@@ -12,7 +12,8 @@ from typing import Any
 
 import pytest
 
-from cocalib.web.port.server import ServerOptions, start
+from cocalib.web.port.link import ServerOptions
+from cocalib.web.port.server import start
 from cocalib.workspace import open_workspace
 from tests.browser.driving import Driver
 from tests.picture_recording import PictureRecording, grey_pictures

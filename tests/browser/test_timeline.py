@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from calib_core.measurements import NS_PER_S
-from cocalib.web.port.server import RunningServer, ServerOptions, start
+from cocalib.web.port.link import ServerOptions
+from cocalib.web.port.server import RunningServer, start
 from cocalib.workspace import open_workspace
 from tests.browser.driving import Driver
 from tests.picture_recording import START, PictureRecording, grey_pictures

@@ -8,7 +8,7 @@ import pytest
 
 from calib_core.recordings import Recording
 from calib_core.synthetic import SimulationOptions, simulate, write_recording
-from cocalib.__main__ import run
+from cocalib.cli import run
 from cocalib.workspace import Workspace
 
 

@@ -16,8 +16,6 @@ from cocalib.batch.job import Job
 from cocalib.batch.outcome import Outcome
 from cocalib.batch.results_folder import ResultsFolder
 
-__all__ = ["BatchProgress", "EngineName", "chosen_engine", "drive", "shard_of"]
-
 EngineName: TypeAlias = Literal["dask", "none"]
 
 _SMALL = 8

@@ -6,8 +6,6 @@ from calib_core.errors import InputError
 from cocalib.batch.manifest import Manifest, ManifestRow
 from cocalib.fleet_prior_file import FleetPriorFile
 
-__all__ = ["require_priors_of_others"]
-
 _MOST_NAMED = 5
 
 

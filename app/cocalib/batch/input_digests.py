@@ -11,8 +11,6 @@ from msgspec import Struct, field
 from cocalib.batch.inputs import InputFile, InputPath
 from cocalib.whole_file import write_whole
 
-__all__ = ["InputDigests"]
-
 _FILE = "inputs.json"
 _PIECE_BYTES = 1 << 22
 _SETTLED_NS = 2_000_000_000

@@ -11,8 +11,6 @@ from pathlib import Path
 from calib_core.input_files import special_kind
 from cocalib.batch.manifest import ManifestRow
 
-__all__ = ["InputFile", "InputPath", "all_reached", "inputs_of", "state_of"]
-
 _LEVELS = 4
 """As far above a folder of pictures as data sets keep their calibration."""
 _SESSION = ".cocalib-session"

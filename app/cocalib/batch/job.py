@@ -13,8 +13,6 @@ from cocalib.batch.inputs import InputPath, inputs_of, state_of
 from cocalib.batch.manifest import ManifestRow
 from cocalib.resources import version
 
-__all__ = ["Job", "job_of", "jobs_of"]
-
 _RESULT_VERSION = 2
 """Counts up when the same inputs give other files."""
 _DIGITS = 32

@@ -6,8 +6,6 @@ from pathlib import Path
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import RecordingOptions
 
-__all__ = ["Manifest", "ManifestRow"]
-
 
 @dataclass(frozen=True, slots=True)
 class ManifestRow:

@@ -5,17 +5,6 @@ from typing import Final, Literal
 import msgspec
 from msgspec import Struct, field
 
-__all__ = [
-    "OUTCOME_SCHEMA",
-    "Outcome",
-    "OutcomeFile",
-    "OutcomeRun",
-    "Status",
-    "StepState",
-    "outcome_text",
-    "read_outcome",
-]
-
 OUTCOME_SCHEMA: Final = "cocalib/outcome-1"
 Status = Literal["solved", "weak", "refused", "failed"]
 """A good or usable calibration; one not to rely on; the data give none; an input cannot be read or the program failed."""

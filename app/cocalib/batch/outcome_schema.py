@@ -6,8 +6,6 @@ from pathlib import Path
 from calib_core.interchange.own.schemas import schema_file_name, schema_text
 from cocalib.batch.outcome import OUTCOME_SCHEMA, Outcome
 
-__all__ = ["write_outcome_schema"]
-
 
 def write_outcome_schema(folder: Path) -> Path:
     """Write the schema into a folder; return its path."""

@@ -16,8 +16,6 @@ from msgspec import Struct
 from cocalib.batch.job import Job
 from cocalib.whole_file import write_whole
 
-__all__ = ["PLANS", "Plan", "Wanted", "read_plans", "write_plan"]
-
 PLANS: Final = "manifests"
 _SCHEMA: Final = "cocalib/batch-plan-1"
 

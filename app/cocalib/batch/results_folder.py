@@ -13,8 +13,6 @@ import msgspec
 from cocalib.batch.outcome import Outcome, OutcomeFile, read_outcome
 from cocalib.batch.writers import Writer, is_abandoned
 
-__all__ = ["LOG_FILE", "OUTCOME_FILE", "ResultsFolder", "listed_files"]
-
 OUTCOME_FILE = "outcome.json"
 LOG_FILE = "log.txt"
 """What only a developer needs; it differs from run to run, so the outcome does not list it."""

@@ -10,8 +10,6 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Self
 
-__all__ = ["Writer", "is_abandoned"]
-
 _NAME = re.compile(
     r"\.(?P<digest>[^.]+)\.(?P<place>[0-9a-f]{12})-(?P<process>\d+)-(?P<begin>\d+)\.(?P<token>[0-9a-f]+)"
 )

@@ -13,8 +13,6 @@ from calib_core.measurements import TimeNs
 from cocalib.box_tracks.stretches import MOST_FRAMES, Start, Stretch, stretches_of
 from cocalib.session import BoxEdges, BoxTrack, RecordingFacts, Session
 
-__all__ = ["BoxKind", "CarriedTrack", "Followed", "PlacedBox", "carried_boxes", "carried_tracks"]
-
 _NOTHING: Mapping[Start, "Followed"] = MappingProxyType({})
 BoxKind: TypeAlias = Literal["stated", "followed", "between"]
 

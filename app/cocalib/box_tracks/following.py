@@ -14,8 +14,6 @@ from calib_core.vision import LostBox, TrackedBox, follow_box
 from cocalib.box_tracks.carried import Followed, PlacedBox
 from cocalib.box_tracks.stretches import Start, Stretch
 
-__all__ = ["BoxFollower", "GreyPictures"]
-
 _KEPT_PICTURES = 12
 """Decoded pictures in memory, for boxes that are followed through the same frames."""
 _HALVED_ABOVE_PX = 1300

@@ -10,8 +10,6 @@ from calib_core.detections import Box, Boxes
 from calib_core.measurements import TimeNs
 from cocalib.session import BoxesLoaded, BoxKeyframe, BoxTrack, RecordingFacts
 
-__all__ = ["boxes_loaded", "read_sent_boxes"]
-
 _LEAST_PX = 3.0
 """Boxes narrower or lower than this, after what is beyond the picture is cut off, are left out [px]."""
 

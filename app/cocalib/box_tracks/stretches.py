@@ -5,8 +5,6 @@ from dataclasses import dataclass
 
 from cocalib.session import BoxEdges, BoxTrack, RecordingFacts
 
-__all__ = ["MOST_FRAMES", "Start", "Stretch", "stretches_of"]
-
 MOST_FRAMES = 900
 """A box is followed through so many frames at most after it was drawn: half a minute at 30 Hz."""
 

@@ -9,18 +9,17 @@ import tyro
 
 from calib_core.errors import CalibrationError, InputError
 from cocalib.cli.flags import File, Switch, called
-from cocalib.cli.output import read_text, told_clicks_at_frames, write_whole
+from cocalib.cli.output import told_clicks_at_frames, write_whole
 from cocalib.cli.recording_flags import TopicFlags, Topics
 from cocalib.cli.tree_flags import FrameFlags, Frames
 from cocalib.terminal import print_exactly
+from cocalib.text_files import read_text
 
 if TYPE_CHECKING:
     from calib_core.camera import Camera
     from calib_core.interchange import AgreementLimits, CheckedFile, CheckPairs, CheckReport, ImportedCalibration
     from calib_core.measurements import ReflectorClick
     from calib_core.recordings import Recording
-
-__all__ = ["Check"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Protocol, Self, cast, runtime_checkable
 
-__all__ = ["COMMANDS", "PROGRAM", "Command", "HasFileDefaults", "Runnable", "overview"]
-
 PROGRAM = "cocalib"
 _DESCRIPTION = "Radar-camera calibration: click the corner reflector, get camera_from_radar and its uncertainty."
 _WIDTH = 80

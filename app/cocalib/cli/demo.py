@@ -16,8 +16,6 @@ from cocalib.cli.flags import Folder, Switch
 from cocalib.cli.serving_flags import ServingFlags
 from cocalib.resources import sample_folder, user_session_folder
 
-__all__ = ["Demo"]
-
 
 @dataclass(frozen=True, slots=True)
 class Demo:

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from calib_core.geometry import RigidTransform
     from calib_core.interchange import CalibrationFile
 
-__all__ = ["Export"]
-
 
 @dataclass(frozen=True, slots=True)
 class Export:

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from calib_core.interchange import CalibrationFile, Provenance
     from calib_core.recordings import Recording
 
-__all__ = ["MCAP", "export_recording"]
-
 MCAP = "mcap"
 _LAYOUT_ENDING = ".foxglove-layout.json"
 

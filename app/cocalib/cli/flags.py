@@ -6,8 +6,6 @@ from typing import Annotated, Any, TypeAlias
 
 import tyro
 
-__all__ = ["File", "Folder", "NewFile", "Switch", "called", "same"]
-
 
 def called(metavar: str | None = None) -> object:
     """Name a value in the help, and omit its default: None or False would say nothing."""

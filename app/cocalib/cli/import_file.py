@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from calib_core.camera import Camera
     from calib_core.interchange import ImportedCalibration
 
-__all__ = ["Import"]
-
 
 @dataclass(frozen=True, slots=True)
 class Import:

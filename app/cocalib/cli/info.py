@@ -6,8 +6,6 @@ from cocalib.cli.flags import Switch
 from cocalib.cli.output import progress_bar
 from cocalib.cli.recording_flags import Recordings, TopicFlags, Topics
 
-__all__ = ["Info"]
-
 
 @dataclass(frozen=True, slots=True)
 class Info:

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from calib_core.interchange.hypotheses.reading import UnstatedFile
     from calib_core.recordings import Recording
 
-__all__ = ["MeaningFlags"]
-
 _CONTRADICTED = 0.05
 
 

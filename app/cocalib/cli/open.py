@@ -10,14 +10,12 @@ import tyro
 from calib_core.errors import InputError
 from calib_core.options import CalibrationOptions
 from cocalib.cli.flags import File, Folder, Switch
-from cocalib.cli.output import read_text
 from cocalib.cli.recording_flags import CameraPosition, MeasuredCamera, Options, Recordings, TopicFlags, Topics
 from cocalib.cli.serving_flags import ServingFlags
+from cocalib.text_files import read_text
 
 if TYPE_CHECKING:
     from cocalib.opening import Choice
-
-__all__ = ["Open"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,20 +9,10 @@ from typing import TYPE_CHECKING
 from calib_core.errors import InputError
 from cocalib import whole_file
 from cocalib.terminal import terminal_stream
-from cocalib.text_files import read_text
 
 if TYPE_CHECKING:
     from calib_core.measurements import ReflectorClick, Unsolvable
     from calib_core.recordings import Recording
-
-__all__ = [
-    "explain_unsolvable",
-    "progress_bar",
-    "read_text",
-    "tell_notes",
-    "told_clicks_at_frames",
-    "write_whole",
-]
 
 
 def explain_unsolvable(outcome: "Unsolvable", *, what: str = "no calibration") -> int:

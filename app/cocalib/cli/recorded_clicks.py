@@ -9,8 +9,6 @@ from calib_core.recordings import Recording
 from cocalib.cli.output import tell_notes
 from cocalib.recorded_clicks import clicks_in_recording
 
-__all__ = ["recorded_clicks"]
-
 
 def recorded_clicks(
     clicks: Sequence[ReflectorClick], recording: Recording, camera: Camera, *, source: Path

@@ -14,17 +14,6 @@ from cocalib.cli.flags import called, same
 if TYPE_CHECKING:
     from calib_core.interchange import VehicleNote
 
-__all__ = [
-    "CameraPosition",
-    "MeasuredCamera",
-    "Options",
-    "Recordings",
-    "TopicFlags",
-    "Topics",
-    "Vehicle",
-    "VehicleFlags",
-]
-
 Recordings: TypeAlias = Annotated[tuple[Path, ...], tyro.conf.Positional, called("RECORDING...")]
 
 

@@ -12,8 +12,6 @@ from cocalib.loopback import is_loopback
 from cocalib.web.port.address import require_address, require_one_address, require_token
 from cocalib.web.port.link import Link, ServerOptions
 
-__all__ = ["ServingFlags"]
-
 
 @dataclass(frozen=True, slots=True)
 class ServingFlags:

@@ -15,8 +15,6 @@ from cocalib.cli.output import write_whole
 if TYPE_CHECKING:
     from cocalib.session.file import Repair, SessionSummary
 
-__all__ = ["Session"]
-
 
 @dataclass(frozen=True, slots=True)
 class Session:

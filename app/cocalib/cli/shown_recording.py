@@ -10,13 +10,12 @@ import tyro
 
 from calib_core.errors import InputError
 from cocalib.cli.flags import File, Switch, called
-from cocalib.cli.output import progress_bar, read_text, told_clicks_at_frames
+from cocalib.cli.output import progress_bar, told_clicks_at_frames
 from cocalib.cli.recording_flags import TopicFlags
+from cocalib.text_files import read_text
 
 if TYPE_CHECKING:
     from cocalib.recorded_view import RecordedView
-
-__all__ = ["Shown", "ShownFlags", "shown_recording"]
 
 
 @dataclass(frozen=True, slots=True)

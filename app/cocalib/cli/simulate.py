@@ -11,8 +11,6 @@ from calib_core.synthetic import PRESETS, Container, PresetName, RadarDefects, S
 from cocalib.cli.flags import called, same
 from cocalib.cli.output import progress_bar
 
-__all__ = ["Simulate"]
-
 
 @dataclass(frozen=True, slots=True)
 class DefectFlags(RadarDefects):

@@ -15,7 +15,7 @@ from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
 from cocalib.cli.flags import File, Switch
-from cocalib.cli.output import explain_unsolvable, read_text, write_whole
+from cocalib.cli.output import explain_unsolvable, write_whole
 from cocalib.cli.recording_flags import (
     CameraPosition,
     MeasuredCamera,
@@ -27,6 +27,7 @@ from cocalib.cli.recording_flags import (
     VehicleFlags,
 )
 from cocalib.terminal import print_exactly
+from cocalib.text_files import read_text
 from cocalib.view import summary_lines
 
 if TYPE_CHECKING:
@@ -35,8 +36,6 @@ if TYPE_CHECKING:
     from calib_core.recordings import Recording
     from cocalib.automatic_solving import PlacedClicks
     from cocalib.fleet_prior_file import FleetPriorFile
-
-__all__ = ["Solve"]
 
 _REFLECTOR_M = 0.24
 

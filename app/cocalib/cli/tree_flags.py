@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from calib_core.interchange import CalibrationFile, Export, FrameTree, ImportedCalibration, TreeFile, WantedFrames
     from calib_core.results import InputFile
 
-__all__ = ["FrameFlags", "Frames", "TreeFlags", "Trees", "input_file"]
-
 
 @dataclass(frozen=True, slots=True)
 class FrameFlags:

@@ -14,19 +14,6 @@ from typing import Any, TypeAlias, TypeVar
 
 import tyro
 
-__all__ = [
-    "Argument",
-    "BadValue",
-    "Fault",
-    "MissingArguments",
-    "MissingValue",
-    "UnknownArgument",
-    "WrongChoice",
-    "flags_of",
-    "missing_parts",
-    "parse",
-]
-
 _PRIVATE = "tyro._errors"
 _PARTS = {
     "UnrecognizedArgs": ("tokens",),

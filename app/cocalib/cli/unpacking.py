@@ -6,8 +6,6 @@ from calib_core.errors import InputError
 from calib_core.interchange.syntax.zip_archives import unpack
 from cocalib.cli.output import write_whole
 
-__all__ = ["is_meant_as_folder", "write_unpacked"]
-
 
 def is_meant_as_folder(path: Path) -> bool:
     """Return whether an output is a folder: it is one, or there is nothing yet and its name does not end in .zip."""

@@ -19,8 +19,6 @@ from cocalib.cli.tyro_hook import (
 )
 from cocalib.terminal import with_colours
 
-__all__ = ["read_command"]
-
 _NUMBERS = {"INT": "a whole number", "FLOAT": "a number"}
 
 

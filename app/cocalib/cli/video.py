@@ -9,8 +9,6 @@ from cocalib.cli.output import progress_bar
 from cocalib.cli.recording_flags import Recordings, TopicFlags, Topics
 from cocalib.cli.shown_recording import ShownFlags, shown_recording
 
-__all__ = ["Video"]
-
 _TRAIL_SCANS, _MOST_TRAIL_SCANS = 5, 100
 
 

@@ -8,8 +8,6 @@ from cocalib.batch.driving import BatchProgress
 from cocalib.fleet.index import FleetIndex, finished_results, read_fleet
 from cocalib.fleet.summary_page import write_summary
 
-__all__ = ["indexed_batch"]
-
 
 @contextmanager
 def indexed_batch(folder: Path) -> Iterator[Callable[[BatchProgress], None]]:

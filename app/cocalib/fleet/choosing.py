@@ -9,9 +9,6 @@ from calib_core.errors import InputError
 from calib_core.fleet import SessionPose, Transition, transition
 from cocalib.fleet.records import FleetRecord, SessionRecord, VehicleRecord
 
-__all__ = ["ComparedSessions", "compare_sessions", "vehicle_named"]
-
-
 _Outcome: TypeAlias = Literal["differs", "same", "cannot-tell"]
 
 

@@ -2,8 +2,6 @@
 
 from datetime import UTC, datetime
 
-__all__ = ["recorded_text"]
-
 
 def recorded_text(recorded_ns: int | None, *, unknown: str = "–") -> str:
     """Write when a recording began, in UTC, to the minute.

@@ -11,17 +11,6 @@ from cocalib.fleet.kinds import Kind, NotCounted, PriorOfType, prior_sigma
 from cocalib.fleet.records import FleetRecord, SessionRecord, UnreadResult, VehicleRecord
 from cocalib.fleet.standing import VehicleStanding, age_days
 
-__all__ = [
-    "COMPARISON_SCHEMA",
-    "HISTORY_SCHEMA",
-    "PRIOR_SCHEMA",
-    "STATUS_SCHEMA",
-    "comparison_document",
-    "history_document",
-    "prior_document",
-    "status_document",
-]
-
 STATUS_SCHEMA: Final = "cocalib/fleet-status-1"
 HISTORY_SCHEMA: Final = "cocalib/fleet-history-1"
 COMPARISON_SCHEMA: Final = "cocalib/fleet-comparison-1"

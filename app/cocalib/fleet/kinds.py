@@ -25,8 +25,6 @@ from calib_core.measurements import TimeNs, Unsolvable
 from cocalib.batch.outcome import Outcome
 from cocalib.fleet.records import FleetRecord, SessionRecord, VehicleRecord
 
-__all__ = ["Kind", "NotCounted", "PriorOfType", "kinds_of", "prior_of_type", "prior_sigma"]
-
 _COUNTED = ("good", "usable")
 
 

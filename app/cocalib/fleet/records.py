@@ -5,8 +5,6 @@ from dataclasses import dataclass
 from calib_core.fleet import SessionPose, Transition
 from cocalib.batch.outcome import Outcome
 
-__all__ = ["FleetRecord", "SessionRecord", "UnreadResult", "VehicleRecord", "is_compared"]
-
 _MOST_NAMED = 5
 _NO_POSE_OF = frozenset({"contradictory", "nothing"})
 

@@ -4,8 +4,6 @@ from collections.abc import Collection, Iterable
 
 from cocalib.batch.outcome import Outcome
 
-__all__ = ["current_and_superseded", "in_order"]
-
 _Place = tuple[Outcome, int | None]
 
 

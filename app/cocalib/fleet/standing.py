@@ -7,8 +7,6 @@ from calib_core.fleet import OffKind, Transition
 from cocalib.fleet.kinds import Kind
 from cocalib.fleet.records import FleetRecord, SessionRecord, VehicleRecord
 
-__all__ = ["VehicleStanding", "age_days", "standings_of"]
-
 _DAY_NS = 86_400_000_000_000
 _POOR = ("weak", "contradictory", "nothing")
 

@@ -12,8 +12,6 @@ from calib_core.fleet import Transition
 from calib_core.geometry import quaternion_wxyz_from_matrix
 from cocalib.fleet.records import FleetRecord, SessionRecord
 
-__all__ = ["csv_bytes", "parquet_bytes"]
-
 _TEXT = (
     "vehicle",
     "session",

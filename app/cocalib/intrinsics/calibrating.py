@@ -15,8 +15,6 @@ from calib_core.intrinsics import (
 )
 from calib_core.measurements import Unsolvable
 
-__all__ = ["calibrate_from"]
-
 
 def calibrate_from(
     pictures: BoardPictures,

@@ -4,8 +4,6 @@ import numpy as np
 
 from calib_core.camera import Camera
 
-__all__ = ["field_of_view_deg", "field_of_view_text"]
-
 
 def field_of_view_deg(camera: Camera) -> tuple[float, float]:
     """Return the field of view along the row and the column of the principal point [deg]; NaN if the lens ends before."""

@@ -19,8 +19,6 @@ from calib_core.measurements import Unsolvable
 from cocalib.error_boundary import error_boundary
 from cocalib.intrinsics.calibrating import calibrate_from
 
-__all__ = ["LensJob", "LensSnapshot", "LensStage"]
-
 LensStage: TypeAlias = Literal["idle", "searching", "calibrating", "cancelled", "failed", "done"]
 _log = logging.getLogger(__name__)
 

@@ -11,8 +11,6 @@ import numpy as np
 from calib_core.errors import InputError
 from calib_core.input_files import name_text
 
-__all__ = ["PICTURE_SUFFIXES", "FilePictures", "pictures_in", "refuse_two_series", "series_of"]
-
 PICTURE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".ppm", ".pgm", ".tif", ".tiff", ".webp")
 _HEAD_BYTES = 1 << 16
 _LEAST_OF_A_SERIES = 3

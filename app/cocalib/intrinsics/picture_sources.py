@@ -11,8 +11,6 @@ from cocalib.intrinsics.picture_files import PICTURE_SUFFIXES, FilePictures, pic
 from cocalib.intrinsics.recorded_pictures import RecordedPictures
 from cocalib.intrinsics.video_pictures import VIDEO_SUFFIXES, VideoPictures
 
-__all__ = ["OpenPictures", "open_pictures", "spelled_out"]
-
 OpenPictures = RecordedPictures | VideoPictures | FilePictures
 
 

@@ -8,8 +8,6 @@ from calib_core.input_files import name_text
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.recordings import Recording
 
-__all__ = ["RecordedPictures"]
-
 
 class RecordedPictures:
     """The frames of a recording's camera, by number."""

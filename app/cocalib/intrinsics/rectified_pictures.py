@@ -9,8 +9,6 @@ from calib_core.interchange.rectification import rectification_maps, rectified_c
 from calib_core.intrinsics import CalibratedLens, LensView
 from cocalib.intrinsics.picture_sources import OpenPictures
 
-__all__ = ["rectified_pictures"]
-
 _COLOUR = (80, 220, 255)
 
 

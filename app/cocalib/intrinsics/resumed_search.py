@@ -9,8 +9,6 @@ from calib_core.intrinsics import Board, BoardSearch, SearchProgress, search_boa
 from calib_core.measurements import Unsolvable
 from cocalib.intrinsics.picture_sources import OpenPictures
 
-__all__ = ["ResumedSearch"]
-
 
 class ResumedSearch:
     """Searches pictures in a thread of its own, so that Ctrl+C in the main thread stops it between two pictures."""

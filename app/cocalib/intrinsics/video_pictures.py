@@ -11,8 +11,6 @@ from calib_core.errors import InputError, MessageError
 from calib_core.input_files import name_text
 from calib_core.measurements import TimeNs
 
-__all__ = ["VIDEO_SUFFIXES", "VideoPictures"]
-
 VIDEO_SUFFIXES = (".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".mjpeg", ".ts")
 _KEPT = 8
 _FARTHEST = 240

@@ -14,8 +14,6 @@ from calib_core.recordings import RecordingOptions
 from cocalib.fleet_prior_file import FleetPriorFile
 from cocalib.web.messages import OpenWith, SessionPlan
 
-__all__ = ["Choice", "ChoicePart", "GivenClicks", "MeaningPick", "UnusablePartError", "part_of_choice"]
-
 ChoicePart: TypeAlias = Literal["camera", "calibration", "clicks", "session"]
 """What is opened together with a recording, and can be left out."""
 

@@ -13,8 +13,6 @@ from cocalib.opening.sessions import session_offer
 from cocalib.solving import intrinsics_near
 from cocalib.web.messages import OpeningChoices, TopicRow
 
-__all__ = ["choices_after", "choices_of"]
-
 
 def choices_of(choice: Choice, opened: Opened) -> OpeningChoices:
     """Describe what can be chosen instead of what is open."""

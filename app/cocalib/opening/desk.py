@@ -23,8 +23,6 @@ from cocalib.web.messages import (
     RecentForgotten,
 )
 
-__all__ = ["OpeningDesk"]
-
 
 class OpeningDesk:
     """Knows what is open and what can be chosen. Used by the main thread and by those that answer pages.

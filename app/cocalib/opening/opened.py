@@ -26,8 +26,6 @@ from cocalib.solving import camera_for
 from cocalib.view import Reference, sentence
 from cocalib.workspace import Workspace, open_workspace, recording_facts
 
-__all__ = ["Opened", "open_choice", "with_remembered"]
-
 _LOOK_EVERY_S = 0.2
 
 

@@ -16,8 +16,6 @@ from cocalib.resources import state_folder
 from cocalib.web.messages import RecentRecording
 from cocalib.whole_file import write_whole
 
-__all__ = ["RecentRecordings"]
-
 _MOST = 20
 _MOST_BYTES = 1 << 20
 _log = logging.getLogger(__name__)

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from calib_core.interchange.hypotheses.ranking import Hypothesis
     from calib_core.interchange.hypotheses.reading import UnstatedFile
 
-__all__ = ["about_calibration", "camera_in", "camera_of", "meaning_of", "reference_from"]
-
 _NOTHING_PICKED = MeaningPick()
 _MOST_POSES, _MOST_OFFERS = 4, 12
 

@@ -9,8 +9,6 @@ from calib_core.errors import InputError
 from calib_core.input_files import name_text, special_kind
 from cocalib.web.messages import FolderEntry, FolderListing
 
-__all__ = ["RootFolder"]
-
 _MOST_ENTRIES = 2000
 _MOST_INSIDE = 500
 _BAG_SUFFIXES = (".bag", ".mcap", ".db3")

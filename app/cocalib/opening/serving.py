@@ -22,8 +22,6 @@ from cocalib.web.messages import Opening, OpeningChoices
 from cocalib.web.port.link import Link
 from cocalib.web.port.serving import Service
 
-__all__ = ["Serving", "serve"]
-
 _RECORDING_SUFFIXES = (".bag", ".mcap", ".db3")
 _LARGE_BYTES = 1_000_000_000
 """If the files are this large in total, the page is served before they are opened."""

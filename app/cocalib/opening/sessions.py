@@ -19,8 +19,6 @@ from cocalib.session.file import (
 )
 from cocalib.web.messages import SessionOffer
 
-__all__ = ["FittingClicks", "fitting_clicks", "session_folder", "session_offer"]
-
 
 def session_folder(choice: Choice, facts: RecordingFacts) -> FoundFolder:
     """Return the folder of the session to open; with `fresh`, or for a new one, the existing one is kept under another name.

@@ -13,8 +13,6 @@ from calib_core.errors import InputError
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.recordings import video_format
 
-__all__ = ["Encoder", "encoding"]
-
 _CODECS = {
     "libx264": ("H.264", {"preset": "veryfast", "crf": "21"}),
     "libopenh264": ("H.264", {}),

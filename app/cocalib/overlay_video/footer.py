@@ -10,8 +10,6 @@ from cocalib.colours import RETURN_RAMPS
 from cocalib.overlay_video.marks import label, label_width_px
 from cocalib.seen_returns import ReturnColours
 
-__all__ = ["footer_height_px", "footers", "time_text", "write_changing"]
-
 _BACKGROUND = (20, 16, 13)
 _TITLE_FROM = 0.5
 """A title has room between this share of the width and the legend; a longer one is left out."""

@@ -10,17 +10,6 @@ from calib_core.detections import Box
 from cocalib.colours import residual_colours
 from cocalib.recorded_view import box_words
 
-__all__ = [
-    "HUES",
-    "draw_boxes",
-    "draw_clicks",
-    "draw_returns",
-    "draw_trail",
-    "label",
-    "label_width_px",
-    "text_height_px",
-]
-
 HUES = ((255, 210, 80), (110, 220, 130), (90, 190, 255), (255, 140, 120), (200, 160, 255), (240, 240, 240))
 """Colours of the classes of boxes, red first."""
 LARGE_PX = 30.0

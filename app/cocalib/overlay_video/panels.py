@@ -11,8 +11,6 @@ from cocalib.overlay_video.marks import draw_boxes, draw_clicks, draw_returns, d
 from cocalib.recorded_view import RecordedView
 from cocalib.seen_returns import FrameBlock, SeenReturns, seen_in
 
-__all__ = ["Panels"]
-
 _HELD_S = 0.5
 """A click stays for so long after its frame, or nobody could see it."""
 

@@ -15,8 +15,6 @@ from cocalib.recorded_view import RecordedView
 from cocalib.seen_returns import frame_blocks
 from cocalib.whole_file import whole_path
 
-__all__ = ["OverlayOptions", "WrittenOverlay", "write_overlay"]
-
 _LONGEST_SCAN_S = 0.25
 
 

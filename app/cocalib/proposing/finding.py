@@ -15,16 +15,6 @@ from calib_core.options import CalibrationOptions, GatingOptions
 from calib_core.proposing import DwellView, FrameSource, Proposals, ViewProgress, dwell_views, proposals_of
 from calib_core.proposing.look import Look, look_of, with_look
 
-__all__ = [
-    "REFLECTOR_M",
-    "RecordedFrames",
-    "beside_the_reflector",
-    "find_proposals",
-    "looks_of",
-    "proposed_again",
-    "view_at",
-]
-
 REFLECTOR_M = 0.24
 """Width of the reflector if nothing is said of it [m]."""
 _BESIDE = 0.6

@@ -16,8 +16,6 @@ from calib_core.proposing.look import Look, with_look
 from cocalib.error_boundary import error_boundary
 from cocalib.proposing.finding import RecordedFrames, find_proposals, looks_of
 
-__all__ = ["ProposingJob", "ProposingSnapshot", "ProposingStage", "ProposingWish"]
-
 ProposingStage: TypeAlias = Literal["off", "looking", "comparing", "ready", "failed"]
 _EARLY = (3, 6)
 _EVERY = 4

@@ -10,8 +10,6 @@ from cocalib.report.making import known_calibration, subject_of
 from cocalib.report.page import report_html
 from cocalib.report.watching import watched
 
-__all__ = ["current_report"]
-
 _NAME = "calibration.json"
 
 

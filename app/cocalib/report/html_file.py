@@ -7,8 +7,6 @@ from pathlib import Path
 
 from cocalib.report.markup import Markup, tag
 
-__all__ = ["html_file"]
-
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 
 

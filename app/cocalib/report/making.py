@@ -10,8 +10,6 @@ from cocalib.recording_check import calibration_of
 from cocalib.report.subject import Against, ReportSubject
 from cocalib.resources import version
 
-__all__ = ["against_of", "known_calibration", "subject_of"]
-
 
 def subject_of(found: ImportedCalibration, calibration: Calibration | None, name: str) -> ReportSubject:
     """Return what is reported when nothing but the calibration is known.

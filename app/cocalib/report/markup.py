@@ -6,8 +6,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TypeAlias
 
-__all__ = ["Child", "Markup", "joined", "number", "scrolled", "tag"]
-
 _EMPTY = frozenset(
     {"br", "col", "hr", "image", "img", "line", "link", "meta", "path", "rect", "circle", "polygon", "use"}
 )

@@ -18,8 +18,6 @@ from cocalib.report.sections.residuals import residuals
 from cocalib.report.sections.uncertainty import uncertainty
 from cocalib.report.subject import ReportSubject
 
-__all__ = ["report_html"]
-
 _PICTURE_WIDTH = 320.0
 
 

@@ -8,8 +8,6 @@ import numpy as np
 
 from cocalib.report.markup import Child, Markup, joined, number, tag
 
-__all__ = ["Axes", "MarkKind", "captioned", "drawing", "mark", "polyline", "rounded_step", "text", "ticks"]
-
 MarkKind: TypeAlias = Literal["used", "disagrees", "excluded"]
 """A filled circle, a cross, a hollow square."""
 

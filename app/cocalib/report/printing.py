@@ -10,8 +10,6 @@ from pathlib import Path
 
 from calib_core.errors import CalibrationError
 
-__all__ = ["PrintingError", "find_browser", "print_pdf"]
-
 _VARIABLE = "COCALIB_BROWSER"
 _NAMES = (
     "chromium",

@@ -13,8 +13,6 @@ from calib_core.radar import polar_from_cartesian
 from calib_core.results import Calibration, PairResult
 from cocalib.report.plots import MarkKind
 
-__all__ = ["ResidualRows", "rows_at_clicks", "rows_of_pairs"]
-
 _NS_PER_S = 1e9
 
 

@@ -7,8 +7,6 @@ from calib_core.interchange import Comparison, FrameNames, ImportedCalibration
 from calib_core.measurements import ReflectorClick
 from calib_core.results import Calibration, DataWarning, InputFile
 
-__all__ = ["Against", "Judged", "Picture", "ReportSubject", "Watched"]
-
 
 @dataclass(frozen=True, slots=True)
 class Picture:

@@ -8,8 +8,6 @@ from calib_core.arrays import Values
 from cocalib.report.residual_rows import ResidualRows
 from cocalib.view.number_format import plain
 
-__all__ = ["Trend", "azimuth_sentence", "place_sentence", "range_sentence", "shift_sentence", "time_sentence", "trend"]
-
 _FEWEST = 8
 """With fewer pairs a rank correlation shows nothing."""
 _SURE = 0.01

@@ -11,8 +11,6 @@ from calib_core.recordings import Recording
 from calib_core.results import Calibration, DataWarning, InputFile
 from cocalib.report.subject import Picture, Watched
 
-__all__ = ["watched"]
-
 _WIDTH_PX = 640
 _QUALITY = 70
 

@@ -1,27 +1,5 @@
 """Where everything is in the Rerun recording: entity paths and the timeline."""
 
-__all__ = [
-    "ACC",
-    "AED",
-    "AGAINST_CAMERA",
-    "AGAINST_RETURNS",
-    "BOXES",
-    "CAMERA",
-    "CAMERA_POSITION",
-    "CLICKED_NOW",
-    "METRICS",
-    "PAIRS",
-    "PICTURE",
-    "RADAR",
-    "REFLECTORS",
-    "RESIDUALS",
-    "RETURNS",
-    "RETURNS_SEEN",
-    "SEEN_RETURNS",
-    "SUMMARY",
-    "TIMELINE",
-]
-
 TIMELINE = "recorded"
 """The stamps of the recording, as the solver uses them."""
 

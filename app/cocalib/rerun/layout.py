@@ -6,8 +6,6 @@ import rerun.blueprint as rrb
 from cocalib.recorded_view import RecordedView
 from cocalib.rerun.entities import ACC, AED, METRICS, PICTURE, RADAR, RESIDUALS, RETURNS_SEEN, SUMMARY, TIMELINE
 
-__all__ = ["layout"]
-
 _BACKGROUND = (13, 16, 20)
 
 

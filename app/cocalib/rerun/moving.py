@@ -29,8 +29,6 @@ from cocalib.rerun.entities import (
 from cocalib.rerun.unmoving import HALF_PIXEL_PX, LARGE_PX, ellipse_strips
 from cocalib.seen_returns import FrameBlock, SeenReturns, frame_blocks, seen_in
 
-__all__ = ["Streamed", "flush", "stream_cloud", "stream_figures", "stream_frames"]
-
 _AGAINST = (230, 120, 230)
 _CHUNK_BYTES = 4 << 20
 _PATIENCE_S = 60.0

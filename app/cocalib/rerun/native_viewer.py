@@ -9,8 +9,6 @@ from pathlib import Path
 from calib_core.errors import InputError
 from cocalib.rerun.sdk import offline_environment, viewer_program
 
-__all__ = ["open_window", "require_display"]
-
 _TO_ONE_MACHINE = ("--bind", "127.0.0.1", "--port", "auto")
 """The viewer also listens for programs that log to it: on all interfaces unless it is told otherwise."""
 

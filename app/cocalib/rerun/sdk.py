@@ -6,8 +6,6 @@ from pathlib import Path
 
 from calib_core.errors import InputError
 
-__all__ = ["offline_environment", "require_sdk", "viewer_program"]
-
 _NOWHERE = "http://127.0.0.1:9"
 _OFFLINE: Mapping[str, str] = {
     "CI": "1",

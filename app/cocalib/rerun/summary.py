@@ -4,8 +4,6 @@ from collections.abc import Iterator
 
 from cocalib.recorded_view import RecordedView
 
-__all__ = ["summary_text"]
-
 
 def summary_text(view: RecordedView) -> str:
     """Return the summary as plain text: as Markdown, a name in a recording could make the viewer fetch a picture."""

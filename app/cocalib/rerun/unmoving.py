@@ -27,8 +27,6 @@ from cocalib.rerun.entities import (
 )
 from cocalib.rerun.summary import summary_text
 
-__all__ = ["HALF_PIXEL_PX", "LARGE_PX", "ellipse_strips", "log_unmoving"]
-
 HALF_PIXEL_PX = 0.5
 """Rerun's (0, 0) is the corner of the top-left pixel, ours its centre."""
 LARGE_PX = 30.0

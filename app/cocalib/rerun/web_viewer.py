@@ -25,8 +25,6 @@ from typing import Any
 from calib_core.errors import InputError
 from cocalib.rerun.sdk import offline_environment, viewer_program
 
-__all__ = ["POLICY", "ServedView", "serve_view"]
-
 POLICY = (
     "default-src 'none'; script-src 'self' 'unsafe-inline' 'wasm-unsafe-eval'; style-src 'self' 'unsafe-inline'; "
     "img-src 'self' data: blob:; font-src 'self'; worker-src 'self' blob:; connect-src 'self'; base-uri 'none'; "

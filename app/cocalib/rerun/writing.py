@@ -16,8 +16,6 @@ from cocalib.whole_file import whole_path
 if TYPE_CHECKING:
     import rerun as rr
 
-__all__ = ["WrittenView", "write_view"]
-
 _APPLICATION = "cocalib"
 _RESERVE_BYTES = 64 << 20
 """More than is written between two looks at the free space."""

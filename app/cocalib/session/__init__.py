@@ -3,9 +3,10 @@
 Nothing here deals with files, threads or screens.
 """
 
-from cocalib.session.applying import EventError, apply
+from cocalib.session.applying import apply
 from cocalib.session.box_tracks import BoxEdges, BoxKeyframe, BoxTrack
 from cocalib.session.chosen_intrinsics import ChosenIntrinsics
+from cocalib.session.event_checks import EventError
 from cocalib.session.events import (
     AssumptionsConfirmed,
     BoxDrawn,

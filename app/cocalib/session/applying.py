@@ -31,8 +31,6 @@ from cocalib.session.events import (
 )
 from cocalib.session.state import DismissedPlacement, RecordingFacts, Session
 
-__all__ = ["EventError", "apply"]
-
 _Aside: TypeAlias = BoxEvent | ColumnsMapped | AssumptionsConfirmed | WarningsAcknowledged | PlacementDismissed
 """Events that no pose depends on."""
 

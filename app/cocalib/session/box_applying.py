@@ -19,8 +19,6 @@ from cocalib.session.events import (
 )
 from cocalib.session.state import RecordingFacts, Session
 
-__all__ = ["BoxEvent", "apply_to_boxes"]
-
 BoxEvent: TypeAlias = BoxDrawn | BoxMoved | BoxHidden | BoxKeyframeRemoved | BoxRemoved | BoxLabelled | BoxesLoaded
 
 _LEAST_PX = 3.0

@@ -5,8 +5,6 @@ from typing import TypeAlias
 
 from calib_core.measurements import TimeNs
 
-__all__ = ["BoxEdges", "BoxKeyframe", "BoxTrack"]
-
 BoxEdges: TypeAlias = tuple[float, float, float, float]
 """Left, top, right and bottom edge of a box [px]; pixel (0, 0) is the centre of the top-left pixel."""
 

@@ -6,8 +6,6 @@ import numpy as np
 
 from calib_core.camera import Camera, CameraCovariance
 
-__all__ = ["ChosenIntrinsics"]
-
 Rows = tuple[tuple[float, ...], ...]
 
 

@@ -9,8 +9,6 @@ from calib_core.arrays import TimesNs
 from calib_core.errors import InputError
 from calib_core.measurements import NS_PER_S, ReflectorClick, TimeNs, time_parts
 
-__all__ = ["ClicksAtFrames", "clicks_at_frames", "half_interval_ns", "nearest_frame"]
-
 _ROUNDED_NS = 1_000
 """Names of pictures and many programs state microseconds: a click that is off by less names its frame all the same."""
 

@@ -8,8 +8,6 @@ from cocalib.session.chosen_intrinsics import ChosenIntrinsics
 from cocalib.session.click_stamps import nearest_frame
 from cocalib.session.state import RecordingFacts
 
-__all__ = ["EventError", "require_camera", "require_frame", "require_pixel", "seconds"]
-
 
 class EventError(CalibrationError):
     """An event that does not fit the session or the recording; the session is unchanged."""

@@ -11,36 +11,6 @@ from cocalib.session.box_tracks import BoxEdges, BoxTrack
 from cocalib.session.chosen_intrinsics import ChosenIntrinsics
 from cocalib.session.state import Outcome
 
-__all__ = [
-    "AssumptionsConfirmed",
-    "BoxDrawn",
-    "BoxHidden",
-    "BoxKeyframeRemoved",
-    "BoxLabelled",
-    "BoxMoved",
-    "BoxRemoved",
-    "BoxesLoaded",
-    "Cleared",
-    "ClickExcluded",
-    "ClickMoved",
-    "ClickPlaced",
-    "ClickRemoved",
-    "ClicksImported",
-    "ColumnsMapped",
-    "Event",
-    "IntrinsicsChosen",
-    "OptionsChanged",
-    "OptionsEdited",
-    "PlacementDismissed",
-    "Redo",
-    "ReturnChosen",
-    "ScansAdded",
-    "Solved",
-    "Step",
-    "Undo",
-    "WarningsAcknowledged",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class ClickPlaced:

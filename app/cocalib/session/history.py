@@ -18,8 +18,6 @@ from cocalib.session.events import (
 )
 from cocalib.session.state import RecordingFacts, Session
 
-__all__ = ["History", "advance", "settled"]
-
 
 @dataclass(frozen=True, slots=True)
 class History:

@@ -12,8 +12,6 @@ from calib_core.results import Calibration, PairResult
 from cocalib.session.box_tracks import BoxTrack
 from cocalib.session.chosen_intrinsics import ChosenIntrinsics
 
-__all__ = ["AssumedReading", "DismissedPlacement", "Outcome", "RecordingFacts", "Session"]
-
 Outcome: TypeAlias = Calibration | Unsolvable
 
 

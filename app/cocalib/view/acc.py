@@ -8,8 +8,6 @@ from cocalib.view.box_panel import AccPanel, ClassRow, SensitivityRow
 from cocalib.view.figure import Figure
 from cocalib.view.wording import sentence, warning_in_sentences
 
-__all__ = ["acc_panel", "no_acc"]
-
 _SHOWN_DEG = (-1.0, 0.0, 1.0)
 
 

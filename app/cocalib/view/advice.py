@@ -7,8 +7,6 @@ from calib_core.verdict import Verdict, placement_words
 from cocalib.view.model import Advice
 from cocalib.view.wording import sentence
 
-__all__ = ["advice_for"]
-
 _NOTICEABLE = 0.05
 
 

@@ -6,8 +6,6 @@ from calib_core.evaluation.figures import Axis
 from calib_core.results import DataWarning
 from cocalib.view.figure import Figure
 
-__all__ = ["AccPanel", "BoxTrackRow", "ClassRow", "SensitivityRow"]
-
 
 @dataclass(frozen=True, slots=True)
 class BoxTrackRow:

@@ -10,8 +10,6 @@ from cocalib.box_tracks.carried import BoxKind, CarriedTrack
 from cocalib.session import BoxTrack, RecordingFacts
 from cocalib.view.box_panel import BoxTrackRow
 
-__all__ = ["BoxInFrame", "BoxedReturn", "box_rows", "boxes_in_frame", "known_labels", "returns_in_frame"]
-
 _USUAL_LABELS = ("person", "car", "truck", "bicycle", "robot")
 
 

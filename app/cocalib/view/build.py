@@ -21,8 +21,6 @@ from cocalib.view.systematic_errors import systematic_errors
 from cocalib.view.verdict_row import shown_verdict, verdict_row
 from cocalib.view.wording import sentence, warning_in_sentences
 
-__all__ = ["view"]
-
 _WITHOUT_PICTURES = (
     "No camera in this recording: nothing can be clicked",
     "Add the camera's file to calibrate: cocalib open RADAR CAMERA.",

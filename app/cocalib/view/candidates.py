@@ -13,8 +13,6 @@ from calib_core.results import Calibration
 from cocalib.session import Session
 from cocalib.view.direction import position_words
 
-__all__ = ["CandidateRow", "PairCandidates", "click_candidates", "pair_of_click"]
-
 _FITS = 9.21  # 99 % quantile of chi-squared with 2 degrees of freedom
 _BETTER = 0.5  # probability from which on another return is suggested
 _SAME_M = 0.02

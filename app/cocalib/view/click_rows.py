@@ -16,8 +16,6 @@ from cocalib.view.number_format import plain
 from cocalib.view.reprojections import Reprojection, length_px, reprojections
 from cocalib.view.wording import sentence
 
-__all__ = ["click_rows"]
-
 _GUESS = (
     "It stands where the radar expects the reflector, and nobody has looked: it does not count. "
     "Move it to the reflector's inner corner."

@@ -12,8 +12,6 @@ from calib_core.diagnostics.uncertainty_map import MAP_DISTANCES_M, uncertainty_
 from calib_core.results import Calibration
 from cocalib.view.number_format import plain
 
-__all__ = ["Contour", "ContourMap", "contour_lines", "contour_maps"]
-
 _MOST_LEVELS = 6
 _STEPS = (1.0, 2.0, 5.0, 10.0)
 _SERIES = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)

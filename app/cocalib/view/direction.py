@@ -5,8 +5,6 @@ import math
 from calib_core.arrays import Vector3
 from calib_core.radar import polar_from_cartesian
 
-__all__ = ["direction_words", "position_words"]
-
 _STRAIGHT_DEG = 0.05
 
 

@@ -4,8 +4,6 @@ from dataclasses import dataclass
 
 from calib_core.options import CalibrationOptions, NoiseOptions
 
-__all__ = ["Disagreement", "disagreement"]
-
 _STRICT = 1.0 / 3.0
 _NOISE = {"sigma_px": "click noise", "sigma_range_m": "range noise", "sigma_azimuth_deg": "azimuth noise"}
 

@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-__all__ = ["Figure", "Level"]
-
 Level: TypeAlias = Literal["plain", "good", "warning"]
 
 

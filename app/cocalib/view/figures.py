@@ -6,13 +6,11 @@ import numpy as np
 
 from calib_core.radar_axes import sigma_in_radar_axes
 from calib_core.results import Calibration
-from cocalib.view.model import Figure
+from cocalib.view.figure import Figure
 from cocalib.view.mounting import mounting_of
 from cocalib.view.number_format import plain, with_sigma
 from cocalib.view.reprojections import reprojections
 from cocalib.view.wording import sentence
-
-__all__ = ["assumed_figures", "firm_text", "metric_figures", "pose_figures", "residual_limit_px"]
 
 _HELD_OUT_RATIO = 1.5
 """A higher ratio of held-out to fitted error means that the pose depends too much on single pairs."""

@@ -15,8 +15,6 @@ from calib_core.stated_error import StatedError, stated_error
 from calib_core.verdict import Verdict, level_named
 from cocalib.view.number_format import plain, with_sigma
 
-__all__ = ["FleetAxis", "fleet_axes", "fleet_sentences"]
-
 _UNUSUAL = 0.05
 _AXES = ("camera forward", "camera left", "camera up", "roll", "pitch", "yaw")
 _TO_SHOWN = np.array([100.0] * 3 + [180.0 / np.pi] * 3)

@@ -7,8 +7,6 @@ from calib_core.advice.coverage import ENOUGH_PLACEMENTS, Coverage, Place
 from calib_core.results import NextPlacement
 from calib_core.verdict import placement_words
 
-__all__ = ["FollowState", "Pace", "advice_words", "pace_words"]
-
 FollowState = Literal["live", "quiet", "complete", "ended"]
 
 _SLOW_S = 1.0

@@ -12,21 +12,6 @@ from calib_core.verdict import VerdictLevel
 from cocalib.view.box_panel import AccPanel, BoxTrackRow
 from cocalib.view.figure import Figure, Level
 
-__all__ = [
-    "Advice",
-    "ClickRow",
-    "ClickState",
-    "DismissedRow",
-    "Ellipse",
-    "Figure",
-    "Level",
-    "Stage",
-    "SystematicErrorRow",
-    "SystematicErrorTable",
-    "VerdictRow",
-    "View",
-]
-
 ClickState: TypeAlias = Literal["pending", "inlier", "outlier", "excluded", "unpaired", "untouched"]
 Stage: TypeAlias = Literal["collecting", "solving", "solved", "unsolvable"]
 

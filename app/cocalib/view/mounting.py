@@ -8,8 +8,6 @@ from calib_core.arrays import Matrix33, Vector3, frozen_array
 from calib_core.geometry import skew
 from calib_core.results import Calibration
 
-__all__ = ["OPTICAL_FROM_BODY", "Mounting", "mounting_of"]
-
 OPTICAL_FROM_BODY: Matrix33 = frozen_array([[0, -1, 0], [0, 0, -1], [1, 0, 0]], (3, 3))
 """A camera that looks forward: its optical axes (x right, y down, z forward) from x forward, y left, z up."""
 

@@ -2,8 +2,6 @@
 
 import math
 
-__all__ = ["plain", "with_sigma"]
-
 _DASH = "–"
 
 

@@ -8,10 +8,8 @@ import numpy as np
 from calib_core.interchange import CalibrationFile, Comparison, PixelDifference, compare, imported
 from calib_core.results import Calibration
 from cocalib.session import Session
-from cocalib.view.model import Figure
+from cocalib.view.figure import Figure
 from cocalib.view.number_format import plain, with_sigma
-
-__all__ = ["Reference", "comparison_figures", "reference_words", "shown_calibration"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

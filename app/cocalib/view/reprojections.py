@@ -17,8 +17,6 @@ from calib_core.radar import polar_from_cartesian
 from calib_core.results import PairResult
 from cocalib.view.model import Ellipse
 
-__all__ = ["Reprojection", "ellipses_of", "length_px", "reprojections"]
-
 _CHI2_95_2D = 5.991464547107979  # 95 % quantile of chi-squared with 2 degrees of freedom
 _SHARE, _FINEST_PX, _COARSEST_PX = 0.01, 2.0**-7, 0.25
 """Steps of pixels: this share of the ellipse's semi-major axis, within these limits, then down to a power of two."""

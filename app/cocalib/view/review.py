@@ -10,8 +10,6 @@ from calib_core.diagnostics.residual_distribution import expected_shares
 from calib_core.results import Calibration
 from cocalib.view.number_format import plain
 
-__all__ = ["ResidualHistogram", "Review", "ReviewRow", "review_of"]
-
 _CHI2_95_2D = 5.991464547107979
 _FEWEST_BINS, _MOST_BINS = 8, 24
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)

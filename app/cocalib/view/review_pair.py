@@ -13,8 +13,6 @@ from calib_core.results import Calibration, PairResult
 from cocalib.view.direction import direction_words
 from cocalib.view.number_format import plain
 
-__all__ = ["PairFact", "PairReview", "ReviewedReturn", "pair_review"]
-
 _MUCH_CLOSER = 3.0
 """From this ratio of distances on, the pose alone decides between two candidates."""
 

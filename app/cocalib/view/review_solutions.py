@@ -11,17 +11,6 @@ from calib_core.results import Calibration
 from cocalib.session import History
 from cocalib.view.wording import sentence
 
-__all__ = [
-    "Compared",
-    "ComparedMark",
-    "ComparedRow",
-    "Solution",
-    "compared",
-    "not_compared",
-    "previous_calibration",
-    "solution_of",
-]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:

@@ -5,14 +5,12 @@ from dataclasses import replace
 from calib_core.diagnostics.consequence import by_consequence
 from calib_core.results import Calibration
 from calib_core.verdict import verdict_on
+from cocalib.view.figure import Figure
 from cocalib.view.figures import assumed_figures, metric_figures, pose_figures
 from cocalib.view.fleet_answer import fleet_sentences
-from cocalib.view.model import Figure
 from cocalib.view.number_format import plain
 from cocalib.view.systematic_errors import refined_sentences, uncertainty_sentences
 from cocalib.view.wording import sentence
-
-__all__ = ["summary_lines"]
 
 _PAPER_NAMES = {"aed": "AED", "held_out_aed": "held-out AED", "cdsd": "CDSD", "rms": "RMS"}
 """In text there is no hover to say what a figure is called in the paper."""

@@ -14,8 +14,6 @@ from cocalib.session import RecordingFacts, Session
 from cocalib.view.model import VerdictRow
 from cocalib.view.wording import sentence
 
-__all__ = ["is_dismissed", "placements_left", "shown_verdict", "verdict_row"]
-
 _SAME_M = 0.5
 _OF_PAIRS = ("doubtful-pair", "agreeing-outliers", "many-outliers")
 

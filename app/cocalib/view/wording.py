@@ -4,8 +4,6 @@ from dataclasses import replace
 
 from calib_core.results import DataWarning
 
-__all__ = ["sentence", "warning_in_sentences"]
-
 
 def sentence(phrase: str) -> str:
     """Capitalize the phrase and add a full stop; an empty phrase stays empty, names such as /radar or c14 are not capitalized."""

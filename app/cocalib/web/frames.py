@@ -14,8 +14,6 @@ from calib_core.camera import Camera
 from calib_core.recordings import Recording
 from cocalib.web.rectified_frames import FrameRectifier
 
-__all__ = ["Frame", "FrameStore", "Size"]
-
 Size = Literal["full", "half", "thumbnail", "rectified"]
 
 HALF_ABOVE_PX = 2_500_000

@@ -16,8 +16,6 @@ from cocalib.solving import RadarSource
 from cocalib.view import Reference, shown_calibration
 from cocalib.web.messages import Overlay, OverlayGuess, OverlayReturn, RadarLook, RadarReturn
 
-__all__ = ["RadarSight", "look_of", "overlay_of", "shown_rows", "still_returns"]
-
 _NEAREST_WITHIN_S = 0.3
 _MOST_RETURNS = 4000
 """So many returns are shown from above at most; of more, every other or every tenth and so on."""

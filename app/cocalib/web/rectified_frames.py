@@ -8,8 +8,6 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange.rectification import rectification_maps, rectified_camera
 
-__all__ = ["FrameRectifier"]
-
 
 class FrameRectifier:
     """Rectifies pictures; the maps of one camera are kept. Every method may be called from any thread."""

@@ -7,8 +7,6 @@ from xml.etree.ElementTree import Element
 
 from calib_core.boxes.file_frames import FileBoxes
 
-__all__ = ["BoxFile", "BoxFormat"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BoxFile:

@@ -7,8 +7,6 @@ from typing import Any
 from calib_core.detections import Box
 from calib_core.errors import InputError
 
-__all__ = ["HALF_PX", "edge_box", "finite_number", "rotated_box", "score_of", "whole_number"]
-
 HALF_PX = 0.5
 """Where (0, 0) is the corner of the top-left pixel, its centre is (0.5, 0.5), which is our (0, 0)."""
 _LARGEST = 1e9

@@ -10,8 +10,6 @@ from calib_core.boxes.formats.box_values import edge_box, finite_number, score_o
 from calib_core.detections import Box
 from calib_core.errors import InputError
 
-__all__ = ["COCO"]
-
 _TRACK_KEYS = ("track_id", "instance_id", "tracking_id")
 
 

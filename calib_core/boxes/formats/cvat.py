@@ -12,8 +12,6 @@ from calib_core.boxes.formats.box_values import edge_box, finite_number, rotated
 from calib_core.detections import Box
 from calib_core.errors import InputError
 
-__all__ = ["CVAT"]
-
 _EDGES = ("xtl", "ytl", "xbr", "ybr")
 _OTHER_SHAPES = ("polygon", "polyline", "points", "cuboid", "mask", "ellipse", "skeleton")
 _MOST_FRAMES = 10_000_000

@@ -11,8 +11,6 @@ from calib_core.boxes.formats.box_values import edge_box, finite_number, score_o
 from calib_core.detections import Box
 from calib_core.errors import InputError
 
-__all__ = ["KITTI_OBJECTS", "KITTI_TRACKS"]
-
 _OBJECT_COLUMNS = (15, 16)  # the last, of results, is the score
 _TRACK_COLUMNS = (17, 18)
 _IGNORED = "DontCare"

@@ -12,8 +12,6 @@ from calib_core.errors import InputError, RecordingError
 from calib_core.measurements import TimeNs
 from calib_core.recordings.time.written_times import read_time
 
-__all__ = ["OPENLABEL"]
-
 
 def _root(file: BoxFile) -> Mapping[str, Any]:
     return _part(file.mapping, "openlabel") or _part(file.mapping, "vcd")

@@ -4,8 +4,6 @@ from calib_core.boxes.file_frames import FileBoxes, FileFrame
 from calib_core.boxes.formats.box_format import BoxFile, BoxFormat
 from calib_core.boxes.own_files import own_boxes
 
-__all__ = ["OWN"]
-
 
 def _recognizes(file: BoxFile) -> bool:
     schema = file.mapping.get("schema")

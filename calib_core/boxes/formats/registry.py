@@ -8,6 +8,4 @@ from calib_core.boxes.formats.openlabel import OPENLABEL
 from calib_core.boxes.formats.own import OWN
 from calib_core.boxes.formats.yolo import YOLO
 
-__all__ = ["BOX_FORMATS"]
-
 BOX_FORMATS: tuple[BoxFormat, ...] = (OWN, OPENLABEL, COCO, CVAT, KITTI_TRACKS, KITTI_OBJECTS, YOLO)

@@ -11,8 +11,6 @@ from calib_core.detections import Box
 from calib_core.errors import InputError
 from calib_core.interchange.syntax.yaml_text import load_yaml_documents
 
-__all__ = ["YOLO"]
-
 _LISTS = frozenset({"classes.txt", "labels.txt", "predefined_classes.txt", "train.txt", "val.txt", "test.txt"})
 _NAMES = ("classes.txt", "predefined_classes.txt", "labels.txt")
 _LINE = re.compile(r"\s*\d+(\s+[-+.\deE]+){4,}\s*")

@@ -24,8 +24,6 @@ from calib_core.estimation.posterior.pose_batch import batch_of
 from calib_core.estimation.posterior.pose_posterior import pose_posterior
 from calib_core.geometry import RigidTransform
 
-__all__ = ["AgreeingOutliers", "find_agreeing_outliers"]
-
 _LEAST_PAIRS = 4  # three always agree
 _LEAST_LOG_RATIO = float(np.log(100.0))
 _STARTS = 12

@@ -15,8 +15,6 @@ from calib_core.estimation.posterior.pivotal_pair import PivotalPair, find_pivot
 from calib_core.estimation.posterior.samples import sample_posterior
 from calib_core.estimation.posterior.summary import PossiblePose, possible_poses, summarize_posterior
 
-__all__ = ["BeyondTheFit", "look_beyond"]
-
 _MOST_PAIRS = 150  # in larger sets the posterior has one peak, and samples cost seconds
 
 

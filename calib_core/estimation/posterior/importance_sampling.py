@@ -13,8 +13,6 @@ import numpy as np
 
 from calib_core.arrays import Values
 
-__all__ = ["Mixture", "WeightedSamples", "importance_samples"]
-
 _DEGREES = 5.0  # of Student's t
 _LEAST_PER_DIMENSION = 4.0  # effective samples to learn from; weights are flattened until there are as many
 _LEAST_WEIGHT = 0.05  # of all components together, shared equally, so that none is ever forgotten

@@ -11,8 +11,6 @@ from calib_core.arrays import Flags, Values
 from calib_core.estimation.posterior.pose_batch import Poses
 from calib_core.estimation.posterior.pose_posterior import NEAR_OUTLIER_FACTOR, PairTerms, PosePosterior
 
-__all__ = ["Modes", "refine_poses"]
-
 _LARGEST_TURN_RAD, _LARGEST_SHIFT_M = 0.3, 1.0
 
 

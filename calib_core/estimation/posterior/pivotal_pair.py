@@ -16,8 +16,6 @@ from calib_core.estimation.posterior.modes import refine_poses
 from calib_core.estimation.posterior.pose_batch import batch_of
 from calib_core.estimation.posterior.pose_posterior import pose_posterior
 
-__all__ = ["PivotalPair", "find_pivotal_pair"]
-
 _LEAST_MOVE = 2.6  # standard deviations without the pair; sets of right pairs exceed it in at most one of a hundred
 _LEAST_PAIRS = 6.0
 _MOST_PAIRS = 100  # in larger sets no single pair matters

@@ -7,8 +7,6 @@ import numpy as np
 
 from calib_core.geometry import RigidTransform, rotation_exp
 
-__all__ = ["Poses", "batch_of", "joined_poses"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Poses:

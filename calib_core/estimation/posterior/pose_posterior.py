@@ -28,8 +28,6 @@ from calib_core.estimation.posterior.pose_batch import Poses
 from calib_core.geometry import RigidTransform, rotation_exp, rotation_jacobian, skew
 from calib_core.radar import position_planes
 
-__all__ = ["NEAR_OUTLIER_FACTOR", "PairTerms", "PosePosterior", "pose_posterior"]
-
 NEAR_OUTLIER_FACTOR = 5.0
 """How many times noisier a near outlier is."""
 

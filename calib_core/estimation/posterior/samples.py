@@ -20,8 +20,6 @@ from calib_core.estimation.posterior.pose_posterior import PosePosterior, pose_p
 from calib_core.geometry import RigidTransform, rotation_log
 from calib_core.radar import cartesian_from_polar
 
-__all__ = ["MOST_ROWS", "PosteriorSamples", "sample_posterior"]
-
 MOST_ROWS = 300
 """Candidate rows up to which samples take a fraction of a second; of more pairs, the local covariance describes the posterior."""
 

@@ -13,8 +13,6 @@ from calib_core.estimation.posterior.importance_sampling import WeightedSamples
 from calib_core.estimation.posterior.samples import PosteriorSamples
 from calib_core.geometry import RigidTransform
 
-__all__ = ["PossiblePose", "PosteriorSummary", "possible_poses", "summarize_posterior"]
-
 _LEAST_INSIDE = 0.91  # of the posterior inside an ellipsoid that is stated to hold 0.95; the samples tell it to 0.01
 _LARGEST_SHIFT = 0.5  # squared distance of the mean from the fit, in standard deviations
 _BULK = 0.99  # of the samples that shape the ellipsoid; the farthest would stretch it

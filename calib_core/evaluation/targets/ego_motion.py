@@ -6,8 +6,6 @@ import numpy as np
 
 from calib_core.arrays import Flags, Points3, Values, Vector2, frozen_array
 
-__all__ = ["LEAST_RETURNS", "EgoVelocity", "cell_weights", "ego_velocity"]
-
 LEAST_RETURNS = 8
 """Fewer returns of a scan do not tell the radar's velocity from that of one target."""
 

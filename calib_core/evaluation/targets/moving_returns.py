@@ -12,8 +12,6 @@ from calib_core.measurements import RadarScans
 from calib_core.options import option
 from calib_core.results import DataWarning
 
-__all__ = ["MovingReturns", "SensorMotion", "TargetOptions", "moving_returns"]
-
 SensorMotion: TypeAlias = Literal["auto", "still", "moving"]
 
 _MOVING_SHARE = 0.1  # of the scans that look as if the sensors moved

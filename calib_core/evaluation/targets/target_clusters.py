@@ -10,8 +10,6 @@ from calib_core.evaluation.targets.moving_returns import TargetOptions
 from calib_core.measurements import RadarScans
 from calib_core.radar import cartesian_jacobian, polar_from_cartesian
 
-__all__ = ["TargetClusters", "target_clusters"]
-
 _REACH = 3.0  # standard deviations between two neighbouring returns of one target
 _RETURNS_AT_ONCE = 20_000
 _SCANS_APART = 4.0  # reaches between two scans, laid out along a fourth axis

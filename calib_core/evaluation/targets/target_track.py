@@ -6,8 +6,6 @@ import numpy as np
 
 from calib_core.arrays import Indices, Points3, TimesNs, frozen_array
 
-__all__ = ["TargetTrack"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TargetTrack:

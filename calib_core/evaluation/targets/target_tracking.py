@@ -16,8 +16,6 @@ from calib_core.evaluation.targets.target_clusters import TargetClusters, target
 from calib_core.evaluation.targets.target_track import TargetTrack
 from calib_core.measurements import NS_PER_S, RadarScans
 
-__all__ = ["FoundTargets", "find_targets", "moving_targets"]
-
 _GATE = 14.156413609126675  # the 99.73 % quantile of chi2 with 3 degrees of freedom
 _DOPPLER_SIGMA_MPS = 0.7  # of a cluster's mean Doppler speed: limbs and wheels move for themselves
 _ACCELERATION_MPS2 = 2.0  # standard deviation of a target's acceleration

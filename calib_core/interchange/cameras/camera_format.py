@@ -10,8 +10,6 @@ from calib_core.errors import InputError
 from calib_core.lens_models.naming import lenses_named, opencv_lens
 from calib_core.lens_models.registry import LENS_MODELS
 
-__all__ = ["CameraFormat", "FoundCamera", "OwnSyntax", "PictureWindow", "found_or_refused"]
-
 
 @dataclass(frozen=True, slots=True)
 class PictureWindow:

@@ -4,8 +4,6 @@ import numpy as np
 
 from calib_core.camera import Camera
 
-__all__ = ["largest_difference_px"]
-
 _GRID = 9
 
 

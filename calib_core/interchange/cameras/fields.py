@@ -16,8 +16,6 @@ from calib_core.interchange.own.documents import CameraDocument
 from calib_core.interchange.syntax.strict_json import checked
 from calib_core.lens_models.registry import LENS_MODELS
 
-__all__ = ["find_cameras", "lens_model_named"]
-
 _MATRIX_KEYS = {  # key of the camera matrix -> keys of the distortion
     "camera_matrix": ("distortion_coefficients", "dist_coeffs", "distortion_coeffs", "dist_coeff"),
     "Camera_Matrix": ("Distortion_Coefficients",),

@@ -14,8 +14,6 @@ from calib_core.interchange.syntax.opencv_xml import load_opencv_xml
 from calib_core.interchange.syntax.strict_json import json_object
 from calib_core.interchange.syntax.yaml_text import load_yaml
 
-__all__ = ["CameraFile", "read_camera", "read_camera_file"]
-
 _MAX_BYTES = 512 * 1024 * 1024
 _LOOKED_FOR = (
     "looked for camera_matrix and image_width (ROS, OpenCV), cam0 with intrinsics (Kalibr), K and D (CameraInfo), "

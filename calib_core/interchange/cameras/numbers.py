@@ -5,8 +5,6 @@ from typing import Any
 
 from calib_core.errors import InputError
 
-__all__ = ["floats"]
-
 _LARGEST = 1e9
 
 

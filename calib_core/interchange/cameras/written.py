@@ -14,8 +14,6 @@ from calib_core.interchange.cameras.formats.opencv import OPENCV_JSON, OPENCV_XM
 from calib_core.interchange.cameras.formats.own_json import OWN_JSON
 from calib_core.interchange.cameras.formats.ros import ROS
 
-__all__ = ["CAMERA_FORMATS", "camera_content"]
-
 CAMERA_FORMATS: dict[str, CameraFormat] = {
     one.name: one
     for one in (

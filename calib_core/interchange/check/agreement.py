@@ -8,8 +8,6 @@ from calib_core.errors import InputError
 from calib_core.interchange.check.comparison import Comparison
 from calib_core.interchange.check.pixel_differences import LOST_TEXT, shown
 
-__all__ = ["AgreementLimits", "Criterion", "Judgement", "judge"]
-
 WITHOUT_COVARIANCE = {"deg": 1.0, "cm": 5.0, "px": 10.0}
 _JUDGED_AT_M = 20.0
 _MAX_LENS_PX = 2.0

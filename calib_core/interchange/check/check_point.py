@@ -11,8 +11,6 @@ from calib_core.interchange.check.pixel_differences import LOST_TEXT, far_outsid
 from calib_core.interchange.check.rounding import Rounding, rounding_of
 from calib_core.interchange.imported import StatedCheckPoint, WrittenPose
 
-__all__ = ["CHECK_POINT_MISSED", "CHECK_POINT_UNUSED", "by_check_point"]
-
 CHECK_POINT_MISSED = "check-point-missed"
 CHECK_POINT_UNUSED = "check-point-unused"
 _CLOSE = 1e-4

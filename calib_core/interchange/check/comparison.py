@@ -19,8 +19,6 @@ from calib_core.interchange.check.pixel_differences import (
 from calib_core.interchange.imported import ImportedCalibration
 from calib_core.pose_difference import pose_difference, squared_distance
 
-__all__ = ["CHI2_95", "ComparedFigure", "Comparison", "compare"]
-
 CHI2_95 = 12.591587243743977
 """The 95 % quantile of chi2 with 6 degrees of freedom."""
 

@@ -8,8 +8,6 @@ from calib_core.geometry import RigidTransform
 from calib_core.interchange.check.slips import UndoneSlips, undone_slips
 from calib_core.interchange.imported import WrittenPose
 
-__all__ = ["CheckResult", "explain", "explained"]
-
 
 @dataclass(frozen=True, slots=True)
 class CheckResult:

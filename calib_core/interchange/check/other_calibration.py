@@ -11,8 +11,6 @@ from calib_core.interchange.check.explanation import CheckResult, explain, expla
 from calib_core.interchange.check.pixel_differences import shown
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 
-__all__ = ["by_other_calibration"]
-
 _COARSE_RAD = np.radians(10.0)
 _COARSE_M = 0.5
 _CLEARLY_BETTER = 0.2

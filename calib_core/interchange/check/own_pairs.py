@@ -8,8 +8,6 @@ from calib_core.interchange.check.rounding import rounding_of
 from calib_core.interchange.imported import ImportedCalibration
 from calib_core.results import PairResult
 
-__all__ = ["by_own_pairs"]
-
 _CLOSE_PX = 0.05
 
 

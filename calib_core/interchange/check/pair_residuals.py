@@ -22,8 +22,6 @@ from calib_core.measurements import MIN_PAIRS
 from calib_core.radar import RadarErrors
 from calib_core.results import Calibration
 
-__all__ = ["CheckPairs", "by_pairs", "read_check_pairs", "read_check_pairs_file"]
-
 _NEAR = 0.03
 _CLEARLY_BETTER = 0.2
 _OTHER_LENS_PX = 2.0

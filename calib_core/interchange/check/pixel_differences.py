@@ -9,19 +9,6 @@ from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, skew
 from calib_core.interchange.imported import ImportedCalibration
 
-__all__ = [
-    "DISTANCES_M",
-    "LOST_TEXT",
-    "LensDifference",
-    "Lenses",
-    "PixelDifference",
-    "far_outside",
-    "lenses_of",
-    "pixel_difference",
-    "pixels_text",
-    "shown",
-]
-
 DISTANCES_M = (5.0, 20.0, 60.0)
 LOST_TEXT = "behind the camera or far outside the picture"
 """What is said instead of a distance in pixels that means nothing."""

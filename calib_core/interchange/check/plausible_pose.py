@@ -8,8 +8,6 @@ from calib_core.interchange.check.slips import undone_slips
 from calib_core.interchange.imported import WrittenPose
 from calib_core.interchange.rotations import looks_forward, off_forward_rad
 
-__all__ = ["by_plausibility"]
-
 _FAR_M = 20.0
 _SIDEWAYS_RAD = np.radians(60.0)
 _NAMED = 3

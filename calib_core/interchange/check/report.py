@@ -15,8 +15,6 @@ from calib_core.interchange.check.plausible_pose import by_plausibility
 from calib_core.interchange.check.same_calibration import by_its_calibration
 from calib_core.interchange.imported import ImportedCalibration
 
-__all__ = ["CheckReport", "Verdict", "check"]
-
 Verdict = Literal["right", "wrong", "doubtful", "unproven"]
 """Confirmed; contradicted; implausible, with nothing to test it against; plausible, with nothing to test it against."""
 

@@ -13,8 +13,6 @@ from calib_core.interchange.check.explanation import CheckResult
 from calib_core.interchange.check.report import CheckReport
 from calib_core.interchange.syntax.json_text import json_text
 
-__all__ = ["CHECK_SCHEMA", "CheckedFile", "check_json", "check_junit", "exit_code"]
-
 CHECK_SCHEMA = "cocalib/check-1"
 _CODES = {"right": 0, "unproven": 0, "doubtful": 3, "wrong": 1}
 

@@ -10,8 +10,6 @@ from calib_core.geometry import RigidTransform, rotation_angle_rad
 from calib_core.interchange.imported import WrittenPose
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL
 
-__all__ = ["Rounding", "as_in_file", "rounding_of", "within_rounding"]
-
 _FULL_DIGITS = 15
 _FLOAT_32 = 1e-6
 _HARMLESS_RAD, _HARMLESS_M = 2e-4, 1e-3

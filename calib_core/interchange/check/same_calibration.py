@@ -9,8 +9,6 @@ from calib_core.interchange.check.rounding import rounding_of, within_rounding
 from calib_core.interchange.imported import ImportedCalibration
 from calib_core.interchange.own.calibration_json import calibration_sha256
 
-__all__ = ["by_its_calibration"]
-
 _TINY = 1e-6
 _SLIP_FIT, _CLOSE = 1e-3, 1e-3
 

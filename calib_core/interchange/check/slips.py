@@ -11,8 +11,6 @@ from calib_core.geometry import matrix_from_quaternion_wxyz, quaternion_wxyz_fro
 from calib_core.interchange.imported import Direction, Form, WrittenPose
 from calib_core.interchange.rotations import matrix_from_rpy, rpy_from_matrix
 
-__all__ = ["SLIPS", "Slip", "UndoneSlips", "undone_slips"]
-
 _ROUNDED = 1.001
 
 

@@ -22,8 +22,6 @@ from calib_core.interchange.rotations import quaternion_xyzw_from_matrix
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import number_text, quoted
 
-__all__ = ["APOLLO"]
-
 
 def _write(file: CalibrationFile) -> str:
     """Write Apollo's extrinsics file; any reader of stamped transforms accepts it."""

@@ -28,8 +28,6 @@ from calib_core.interchange.rotations import LINK_FROM_OPTICAL, rpy_from_matrix
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import number_text, quoted
 
-__all__ = ["AUTOWARE"]
-
 _NOTES = (
     "poses are in sensor_kit_base_link; the radar is at the kit's origin unless its pose is given (--parent-from-radar)",
     POSE_ONLY,

@@ -16,8 +16,6 @@ from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import numbers_text
 from calib_core.interchange.syntax.zip_archives import pack
 
-__all__ = ["COLMAP"]
-
 _NOTES = (
     "unpack it into a folder: cameras.txt, images.txt and points3D.txt; the world frame is the radar frame; "
     "COLMAP puts the centre of the top-left pixel at (0.5, 0.5), so the principal point is half a pixel larger",

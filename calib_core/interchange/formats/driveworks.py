@@ -16,8 +16,6 @@ from calib_core.interchange.rotations import LINK_FROM_OPTICAL, matrix_from_rpy,
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.json_text import json_text
 
-__all__ = ["CORRECTED", "DRIVEWORKS", "is_corrected", "posed_sensor"]
-
 _NOTES = (
     "nominalSensor2Rig_FLU is the sensor's pose in the rig: metres, roll-pitch-yaw in degrees about fixed axes, the camera with "
     "body axes (x forward, y left, z up); the radar is at the rig's origin unless its pose is given (--parent-from-radar)",

@@ -23,8 +23,6 @@ from calib_core.interchange.syntax.mcap_file import McapFile, McapMessage, mcap_
 from calib_core.interchange.syntax.strict_json import json_value
 from calib_core.lens_models.naming import written_lens
 
-__all__ = ["FOXGLOVE"]
-
 _NOTES = (
     "open it in Foxglove: /tf_static is the pose of the child (camera, optical) in the parent (radar), rotation named x y z w, "
     "/camera_calibration the lens; the check point and where it comes from are in the file's metadata",

@@ -16,8 +16,6 @@ from calib_core.interchange.rotations import upper_rows
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import numbers_text
 
-__all__ = ["KALIBR"]
-
 _NOTES = ("T_cam_radar is our own key; Kalibr has none for radars",)
 
 

@@ -12,8 +12,6 @@ from calib_core.interchange.own.calibration_json import calibration_sha256
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import numbers_text
 
-__all__ = ["KITTI"]
-
 _NOTES = (
     "Tr_velo_to_cam maps radar points to the camera frame: p_camera = R p_radar + t (as in View-of-Delft)",
     "a comment would break KITTI readers, so the check point, the evidence and the calibration's hash are numbers in "

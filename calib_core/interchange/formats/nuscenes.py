@@ -25,8 +25,6 @@ from calib_core.interchange.syntax.json_text import json_text
 from calib_core.interchange.syntax.strict_json import json_value
 from calib_core.interchange.syntax.zip_archives import pack
 
-__all__ = ["NUSCENES"]
-
 _NOTES = (
     "translation and rotation (w x y z) are the sensor's pose in the ego frame, camera optical; "
     "the ego frame is the radar frame unless its pose is given (--parent-from-radar)",

@@ -21,8 +21,6 @@ from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import quoted
 from calib_core.lens_models.naming import written_lens
 
-__all__ = ["OPENCV"]
-
 _OF_SECOND_CAMERA = ("M2", "K2", "cameraMatrix2", "camera_matrix_2", "R2", "P2")
 _ROUNDING = 2e-3
 

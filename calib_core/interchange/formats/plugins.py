@@ -12,8 +12,6 @@ from calib_core.interchange.imported import ImportedCalibration
 from calib_core.interchange.syntax.content import Content
 from calib_core.plugins import Plugin, load_plugins, warn_skipped
 
-__all__ = ["GROUP", "plugin_formats"]
-
 GROUP = "cocalib.formats"
 _NAME = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
 

@@ -41,8 +41,6 @@ from calib_core.interchange.formats.ros.urdf import URDF
 from calib_core.interchange.own.calibration_format import CALIBRATION_1
 from calib_core.interchange.own.truth_json import TRUTH
 
-__all__ = ["CAMERA_ONLY", "FORMATS", "format_named", "readers", "written_formats"]
-
 FORMATS: tuple[Format, ...] = (
     CALIBRATION_1,
     PACK,

@@ -12,18 +12,6 @@ from calib_core.interchange.origin import origin_lines, stated_origin
 from calib_core.interchange.syntax.yaml_text import numbers_text, quoted
 from calib_core.radar import RadarErrors
 
-__all__ = [
-    "POSE_ONLY",
-    "STATEMENT_KEY",
-    "hash_comment",
-    "stated_check_point",
-    "stated_frames",
-    "stated_lines",
-    "statement",
-    "with_statement",
-    "xml_comment",
-]
-
 POSE_ONLY = "contains the pose only: keep your camera_info, or also export opencv, which contains the camera"
 """A note for every format that stores nothing of the camera."""
 

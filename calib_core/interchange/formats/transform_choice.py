@@ -7,8 +7,6 @@ from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import FrameNames
 from calib_core.interchange.imported import looks_like_camera, looks_like_radar
 
-__all__ = ["Ends", "choose_transform"]
-
 
 @dataclass(frozen=True, slots=True)
 class Ends:

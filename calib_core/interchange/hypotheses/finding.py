@@ -19,8 +19,6 @@ from calib_core.interchange.hypotheses.number_readings import (
 )
 from calib_core.interchange.hypotheses.plain_values import array_of
 
-__all__ = ["Found", "find_poses"]
-
 _WHOLE = "the file"
 _MOST_POSES = 200
 _MOST_VALUES = 20_000

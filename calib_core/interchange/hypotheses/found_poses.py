@@ -5,8 +5,6 @@ from dataclasses import dataclass, field, replace
 from calib_core.arrays import Matrix33, Vector3, frozen_array
 from calib_core.interchange.hypotheses.key_words import KeyHints
 
-__all__ = ["FoundPose", "PoseReading", "RotationReading", "Unreadable"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RotationReading:

@@ -7,8 +7,6 @@ from typing import Literal
 
 from calib_core.interchange.imported import Direction, looks_like_camera, looks_like_radar
 
-__all__ = ["KeyHints", "Part", "hints_of", "part_of", "unit_in", "words_of"]
-
 Part = Literal["rotation", "translation", "other"]
 
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")

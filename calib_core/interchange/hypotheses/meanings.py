@@ -12,8 +12,6 @@ from calib_core.interchange.hypotheses.found_poses import FoundPose, PoseReading
 from calib_core.interchange.imported import Direction
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL
 
-__all__ = ["CameraAxes", "LengthUnit", "Meaning", "RadarAxes", "meanings_of"]
-
 CameraAxes: TypeAlias = Literal["optical", "body", "opengl"]
 RadarAxes: TypeAlias = Literal["flu", "frd", "rfu", "optical-like"]
 LengthUnit: TypeAlias = Literal["m", "mm", "cm"]

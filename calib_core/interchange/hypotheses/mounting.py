@@ -7,8 +7,6 @@ import numpy as np
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.rotations import off_forward_rad
 
-__all__ = ["is_usual", "mounting_weight", "mounting_words"]
-
 _ALONG_RAD, _UPRIGHT_RAD = math.radians(20.0), math.radians(12.0)
 _USUAL_ALONG_RAD, _USUAL_UPRIGHT_RAD = math.radians(50.0), math.radians(35.0)
 _USUAL_M = (0.01, 4.0)

@@ -13,15 +13,6 @@ from calib_core.interchange.hypotheses.key_words import unit_in, words_of
 from calib_core.interchange.hypotheses.plain_values import array_of, number_of
 from calib_core.interchange.rotations import matrix_from_rpy, nearest_rotation
 
-__all__ = [
-    "matrix_readings",
-    "named_rotation_readings",
-    "named_vector",
-    "rotation_readings",
-    "seven_number_readings",
-    "vector_of",
-]
-
 _ROUNDING = 2e-3
 _FULL_TURN_RAD = 2 * math.pi
 _LARGEST = 1e9

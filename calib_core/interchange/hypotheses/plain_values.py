@@ -10,8 +10,6 @@ from calib_core.errors import InputError
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.npy_array import is_npy, load_npy
 
-__all__ = ["array_of", "number_of", "plain_values"]
-
 _MOST_NUMBERS = 64
 _DEEPEST = 40
 _MOST_ROWS = 10_000

@@ -13,8 +13,6 @@ from calib_core.interchange.hypotheses.found_poses import FoundPose
 from calib_core.interchange.hypotheses.meanings import Meaning, meanings_of
 from calib_core.interchange.hypotheses.mounting import is_usual, mounting_weight, mounting_words
 
-__all__ = ["Hypothesis", "clear_one", "contradicts_names", "hypotheses_of", "likely_ones"]
-
 _SAME_RAD, _SAME_M = 1e-4, 1e-4
 _CLEAR = 0.95
 _LEAST_SHARE = 0.01

@@ -24,8 +24,6 @@ from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.importing import read_any
 from calib_core.interchange.syntax.content import Content, readings
 
-__all__ = ["BARE_POSE", "UnstatedFile", "as_imported", "picked", "read_clear", "read_unstated"]
-
 _BARE = tuple(known.reads for known in (MATRIX, NUMPY, MATLAB, OPENCV))
 _SHOWN = 8
 

@@ -6,8 +6,6 @@ from calib_core.errors import InputError
 from calib_core.interchange.own.documents import AngleMapDocument
 from calib_core.radar import AngleMap
 
-__all__ = ["angle_map_document", "angle_map_of"]
-
 
 def angle_map_document(angle_map: AngleMap | None) -> AngleMapDocument | None:
     """Return the document of an angle map."""

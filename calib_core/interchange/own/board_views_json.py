@@ -21,17 +21,6 @@ from calib_core.interchange.syntax.strict_json import parse_document
 from calib_core.intrinsics import Board, BoardCorners, LeftOutPicture
 from calib_core.measurements import TimeNs
 
-__all__ = [
-    "BoardViews",
-    "PictureSource",
-    "board_document",
-    "left_out_documents",
-    "read_board_views",
-    "runs_of",
-    "source_document",
-    "write_board_views",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class PictureSource:

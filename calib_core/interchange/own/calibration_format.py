@@ -17,8 +17,6 @@ from calib_core.interchange.own.transform_document import are_inverse, transform
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.strict_json import parse_document
 
-__all__ = ["CALIBRATION_1"]
-
 
 def _recognizes(content: Content) -> bool:
     return str(content.json_mapping.get("schema", "")).startswith("cocalib/calibration-")

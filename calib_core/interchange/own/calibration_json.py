@@ -47,17 +47,6 @@ from calib_core.radar import RadarErrors
 from calib_core.results import Calibration, CheckPoint, DataWarning, Metrics
 from calib_core.verdict import Verdict, verdict_on
 
-__all__ = [
-    "COVARIANCE_CONVENTION",
-    "calibration_file",
-    "calibration_file_of",
-    "calibration_sha256",
-    "calibration_text",
-    "kept_results",
-    "read_calibration",
-    "write_calibration",
-]
-
 COVARIANCE_CONVENTION = (
     "6x6, row-major, order (x, y, z, rotX, rotY, rotZ) [m, rad], of the error (dt, dtheta) of camera_from_radar "
     "in camera axes: t = t_hat + dt, R = Exp(dtheta) R_hat"

@@ -9,8 +9,6 @@ from calib_core.camera import Camera, CameraCovariance
 from calib_core.errors import InputError
 from calib_core.interchange.own.documents import CameraCovarianceDocument, CameraDocument
 
-__all__ = ["camera_document", "camera_of", "refuse_skew"]
-
 
 def refuse_skew(camera: Camera, whose: str) -> None:
     """Refuse a camera with skew, for a format whose readers would ignore it.

@@ -15,8 +15,6 @@ from calib_core.interchange.syntax.strict_json import parse_document
 from calib_core.measurements import ReflectorClick, time_from_parts, time_parts
 from calib_core.results import UnconfirmedClicks
 
-__all__ = ["ClicksFile", "read_clicks", "read_clicks_file", "refuse_repeated_ids", "write_clicks"]
-
 
 @dataclass(frozen=True, slots=True)
 class ClicksFile:

@@ -9,8 +9,6 @@ from calib_core.interchange.own.documents import CovariancePartsDocument
 from calib_core.interchange.own.documents import Matrix66 as StatedMatrix
 from calib_core.interchange.own.numbers import nested
 
-__all__ = ["covariance_parts_document", "covariance_parts_of"]
-
 
 def covariance_parts_document(parts: CovarianceParts | None) -> CovariancePartsDocument | None:
     """Return the document of the parts; without a measured camera position that part is left out."""

@@ -7,16 +7,6 @@ from msgspec import Meta, Struct
 
 from calib_core.interchange.own.documents import Measured, TimeDocument
 
-__all__ = [
-    "BOXES_SCHEMA",
-    "LABELS_SCHEMA",
-    "BoxDocument",
-    "BoxesDocument",
-    "FrameDocument",
-    "LabelsDocument",
-    "ScanDocument",
-]
-
 BOXES_SCHEMA: Final = "cocalib/boxes-1"
 LABELS_SCHEMA: Final = "cocalib/labels-1"
 

@@ -15,34 +15,6 @@ from calib_core.measurements import Mark
 from calib_core.options import CalibrationOptions
 from calib_core.verdict import VerdictLevel
 
-__all__ = [
-    "CALIBRATION_SCHEMA",
-    "CLICKS_SCHEMA",
-    "PAIRS_SCHEMA",
-    "AngleMapDocument",
-    "CalibrationDocument",
-    "CameraDocument",
-    "CandidateDocument",
-    "CheckPointDocument",
-    "ClickDocument",
-    "ClicksDocument",
-    "DataAloneDocument",
-    "FleetAnswerDocument",
-    "FramesDocument",
-    "PairDocument",
-    "PairsDocument",
-    "PositionDocument",
-    "RadarDocument",
-    "RadarErrorsDocument",
-    "ReturnDocument",
-    "SolvedPairDocument",
-    "SystematicErrorDocument",
-    "TimeDocument",
-    "TransformDocument",
-    "VehicleDocument",
-    "names_schema",
-]
-
 CLICKS_SCHEMA: Final = "cocalib/clicks-1"
 PAIRS_SCHEMA: Final = "cocalib/pairs-1"
 CALIBRATION_SCHEMA: Final = "cocalib/calibration-1"

@@ -9,8 +9,6 @@ from calib_core.interchange.own.stated_covariance import stated_covariance
 from calib_core.interchange.own.transform_document import transform_document, transform_of
 from calib_core.verdict import level_named
 
-__all__ = ["fleet_answer_document", "fleet_answer_of"]
-
 _PLACE = "fleet_prior"
 
 

@@ -6,8 +6,6 @@ from msgspec import Meta, Struct
 
 from calib_core.interchange.own.documents import Freedom, Matrix66, Name, TransformDocument, Widened
 
-__all__ = ["FLEET_PRIOR_SCHEMA", "FleetPriorDocument"]
-
 FLEET_PRIOR_SCHEMA: Final = "cocalib/fleet-prior-1"
 
 

@@ -9,8 +9,6 @@ from calib_core.interchange.own.numbers import finite_or_none, nested
 from calib_core.interchange.own.stated_covariance import stated_covariance
 from calib_core.interchange.own.transform_document import transform_document, transform_of
 
-__all__ = ["fleet_prior_fields", "fleet_prior_of_fields"]
-
 
 def fleet_prior_fields(prior: FleetPrior) -> dict[str, Any]:
     """Return the keys that both documents have, in the order of their schemas."""

@@ -10,8 +10,6 @@ from calib_core.interchange.own.fleet_prior_fields import fleet_prior_fields, fl
 from calib_core.interchange.syntax.json_text import json_text
 from calib_core.interchange.syntax.strict_json import parse_document
 
-__all__ = ["read_fleet_prior", "write_fleet_prior"]
-
 _SIGMA_M, _SIGMA_RAD = (1e-4, 10.0), (1e-5, 1.6)
 """What a mounting is known to: a tenth of a millimetre to ten metres, and two arc seconds to a quarter turn."""
 

@@ -37,8 +37,6 @@ from calib_core.intrinsics import (
 from calib_core.intrinsics.searching.coverage import Coverage
 from calib_core.measurements import Unsolvable
 
-__all__ = ["write_intrinsics"]
-
 
 def write_intrinsics(
     lens: CalibratedLens,

@@ -8,24 +8,6 @@ from msgspec import Meta, Struct
 from calib_core.interchange.own.documents import CameraDocument, Count, Measured, Name, Pixel, Positive, WarningDocument
 from calib_core.intrinsics import BoardKind
 
-__all__ = [
-    "BOARD_VIEWS_SCHEMA",
-    "INTRINSICS_SCHEMA",
-    "BoardDocument",
-    "BoardViewDocument",
-    "BoardViewsDocument",
-    "CoverageDocument",
-    "IntrinsicsDocument",
-    "LeftOutDocument",
-    "LensParameterDocument",
-    "LensPoseDocument",
-    "LensViewDocument",
-    "ModelTrialDocument",
-    "ResidualFieldDocument",
-    "SourceDocument",
-    "UncertaintyDocument",
-]
-
 BOARD_VIEWS_SCHEMA: Final = "cocalib/board-views-1"
 INTRINSICS_SCHEMA: Final = "cocalib/intrinsics-1"
 

@@ -4,8 +4,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["finite_or_none", "nan_if_none", "nested"]
-
 
 def finite_or_none(value: float) -> float | None:
     """Return a finite number as it is, and None for any other."""

@@ -11,8 +11,6 @@ from calib_core.measurements import Candidate, Pair, TimeNs, time_from_parts, ti
 from calib_core.radar import covariance_from_sigma_polar
 from calib_core.results import PairResult
 
-__all__ = ["SOLVED_FROM_KEYS", "solved_pair_document", "solved_pair_of"]
-
 _AGREEMENT_M = 1e-6
 
 SOLVED_FROM_KEYS = ("sigma_px", "radar_time", "candidates")

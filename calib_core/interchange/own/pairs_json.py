@@ -26,8 +26,6 @@ from calib_core.options import CalibrationOptions, CameraPositionPrior, NoiseOpt
 from calib_core.pair_checks import too_near
 from calib_core.radar import covariance_from_sigma_polar
 
-__all__ = ["PairsFile", "read_pairs", "write_pairs"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairsFile:

@@ -15,16 +15,6 @@ from calib_core.interchange.own.documents import (
     TimeDocument,
 )
 
-__all__ = [
-    "PROPOSALS_SCHEMA",
-    "DwellDocument",
-    "PictureCandidateDocument",
-    "ProposalDocument",
-    "ProposalsDocument",
-    "RoughMountingDocument",
-    "UnproposedDocument",
-]
-
 PROPOSALS_SCHEMA: Final = "cocalib/proposals-1"
 
 _Share = Annotated[float, Meta(ge=0.0, le=1.0)]

@@ -7,8 +7,6 @@ from calib_core.interchange.own import documents
 from calib_core.interchange.own.unconfirmed_document import unconfirmed_document, unconfirmed_of
 from calib_core.results import InputFile
 
-__all__ = ["provenance_document", "provenance_of"]
-
 
 def provenance_document(provenance: Provenance) -> documents.ProvenanceDocument:
     """Return the document of a provenance."""

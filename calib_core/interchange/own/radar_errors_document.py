@@ -5,8 +5,6 @@ from calib_core.interchange.own.numbers import finite_or_none
 from calib_core.radar import RadarErrors
 from calib_core.systematic_errors import SystematicErrorResult
 
-__all__ = ["radar_errors_document", "radar_errors_of", "systematic_error_document", "systematic_error_of"]
-
 
 def radar_errors_document(errors: RadarErrors) -> RadarErrorsDocument:
     """Return the document of the radar's errors."""

@@ -3,8 +3,6 @@
 from calib_core.interchange.own.documents import ReturnDocument, TimeDocument
 from calib_core.measurements import ChosenReturn, time_from_parts, time_parts
 
-__all__ = ["chosen_of", "return_document"]
-
 
 def return_document(chosen: ChosenReturn) -> ReturnDocument:
     """Return the document of a chosen return."""

@@ -25,8 +25,6 @@ from calib_core.interchange.own.lens_documents import (
 from calib_core.interchange.own.proposal_documents import PROPOSALS_SCHEMA, ProposalsDocument
 from calib_core.interchange.syntax.json_text import json_text
 
-__all__ = ["schema_file_name", "schema_text", "schema_texts", "write_schemas"]
-
 _DOCUMENTS: dict[str, Any] = {
     CLICKS_SCHEMA: ClicksDocument,
     PAIRS_SCHEMA: PairsDocument,

@@ -6,8 +6,6 @@ from calib_core.arrays import Matrix66
 from calib_core.errors import InputError
 from calib_core.interchange.own.documents import Matrix66 as StatedMatrix
 
-__all__ = ["stated_covariance"]
-
 _SYMMETRIC = 1e-6
 """The largest difference allowed between two entries that ought to be equal, as a share of the two sigmas' product."""
 _DEFINITE = 1e-12

@@ -10,8 +10,6 @@ from calib_core.interchange.own.documents import TransformDocument
 from calib_core.interchange.own.numbers import nested
 from calib_core.interchange.rotations import nearest_rotation
 
-__all__ = ["are_inverse", "transform_document", "transform_of"]
-
 _AGREEMENT = 1e-5
 """The largest difference allowed between two statements of one transform, in any matrix entry, besides rounding."""
 _ORTHONORMAL = 1e-6

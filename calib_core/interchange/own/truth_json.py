@@ -10,8 +10,6 @@ from calib_core.interchange.own.transform_document import transform_of
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.strict_json import checked
 
-__all__ = ["TRUTH"]
-
 _SCHEMA = "cocalib/truth-1"
 
 

@@ -7,8 +7,6 @@ from msgspec import UNSET, UnsetType
 from calib_core.interchange.own.documents import UnconfirmedDocument
 from calib_core.results import UnconfirmedClicks
 
-__all__ = ["unconfirmed_document", "unconfirmed_of"]
-
 
 def unconfirmed_document(unconfirmed: UnconfirmedClicks | None) -> UnconfirmedDocument | UnsetType:
     """Return the document; unset if everything was confirmed."""

@@ -7,8 +7,6 @@ from typing import Any
 from calib_core.interchange.calibration_file import UnknownResult
 from calib_core.interchange.syntax.strict_json import fields_of, item_type
 
-__all__ = ["unknown_results", "with_unknown"]
-
 
 def unknown_results(content: Any, document: Any) -> tuple[UnknownResult, ...]:
     """Return every key of parsed JSON that a document type does not have, at any depth.

@@ -7,8 +7,6 @@ from calib_core.interchange.calibration_file import UnknownResult
 from calib_core.interchange.own.documents import VehicleDocument
 from calib_core.interchange.vehicle_note import VehicleNote
 
-__all__ = ["vehicle_document", "vehicle_of"]
-
 
 def vehicle_document(note: VehicleNote, kept: tuple[UnknownResult, ...] = ()) -> VehicleDocument | None:
     """Return the document; None if nothing is stated.

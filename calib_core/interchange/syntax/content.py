@@ -14,8 +14,6 @@ from calib_core.interchange.syntax.strict_json import json_value
 from calib_core.interchange.syntax.yaml_text import joined_documents, load_yaml_documents
 from calib_core.interchange.syntax.zip_archives import unpack
 
-__all__ = ["Content", "Syntax", "decoded", "readings"]
-
 Syntax = Literal["archive", "mat", "mcap", "bytes", "json", "xml", "lines", "yaml"]
 """zip archive, MATLAB's mat, a small MCAP of JSON messages, other bytes, JSON, XML, text by its lines, text as YAML."""
 

@@ -4,8 +4,6 @@ import json
 import math
 from typing import Any
 
-__all__ = ["json_text"]
-
 _WIDTH = 118
 _INDENT = "  "
 

@@ -13,8 +13,6 @@ import numpy as np
 
 from calib_core.errors import InputError
 
-__all__ = ["load_mat"]
-
 _HEADER_BYTES = 128
 _MAX_BYTES = 8 * 1024 * 1024
 _MAX_DEPTH = 4

@@ -10,8 +10,6 @@ from dataclasses import dataclass
 
 from calib_core.errors import InputError
 
-__all__ = ["MCAP_MAGIC", "McapFile", "McapMessage", "load_mcap", "mcap_bytes"]
-
 MCAP_MAGIC = b"\x89MCAP0\r\n"
 _HEADER, _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _MESSAGE_INDEX, _CHUNK_INDEX = range(1, 9)
 _STATISTICS, _METADATA, _METADATA_INDEX, _DATA_END = 11, 12, 13, 15

@@ -8,8 +8,6 @@ import numpy as np
 
 from calib_core.errors import InputError
 
-__all__ = ["is_npy", "load_npy"]
-
 _MAGIC = b"\x93NUMPY"
 _HEADER = re.compile(
     r"\{'descr': '([<>|=][fiub][1248])', 'fortran_order': (True|False), 'shape': \(([\d, ]{0,60})\), ?\}\s*"

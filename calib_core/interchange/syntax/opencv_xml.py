@@ -5,8 +5,6 @@ from xml.etree import ElementTree
 
 from calib_core.errors import InputError
 
-__all__ = ["is_file_storage", "load_opencv_xml", "opencv_values", "parse_xml"]
-
 _MAX_CHARACTERS = 4 * 1024 * 1024
 
 

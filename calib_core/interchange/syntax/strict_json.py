@@ -15,8 +15,6 @@ import msgspec
 
 from calib_core.errors import InputError
 
-__all__ = ["checked", "fields_of", "item_type", "json_object", "json_value", "parse_document"]
-
 Document = TypeVar("Document")
 
 _MAX_DEPTH = 100

@@ -9,8 +9,6 @@ import numpy as np
 
 from calib_core.errors import InputError
 
-__all__ = ["PlacedElement", "placed_xml"]
-
 _DEEPEST = 200
 
 

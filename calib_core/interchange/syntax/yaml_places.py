@@ -7,8 +7,6 @@ from typing import Any
 from calib_core.errors import InputError
 from calib_core.interchange.syntax.yaml_text import refuse_bad_yaml
 
-__all__ = ["PlacedValue", "placed_yaml"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlacedValue:

@@ -8,16 +8,6 @@ from typing import Any
 
 from calib_core.errors import InputError
 
-__all__ = [
-    "joined_documents",
-    "load_yaml",
-    "load_yaml_documents",
-    "number_text",
-    "numbers_text",
-    "quoted",
-    "refuse_bad_yaml",
-]
-
 _MAX_CHARACTERS = 2 * 1024 * 1024
 _MAX_DEPTH = 100
 _OPENCV_TAG = "tag:yaml.org,2002:opencv-matrix"

@@ -10,8 +10,6 @@ import numpy as np
 
 from calib_core.errors import InputError
 
-__all__ = ["pack", "pack_arrays", "unpack"]
-
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 _MAX_BYTES = 8 * 1024 * 1024
 _DAMAGED = (EOFError, LookupError, NotImplementedError, OSError, RuntimeError, ValueError, struct.error, zlib.error)

@@ -12,8 +12,6 @@ from calib_core.interchange.formats.ros.tf2_command import write_command
 from calib_core.interchange.formats.ros.urdf import write_joint
 from calib_core.interchange.trees.frame_tree import FrameTree
 
-__all__ = ["attached_export"]
-
 _WRITERS: Mapping[str, Callable[[CalibrationFile, ChildFrame], str]] = {
     "tf2": write_command,
     "tf2-launch-py": write_python,

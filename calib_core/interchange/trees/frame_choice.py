@@ -12,15 +12,6 @@ from calib_core.errors import InputError
 from calib_core.interchange.imported import looks_like_camera, looks_like_radar
 from calib_core.interchange.trees.frame_tree import FrameTree
 
-__all__ = [
-    "ChosenFrames",
-    "WantedFrames",
-    "choose_frames",
-    "is_fixture",
-    "is_of_camera",
-    "is_of_radar",
-]
-
 _FIXTURE = re.compile(r"mount|bracket|holder|support|housing|plate|base|rig|bar\b|rack|mast", re.IGNORECASE)
 _NO_PICTURES = re.compile(r"imu|gyro|accel|lidar|velodyne|laser|gps|gnss", re.IGNORECASE)
 _SAME = 1e-6

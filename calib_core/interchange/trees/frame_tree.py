@@ -10,8 +10,6 @@ from calib_core.geometry import RigidTransform
 from calib_core.interchange.imported import Axes
 from calib_core.interchange.trees.joint import Joint
 
-__all__ = ["FrameTree", "Sensor", "Step"]
-
 _LISTED = 12
 
 

@@ -8,8 +8,6 @@ from calib_core.interchange.trees.frame_choice import ChosenFrames, is_fixture, 
 from calib_core.interchange.trees.frame_tree import FrameTree, Step
 from calib_core.interchange.trees.joint import Joint
 
-__all__ = ["FreeJoint", "free_joint"]
-
 
 @dataclass(frozen=True, slots=True)
 class FreeJoint:

@@ -9,8 +9,6 @@ from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.imported import Form, WrittenPose
 
-__all__ = ["Joint", "JointNumbers", "Place", "Slot"]
-
 _SAME = 1e-6
 
 

@@ -21,8 +21,6 @@ from calib_core.interchange.trees.joint import Joint, JointNumbers, Slot
 from calib_core.interchange.trees.posed_in_tree import axes_of_camera
 from calib_core.interchange.trees.reading import TreeFile, joined_tree
 
-__all__ = ["Patch", "patched"]
-
 _DIGITS = 9
 _READ_BACK = 1e-6
 

@@ -18,8 +18,6 @@ from calib_core.interchange.trees.reading import may_have_several_joints, tree_i
 from calib_core.interchange.trees.stated_joint import stated_joint
 from calib_core.interchange.trees.tree_part import joined
 
-__all__ = ["CameraAxes", "axes_of_camera", "calibration_in_tree", "chained_calibration"]
-
 _STANDARD = 1e-4
 
 

@@ -18,8 +18,6 @@ from calib_core.interchange.trees.readers.stamped import read_stamped, recognize
 from calib_core.interchange.trees.readers.urdf import read_urdf, recognizes_urdf
 from calib_core.interchange.trees.tree_part import TreePart, joined
 
-__all__ = ["TreeFile", "files_of_trees", "joined_tree", "may_have_several_joints", "read_tree", "tree_in"]
-
 _PATTERNS = ("*.urdf", "*.xacro", "*calibration.yaml", "*extrinsics*.yaml", "*intrinsics*.yaml", "sensor.json")
 _POSES = "calibrated_sensor.json"
 _DEPTH = 4

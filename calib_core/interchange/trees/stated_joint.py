@@ -8,8 +8,6 @@ import numpy as np
 from calib_core.interchange.imported import WrittenPose
 from calib_core.interchange.trees.joint import Joint, Place
 
-__all__ = ["stated_joint"]
-
 _STRING = r'"(?:[^"\\]|\\.)*"'
 _FIXED = re.compile(rf"; ({_STRING}) is fixed in ({_STRING}) at x y z qx qy qz qw \[([^\]]*)\]")
 

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from calib_core.interchange.trees.frame_tree import FrameTree, Sensor
 from calib_core.interchange.trees.joint import Joint
 
-__all__ = ["TreePart", "joined"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TreePart:

@@ -13,8 +13,6 @@ import numpy as np
 from calib_core.arrays import Points2
 from calib_core.intrinsics.detection.subpixel import refined_corners
 
-__all__ = ["find_checkerboard", "is_regular"]
-
 _QUICK_WIDTH_PX = 960
 _ROBUST_WIDTHS_PX = (640, 320)  # the smaller one also finds blurred boards, which are to be named
 _CROSSING_SHARE = 0.75  # of the contrast inside; at a board's border it is half

@@ -5,8 +5,6 @@ import numpy as np
 from calib_core.arrays import Indices, Points2
 from calib_core.intrinsics.board import Board
 
-__all__ = ["blur_px"]
-
 _ALONG = np.linspace(-0.2, 0.2, 5)  # where along an edge it is crossed, over its length, from its middle
 _SAMPLES = 41
 _ENDS = 5

@@ -7,8 +7,6 @@ from calib_core.intrinsics.board import Board
 from calib_core.intrinsics.detection.checkerboards import find_checkerboard
 from calib_core.intrinsics.detection.marker_boards import find_aprilgrid, find_charuco
 
-__all__ = ["find_board"]
-
 
 def find_board(picture: np.ndarray, board: Board) -> tuple[Indices, Points2] | None:
     """Find a board: ids (n,) of its corners in the picture, ascending, and their pixels (n, 2); None if it is not there.

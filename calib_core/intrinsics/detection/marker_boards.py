@@ -13,8 +13,6 @@ from calib_core.arrays import Flags, Indices, Points2, Values
 from calib_core.intrinsics.board import Board
 from calib_core.intrinsics.detection.subpixel import refined_corners
 
-__all__ = ["charuco_board", "find_aprilgrid", "find_charuco"]
-
 _LEAST_CORNERS = 6
 _LEAST_TAGS = 2
 _KALIBR_BORDER_BITS = 2

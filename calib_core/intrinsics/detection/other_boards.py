@@ -4,8 +4,6 @@ import numpy as np
 
 from calib_core.intrinsics.board import Board
 
-__all__ = ["board_in"]
-
 _WIDTH_PX = 640
 _SEEDS = ((3, 3), (4, 3), (5, 4))
 

@@ -9,8 +9,6 @@ import numpy as np
 
 from calib_core.arrays import Points2, Values
 
-__all__ = ["refined_corners"]
-
 _WINDOW_SHARE = 0.22  # half the window over the distance to the nearest neighbour
 _SMALLEST_PX, _LARGEST_PX = 2, 9
 _STEPS, _ENOUGH_PX = 40, 1e-3

@@ -15,8 +15,6 @@ from calib_core.intrinsics.searching.search_result import BoardSearch, SearchPro
 from calib_core.intrinsics.searching.view_choice import chosen_views
 from calib_core.measurements import Unsolvable
 
-__all__ = ["search_boards"]
-
 _LISTED = 200  # of so few pictures, each one without a board is named
 _ASKED_FOR_OTHERS = 13
 _BEFORE_OTHERS, _OTHERS_ENOUGH = 24, 6

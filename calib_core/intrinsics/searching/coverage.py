@@ -10,8 +10,6 @@ from calib_core.arrays import Vector3, frozen_array
 from calib_core.intrinsics.board import Board
 from calib_core.intrinsics.board_pictures import BoardCorners
 
-__all__ = ["Coverage", "view_coverage"]
-
 _CELLS = (6, 8)
 _FINE = (36, 48)
 _ROUGH_FOCAL_LENGTH = 0.9  # over the width of the picture; tilts need no better one

@@ -7,8 +7,6 @@ import numpy as np
 
 from calib_core.measurements import NS_PER_S, TimeNs
 
-__all__ = ["PictureOrder"]
-
 _EVERY_ONE = 300
 _FIRST_PASS = 180
 _MOST = 420

@@ -6,8 +6,6 @@ from calib_core.intrinsics.board import Board
 from calib_core.intrinsics.board_pictures import BoardCorners, LeftOutPicture
 from calib_core.intrinsics.searching.coverage import Coverage, view_coverage
 
-__all__ = ["BoardSearch", "SearchProgress"]
-
 
 @dataclass(frozen=True, slots=True)
 class SearchProgress:

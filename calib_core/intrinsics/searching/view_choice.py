@@ -8,8 +8,6 @@ from calib_core.arrays import Points2, Values
 from calib_core.intrinsics.board import Board
 from calib_core.intrinsics.board_pictures import BoardCorners, LeftOutPicture
 
-__all__ = ["MOST_VIEWS", "chosen_views", "outline_px"]
-
 MOST_VIEWS = 60
 _SHARP_SHARE = 0.3
 _BLURRED_FACTOR, _BLURRED_PX = 1.6, 0.8

@@ -8,8 +8,6 @@ from calib_core.arrays import Values
 from calib_core.intrinsics.solving.linearization import Freedom, LensState, Linearized, linearize, residuals_of
 from calib_core.intrinsics.solving.view_stack import ViewStack
 
-__all__ = ["Reduced", "adjust", "reduced", "weighted_cost"]
-
 _STEPS = 60
 _FIRST_DAMPING = 1e-4
 _LEAST_DAMPING = 1e-12

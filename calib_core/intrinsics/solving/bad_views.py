@@ -16,8 +16,6 @@ from calib_core.intrinsics.solving.robust import adjust_robustly, typical_sigma
 from calib_core.intrinsics.solving.starting import pose_views
 from calib_core.intrinsics.solving.view_stack import ViewStack
 
-__all__ = ["JudgedViews", "judge_views"]
-
 _ROUNDS = 4
 _CORNER_LIMIT = 8.0  # standard deviations of the view; real corners reach 4
 _MOST_CORNERS_OUT = 0.2

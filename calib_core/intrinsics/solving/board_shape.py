@@ -12,8 +12,6 @@ from calib_core.intrinsics.solving.linearization import LensState, linearize
 from calib_core.intrinsics.solving.model_choice import LensFit
 from calib_core.intrinsics.solving.view_stack import ViewStack
 
-__all__ = ["ShapeTest", "try_shapes"]
-
 _CHANCE = 1e-4
 _BENDS = 3  # the first warps are of one kind, heights; the last is of lengths
 

@@ -6,8 +6,6 @@ import numpy as np
 
 from calib_core.arrays import Points3, frozen_array
 
-__all__ = ["FLAT", "BoardWarp", "possible_warps"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BoardWarp:

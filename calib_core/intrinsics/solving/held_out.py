@@ -7,8 +7,6 @@ from calib_core.intrinsics.solving.adjustment import adjust
 from calib_core.intrinsics.solving.linearization import Freedom, LensState, residuals_of, warped
 from calib_core.intrinsics.solving.view_stack import ViewStack
 
-__all__ = ["held_out_squares", "view_folds"]
-
 _REFIT_STEPS = 4  # from the fit with all views
 _POSE_STEPS = 6
 

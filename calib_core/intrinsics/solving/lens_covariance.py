@@ -8,8 +8,6 @@ from scipy import stats
 from calib_core.arrays import Values, frozen_array
 from calib_core.intrinsics.solving.adjustment import Reduced
 
-__all__ = ["SharedCovariance", "shared_covariance"]
-
 _NORMAL_95 = 1.959963984540054
 _LEAST_FREEDOM = 1.5
 _LEAST_SHARE = 0.1  # of the variance that independent corners would give

@@ -6,8 +6,6 @@ from calib_core.arrays import Flags, Points2
 from calib_core.camera import Camera
 from calib_core.intrinsics.solving.view_stack import ViewStack
 
-__all__ = ["folds_back", "folds_where_seen", "picture_places"]
-
 _PLACES = 24
 
 

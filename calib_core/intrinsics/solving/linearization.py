@@ -10,8 +10,6 @@ from calib_core.geometry import RigidTransform, rotation_exp, rotation_jacobian
 from calib_core.intrinsics.solving.board_warp import FLAT, BoardWarp
 from calib_core.intrinsics.solving.view_stack import ViewStack
 
-__all__ = ["Freedom", "LensState", "Linearized", "linearize", "residuals_of", "warped"]
-
 _PULLED = {"rational_polynomial": ("k4", "k5", "k6")}
 _PULL_PX2 = 0.01  # one unit costs as much as one corner that is 0.1 px off
 

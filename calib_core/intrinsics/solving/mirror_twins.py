@@ -6,8 +6,6 @@ from scipy.spatial import cKDTree
 from calib_core.arrays import Values
 from calib_core.intrinsics.solving.view_stack import ViewStack
 
-__all__ = ["mirror_twins"]
-
 _COPY_SHARE = (
     0.7  # of the residuals; corners of two pictures taken apart differ by 1.4 times these, those of copies by less
 )

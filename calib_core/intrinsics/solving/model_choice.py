@@ -15,8 +15,6 @@ from calib_core.intrinsics.solving.linearization import Freedom, LensState, resi
 from calib_core.intrinsics.solving.starting import start
 from calib_core.intrinsics.solving.view_stack import ViewStack
 
-__all__ = ["MODELS", "ChosenModel", "LensFit", "choose_model", "fit_model"]
-
 MODELS = ("pinhole", "plumb_bob", "equidistant", "rational_polynomial")
 """From the simplest to the most flexible."""
 

@@ -6,8 +6,6 @@ from calib_core.intrinsics.solving.adjustment import adjust
 from calib_core.intrinsics.solving.linearization import Freedom, LensState, residuals_of
 from calib_core.intrinsics.solving.view_stack import ViewStack
 
-__all__ = ["adjust_robustly", "typical_sigma"]
-
 _ROUNDS = 12
 _STEPS = 2
 _REACH = 4.0  # in standard deviations: a corner that far away has a quarter of its weight

@@ -9,8 +9,6 @@ from calib_core.intrinsics.solving.linearization import Freedom, LensState, line
 from calib_core.intrinsics.solving.model_choice import LensFit
 from calib_core.intrinsics.solving.view_stack import ViewStack
 
-__all__ = ["RowSkew", "row_skew"]
-
 _LEAST_SHARE = 0.2
 _LEAST_RATIO = 1.4  # correlated noise reaches 1.3; a wrong lens model may exceed it too
 

@@ -9,8 +9,6 @@ from calib_core.intrinsics.solving.robust import adjust_robustly
 from calib_core.intrinsics.solving.view_stack import ViewStack
 from calib_core.lens_models.registry import LENS_MODELS
 
-__all__ = ["pose_views", "simple_camera", "start"]
-
 _FOCAL_LENGTHS = (0.2, 0.26, 0.33, 0.42, 0.55, 0.75, 1.0, 1.4, 2.0, 2.8, 4.0)
 """Tried ones, as shares of the longer side of the picture; the poses fit well over a factor of 1.3."""
 

@@ -8,8 +8,6 @@ import numpy as np
 from calib_core.arrays import Flags, Points3, frozen_array
 from calib_core.intrinsics.board_pictures import BoardCorners
 
-__all__ = ["ViewStack", "stack_views"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ViewStack:

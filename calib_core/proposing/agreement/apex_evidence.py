@@ -11,8 +11,6 @@ import numpy as np
 from calib_core.proposing.agreement.pose_agreement import PoseAgreement
 from calib_core.proposing.dwell_views import DwellView
 
-__all__ = ["apex_log_odds"]
-
 _WIDE_ENOUGH_PX = 16.0
 """Width of a reflector whose apex can be seen."""
 _OF_REFLECTOR, _OF_OTHERS = 0.85, 0.25

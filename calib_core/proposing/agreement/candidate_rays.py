@@ -14,8 +14,6 @@ from calib_core.proposing.dwell_views import DwellView
 from calib_core.proposing.picture_candidates import PictureCandidate
 from calib_core.radar import cartesian_jacobian, polar_from_cartesian
 
-__all__ = ["CandidateRays", "candidate_rays", "weaker_db"]
-
 _NONE = -1.5
 """Log-odds that no candidate is the reflector, where the strongest one that has no apex counts as 0."""
 _STRENGTH, _APEX = 3.0, 3.0

@@ -12,8 +12,6 @@ from calib_core.proposing.agreement.candidate_rays import CandidateRays
 from calib_core.proposing.agreement.mounting_prior import MountingPrior
 from calib_core.proposing.agreement.pose_agreement import pose_agreement
 
-__all__ = ["chance_score", "chance_scores"]
-
 _DEALS = 16
 _SHIFTS = (1, -1, 2, -2)
 _REFINED = 8

@@ -8,8 +8,6 @@ from calib_core.arrays import Matrix33, Values, Vector3, frozen_array
 from calib_core.baselines.mounting import mounting_rotation
 from calib_core.options import CalibrationOptions
 
-__all__ = ["MOST_TURNED_RAD", "MountingPrior", "mounting_prior"]
-
 MOST_TURNED_RAD = float(np.radians(26.0))
 """Largest rotation away from the nominal mounting."""
 _TURNED_SIGMA_RAD = np.radians(9.0)

@@ -20,8 +20,6 @@ from calib_core.proposing.agreement.pose_refinement import (
 )
 from calib_core.proposing.agreement.rotation_consensus import rotation_consensus
 
-__all__ = ["PoseAgreement", "pose_agreement"]
-
 _LEAST_DWELLS = 2
 _OTHER_POSE_RAD = np.radians(2.5)
 """Mean angle between the predictions of two poses that differ clearly."""

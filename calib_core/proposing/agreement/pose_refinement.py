@@ -15,8 +15,6 @@ from calib_core.proposing.agreement.candidate_rays import CandidateRays
 from calib_core.proposing.agreement.mounting_prior import MountingPrior
 from calib_core.proposing.agreement.rotation_consensus import Rotations
 
-__all__ = ["Expectation", "RoughPoses", "expectation", "refined_poses"]
-
 NOISE_LEVELS = (4.0, 2.0, 1.0, 0.5, 0.25)
 """Factors on the stated standard deviations of the radar's angles, in the order in which they are tried."""
 _FREE = 6.0

@@ -12,8 +12,6 @@ from calib_core.arrays import Indices, Values, frozen_array
 from calib_core.proposing.agreement.candidate_rays import CandidateRays
 from calib_core.proposing.agreement.mounting_prior import MOST_TURNED_RAD, MountingPrior
 
-__all__ = ["Rotations", "rotation_consensus"]
-
 _MOST_PAIRED = 600
 """Candidates of which any two give a rotation; of more, so many are drawn by their odds."""
 _MOST_TRIED = 6000

@@ -9,8 +9,6 @@ from calib_core.errors import MessageError
 from calib_core.measurements import TimeNs, time_from_parts
 from calib_core.recordings.messages.decoding import Message
 
-__all__ = ["drawn_boxes"]
-
 _LINE_LOOP, _LINE_STRIP = 2, 3
 _SQUARE_PX = 0.5
 

@@ -5,8 +5,6 @@ from dataclasses import dataclass
 
 from calib_core.recordings.messages.definitions import PRIMITIVES, Definition, Field
 
-__all__ = ["BoxLayout", "box_layout"]
-
 _CENTRES = (("bbox.center.position.x", "bbox.center.position.y"), ("bbox.center.x", "bbox.center.y"))
 _SIZES = (("bbox.size_x", "bbox.size_y"), ("bbox.size.x", "bbox.size.y"))
 _EDGES = (("xmin", "ymin", "xmax", "ymax"), ("x_min", "y_min", "x_max", "y_max"))

@@ -6,8 +6,6 @@ from calib_core.arrays import Indices, TimesNs
 from calib_core.errors import InputError
 from calib_core.measurements import NS_PER_S
 
-__all__ = ["STAMP_TOLERANCE_NS", "frames_of_stamps"]
-
 STAMP_TOLERANCE_NS = 1_000_000
 """Times in names of files are often rounded to milliseconds; frames are further apart."""
 _LEAST_MATCHING = 0.5

@@ -16,8 +16,6 @@ from calib_core.recordings.boxes.stamp_matching import frames_of_stamps
 from calib_core.recordings.messages.decoding import Message, decode
 from calib_core.recordings.topics import Topic
 
-__all__ = ["boxes_in_topic", "frames_in_message"]
-
 _HALF_PX = 0.5
 """Detectors count from the corner of the top-left pixel, whose centre is our (0, 0)."""
 

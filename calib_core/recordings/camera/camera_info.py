@@ -12,8 +12,6 @@ from calib_core.recordings.messages.decoding import Message
 from calib_core.recordings.messages.definitions import Definition
 from calib_core.results import DataWarning
 
-__all__ = ["CameraReading", "camera_from_info", "is_camera_info"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraReading:

@@ -10,8 +10,6 @@ from calib_core.errors import MessageError, RecordingError
 from calib_core.recordings.camera.images import EncodedImage, ImageLayout
 from calib_core.recordings.topics import Topic
 
-__all__ = ["ImageStream"]
-
 _HEAD_BYTES = 4096
 
 

@@ -13,16 +13,6 @@ from calib_core.recordings.camera.video_packets import Packet, packet_of, requir
 from calib_core.recordings.messages.decoding import Message, decode
 from calib_core.recordings.messages.definitions import Definition
 
-__all__ = [
-    "EncodedImage",
-    "ImageLayout",
-    "encoded_pixels",
-    "is_compressed_image",
-    "is_packet",
-    "is_picture",
-    "is_raw_image",
-]
-
 _RAW_NAMES = frozenset({"height", "width", "encoding", "step", "data"})
 _COMPRESSED_NAMES = frozenset({"format", "data"})
 _PACKET_NAMES = frozenset({"encoding", "pts", "flags", "data"})

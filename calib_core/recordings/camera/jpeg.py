@@ -5,8 +5,6 @@ from collections.abc import Iterator
 
 from calib_core.errors import MessageError
 
-__all__ = ["JPEG_MAGIC", "PNG_MAGIC", "has_end", "png_size", "repaired_jpeg"]
-
 JPEG_MAGIC = b"\xff\xd8\xff"
 PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 _END = b"\xff\xd9"

@@ -12,8 +12,6 @@ from calib_core.errors import MessageError
 from calib_core.recordings.camera.images import ImageLayout
 from calib_core.recordings.camera.jpeg import JPEG_MAGIC, has_end
 
-__all__ = ["PictureCheck"]
-
 _CUT = "the JPEG has no end marker: it is cut off"
 
 

@@ -5,8 +5,6 @@ from pathlib import Path
 from calib_core.errors import MessageError
 from calib_core.recordings.camera.jpeg import JPEG_MAGIC, PNG_MAGIC, png_size, repaired_jpeg
 
-__all__ = ["picture_fault", "picture_size_px"]
-
 _HEAD_BYTES = 1 << 12
 _PNG_END = b"IEND"
 _BEGINNINGS = (b"BM", b"P1", b"P2", b"P3", b"P4", b"P5", b"P6", b"II*\0", b"MM\0*", b"RIFF")

@@ -12,8 +12,6 @@ from calib_core.recordings.camera.video_stream import VideoStream
 from calib_core.recordings.time.dates import utc
 from calib_core.results import DataWarning
 
-__all__ = ["frames_of_one_size"]
-
 _SAMPLED_FRAMES = 64
 _SHOWN_TIMES = 3
 

@@ -8,8 +8,6 @@ import numpy as np
 from calib_core.errors import MessageError
 from calib_core.recordings.messages.decoding import Message
 
-__all__ = ["READABLE", "check_size", "converted_pixels", "raw_pixels", "stretched"]
-
 _MAX_PIXELS = 200_000_000
 READABLE = (
     "jpeg, png, mono8, mono16, rgb8, bgr8, rgba8, bgra8, their 16-bit kinds, bayer_*8, bayer_*16, yuv422, yuv422_yuy2 and "

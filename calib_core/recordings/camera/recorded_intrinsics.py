@@ -12,8 +12,6 @@ from calib_core.recordings.camera.image_stream import ImageStream
 from calib_core.recordings.topics import Topic
 from calib_core.results import DataWarning
 
-__all__ = ["PublishedCamera", "published_camera", "recorded_camera"]
-
 
 class PublishedCamera(Protocol):
     """Intrinsics that stand in a file beside the pictures."""

@@ -14,8 +14,6 @@ from calib_core.errors import MessageError
 from calib_core.recordings.camera.jpeg import JPEG_MAGIC, PNG_MAGIC
 from calib_core.recordings.messages.decoding import Message
 
-__all__ = ["Packet", "PacketDecoder", "packet_of", "require_codec"]
-
 _CODECS = {"h264": "h264", "avc": "h264", "h265": "hevc", "hevc": "hevc"}
 _START = re.compile(rb"\x00\x00\x01(.)", re.DOTALL)
 _LOOK_BYTES = 4096

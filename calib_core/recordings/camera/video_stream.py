@@ -14,8 +14,6 @@ from calib_core.recordings.camera.video_packets import Packet, PacketDecoder
 from calib_core.recordings.topics import Topic
 from calib_core.results import DataWarning
 
-__all__ = ["VideoStream", "about_video", "image_stream"]
-
 _SOUGHT_MESSAGES = 2000
 
 

@@ -6,8 +6,6 @@ from typing import Literal, TypeAlias
 
 from calib_core.recordings.containers.positioned_reads import Stretch
 
-__all__ = ["AccountBuilder", "ByteKind", "FileAccount", "Progress"]
-
 ByteKind: TypeAlias = Literal["messages", "records", "index", "padding", "damaged", "unknown"]
 """Messages and the chunks that hold them; other records, such as definitions; the index; empty space; bytes that do not parse
 or fail their checksum; bytes that no record of the format claims."""

@@ -10,8 +10,6 @@ from calib_core.recordings.containers.positioned_reads import FileBytes
 from calib_core.recordings.containers.sources import MessageIndex
 from calib_core.results import DataWarning
 
-__all__ = ["AppendedFile", "damaged_chunks", "with_messages"]
-
 _REMEMBERED_BYTES = 64
 
 

@@ -10,8 +10,6 @@ import numpy as np
 from calib_core.recordings.containers.index_cache import FileCache
 from calib_core.recordings.containers.sources import Channel, Heads, MessageIndex
 
-__all__ = ["KeptIndex", "heads_from", "index_from", "keep_heads", "keep_index"]
-
 _FEWEST_HEADS = 500
 
 

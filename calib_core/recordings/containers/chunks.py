@@ -25,8 +25,6 @@ from calib_core.recordings.containers.positioned_reads import FileBytes
 from calib_core.recordings.containers.sources import Channel, Heads, MessageIndex
 from calib_core.results import DataWarning
 
-__all__ = ["CACHE_BYTES", "FIRST_CHUNKS", "MAX_MESSAGE_BYTES", "ChannelFilter", "Chunk", "ChunkedSource"]
-
 ChannelFilter: TypeAlias = Callable[[Channel], bool]
 CACHE_BYTES = 24 * 2**20
 FIRST_CHUNKS = 16

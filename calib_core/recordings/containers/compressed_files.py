@@ -14,8 +14,6 @@ from calib_core.errors import RecordingError
 from calib_core.recordings.containers.positioned_reads import FileBytes
 from calib_core.results import DataWarning
 
-__all__ = ["packing_of", "unpacked_file"]
-
 _COMMANDS = {"Zstandard": "zstd -d", "gzip": "gunzip", "bzip2": "bunzip2", "LZ4": "lz4 -d"}
 _MAGIC = {b"\x28\xb5\x2f\xfd": "Zstandard", b"\x1f\x8b": "gzip", b"BZh": "bzip2", b"\x04\x22\x4d\x18": "LZ4"}
 _PIECE_BYTES = 1 << 20

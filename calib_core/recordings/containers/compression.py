@@ -6,8 +6,6 @@ from typing import Protocol
 
 from calib_core.errors import RecordingError
 
-__all__ = ["MAX_CHUNK_BYTES", "refuse_bomb", "unpack", "unpack_message", "unpack_what_is_there"]
-
 MAX_CHUNK_BYTES = 1 << 28
 """Recorders write chunks of about 1 MB; a compressed one that declares more than 256 MiB is damaged or malicious."""
 

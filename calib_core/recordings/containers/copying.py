@@ -16,8 +16,6 @@ from calib_core.recordings.containers.sources import MessageIndex, Source
 from calib_core.recordings.containers.sqlite.reader import SqliteSource
 from calib_core.recordings.containers.stored_channels import StoredChannel
 
-__all__ = ["CopiedFile", "Losses", "StoredMessage", "copied_file", "merged_messages"]
-
 _ROWS_TOGETHER = 4096
 
 

@@ -7,15 +7,13 @@ from pathlib import Path
 from typing import TypeAlias
 
 from calib_core.errors import RecordingError
-from calib_core.recordings.containers.mcap import reader as mcap
+from calib_core.recordings.containers.mcap import records as mcap_records
 from calib_core.recordings.containers.mcap.growing import GrowingMcap
 from calib_core.recordings.containers.positioned_reads import FileBytes
 from calib_core.recordings.containers.rosbag1.growing import GrowingBag
 from calib_core.recordings.containers.sources import GrowingSource, Source
 from calib_core.recordings.containers.sqlite import reader as sqlite_bag
 from calib_core.recordings.containers.sqlite.growing import GrowingDatabase
-
-__all__ = ["FollowedFiles"]
 
 _SUFFIXES = (".bag", ".mcap", ".db3", ".active")
 _METADATA = "metadata.yaml"
@@ -140,7 +138,7 @@ def _kind(file: FileBytes) -> Callable[[FileBytes], GrowingSource] | None:
     head = file.up_to(0, 16)
     if head.startswith(b"#ROSBAG V"):
         return GrowingBag
-    if head.startswith(mcap.MAGIC):
+    if head.startswith(mcap_records.MAGIC):
         return GrowingMcap
     if head == sqlite_bag.MAGIC:
         return GrowingDatabase

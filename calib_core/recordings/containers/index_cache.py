@@ -21,8 +21,6 @@ import numpy as np
 
 from calib_core.recordings.containers.positioned_reads import FileBytes
 
-__all__ = ["SMALLEST_FILE_BYTES", "FileCache", "cache_folder", "cache_of"]
-
 _VERSION = "1"
 _ENDS_BYTES = 1 << 16
 _MAX_ENTRY_BYTES = 128_000_000

@@ -8,8 +8,6 @@ from calib_core.arrays import Indices
 from calib_core.recordings.containers.accounts import AccountBuilder
 from calib_core.recordings.containers.sources import MessageIndex
 
-__all__ = ["IndexedPlaces"]
-
 
 class IndexedPlaces:
     """The places that an index names, chunk by chunk.

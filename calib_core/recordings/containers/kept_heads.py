@@ -6,8 +6,6 @@ import numpy as np
 
 from calib_core.recordings.containers.sources import Heads, MessageIndex
 
-__all__ = ["KeptHeads"]
-
 _OFFSET_BITS = 40  # a file of a terabyte
 
 

@@ -21,8 +21,6 @@ from calib_core.recordings.containers.recorded_messages import (
 )
 from calib_core.recordings.containers.stored_channels import ChannelNotes, StoredChannel
 
-__all__ = ["MESSAGE_TYPES", "RADAR_SCAN_DEFINITION", "RADAR_SCAN_TYPE", "MessageBuilder"]
-
 RADAR_SCAN_TYPE = "ti_mmwave_rospkg/msg/RadarScan"
 RADAR_SCAN_DEFINITION = """\
 Header header

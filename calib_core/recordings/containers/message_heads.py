@@ -12,8 +12,6 @@ from calib_core.errors import RecordingError
 from calib_core.recordings.containers.positioned_reads import FileBytes
 from calib_core.recordings.containers.sources import Heads, MessageIndex
 
-__all__ = ["ChunkAccess", "gather_far", "gather_heads"]
-
 _NEAR_BYTES = 4096
 _RUN_MESSAGES = 4096
 _THREADS = 4

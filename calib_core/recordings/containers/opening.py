@@ -10,13 +10,12 @@ from calib_core.errors import RecordingError
 from calib_core.recordings.containers.chunks import ChannelFilter
 from calib_core.recordings.containers.compressed_files import packing_of, unpacked_file
 from calib_core.recordings.containers.mcap import reader as mcap
+from calib_core.recordings.containers.mcap import records as mcap_records
 from calib_core.recordings.containers.positioned_reads import FileBytes
 from calib_core.recordings.containers.rosbag1.reader import Rosbag1Source
 from calib_core.recordings.containers.sources import Source
 from calib_core.recordings.containers.sqlite import reader as sqlite_bag
 from calib_core.results import DataWarning
-
-__all__ = ["holds_recording", "open_beginnings", "open_sources"]
 
 _SUFFIXES = (".bag", ".mcap", ".db3")
 _MORE_SUFFIXES = (".active", ".zstd", ".zst", ".gz", ".bz2", ".lz4")
@@ -123,7 +122,7 @@ def _beginning(file: FileBytes, first_of: ChannelFilter, *, packed: bool) -> "_A
     head = file.up_to(0, 16)
     if head.startswith(b"#ROSBAG V"):
         return Rosbag1Source(file, first_of=first_of)
-    if head.startswith(mcap.MAGIC):
+    if head.startswith(mcap_records.MAGIC):
         return mcap.McapSource(file, first_of=first_of)
     if head == sqlite_bag.MAGIC:
         return sqlite_bag.SqliteSource(file, packed=packed, first_rows=_FIRST_ROWS)
@@ -262,7 +261,7 @@ def _open(found: _Found) -> "_AnySource":
 def _source(file: FileBytes, head: bytes, *, packed: bool) -> "_AnySource":
     if head.startswith(b"#ROSBAG V"):
         return Rosbag1Source(file)
-    if head.startswith(mcap.MAGIC):
+    if head.startswith(mcap_records.MAGIC):
         return mcap.McapSource(file)
     if head == sqlite_bag.MAGIC:
         return sqlite_bag.SqliteSource(file, packed=packed)

@@ -11,8 +11,6 @@ from typing import Protocol
 from calib_core.errors import RecordingError
 from calib_core.results import DataWarning
 
-__all__ = ["FileBytes", "FileStretch", "MemoryStretch", "Stretch"]
-
 _BUFFER_BYTES = 1 << 20
 _OVERLAP_BYTES = 64
 _MAX_SEARCH_BYTES = 1 << 30

@@ -10,18 +10,6 @@ from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import TimeNs
 
-__all__ = [
-    "CameraInfoMessage",
-    "CloudMessage",
-    "CompressedImageMessage",
-    "ImageMessage",
-    "MessageBody",
-    "RadarReturnMessage",
-    "RecordedMessage",
-    "TransformMessage",
-    "VendorScanMessage",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class CompressedImageMessage:

@@ -4,8 +4,6 @@ from pathlib import Path
 
 from calib_core.results import DataWarning
 
-__all__ = ["about_recovery"]
-
 
 def about_recovery(
     path: Path,

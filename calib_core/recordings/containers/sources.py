@@ -12,8 +12,6 @@ from calib_core.recordings.assumptions import Assumption
 from calib_core.recordings.containers.accounts import FileAccount, Progress
 from calib_core.results import DataWarning
 
-__all__ = ["Channel", "Encoding", "GrowingSource", "Heads", "MessageIndex", "Source"]
-
 Encoding = Literal["ros1", "cdr"]
 
 

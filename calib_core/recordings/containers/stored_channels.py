@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-__all__ = ["ChannelNotes", "StoredChannel"]
-
 ChannelNotes = tuple[tuple[str, str], ...]
 """What a recorder notes of a channel besides its type, by key: quality of service, latching, the publisher's name."""
 

@@ -8,8 +8,6 @@ from calib_core.errors import RecordingError
 from calib_core.recordings.containers.message_building import MESSAGE_TYPES, MessageBuilder
 from calib_core.recordings.containers.recorded_messages import RecordedMessage
 
-__all__ = ["Ros1Compression", "Ros2Container", "write_ros1_bag", "write_ros2"]
-
 Ros1Compression = Literal["none", "bz2", "lz4"]
 Ros2Container = Literal["mcap", "sqlite3"]
 

@@ -15,8 +15,6 @@ from calib_core.recordings.field_words.words import (
     folded,
 )
 
-__all__ = ["SPELT", "NamedQuantity", "named_quantity", "quantity_of", "spelt"]
-
 _QUANTITIES = {"longitudinal": "x", "lateral": "y", "radial": "doppler", "vague": "azimuth"}
 _MOST_WORDS_OF_A_UNIT = 3
 

@@ -6,8 +6,6 @@ posX, x_pos, target.position_x and f_PosX. A new spelling is added here, once.
 
 from dataclasses import dataclass
 
-__all__ = ["AMBIGUOUS", "SPELLINGS", "Spelling"]
-
 
 @dataclass(frozen=True, slots=True)
 class Spelling:

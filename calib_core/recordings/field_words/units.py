@@ -5,17 +5,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-__all__ = [
-    "UNITS",
-    "UNITS_BY_SPELLING",
-    "Dimension",
-    "Unit",
-    "dimension_of",
-    "unit_of_word",
-    "unit_of_words",
-    "units_for",
-]
-
 Dimension: TypeAlias = Literal["length", "angle", "speed", "level", "time"]
 
 

@@ -5,19 +5,6 @@ from functools import cache
 
 from calib_core.recordings.field_words.spellings import AMBIGUOUS, SPELLINGS
 
-__all__ = [
-    "BLOCKERS",
-    "FILLERS",
-    "NUMBERS",
-    "SECOND",
-    "STATISTICS",
-    "SUBJECTS",
-    "TYPE_PREFIXES",
-    "folded",
-    "has_word",
-    "words_of",
-]
-
 
 def _words(text: str) -> frozenset[str]:
     return frozenset(text.split())

@@ -16,8 +16,6 @@ from calib_core.errors import MessageError
 from calib_core.recordings.messages.definitions import PRIMITIVES, Definition, Field
 from calib_core.recordings.messages.field_offsets import Place, TypesKey, element_layout, structure, walk
 
-__all__ = ["Message", "Pin", "Value", "decode", "fixed_part", "payload_byte_order"]
-
 Value: TypeAlias = "int | float | str | Message | np.ndarray | list[Any]"
 _STRINGS = ("string", "wstring")
 

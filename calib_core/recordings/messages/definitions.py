@@ -9,8 +9,6 @@ from calib_core.errors import MessageError
 from calib_core.recordings.containers.sources import Channel, Encoding
 from calib_core.recordings.messages.known_definitions import KNOWN_DEFINITIONS
 
-__all__ = ["PRIMITIVES", "Definition", "Field", "definition_of", "parse_definition", "short_type"]
-
 PRIMITIVES: Mapping[str, str] = {
     "bool": "u1", "byte": "u1", "char": "u1", "octet": "u1",
     "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",

@@ -9,8 +9,6 @@ import numpy as np
 
 from calib_core.recordings.messages.definitions import PRIMITIVES, Definition, Field
 
-__all__ = ["ElementLayout", "Place", "TypesKey", "element_layout", "structure", "walk"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ElementLayout:

@@ -5,8 +5,6 @@ The field lists are those of ROS 2, and only of types whose layout has not chang
 
 from collections.abc import Mapping
 
-__all__ = ["KNOWN_DEFINITIONS"]
-
 _POINT = "float64 x\nfloat64 y\nfloat64 z\n"
 _SEPARATOR = "================\n"
 

@@ -6,8 +6,6 @@ from calib_core.recordings.containers.stored_channels import StoredChannel
 from calib_core.recordings.messages.definitions import short_type
 from calib_core.recordings.messages.known_definitions import KNOWN_DEFINITIONS
 
-__all__ = ["with_definition"]
-
 _UNCHANGED = ("tf2_msgs/TFMessage",)
 
 

@@ -18,8 +18,6 @@ from calib_core.recordings.time.written_dates import date_text
 from calib_core.recordings.time.written_times import TimeUnit, read_time
 from calib_core.results import DataWarning
 
-__all__ = ["StampedFiles", "stamp_files"]
-
 _FILE_NAMES = ("file", "filename", "file_name", "image", "name", "path", "frame", "image_name", "filepath")
 _TIME_NAME = re.compile(r"(?:time|timestamp|stamp|t)(?:[_ ]*[\[(]?\s*(ns|us|ms|s)\s*[\])]?)?")
 _STEP_NS = NS_PER_S // 10

@@ -13,8 +13,6 @@ from calib_core.arrays import Matrix33, Values
 from calib_core.camera import Camera
 from calib_core.recordings.camera.picture_files import picture_size_px
 
-__all__ = ["FolderCamera", "camera_beside", "size_of_pictures_beside"]
-
 _MAX_BYTES = 1 << 29
 _LEVELS = 4
 _SUFFIXES = (".jpg", ".jpeg", ".png")

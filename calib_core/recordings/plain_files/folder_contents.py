@@ -12,8 +12,6 @@ from calib_core.recordings.plain_files.reading_options import PlainOptions
 from calib_core.recordings.plain_files.tables.opening import TABLE_SUFFIXES, is_one_scan_each, table_fault
 from calib_core.recordings.plain_files.video import VIDEO_SUFFIXES
 
-__all__ = ["Contents", "contents_of", "is_ros"]
-
 _DEPTH = 5
 _LIDAR = "lidar clouds, which this program does not use"
 _KNOWN_TABLES = re.compile(

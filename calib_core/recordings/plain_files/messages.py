@@ -7,8 +7,6 @@ import numpy as np
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.recordings.containers.sources import Channel
 
-__all__ = ["cloud_channel", "cloud_message", "header_bytes", "picture_channel", "picture_message"]
-
 _CODES = {"i1": 1, "u1": 2, "i2": 3, "u2": 4, "i4": 5, "u4": 6, "f4": 7, "f8": 8}
 
 

@@ -11,8 +11,6 @@ from calib_core.measurements import NS_PER_S
 from calib_core.recordings.time.written_dates import WrittenMoment, moments_in
 from calib_core.recordings.time.written_times import epoch_in_name
 
-__all__ = ["NamedTimes", "times_in_names"]
-
 _FRACTIONS = (3, 6, 9)
 _MOST_PER_SECOND = 250
 

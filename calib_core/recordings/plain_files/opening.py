@@ -20,8 +20,6 @@ from calib_core.recordings.plain_files.tables.opening import (
 from calib_core.recordings.plain_files.video import VIDEO_SUFFIXES, open_video
 from calib_core.results import DataWarning
 
-__all__ = ["files_behind", "open_plain_sources"]
-
 _Opener = Callable[[Path, Sequence[Path], PlainOptions, Mapping[int, TimeNs]], PlainSource]
 _FOLDERS: Mapping[str, _Opener] = {
     **dict.fromkeys(PICTURE_SUFFIXES, open_picture_folder),

@@ -16,8 +16,6 @@ from calib_core.recordings.plain_files.reading_options import PlainOptions
 from calib_core.recordings.plain_files.source import PlainSource, topic_of
 from calib_core.results import DataWarning
 
-__all__ = ["PICTURE_SUFFIXES", "open_picture_folder"]
-
 PICTURE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".ppm", ".pgm", ".tif", ".tiff", ".webp")
 _FRAME = "camera"
 _MAX_BYTES = 1 << 30

@@ -12,8 +12,6 @@ from calib_core.recordings.plain_files.messages import cloud_channel, cloud_mess
 from calib_core.recordings.plain_files.reading_options import PlainOptions
 from calib_core.recordings.plain_files.source import PlainSource, topic_of
 
-__all__ = ["is_lidar_bin", "open_bin_folder", "open_pcd_folder", "points_of_bin", "points_of_pcd"]
-
 _FRAME = "radar"
 _MAX_BYTES = 1 << 28
 _HEAD_BYTES = 1 << 16

@@ -5,8 +5,6 @@ from pathlib import Path
 
 from calib_core.recordings.column_map import MappedColumn
 
-__all__ = ["PlainOptions"]
-
 
 @dataclass(frozen=True, slots=True)
 class PlainOptions:

@@ -16,8 +16,6 @@ from calib_core.recordings.plain_files.folder_cameras import FolderCamera
 from calib_core.recordings.plain_files.messages import header_bytes
 from calib_core.results import DataWarning
 
-__all__ = ["PlainSource", "topic_of"]
-
 _HEADER_BYTES = 16
 _MAX_FAULTS = 5
 

@@ -10,8 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["MAGIC", "MAX_PACKET_BYTES", "Packet", "Tlv", "item_name", "packet_in", "points_of"]
-
 MAGIC = b"\x02\x01\x04\x03\x06\x05\x08\x07"
 MAX_PACKET_BYTES = 1 << 20
 _HEADER = struct.Struct("<8s7I")

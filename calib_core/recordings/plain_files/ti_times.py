@@ -15,8 +15,6 @@ from calib_core.recordings.plain_files.ti_packets import Packet
 from calib_core.recordings.time.written_times import read_time
 from calib_core.results import DataWarning
 
-__all__ = ["StampedPackets", "stamp_packets"]
-
 _CYCLES_PER_S = 200e6
 _WRAP = 1 << 32
 _DEFAULT_PERIOD_S = 0.1

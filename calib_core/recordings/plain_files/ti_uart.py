@@ -25,8 +25,6 @@ from calib_core.recordings.plain_files.ti_packets import (
 from calib_core.recordings.plain_files.ti_times import stamp_packets
 from calib_core.results import DataWarning
 
-__all__ = ["open_uart_streams"]
-
 _SUFFIXES = (".bin", ".dat", ".raw", ".log", "")
 _FRAME = "radar"
 _LOOK_BYTES = 1 << 20

@@ -16,8 +16,6 @@ from calib_core.results import DataWarning
 if TYPE_CHECKING:
     pass
 
-__all__ = ["VIDEO_SUFFIXES", "open_video"]
-
 VIDEO_SUFFIXES = (".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".mjpeg", ".ts")
 _FRAME = "camera"
 _JPEG_QUALITY = 95

@@ -8,8 +8,6 @@ import numpy as np
 from calib_core.arrays import Matrix33
 from calib_core.errors import OptionError
 
-__all__ = ["RadarAxes", "parse_radar_axes"]
-
 _DIRECTIONS = {
     "forward": (0, 1), "backward": (0, -1),
     "left": (1, 1), "right": (1, -1),

@@ -3,11 +3,10 @@
 import numpy as np
 
 from calib_core.radar import polar_from_cartesian
-from calib_core.recordings.radar.columns import ColumnPlan, Returns
+from calib_core.recordings.radar.column_plan import ColumnPlan
+from calib_core.recordings.radar.columns import Returns
 from calib_core.recordings.radar.scan_stream import RadarStream
 from calib_core.results import DataWarning
-
-__all__ = ["about_claims"]
 
 _SAMPLED_SCANS = 12
 _FEW = 5

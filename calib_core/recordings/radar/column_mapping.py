@@ -11,8 +11,6 @@ from calib_core.recordings.column_map import UNITS, MappedColumn
 from calib_core.recordings.radar.axes import RadarAxes
 from calib_core.recordings.radar.column_plan import ColumnAssumption, ColumnPlan, ColumnReading
 
-__all__ = ["StatedReading", "map_columns"]
-
 _CARTESIAN, _POLAR = ("x", "y", "z"), ("range", "azimuth", "elevation")
 _SIDES = {
     "x": "forward",

@@ -8,8 +8,6 @@ from calib_core.arrays import Matrix33
 from calib_core.recordings.assumptions import Assumption
 from calib_core.recordings.radar.axes import RadarAxes
 
-__all__ = ["ColumnAssumption", "ColumnPlan", "ColumnReading", "plain_name"]
-
 _NO_SCALES = (1.0, 1.0, 1.0)
 _DIRECTIONS = ("forward", "left", "up")
 _ANGLES = ("azimuth", "elevation")

@@ -5,16 +5,14 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from calib_core.recordings.assumptions import Assumption
-from calib_core.recordings.radar.column_plan import ColumnAssumption, ColumnReading
-from calib_core.recordings.radar.columns import ColumnPlan, plan_columns
+from calib_core.recordings.radar.column_plan import ColumnAssumption, ColumnPlan, ColumnReading
+from calib_core.recordings.radar.columns import plan_columns
 from calib_core.recordings.radar.plugins import all_decoders
 from calib_core.recordings.radar.registry import Decoder, MessageKind
 from calib_core.recordings.radar.self_describing.candidates import DescribedColumn
 from calib_core.recordings.radar.self_describing.description import describe_columns, fill_in
 from calib_core.recordings.radar.self_describing.lengths import FARTHEST_M
 from calib_core.recordings.radar.self_describing.values import farthest
-
-__all__ = ["column_readings", "find_decoder", "plan_described", "plan_for", "plan_like"]
 
 _CLOUDS = ("cloud", "channels")
 

@@ -11,8 +11,6 @@ from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.recordings.radar.column_plan import ColumnPlan, plain_name
 from calib_core.recordings.radar.noise import full_covariance, sigma_polar_from_covariance
 
-__all__ = ["ColumnPlan", "Returns", "names_a_speed", "no_returns", "plan_columns", "returns_from", "unknown"]
-
 _POSITION_PREFIXES = ("", "position", "poseposition", "poseposeposition", "pos", "point")
 _RANGES = ("range", "r", "distance", "dist", "rangem", "targetrange")
 _AZIMUTHS = ("azimuth", "azimuthangle", "azimuthrad", "azimuthdeg", "az")

@@ -17,8 +17,6 @@ from calib_core.recordings.radar.message_layouts.samples import Samples, leaf_na
 from calib_core.recordings.radar.message_layouts.single_returns import PointLayout
 from calib_core.recordings.radar.message_layouts.struct_lists import struct_lists
 
-__all__ = ["RadarLayout", "ScanLayout", "column_names", "layouts_of_parts", "recognise"]
-
 _NOTHING = StatedReading()
 
 

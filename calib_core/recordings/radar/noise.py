@@ -5,8 +5,6 @@ import numpy as np
 from calib_core.arrays import Points3
 from calib_core.radar import polar_from_cartesian
 
-__all__ = ["full_covariance", "sigma_polar_from_covariance"]
-
 _UPPER = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
 
 

@@ -8,8 +8,6 @@ from calib_core.plugins import load_plugins, warn_skipped
 from calib_core.recordings.radar.columns import plan_columns
 from calib_core.recordings.radar.registry import DECODERS, Decoder, MessageKind
 
-__all__ = ["GROUP", "all_decoders"]
-
 GROUP = "cocalib.radar_layouts"
 
 

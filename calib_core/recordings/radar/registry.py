@@ -8,8 +8,6 @@ that matches none is read by its column names alone (columns.py).
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = ["DECODERS", "Decoder", "MessageKind"]
-
 MessageKind = Literal["cloud", "channels", "list", "arrays", "point"]
 """sensor_msgs/PointCloud2, sensor_msgs/PointCloud, a header with one list, arrays side by side, or one return each."""
 

@@ -11,8 +11,6 @@ from calib_core.recordings.radar.column_plans import plan_for
 from calib_core.recordings.radar.registry import DECODERS, Decoder, MessageKind
 from calib_core.recordings.time.written_dates import DATE_SPELLINGS
 
-__all__ = ["main", "radar_formats"]
-
 _KINDS: dict[MessageKind, str] = {
     "cloud": "Clouds: sensor_msgs/PointCloud2",
     "channels": "Clouds: sensor_msgs/PointCloud",

@@ -10,8 +10,6 @@ import numpy as np
 from calib_core.arrays import TimesNs
 from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 
-__all__ = ["ScanBlocks"]
-
 _BLOCK_SCANS = 128
 _CACHED_RETURNS = 1_000_000
 _WINDOW_RETURNS = 50_000

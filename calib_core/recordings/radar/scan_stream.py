@@ -17,8 +17,6 @@ from calib_core.recordings.radar.message_layouts.single_returns import PointLayo
 from calib_core.recordings.radar.scan_blocks import ScanBlocks
 from calib_core.recordings.topics import Topic
 
-__all__ = ["RadarStream"]
-
 _USUAL_CLOUD_BYTES = 4096
 _SMALLEST_CLOUD_BYTES = 256
 _LONGEST_TOGETHER = 1 << 17

@@ -23,8 +23,6 @@ from calib_core.recordings.time.clock_faults import (
 from calib_core.recordings.time.dates import span_text
 from calib_core.results import DataWarning
 
-__all__ = ["Clock", "ClockChoice", "choose_clock", "choose_clocks"]
-
 Clock = Literal["auto", "header", "receive"]
 _AGREE_NS = NS_PER_S
 _BLOCK = 11

@@ -13,8 +13,6 @@ from calib_core.recordings.time.clock_faults import YEAR_2000_NS, Stamps, header
 from calib_core.recordings.time.dates import span_text
 from calib_core.results import DataWarning
 
-__all__ = ["ClockDiagnosis", "about_clocks", "between_islands", "diagnose"]
-
 _GAP_PERIODS = 5.0
 _ISLAND_S = 10.0
 _JUMP_S = 0.25

@@ -7,19 +7,6 @@ import numpy as np
 from calib_core.arrays import Indices, TimesNs
 from calib_core.measurements import NS_PER_S
 
-__all__ = [
-    "HALF_DISTINCT",
-    "MANY",
-    "RETURNS_DISTINCT",
-    "YEAR_2000_NS",
-    "Stamps",
-    "ancient",
-    "disorder",
-    "distinct_times",
-    "header_fault",
-    "receive_fault",
-]
-
 YEAR_2000_NS = 946_684_800 * NS_PER_S
 _YEAR_2100_NS = 4_102_444_800 * NS_PER_S
 MANY = 0.01

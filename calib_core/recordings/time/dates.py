@@ -4,8 +4,6 @@ from datetime import UTC, datetime
 
 from calib_core.measurements import NS_PER_S, TimeNs
 
-__all__ = ["span_text", "utc"]
-
 
 def utc(time: TimeNs) -> str:
     """Format a stamp as UTC date and time with milliseconds."""

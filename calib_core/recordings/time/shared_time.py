@@ -7,8 +7,6 @@ import numpy as np
 from calib_core.arrays import TimesNs
 from calib_core.measurements import NS_PER_S
 
-__all__ = ["SharedTime", "shared_time"]
-
 _GAP_PERIODS = 5.0
 _STRETCH_GAP_NS = NS_PER_S
 

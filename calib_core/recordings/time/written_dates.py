@@ -8,8 +8,6 @@ from datetime import UTC, datetime, timedelta
 from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S, TimeNs
 
-__all__ = ["DATE_SPELLINGS", "WrittenMoment", "date_text", "moments_in", "parse_zone", "zone_of"]
-
 DATE_SPELLINGS: tuple[str, ...] = (
     "2024-05-17T09:42:31.208764Z", "2024-05-17T11:42:31.208764+02:00", "2024-05-17 09:42:31.208764",
     "2024/05/17/09:42:31.208764", "2024/05/17 09:42:31.208764", "17.05.2024 09:42:31.208764", "2024-05-17_09-42-31-208764",

@@ -9,8 +9,6 @@ from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.recordings.time.written_dates import WrittenMoment, date_text
 
-__all__ = ["TimeUnit", "epoch_in_name", "read_time", "time_from_name", "unit_of_epoch"]
-
 TimeUnit = Literal["ns", "us", "ms", "s"]
 _SCALE: dict[TimeUnit, int] = {"ns": 1, "us": 1000, "ms": 1_000_000, "s": NS_PER_S}
 _UNIT_OF_DIGITS: dict[int, TimeUnit] = {19: "ns", 16: "us", 13: "ms", 10: "s"}

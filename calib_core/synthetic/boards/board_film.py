@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-__all__ = ["BoardFilm", "BoardShape"]
-
 
 @dataclass(frozen=True, slots=True)
 class BoardShape:

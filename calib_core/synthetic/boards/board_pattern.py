@@ -7,8 +7,6 @@ import numpy as np
 from calib_core.arrays import Values, frozen_array
 from calib_core.intrinsics import Board
 
-__all__ = ["BoardPattern", "pattern_of"]
-
 _MARGIN_SQUARES = 0.6
 """Width of the white margin around the squares."""
 _TAG_BORDER_BITS = 2

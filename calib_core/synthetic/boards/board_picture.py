@@ -12,8 +12,6 @@ from calib_core.synthetic.boards.printed_board import PrintedBoard, printed_boar
 from calib_core.synthetic.boards.room import room_behind
 from calib_core.synthetic.boards.smooth_rays import grid_rays
 
-__all__ = ["draw_board", "render_board"]
-
 _FINE = 2
 """Samples per pixel along each axis; each is filtered over its own width, so that edges are exact."""
 _STRIDE = 8

@@ -9,8 +9,6 @@ from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.intrinsics import Board
 
-__all__ = ["Waving", "waved_poses"]
-
 _TRIES = 300
 _SHIFTS = 12
 _RIM_PX = 4.0

@@ -11,8 +11,6 @@ from calib_core.intrinsics import Board
 from calib_core.synthetic.boards.board_film import BoardFilm
 from calib_core.synthetic.boards.printed_board import PrintedBoard, printed_board
 
-__all__ = ["MovingBoard", "true_corners"]
-
 _ROUNDS = 30
 _CLOSE_PX = 1e-9
 

@@ -9,8 +9,6 @@ from calib_core.intrinsics import Board
 from calib_core.synthetic.boards.board_film import BoardShape
 from calib_core.synthetic.boards.board_pattern import BoardPattern, pattern_of
 
-__all__ = ["PrintedBoard", "printed_board"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PrintedBoard:

@@ -4,8 +4,6 @@ import numpy as np
 
 from calib_core.camera import Camera
 
-__all__ = ["room_behind"]
-
 _OCTAVES_PX = ((160, 28.0), (40, 14.0), (9, 6.0))
 _THINGS = 14
 

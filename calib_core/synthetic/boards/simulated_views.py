@@ -13,8 +13,6 @@ from calib_core.synthetic.boards.board_film import BoardFilm
 from calib_core.synthetic.boards.moving_board import MovingBoard
 from calib_core.synthetic.boards.printed_board import printed_board
 
-__all__ = ["CornerErrors", "simulated_views"]
-
 
 @dataclass(frozen=True, slots=True)
 class CornerErrors:

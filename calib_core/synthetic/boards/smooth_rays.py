@@ -5,8 +5,6 @@ import numpy as np
 from calib_core.arrays import Values
 from calib_core.camera import Camera
 
-__all__ = ["grid_rays"]
-
 _NODES = 20
 
 

@@ -12,16 +12,6 @@ from calib_core.measurements import Candidate, Pair
 from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, polar_from_cartesian
 from calib_core.synthetic.pairs.simulated import SimulatedPairs
 
-__all__ = [
-    "clicked_again",
-    "from_moved_camera",
-    "in_other_units",
-    "mirrored",
-    "with_companion",
-    "with_rounded_elevations",
-    "with_zero_pair",
-]
-
 
 def clicked_again(
     simulated: SimulatedPairs, clicks: int, *, rng: np.random.Generator, sigma_px: float = 2.0

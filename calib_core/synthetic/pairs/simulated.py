@@ -13,20 +13,6 @@ from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar
 from calib_core.synthetic.pairs.systematic_errors import SystematicErrors
 from calib_core.synthetic.rig import Rig, RigOptions, random_rig, typical_camera
 
-__all__ = [
-    "AISLE",
-    "FIELD",
-    "NOISE_PROFILES",
-    "NoiseName",
-    "NoiseProfile",
-    "OutlierMix",
-    "PairsLayout",
-    "SimulatedPairs",
-    "draw_positions",
-    "simulate_pairs",
-    "study_camera",
-]
-
 NoiseName = Literal["ti", "ti_fine", "ti_aisle", "imaging", "none"]
 
 

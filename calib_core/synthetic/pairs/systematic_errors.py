@@ -18,8 +18,6 @@ from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.options import LensOptions, RadarOptions, ReflectorOptions
 from calib_core.radar import polar_from_cartesian
 
-__all__ = ["SystematicErrors", "draw_systematic_errors"]
-
 
 @dataclass(frozen=True, slots=True)
 class SystematicErrors:

@@ -9,8 +9,6 @@ from calib_core.synthetic.options import SimulationOptions
 from calib_core.synthetic.radar.profiles import RadarProfile
 from calib_core.synthetic.timeline import Islands, SensorTimes, draw_times
 
-__all__ = ["Antenna", "antennas_of"]
-
 _NEAR_HZ, _NEAR_END_M = 25.0, 10.0
 _FAR_HZ, _FAR_BEGIN_M = 20.0, 5.0
 _NEAR_BEAM_DEG, _FAR_BEAM_DEG = 60.0, 20.0

@@ -7,9 +7,7 @@ import numpy as np
 
 from calib_core.arrays import Flags, Points3, Values
 from calib_core.geometry import RigidTransform, rotation_exp
-from calib_core.synthetic.options import RadarDefects
-
-__all__ = ["distorted", "radar_from_reported", "reported_points", "second_azimuths", "second_is_true"]
+from calib_core.synthetic.radar_options import RadarDefects
 
 _ROUNDING_RAD = 1e-6
 _PERIOD = 0.6

@@ -7,9 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib_core.synthetic.options import RadarDefects, RadarName
-
-__all__ = ["RADAR_PROFILES", "RadarProfile", "profile_with"]
+from calib_core.synthetic.radar_options import RadarDefects, RadarName
 
 
 @dataclass(frozen=True, slots=True)

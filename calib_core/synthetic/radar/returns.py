@@ -7,11 +7,9 @@ import numpy as np
 from calib_core.arrays import Flags, Indices, Points3, Values, frozen_array
 from calib_core.measurements import RadarScan, TimeNs
 from calib_core.radar import direction_cosines
-from calib_core.synthetic.options import RadarDefects
 from calib_core.synthetic.radar.defects import distorted, reported_points
 from calib_core.synthetic.radar.profiles import RadarProfile
-
-__all__ = ["Measured", "Targets", "measure"]
+from calib_core.synthetic.radar_options import RadarDefects
 
 _MISSED = 0.02
 _SIDE_LOBE_SHARE = 0.12

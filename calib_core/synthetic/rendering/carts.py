@@ -7,8 +7,6 @@ from calib_core.synthetic.rendering.facets import Facet
 from calib_core.synthetic.rendering.light import lit
 from calib_core.synthetic.scene.scenes import Scene
 
-__all__ = ["cart_facets"]
-
 _METAL = (0.55, 0.57, 0.60)
 _CARDBOARD = (0.50, 0.36, 0.20)
 _PARTS = (((0.35, 0.25, 0.12, 0.22), _METAL), ((0.30, 0.22, 0.22, 0.85), _CARDBOARD))

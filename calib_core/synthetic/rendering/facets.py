@@ -6,8 +6,6 @@ import numpy as np
 
 from calib_core.arrays import Points3
 
-__all__ = ["Facet", "subdivided"]
-
 _STEPS = 6
 
 

@@ -31,8 +31,6 @@ from calib_core.synthetic.scene.vehicles import VehicleState
 if TYPE_CHECKING:  # boards need what calibrates a lens, which is slow to import
     from calib_core.synthetic.boards import MovingBoard
 
-__all__ = ["FrameRenderer"]
-
 _FINE = 8
 _COARSE = 3
 _LARGE_PX = 150.0

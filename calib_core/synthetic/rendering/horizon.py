@@ -7,8 +7,6 @@ import numpy as np
 from calib_core.synthetic.rendering.noise import fractal_noise, hash_random, value_noise
 from calib_core.synthetic.scene.scenes import Backdrop
 
-__all__ = ["HAZE", "backdrop_colour"]
-
 HAZE = np.array([0.66, 0.75, 0.84], dtype=np.float32)
 _ZENITH = np.array([0.085, 0.22, 0.60], dtype=np.float32)
 

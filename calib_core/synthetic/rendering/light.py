@@ -5,8 +5,6 @@ import numpy as np
 from calib_core.arrays import Vector3
 from calib_core.synthetic.scene.scenes import Scene
 
-__all__ = ["SKY", "SUN", "display", "lit", "sun_direction"]
-
 SUN = np.array([1.34, 1.24, 1.06], dtype=np.float32)
 SKY = np.array([0.25, 0.295, 0.365], dtype=np.float32)
 _LAMPS = np.array([0.62, 0.61, 0.58], dtype=np.float32)

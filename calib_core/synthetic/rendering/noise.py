@@ -2,8 +2,6 @@
 
 import numpy as np
 
-__all__ = ["cell_random", "fractal_noise", "hash_random", "line_coverage", "value_noise"]
-
 
 def hash_random(i: np.ndarray, j: np.ndarray, seed: int) -> np.ndarray:
     """Return a number in 0 to 1 for each pair of integers, the same one every time."""

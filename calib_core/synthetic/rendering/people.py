@@ -10,8 +10,6 @@ from calib_core.synthetic.rendering.still import Still
 from calib_core.synthetic.scene.person import Capsule, Surface
 from calib_core.synthetic.scene.scenes import Scene
 
-__all__ = ["Window", "draw_limbs", "shade_ground"]
-
 _ALBEDO: dict[Surface, tuple[float, float, float]] = {
     "skin": (0.52, 0.33, 0.24),
     "helmet": (0.93, 0.66, 0.04),

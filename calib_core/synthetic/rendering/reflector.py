@@ -12,8 +12,6 @@ from calib_core.synthetic.rendering.light import lit
 from calib_core.synthetic.scene.person import Capsule
 from calib_core.synthetic.scene.scenes import USUAL_EDGE_M, Scene
 
-__all__ = ["apex_edges", "on_block", "reflector_facets", "shadow_limbs", "stand_limbs"]
-
 _BASE_HALF_M = 0.095
 _GROUND_STAND_M = 0.35
 _ALUMINIUM = np.array([0.80, 0.82, 0.85], dtype=np.float32)

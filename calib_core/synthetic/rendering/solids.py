@@ -9,8 +9,6 @@ from calib_core.synthetic.rendering.surfaces import Patch, material_colour
 from calib_core.synthetic.rig import Rig
 from calib_core.synthetic.scene.scenes import Box, Cylinder, Material, Scene
 
-__all__ = ["Hits", "Solid", "block", "shadowed", "trace"]
-
 _FAR = np.float32(np.inf)
 
 

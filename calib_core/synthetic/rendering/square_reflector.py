@@ -9,8 +9,6 @@ from calib_core.arrays import Vector3
 from calib_core.synthetic.rendering.facets import Facet, subdivided
 from calib_core.synthetic.scene.person import Capsule
 
-__all__ = ["pole_limbs", "square_edges", "square_facets"]
-
 _STEEL = np.array([0.46, 0.48, 0.50], dtype=np.float32)
 _PAINT = np.array([0.10, 0.16, 0.30], dtype=np.float32)
 _SHEET_LEVEL = (0.30, 0.95, 0.60)

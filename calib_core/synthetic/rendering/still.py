@@ -12,8 +12,6 @@ from calib_core.synthetic.rendering.surfaces import Patch, ground_colour
 from calib_core.synthetic.rig import Rig
 from calib_core.synthetic.scene.scenes import Scene
 
-__all__ = ["Still", "pixel_rays", "trace_still"]
-
 _GRID_PX = 4
 _SAMPLES = ((-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25))
 _SUN_RADIUS = 0.012

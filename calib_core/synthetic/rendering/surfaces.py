@@ -8,8 +8,6 @@ import numpy as np
 from calib_core.synthetic.rendering.noise import cell_random, fractal_noise, line_coverage
 from calib_core.synthetic.scene.scenes import Ground, Material
 
-__all__ = ["Patch", "ground_colour", "material_colour"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Patch:

@@ -9,8 +9,6 @@ from calib_core.synthetic.scene.person import Capsule
 from calib_core.synthetic.scene.scenes import Scene
 from calib_core.synthetic.scene.vehicles import Colour, Part, VehicleState, vehicle_parts
 
-__all__ = ["vehicle_facets", "vehicle_shadow"]
-
 _COLOURS: dict[Colour, tuple[float, float, float]] = {
     "paint": (0.0, 0.0, 0.0),
     "glass": (0.030, 0.040, 0.050),

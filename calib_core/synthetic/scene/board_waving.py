@@ -11,8 +11,6 @@ from calib_core.intrinsics import Board
 from calib_core.synthetic.boards import BoardFilm, BoardShape, MovingBoard, PrintedBoard, printed_board, waved_poses
 from calib_core.synthetic.options import WavedBoard
 
-__all__ = ["BoardWaving", "draw_waving"]
-
 _PERIOD_S = 1.0
 _HELD_SHARE = 0.45
 _EXPOSURE_S = 0.006

@@ -9,8 +9,6 @@ from calib_core.synthetic.pairs.simulated import PairsLayout
 from calib_core.synthetic.scene.open_scenes import open_rooftop, open_yard, road
 from calib_core.synthetic.scene.scenes import Board, Box, Cylinder, Scatterer, Scene
 
-__all__ = ["scene_named"]
-
 
 def scene_named(name: SceneName) -> Scene:
     """Return a scene by its name."""

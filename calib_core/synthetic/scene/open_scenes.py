@@ -3,8 +3,6 @@
 from calib_core.synthetic.pairs.simulated import PairsLayout
 from calib_core.synthetic.scene.scenes import Board, Box, Cylinder, Scatterer, Scene
 
-__all__ = ["open_rooftop", "open_yard", "road"]
-
 
 def open_rooftop() -> Scene:
     """Build a rooftop with nothing that echoes within 20 m."""

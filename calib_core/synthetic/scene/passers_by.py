@@ -7,8 +7,6 @@ import numpy as np
 from calib_core.arrays import Vector2, frozen_array
 from calib_core.synthetic.scene.person import PersonState
 
-__all__ = ["PasserBy", "draw_passers_by"]
-
 _STOPPING = 3
 """Every third passer-by stops."""
 

@@ -7,8 +7,6 @@ import numpy as np
 
 from calib_core.arrays import Vector2, Vector3
 
-__all__ = ["Capsule", "PersonState", "Surface", "capsules", "hand_position"]
-
 Surface = Literal["skin", "helmet", "jacket", "vest", "yoke", "trousers", "shoe", "stripe"]
 
 _HIP_M, _THIGH_M, _SHIN_M = 0.985, 0.46, 0.47

@@ -13,8 +13,6 @@ from calib_core.synthetic.scene.stage import Stage
 from calib_core.synthetic.scene.story import Resting
 from calib_core.synthetic.scene.vehicles import VehicleState, hidden_by
 
-__all__ = ["SimulatedPlacement", "clear_frames", "placements_of"]
-
 _CLEARANCE_M = 0.16
 """How far a limb must be from the line of sight for all of the reflector to be visible."""
 

@@ -11,19 +11,6 @@ import numpy as np
 from calib_core.synthetic.options import SceneName
 from calib_core.synthetic.pairs.simulated import PairsLayout
 
-__all__ = [
-    "STANDS_LOWER",
-    "USUAL_EDGE_M",
-    "Backdrop",
-    "Board",
-    "Box",
-    "Cylinder",
-    "Ground",
-    "Material",
-    "Scatterer",
-    "Scene",
-]
-
 USUAL_EDGE_M = 0.16
 """Length of the three edges that meet at the apex of the usual reflector [m]."""
 STANDS_LOWER = 0.32

@@ -7,8 +7,6 @@ import numpy as np
 
 from calib_core.arrays import Vector2
 
-__all__ = ["PUT_DOWN_S", "STEP_AWAY_S", "Action", "Leg", "Script"]
-
 _SPEED_MPS = 1.25
 PUT_DOWN_S = 0.8
 """How long putting the reflector down or picking it up takes."""

@@ -27,8 +27,6 @@ from calib_core.synthetic.timeline import Islands, SensorTimes, draw_islands, dr
 if TYPE_CHECKING:  # boards need what calibrates a lens, which is slow to import
     from calib_core.synthetic.scene.board_waving import BoardWaving
 
-__all__ = ["Stage", "child_rng", "set_stage"]
-
 _BEFORE_BOARD_M = 0.02
 """How far in front of the board's surface the apex is; the reflector's edges reach no farther back."""
 _TRIPOD_M = 1.4

@@ -15,8 +15,6 @@ from calib_core.synthetic.scene.person import PersonState, hand_position
 from calib_core.synthetic.scene.script import PUT_DOWN_S, STEP_AWAY_S, Leg, Script
 from calib_core.synthetic.scene.traffic import Actor, Mover
 
-__all__ = ["Moment", "Resting", "Story", "tell_story"]
-
 _LEAD_IN_S = 0.6
 _TURNING_S = 0.5
 _BEHIND_M = 0.52

@@ -9,8 +9,6 @@ from calib_core.errors import OptionError
 from calib_core.synthetic.options import Surroundings
 from calib_core.synthetic.scene.scenes import Box, Cylinder, Scatterer, Scene
 
-__all__ = ["Flicker", "cart_position", "draw_flickers", "furnished", "in_sight"]
-
 _CAR_M = (4.4, 1.8)
 _CAR_DBSM = (20.0, 14.0, 11.0)
 """Of a car's near corner, its side and its far wheel."""

@@ -12,8 +12,6 @@ from calib_core.synthetic.scene.person import PersonState
 from calib_core.synthetic.scene.scenes import Scene
 from calib_core.synthetic.scene.vehicles import VehicleState
 
-__all__ = ["Actor", "ActorLabel", "Mover", "draw_movers"]
-
 ActorLabel: TypeAlias = Literal["person", "robot", "car"]
 
 _WALKED_DEG = 27.0

@@ -8,17 +8,6 @@ import numpy as np
 
 from calib_core.arrays import Flags, Points3, Values, Vector2, Vector3
 
-__all__ = [
-    "Colour",
-    "Part",
-    "VehicleKind",
-    "VehicleState",
-    "echo_places",
-    "hidden_by",
-    "outline_points",
-    "vehicle_parts",
-]
-
 VehicleKind = Literal["robot", "car"]
 Colour = Literal["paint", "glass", "dark", "orange", "lamp", "tail"]
 

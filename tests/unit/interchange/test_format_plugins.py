@@ -23,7 +23,8 @@ from calib_core.interchange import (
 )
 from calib_core.interchange.formats.plugins import GROUP, plugin_formats
 from cocalib.cli import run
-from cocalib.web.channel.export_preview import export_preview, format_rows
+from cocalib.web.channel.export_preview import export_preview
+from cocalib.web.exports.format_list import format_rows
 from tests.fake_distribution import install
 
 PARAMETERS = '''

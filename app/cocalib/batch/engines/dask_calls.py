@@ -11,8 +11,6 @@ from typing import Any
 from calib_core.errors import InputError
 from cocalib.batch.engines.dask_connection import Connection
 
-__all__ = ["Call", "Died", "finished_calls"]
-
 
 class Died(enum.Enum):
     """What comes of a call instead of a result."""

@@ -14,8 +14,6 @@ from cocalib.batch.job import Job
 from cocalib.batch.outcome import Outcome
 from cocalib.resources import version
 
-__all__ = ["DaskCluster"]
-
 _Found = TypeVar("_Found")
 _DIED = "every worker that ran this job died of it or was killed"
 _DIED_HINT = (

@@ -17,8 +17,6 @@ from cocalib.batch.engines.worker_checks import check_workers
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster
 
-__all__ = ["Connection", "connected"]
-
 _PATIENCE_S = 5
 _START_S = 120
 _COUNTED_EVERY_S = 1.0

@@ -7,8 +7,6 @@ from typing import Any, Protocol, TypeVar
 from cocalib.batch.job import Job
 from cocalib.batch.outcome import Outcome
 
-__all__ = ["Engine"]
-
 _Found = TypeVar("_Found")
 
 

@@ -8,8 +8,6 @@ from cocalib.batch.engines.one_job import run_once
 from cocalib.batch.job import Job
 from cocalib.batch.outcome import Outcome
 
-__all__ = ["InProcess"]
-
 _Found = TypeVar("_Found")
 
 

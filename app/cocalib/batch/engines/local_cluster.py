@@ -12,8 +12,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from distributed import LocalCluster
 
-__all__ = ["local_cluster"]
-
 _ALLOWED_DEATHS = 1
 """Deaths of workers that a call survives; the next one ends it."""
 _PRELOADED = "cocalib.batch.engines.worker_side"

@@ -11,8 +11,6 @@ from cocalib.batch.results_folder import OUTCOME_FILE, ResultsFolder
 from cocalib.batch.running import run_job
 from cocalib.error_boundary import error_boundary
 
-__all__ = ["failed_outcome", "run_once"]
-
 
 def run_once(job: Job, results: Path) -> Outcome:
     """Return what came of a job; it is run only if nobody has run it yet.

@@ -5,8 +5,6 @@ from urllib.parse import urlsplit
 from calib_core.errors import InputError
 from cocalib.loopback import is_loopback
 
-__all__ = ["checked_address"]
-
 
 def checked_address(address: str) -> str:
     """Return the address of a scheduler if it is safe to connect to.

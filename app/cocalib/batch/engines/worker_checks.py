@@ -11,8 +11,6 @@ from cocalib.resources import version
 if TYPE_CHECKING:
     from distributed import Client
 
-__all__ = ["check_workers", "dask_trouble", "version_trouble"]
-
 _RESTART_S = 90
 """How long workers that were killed may take to start again on a busy machine."""
 

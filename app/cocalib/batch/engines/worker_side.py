@@ -11,8 +11,6 @@ from cocalib.batch.job import Job
 from cocalib.batch.outcome import Outcome
 from cocalib.resources import version
 
-__all__ = ["call", "dask_setup", "run_in_worker", "worker_version"]
-
 
 def dask_setup(_: object) -> None:
     """Leave Ctrl+C to the driver; Dask calls this when a worker starts that preloads this module."""

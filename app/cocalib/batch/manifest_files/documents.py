@@ -7,8 +7,6 @@ from msgspec import Meta, Struct, field
 from calib_core.interchange.vehicle_note import MOST_CHARACTERS
 from calib_core.recordings import RecordingOptions
 
-__all__ = ["ManifestDocument", "SessionDocument", "SharedDocument"]
-
 Name = Annotated[str, Meta(min_length=1, max_length=MOST_CHARACTERS)]
 
 

@@ -12,8 +12,6 @@ from calib_core.interchange import names_schema
 from calib_core.interchange.own.documents import CLICKS_SCHEMA
 from cocalib.solving import intrinsics_near
 
-__all__ = ["first_manifest"]
-
 _SUFFIXES = (".bag", ".mcap", ".db3")
 _PLAIN_SUFFIXES = (".avi", ".csv", ".jpeg", ".jpg", ".jsonl", ".mp4", ".pcd", ".png")
 """Of recordings without ROS: what belongs to one is not to be seen from the names."""

@@ -20,8 +20,6 @@ from cocalib.batch.manifest_files.documents import ManifestDocument, SessionDocu
 from cocalib.option_changes import options_from_tree
 from cocalib.text_files import read_text
 
-__all__ = ["read_manifest"]
-
 _MOST_BYTES = 64 * 1024 * 1024
 _SEPARATOR = ";"
 _SEVERAL = ("recording", "exports", "camera_position_m", "map")

@@ -9,8 +9,6 @@ from calib_core.errors import CalibrationError
 from cocalib.batch.results_folder import LOG_FILE
 from cocalib.error_boundary import error_boundary
 
-__all__ = ["Failure", "attempted"]
-
 _Made = TypeVar("_Made")
 
 _UNREACHED = frozenset(

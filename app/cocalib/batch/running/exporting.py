@@ -6,8 +6,6 @@ from calib_core.errors import InputError
 from calib_core.interchange import export
 from cocalib.batch.running.solving import SolvedSession
 
-__all__ = ["EXPORT_FOLDER", "export_session"]
-
 EXPORT_FOLDER = "export"
 
 

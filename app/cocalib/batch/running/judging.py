@@ -11,8 +11,6 @@ from cocalib.boxes import find_boxes
 from cocalib.evaluating import EvidenceOptions, evaluate_recording, evaluation_exit_code
 from cocalib.judged_calibration import judged_calibration
 
-__all__ = ["EVALUATION_FILE", "JudgedSession", "judge_session"]
-
 EVALUATION_FILE = "evaluation.json"
 
 

@@ -14,8 +14,6 @@ from cocalib.batch.running.solving import SolvedSession
 from cocalib.batch.running.steps import SessionResult
 from cocalib.resources import version
 
-__all__ = ["failed", "outcome_of"]
-
 
 def outcome_of(job: Job, result: SessionResult) -> Outcome:
     """Return the outcome, without its files and its run."""

@@ -12,8 +12,6 @@ from cocalib.judged_calibration import judged_calibration
 from cocalib.recording_check import other_camera
 from cocalib.report import Judged, report_html, subject_of, watched
 
-__all__ = ["REPORT_FILE", "report_session"]
-
 REPORT_FILE = "report.html"
 
 

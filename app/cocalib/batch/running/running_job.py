@@ -16,8 +16,6 @@ from cocalib.batch.running.attempting import Failure
 from cocalib.batch.running.outcome_of import failed, outcome_of
 from cocalib.batch.running.steps import run_steps
 
-__all__ = ["run_job"]
-
 
 def run_job(job: Job, results: Path) -> Outcome:
     """Run a job and keep its result under its digest.

@@ -18,8 +18,6 @@ from cocalib.recorded_clicks import clicks_in_recording, file_of_clicks, require
 from cocalib.required_camera import required_camera
 from cocalib.solving import calibration_text
 
-__all__ = ["CALIBRATION_FILE", "CLICKS_FILE", "GivenFiles", "SolvedSession", "given_files", "solve_session"]
-
 CALIBRATION_FILE = "calibration.json"
 CLICKS_FILE = "clicks.json"
 

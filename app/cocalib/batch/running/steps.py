@@ -15,8 +15,6 @@ from cocalib.batch.running.judging import EVALUATION_FILE, JudgedSession, judge_
 from cocalib.batch.running.reporting import REPORT_FILE, report_session
 from cocalib.batch.running.solving import SolvedSession, given_files, solve_session
 
-__all__ = ["SessionResult", "run_steps"]
-
 _Made = TypeVar("_Made")
 
 

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from calib_core.evaluation import PairedDifference
     from cocalib.comparing import ComparedOnRecording
 
-__all__ = ["COMPARISON_SCHEMA", "Compare"]
-
 COMPARISON_SCHEMA = "cocalib/comparison-1"
 
 

@@ -18,8 +18,6 @@ from cocalib.terminal import print_exactly
 if TYPE_CHECKING:
     from calib_core.evaluation import Evaluation
 
-__all__ = ["Evaluate"]
-
 
 @dataclass(frozen=True, slots=True)
 class Evaluate:

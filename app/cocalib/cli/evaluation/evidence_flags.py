@@ -9,7 +9,8 @@ import tyro
 
 from calib_core.errors import InputError
 from cocalib.cli.flags import File, called
-from cocalib.cli.output import progress_bar, read_text, told_clicks_at_frames
+from cocalib.cli.output import progress_bar, told_clicks_at_frames
+from cocalib.text_files import read_text
 
 if TYPE_CHECKING:
     from calib_core.detections import Boxes, ReturnLabels
@@ -17,8 +18,6 @@ if TYPE_CHECKING:
     from calib_core.measurements import ReflectorClick
     from calib_core.recordings import Recording
     from cocalib.evaluating import EvidenceOptions
-
-__all__ = ["EvidenceFlags", "EvidenceUsed"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from calib_core.results import Calibration
     from cocalib.report import ReportSubject
 
-__all__ = ["Report"]
-
 
 @dataclass(frozen=True, slots=True)
 class Report:

@@ -11,8 +11,6 @@ from cocalib.cli.output import progress_bar
 from cocalib.cli.recording_flags import Recordings, TopicFlags, Topics
 from cocalib.cli.shown_recording import Shown, ShownFlags, shown_recording
 
-__all__ = ["Rerun"]
-
 
 @dataclass(frozen=True, slots=True)
 class Rerun:

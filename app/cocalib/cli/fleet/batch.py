@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from cocalib.batch.manifest import Manifest
     from cocalib.batch.results_folder import ResultsFolder
 
-__all__ = ["Batch"]
-
 
 @dataclass(frozen=True, slots=True)
 class Batch:

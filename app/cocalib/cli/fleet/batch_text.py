@@ -11,8 +11,6 @@ if TYPE_CHECKING:
     from cocalib.batch.driving import BatchProgress
     from cocalib.batch.outcome import Outcome
 
-__all__ = ["batch_lines", "exit_code", "shown_batch"]
-
 _WEAK_CODE, _FAILED_FROM, _MOST_CODE = 3, 10, 99
 _WITHOUT = ("refused", "failed")
 _KEYS_OF = {

@@ -16,8 +16,6 @@ from cocalib.terminal import print_exactly
 if TYPE_CHECKING:
     from cocalib.fleet.records import FleetRecord
 
-__all__ = ["Fleet"]
-
 _Action: TypeAlias = Literal["status", "history", "compare", "prior", "export", "summary", "rebuild"]
 _NAMES: Final[dict[str, tuple[str, ...]]] = {
     "status": (),

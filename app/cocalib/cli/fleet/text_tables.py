@@ -9,8 +9,6 @@ from cocalib.fleet.records import FleetRecord, SessionRecord, VehicleRecord
 from cocalib.fleet.standing import VehicleStanding, age_days
 from cocalib.view.number_format import plain, with_sigma
 
-__all__ = ["history_lines", "kind_lines", "prior_lines", "status_lines"]
-
 _DASH = "–"
 _LONGEST = 32
 _MOST_NAMED = 10

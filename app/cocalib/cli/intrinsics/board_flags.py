@@ -11,8 +11,6 @@ from cocalib.cli.flags import called
 if TYPE_CHECKING:
     from calib_core.intrinsics import Board
 
-__all__ = ["BoardFlags", "BoardUsed"]
-
 
 @dataclass(frozen=True, slots=True)
 class BoardFlags:

@@ -11,8 +11,6 @@ from cocalib.cli.intrinsics.lens_text import camera_lines
 from cocalib.cli.output import write_whole
 from cocalib.terminal import print_exactly
 
-__all__ = ["CAMERA_SUFFIXES", "camera_format", "convert_camera", "require_format", "size_of", "write_camera"]
-
 CAMERA_SUFFIXES = (".yaml", ".yml", ".json", ".xml", ".cameramodel", ".txt", ".mat", ".bin", ".conf")
 _BY_SUFFIX = {".json": "json", ".xml": "opencv-xml", ".cameramodel": "mrcal", ".mat": "matlab"}
 

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from cocalib.intrinsics import OpenPictures
     from cocalib.intrinsics.resumed_search import ResumedSearch
 
-__all__ = ["Intrinsics"]
-
 
 @dataclass(frozen=True, slots=True)
 class Intrinsics:

@@ -19,8 +19,6 @@ from cocalib.intrinsics.field_of_view import field_of_view_text
 from cocalib.view.number_format import plain, with_sigma
 from cocalib.view.wording import sentence
 
-__all__ = ["DOUBTFUL", "camera_lines", "left_out_lines", "lens_lines"]
-
 DOUBTFUL = frozenset(
     {
         "large-residuals",

@@ -9,12 +9,11 @@ from pathlib import Path
 from calib_core.interchange.own.board_views_json import read_board_views, write_board_views
 from calib_core.intrinsics import Board, BoardSearch, SearchProgress
 from calib_core.measurements import Unsolvable
-from cocalib.cli.output import read_text, write_whole
+from cocalib.cli.output import write_whole
 from cocalib.intrinsics.picture_sources import OpenPictures
 from cocalib.intrinsics.resumed_search import ResumedSearch
 from cocalib.terminal import terminal_stream
-
-__all__ = ["kept_on_interruption", "search_for", "searched"]
+from cocalib.text_files import read_text
 
 _DEFAULT_VIEWS = Path("board-views.json")
 _LINE_EVERY_S = 5.0

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from calib_core.proposing import DwellView, Proposals
     from calib_core.recordings import Recording
 
-__all__ = ["Propose"]
-
 
 @dataclass(frozen=True, slots=True)
 class Propose:

@@ -8,8 +8,6 @@ from calib_core.errors import InputError
 from calib_core.proposing import ViewProgress
 from cocalib.terminal import terminal_stream
 
-__all__ = ["checked_reflector_m", "shown_progress"]
-
 _LEAST_M, _MOST_M = 0.02, 2.0
 
 

@@ -10,8 +10,6 @@ from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.proposing import DwellView, Proposals
 from calib_core.proposing.proposals_json import named_proposals
 
-__all__ = ["proposal_lines", "unproposed_lines"]
-
 _HEAD = ("id", "time [s]", "range [m]", "column [px]", "row [px]", "sigma [px]", "confidence", "reason")
 
 

@@ -14,8 +14,6 @@ from cocalib.fleet.index.stored_pose import insert_pose, insert_transition, pose
 from cocalib.fleet.records import SessionRecord, UnreadResult, is_compared
 from cocalib.fleet.session_order import current_and_superseded, in_order
 
-__all__ = ["Places", "fill", "has_places", "known_results", "put", "set_places"]
-
 Places = Mapping[tuple[str, str], Wanted]
 """What the manifests want, by vehicle and session."""
 

@@ -15,8 +15,6 @@ from cocalib.fleet.index.stored_pose import pose_of, transition_of
 from cocalib.fleet.index.tables import create_tables, damaged, has_tables, index_path, read_only, require_version
 from cocalib.fleet.records import FleetRecord, SessionRecord, UnreadResult, VehicleRecord
 
-__all__ = ["read_fleet"]
-
 
 def read_fleet(folder: Path) -> FleetRecord:
     """Return what the results of a folder say.

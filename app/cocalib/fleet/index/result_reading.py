@@ -15,8 +15,6 @@ from cocalib.batch.outcome import OUTCOME_SCHEMA, Outcome, read_outcome
 from cocalib.batch.results_folder import OUTCOME_FILE, ResultsFolder
 from cocalib.fleet.records import SessionRecord, UnreadResult
 
-__all__ = ["finished_results", "outcome_of", "with_pose"]
-
 _CALIBRATION = "calibration.json"
 _MOST = 2**63
 

@@ -16,8 +16,6 @@ from calib_core.options import CameraPositionPrior
 from calib_core.systematic_errors import SystematicErrorResult
 from cocalib.batch.outcome import Outcome
 
-__all__ = ["insert_pose", "insert_transition", "pose_of", "transition_of"]
-
 _FIGURES = (
     *("rotation_deg", "rotation_sigma_deg", "position_cm", "position_sigma_cm", "picture_px", "picture_sigma_px"),
     *("squared", "resolved_deg", "resolved_cm"),

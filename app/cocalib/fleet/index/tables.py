@@ -6,18 +6,6 @@ from typing import Final
 
 from calib_core.errors import InputError
 
-__all__ = [
-    "INDEX_FILE",
-    "INDEX_VERSION",
-    "create_tables",
-    "damaged",
-    "has_tables",
-    "index_path",
-    "read_only",
-    "require_version",
-    "writable",
-]
-
 INDEX_FILE: Final = "fleet.sqlite"
 INDEX_VERSION: Final = 3
 """SQLite's user_version. It counts up with every change of the tables."""

@@ -14,8 +14,6 @@ from cocalib.fleet.index.tables import create_tables, damaged, has_tables, index
 from cocalib.fleet.records import UnreadResult
 from cocalib.whole_file import whole_path
 
-__all__ = ["FleetIndex", "rebuild_index"]
-
 
 class FleetIndex:
     """The index of a folder with results, open for writing by the one process that drives the batch.

@@ -10,17 +10,6 @@ from cocalib.report.markup import Child, Markup, scrolled, tag
 from cocalib.report.sections.answer import LEVEL_SIGNS
 from cocalib.view.number_format import plain, with_sigma
 
-__all__ = [
-    "Column",
-    "change_cells",
-    "number_cell",
-    "report_cell",
-    "sigma_cells",
-    "sortable",
-    "verdict_cell",
-    "words_cell",
-]
-
 _DASH = "–"
 _LONG = 20
 """Longer names may be broken into lines."""

@@ -10,8 +10,6 @@ from cocalib.report.markup import Markup, joined, tag
 from cocalib.report.plots import Axes, drawing, mark, polyline
 from cocalib.view.number_format import with_sigma
 
-__all__ = ["Drift", "drift_of", "drift_plot"]
-
 _WIDTH, _HEIGHT = 128.0, 27.0
 _MOST = 2.0
 """The upper edge: a change this many times the limit, and more."""

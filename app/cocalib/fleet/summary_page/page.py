@@ -16,8 +16,6 @@ from cocalib.resources import version
 from cocalib.view.wording import sentence
 from cocalib.whole_file import write_whole
 
-__all__ = ["SUMMARY_FILE", "summary_html", "write_summary"]
-
 SUMMARY_FILE: Final = "summary.html"
 
 

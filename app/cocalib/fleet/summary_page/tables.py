@@ -21,8 +21,6 @@ from cocalib.fleet.summary_page.drift import drift_of, drift_plot
 from cocalib.report.markup import Markup, scrolled, tag
 from cocalib.view.number_format import plain
 
-__all__ = ["session_table", "type_table", "vehicle_table"]
-
 _FIGURES = (
     Column("σ deg", is_number=True, about="largest standard deviation of the rotation about an axis"),
     Column("σ cm", is_number=True, about="largest standard deviation of the position along an axis"),

@@ -10,8 +10,6 @@ from cocalib.report.lens.tables import left_out_table, model_table, parameter_ta
 from cocalib.report.lens.views import coverage_of_views, errors_of_views
 from cocalib.report.markup import Markup, tag
 
-__all__ = ["lens_report_html"]
-
 
 def lens_report_html(lens: CalibratedLens, source: PictureSource, coverage: Coverage, *, searched: int) -> str:
     """Return the report as HTML that is well-formed XML, too; the same lens gives the same bytes.

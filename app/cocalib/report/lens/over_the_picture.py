@@ -17,8 +17,6 @@ from cocalib.report.markup import Child, Markup, tag
 from cocalib.report.plots import Axes, captioned, drawing, text
 from cocalib.view.number_format import plain
 
-__all__ = ["covered", "residuals_over_the_picture", "uncertainty_over_the_picture"]
-
 _WIDTH = 320.0
 _MOST_POINTS = 1500
 _LONGEST = 22.0

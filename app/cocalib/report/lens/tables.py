@@ -7,8 +7,6 @@ from cocalib.report.markup import Child, Markup, scrolled, tag
 from cocalib.view.number_format import plain, with_sigma
 from cocalib.view.wording import sentence
 
-__all__ = ["left_out_table", "model_table", "parameter_table", "view_table", "warning_list"]
-
 _MOST_ROWS = 400
 
 

@@ -10,8 +10,6 @@ from cocalib.report.plots import Axes, captioned, drawing, mark
 from cocalib.view.number_format import plain
 from cocalib.view.wording import sentence
 
-__all__ = ["coverage_of_views", "errors_of_views"]
-
 
 def coverage_of_views(lens: CalibratedLens, coverage: Coverage) -> Markup:
     """Return where the corners are, how the board was turned and how far it was, and what to film next."""

@@ -10,8 +10,6 @@ from cocalib.report.plots import Axes, captioned, drawing, polyline, text
 from cocalib.view.number_format import plain
 from cocalib.view.wording import sentence
 
-__all__ = ["acc"]
-
 _BINS = 10
 _LINES = ("contour a", "contour b", "contour c")
 _DASHES = ("solid", "dashed", "dotted")

@@ -14,8 +14,6 @@ from cocalib.view.number_format import plain
 from cocalib.view.systematic_errors import uncertainty_sentences
 from cocalib.view.wording import sentence
 
-__all__ = ["LEVEL_SIGNS", "answer"]
-
 LEVEL_SIGNS = {"good": "●", "usable": "◐", "weak": "○", "contradictory": "✕", "nothing": "–", "not judged": "–"}
 """The level as a shape, for print without colour."""
 _ROW = 15.0

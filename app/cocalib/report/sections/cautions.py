@@ -8,8 +8,6 @@ from cocalib.report.markup import Markup, tag
 from cocalib.report.subject import ReportSubject
 from cocalib.view.wording import sentence
 
-__all__ = ["cautions"]
-
 _MOST, _MOST_UNPAIRED = 10, 5
 _SIGNS = {"contradictory": "✕", "weak": "▲", "limited": "△", "note": "·"}
 

@@ -4,8 +4,6 @@ from cocalib.report.markup import Markup, tag
 from cocalib.report.subject import Against
 from cocalib.view.wording import sentence
 
-__all__ = ["comparison"]
-
 
 def comparison(against: Against, name: str) -> Markup:
     """Return the comparison.

@@ -9,8 +9,6 @@ from cocalib.report.residual_rows import ResidualRows
 from cocalib.report.sections.uncertainty import picture_layer
 from cocalib.view.number_format import plain
 
-__all__ = ["coverage"]
-
 _WIDTH = 320.0
 _ROWS, _COLUMNS = ("upper", "middle", "lower"), ("left", "centre", "right")
 

@@ -4,8 +4,6 @@ from calib_core.results import Calibration
 from cocalib.report.markup import Markup, tag
 from cocalib.view.fleet_answer import fleet_axes, fleet_sentences
 
-__all__ = ["fleet_prior"]
-
 _HEADS = ("from the fleet's mean", "fleet", "data alone", "answer")
 _MOST_NAMED = 12
 

@@ -6,8 +6,6 @@ from cocalib.report.markup import Markup, scrolled, tag
 from cocalib.report.residual_rows import ResidualRows
 from cocalib.view.number_format import plain
 
-__all__ = ["pair_table"]
-
 _MOST = 30
 _WORDS = {"used": "● agrees", "disagrees": "✕ disagrees", "excluded": "□ left out"}
 _HEADS = (

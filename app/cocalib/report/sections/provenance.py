@@ -12,8 +12,6 @@ from cocalib.report.markup import Markup, scrolled, tag
 from cocalib.report.subject import ReportSubject
 from cocalib.view.wording import sentence
 
-__all__ = ["provenance"]
-
 _MOST_FILES, _MOST_ROWS = 12, 19
 _RESTS_ON = {
     "clicked": "clicks: solved from pairs of radar positions and clicked pixels",

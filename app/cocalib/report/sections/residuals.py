@@ -11,8 +11,6 @@ from cocalib.report.sections.uncertainty import picture_layer
 from cocalib.report.trends import azimuth_sentence, place_sentence, range_sentence, shift_sentence, time_sentence
 from cocalib.view.number_format import plain
 
-__all__ = ["legend", "residuals"]
-
 _WIDTH = 320.0
 _LONGEST_SHARE = 0.12
 _MOST_DRAWN = 400

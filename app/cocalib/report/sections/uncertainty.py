@@ -6,8 +6,6 @@ from cocalib.report.plots import captioned, drawing, polyline, text
 from cocalib.report.subject import ReportSubject
 from cocalib.view.contours import ContourMap, contour_maps
 
-__all__ = ["picture_layer", "uncertainty"]
-
 _WIDTH = 320.0
 _LINES = ("contour a", "contour b", "contour c")
 

@@ -5,10 +5,11 @@ A session is a folder, `NAME.cocalib-session/`, with `journal.jsonl` (one line p
 them are opened without following links, carry checksums, and are compared with each other before anything is overwritten.
 """
 
+from cocalib.resources import user_session_folder
 from cocalib.session.file.closing import Closed
 from cocalib.session.file.errors import SessionFileError
 from cocalib.session.file.finding import FoundFolder, find_session_folder, has_session_of
-from cocalib.session.file.folders import recording_session_folder, unused_session_folder, user_session_folder
+from cocalib.session.file.folders import recording_session_folder, unused_session_folder
 from cocalib.session.file.listing import SessionSummary, session_summaries
 from cocalib.session.file.remembered import remembered_map
 from cocalib.session.file.repairing import Repair, inspect_session, repair_session

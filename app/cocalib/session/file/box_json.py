@@ -20,21 +20,6 @@ from cocalib.session import (
 )
 from cocalib.session.file.form_parts import StampForm, StepPart
 
-__all__ = [
-    "EVENT_OF",
-    "FORM_OF",
-    "BoxDrawnForm",
-    "BoxHiddenForm",
-    "BoxKeyframeRemovedForm",
-    "BoxLabelledForm",
-    "BoxMovedForm",
-    "BoxRemovedForm",
-    "BoxTrackForm",
-    "BoxesLoadedForm",
-    "form_of_track",
-    "track_from_form",
-]
-
 TrackId: TypeAlias = Annotated[str, Meta(min_length=1, max_length=100)]
 LabelForm: TypeAlias = Annotated[str, Meta(max_length=100)]
 EdgesForm: TypeAlias = tuple[float, float, float, float]

@@ -7,8 +7,6 @@ copies and other programs; someone who edits a session on purpose can calculate 
 import hashlib
 from dataclasses import dataclass
 
-__all__ = ["SealedLine", "line_bytes", "sealed", "taken_apart"]
-
 _DIGITS = 16
 _BEFORE, _AFTER = b',"sum":"', b'"}'
 _LENGTH = len(_BEFORE) + _DIGITS + len(_AFTER)

@@ -7,16 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from calib_core.measurements import ReflectorClick
-from cocalib.resources import version
+from cocalib.resources import user_session_folder, version
 from cocalib.session import BoxesLoaded, ClicksImported, OptionsChanged, Session
 from cocalib.session.file.errors import SessionFileError
-from cocalib.session.file.folders import user_session_folder
 from cocalib.session.file.guarded_folder import GuardedFolder
 from cocalib.session.file.identity import RecordingForm
 from cocalib.session.file.journal import begin_journal
 from cocalib.session.file.snapshot import SNAPSHOT, read_snapshot, write_snapshot
-
-__all__ = ["Closed", "rescued", "snapshot_fault"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,8 +2,6 @@
 
 from calib_core.errors import CalibrationError
 
-__all__ = ["SessionFileError"]
-
 
 class SessionFileError(CalibrationError):
     """A session that cannot be opened, read or written; what is on disk is unchanged."""

@@ -14,8 +14,6 @@ from cocalib.session.file.identity import RecordingForm, has_dates, is_same_reco
 from cocalib.session.file.journal_reading import JOURNAL, read_journal
 from cocalib.session.file.snapshot import SNAPSHOT, read_snapshot
 
-__all__ = ["FoundFolder", "find_session_folder", "has_session_of"]
-
 _HEAD_BYTES = 1 << 16
 
 

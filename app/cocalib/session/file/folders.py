@@ -8,14 +8,6 @@ from pathlib import Path
 
 from cocalib.resources import SESSION_SUFFIX, user_session_folder
 
-__all__ = [
-    "is_writable",
-    "recording_session_folder",
-    "session_folders_in",
-    "unused_session_folder",
-    "user_session_folder",
-]
-
 _SET_ASIDE = re.compile(re.escape(SESSION_SUFFIX) + r"\.[0-9]+$")
 
 

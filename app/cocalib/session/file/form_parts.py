@@ -7,8 +7,6 @@ from msgspec import Meta
 
 from calib_core.measurements import Stamp
 
-__all__ = ["StampForm", "StepPart"]
-
 
 class StampForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A time."""

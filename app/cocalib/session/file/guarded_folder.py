@@ -12,8 +12,6 @@ from pathlib import Path
 
 from cocalib.session.file.errors import SessionFileError
 
-__all__ = ["GuardedFolder", "folder_fault"]
-
 _SAFELY = (
     getattr(os, "O_NOFOLLOW", 0)
     | getattr(os, "O_NONBLOCK", 0)

@@ -11,9 +11,7 @@ from calib_core.arrays import TimesNs
 from calib_core.measurements import Stamp, TimeNs
 from cocalib.session import RecordingFacts
 from cocalib.session.file.errors import SessionFileError
-from cocalib.session.file.step_json import StampForm
-
-__all__ = ["RecordingForm", "facts_of", "has_dates", "is_same_recording", "recording_form", "require_same_recording"]
+from cocalib.session.file.form_parts import StampForm
 
 _FIRST_DATE_S = 631_152_000
 """Earlier stamps count from the start of the recording, or of a simulation: 1990."""

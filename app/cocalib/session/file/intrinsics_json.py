@@ -8,15 +8,6 @@ from msgspec import Meta
 from cocalib.session import ChosenIntrinsics, IntrinsicsChosen
 from cocalib.session.file.form_parts import StepPart
 
-__all__ = [
-    "IntrinsicsChosenForm",
-    "IntrinsicsForm",
-    "chosen_from_form",
-    "form_of_chosen",
-    "form_of_intrinsics",
-    "intrinsics_from_form",
-]
-
 WordsForm: TypeAlias = Annotated[str, Meta(max_length=500)]
 NameForm: TypeAlias = Annotated[str, Meta(max_length=100)]
 PixelCount: TypeAlias = Annotated[int, Meta(ge=1, le=1_000_000)]

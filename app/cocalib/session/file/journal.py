@@ -17,8 +17,6 @@ from cocalib.session.file.identity import RecordingForm
 from cocalib.session.file.journal_reading import JOURNAL, SCHEMA, Head, Line, read_journal
 from cocalib.session.file.step_json import form_of_step
 
-__all__ = ["Journal", "begin_journal"]
-
 
 def begin_journal(
     folder: GuardedFolder, recording: RecordingForm, steps: Sequence[Step], *, cocalib: str, continues: str = ""

@@ -12,18 +12,6 @@ from cocalib.session.file.errors import SessionFileError
 from cocalib.session.file.identity import RecordingForm
 from cocalib.session.file.step_json import StepForm, step_from_form
 
-__all__ = [
-    "JOURNAL",
-    "SCHEMA",
-    "SCHEMA_1",
-    "DoubtfulLine",
-    "FoundJournal",
-    "Head",
-    "Line",
-    "read_journal",
-    "steps_after",
-]
-
 JOURNAL = "journal.jsonl"
 SCHEMA, SCHEMA_1 = "cocalib/session-2", "cocalib/session-1"
 """What is written, and what older versions wrote: lines without checksums."""

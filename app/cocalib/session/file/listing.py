@@ -13,8 +13,6 @@ from cocalib.session.file.lock import lock_holder
 from cocalib.session.file.repairing import inspect_session
 from cocalib.session.file.snapshot import SNAPSHOT
 
-__all__ = ["SessionSummary", "session_summaries"]
-
 
 @dataclass(frozen=True, slots=True)
 class SessionSummary:

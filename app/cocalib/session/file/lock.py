@@ -7,8 +7,6 @@ import sys
 from cocalib.session.file.errors import SessionFileError
 from cocalib.session.file.guarded_folder import GuardedFolder
 
-__all__ = ["LOCK", "FolderLock", "lock_holder"]
-
 LOCK = "lock"
 _LOCKED_BYTE = 1 << 20  # far past the text: Windows does not allow reading a locked byte
 

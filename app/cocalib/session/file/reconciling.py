@@ -18,8 +18,6 @@ from cocalib.session.file.journal_reading import (
 )
 from cocalib.session.file.snapshot import SNAPSHOT, FoundSnapshot, read_snapshot
 
-__all__ = ["Contents", "read_contents"]
-
 
 @dataclass(frozen=True, slots=True)
 class Contents:

@@ -8,8 +8,6 @@ import msgspec
 from cocalib.session.file.errors import SessionFileError
 from cocalib.session.file.guarded_folder import GuardedFolder
 
-__all__ = ["remembered_map"]
-
 _JOURNAL = "journal.jsonl"
 
 

@@ -10,8 +10,6 @@ from cocalib.session.file.lock import FolderLock
 from cocalib.session.file.reconciling import Contents, read_contents
 from cocalib.session.file.rewriting import rewrite
 
-__all__ = ["Repair", "inspect_session", "repair_session"]
-
 
 @dataclass(frozen=True, slots=True)
 class Repair:

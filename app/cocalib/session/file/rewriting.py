@@ -8,8 +8,6 @@ from cocalib.session.file.journal_reading import JOURNAL
 from cocalib.session.file.reconciling import Contents
 from cocalib.session.file.snapshot import SNAPSHOT, write_snapshot
 
-__all__ = ["rewrite"]
-
 
 def rewrite(
     folder: GuardedFolder, found: Contents, recording: RecordingForm

@@ -20,8 +20,6 @@ from cocalib.session.file.reconciling import Contents, read_contents
 from cocalib.session.file.rewriting import rewrite
 from cocalib.session.file.snapshot import SNAPSHOT, write_snapshot
 
-__all__ = ["Restored", "SessionFile", "open_session_file", "set_aside"]
-
 _STEPS_PER_SNAPSHOT = 10
 _log = logging.getLogger(__name__)
 

@@ -39,8 +39,6 @@ from cocalib.session.file.intrinsics_json import IntrinsicsForm, form_of_intrins
 from cocalib.session.file.journal_reading import SCHEMA, SCHEMA_1
 from cocalib.session.file.step_json import ClickForm, PlacementDismissedForm, click_from_form, form_of_click
 
-__all__ = ["SNAPSHOT", "FoundSnapshot", "read_snapshot", "write_snapshot"]
-
 SNAPSHOT = "session.json"
 _DIGITS = 8
 

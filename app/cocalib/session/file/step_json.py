@@ -30,34 +30,6 @@ from cocalib.session.file import box_json as boxes
 from cocalib.session.file.form_parts import StampForm, StepPart
 from cocalib.session.file.intrinsics_json import IntrinsicsChosenForm, chosen_from_form, form_of_chosen
 
-__all__ = [
-    "AssumptionsConfirmedForm",
-    "ClearedForm",
-    "ClickExcludedForm",
-    "ClickForm",
-    "ClickId",
-    "ClickMovedForm",
-    "ClickPlacedForm",
-    "ClickRemovedForm",
-    "ClicksImportedForm",
-    "ColumnsMappedForm",
-    "IntrinsicsChosenForm",
-    "OptionsChangedForm",
-    "PixelForm",
-    "PlacementDismissedForm",
-    "RedoForm",
-    "ReturnChosenForm",
-    "ReturnForm",
-    "StampForm",
-    "StepForm",
-    "UndoForm",
-    "WarningsAcknowledgedForm",
-    "click_from_form",
-    "form_of_click",
-    "form_of_step",
-    "step_from_form",
-]
-
 ClickId: TypeAlias = Annotated[str, Meta(min_length=1, max_length=100)]
 PixelForm: TypeAlias = tuple[float, float]
 PositionForm: TypeAlias = tuple[float, float, float]

@@ -13,8 +13,6 @@ from cocalib.error_boundary import error_boundary
 from cocalib.web.messages import Progress
 from cocalib.workspace import Workspace
 
-__all__ = ["BoxFollowing"]
-
 _AT_ONCE_S = 0.15
 """Work is handed out in pieces of this length: a newer box waits no longer [s]."""
 _TELL_EVERY_S = 0.6

@@ -21,8 +21,6 @@ from cocalib.view.box_panel import AccPanel
 from cocalib.view.box_rows import BoxedReturn, returns_in_frame
 from cocalib.workspace import Judged, Workspace
 
-__all__ = ["BoxJudging"]
-
 _log = logging.getLogger(__name__)
 
 

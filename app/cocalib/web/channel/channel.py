@@ -49,8 +49,6 @@ from cocalib.web.messages import (
 from cocalib.web.radar_sight import look_of, overlay_of
 from cocalib.web.view3d.scene import TabScene
 
-__all__ = ["Channel", "Socket"]
-
 _GREET_EVERY_S = 0.25
 """Minimum time between two greetings of one page, and between two whole Views that it asks for [s]."""
 

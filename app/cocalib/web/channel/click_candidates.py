@@ -7,8 +7,6 @@ from cocalib.session import Session
 from cocalib.solving import RadarSource, window_candidates
 from cocalib.view import PairCandidates, click_candidates, pair_of_click
 
-__all__ = ["candidates_of"]
-
 
 def candidates_of(session: Session, selected: str | None, recording: RadarSource) -> PairCandidates:
     """List the returns that may belong to the selected click; none if there is no such click, or it has no pair.

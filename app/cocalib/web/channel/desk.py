@@ -6,8 +6,6 @@ from typing import Protocol
 from calib_core.errors import InputError
 from cocalib.web.messages import Done, Incoming, OpeningCommand, Outgoing, encode
 
-__all__ = ["ClosedDesk", "Desk", "answer_of"]
-
 
 class Desk(Protocol):
     """Answers what pages ask about the choice of a recording."""

@@ -22,10 +22,7 @@ from calib_core.results import DataWarning
 from cocalib.view import sentence, warning_in_sentences
 from cocalib.web.exports.check_point import CheckPointRow, check_point_row
 from cocalib.web.exports.file_numbers import FileNumbers, PoseInFile, our_numbers, pose_in_file
-from cocalib.web.exports.format_list import FormatRow, format_rows
 from cocalib.web.exports.query import Field, FieldError, Fields, fields_in
-
-__all__ = ["ExportPreview", "FormatRow", "NoPreview", "export_preview", "exported", "format_rows"]
 
 _EVIDENCE: dict[Evidence, str] = {
     "clicked": "Rests on clicks",

@@ -40,8 +40,6 @@ from cocalib.web.messages import (
 from cocalib.web.radar_sight import RadarSight
 from cocalib.workspace import Workspace
 
-__all__ = ["Hub", "Tab"]
-
 _SEARCHING = "Searching the radar data for placements"
 _log = logging.getLogger(__name__)
 

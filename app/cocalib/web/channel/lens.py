@@ -19,8 +19,6 @@ from cocalib.web.channel.outbox import Outbox
 from cocalib.web.messages import LensCalibrate, LensCancel, LensRequest, LensResult, LensState, Outgoing, encode
 from cocalib.workspace import Workspace
 
-__all__ = ["LensDesk"]
-
 _TELL_EVERY_S = 0.2
 """Pages are told of the progress no more often [s]."""
 _log = logging.getLogger(__name__)

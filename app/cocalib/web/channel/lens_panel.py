@@ -26,8 +26,6 @@ from cocalib.web.messages import (
     LensViewRow,
 )
 
-__all__ = ["camera_table", "coverage_of", "lens_result", "view_corners"]
-
 _MOST_RESIDUALS = 3000
 _GRID = (24, 16)
 

@@ -22,8 +22,6 @@ from cocalib.web.channel.radar_survey import GrowingSurvey, Survey
 from cocalib.web.messages import FollowNote, FramesAdded, Outgoing, StampColumns
 from cocalib.workspace import Workspace
 
-__all__ = ["LiveEdge", "Pages"]
-
 _LOOK_EVERY_S = 0.2
 _SURVEY_EVERY_S = 1.0
 _SURVEY_SHARE = 0.2  # of the time, at most, is spent searching for placements

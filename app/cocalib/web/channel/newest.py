@@ -7,8 +7,6 @@ from typing import Generic, TypeVar
 
 from cocalib.error_boundary import error_boundary
 
-__all__ = ["NewestWins"]
-
 Item = TypeVar("Item")
 _log = logging.getLogger(__name__)
 

@@ -7,8 +7,6 @@ from calib_core.errors import InputError
 from calib_core.recordings import Recording
 from cocalib.hypothesis_sheet import OpenMeaning, frame_with_returns, jpeg, tile
 
-__all__ = ["MeaningRow", "MeaningRows", "drawn_meaning", "meaning_rows"]
-
 _WIDTH_PX = 480
 
 

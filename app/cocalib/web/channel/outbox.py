@@ -5,8 +5,6 @@ from collections import OrderedDict
 from collections.abc import Awaitable, Callable, Hashable
 from typing import TypeAlias
 
-__all__ = ["Message", "Outbox"]
-
 Message: TypeAlias = str | bytes | Callable[[], str]
 """What is sent, or a function that writes it when it is sent."""
 

@@ -14,8 +14,6 @@ from calib_core.errors import CalibrationError
 from calib_core.measurements import NS_PER_S
 from calib_core.recordings import Recording
 
-__all__ = ["PictureChanges", "changes_of", "comparison_order"]
-
 _MOST = 300
 """Number of frames that are compared with the next one; more are not visible in the timeline."""
 _REST = 8

@@ -7,8 +7,6 @@ from cocalib.view import Figure
 from cocalib.view.number_format import plain
 from cocalib.web.messages import PlacementRow
 
-__all__ = ["SHORTEST_S", "placement_figures", "placement_note", "placement_summary"]
-
 SHORTEST_S = 2.0
 """A placement lasts at least this long [s]."""
 _SHORT_S = 3.0

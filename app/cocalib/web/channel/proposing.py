@@ -27,8 +27,6 @@ from cocalib.web.messages import (
 )
 from cocalib.workspace import Workspace
 
-__all__ = ["ProposingDesk"]
-
 _TELL_EVERY_S = 0.2
 """Pages are told of changes no more often [s]."""
 _SHORTEST_S = 2.0

@@ -7,8 +7,6 @@ from calib_core.measurements import RadarScans
 from calib_core.options import GatingOptions
 from cocalib.web.messages import RadarMap
 
-__all__ = ["RadarMapSum"]
-
 _CELLS_ACROSS = 600
 _SMALLEST_CELL_M = 0.2
 _MOST_CELLS = 6000

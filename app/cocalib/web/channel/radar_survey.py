@@ -15,8 +15,6 @@ from cocalib.web.channel.placement_words import SHORTEST_S, placement_figures, p
 from cocalib.web.channel.radar_map import RadarMapSum
 from cocalib.web.messages import PlacementRow, Placements, RadarMap
 
-__all__ = ["Activity", "GrowingSurvey", "Survey", "placements_at", "survey_of"]
-
 _MOST_SLICES = 8000
 _AT_RANGE_M = 1.0
 _OWN_RETURNS_M, _OWN_SHARE = 0.5, 0.1

@@ -41,8 +41,6 @@ from cocalib.web.messages.review_messages import (
 )
 from cocalib.workspace import Workspace
 
-__all__ = ["ReviewDesk"]
-
 _Work: TypeAlias = Callable[[], Outgoing]
 
 _LABELS: dict[SolutionKind, str] = {

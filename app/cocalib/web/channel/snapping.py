@@ -11,8 +11,6 @@ from calib_core.vision import Apex, NoApex, find_apex
 from cocalib.web.frames import Frame, FrameStore
 from cocalib.web.messages import Snapped, SnapWanted
 
-__all__ = ["snapped"]
-
 
 async def snapped(wanted: SnapWanted, moments: TimesNs, frames: FrameStore, executor: Executor) -> Snapped:
     """Search for the apex near a pixel.

@@ -24,8 +24,6 @@ from cocalib.web.view3d.scene import TabScene
 from cocalib.web.view3d.sight import Sight
 from cocalib.web.view3d.space_look import space_look
 
-__all__ = ["SpaceFeed", "surveyed_extent"]
-
 _PLAYING_EVERY_S, _LOOKING_EVERY_S = 1.0, 0.34
 """Minimum time between two drawings while playing, with and without pictures: the 3D view shares the page's main thread, and the
 picture comes first [s]."""

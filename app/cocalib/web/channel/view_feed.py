@@ -5,8 +5,6 @@ from dataclasses import dataclass
 from cocalib.view import View
 from cocalib.web.messages import ViewChange, change_between, encode
 
-__all__ = ["Shown", "ViewFeed"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shown:

@@ -9,8 +9,6 @@ from calib_core.camera import Camera
 from calib_core.interchange import CalibrationFile, Format, ImportedCalibration
 from calib_core.measurements import TimeNs
 
-__all__ = ["CheckPointRow", "check_point_row", "picture_of"]
-
 _SAME_M = 2e-3
 """The check point is the true position of a pair, rounded to a millimetre in each coordinate."""
 

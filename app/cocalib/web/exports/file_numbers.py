@@ -8,8 +8,6 @@ import numpy as np
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 from calib_core.interchange import FrameNames, ImportedCalibration, WrittenPose
 
-__all__ = ["FileNumbers", "NumberRow", "PoseInFile", "our_numbers", "pose_in_file"]
-
 _ORDERS = {
     "quaternion_xyzw": ("qx", "qy", "qz", "qw"),
     "quaternion_wxyz": ("qw", "qx", "qy", "qz"),

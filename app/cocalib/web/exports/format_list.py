@@ -4,8 +4,6 @@ from dataclasses import dataclass
 
 from calib_core.interchange import written_formats
 
-__all__ = ["FormatRow", "format_rows"]
-
 
 @dataclass(frozen=True, slots=True)
 class FormatRow:

@@ -8,8 +8,6 @@ from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange import FrameNames, parent_pose
 
-__all__ = ["Field", "FieldError", "Fields", "fields_in"]
-
 Field = Literal["frames", "parent", "rectified"]
 """A part of the panel that the user fills in."""
 

@@ -4,8 +4,6 @@ from dataclasses import dataclass
 
 from cocalib.view.box_rows import BoxedReturn, BoxInFrame
 
-__all__ = ["FrameBoxes"]
-
 
 @dataclass(frozen=True, slots=True)
 class FrameBoxes:

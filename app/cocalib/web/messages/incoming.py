@@ -15,31 +15,11 @@ from calib_core.measurements import TimeNs
 from cocalib.option_changes import changes_from_tree
 from cocalib.session import ClickPlaced, OptionsEdited, Step
 from cocalib.session.file import step_json as forms
+from cocalib.session.file.form_parts import StampForm
 from cocalib.web.messages.lens_messages import LensRequest
 from cocalib.web.messages.opening_messages import ChoicesWanted, FolderWanted, OpeningCommand, OpenWith, RecentForgotten
 from cocalib.web.messages.proposal_messages import ProposingSwitch
 from cocalib.web.messages.review_messages import ReviewRequest
-
-__all__ = [
-    "MAX_TEXT_BYTES",
-    "BoxesWanted",
-    "Command",
-    "CursorMoved",
-    "FollowingStopped",
-    "FrameWanted",
-    "Hello",
-    "ImportWanted",
-    "Incoming",
-    "MessageForm",
-    "ReturnColour",
-    "SnapWanted",
-    "ViewWanted",
-    "Viewpoint",
-    "ViewpointWanted",
-    "is_about_opening",
-    "parse",
-    "request_of",
-]
 
 MAX_TEXT_BYTES = 4 * 1024 * 1024
 """A longer message is refused without parsing; 10,000 clicks take about one megabyte."""
@@ -245,7 +225,7 @@ class ImportForm(_Form, frozen=True, tag="import_clicks"):
 class SnapForm(_Form, frozen=True, tag="snap_wanted"):
     """The reflector's apex near a pixel is requested; one message `snapped` answers."""
 
-    image_time: forms.StampForm
+    image_time: StampForm
     pixel_px: forms.PixelForm
     id: forms.ClickId | None = None
     over_dwell: bool = False

@@ -9,23 +9,6 @@ from msgspec import Meta
 from calib_core.intrinsics import BoardKind
 from calib_core.results import DataWarning
 
-__all__ = [
-    "LensCalibrate",
-    "LensCamera",
-    "LensCancel",
-    "LensCoverage",
-    "LensGrid",
-    "LensLeftOut",
-    "LensParameter",
-    "LensRequest",
-    "LensResult",
-    "LensState",
-    "LensTally",
-    "LensTrial",
-    "LensUse",
-    "LensViewRow",
-]
-
 LensModelName: TypeAlias = Literal["auto", "pinhole", "plumb_bob", "rational_polynomial", "equidistant"]
 Stage: TypeAlias = Literal["idle", "searching", "calibrating", "cancelled", "failed", "done"]
 

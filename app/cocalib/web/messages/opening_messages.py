@@ -6,24 +6,6 @@ from typing import Annotated, Literal, TypeAlias
 import msgspec
 from msgspec import Meta
 
-__all__ = [
-    "MAX_CAMERA_FILE_BYTES",
-    "ChoicesWanted",
-    "DroppedFile",
-    "FolderEntry",
-    "FolderListing",
-    "FolderWanted",
-    "IntrinsicsChoice",
-    "OpenWith",
-    "OpeningChoices",
-    "OpeningCommand",
-    "RecentForgotten",
-    "RecentRecording",
-    "SessionOffer",
-    "SessionPlan",
-    "TopicRow",
-]
-
 MAX_CAMERA_FILE_BYTES = 512 * 1024
 """A file of intrinsics has a few kB; a larger one is refused before it is sent, and again when it arrives."""
 

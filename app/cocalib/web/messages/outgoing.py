@@ -24,28 +24,6 @@ from cocalib.web.messages.review_messages import Uncertainty
 from cocalib.web.messages.space_messages import SpaceLook
 from cocalib.web.messages.view_changes import ViewChange
 
-__all__ = [
-    "TYPES",
-    "Done",
-    "FollowNote",
-    "FrameHeader",
-    "FramesAdded",
-    "Opening",
-    "Outgoing",
-    "Overlay",
-    "OverlayGuess",
-    "OverlayReturn",
-    "Problem",
-    "Progress",
-    "RecordingNote",
-    "SensorNote",
-    "SessionNote",
-    "Snapped",
-    "StampColumns",
-    "encode",
-    "encode_frame",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class StampColumns:

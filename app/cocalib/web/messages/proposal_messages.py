@@ -7,8 +7,6 @@ import msgspec
 
 from calib_core.measurements import Stamp
 
-__all__ = ["ProposalNews", "ProposalPlace", "ProposalRow", "ProposingSwitch", "UnproposedRow"]
-
 Stage: TypeAlias = Literal["off", "looking", "comparing", "ready", "failed"]
 
 

@@ -6,8 +6,6 @@ import msgspec
 
 from cocalib.view import Figure
 
-__all__ = ["PlacementRow", "Placements", "RadarLook", "RadarMap", "RadarReturn"]
-
 
 @dataclass(frozen=True, slots=True)
 class PlacementRow:

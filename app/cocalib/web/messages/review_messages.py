@@ -8,16 +8,6 @@ from msgspec import Meta
 
 from cocalib.view.contours import ContourMap
 
-__all__ = [
-    "CompareForm",
-    "PairReviewForm",
-    "ReviewForm",
-    "ReviewRequest",
-    "SolutionKind",
-    "Uncertainty",
-    "UncertaintyForm",
-]
-
 SolutionKind: TypeAlias = Literal["now", "default", "paper", "toggled", "before", "reference", "file"]
 
 

@@ -5,16 +5,6 @@ from typing import Literal, TypeAlias
 
 import msgspec
 
-__all__ = [
-    "PlacementState",
-    "SpaceLabel",
-    "SpaceLegend",
-    "SpaceLook",
-    "SpacePlacement",
-    "SpaceReflector",
-    "SpaceReturn",
-]
-
 PlacementState: TypeAlias = Literal["open", "clicked", "dismissed"]
 
 

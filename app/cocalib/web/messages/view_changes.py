@@ -7,8 +7,6 @@ from typing import Any
 
 from cocalib.view import ClickRow, View
 
-__all__ = ["ClickChange", "RowValues", "ViewChange", "change_between"]
-
 _VIEW_FIELDS = tuple(field.name for field in fields(View) if field.name != "clicks")
 _ROW_FIELDS = tuple(field.name for field in fields(ClickRow))
 _row_values = attrgetter(*_ROW_FIELDS)

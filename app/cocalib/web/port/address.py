@@ -5,8 +5,6 @@ from pathlib import Path
 
 from calib_core.errors import CalibrationError
 
-__all__ = ["AddressError", "listening_at", "require_address", "require_one_address", "require_token"]
-
 _LAST_PORT = 65535
 _PORTS_TRIED = 1000
 _QUEUE = 100

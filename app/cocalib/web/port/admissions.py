@@ -11,8 +11,6 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 
-__all__ = ["MAX_IDLE_S", "Admissions"]
-
 MAX_IDLE_S = 12 * 3600.0
 """A browser that has neither an open page nor made a request for this long is no longer admitted [s]."""
 _MAX_AGE_S = 7 * 24 * 3600

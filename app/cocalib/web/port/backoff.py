@@ -4,8 +4,6 @@ import asyncio
 import time
 from collections.abc import Callable
 
-__all__ = ["Backoff"]
-
 _FREE_TRIES = 5
 _FIRST_DELAY_S = 0.25
 _LONGEST_DELAY_S = 8.0

@@ -14,8 +14,6 @@ from cocalib.web.port.backoff import Backoff
 from cocalib.web.port.resumption import Resumption
 from cocalib.web.port.routes import Reply, Routes, json_reply, landing, refusal
 
-__all__ = ["MAX_SOCKETS", "Entrance"]
-
 MAX_SOCKETS = 64
 """WebSockets of one browser; a page has two."""
 _METHODS = ("GET", "HEAD")

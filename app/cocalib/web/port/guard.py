@@ -16,8 +16,6 @@ from urllib.parse import parse_qs
 from cocalib.loopback import is_loopback
 from cocalib.web.port.admissions import Admissions
 
-__all__ = ["Admitted", "Allowed", "Guard", "Refused", "Request", "Verdict", "host_name", "is_address"]
-
 _HOST = re.compile(r"(\[[^\]]*\]|[^:\[\]]*)(?::[0-9]*)?")
 _LOOPBACK_NAMES = ("127.0.0.1", "localhost", "[::1]")
 

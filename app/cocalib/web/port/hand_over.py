@@ -12,8 +12,6 @@ from pathlib import Path
 
 from cocalib.resources import state_folder
 
-__all__ = ["HandOver"]
-
 _SNAPS = ("firefox", "chromium", "brave", "opera")
 
 

@@ -19,8 +19,6 @@ from cocalib.web.port.guard import Guard, is_address
 from cocalib.web.port.hand_over import HandOver
 from cocalib.web.port.unix_socket import forwarding_command, listening_socket, remove_socket
 
-__all__ = ["Link", "ServerOptions"]
-
 _FORWARDED_PORT = 8080
 
 

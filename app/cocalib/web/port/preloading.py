@@ -4,8 +4,6 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-__all__ = ["with_preloaded_modules"]
-
 _IMPORT = re.compile(r"""^(?:import|export)\b[^'"();]*?["']\./([a-z0-9_]+\.js)["']""", re.MULTILINE)
 _SCRIPT = re.compile(r'<script type="module" src="([a-z0-9_]+\.js)">')
 

@@ -8,8 +8,6 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = ["Fault", "Head", "read_head"]
-
 Fault = Literal[400, 414, 431, 505]
 MAX_HEAD_BYTES = 64 * 1024
 _MAX_LINE_BYTES = 8 * 1024

@@ -18,8 +18,6 @@ from pathlib import Path
 
 from cocalib.resources import state_folder
 
-__all__ = ["Resumption", "Ticket"]
-
 _KEY_BYTES = 32
 _VALID_S = 24 * 3600
 _CHALLENGE_S = 30.0

@@ -23,18 +23,17 @@ from cocalib.report import current_report
 from cocalib.session import Session
 from cocalib.solving import calibration_text
 from cocalib.view import sentence
-from cocalib.web.channel.export_preview import NoPreview, export_preview, exported, format_rows
+from cocalib.web.channel.export_preview import NoPreview, export_preview, exported
 from cocalib.web.channel.lens import LensDesk
 from cocalib.web.channel.open_meaning import drawn_meaning, meaning_rows
 from cocalib.web.channel.picture_changes import PictureChanges
 from cocalib.web.channel.radar_survey import Survey
 from cocalib.web.exports.check_point import picture_of
+from cocalib.web.exports.format_list import format_rows
 from cocalib.web.exports.query import FieldError
 from cocalib.web.port.preloading import with_preloaded_modules
 from cocalib.web.port.viser_hook import client_page
 from cocalib.workspace import Workspace
-
-__all__ = ["Reply", "Routes", "json_reply", "landing", "refusal"]
 
 _TYPES = {
     ".html": "text/html; charset=utf-8",
@@ -74,11 +73,19 @@ class Surveyor(Protocol):
     """Provides the radar survey once it is complete, how much the pictures change, and the lens, as far as they are known."""
 
     @property
-    def survey(self) -> Survey | None: ...
+    def survey(self) -> Survey | None:
+        """The radar's survey of the recording."""
+        ...
+
     @property
-    def picture_changes(self) -> PictureChanges: ...
+    def picture_changes(self) -> PictureChanges:
+        """How much the pictures change."""
+        ...
+
     @property
-    def lens(self) -> LensDesk: ...
+    def lens(self) -> LensDesk:
+        """The lens of whoever calibrates one."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)

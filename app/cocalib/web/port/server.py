@@ -33,8 +33,6 @@ from cocalib.workspace import Workspace
 if TYPE_CHECKING:
     import viser
 
-__all__ = ["RunningServer", "ServerOptions", "start"]
-
 _AGAIN = 1012
 """The WebSocket's close code for a service that restarts."""
 _log = logging.getLogger(__name__)

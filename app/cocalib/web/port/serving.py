@@ -21,8 +21,6 @@ from cocalib.web.port.server import RunningServer
 from cocalib.web.port.waiting import WaitingRoom
 from cocalib.workspace import Workspace
 
-__all__ = ["ChoosingDesk", "Service"]
-
 _WAIT_S = 0.25
 """A signal is noticed at the latest after this time [s]."""
 _log = logging.getLogger(__name__)

@@ -10,8 +10,6 @@ from pathlib import Path
 
 from cocalib.web.port.address import AddressError
 
-__all__ = ["forwarding_command", "listening_socket", "remove_socket"]
-
 _LONGEST_BYTES = 103
 """macOS allows 103 bytes, Linux 107."""
 

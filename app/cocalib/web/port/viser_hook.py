@@ -21,8 +21,6 @@ from cocalib.web.port.websockets_hook import ProcessRequest, SocketHandler, wrap
 if TYPE_CHECKING:
     import viser
 
-__all__ = ["client_page", "missing_parts", "only_allowed", "path_of_client", "start_viser", "stop_viser"]
-
 _ALLOWED_MESSAGES = ("ViewerCameraMessage",)
 """What our page's 3D view sends: where its camera is. It has no controls, no clicks and no uploads."""
 _MAX_MESSAGE_BYTES = 4096

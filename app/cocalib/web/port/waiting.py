@@ -26,8 +26,6 @@ from cocalib.web.messages import (
     request_of,
 )
 
-__all__ = ["WaitingRoom"]
-
 _log = logging.getLogger(__name__)
 
 _MAX_HELD = 2000

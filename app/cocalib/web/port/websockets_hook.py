@@ -23,8 +23,6 @@ from websockets.http11 import Request, Response
 from cocalib.error_boundary import report_of
 from cocalib.web.port.request_head import Head, read_head
 
-__all__ = ["Connection", "ProcessRequest", "SocketHandler", "head_of", "wrapped_serve"]
-
 ProcessRequest = Callable[[ServerConnection, Request], Awaitable[Response | None]]
 SocketHandler = Callable[[ServerConnection], Awaitable[None]]
 

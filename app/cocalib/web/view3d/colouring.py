@@ -11,8 +11,6 @@ from cocalib.web.view3d.extent import Extent
 from cocalib.web.view3d.returns import Returns
 from cocalib.web.view3d.shapes import DARK, LIGHT
 
-__all__ = ["Colouring", "map_colours"]
-
 _OLDEST_WEIGHT = 0.2
 _BACKGROUND = {False: np.array([13, 16, 20]), True: np.array([233, 236, 240])}
 

@@ -8,8 +8,6 @@ import numpy as np
 from calib_core.arrays import Points3, Values, Vector3
 from cocalib.web.messages import Viewpoint
 
-__all__ = ["UNKNOWN", "Extent", "Stand", "extent_of", "fitted_stand", "ring_ranges_m"]
-
 _MOST = 0.98
 """The extent holds this share of the static returns; the rest may be ghosts or multipath."""
 _MOST_HEIGHTS = (0.05, 0.95)

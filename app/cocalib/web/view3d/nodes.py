@@ -9,8 +9,6 @@ from calib_core.arrays import Points3
 if TYPE_CHECKING:
     import viser
 
-__all__ = ["add_cloud", "add_lines", "fill_cloud", "fill_lines"]
-
 _NOWHERE = np.zeros((1, 3))
 _NO_LINE = np.zeros((1, 2, 3))
 

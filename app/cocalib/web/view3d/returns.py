@@ -15,8 +15,6 @@ from cocalib.web.view3d.nodes import add_cloud, fill_cloud
 if TYPE_CHECKING:
     import viser
 
-__all__ = ["Returns", "SizedClouds", "size_classes"]
-
 SIZES = (0.55, 0.75, 1.0, 1.35, 1.8)
 """Sizes of returns from weak to strong, relative to the middle one."""
 _MIDDLE = len(SIZES) // 2

@@ -29,8 +29,6 @@ from cocalib.web.view3d.surveyed import SurveyNodes
 if TYPE_CHECKING:
     import viser
 
-__all__ = ["FIELD_OF_VIEW_RAD", "LOOK_AT", "STAND_AT", "TabScene"]
-
 STAND_AT, LOOK_AT = (-5.0, 0.0, 3.6), (6.0, 0.0, -0.4)
 """Initial position and target of the 3D view's camera, until the extent of the data is known."""
 

@@ -13,18 +13,6 @@ from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar
 from calib_core.results import Calibration, PairResult
 from cocalib.colours import Colour
 
-__all__ = [
-    "DARK",
-    "LIGHT",
-    "Palette",
-    "ellipsoids",
-    "next_place",
-    "nominal_camera_from_radar",
-    "range_rings",
-    "rays_to",
-    "vertical_field_of_view_rad",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class Palette:

@@ -18,8 +18,6 @@ from cocalib.web.view3d.colouring import Colouring
 from cocalib.web.view3d.extent import Extent
 from cocalib.web.view3d.returns import Returns
 
-__all__ = ["Sight", "true_positions"]
-
 _SAME_PLACE_M = 1.0
 """Of two placements at one time, a pair belongs to the one this close to its return."""
 

@@ -11,8 +11,6 @@ from cocalib.web.view3d.extent import ring_ranges_m
 from cocalib.web.view3d.returns import SIZES, Returns, size_classes
 from cocalib.web.view3d.sight import Sight, true_positions
 
-__all__ = ["ground_m", "space_look"]
-
 _MOST_RETURNS = 3000
 """So many returns can be picked; of more, every other or every tenth and so on."""
 _MOST_IN_WINDOW = 1000

@@ -13,8 +13,6 @@ from cocalib.web.view3d.sight import Sight
 if TYPE_CHECKING:
     import viser
 
-__all__ = ["SurveyNodes"]
-
 _RING_SHARE = 0.025
 """Radius of a placement's ring, as a share of the extent."""
 

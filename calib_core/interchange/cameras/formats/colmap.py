@@ -11,8 +11,6 @@ from calib_core.interchange.own.camera_document import refuse_skew
 from calib_core.interchange.syntax.yaml_text import numbers_text
 from calib_core.lens_models.naming import lenses_named, names_in, written_lens
 
-__all__ = ["COLMAP_CAMERAS", "HALF_PIXEL", "colmap_camera_line", "found_colmap_camera"]
-
 HALF_PIXEL = 0.5
 _ONE_FOCAL = {"SIMPLE_PINHOLE": 0, "SIMPLE_RADIAL": 1, "RADIAL": 2, "SIMPLE_RADIAL_FISHEYE": 1, "RADIAL_FISHEYE": 2}
 """COLMAP's models with one focal length, and how many radial coefficients each has."""

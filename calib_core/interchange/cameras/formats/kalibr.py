@@ -6,8 +6,6 @@ from calib_core.interchange.own.camera_document import refuse_skew
 from calib_core.interchange.syntax.yaml_text import numbers_text, quoted
 from calib_core.lens_models.naming import WrittenLens, written_lens
 
-__all__ = ["KALIBR_CHAIN", "kalibr_camera_text"]
-
 _NO_DISTORTION = "none"
 _NO_DISTORTION_AS_LOADED = WrittenLens("radtan", (0.0, 0.0, 0.0, 0.0))
 """Kalibr names the model "none", but its reader makes no pinhole camera of it."""

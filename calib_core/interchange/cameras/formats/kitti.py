@@ -10,8 +10,6 @@ from calib_core.interchange.own.camera_document import refuse_skew
 from calib_core.interchange.syntax.yaml_text import numbers_text
 from calib_core.lens_models.naming import written_lens
 
-__all__ = ["KITTI_CAMERAS_FILE"]
-
 _KEY = re.compile(r"^(K|D|S|P_rect|S_rect|R_rect|R|T|P)_?(\d{1,2}):\s*(.*)$")
 
 

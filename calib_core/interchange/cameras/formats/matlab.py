@@ -11,8 +11,6 @@ from calib_core.errors import InputError
 from calib_core.interchange.cameras.camera_format import CameraFormat, FoundCamera, OwnSyntax
 from calib_core.interchange.syntax.mat_file import load_mat
 
-__all__ = ["MATLAB_PARAMETERS", "ONE_BASED", "dated_nothing"]
-
 ONE_BASED = 1.0
 _MAT_TEXT_BYTES = 116
 _MAT_5, _MAT_7_3 = b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"

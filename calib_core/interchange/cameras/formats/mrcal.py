@@ -11,8 +11,6 @@ from calib_core.interchange.cameras.numbers import floats
 from calib_core.interchange.own.camera_document import refuse_skew
 from calib_core.interchange.syntax.yaml_text import numbers_text
 
-__all__ = ["MRCAL"]
-
 _COEFFICIENTS = {"LENSMODEL_PINHOLE": 0, "LENSMODEL_OPENCV4": 4, "LENSMODEL_OPENCV5": 5, "LENSMODEL_OPENCV8": 8}
 _MODELS = {0: "pinhole", 4: "plumb_bob", 5: "plumb_bob", 8: "rational_polynomial"}
 _SOLVABLE = "calibrate with LENSMODEL_OPENCV8, or convert it with mrcal-convert-lensmodel"

@@ -10,8 +10,6 @@ from calib_core.interchange.own.camera_document import refuse_skew
 from calib_core.interchange.syntax.yaml_text import numbers_text, quoted
 from calib_core.lens_models.naming import WrittenLens, written_lens
 
-__all__ = ["OPENCV_JSON", "OPENCV_XML", "OPENCV_YAML", "file_storage_matrix"]
-
 
 def file_storage_matrix(key: str, matrix: np.ndarray) -> str:
     """Write a matrix as FileStorage does in YAML."""

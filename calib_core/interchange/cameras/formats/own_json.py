@@ -7,8 +7,6 @@ from calib_core.interchange.cameras.camera_format import CameraFormat
 from calib_core.interchange.own.camera_document import camera_document
 from calib_core.interchange.syntax.json_text import json_text
 
-__all__ = ["OWN_JSON"]
-
 
 def _write(camera: Camera, _name: str) -> str:
     return json_text(msgspec.to_builtins(camera_document(camera)))

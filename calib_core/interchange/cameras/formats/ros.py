@@ -8,8 +8,6 @@ from calib_core.interchange.own.camera_document import refuse_skew
 from calib_core.interchange.syntax.yaml_text import numbers_text, quoted
 from calib_core.lens_models.naming import written_lens
 
-__all__ = ["ROS", "camera_info_text"]
-
 
 def camera_info_text(camera: Camera, name: str = "camera") -> str:
     """Write ROS camera_info YAML (as camera_calibration does), which image pipelines and `--camera` read.

@@ -14,8 +14,6 @@ from calib_core.interchange.imported import ImportedCalibration
 from calib_core.interchange.own.calibration_json import COVARIANCE_CONVENTION
 from calib_core.interchange.syntax.content import Content
 
-__all__ = ["MATLAB"]
-
 _NOTES = (
     "in MATLAB: load radar_camera.mat; tform = rigidtform3d(camera_from_radar.A); intrinsics = "
     "cameraIntrinsicsFromOpenCV(camera.K, camera.Distortion, camera.ImageSize), which counts pixels from 0 as camera.K does; "

@@ -14,8 +14,6 @@ from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoin
 from calib_core.interchange.own.calibration_json import COVARIANCE_CONVENTION
 from calib_core.interchange.rotations import upper_rows
 
-__all__ = ["from_arrays"]
-
 _ROUNDING = 1e-5
 
 

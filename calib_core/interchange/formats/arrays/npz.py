@@ -15,8 +15,6 @@ from calib_core.interchange.own.calibration_json import COVARIANCE_CONVENTION
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.zip_archives import pack_arrays
 
-__all__ = ["NUMPY"]
-
 
 def _write(file: CalibrationFile) -> bytes:
     """Write an npz of plain arrays: numpy.load reads it with allow_pickle=False."""

@@ -17,8 +17,6 @@ from calib_core.interchange.rotations import upper_rows
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import numbers_text
 
-__all__ = ["MATRIX"]
-
 _LARGEST = 1e9
 
 

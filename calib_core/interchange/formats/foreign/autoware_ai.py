@@ -15,8 +15,6 @@ from calib_core.interchange.formats.foreign.pose_parts import direction_by_facin
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.syntax.content import Content
 
-__all__ = ["AUTOWARE_AI"]
-
 _KEY = "CameraExtrinsicMat"
 _ASSUMPTION = (
     f"the file does not say which way {_KEY} goes; read as Autoware.AI publishes it, the camera's pose (optical axes) "

@@ -11,8 +11,6 @@ from calib_core.interchange.formats.foreign.pose_parts import between_named_fram
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.syntax.content import Content
 
-__all__ = ["EASY_HANDEYE"]
-
 
 def _recognizes(content: Content) -> bool:
     given = _parameters(content.mapping)

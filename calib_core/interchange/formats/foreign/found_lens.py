@@ -7,8 +7,6 @@ import numpy as np
 from calib_core.interchange.cameras.camera_format import FoundCamera
 from calib_core.interchange.imported import ImportedCalibration
 
-__all__ = ["pinhole_matrix", "with_camera"]
-
 
 def with_camera(found: ImportedCalibration, camera: FoundCamera | None, *, source: str) -> ImportedCalibration:
     """Return what was read with its camera; without an image size the camera is completed later, by `camera_for`.

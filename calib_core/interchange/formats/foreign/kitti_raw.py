@@ -15,8 +15,6 @@ from calib_core.interchange.formats.foreign.pose_parts import rigid
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.syntax.content import Content
 
-__all__ = ["KITTI_ODOMETRY", "KITTI_RAW"]
-
 _CAMERAS = "calib_cam_to_cam.txt"
 _AS_RADAR = "the Velodyne's frame is taken to be the radar's; KITTI has no radar"
 _UNDISTORTED = "assumed that the pictures are undistorted, those of image_02"

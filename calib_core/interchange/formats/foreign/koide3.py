@@ -26,8 +26,6 @@ from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.json_text import json_text
 from calib_core.lens_models.naming import written_lens
 
-__all__ = ["KOIDE3"]
-
 _NUMBERS = "T_lidar_camera: pose of the camera (optical) in the radar, x y z qx qy qz qw"
 _NOTES = ("the radar takes the place of the lidar; image_size is our own key, the tool has none",)
 _KEY = "T_lidar_camera"

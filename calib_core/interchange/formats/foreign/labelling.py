@@ -15,8 +15,6 @@ from calib_core.interchange.formats.foreign.pose_parts import named_numbers, rig
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.syntax.content import Content
 
-__all__ = ["SCALE", "SEGMENTS"]
-
 _AS_RADAR = "the sensor that the file calls {} is taken to be the radar, x forward, y left, z up"
 _OPENGL_FROM_OPTICAL = RigidTransform(np.diag([1.0, -1.0, -1.0]), np.zeros(3))
 _BROWN = ("k1", "k2", "p1", "p2", "k3")

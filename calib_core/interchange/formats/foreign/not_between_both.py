@@ -8,8 +8,6 @@ from calib_core.errors import InputError
 from calib_core.interchange.format import Reads
 from calib_core.interchange.syntax.content import Content
 
-__all__ = ["KALIBR_CHAIN", "KITTI_CAMERAS", "K_RADAR_CAMERA", "K_RADAR_OFFSET"]
-
 _OFFSET_HEADER = re.compile(r"frame difference\s*,\s*x\s*,\s*y", re.IGNORECASE)
 
 

@@ -30,8 +30,6 @@ from calib_core.interchange.imported import (
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.json_text import json_text
 
-__all__ = ["OPENLABEL"]
-
 _NUMBERS = "pose_wrt_parent: pose of the camera (optical) in its parent, the radar; matrix by rows"
 _ASSUMPTIONS = (
     "assumed that pose_wrt_parent is the pose in the parent, as the standard words it; some data sets write the inverse",

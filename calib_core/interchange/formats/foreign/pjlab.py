@@ -25,8 +25,6 @@ from calib_core.interchange.imported import (
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.json_text import json_text
 
-__all__ = ["PJLAB"]
-
 _NUMBERS = "sensor_calib.data carries radar points into the camera (p_target = matrix p_sensor)"
 _CV_64F = 6
 

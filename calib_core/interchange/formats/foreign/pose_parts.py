@@ -20,8 +20,6 @@ from calib_core.interchange.imported import (
     posed_between,
 )
 
-__all__ = ["AXES_ASSUMED", "between_named_frames", "direction_by_facing", "named_numbers", "rigid", "rigid_matrix"]
-
 AXES_ASSUMED = "assumed a radar frame with x forward, y left, z up, and a camera frame with optical axes (z forward)"
 """For formats that name both sensors but say nothing of their axes."""
 

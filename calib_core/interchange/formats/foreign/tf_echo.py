@@ -13,8 +13,6 @@ from calib_core.interchange.formats.foreign.pose_parts import between_named_fram
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.syntax.content import Content
 
-__all__ = ["TF_ECHO"]
-
 _LIST = r"\[([^\]]*)\]"
 _TRANSLATION = re.compile(rf"Translation:\s*{_LIST}")
 _QUATERNION = re.compile(rf"in Quaternion(?: \(xyzw\))?\s*{_LIST}")

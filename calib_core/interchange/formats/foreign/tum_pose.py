@@ -10,8 +10,6 @@ from calib_core.interchange.formats.foreign.pose_parts import direction_by_facin
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.syntax.content import Content
 
-__all__ = ["TUM_POSE"]
-
 _COUNT = 8
 _UNIT_LENGTH = 1e-2
 _NAMED = {

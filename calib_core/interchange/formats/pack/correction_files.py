@@ -10,8 +10,6 @@ from calib_core.interchange.syntax.zip_archives import pack
 from calib_core.radar import AngleMap
 from calib_core.results import Calibration
 
-__all__ = ["correction_files"]
-
 _MAP_CSV = "radar_angle_map.csv"
 _MAP_NPZ = "radar_angle_map.npz"
 

@@ -22,8 +22,6 @@ from calib_core.interchange.own.calibration_json import write_calibration
 from calib_core.interchange.syntax.content import Content, readings
 from calib_core.interchange.syntax.zip_archives import pack
 
-__all__ = ["PACK"]
-
 _CALIBRATION = "calibration.json"
 _README = "README.txt"
 _TRANSFORMS = (TF2, TF2_LAUNCH_PY, TF2_LAUNCH_XML, TF1_LAUNCH, URDF)

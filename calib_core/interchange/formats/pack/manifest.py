@@ -6,8 +6,6 @@ from collections.abc import Mapping
 
 from calib_core.errors import InputError
 
-__all__ = ["MANIFEST", "manifest_text", "verify"]
-
 MANIFEST = "SHA256SUMS"
 _LINE = re.compile(r"([0-9a-f]{64}) [ *](.+)")
 

@@ -10,8 +10,6 @@ from calib_core.interchange.origin import missing_map, origin_lines
 from calib_core.interchange.syntax.yaml_text import numbers_text, quoted
 from calib_core.radar import RadarErrors
 
-__all__ = ["readme_text"]
-
 _WIDTH = 110
 _FILES = {
     "calibration.json": "the calibration itself (cocalib/calibration-1): pose, covariance, lens, pairs, warnings, provenance",

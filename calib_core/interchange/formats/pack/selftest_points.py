@@ -8,8 +8,6 @@ from calib_core.interchange.syntax.yaml_text import number_text
 from calib_core.radar import polar_from_cartesian
 from calib_core.results import Calibration
 
-__all__ = ["selftest_csv"]
-
 _POINTS = 10
 _PICTURE_SHARES = (0.06, 0.28, 0.5, 0.72, 0.94)
 _RANGES_M = (4.0, 8.0, 15.0, 30.0, 60.0, 11.0, 22.0)  # as many as have no divisor in common with the rows and columns

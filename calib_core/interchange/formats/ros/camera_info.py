@@ -6,8 +6,6 @@ from calib_core.interchange.format import Format
 from calib_core.interchange.formats.statement import hash_comment, statement
 from calib_core.interchange.own.camera_document import refuse_skew
 
-__all__ = ["CAMERA_INFO"]
-
 _NUMBERS = "camera_matrix (K), distortion (D), rectification (R, identity) and projection (P); no pose"
 _NOTES = ("contains the camera only, without the pose: also export a format with the pose, such as tf2 or urdf",)
 

@@ -22,8 +22,6 @@ from calib_core.interchange.formats.statement import POSE_ONLY, hash_comment, st
 from calib_core.interchange.imported import ImportedCalibration
 from calib_core.interchange.syntax.content import Content
 
-__all__ = ["TF1_LAUNCH", "TF2_LAUNCH_PY", "TF2_LAUNCH_XML", "write_python", "write_ros1_xml", "write_ros2_xml"]
-
 
 def write_python(file: CalibrationFile, child: ChildFrame | None = None) -> str:
     """Write a ROS 2 launch file in Python."""

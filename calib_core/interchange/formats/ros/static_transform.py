@@ -16,19 +16,6 @@ from calib_core.interchange.imported import Form, ImportedCalibration, WrittenPo
 from calib_core.interchange.rotations import quaternion_xyzw_from_matrix
 from calib_core.interchange.syntax.yaml_text import number_text, numbers_text, quoted
 
-__all__ = [
-    "LABELS",
-    "NUMBERS",
-    "PUBLISHER",
-    "ChildFrame",
-    "child_of",
-    "from_publishers",
-    "meaning",
-    "pose_numbers",
-    "radar_from_child",
-    "second_parent_notes",
-]
-
 PUBLISHER = "static_transform_publisher"
 _DRIVERS_ENDING = "_optical_frame"
 LABELS = ("--x", "--y", "--z", "--qx", "--qy", "--qz", "--qw")

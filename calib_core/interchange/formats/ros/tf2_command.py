@@ -20,8 +20,6 @@ from calib_core.interchange.formats.statement import POSE_ONLY, hash_comment, st
 from calib_core.interchange.imported import ImportedCalibration
 from calib_core.interchange.syntax.content import Content
 
-__all__ = ["TF2", "write_command"]
-
 
 def write_command(file: CalibrationFile, child: ChildFrame | None = None) -> str:
     """Write the ROS 2 command that publishes the camera's pose in the radar frame."""

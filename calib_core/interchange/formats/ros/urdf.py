@@ -36,8 +36,6 @@ from calib_core.interchange.rotations import (
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import numbers_text
 
-__all__ = ["URDF", "write_joint"]
-
 
 def _write(file: CalibrationFile) -> str:
     """Write a robot of three links, whose two joints can be copied into another URDF."""

@@ -13,8 +13,6 @@ from calib_core.interchange.syntax.yaml_places import PlacedValue, placed_yaml
 from calib_core.interchange.trees.joint import Joint, JointNumbers, Place
 from calib_core.interchange.trees.tree_part import TreePart
 
-__all__ = ["read_autoware", "recognizes_autoware"]
-
 _KEYS = ("x", "y", "z", "roll", "pitch", "yaw")
 _ANGLES = {"roll", "pitch", "yaw"}
 

@@ -4,8 +4,6 @@ from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.trees.frame_tree import Sensor
 from calib_core.interchange.trees.tree_part import TreePart
 
-__all__ = ["cameras_named_in"]
-
 
 def cameras_named_in(content: Content) -> TreePart | None:
     """Return the camera whose frame a CameraInfo in YAML names; None if it is no such file.

@@ -11,8 +11,6 @@ from calib_core.interchange.trees.frame_tree import Sensor
 from calib_core.interchange.trees.joint import Joint, Place
 from calib_core.interchange.trees.tree_part import TreePart
 
-__all__ = ["has_one_of_each", "read_driveworks", "recognizes_driveworks"]
-
 _POSE = "nominalSensor2Rig_FLU"
 _RIG = "rig"
 _NOTE = "the format defines the camera axes as body axes (x forward, y left, z up)"

@@ -13,8 +13,6 @@ from calib_core.interchange.trees.frame_tree import Sensor
 from calib_core.interchange.trees.joint import Joint, Place
 from calib_core.interchange.trees.tree_part import TreePart
 
-__all__ = ["has_several_transforms", "read_foxglove", "recognizes_foxglove"]
-
 _NUMBERS = (("translation", "xyz"), ("rotation", "xyzw"))
 
 

@@ -12,8 +12,6 @@ from calib_core.interchange.trees.frame_tree import Sensor
 from calib_core.interchange.trees.joint import Joint, Place
 from calib_core.interchange.trees.tree_part import TreePart
 
-__all__ = ["read_nuscenes", "recognizes_poses", "recognizes_sensors"]
-
 _EGO = "ego"
 _NOTE = "nuScenes' camera frames have optical axes, and its pictures are undistorted"
 

@@ -14,8 +14,6 @@ from calib_core.interchange.syntax.xml_places import placed_xml
 from calib_core.interchange.trees.joint import Joint, JointNumbers, Place, Slot
 from calib_core.interchange.trees.tree_part import TreePart
 
-__all__ = ["PUBLISHER", "read_publishers", "recognizes_publishers"]
-
 PUBLISHER = "static_transform_publisher"
 _QUATERNION = ("qx", "qy", "qz", "qw")
 _WORD = re.compile(r"""(?:"[^"\n]*"|'[^'\n]*'|[^\s"'\\;&|])+""")

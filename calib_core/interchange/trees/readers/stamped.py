@@ -12,8 +12,6 @@ from calib_core.interchange.syntax.yaml_places import PlacedValue, placed_yaml
 from calib_core.interchange.trees.joint import Joint, JointNumbers, Place
 from calib_core.interchange.trees.tree_part import TreePart
 
-__all__ = ["read_stamped", "recognizes_stamped"]
-
 _NUMBERS = (("translation", "xyz"), ("rotation", "xyzw"))
 
 

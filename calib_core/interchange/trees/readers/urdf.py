@@ -12,8 +12,6 @@ from calib_core.interchange.syntax.xml_places import PlacedElement, placed_xml
 from calib_core.interchange.trees.joint import Joint, JointNumbers, Place, Slot
 from calib_core.interchange.trees.tree_part import TreePart
 
-__all__ = ["XACRO_COMMAND", "read_urdf", "recognizes_urdf"]
-
 XACRO_COMMAND = "expand it first: xacro FILE.xacro > FILE.urdf"
 _EXPRESSION = re.compile(r"\$[({]")
 _HARMLESS = {"xacro:property", "xacro:arg"}

@@ -20,8 +20,6 @@ from calib_core.recordings.containers.mcap.records import (
 from calib_core.recordings.containers.mcap.recovery import FoundInMcap, Part, parts_of_mcap
 from calib_core.recordings.containers.positioned_reads import FileBytes, FileStretch
 
-__all__ = ["account_for_mcap"]
-
 _PIECE_BYTES = 1 << 20
 _KINDS: dict[int, ByteKind] = {MESSAGE: "messages", MESSAGE_INDEX: "index"}
 

@@ -28,8 +28,6 @@ from calib_core.recordings.containers.mcap.writing import AttachmentHead, McapWr
 from calib_core.recordings.containers.positioned_reads import FileStretch
 from calib_core.recordings.containers.stored_channels import StoredChannel
 
-__all__ = ["BesidesMessages", "besides_messages", "copy_besides", "sent"]
-
 _PIECE_BYTES = 1 << 20
 _HEAD_BYTES = 1 << 16
 _TAIL_BYTES = 37

@@ -11,8 +11,6 @@ from calib_core.recordings.containers.mcap.recovery import FoundInMcap, scan_fur
 from calib_core.recordings.containers.sources import Heads, MessageIndex
 from calib_core.results import DataWarning
 
-__all__ = ["GrowingMcap"]
-
 
 class GrowingMcap(McapSource):
     """An MCAP file that is still being written: its complete records are indexed as they come."""

@@ -40,8 +40,6 @@ from calib_core.results import DataWarning
 if TYPE_CHECKING:
     from calib_core.recordings.containers.positioned_reads import FileBytes
 
-__all__ = ["MAGIC", "McapSource"]
-
 _INDEX_ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
 _TAIL_BYTES = 37
 _PIECE_BYTES = 1 << 20

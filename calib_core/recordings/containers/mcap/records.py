@@ -8,42 +8,6 @@ from calib_core.recordings.containers.positioned_reads import Stretch
 from calib_core.recordings.containers.sources import Channel
 from calib_core.recordings.containers.stored_channels import ChannelNotes, StoredChannel
 
-__all__ = [
-    "ATTACHMENT",
-    "ATTACHMENT_INDEX",
-    "BETWEEN_CHUNKS",
-    "CHANNEL",
-    "CHUNK",
-    "CHUNK_INDEX",
-    "CHUNK_KINDS",
-    "DATA_END",
-    "DATA_KINDS",
-    "FOOTER",
-    "HEADER",
-    "MAGIC",
-    "MAX_RECORD_BYTES",
-    "MESSAGE",
-    "MESSAGE_HEAD",
-    "MESSAGE_INDEX",
-    "METADATA",
-    "METADATA_INDEX",
-    "PRIVATE",
-    "RECORD",
-    "SCHEMA",
-    "STATISTICS",
-    "SUMMARY_KINDS",
-    "SUMMARY_OFFSET",
-    "ChunkHead",
-    "ChunkInfo",
-    "Declarations",
-    "chunk_head",
-    "chunk_info",
-    "crc_position",
-    "statistics",
-    "string_at",
-    "walk",
-]
-
 MAGIC = b"\x89MCAP0\r\n"
 FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = 2, 3, 4, 5, 6, 7, 8
 STATISTICS, DATA_END = 11, 15

@@ -30,8 +30,6 @@ from calib_core.recordings.containers.mcap.records import (
 )
 from calib_core.recordings.containers.positioned_reads import FileBytes, FileStretch, MemoryStretch, Stretch
 
-__all__ = ["FoundInMcap", "Part", "parts_of_mcap", "scan_further", "scan_mcap"]
-
 _CANDIDATE = re.compile(rb"[\x03-\x06][\x00-\xff]{4}\x00\x00\x00\x00")
 _COMPRESSIONS = ("", "lz4", "zstd")
 _MAX_TRIES = 20_000

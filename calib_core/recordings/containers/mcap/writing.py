@@ -29,8 +29,6 @@ from calib_core.recordings.containers.mcap.records import (
 )
 from calib_core.recordings.containers.stored_channels import StoredChannel
 
-__all__ = ["AttachmentHead", "ChunkCompression", "McapWriter"]
-
 ChunkCompression = Literal["", "lz4", "zstd"]
 
 _CHUNK_BYTES = 1 << 22

@@ -6,8 +6,6 @@ from calib_core.recordings.containers.indexed_places import IndexedPlaces
 from calib_core.recordings.containers.positioned_reads import FileBytes, FileStretch
 from calib_core.recordings.containers.rosbag1.recovery import BagWalk, FoundInBag, Record, note_record, scan_chunk
 
-__all__ = ["account_for_bag"]
-
 _MAGIC_BYTES = 13
 _BAG_HEADER, _INDEX, _CHUNK, _CHUNK_INFO = 3, 4, 5, 6
 

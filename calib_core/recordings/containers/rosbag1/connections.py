@@ -9,8 +9,6 @@ from calib_core.recordings.containers.rosbag1.recovery import scan_bag
 from calib_core.recordings.containers.rosbag1.tail import CONNECTION, record_head
 from calib_core.recordings.containers.stored_channels import StoredChannel
 
-__all__ = ["stored_connections"]
-
 _MAGIC_BYTES = len(b"#ROSBAG V2.0\n")
 _OWN_FIELDS = ("topic", "type", "message_definition")
 

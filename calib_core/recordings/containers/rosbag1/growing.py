@@ -12,8 +12,6 @@ from calib_core.recordings.containers.rosbag1.recovery import FoundInBag, scan_f
 from calib_core.recordings.containers.sources import Heads, MessageIndex
 from calib_core.results import DataWarning
 
-__all__ = ["GrowingBag"]
-
 _INDEX_POSITION = re.compile(rb"index_pos=([\x00-\xff]{8})")
 _HEADER_BYTES = 4096
 

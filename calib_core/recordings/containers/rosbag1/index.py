@@ -12,8 +12,6 @@ from calib_core.recordings.containers.rosbag1.records import fields_of
 from calib_core.recordings.containers.rosbag1.tail import ChunkInfo, damaged
 from calib_core.recordings.containers.sources import MessageIndex
 
-__all__ = ["BagIndex", "read_indexes"]
-
 _CHUNK = 5
 _INDEX, _CONNECTION = b"\x04", b"\x07"
 _U32 = struct.Struct("<I")

@@ -30,8 +30,6 @@ from calib_core.recordings.containers.sources import Channel, MessageIndex
 if TYPE_CHECKING:
     from calib_core.recordings.containers.positioned_reads import FileBytes
 
-__all__ = ["Rosbag1Source", "channels_of"]
-
 _MAGIC = re.compile(rb"#ROSBAG V(\d+)\.(\d+)\n")
 _MESSAGE, _BAG_HEADER = 2, 3
 _U32 = struct.Struct("<I")

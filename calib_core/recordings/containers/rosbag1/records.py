@@ -2,8 +2,6 @@
 
 import struct
 
-__all__ = ["fields_of"]
-
 _U32 = struct.Struct("<I")
 
 

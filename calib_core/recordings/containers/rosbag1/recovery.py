@@ -15,8 +15,6 @@ from calib_core.recordings.containers.compression import refuse_bomb, unpack, un
 from calib_core.recordings.containers.positioned_reads import FileBytes, FileStretch, MemoryStretch, Stretch
 from calib_core.recordings.containers.rosbag1.records import fields_of
 
-__all__ = ["BagWalk", "FoundInBag", "Record", "note_record", "scan_bag", "scan_chunk", "scan_further"]
-
 _MESSAGE, _CHUNK, _CONNECTION = 2, 5, 7
 _OTHER_KINDS = frozenset({3, 4, 6})  # the bag's header, and its index
 _U32 = struct.Struct("<I")

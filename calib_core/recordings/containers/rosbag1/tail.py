@@ -10,8 +10,6 @@ from calib_core.recordings.containers.positioned_reads import FileBytes, FileStr
 from calib_core.recordings.containers.rosbag1.records import fields_of
 from calib_core.recordings.containers.sources import Channel
 
-__all__ = ["CONNECTION", "ChunkInfo", "channel_of", "counts_of", "damaged", "first_chunks", "read_tail", "record_head"]
-
 _CHUNK_INFO, CONNECTION = 6, 7
 _U32 = struct.Struct("<I")
 _MAX_HEADER_BYTES = 1 << 24

@@ -9,8 +9,6 @@ import numpy as np
 from calib_core.recordings.containers.accounts import AccountBuilder, ByteKind, FileAccount, Progress
 from calib_core.recordings.containers.positioned_reads import FileBytes, FileStretch
 
-__all__ = ["account_for_database"]
-
 _HEAD_BYTES = 100
 _TABLE_LEAF, _TABLE_BRANCH, _INDEX_LEAF, _INDEX_BRANCH = 13, 5, 10, 2
 _KINDS: tuple[ByteKind, ...] = ("unknown", "messages", "records", "index", "padding", "damaged")

@@ -20,8 +20,6 @@ from calib_core.recordings.containers.sqlite.reader import SqliteSource
 from calib_core.recordings.containers.sqlite.recovery import open_database, rows_after
 from calib_core.results import DataWarning
 
-__all__ = ["GrowingDatabase"]
-
 _LOOKS_AFTER_A_CHANGE = 5
 _NOT_SEEN = (-1, -1)
 _VERSIONS = slice(18, 20)

@@ -31,8 +31,6 @@ from calib_core.results import DataWarning
 if TYPE_CHECKING:
     from calib_core.recordings.containers.positioned_reads import FileBytes
 
-__all__ = ["MAGIC", "SqliteSource"]
-
 MAGIC = b"SQLite format 3\0"
 _FORMATS = {"ros2msg": "msg", "ros2idl": "idl"}
 _QUALITY = "offered_qos_profiles"

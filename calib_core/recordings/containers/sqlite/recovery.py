@@ -16,17 +16,6 @@ from calib_core.errors import RecordingError
 from calib_core.recordings.containers.positioned_reads import FileBytes
 from calib_core.results import DataWarning
 
-__all__ = [
-    "FoundRows",
-    "about_rows",
-    "connect",
-    "damaged_database",
-    "first_rows",
-    "open_database",
-    "rows_after",
-    "scan_rows",
-]
-
 _MAX_VALUE_BYTES = 1 << 28
 _BATCH_ROWS = 20_000
 _MAX_FAULTS = 4000

@@ -10,8 +10,6 @@ from calib_core.recordings.field_words.spellings import SPELLINGS, Spelling
 from calib_core.recordings.field_words.units import dimension_of, unit_of_word, unit_of_words
 from calib_core.recordings.field_words.words import SUBJECTS, words_of
 
-__all__ = ["COLUMN_SPELLINGS", "TIME_QUANTITIES", "ColumnName", "read_column_name"]
-
 _TIMES: Mapping[str, str] = {
     "time": "time timestamp stamp t epoch unixtime unixtimestamp headerstamp datetime utc utctime timeutc timeofmeasurement "
     "measurementtime rostime ts gpstime timegps",

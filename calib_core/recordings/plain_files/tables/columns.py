@@ -17,8 +17,6 @@ from calib_core.recordings.plain_files.tables.column_names import (
 )
 from calib_core.recordings.plain_files.tables.text_tables import TABLE_EXAMPLE
 
-__all__ = ["QUANTITIES", "TableColumn", "TableColumns", "choose_columns", "units_of"]
-
 QUANTITIES: tuple[str, ...] = tuple(name for name in COLUMN_SPELLINGS if name not in TIME_QUANTITIES)
 """What a column of numbers may hold, and the name it has from then on."""
 

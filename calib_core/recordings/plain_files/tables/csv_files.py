@@ -17,8 +17,6 @@ from calib_core.recordings.plain_files.tables.columns import TableColumns, units
 from calib_core.recordings.plain_files.tables.text_tables import TABLE_EXAMPLE, TableRows, TextTable
 from calib_core.recordings.plain_files.tables.times import TimeReader
 
-__all__ = ["CSV_EXAMPLE", "csv_columns", "first_rows", "read_rows", "require_header"]
-
 CSV_EXAMPLE = TABLE_EXAMPLE
 _SAMPLED_ROWS = 2000
 _SHOWN_SPELLINGS = 18

@@ -16,8 +16,6 @@ from calib_core.recordings.plain_files.tables.columns import TableColumns
 from calib_core.recordings.plain_files.tables.text_tables import TableRows
 from calib_core.recordings.plain_files.tables.times import TimeReader
 
-__all__ = ["JsonTable", "open_json_table", "read_json_rows"]
-
 _MAX_BYTES = 1 << 28
 _SAMPLED_ROWS = 500
 _DECODER = json.JSONDecoder(parse_float=str, parse_int=str, parse_constant=str)

@@ -27,15 +27,6 @@ from calib_core.recordings.plain_files.tables.text_tables import TABLE_EXAMPLE, 
 from calib_core.recordings.plain_files.tables.times import TimeReader, time_reader
 from calib_core.recordings.plain_files.tables.units import TableUnits, settle_units
 
-__all__ = [
-    "JSON_SUFFIXES",
-    "TABLE_SUFFIXES",
-    "is_one_scan_each",
-    "open_radar_table",
-    "open_table_folder",
-    "table_fault",
-]
-
 JSON_SUFFIXES = (".json", ".jsonl", ".ndjson")
 TABLE_SUFFIXES = (".csv", ".tsv", ".txt", *JSON_SUFFIXES)
 _SAMPLED_FILES = 12

@@ -18,8 +18,6 @@ from calib_core.recordings.plain_files.tables.text_tables import TableRows
 from calib_core.recordings.plain_files.tables.units import TableUnits, settle_units
 from calib_core.results import DataWarning
 
-__all__ = ["ReturnTable", "computed_words", "points_of", "source_of", "table_words"]
-
 RADAR_FRAME = "radar"
 _MOST_NAMES = 8
 

@@ -14,8 +14,6 @@ from calib_core.arrays import TimesNs
 from calib_core.errors import RecordingError
 from calib_core.recordings.plain_files.tables.column_names import read_column_name
 
-__all__ = ["TABLE_EXAMPLE", "TableRows", "TextTable", "open_text_table"]
-
 TABLE_EXAMPLE = "time_ns,x_m,y_m,z_m,doppler_mps,snr_db"
 _SEPARATORS = (",", ";", "\t", "|", " ")
 _HEAD_BYTES = 1 << 16

@@ -13,8 +13,6 @@ from calib_core.recordings.plain_files.tables.columns import TableColumn, TableC
 from calib_core.recordings.time.written_dates import date_text
 from calib_core.recordings.time.written_times import TimeUnit, read_time, unit_of_epoch
 
-__all__ = ["TimeReader", "time_reader"]
-
 _SCALES: dict[TimeUnit, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _USUAL_STEP_S = 0.07
 _GPS_EPOCH_S = 315_964_800

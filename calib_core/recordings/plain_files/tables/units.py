@@ -11,8 +11,6 @@ from calib_core.recordings.column_map import MappedColumn
 from calib_core.recordings.plain_files.reading_options import PlainOptions
 from calib_core.recordings.plain_files.tables.columns import TableColumn, TableColumns, units_of
 
-__all__ = ["TableUnits", "settle_units"]
-
 _SAMPLED_ROWS = 20_000
 _LENGTHS = ("x", "y", "z", "range")
 _SPEEDS = ("doppler", "vx", "vy", "vz")

@@ -8,13 +8,12 @@ import numpy as np
 from calib_core.recordings.messages.decoding import Message, decode
 from calib_core.recordings.messages.definitions import PRIMITIVES, Definition
 from calib_core.recordings.radar.column_mapping import StatedReading
+from calib_core.recordings.radar.column_plan import ColumnPlan
 from calib_core.recordings.radar.column_plans import find_decoder, plan_described, plan_for
-from calib_core.recordings.radar.columns import ColumnPlan, Returns, no_returns, returns_from
+from calib_core.recordings.radar.columns import Returns, no_returns, returns_from
 from calib_core.recordings.radar.message_layouts.samples import Samples
 from calib_core.recordings.radar.message_layouts.struct_lists import count_field
 from calib_core.recordings.radar.self_describing.candidates import DescribedColumn
-
-__all__ = ["ArrayLayout"]
 
 _NOTHING = StatedReading()
 

@@ -8,13 +8,12 @@ from calib_core.errors import MessageError
 from calib_core.recordings.messages.decoding import Message, decode
 from calib_core.recordings.messages.definitions import Definition
 from calib_core.recordings.radar.column_mapping import StatedReading
+from calib_core.recordings.radar.column_plan import ColumnPlan
 from calib_core.recordings.radar.column_plans import plan_described
-from calib_core.recordings.radar.columns import ColumnPlan, Returns, no_returns, returns_from
+from calib_core.recordings.radar.columns import Returns, no_returns, returns_from
 from calib_core.recordings.radar.message_layouts.point_clouds import lidar_like
 from calib_core.recordings.radar.message_layouts.samples import Samples
 from calib_core.recordings.radar.self_describing.candidates import DescribedColumn
-
-__all__ = ["ChannelCloudLayout", "is_channel_cloud"]
 
 _NOTHING = StatedReading()
 

@@ -10,13 +10,11 @@ from calib_core.recordings.field_words.words import has_word
 from calib_core.recordings.messages.decoding import Message, decode
 from calib_core.recordings.messages.definitions import Definition
 from calib_core.recordings.radar.column_mapping import StatedReading
-from calib_core.recordings.radar.column_plan import ColumnAssumption
+from calib_core.recordings.radar.column_plan import ColumnAssumption, ColumnPlan
 from calib_core.recordings.radar.column_plans import find_decoder, plan_described
-from calib_core.recordings.radar.columns import ColumnPlan, Returns, no_returns, returns_from
+from calib_core.recordings.radar.columns import Returns, no_returns, returns_from
 from calib_core.recordings.radar.message_layouts.samples import Samples, described, leaf_names
 from calib_core.recordings.radar.message_layouts.struct_lists import ListPlace, count_field, joined, struct_lists
-
-__all__ = ["ListLayout"]
 
 _NOTHING = StatedReading()
 

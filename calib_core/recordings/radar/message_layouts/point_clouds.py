@@ -12,12 +12,11 @@ from calib_core.errors import MessageError
 from calib_core.recordings.messages.decoding import Message, decode, payload_byte_order
 from calib_core.recordings.messages.definitions import Definition
 from calib_core.recordings.radar.column_mapping import StatedReading
+from calib_core.recordings.radar.column_plan import ColumnPlan
 from calib_core.recordings.radar.column_plans import plan_described, plan_for, plan_like
-from calib_core.recordings.radar.columns import ColumnPlan, Returns, names_a_speed, no_returns, returns_from
+from calib_core.recordings.radar.columns import Returns, names_a_speed, no_returns, returns_from
 from calib_core.recordings.radar.message_layouts.samples import Samples
 from calib_core.recordings.radar.self_describing.candidates import DescribedColumn
-
-__all__ = ["CloudLayout", "cloud_columns", "is_cloud", "lidar_like"]
 
 _CLOUD_NAMES = frozenset({"height", "width", "fields", "is_bigendian", "point_step", "row_step", "data"})
 _FORMATS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}

@@ -10,8 +10,6 @@ from calib_core.recordings.messages.decoding import Message, decode
 from calib_core.recordings.messages.definitions import PRIMITIVES, Definition
 from calib_core.recordings.radar.self_describing.candidates import DescribedColumn
 
-__all__ = ["Samples", "described", "leaf_names"]
-
 _SCANS = 9
 _STANDARD = "geometry_msgs/"
 

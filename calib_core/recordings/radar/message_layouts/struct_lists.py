@@ -10,8 +10,6 @@ from calib_core.recordings.field_words.words import has_word, words_of
 from calib_core.recordings.messages.decoding import Message
 from calib_core.recordings.messages.definitions import PRIMITIVES, Definition
 
-__all__ = ["ListPlace", "count_field", "joined", "struct_lists"]
-
 _DEEPEST = 5
 _COUNTS = ("count", "cnt", "num", "number", "n", "nr", "nof", "size", "len", "length", "total", "valid")
 

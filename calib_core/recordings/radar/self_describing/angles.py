@@ -10,8 +10,6 @@ from calib_core.recordings.radar.self_describing.comments import positive_side
 from calib_core.recordings.radar.self_describing.lengths import are, assume, flag_unit, length_unit_of
 from calib_core.recordings.radar.self_describing.values import Finding, angle_unit
 
-__all__ = ["polar_part"]
-
 _COMMENT = "comment in the definition"
 
 

@@ -13,8 +13,6 @@ from calib_core.recordings.radar.self_describing.comment_units import unit_in
 from calib_core.recordings.radar.self_describing.comments import angle_in
 from calib_core.recordings.radar.self_describing.names import Meaning, meaning_of
 
-__all__ = ["Chosen", "DescribedColumn", "Picked", "choose"]
-
 
 def _words(text: str) -> frozenset[str]:
     return frozenset(text.split())

@@ -4,8 +4,6 @@ import re
 
 from calib_core.recordings.field_words.units import UNITS_BY_SPELLING, Dimension, Unit
 
-__all__ = ["unit_in"]
-
 _BY_WORD = {word: unit for word, unit in UNITS_BY_SPELLING.items() if unit.dimension != "time"}
 _WORDS = "|".join(sorted((re.escape(word) for word in _BY_WORD), key=len, reverse=True))
 _NUMBER = r"(?:(?P<number>\d+\s*/\s*\d+|\d*\.?\d+(?:e-?\d+)?)\s*\*?\s*)?"

@@ -4,8 +4,6 @@ import re
 from collections.abc import Mapping
 from typing import Literal, TypeAlias
 
-__all__ = ["Direction", "angle_in", "axes_in", "axis_side", "positive_side"]
-
 Direction: TypeAlias = Literal["forward", "backward", "left", "right", "up", "down"]
 
 _WORDS: Mapping[str, Direction] = {

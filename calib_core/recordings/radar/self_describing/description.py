@@ -12,8 +12,6 @@ from calib_core.recordings.radar.self_describing.lengths import assume
 from calib_core.recordings.radar.self_describing.positions import cartesian_part
 from calib_core.recordings.radar.self_describing.speeds import speed_part
 
-__all__ = ["describe_columns", "fill_in"]
-
 _MOST_SENSORS = 8
 _INVALID_POSITION = ("invalid_distance", "invalid_range", "invalid_azimuth", "invalid_elevation")
 _INVALID_DOPPLER = ("invalid_range_rate", "invalid_doppler", "invalid_velocity")

@@ -6,8 +6,6 @@ from calib_core.recordings.radar.column_plan import ColumnAssumption
 from calib_core.recordings.radar.self_describing.candidates import Picked
 from calib_core.recordings.radar.self_describing.values import Finding, farthest, length_unit
 
-__all__ = ["FARTHEST_M", "are", "assume", "flag_unit", "length_unit_of"]
-
 FARTHEST_M = 1000.0
 """No radar returns lie farther away."""
 _ROS = "ROS defines it (REP 103)"

@@ -8,8 +8,6 @@ from calib_core.recordings.field_words.spellings import AMBIGUOUS, SPELLINGS
 from calib_core.recordings.field_words.units import Unit
 from calib_core.recordings.field_words.words import words_of
 
-__all__ = ["Meaning", "meaning_of"]
-
 
 @dataclass(frozen=True, slots=True)
 class Meaning:

@@ -10,8 +10,6 @@ from calib_core.recordings.radar.self_describing.comments import Direction, axes
 from calib_core.recordings.radar.self_describing.lengths import assume, length_unit_of
 from calib_core.recordings.radar.self_describing.values import Finding, PolarAgreement, agreement, forward_axis
 
-__all__ = ["cartesian_part"]
-
 _COMMENT = "comment in the definition"
 _ROS = "ROS defines it (REP 103)"
 _AXES = {"x": "y", "y": "x"}

@@ -9,8 +9,6 @@ from calib_core.recordings.radar.self_describing.candidates import Chosen, Picke
 from calib_core.recordings.radar.self_describing.lengths import assume, flag_unit
 from calib_core.recordings.radar.self_describing.values import speed_unit
 
-__all__ = ["speed_part"]
-
 _EITHER = "either: only its size matters"
 
 

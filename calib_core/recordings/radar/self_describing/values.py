@@ -8,17 +8,6 @@ import numpy as np
 from calib_core.arrays import Values
 from calib_core.recordings.field_words.units import Unit, unit_of_word
 
-__all__ = [
-    "Finding",
-    "PolarAgreement",
-    "agreement",
-    "angle_unit",
-    "farthest",
-    "forward_axis",
-    "length_unit",
-    "speed_unit",
-]
-
 _NEAREST_M, _FARTHEST_M = 4.0, 500.0
 """No recording of a radar ends nearer than the first, and no automotive radar sees farther than the second [m]."""
 _USUAL_M = 300.0

@@ -12,8 +12,6 @@ from calib_core.recordings.radar.scan_stream import RadarStream
 from calib_core.recordings.radar.several_topics.merging import Spread, aligned, merged, moments_of, spread_of
 from calib_core.recordings.topics import Topic
 
-__all__ = ["MergedStream", "measured_spread"]
-
 _STRETCHES = 3
 _SCANS_OF_A_STRETCH = 10
 

@@ -15,8 +15,6 @@ from calib_core.association.clustering import CLUSTER_SCALE
 from calib_core.measurements import RadarScans
 from calib_core.radar import direction_cosines
 
-__all__ = ["Moments", "Spread", "aligned", "matches", "merged", "moments_of", "spread_of"]
-
 _HALF_STEP_MPS = (0.01, 0.5)  # least and largest half of a Doppler bin
 _SPAN_M = 1e5  # between the ranges of two scans in one sorted list
 _SNR_DB = 3.0

@@ -18,8 +18,6 @@ from calib_core.recordings.radar.several_topics.merged_stream import measured_sp
 from calib_core.recordings.radar.several_topics.merging import Spread, aligned, matches, moments_of
 from calib_core.recordings.topics import Rhythm
 
-__all__ = ["Examined", "Figures", "RadarSensor", "figures_of", "other_azimuths", "relation", "sensors_of"]
-
 Relation = Literal["same", "alternatives", "ranges", "apart"]
 """Of two topics: the same returns, other azimuths of the same returns, other ranges of one radar, or two radars."""
 

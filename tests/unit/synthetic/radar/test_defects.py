@@ -21,9 +21,9 @@ from calib_core.synthetic import (
     simulate_scans,
 )
 from calib_core.synthetic.messages import CLOUD_TOPIC, SECOND_COLUMN, SECOND_SUFFIX, camera_messages, radar_messages
-from calib_core.synthetic.options import SecondAzimuth
 from calib_core.synthetic.radar.defects import radar_from_reported, second_azimuths
 from calib_core.synthetic.radar.returns import Targets, measure
+from calib_core.synthetic.radar_options import SecondAzimuth
 from calib_core.synthetic.rig import RigOptions, radar_stand
 from calib_core.synthetic.truth import truth_text
 

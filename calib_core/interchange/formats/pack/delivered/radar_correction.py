@@ -21,8 +21,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Dict, List, Optional, Sequence, Tuple, Union  # noqa: UP035 - Python 3.8 needs them
 
-__all__ = ["AngleMap", "RadarCorrection"]
-
 
 @dataclass(frozen=True)
 class AngleMap:

@@ -20,8 +20,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, List, Sequence, Tuple  # noqa: UP035 - Python 3.8 needs them
 
-__all__ = ["Camera", "main"]
-
 TOLERANCE_PX = 1e-3
 
 

@@ -8,7 +8,8 @@ import pytest
 
 from cocalib.web.port import backoff as module
 from cocalib.web.port.backoff import Backoff
-from cocalib.web.port.server import RunningServer, ServerOptions, start
+from cocalib.web.port.link import ServerOptions
+from cocalib.web.port.server import RunningServer, start
 from cocalib.workspace import open_workspace
 from tests.picture_recording import PictureRecording, grey_pictures
 from tests.port_client import come_in, get

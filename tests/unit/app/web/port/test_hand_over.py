@@ -8,7 +8,7 @@ import pytest
 from cocalib.web.messages import Opening
 from cocalib.web.port import hand_over as module
 from cocalib.web.port.hand_over import HandOver
-from cocalib.web.port.server import ServerOptions
+from cocalib.web.port.link import ServerOptions
 from cocalib.web.port.serving import Service
 from tests.port_client import come_in
 

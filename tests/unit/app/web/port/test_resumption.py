@@ -12,8 +12,9 @@ from urllib.parse import urlencode
 
 import pytest
 
+from cocalib.web.port.link import ServerOptions
 from cocalib.web.port.resumption import Resumption, Ticket
-from cocalib.web.port.server import RunningServer, ServerOptions, start
+from cocalib.web.port.server import RunningServer, start
 from cocalib.workspace import Workspace, open_workspace
 from tests.picture_recording import PictureRecording, grey_pictures
 from tests.port_client import come_in, get

@@ -22,7 +22,8 @@ from cocalib.cli import run
 from cocalib.session import ClickPlaced
 from cocalib.web.messages import Opening
 from cocalib.web.port import serving
-from cocalib.web.port.server import RunningServer, ServerOptions
+from cocalib.web.port.link import ServerOptions
+from cocalib.web.port.server import RunningServer
 from cocalib.web.port.serving import Service
 from cocalib.workspace import Workspace, open_workspace
 from tests.picture_recording import START, PictureRecording, grey_pictures
