@@ -72,7 +72,7 @@ bench-accuracy: $(VENV)/.bench  ## Measure accuracy against the bound and other 
 paper: dev  ## Repeat the paper's experiments on simulated sessions; write docs/paper-experiments.md and its figures.
 	$(BIN)/python -m benchmarks.paper $(PAPER)
 
-sample: env  ## Regenerate sample_data/, bit for bit.
+sample: env  ## Regenerate sample_data/.
 	$(BIN)/python -m calib_core.synthetic.sample sample_data
 
 picture: dev  ## Retake the README's pictures.

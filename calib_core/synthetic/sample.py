@@ -1,4 +1,4 @@
-"""Regenerate the sample recording, bit for bit: python -m calib_core.synthetic.sample sample_data."""
+"""Regenerate the sample recording: python -m calib_core.synthetic.sample sample_data."""
 
 import argparse
 import shutil
@@ -40,8 +40,8 @@ down at {placements} places on a rooftop. No real sensor was involved.
 | `truth.json` | the true `camera_from_radar`, and where and when the reflector stood still; for tests and benchmarks only |
 
 The reflector's position is its apex, the inner corner where the three sheets meet. The apex is the phase centre and the
-point to click. `make sample` (`python -m calib_core.synthetic.sample sample_data`) regenerates these files, byte for byte
-with the pinned packages.
+point to click. `make sample` (`python -m calib_core.synthetic.sample sample_data`) regenerates these files; how a processor
+rounds decides the last bits of a few pictures.
 """
 
 
