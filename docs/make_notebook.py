@@ -118,7 +118,7 @@ CELLS: tuple[tuple[str, str], ...] = (
     ),
     (
         "code",
-        'exported = cc.export(rooftop, "tf2")\nprint(exported.content)\n'
+        'exported = cc.export(rooftop, "tf2")\nprint(exported.file_name)\n'
         "Path(exported.file_name).write_bytes(exported.data)\n"
         "print(cc.check(exported.file_name, against=rooftop).verdict)",
     ),

@@ -113,8 +113,8 @@ class Provenance:
 
 
 @dataclass(frozen=True, slots=True)
-class UnknownResult:
-    """A result written by a later version and unknown to this one.
+class KeptResult:
+    """A result that goes back into the file as it was read: one unknown to this version, or one that follows from others.
 
     Attributes:
         place: the path to it: keys and list indices, its own key last.
@@ -134,7 +134,8 @@ class CalibrationFile:
         frames: the names of the two frames.
         check_point: a radar point and the pixel it must project to; None if a file from another tool has none.
         provenance: where it comes from.
-        unknown: results written by a later version and unknown to this one; kept when the file is rewritten.
+        kept: what stays as it was read when the file is rewritten: results unknown to this version, and those that follow from
+            others, which another processor would round differently.
         verdict: how far to trust it, as it was judged when it was solved; None in files of older versions and other tools.
         evidence: what the pose rests on, as the file states it; None in files of older versions.
         vehicle: what is stated of the vehicle and its sensors.
@@ -146,7 +147,7 @@ class CalibrationFile:
     frames: FrameNames = field(default_factory=FrameNames)
     check_point: CheckPoint | None = None
     provenance: Provenance = field(default_factory=Provenance)
-    unknown: tuple[UnknownResult, ...] = ()
+    kept: tuple[KeptResult, ...] = ()
     verdict: Verdict | None = None
     evidence: Evidence | None = None
     made_from_sha256: str = ""

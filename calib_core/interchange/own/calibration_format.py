@@ -9,7 +9,7 @@ from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose, imported
 from calib_core.interchange.own.calibration_json import (
     calibration_file_of,
-    kept_results,
+    kept_results_of,
     write_calibration,
 )
 from calib_core.interchange.own.documents import CalibrationDocument, TransformDocument
@@ -40,9 +40,9 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         except InputError:
             faults.append("radar_from_camera has contradictory rotations, or an invalid one")
     file = calibration_file_of(document, pose, source=source)
-    kept = kept_results(content.text, source=source)
+    kept = kept_results_of(content.text, source=source)
     as_written = WrittenPose("matrix", np.array(stated.rotation), np.array(stated.translation_m), "camera_from_radar")
-    return replace(imported(replace(file, unknown=kept)), pose=as_written, faults=tuple(faults))
+    return replace(imported(replace(file, kept=kept)), pose=as_written, faults=tuple(faults))
 
 
 CALIBRATION_1 = Format(

@@ -15,8 +15,8 @@ from calib_core.interchange.calibration_file import (
     EQUATION,
     CalibrationFile,
     FrameNames,
+    KeptResult,
     Provenance,
-    UnknownResult,
     choose_check_point,
 )
 from calib_core.interchange.own import documents
@@ -25,6 +25,7 @@ from calib_core.interchange.own.camera_document import camera_document, camera_o
 from calib_core.interchange.own.clicks_json import refuse_repeated_ids
 from calib_core.interchange.own.covariance_parts_document import covariance_parts_document, covariance_parts_of
 from calib_core.interchange.own.fleet_answer_document import fleet_answer_document, fleet_answer_of
+from calib_core.interchange.own.kept_results import kept_results, with_kept
 from calib_core.interchange.own.numbers import finite_or_none, nan_if_none, nested
 from calib_core.interchange.own.pair_document import SOLVED_FROM_KEYS, solved_pair_document, solved_pair_of
 from calib_core.interchange.own.provenance_document import provenance_document, provenance_of
@@ -35,7 +36,6 @@ from calib_core.interchange.own.radar_errors_document import (
     systematic_error_of,
 )
 from calib_core.interchange.own.transform_document import are_inverse, transform_document, transform_of
-from calib_core.interchange.own.unknown_results import unknown_results, with_unknown
 from calib_core.interchange.own.vehicle_document import vehicle_document, vehicle_of
 from calib_core.interchange.syntax.content import decoded
 from calib_core.interchange.syntax.json_text import json_text
@@ -136,7 +136,7 @@ def write_calibration(file: CalibrationFile) -> str:
         camera=camera_document(calibration.camera),
         given_camera=camera_document(calibration.given_camera) if calibration.given_camera is not None else None,
         fleet_prior=fleet_answer_document(calibration.fleet),
-        vehicle=vehicle_document(file.vehicle, file.unknown),
+        vehicle=vehicle_document(file.vehicle, file.kept),
         options=calibration.options,
         provenance=provenance_document(file.provenance),
     )
@@ -160,7 +160,7 @@ def write_calibration(file: CalibrationFile) -> str:
     if not calibration.systematic_errors and calibration.radar_errors == RadarErrors():
         absent |= {"radar_errors", "systematic_errors"}
     known = encodable({key: content[key] for key in _KEY_ORDER if key not in absent})
-    return json_text(with_unknown(known, file.unknown))
+    return json_text(with_kept(known, file.kept))
 
 
 _KEY_ORDER = (
@@ -212,12 +212,12 @@ def read_calibration(content: str | bytes, source: str = "calibration") -> Calib
             "cocalib check finds which is wrong; correct it or remove radar_from_camera"
         )
     file = calibration_file_of(document, camera_from_radar, source=source)
-    return dataclasses.replace(file, unknown=kept_results(text, source=source))
+    return dataclasses.replace(file, kept=kept_results_of(text, source=source))
 
 
-def kept_results(text: str, *, source: str) -> tuple[UnknownResult, ...]:
-    """Return the results in a calibration-1 file that this version does not know."""
-    return unknown_results(json_object(text, source=source), documents.CalibrationDocument)
+def kept_results_of(text: str, *, source: str) -> tuple[KeptResult, ...]:
+    """Return the results in the text of a calibration-1 file that stay as they are when it is rewritten."""
+    return kept_results(json_object(text, source=source), documents.CalibrationDocument)
 
 
 def calibration_file_of(

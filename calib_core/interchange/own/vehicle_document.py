@@ -3,17 +3,17 @@
 from dataclasses import asdict
 
 from calib_core.errors import InputError
-from calib_core.interchange.calibration_file import UnknownResult
+from calib_core.interchange.calibration_file import KeptResult
 from calib_core.interchange.own.documents import VehicleDocument
 from calib_core.interchange.vehicle_note import VehicleNote
 
 
-def vehicle_document(note: VehicleNote, kept: tuple[UnknownResult, ...] = ()) -> VehicleDocument | None:
+def vehicle_document(note: VehicleNote, kept: tuple[KeptResult, ...] = ()) -> VehicleDocument | None:
     """Return the document; None if nothing is stated.
 
     Args:
         note: what is stated.
-        kept: results of a later version that go back to their places, which may be in this document alone.
+        kept: results that go back to their places, which may be in this document alone.
     """
     has_more = any(result.place[0] == "vehicle" for result in kept)
     return VehicleDocument(**asdict(note)) if has_more or note != VehicleNote() else None

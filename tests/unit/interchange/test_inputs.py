@@ -166,6 +166,31 @@ def test_a_calibration_reads_back_and_writes_the_same_bytes(golden_text):
     assert file.frames == FrameNames("radar", "camera_optical")
 
 
+def test_what_another_processor_derived_keeps_its_last_digit(golden_text):
+    content = json.loads(golden_text)
+    for numbers in (
+        *(content["camera_from_radar"]["quaternion_wxyz"], content["radar_from_camera"]["translation_m"]),
+        *(content["radar_from_camera"]["quaternion_wxyz"], content["pairs"][0]["residual_px"]),
+    ):
+        numbers[:] = [math.nextafter(number, 9.0) for number in numbers]
+    content["pairs"][0]["distance_px"] = math.nextafter(content["pairs"][0]["distance_px"], 9.0)
+    content["sigma"] = {key: math.nextafter(sigma, 9.0) for key, sigma in content["sigma"].items()}
+
+    assert json.loads(write_calibration(read_calibration(json.dumps(content)))) == content
+
+
+def test_what_is_derived_follows_a_pose_that_was_changed(golden_text):
+    file = read_calibration(golden_text)
+    moved = file.calibration.camera_from_radar.perturbed(np.array([1e-6, 0.0, 0.0, 0.0, 0.0, 1e-6]))
+    changed = dataclasses.replace(file, calibration=dataclasses.replace(file.calibration, camera_from_radar=moved))
+
+    again = read_calibration(write_calibration(changed)).calibration.camera_from_radar
+
+    assert np.array_equal(again.as_matrix(), moved.as_matrix())
+    stated = json.loads(write_calibration(changed))["radar_from_camera"]["translation_m"]
+    np.testing.assert_allclose(stated, moved.inverse().translation_m, rtol=0, atol=1e-15)
+
+
 def test_what_is_unknown_is_null_and_never_nan(golden_text):
     content = json.loads(golden_text)
     content["covariance"] = None
