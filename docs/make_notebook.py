@@ -93,7 +93,7 @@ CELLS: tuple[tuple[str, str], ...] = (
     ),
     (
         "code",
-        "from pathlib import Path\n\nfrom cocalib.resources import sample_folder\n\n"
+        "from pathlib import Path\n\nfrom cocalib.platform.resources import sample_folder\n\n"
         'folder = sample_folder() / "rooftop"\n'
         'clicks = cc.read_clicks(folder / "clicks.json")\n'
         'with cc.open_recording([folder / "radar.bag", folder / "camera.bag"]) as recording:\n'

@@ -3,7 +3,7 @@
 import signal
 
 from cocalib.batch.engines.dask_cluster import DaskCluster
-from cocalib.signals import stop_on_signals
+from cocalib.platform.process import stop_on_signals
 from tests.batch_calls import endless
 
 if __name__ == "__main__":

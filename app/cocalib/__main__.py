@@ -7,9 +7,8 @@ import sys
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from cocalib.cli import run
-from cocalib.error_boundary import report_thread_errors
-from cocalib.memory import keep_freed_memory
-from cocalib.signals import stop_on_signals
+from cocalib.platform.error_boundary import report_thread_errors
+from cocalib.platform.process import keep_freed_memory, stop_on_signals
 
 
 def main() -> None:

@@ -9,7 +9,7 @@ from calib_core.fleet_prior import FleetPrior
 from calib_core.input_files import name_text
 from calib_core.interchange.own.fleet_prior_json import read_fleet_prior
 from calib_core.results import InputFile
-from cocalib.text_files import read_text
+from cocalib.platform.files import read_text
 
 
 @dataclass(frozen=True, slots=True, eq=False)

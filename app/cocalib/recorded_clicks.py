@@ -10,8 +10,8 @@ from calib_core.errors import InputError
 from calib_core.interchange.own.clicks_json import ClicksFile, read_clicks_file
 from calib_core.measurements import ReflectorClick, TimeNs, time_parts
 from calib_core.recordings import Recording
+from cocalib.platform.files import read_text
 from cocalib.session.click_stamps import ClicksAtFrames, clicks_at_frames, half_interval_ns
-from cocalib.text_files import read_text
 
 
 def file_of_clicks(path: Path) -> ClicksFile:

@@ -13,7 +13,7 @@ from calib_core.fleet_prior import FleetPrior
 from calib_core.measurements import ReflectorClick, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, PairResult
-from cocalib.error_boundary import report_of
+from cocalib.platform.error_boundary import report_of
 from cocalib.session import Solved
 from cocalib.solving import RadarSource, check_clicks, solve_in_steps
 

@@ -34,7 +34,7 @@ from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording, about_assumptions
 from calib_core.results import Calibration, InputFile, PairResult, UnconfirmedClicks
 from cocalib.board_search import find_board
-from cocalib.resources import version
+from cocalib.platform.resources import version
 from cocalib.session import Outcome
 
 _MOST_CANDIDATES = 50

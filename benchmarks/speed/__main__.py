@@ -13,7 +13,7 @@ from benchmarks.speed.serving import measure_serving
 from benchmarks.speed.showing import measure_showing
 from benchmarks.speed.solving import measure_solving
 from benchmarks.speed.starting import measure_starting
-from cocalib.resources import sample_folder
+from cocalib.platform.resources import sample_folder
 
 _PAGE = Path(__file__).resolve().parents[2] / "docs" / "speed.md"
 

@@ -15,7 +15,7 @@ from playwright.sync_api import Page, sync_playwright
 
 from benchmarks.speed.rows import Row, Table, spread
 from calib_core.synthetic import SimulationOptions, simulate, write_recording
-from cocalib.resources import sample_folder
+from cocalib.platform.resources import sample_folder
 from tests.find_browser import find_browser
 
 __all__ = ["measure_page"]

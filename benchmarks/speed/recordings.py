@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks.speed.rows import Row, Table
 from calib_core.recordings import first_picture, open_recording
-from cocalib.memory import keep_freed_memory
+from cocalib.platform.process import keep_freed_memory
 
 __all__ = ["measure_recordings", "write_bag"]
 
@@ -26,7 +26,7 @@ _DECODINGS = 4
 _MEMORY = """
 import pathlib, resource, sys
 from calib_core.recordings import first_picture, open_recording
-from cocalib.memory import keep_freed_memory
+from cocalib.platform.process import keep_freed_memory
 import cv2
 keep_freed_memory()
 def peak():  # on Linux, ru_maxrss is inherited from the parent process; VmHWM is not

@@ -13,7 +13,7 @@ _FRAMES = 2_000
 _SHOW = """
 import pathlib, sys, time
 import numpy as np
-from cocalib.memory import keep_freed_memory
+from cocalib.platform.process import keep_freed_memory
 from cocalib.recorded_view import recorded_view
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform

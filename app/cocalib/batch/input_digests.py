@@ -9,7 +9,7 @@ import msgspec
 from msgspec import Struct, field
 
 from cocalib.batch.inputs import InputFile, InputPath
-from cocalib.whole_file import write_whole
+from cocalib.platform.files import write_whole
 
 _FILE = "inputs.json"
 _PIECE_BYTES = 1 << 22

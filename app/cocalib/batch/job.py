@@ -11,7 +11,7 @@ from typing import Any
 from cocalib.batch.input_digests import InputDigests
 from cocalib.batch.inputs import InputPath, inputs_of, state_of
 from cocalib.batch.manifest import ManifestRow
-from cocalib.resources import version
+from cocalib.platform.resources import version
 
 _RESULT_VERSION = 2
 """Counts up when the same inputs give other files."""

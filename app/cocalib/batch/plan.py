@@ -14,7 +14,7 @@ import msgspec
 from msgspec import Struct
 
 from cocalib.batch.job import Job
-from cocalib.whole_file import write_whole
+from cocalib.platform.files import write_whole
 
 PLANS: Final = "manifests"
 _SCHEMA: Final = "cocalib/batch-plan-1"

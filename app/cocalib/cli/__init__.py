@@ -15,8 +15,8 @@ from difflib import get_close_matches
 
 from calib_core.errors import CalibrationError, InputError
 from cocalib.cli.commands import COMMANDS, PROGRAM, overview
-from cocalib.error_boundary import INTERNAL_ERROR, error_boundary
-from cocalib.terminal import escaped_output
+from cocalib.platform.error_boundary import INTERNAL_ERROR, error_boundary
+from cocalib.platform.terminal import escaped_output
 
 __all__ = ["refuse", "run"]
 
@@ -74,7 +74,7 @@ def _run(first: str = "--help", *others: str) -> int:
         print(overview())
         return 0
     if first == "--version":
-        from cocalib.resources import version
+        from cocalib.platform.resources import version
 
         print(f"{PROGRAM} {version()}")
         return 0

@@ -12,8 +12,8 @@ from cocalib.cli.flags import File, Switch, called
 from cocalib.cli.output import told_clicks_at_frames, write_whole
 from cocalib.cli.recording_flags import TopicFlags, Topics
 from cocalib.cli.tree_flags import FrameFlags, Frames
-from cocalib.terminal import print_exactly
-from cocalib.text_files import read_text
+from cocalib.platform.files import read_text
+from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
     from calib_core.camera import Camera

@@ -14,7 +14,7 @@ import tyro
 
 from cocalib.cli.flags import Folder, Switch
 from cocalib.cli.serving_flags import ServingFlags
-from cocalib.resources import sample_folder, user_session_folder
+from cocalib.platform.resources import sample_folder, user_session_folder
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from cocalib.cli.output import write_whole
 from cocalib.cli.recording_flags import TopicFlags, Topics
 from cocalib.cli.tree_flags import FrameFlags, Frames, TreeFlags, Trees
 from cocalib.cli.unpacking import is_meant_as_folder, write_unpacked
-from cocalib.terminal import print_exactly
+from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
     from calib_core.geometry import RigidTransform

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from calib_core.errors import InputError, RecordingError
 from cocalib.cli.output import progress_bar, write_whole
 from cocalib.cli.recording_flags import TopicFlags
-from cocalib.whole_file import writing_whole
+from cocalib.platform.files import writing_whole
 
 if TYPE_CHECKING:
     from calib_core.deployment import RecordingWritten
@@ -38,7 +38,7 @@ def export_recording(
         RecordingError: the recording cannot be read.
     """
     from calib_core.deployment import write_into_recording
-    from cocalib.resources import version
+    from cocalib.platform.resources import version
 
     if out.is_dir():
         out = out / f"{paths[0].stem}-calibrated.mcap"

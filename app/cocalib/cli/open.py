@@ -12,7 +12,7 @@ from calib_core.options import CalibrationOptions
 from cocalib.cli.flags import File, Folder, Switch
 from cocalib.cli.recording_flags import CameraPosition, MeasuredCamera, Options, Recordings, TopicFlags, Topics
 from cocalib.cli.serving_flags import ServingFlags
-from cocalib.text_files import read_text
+from cocalib.platform.files import read_text
 
 if TYPE_CHECKING:
     from cocalib.opening import Choice

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from calib_core.errors import InputError
-from cocalib import whole_file
-from cocalib.terminal import terminal_stream
+from cocalib.platform import files
+from cocalib.platform.terminal import terminal_stream
 
 if TYPE_CHECKING:
     from calib_core.measurements import ReflectorClick, Unsolvable
@@ -37,7 +37,7 @@ def write_whole(path: Path, content: str | bytes) -> None:
         InputError: the folder is missing or not writable.
     """
     try:
-        whole_file.write_whole(path, content.encode("utf-8") if isinstance(content, str) else content)
+        files.write_whole(path, content.encode("utf-8") if isinstance(content, str) else content)
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {(error.strerror or str(error)).lower()}") from error
 

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import tyro
 
 from cocalib.cli.flags import Switch, called
-from cocalib.loopback import is_loopback
+from cocalib.platform.loopback import is_loopback
 from cocalib.web.port.address import require_address, require_one_address, require_token
 from cocalib.web.port.link import Link, ServerOptions
 

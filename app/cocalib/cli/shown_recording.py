@@ -12,7 +12,7 @@ from calib_core.errors import InputError
 from cocalib.cli.flags import File, Switch, called
 from cocalib.cli.output import progress_bar, told_clicks_at_frames
 from cocalib.cli.recording_flags import TopicFlags
-from cocalib.text_files import read_text
+from cocalib.platform.files import read_text
 
 if TYPE_CHECKING:
     from cocalib.recorded_view import RecordedView

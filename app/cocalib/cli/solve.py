@@ -26,8 +26,8 @@ from cocalib.cli.recording_flags import (
     Vehicle,
     VehicleFlags,
 )
-from cocalib.terminal import print_exactly
-from cocalib.text_files import read_text
+from cocalib.platform.files import read_text
+from cocalib.platform.terminal import print_exactly
 from cocalib.view import summary_lines
 
 if TYPE_CHECKING:

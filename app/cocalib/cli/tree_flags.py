@@ -14,7 +14,7 @@ from calib_core.errors import InputError
 from calib_core.input_files import name_text
 from cocalib.cli.flags import File, Switch, called
 from cocalib.cli.output import write_whole
-from cocalib.terminal import print_exactly
+from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
     from calib_core.geometry import RigidTransform

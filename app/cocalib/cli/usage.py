@@ -17,7 +17,7 @@ from cocalib.cli.tyro_hook import (
     flags_of,
     parse,
 )
-from cocalib.terminal import with_colours
+from cocalib.platform.terminal import with_colours
 
 _NUMBERS = {"INT": "a whole number", "FLOAT": "a number"}
 

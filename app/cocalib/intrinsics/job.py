@@ -16,8 +16,8 @@ from calib_core.intrinsics import (
     SearchProgress,
 )
 from calib_core.measurements import Unsolvable
-from cocalib.error_boundary import error_boundary
 from cocalib.intrinsics.calibrating import calibrate_from
+from cocalib.platform.error_boundary import error_boundary
 
 LensStage: TypeAlias = Literal["idle", "searching", "calibrating", "cancelled", "failed", "done"]
 _log = logging.getLogger(__name__)

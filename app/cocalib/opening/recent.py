@@ -12,9 +12,9 @@ import msgspec
 from msgspec import Meta
 
 from calib_core.input_files import name_text
-from cocalib.resources import state_folder
+from cocalib.platform.files import write_whole
+from cocalib.platform.resources import state_folder
 from cocalib.web.messages import RecentRecording
-from cocalib.whole_file import write_whole
 
 _MOST = 20
 _MOST_BYTES = 1 << 20

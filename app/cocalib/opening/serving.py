@@ -10,13 +10,13 @@ from pathlib import Path
 
 from calib_core.errors import CalibrationError, RecordingError
 from calib_core.recordings import first_picture
-from cocalib.error_boundary import error_boundary
 from cocalib.opening.choice import Choice, ChoicePart, UnusablePartError
 from cocalib.opening.choices import choices_after, choices_of
 from cocalib.opening.desk import OpeningDesk
 from cocalib.opening.opened import open_choice, with_remembered
 from cocalib.opening.recent import RecentRecordings
 from cocalib.opening.root_folder import RootFolder
+from cocalib.platform.error_boundary import error_boundary
 from cocalib.view import sentence
 from cocalib.web.messages import Opening, OpeningChoices
 from cocalib.web.port.link import Link

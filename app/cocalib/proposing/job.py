@@ -13,7 +13,7 @@ from calib_core.measurements import ReflectorClick, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.proposing import DwellView, Proposals, ViewProgress, proposals_of
 from calib_core.proposing.look import Look, with_look
-from cocalib.error_boundary import error_boundary
+from cocalib.platform.error_boundary import error_boundary
 from cocalib.proposing.finding import RecordedFrames, find_proposals, looks_of
 
 ProposingStage: TypeAlias = Literal["off", "looking", "comparing", "ready", "failed"]

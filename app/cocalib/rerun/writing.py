@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from calib_core.errors import InputError
+from cocalib.platform.files import whole_path
 from cocalib.recorded_view import RecordedView
 from cocalib.rerun.sdk import require_sdk
-from cocalib.whole_file import whole_path
 
 if TYPE_CHECKING:
     import rerun as rr

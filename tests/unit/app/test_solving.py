@@ -17,7 +17,7 @@ from calib_core.measurements import RadarScans, ReflectorClick, TimeNs, Unsolvab
 from calib_core.options import CalibrationOptions, LocatingOptions
 from calib_core.recordings import Recording, RecordingOptions, open_recording
 from calib_core.results import Calibration, DataWarning
-from cocalib.resources import version
+from cocalib.platform.resources import version
 from cocalib.session import ClicksImported, OptionsChanged
 from cocalib.solving import (
     calibration_text,

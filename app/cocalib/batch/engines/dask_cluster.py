@@ -12,7 +12,7 @@ from cocalib.batch.engines.one_job import failed_outcome
 from cocalib.batch.engines.worker_side import call, run_in_worker
 from cocalib.batch.job import Job
 from cocalib.batch.outcome import Outcome
-from cocalib.resources import version
+from cocalib.platform.resources import version
 
 _Found = TypeVar("_Found")
 _DIED = "every worker that ran this job died of it or was killed"

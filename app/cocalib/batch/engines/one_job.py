@@ -9,7 +9,7 @@ from cocalib.batch.job import Job
 from cocalib.batch.outcome import OUTCOME_SCHEMA, Outcome, OutcomeRun, outcome_text
 from cocalib.batch.results_folder import OUTCOME_FILE, ResultsFolder
 from cocalib.batch.running import run_job
-from cocalib.error_boundary import error_boundary
+from cocalib.platform.error_boundary import error_boundary
 
 
 def run_once(job: Job, results: Path) -> Outcome:

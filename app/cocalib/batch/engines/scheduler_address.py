@@ -3,7 +3,7 @@
 from urllib.parse import urlsplit
 
 from calib_core.errors import InputError
-from cocalib.loopback import is_loopback
+from cocalib.platform.loopback import is_loopback
 
 
 def checked_address(address: str) -> str:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from calib_core.errors import InputError
 from cocalib.batch.engines.worker_side import worker_version
-from cocalib.resources import version
+from cocalib.platform.resources import version
 
 if TYPE_CHECKING:
     from distributed import Client

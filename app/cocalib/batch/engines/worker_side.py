@@ -9,7 +9,7 @@ from calib_core.errors import InputError
 from cocalib.batch.engines.one_job import run_once
 from cocalib.batch.job import Job
 from cocalib.batch.outcome import Outcome
-from cocalib.resources import version
+from cocalib.platform.resources import version
 
 
 def dask_setup(_: object) -> None:

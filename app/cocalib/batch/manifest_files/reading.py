@@ -18,7 +18,7 @@ from calib_core.options import CalibrationOptions, CameraPositionPrior
 from cocalib.batch.manifest import Manifest, ManifestRow
 from cocalib.batch.manifest_files.documents import ManifestDocument, SessionDocument
 from cocalib.option_changes import options_from_tree
-from cocalib.text_files import read_text
+from cocalib.platform.files import read_text
 
 _MOST_BYTES = 64 * 1024 * 1024
 _SEPARATOR = ";"

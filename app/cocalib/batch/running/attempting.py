@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from calib_core.errors import CalibrationError
 from cocalib.batch.results_folder import LOG_FILE
-from cocalib.error_boundary import error_boundary
+from cocalib.platform.error_boundary import error_boundary
 
 _Made = TypeVar("_Made")
 

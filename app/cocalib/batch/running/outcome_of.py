@@ -12,7 +12,7 @@ from cocalib.batch.outcome import OUTCOME_SCHEMA, Outcome, PriorUse, Status
 from cocalib.batch.running.attempting import Failure
 from cocalib.batch.running.solving import SolvedSession
 from cocalib.batch.running.steps import SessionResult
-from cocalib.resources import version
+from cocalib.platform.resources import version
 
 
 def outcome_of(job: Job, result: SessionResult) -> Outcome:

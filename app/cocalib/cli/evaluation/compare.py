@@ -12,7 +12,7 @@ from cocalib.cli.flags import File, Switch, called
 from cocalib.cli.output import progress_bar
 from cocalib.cli.recording_flags import Recordings, TopicFlags, Topics
 from cocalib.cli.tree_flags import FrameFlags, Frames
-from cocalib.terminal import print_exactly
+from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
     from calib_core.camera import Camera

@@ -10,7 +10,7 @@ import tyro
 from calib_core.errors import InputError
 from cocalib.cli.flags import File, called
 from cocalib.cli.output import progress_bar, told_clicks_at_frames
-from cocalib.text_files import read_text
+from cocalib.platform.files import read_text
 
 if TYPE_CHECKING:
     from calib_core.detections import Boxes, ReturnLabels

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from cocalib.terminal import terminal_stream
+from cocalib.platform.terminal import terminal_stream
 
 if TYPE_CHECKING:
     from cocalib.batch.driving import BatchProgress

@@ -11,7 +11,7 @@ import tyro
 from calib_core.errors import InputError
 from cocalib.cli.flags import File, Switch, called
 from cocalib.cli.output import write_whole
-from cocalib.terminal import print_exactly
+from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
     from cocalib.fleet.records import FleetRecord

@@ -9,7 +9,7 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from cocalib.cli.intrinsics.lens_text import camera_lines
 from cocalib.cli.output import write_whole
-from cocalib.terminal import print_exactly
+from cocalib.platform.terminal import print_exactly
 
 CAMERA_SUFFIXES = (".yaml", ".yml", ".json", ".xml", ".cameramodel", ".txt", ".mat", ".bin", ".conf")
 _BY_SUFFIX = {".json": "json", ".xml": "opencv-xml", ".cameramodel": "mrcal", ".mat": "matlab"}

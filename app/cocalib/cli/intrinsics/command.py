@@ -16,7 +16,7 @@ from calib_core.recordings import RecordingOptions
 from cocalib.cli.flags import File, Folder, Switch, called, same
 from cocalib.cli.intrinsics.board_flags import BoardFlags, BoardUsed
 from cocalib.cli.output import explain_unsolvable, write_whole
-from cocalib.terminal import print_exactly
+from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
     from calib_core.intrinsics import BoardSearch, CalibratedLens

@@ -12,8 +12,8 @@ from calib_core.measurements import Unsolvable
 from cocalib.cli.output import write_whole
 from cocalib.intrinsics.picture_sources import OpenPictures
 from cocalib.intrinsics.resumed_search import ResumedSearch
-from cocalib.terminal import terminal_stream
-from cocalib.text_files import read_text
+from cocalib.platform.files import read_text
+from cocalib.platform.terminal import terminal_stream
 
 _DEFAULT_VIEWS = Path("board-views.json")
 _LINE_EVERY_S = 5.0

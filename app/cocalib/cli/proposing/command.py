@@ -11,7 +11,7 @@ from calib_core.options import CalibrationOptions
 from cocalib.cli.flags import File, Switch
 from cocalib.cli.output import explain_unsolvable, write_whole
 from cocalib.cli.recording_flags import CameraPosition, MeasuredCamera, Options, Recordings, TopicFlags, Topics
-from cocalib.terminal import print_exactly
+from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 
 from calib_core.errors import InputError
 from calib_core.proposing import ViewProgress
-from cocalib.terminal import terminal_stream
+from cocalib.platform.terminal import terminal_stream
 
 _LEAST_M, _MOST_M = 0.02, 2.0
 

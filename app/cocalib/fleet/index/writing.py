@@ -12,7 +12,7 @@ from cocalib.fleet.index.filling import Places, fill, put, set_places
 from cocalib.fleet.index.result_reading import finished_results
 from cocalib.fleet.index.tables import create_tables, damaged, has_tables, index_path, require_version, writable
 from cocalib.fleet.records import UnreadResult
-from cocalib.whole_file import whole_path
+from cocalib.platform.files import whole_path
 
 
 class FleetIndex:

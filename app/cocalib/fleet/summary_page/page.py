@@ -10,11 +10,11 @@ from cocalib.fleet.kinds import Kind, kinds_of
 from cocalib.fleet.records import FleetRecord, UnreadResult
 from cocalib.fleet.standing import VehicleStanding, standings_of
 from cocalib.fleet.summary_page.tables import session_table, type_table, vehicle_table
+from cocalib.platform.files import write_whole
+from cocalib.platform.resources import version
 from cocalib.report.html_file import html_file
 from cocalib.report.markup import Child, Markup, tag
-from cocalib.resources import version
 from cocalib.view.wording import sentence
-from cocalib.whole_file import write_whole
 
 SUMMARY_FILE: Final = "summary.html"
 

@@ -5,7 +5,7 @@ A session is a folder, `NAME.cocalib-session/`, with `journal.jsonl` (one line p
 them are opened without following links, carry checksums, and are compared with each other before anything is overwritten.
 """
 
-from cocalib.resources import user_session_folder
+from cocalib.platform.resources import user_session_folder
 from cocalib.session.file.closing import Closed
 from cocalib.session.file.errors import SessionFileError
 from cocalib.session.file.finding import FoundFolder, find_session_folder, has_session_of

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from calib_core.measurements import ReflectorClick
-from cocalib.resources import user_session_folder, version
+from cocalib.platform.resources import user_session_folder, version
 from cocalib.session import BoxesLoaded, ClicksImported, OptionsChanged, Session
 from cocalib.session.file.errors import SessionFileError
 from cocalib.session.file.guarded_folder import GuardedFolder

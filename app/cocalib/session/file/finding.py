@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from calib_core.results import DataWarning
-from cocalib.resources import state_folder
+from cocalib.platform.resources import state_folder
 from cocalib.session import RecordingFacts
 from cocalib.session.file.errors import SessionFileError
 from cocalib.session.file.folders import is_writable, recording_session_folder, session_folders_in

@@ -6,7 +6,7 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from cocalib.resources import SESSION_SUFFIX, user_session_folder
+from cocalib.platform.resources import SESSION_SUFFIX, user_session_folder
 
 _SET_ASIDE = re.compile(re.escape(SESSION_SUFFIX) + r"\.[0-9]+$")
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from cocalib.resources import state_folder
+from cocalib.platform.resources import state_folder
 from cocalib.session.file.errors import SessionFileError
 from cocalib.session.file.folders import recording_session_folder, session_folders_in
 from cocalib.session.file.guarded_folder import GuardedFolder

@@ -1,6 +1,6 @@
 """Write a session again from what its files prove, with the old ones kept as backups."""
 
-from cocalib.resources import version
+from cocalib.platform.resources import version
 from cocalib.session.file.guarded_folder import GuardedFolder
 from cocalib.session.file.identity import RecordingForm
 from cocalib.session.file.journal import begin_journal

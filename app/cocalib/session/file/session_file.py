@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from calib_core.results import DataWarning
-from cocalib.resources import version
+from cocalib.platform.resources import version
 from cocalib.session import History, RecordingFacts, Step
 from cocalib.session.file.closing import Closed, rescued, snapshot_fault
 from cocalib.session.file.errors import SessionFileError

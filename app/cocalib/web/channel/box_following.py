@@ -9,7 +9,7 @@ from concurrent.futures import Executor
 from calib_core.recordings import Recording
 from cocalib.box_tracks.following import BoxFollower, GreyPictures
 from cocalib.box_tracks.stretches import Stretch, stretches_of
-from cocalib.error_boundary import error_boundary
+from cocalib.platform.error_boundary import error_boundary
 from cocalib.web.messages import Progress
 from cocalib.workspace import Workspace
 

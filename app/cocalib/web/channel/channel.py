@@ -6,7 +6,7 @@ from typing import Protocol
 
 from calib_core.errors import CalibrationError
 from calib_core.measurements import RadarScan, RadarScans, TimeNs
-from cocalib.error_boundary import error_boundary
+from cocalib.platform.error_boundary import error_boundary
 from cocalib.session import Step
 from cocalib.view import sentence
 from cocalib.view.box_rows import boxes_in_frame

@@ -13,8 +13,8 @@ from calib_core.errors import CalibrationError
 from calib_core.measurements import Stamp, TimeNs
 from calib_core.recordings import FollowedRecording, Recording, TopicSummary, clock_lines
 from calib_core.results import DataWarning
-from cocalib.error_boundary import error_boundary
-from cocalib.resources import version
+from cocalib.platform.error_boundary import error_boundary
+from cocalib.platform.resources import version
 from cocalib.view import AccPanel, View, warning_in_sentences
 from cocalib.web.channel.box_following import BoxFollowing
 from cocalib.web.channel.box_judging import BoxJudging

@@ -10,8 +10,8 @@ from calib_core.errors import InputError
 from calib_core.interchange import camera_info_text
 from calib_core.intrinsics import Board, CalibratedLens, IntrinsicsOptions, board_of_size
 from calib_core.recordings import Recording
-from cocalib.error_boundary import error_boundary
 from cocalib.intrinsics import LensJob, LensSnapshot, RecordedPictures
+from cocalib.platform.error_boundary import error_boundary
 from cocalib.session import ChosenIntrinsics, IntrinsicsChosen
 from cocalib.view import sentence
 from cocalib.web.channel.lens_panel import camera_table, coverage_of, lens_result, view_corners

@@ -5,7 +5,7 @@ import logging
 from collections.abc import Awaitable, Callable
 from typing import Generic, TypeVar
 
-from cocalib.error_boundary import error_boundary
+from cocalib.platform.error_boundary import error_boundary
 
 Item = TypeVar("Item")
 _log = logging.getLogger(__name__)

@@ -7,7 +7,7 @@ from urllib.parse import parse_qs
 
 import msgspec
 
-from cocalib.error_boundary import error_boundary
+from cocalib.platform.error_boundary import error_boundary
 from cocalib.web.port import guard
 from cocalib.web.port.admissions import Admissions
 from cocalib.web.port.backoff import Backoff

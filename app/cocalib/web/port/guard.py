@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Literal
 from urllib.parse import parse_qs
 
-from cocalib.loopback import is_loopback
+from cocalib.platform.loopback import is_loopback
 from cocalib.web.port.admissions import Admissions
 
 _HOST = re.compile(r"(\[[^\]]*\]|[^:\[\]]*)(?::[0-9]*)?")

@@ -10,7 +10,7 @@ import webbrowser
 from collections.abc import Callable
 from pathlib import Path
 
-from cocalib.resources import state_folder
+from cocalib.platform.resources import state_folder
 
 _SNAPS = ("firefox", "chromium", "brave", "opera")
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TextIO
 from urllib.parse import quote
 
-from cocalib.loopback import is_loopback
+from cocalib.platform.loopback import is_loopback
 from cocalib.web.port.address import listening_at
 from cocalib.web.port.admissions import Admissions
 from cocalib.web.port.guard import Guard, is_address

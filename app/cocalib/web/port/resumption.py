@@ -16,7 +16,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from cocalib.resources import state_folder
+from cocalib.platform.resources import state_folder
 
 _KEY_BYTES = 32
 _VALID_S = 24 * 3600

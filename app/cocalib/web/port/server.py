@@ -13,8 +13,8 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
 from calib_core.recordings import EncodedImage, Recording
-from cocalib.error_boundary import error_boundary
-from cocalib.resources import static_folder
+from cocalib.platform.error_boundary import error_boundary
+from cocalib.platform.resources import static_folder
 from cocalib.web.channel.channel import Channel, Socket
 from cocalib.web.channel.desk import Desk
 from cocalib.web.channel.hub import Hub

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, cast
 import msgspec
 from websockets.asyncio.server import ServerConnection
 
-from cocalib.resources import InstallationError
+from cocalib.platform.resources import InstallationError
 from cocalib.web.port.websockets_hook import ProcessRequest, SocketHandler, wrapped_serve
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from collections import deque
 
 from calib_core.errors import CalibrationError
 from calib_core.recordings import EncodedImage
-from cocalib.error_boundary import error_boundary
+from cocalib.platform.error_boundary import error_boundary
 from cocalib.view import sentence
 from cocalib.web.channel.channel import Socket
 from cocalib.web.channel.desk import ClosedDesk, Desk, answer_of

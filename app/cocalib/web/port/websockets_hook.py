@@ -20,7 +20,7 @@ import websockets.asyncio.server as websocket_server
 from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
-from cocalib.error_boundary import report_of
+from cocalib.platform.error_boundary import report_of
 from cocalib.web.port.request_head import Head, read_head
 
 ProcessRequest = Callable[[ServerConnection, Request], Awaitable[Response | None]]

@@ -14,7 +14,7 @@ from cocalib.batch.engines import dask_connection, worker_checks
 from cocalib.batch.engines.dask_cluster import DaskCluster
 from cocalib.batch.engines.in_process import InProcess
 from cocalib.batch.results_folder import ResultsFolder
-from cocalib.resources import version
+from cocalib.platform.resources import version
 from tests.batch_calls import quick_jobs, squared
 from tests.dask_processes import scheduler_process, worker_process, worker_processes
 

@@ -10,7 +10,7 @@ import msgspec
 import pytest
 import viser
 
-from cocalib.resources import InstallationError
+from cocalib.platform.resources import InstallationError
 from cocalib.web.port import viser_hook
 from cocalib.web.port.websockets_hook import ProcessRequest, SocketHandler
 

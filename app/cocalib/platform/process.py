@@ -1,5 +1,6 @@
-"""Signals that end the program: Ctrl+C, SIGTERM and SIGHUP all end it in order, once."""
+"""How the process ends at a signal and handles freed memory: Ctrl+C, SIGTERM and SIGHUP all end it in order, once."""
 
+import ctypes
 import signal
 import sys
 import threading
@@ -9,6 +10,9 @@ from types import FrameType
 
 _NAMES = ("SIGINT", "SIGTERM", "SIGHUP")  # Windows has no SIGHUP
 _AGAIN_S = 0.02
+_TRIM_THRESHOLD, _MMAP_THRESHOLD, _ARENA_MAX = -1, -3, -8  # as <malloc.h> has them
+_KEPT_BYTES = 64 << 20
+_LARGEST_BYTES = 32 << 20
 
 
 def stop_on_signals() -> None:
@@ -59,3 +63,21 @@ def _send_again(number: int) -> None:
 
 def _numbers() -> list[signal.Signals]:
     return [signal.Signals[name] for name in _NAMES if name in signal.Signals.__members__]
+
+
+def keep_freed_memory() -> bool:
+    """Make the C library keep up to 64 MB of freed memory instead of returning it to the system at once.
+
+    A picture's pixels take megabytes that are allocated and freed with every frame. Getting them from the system each time,
+    page by page, takes as long as decoding the picture. All threads share what is kept, or each would keep as much.
+
+    Returns:
+        False if the C library has no such setting (it is not glibc).
+    """
+    if not sys.platform.startswith("linux"):
+        return False
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
+    if mallopt is None:
+        return False
+    kept = mallopt(_TRIM_THRESHOLD, _KEPT_BYTES) == 1 and mallopt(_ARENA_MAX, 1) == 1
+    return bool(mallopt(_MMAP_THRESHOLD, _LARGEST_BYTES) == 1 and kept)

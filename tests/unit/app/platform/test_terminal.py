@@ -9,7 +9,7 @@ import traceback
 import msgspec
 import pytest
 
-from cocalib.terminal import escaped, escaped_output, print_exactly, terminal_stream, with_colours
+from cocalib.platform.terminal import escaped, escaped_output, print_exactly, terminal_stream, with_colours
 
 HOSTILE = {
     "escape": "\x1b[2J\x1b]0;owned\x07",

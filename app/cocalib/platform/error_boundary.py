@@ -19,8 +19,8 @@ from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
 
-from cocalib.resources import state_folder, version
-from cocalib.terminal import escaped
+from cocalib.platform.resources import state_folder, version
+from cocalib.platform.terminal import escaped
 
 INTERNAL_ERROR = 70
 """The exit code of a command that ended in the boundary (EX_SOFTWARE)."""

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from cocalib.whole_file import write_whole
+from cocalib.platform.files import write_whole
 
 
 def test_a_link_is_followed_and_stays(tmp_path: Path) -> None:

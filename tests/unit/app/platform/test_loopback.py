@@ -2,7 +2,7 @@
 
 import pytest
 
-from cocalib.loopback import is_loopback
+from cocalib.platform.loopback import is_loopback
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from calib_core.errors import CalibrationError
 
 SESSION_SUFFIX = ".cocalib-session"
 _DISTRIBUTION = "cocalib"
-_PACKAGE_FOLDER = Path(__file__).resolve().parent
+_PACKAGE_FOLDER = Path(__file__).resolve().parents[1]
 
 
 class InstallationError(CalibrationError):

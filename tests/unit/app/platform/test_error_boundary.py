@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from cocalib import error_boundary as module
 from cocalib.cli import run
-from cocalib.error_boundary import INTERNAL_ERROR, error_boundary, report_of, report_thread_errors
+from cocalib.platform import error_boundary as module
+from cocalib.platform.error_boundary import INTERNAL_ERROR, error_boundary, report_of, report_thread_errors
 
 
 @pytest.fixture(autouse=True)
@@ -118,6 +118,6 @@ def test_no_other_module_catches_every_exception(project_root: Path) -> None:
         for path in sorted((project_root / folder).rglob("*.py"))
         if any(words in path.read_text() for words in ("except Exception", "except:"))
     ]
-    assert found == ["app/cocalib/error_boundary.py", "calib_core/interchange/formats/plugins.py"], (
+    assert found == ["app/cocalib/platform/error_boundary.py", "calib_core/interchange/formats/plugins.py"], (
         "plug-ins run foreign code"
     )

@@ -1,4 +1,4 @@
-"""The process keeps freed memory."""
+"""A signal ends the program, also one that comes where Python drops exceptions."""
 
 import platform
 import subprocess
@@ -6,10 +6,36 @@ import sys
 
 import pytest
 
+_ENDS = """
+import os, signal, threading
+from cocalib.platform.process import stop_on_signals
+
+class Deleted:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGTERM)
+        for _ in range(1000):
+            pass
+
+stop_on_signals()
+try:
+    deleted = Deleted()
+    del deleted
+    threading.Event().wait(30)
+except KeyboardInterrupt as interrupt:
+    print("ended by", interrupt.args[0])
+"""
+
+
+def test_a_signal_that_comes_while_an_object_is_deleted_ends_the_program() -> None:
+    done = subprocess.run([sys.executable, "-c", _ENDS], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.strip() == "ended by 15"
+    assert done.stderr == ""
+
+
 _FAULTS = """
 import resource, sys
 import numpy as np
-from cocalib.memory import keep_freed_memory
+from cocalib.platform.process import keep_freed_memory
 if "keep" in sys.argv:
     keep_freed_memory()
 def faults():
@@ -25,7 +51,7 @@ print(faults())
 
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="the C library is not glibc")
 def test_the_c_library_takes_every_setting() -> None:
-    code = "import sys; from cocalib.memory import keep_freed_memory; sys.exit(not keep_freed_memory())"
+    code = "import sys; from cocalib.platform.process import keep_freed_memory; sys.exit(not keep_freed_memory())"
     subprocess.run([sys.executable, "-c", code], check=True)
 
 

@@ -5,13 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from cocalib import resources
-from cocalib.resources import (
-    InstallationError,
-    sample_folder,
-    static_folder,
-    version,
-)
+from cocalib.platform import resources
+from cocalib.platform.resources import InstallationError, sample_folder, static_folder, version
 
 
 def test_a_checkout_has_its_files_at_its_top(project_root: Path) -> None:
