@@ -13,7 +13,7 @@ import { emit, state } from "./state.js";
 /** Colours of objects, told apart also by the letters of their labels; Okabe and Ito's, for any eyes. */
 const COLOURS = ["#56b4e9", "#e69f00", "#41c99a", "#f0e442", "#d78fbf", "#ff8a5c", "#9db4ff"];
 /** Half the side of a handle [CSS px]. */
-export const HANDLE = 4;
+const HANDLE = 4;
 
 export const boxing = {
   /** Whether boxes are drawn instead of clicks placed: while the tab "Evaluate" is open. */ on: false,

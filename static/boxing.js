@@ -164,7 +164,7 @@ async function done(message) {
 }
 
 /** Send what was changed by keys. */
-export function flushBox() {
+function flushBox() {
   if (!timer) return;
   clearTimeout(timer);
   timer = 0;

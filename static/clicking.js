@@ -5,7 +5,6 @@ import { askApex } from "./apex.js";
 import { boxing } from "./boxes.js";
 import { boxesTake, cancelBox, cursorOver, dragBox, dropBox, pressBox } from "./boxing.js";
 import { candidateNear, choose } from "./candidates.js";
-import { leaveCross } from "./cross.js";
 import { onImage, pan, toCss, toImage, viewport } from "./geometry.js";
 import { leaveLive } from "./live.js";
 import { hold } from "./loupe.js";
@@ -215,6 +214,13 @@ export async function moveTo(click, u, v, { mark = "moved", sigma_px = null } = 
 export function clamped(u, v) {
   const most = [viewport.imageWidth - 0.5, viewport.imageHeight - 0.5];
   return [Math.min(most[0], Math.max(-0.5, u)), Math.min(most[1], Math.max(-0.5, v))];
+}
+
+/** Put the keyboard's cross away; the next placement may bring it back. */
+export function leaveCross() {
+  if (!state.cross) return;
+  state.cross = null;
+  emit("cross");
 }
 
 /** Show a mark where the user left it, before the server confirms it. @param {string} key its id, or a name for a new one @param {import("./state.js").Draft} mark */

@@ -4,7 +4,7 @@
  * It starts where the radar expects the reflector. A mark that is set there without the cross being moved is a guess: it does not count.
  */
 
-import { clamped, moveTo, place } from "./clicking.js";
+import { clamped, leaveCross, moveTo, place } from "./clicking.js";
 import { ink } from "./colours.js";
 import { lookInto, toDevice, viewport } from "./geometry.js";
 import { leaveLive } from "./live.js";
@@ -38,17 +38,15 @@ export function startCross() {
 
 /** Show the cross, or hide it. */
 export function toggleCross() {
-  if (state.cross) return leaveCross(true);
+  if (state.cross) return endCross();
   wanted = true;
   start();
 }
 
-/** Hide the cross. @param {boolean} [forGood] not to return at the next placement */
-export function leaveCross(forGood = false) {
-  if (forGood) wanted = false;
-  if (!state.cross) return;
-  state.cross = null;
-  emit("cross");
+/** Hide the cross, not to return at the next placement. */
+function endCross() {
+  wanted = false;
+  leaveCross();
 }
 
 /** Another frame has its own cross. */
@@ -100,7 +98,7 @@ export function crossTakes(key) {
   const plain = key.replace("Shift+", "");
   if (DIGITS.includes(key)) zoomInto(cross, DIGITS.indexOf(key));
   else if (key === "Backspace") zoomOut(cross);
-  else if (key === "Escape") leaveCross(true);
+  else if (key === "Escape") endCross();
   else if (plain.startsWith("Arrow") && !key.startsWith("Alt")) step(cross, plain, key !== plain);
   else return false;
   return true;

@@ -6,7 +6,7 @@ import { make } from "./notices.js";
 /** @typedef {Record<string, any>} Preview ExportPreview of app/cocalib/web/channel/export_preview.py */
 const TYPING_MS = 250;
 const RECTIFIED = "cocalib-rectified";
-export const PARENT = ["x", "y", "z", "qx", "qy", "qz", "qw"];
+const PARENT = ["x", "y", "z", "qx", "qy", "qz", "qw"];
 export const IDENTITY = ["0", "0", "0", "0", "0", "0", "1"];
 const NAMES = [
   ["radar_frame", "Radar frame"],

@@ -16,7 +16,7 @@ const EMPTY = [
   ["rms", "root mean square (RMS)"],
   ["inliers", "pairs that agree"],
 ];
-export const poseTable = make("table", "", []);
+const poseTable = make("table", "", []);
 const poseHead = make("div", "pose-head", "");
 const apartTable = make("table", "", []);
 const apart = make("div", "apart", []);

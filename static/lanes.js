@@ -180,7 +180,7 @@ function drawPicture(pen, { top, bottom }, axis) {
 }
 
 /** A change as a part of the most in the recording. @param {number} index */
-export const changeShare = (index) => Math.min(1, changes.grey_levels[index] / Math.max(MUCH, ...changes.grey_levels));
+const changeShare = (index) => Math.min(1, changes.grey_levels[index] / Math.max(MUCH, ...changes.grey_levels));
 
 /** The greatest value in each column of pixels, as [x, value]. @param {Axis} axis @param {number} count @param {(index: number) => number} time @param {(index: number) => number} value @returns {Map<number, number>} */
 function columns(axis, count, time, value) {

@@ -83,7 +83,7 @@ function startPanes() {
 const paneButtons = () => /** @type {HTMLElement[]} */ ([...document.querySelectorAll("#panes button")]);
 
 /** Show a pane beside the picture where there is room for one only. @param {string} pane "picture" for none */
-export function showPane(pane) {
+function showPane(pane) {
   root.dataset.pane = pane;
   for (const button of paneButtons()) button.setAttribute("aria-pressed", String(button.dataset.pane === pane));
   keep({ pane });
@@ -166,6 +166,6 @@ function startDivider(id, follow) {
 }
 
 /** Highlight the Pose tab once there is a calibration. */
-export function startBadges() {
+function startBadges() {
   on(["view"], () => document.getElementById("tab-pose")?.classList.toggle("ready", state.view?.has_calibration ?? false));
 }

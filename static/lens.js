@@ -2,12 +2,11 @@
 /** The tab "Lens": the intrinsics in use, a form that calibrates them from a board in the recording, and the result. */
 
 import { boardForm } from "./lens_board.js";
-import { drawLensResult, lensResult, takeLensResult } from "./lens_result.js";
+import { drawLensResult, lensResult, parameters, saveCamera, takeLensResult } from "./lens_result.js";
 import { drawMap, drawProgress, focusCancel, lensProgress, running, startLensProgress } from "./lens_progress.js";
 import { showTab } from "./layout.js";
 import { make, toast } from "./notices.js";
 import { toggleRectified, withoutRectified } from "./rectified.js";
-import { saveFile } from "./saving.js";
 import { send } from "./socket.js";
 import { emit, on, state } from "./state.js";
 
@@ -62,14 +61,8 @@ async function start() {
 }
 
 /** Stop looking for the board. */
-export async function cancelLens() {
+async function cancelLens() {
   const refusal = await send({ type: "lens_cancel" });
-  if (refusal) toast(refusal);
-}
-
-/** Solve with the calibrated lens. */
-export async function useLens() {
-  const refusal = await send({ type: "lens_use" });
   if (refusal) toast(refusal);
 }
 
@@ -77,12 +70,6 @@ export async function useLens() {
 async function useGiven() {
   const refusal = await send({ type: "intrinsics_chosen", intrinsics: null });
   if (refusal) toast(refusal);
-}
-
-/** Download intrinsics. @param {boolean} inUse those in use, else the calibrated ones */
-export async function saveCamera(inUse) {
-  const unsaved = await saveFile(`api/camera.yaml${inUse ? "?in_use" : ""}`, "camera.yaml");
-  if (unsaved) toast(unsaved.reason, "Try again.");
 }
 
 function draw() {
@@ -142,11 +129,6 @@ function drawPresent(lens) {
   );
 }
 
-/** @param {import("./messages.js").LensCamera} camera */
-export function parameters(camera) {
-  return make("dl", "lens-parameters", camera.parameters.map(({ name, value, unit }) => make("div", "", [make("dt", "", name), make("dd", "", [value, unit ? make("span", "unit", ` ${unit}`) : ""])])));
-}
-
 function drawPlots() {
   if (page.hidden || !state.lens) return;
   const { imageWidth, imageHeight } = sizeOfPicture();
@@ -154,4 +136,4 @@ function drawPlots() {
 }
 
 /** The size of the recorded pictures. */
-export const sizeOfPicture = () => ({ imageWidth: state.recording?.width_px ?? 0, imageHeight: state.recording?.height_px ?? 0 });
+const sizeOfPicture = () => ({ imageWidth: state.recording?.width_px ?? 0, imageHeight: state.recording?.height_px ?? 0 });

@@ -5,10 +5,11 @@ import { ask, content } from "./asking.js";
 import { ink, rampColour } from "./colours.js";
 import { toDevice, viewport } from "./geometry.js";
 import { drawResiduals, drawUncertainty, veilEmpty } from "./lens_plots.js";
-import { make } from "./notices.js";
+import { make, toast } from "./notices.js";
 import { goTo, pause } from "./player.js";
+import { saveFile } from "./saving.js";
+import { send } from "./socket.js";
 import { emit, on, state } from "./state.js";
-import { parameters, saveCamera, useLens } from "./lens.js";
 
 /** A corner in the frame: where, its residual, and whether it was used. @typedef {[number, number, number, number, boolean]} Corner */
 export const lensResult = make("section", "lens-result", []);
@@ -73,6 +74,23 @@ export function drawLensResult() {
   );
   drawPlots();
   lookUp();
+}
+
+/** Solve with the calibrated lens. */
+async function useLens() {
+  const refusal = await send({ type: "lens_use" });
+  if (refusal) toast(refusal);
+}
+
+/** Download intrinsics. @param {boolean} inUse those in use, else the calibrated ones */
+export async function saveCamera(inUse) {
+  const unsaved = await saveFile(`api/camera.yaml${inUse ? "?in_use" : ""}`, "camera.yaml");
+  if (unsaved) toast(unsaved.reason, "Try again.");
+}
+
+/** @param {import("./messages.js").LensCamera} camera */
+export function parameters(camera) {
+  return make("dl", "lens-parameters", camera.parameters.map(({ name, value, unit }) => make("div", "", [make("dt", "", name), make("dd", "", [value, unit ? make("span", "unit", ` ${unit}`) : ""])])));
 }
 
 /** @param {number|null} value */

@@ -2,16 +2,17 @@
 /** The page: wires the modules together and passes the server's messages to those that draw them. */
 
 import { act, actionNamed } from "./actions.js";
+import { registerActions } from "./action_table.js";
 import { takeSnapped } from "./apex.js";
 import { startArriving } from "./arriving.js";
 import { ask, content } from "./asking.js";
-import { boxing, takeFrameBoxes } from "./boxes.js";
+import { boxing, drawBoxes, takeFrameBoxes } from "./boxes.js";
 import { startBoxing } from "./boxing.js";
-import { startCandidates, take as takeCandidates } from "./candidates.js";
+import { drawCandidates, startCandidates, take as takeCandidates } from "./candidates.js";
 import { startClicking } from "./clicking.js";
-import { startCompare, takeCompared } from "./compare.js";
-import { startContours, takeUncertainty } from "./contours.js";
-import { startCross } from "./cross.js";
+import { drawCompared, startCompare, takeCompared } from "./compare.js";
+import { drawContours, startContours, takeUncertainty } from "./contours.js";
+import { drawCross, startCross } from "./cross.js";
 import { startDescribing } from "./describing.js";
 import { startEvaluating } from "./evaluating.js";
 import { startExporting } from "./exporting.js";
@@ -22,21 +23,24 @@ import { activity } from "./lanes.js";
 import { startLayers } from "./layers.js";
 import { startLayout } from "./layout.js";
 import { startLens, takeLens, takeResult } from "./lens.js";
-import { startLensResult } from "./lens_result.js";
+import { drawLensMarks, startLensResult } from "./lens_result.js";
 import { startLive, takeFollowing, takeFrames } from "./live.js";
 import { startLooking } from "./looking.js";
 import { startLoupe } from "./loupe.js";
 import { setBanner, startTips, toast } from "./notices.js";
+import { drawEvaluated, drawMarks } from "./marks.js";
 import { startMeanings } from "./meanings.js";
 import { isAnother, startOpening, takeChoices, takeFolder } from "./opening.js";
 import { startOptions } from "./options.js";
 import { startPairs } from "./pairs.js";
 import { startPalette } from "./palette.js";
-import { startPicture } from "./picture.js";
+import { addLayer, startPicture } from "./picture.js";
 import { startPictureChanges } from "./picture_changes.js";
 import { frameFailed, goTo, receiveFrame, requestAgain, tellCursor } from "./player.js";
+import { drawProposal } from "./proposal_marks.js";
+import { startSwitch as startProposalSwitch } from "./proposal_switch.js";
 import { justMoved, shownOffer, startProposals, takeProposals } from "./proposals.js";
-import { startRectified } from "./rectified.js";
+import { drawRectified, startRectified } from "./rectified.js";
 import { plots, startReview, takePair, takeReview } from "./review.js";
 import { startRoving } from "./roving.js";
 import { startScatter } from "./scatter.js";
@@ -154,11 +158,23 @@ async function loadActivity() {
   emit("cursor");
 }
 
+/** Draw over the frame, from the bottom to the top: the rectified picture shows no marks, and boxes stand alone. */
+function addLayers() {
+  const isRectified = () => state.rectified || state.shown?.rectified === true;
+  const isMarked = () => !isRectified() && !boxing.on;
+  addLayer(drawRectified, isRectified);
+  addLayer(drawEvaluated, () => !isRectified() && boxing.on);
+  for (const draw of [drawLensMarks, drawContours, drawMarks, drawCandidates, drawProposal, drawCross, drawCompared, drawBoxes]) addLayer(draw, isMarked);
+}
+
+registerActions();
+addLayers();
 startLayout();
 startTips();
 startStatus();
 startPicture();
 startLayers();
+startProposalSwitch();
 startProposals();
 startLoupe();
 startLive();

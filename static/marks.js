@@ -4,16 +4,9 @@
  * 95 % of good residuals = ellipse, radar returns = dots (static) and triangles (moving).
  */
 
-import { boxing, drawBoxedReturns, drawBoxes } from "./boxes.js";
-import { drawCandidates } from "./candidates.js";
+import { drawBoxedReturns, drawBoxes } from "./boxes.js";
 import { ink, residualColour } from "./colours.js";
-import { drawCompared } from "./compare.js";
-import { drawContours } from "./contours.js";
-import { drawCross } from "./cross.js";
 import { toCss, toDevice, viewport, zoom } from "./geometry.js";
-import { drawLensMarks } from "./lens_result.js";
-import { drawProposal } from "./proposal_marks.js";
-import { drawRectified } from "./rectified.js";
 import { clicks, clicksIn, isOffered, placementsAt, state } from "./state.js";
 
 /** @typedef {CanvasRenderingContext2D} Ink */
@@ -24,32 +17,26 @@ const CLOSE = 36;
 /** From this many screen px per image px on, the view counts as being close to the reflector. */
 const CLOSE_ZOOM = 2;
 
-/** Draw all marks of the frame on screen. @param {Ink} pen */
+/** What the server says of the frame on screen, once it is known. */
+const overlayHere = () => (state.overlay?.index === state.shown?.index ? state.overlay : null);
+
+/** The returns, what is predicted and the clicks of the frame on screen. @param {Ink} pen */
 export function drawMarks(pen) {
   const index = state.shown?.index ?? -1;
-  const overlay = state.overlay?.index === index ? state.overlay : null;
-  if (state.rectified || state.shown?.rectified) return drawRectified(pen);
-  if (boxing.on) return drawEvaluated(pen, overlay);
-  drawLensMarks(pen);
-  drawContours(pen);
+  const overlay = overlayHere();
   if (state.layers.returns && overlay?.returns) drawReturns(pen, overlay.returns);
   if (state.layers.predictions && overlay) for (const [u, v, range] of overlay.guesses) if (isOpen(index, range)) drawGuess(pen, u, v);
   if (state.layers.predictions && state.view?.advice && !state.view.verdict.done) drawAdvice(pen, state.view.advice);
   const here = clicks();
   if (state.layers.others) for (const click of here) if (click.frame !== index) drawOther(pen, click);
   for (const click of clicksIn(index)) drawClick(pen, click);
-  drawCandidates(pen);
-  drawProposal(pen);
-  drawCross(pen);
-  drawCompared(pen);
-  drawBoxes(pen);
 }
 
-/** What moves, and the boxes around it; the clicks are out of the way. @param {Ink} pen @param {import("./messages.js").Overlay|null} overlay */
-function drawEvaluated(pen, overlay) {
+/** What moves, and the boxes around it; the clicks are out of the way. @param {Ink} pen */
+export function drawEvaluated(pen) {
   drawBoxes(pen);
   if (!state.layers.returns || drawBoxedReturns(pen)) return;
-  drawReturns(pen, (overlay?.returns ?? []).filter(([, , , , , isStill]) => !isStill));
+  drawReturns(pen, (overlayHere()?.returns ?? []).filter(([, , , , , isStill]) => !isStill));
 }
 
 /** Whether a placement in a frame still wants a click. @param {number} index @param {number} range its own [m] */

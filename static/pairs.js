@@ -39,7 +39,7 @@ export function startPairs() {
 }
 
 /** Clicks in the order of the table. */
-export function sorted() {
+function sorted() {
   const sign = sorting.descending ? -1 : 1;
   return [...clicks()].sort((a, b) => sign * ((a[sorting.key] ?? -1) - (b[sorting.key] ?? -1)) || a.frame - b.frame);
 }

@@ -1,7 +1,6 @@
 // @ts-check
-/** The camera frame on its canvas: size, zoom, pan and redrawing. */
+/** The camera frame on its canvas, with the layers that others draw over it: size, zoom, pan and redrawing. */
 
-import { drawMarks } from "./marks.js";
 import * as geometry from "./geometry.js";
 import { emit, on, state } from "./state.js";
 
@@ -13,6 +12,8 @@ const paper = /** @type {CanvasRenderingContext2D} */ (picture.getContext("2d", 
 const ink = /** @type {CanvasRenderingContext2D} */ (marks.getContext("2d"));
 /** From this many device px per image px on, pixels are shown as squares; not below, since their edges snap to device px. */
 const SQUARES_FROM = 8;
+/** What is drawn over the frame, from the bottom to the top. @type {{draw: (pen: CanvasRenderingContext2D) => void, when: () => boolean}[]} */
+const layers = [];
 let drawPicture = false;
 let drawInk = false;
 
@@ -28,6 +29,9 @@ export function startPicture() {
   on(["theme"], redraw);
   measure();
 }
+
+/** Draw something over every frame, above what was added before. @param {(pen: CanvasRenderingContext2D) => void} draw @param {() => boolean} when it is drawn */
+export const addLayer = (draw, when) => layers.push({ draw, when });
 
 /** Follow the ratio of device to CSS pixels, which changes with the browser's zoom and the monitor. */
 function watchRatio() {
@@ -86,7 +90,7 @@ function paint() {
   drawPicture = drawInk = false;
   ink.setTransform(1, 0, 0, 1, 0, 0);
   ink.clearRect(0, 0, marks.width, marks.height);
-  if (state.shown) drawMarks(ink);
+  if (state.shown) for (const { draw, when } of layers) if (when()) draw(ink);
 }
 
 function paintPicture() {

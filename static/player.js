@@ -91,7 +91,7 @@ function tickWithoutPictures(due) {
 }
 
 /** The last frame at or before a time. @param {number} time s from the first frame */
-export function indexAt(time) {
+function indexAt(time) {
   let [low, high] = [0, state.seconds.length - 1];
   while (low < high) {
     const middle = (low + high + 1) >> 1;

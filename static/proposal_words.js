@@ -1,32 +1,13 @@
 // @ts-check
 /** What is said of proposals: the line on the frame, how far they are, and why there are none. */
 
-import { counted, heldBack, openProposals, shownOffer } from "./proposals.js";
-import { emit, state } from "./state.js";
+import { counted, heldBack, isSearching, openProposals, saidWords, say, searchWords, shownOffer } from "./proposals.js";
+import { state } from "./state.js";
 
 /** @typedef {import("./steps.js").Words} Words */
 
-/** What the line says for a moment. */
-let said = { text: "", until: 0 };
-
-/** Say something in the line on the frame for a while. @param {string} text @param {number} [ms] */
-export function say(text, ms = 5000) {
-  said = { text, until: performance.now() + ms };
-  emit("proposals");
-  if (text) setTimeout(() => emit("proposals"), ms + 20);
-}
-
-/** What is being said now, as a sentence with a space behind it; "" if nothing. */
-export const saidWords = () => (performance.now() < said.until && said.text ? `${said.text}. ` : "");
-
-/** While proposals are still being found. */
-export const isSearching = () => Boolean(state.proposals?.on && state.proposals.stage === "looking");
-
 /** How many proposals there are, for sentences. */
-export const howMany = () => `${openProposals().length} proposal${openProposals().length === 1 ? "" : "s"}${isSearching() ? " so far" : ""}`;
-
-/** How far the search is, as a sentence. */
-export const searchWords = () => `Proposals are being looked for: ${state.proposals?.done} of ${state.proposals?.count}`;
+const howMany = () => `${openProposals().length} proposal${openProposals().length === 1 ? "" : "s"}${isSearching() ? " so far" : ""}`;
 
 /** N found no proposal: say why, if that is not because all are decided. */
 export function sayNone() {

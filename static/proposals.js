@@ -10,8 +10,6 @@ import { toCss, viewport } from "./geometry.js";
 import { toast } from "./notices.js";
 import { fit } from "./picture.js";
 import { goTo, pause } from "./player.js";
-import { startSwitch } from "./proposal_switch.js";
-import { isSearching, say, searchWords } from "./proposal_words.js";
 import { zoomInto } from "./proposal_zoom.js";
 import { send } from "./socket.js";
 import { clickIn, emit, isDismissed, isLookedAt, isOffered, on, placementsAt, state } from "./state.js";
@@ -53,7 +51,6 @@ const onTheWay = new Map();
 let over = false;
 
 export function startProposals() {
-  startSwitch();
   on(["shown"], arrive);
   on(["shown", "view", "proposals", "placements", "playing"], notice);
   on(["view"], settle);
@@ -80,6 +77,25 @@ export function takeProposals(message) {
   }
   emit("proposals");
 }
+
+/** What the line says for a moment. */
+let said = { text: "", until: 0 };
+
+/** Say something in the line on the frame for a while. @param {string} text @param {number} [ms] */
+export function say(text, ms = 5000) {
+  said = { text, until: performance.now() + ms };
+  emit("proposals");
+  if (text) setTimeout(() => emit("proposals"), ms + 20);
+}
+
+/** What is being said now, as a sentence with a space behind it; "" if nothing. */
+export const saidWords = () => (performance.now() < said.until && said.text ? `${said.text}. ` : "");
+
+/** While proposals are still being found. */
+export const isSearching = () => Boolean(state.proposals?.on && state.proposals.stage === "looking");
+
+/** How far the search is, as a sentence. */
+export const searchWords = () => `Proposals are being looked for: ${state.proposals?.done} of ${state.proposals?.count}`;
 
 /** Take note of a proposal that has just appeared on screen. */
 function notice() {

@@ -25,7 +25,7 @@ function partsOf(owner) {
 }
 
 /** What the 3D view in a window lacks, in words; empty if everything is there. @param {any} owner @returns {string[]} */
-export function missingParts(owner) {
+function missingParts(owner) {
   const found = partsOf(owner);
   if (!found) return ["window.__viserMutable"];
   const elements = (/** @type {any} */ matrix) => matrix?.elements?.length === 16;

@@ -5,7 +5,8 @@ import { act, actionNamed } from "./actions.js";
 import { boxing } from "./boxes.js";
 import { boxAdvice } from "./evaluating.js";
 import { make } from "./notices.js";
-import { proposalAdvice, proposalWords, saidWords, silentWords } from "./proposal_words.js";
+import { proposalAdvice, proposalWords, silentWords } from "./proposal_words.js";
+import { saidWords } from "./proposals.js";
 import { clickIn, clicks, clicksIn, isClicked, isDismissed, isOffered, on, placementAt, placementsAt, rangeApart, state } from "./state.js";
 
 const guide = /** @type {HTMLElement} */ (document.getElementById("guide"));
@@ -137,7 +138,7 @@ function outlierWords(click) {
 }
 
 /** The next thing to do: the verdict's action, with its key; null when there is nothing to say. @returns {Words|null} */
-export function nextAction() {
+function nextAction() {
   const view = state.view;
   if (!view || view.stage === "unsolvable") return null; // the orange box says what to do
   const { action, key, done } = view.verdict;

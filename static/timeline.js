@@ -80,7 +80,7 @@ function pinch(event) {
   zoomTo((span.to - span.from) * (Math.max(20, Math.abs(before - other)) / Math.max(20, Math.abs(event.offsetX - other))), drawn, other);
 }
 
-export function showAll() {
+function showAll() {
   const last = length();
   [span.from, span.to] = [-0.01 * last, Math.max(1.01 * last, 0.1)];
   redraw();
@@ -101,13 +101,13 @@ function extend() {
 const room = () => Math.max(1, canvas.clientWidth - lanes.left - lanes.right);
 
 /** @param {number} seconds @returns {number} CSS px */
-export const toX = (seconds) => lanes.left + ((toFolded(folding, seconds) - span.from) / (span.to - span.from)) * room();
+const toX = (seconds) => lanes.left + ((toFolded(folding, seconds) - span.from) / (span.to - span.from)) * room();
 
 /** @param {number} x CSS px @returns {number} drawn s */
 const toDrawn = (x) => span.from + ((x - lanes.left) / room()) * (span.to - span.from);
 
 /** @param {number} x CSS px @returns {number} s */
-export const toSeconds = (x) => unfolded(folding, toDrawn(x));
+const toSeconds = (x) => unfolded(folding, toDrawn(x));
 
 /** @param {PointerEvent} event */
 function scrub(event) {

@@ -5,7 +5,7 @@
 /** @typedef {import("./messages.js").ClickRow} Click */
 
 /** Return the View after a change; a row that does not change stays the same object. @param {View} view @param {import("./messages.js").ViewChange} change @returns {View} */
-export function changed(view, change) {
+function changed(view, change) {
   const clicks = change.clicks ? changedRows(view.clicks, change.clicks) : view.clicks;
   return /** @type {View} */ ({ ...view, ...change.fields, clicks });
 }
