@@ -1,4 +1,3 @@
-// @ts-check
 /** What the boxes say about the calibration: Acc, each class, and how Acc changes when the camera is turned, which says what it can see at all. */
 
 import { themeColour } from "./colours.js";

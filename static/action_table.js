@@ -1,4 +1,3 @@
-// @ts-check
 /** The table of actions, once: words, keys, what runs and when it can be done. */
 
 import { register } from "./actions.js";

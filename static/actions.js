@@ -1,4 +1,3 @@
-// @ts-check
 /** Every action of the page: what it does in words, its keys, and when it can be done. Whoever has one registers it; keys, help and palette ask here. */
 
 /**

@@ -1,4 +1,3 @@
-// @ts-check
 /**
  * Comes back to a server that was restarted: its cookie is worth nothing to the new one, so the page proves that it was
  * admitted before. The secret stays in this page's memory; no request carries it.

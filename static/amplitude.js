@@ -1,4 +1,3 @@
-// @ts-check
 /** Colours of amplitudes, the same as in the 3D view (app/cocalib/web/view3d/looking.py): from most returns to the strongest of the recording. */
 
 import { state } from "./state.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /** Asks the server for the reflector's apex near a pixel, in one frame or averaged over those of its placement. */
 
 import { send } from "./socket.js";

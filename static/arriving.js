@@ -1,4 +1,3 @@
-// @ts-check
 /** Going to another placement or pair: bring the reflector into view, zoomed in where the radar expects it. */
 
 import { expectedHere } from "./cross.js";

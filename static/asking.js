@@ -1,4 +1,3 @@
-// @ts-check
 /** Requests outside the channel: the answer, or in words why there is none. A server that is gone is an answer too. */
 
 /** @typedef {{answer: Response|null, reason: string, isLost: boolean}} Asked `isLost` says that it is worth asking again. */

@@ -1,4 +1,3 @@
-// @ts-check
 /** A recording without pictures, seen from above: static returns of the whole recording, those of the last seconds, and the placements. */
 
 import { amplitudeColour, staying } from "./amplitude.js";

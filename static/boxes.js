@@ -1,4 +1,3 @@
-// @ts-check
 /** Boxes around objects: which ones the frame on screen has, which one is selected, and how they are drawn. */
 
 import { ink } from "./colours.js";

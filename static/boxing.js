@@ -1,4 +1,3 @@
-// @ts-check
 /** Drawing boxes: drag to draw, drag inside the selected one to move it, drag a handle to resize it, click to select. Every correction is a keyframe. */
 
 import { boxing, HANDLES, handleAt, selectBox, selectedBox, selectedTrack, shownBoxes } from "./boxes.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /**
  * The radar returns that may belong to the selected click: numbered rings on the frame, and the choice between them. A click on
  * a number chooses; C takes the one that would fit better, or else the next one; undo takes the choice back.

@@ -1,4 +1,3 @@
-// @ts-check
 /** Pointer input on the frame: click to place, drag a mark to move it, click a candidate's number to choose it, drag elsewhere to pan, wheel to zoom at the cursor, arrow keys to nudge. */
 
 import { askApex } from "./apex.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /** Colours of the marks. The residual ramp from blue through sand to red-orange also works for colour-blind users; shapes carry the same information. */
 
 /** @type {[number, [number, number, number]][]} */

@@ -1,4 +1,3 @@
-// @ts-check
 /** Two solutions side by side: chosen here, compared by the server, drawn over the picture with two shapes. */
 
 import { make, toast } from "./notices.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /** The uncertainty in the picture: lines on which a point at some distance may be this many pixels away from its drawn place. */
 
 import { toDevice, viewport } from "./geometry.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /**
  * The keyboard's cross: digits zoom into one of nine fields, arrows move it faster the longer they are held, Enter sets the mark.
  * It starts where the radar expects the reflector. A mark that is set there without the cross being moved is a guess: it does not count.

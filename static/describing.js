@@ -1,4 +1,3 @@
-// @ts-check
 /** The page in words, for those who do not see it: the picture with its marks, and where the dividers are. */
 
 import { on, clicksIn, isClicked, placementAt, state } from "./state.js";

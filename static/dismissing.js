@@ -1,4 +1,3 @@
-// @ts-check
 /** Dismissing a placement that the radar found and that is not the reflector; undo brings it back. */
 
 import { toast } from "./notices.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /** The tab "Evaluate": while it is open, boxes are drawn on the picture; it lists them and says what they say about the calibration. */
 
 import { accSection, drawAcc } from "./acc.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /** What the user fills in on the export panel: frame names, the radar's pose in a third frame, whether pictures are rectified. */
 
 import { make } from "./notices.js";

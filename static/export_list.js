@@ -1,4 +1,3 @@
-// @ts-check
 /** The list of the export panel: formats under the heading of where they are used, and a field to find one by typing. */
 
 import { make } from "./notices.js";

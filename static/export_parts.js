@@ -1,4 +1,3 @@
-// @ts-check
 /** Parts of the export panel: the text with its comments dimmed, the file's numbers, its check point, what it rests on. */
 
 import { shape } from "./frames.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /** The export panel: a preview of every format, the direction of its transform, and the clicks. */
 
 import { ask, BROKE_OFF, content } from "./asking.js";

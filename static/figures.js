@@ -1,4 +1,3 @@
-// @ts-check
 /** Metrics and pose, with the server's text. */
 
 import { make } from "./notices.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /**
  * A time axis that folds gaps: where nothing was recorded, it advances by little. Seconds of the recording go in, drawn seconds come out;
  * the way is strictly monotone, so it has an exact way back, also inside a gap.

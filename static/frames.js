@@ -1,4 +1,3 @@
-// @ts-check
 /** A small drawing of the radar's and the camera's axes, with a bold arrow for the direction of the file's transform. */
 
 const NS = "http://www.w3.org/2000/svg";

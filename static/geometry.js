@@ -1,4 +1,3 @@
-// @ts-check
 /**
  * Maps image pixels to the screen and back. Image pixels follow OpenCV: (0, 0) is the centre of the top-left pixel, the picture's
  * edge is at -0.5. The half pixel appears only in `toDevice` and its inverse.

@@ -1,4 +1,3 @@
-// @ts-check
 /** The help dialog: keys, mouse and marks. */
 
 import { ink } from "./colours.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /** Adding the clicks of a clicks.json that the user chooses. */
 
 import { make, toast } from "./notices.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /** Keyboard: which action of actions.js a key runs. It also works while the 3D view has the focus. */
 
 import { ACTIONS, act } from "./actions.js";

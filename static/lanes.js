@@ -1,4 +1,3 @@
-// @ts-check
 /** Draws the timeline, lane by lane: ruler, placements, clicks with their residuals as height, radar activity, picture changes, and the current frame. */
 
 import { ink, residualColour, themeColour } from "./colours.js";

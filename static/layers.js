@@ -1,4 +1,3 @@
-// @ts-check
 /** The overlays of the frame, each with a chip and a key. */
 
 import { make } from "./notices.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /** The shape of the page for the window's size, dividers, panes, tabs and the theme; the user's choices are remembered. */
 
 import { emit, on, state } from "./state.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /** The tab "Lens": the intrinsics in use, a form that calibrates them from a board in the recording, and the result. */
 
 import { boardForm } from "./lens_board.js";

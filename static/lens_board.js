@@ -1,4 +1,3 @@
-// @ts-check
 /** The form that describes the board, remembered from one recording to the next. */
 
 import { make } from "./notices.js";

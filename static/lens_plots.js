@@ -1,4 +1,3 @@
-// @ts-check
 /** Small plots over the area of the picture: where the board was, residuals, and how uncertain a projection is. */
 
 import { rampColour, themeColour } from "./colours.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /** How far the calibration of the lens is: what was found, which view is missing, where the board was. */
 
 import { drawCoverage } from "./lens_plots.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /** The result of calibrating the lens: the model and why, how well it fits, every view, what was left out, and plots over the picture. */
 
 import { ask, content } from "./asking.js";

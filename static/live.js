@@ -1,4 +1,3 @@
-// @ts-check
 /** Following a recording that is still being written: its new frames, and whether the page shows the newest one. */
 
 import { goTo } from "./player.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /** Names of any length and script: cut in the middle where there is no room, in full on hover. */
 
 import { make } from "./notices.js";

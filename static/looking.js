@@ -1,4 +1,3 @@
-// @ts-check
 /** A recording without pictures: what the page shows instead of the picture, its controls, and the table of placements. */
 
 import { amplitudeRange, rampColour } from "./amplitude.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /** The loupe: the picture around a point, magnified 4 to 16 times, with a cross centred on the point to a fraction of a pixel. */
 
 import { ink } from "./colours.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /** The page: wires the modules together and passes the server's messages to those that draw them. */
 
 import { act, actionNamed } from "./actions.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /**
  * Marks on the frame: click = cross, reprojection = ring, their residual = line, excluded = hollow, predicted = dashed,
  * 95 % of good residuals = ellipse, radar returns = dots (static) and triangles (moving).

@@ -1,4 +1,3 @@
-// @ts-check
 /**
  * Picking what a calibration means whose numbers do not state it: each meaning is drawn over the frame on the screen, and the one
  * that is picked is shown as the calibration.

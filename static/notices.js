@@ -1,4 +1,3 @@
-// @ts-check
 /** Notices: toasts for errors, the banner for a lost connection, and explanations of figures and controls. */
 
 import { toCss } from "./geometry.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /**
  * Choosing what is opened and how: the dialog behind "Recording…", which the server also opens with a question, the strip on a
  * recording without intrinsics, and camera files dropped on the page.

@@ -1,4 +1,3 @@
-// @ts-check
 /** The parts of the dialog that chooses what is opened: radar and camera, intrinsics, session, other recordings. */
 
 import { make } from "./notices.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /** The options, built from the server's descriptions: the most used first, all others below. */
 
 import { showTab } from "./layout.js";

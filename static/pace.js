@@ -1,4 +1,3 @@
-// @ts-check
 /**
  * Runs in the 3D view's frame, before viser's own script. Viser draws as often as it can and shares its thread with our page;
  * without a graphics card, every drawing delays the picture. The 3D view therefore draws at full rate only while the user moves

@@ -1,4 +1,3 @@
-// @ts-check
 /** The table of pairs, one row per click, sorted by time, range or residual; click a row to go there, its checkbox to exclude it. */
 
 import { comeTo } from "./arriving.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /** The command palette: every action, placement, pair and option, found by typing. */
 
 import { ACTIONS, keyNames, reasonAgainst } from "./actions.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /** The camera frame on its canvas, with the layers that others draw over it: size, zoom, pan and redrawing. */
 
 import * as geometry from "./geometry.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /** How much the picture changes, fetched piece by piece: the server compares frames in the background, coarse to fine. */
 
 import { changes } from "./lanes.js";

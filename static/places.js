@@ -1,4 +1,3 @@
-// @ts-check
 /** What can be gone to by typing: placements, pairs, frames, times, and the options of the panel. */
 
 import { comeTo } from "./arriving.js";

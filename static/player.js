@@ -1,4 +1,3 @@
-// @ts-check
 /** Which frame is on the screen: stepping, playing, and the requests for frames (few in flight, the newest wins). */
 
 import { clicks, emit, select, state } from "./state.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /** Ticks of an axis, and the shapes of marks on a plot. */
 
 /** Round values on an axis, about so many. @param {import("./plots.js").Axis} axis @param {number} count @returns {number[]} */

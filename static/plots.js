@@ -1,4 +1,3 @@
-// @ts-check
 /**
  * Small plots on a canvas: dots or bars with axes, ticks and units. Every mark stands for one or more pairs; pointing at it, or moving
  * to it with the arrow keys, tells the owner, which highlights the same pairs in every plot.

@@ -1,4 +1,3 @@
-// @ts-check
 /** Draws a proposal on the frame: a dashed cross with its 95 % ring, and faint numbers at the other places in question. */
 
 import { ink } from "./colours.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /** The switch of the proposals, with how far the search is: a chip among the layers, and the key O. */
 
 import { make, toast } from "./notices.js";

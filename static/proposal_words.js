@@ -1,4 +1,3 @@
-// @ts-check
 /** What is said of proposals: the line on the frame, how far they are, and why there are none. */
 
 import { counted, heldBack, isSearching, openProposals, saidWords, say, searchWords, shownOffer } from "./proposals.js";

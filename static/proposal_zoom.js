@@ -1,4 +1,3 @@
-// @ts-check
 /** The view of a proposal: zoomed to the reflector's size, with room for the line on the frame. */
 
 import { lookAt, lookInto, pan, toCss, viewport, zoom } from "./geometry.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /**
  * Proposals of where the reflector stood, one placement at a time: N goes to the next one, Enter accepts what the picture shows, C
  * takes another place, X says that it is not the reflector, a click puts the mark elsewhere. They are found on the server.

@@ -1,4 +1,3 @@
-// @ts-check
 /**
  * The picture without the lens's distortion, to judge the intrinsics by straight edges: a grid, and lines that the person drags along
  * them. Marks belong to the picture as taken, so meanwhile they are hidden and nothing can be marked.

@@ -1,4 +1,3 @@
-// @ts-check
 /** The review of all pairs: linked plots of the residuals with a filter, and why the selected pair uses its return. */
 
 import { comeTo } from "./arriving.js";

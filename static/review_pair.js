@@ -1,4 +1,3 @@
-// @ts-check
 /** Which return a pair uses and why, in the server's words: its figures, and all returns that were possible. */
 
 import { make } from "./notices.js";

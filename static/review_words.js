@@ -1,4 +1,3 @@
-// @ts-check
 /** The figures of a pair in the review, as text. */
 
 /** Limits of an axis, a little beyond its values. @param {number[]} values */

@@ -1,4 +1,3 @@
-// @ts-check
 /** One stop of the Tab key per table or row of figures; the arrow keys go on from there. It follows whatever draws them. */
 
 /**

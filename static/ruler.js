@@ -1,4 +1,3 @@
-// @ts-check
 /** The ruler of the timeline, and its folded gaps. */
 
 import { themeColour } from "./colours.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /** Files that the server makes, kept in the browser's folder for downloads. */
 import { ask, BROKE_OFF, content } from "./asking.js";
 import { make } from "./notices.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /** Scatter plot of the residuals: how far right (du) and down (dv) each reprojection is from its click. An off-centre cloud indicates a bias. */
 
 import { ink, residualColour, themeColour } from "./colours.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /** Search by words: how well a query fits what an entry is called, or other words for it. */
 
 /** @typedef {{words: string, also?: string}} Searchable */

@@ -1,4 +1,3 @@
-// @ts-check
 /** S: the mark, or the keyboard's cross, goes to the reflector's apex that the picture shows within 15 px; the server finds it. */
 
 import { askApex } from "./apex.js";

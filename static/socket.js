@@ -1,4 +1,3 @@
-// @ts-check
 /**
  * The channel to the server: sends events, resends those that were not confirmed before the connection was lost, and passes
  * messages to their reader. Undo and redo are not resent, because they must not be applied twice.

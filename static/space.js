@@ -1,4 +1,3 @@
-// @ts-check
 /** The 3D view: viser's own page in an iframe. It has its own connection to the server; the name of this tab links the two. */
 
 import { comeTo } from "./arriving.js";

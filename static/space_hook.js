@@ -1,4 +1,3 @@
-// @ts-check
 /**
  * All use of viser's private browser API: where its camera is, and when it has drawn. viser sets `__viserMutable` for its own tests;
  * a version without it leaves the 3D view without labels and picking. tests/browser/test_space.py says in words what changed.

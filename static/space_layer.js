@@ -1,4 +1,3 @@
-// @ts-check
 /**
  * What the page draws over the 3D view: labels, range numbers, placements, the mark under the pointer; and the Camera view, which is
  * the page's own picture with the returns in front of it, projected by the server through the same lens.

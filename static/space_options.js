@@ -1,4 +1,3 @@
-// @ts-check
 /** How the user wants the 3D view: colours, trail, hidden, enlarged. Remembered in this browser. */
 
 import { state } from "./state.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /** What is under the pointer in the 3D view, in words; and where range numbers stand so that they can be read. */
 
 /** @typedef {import("./messages.js").SpaceLook} Look */

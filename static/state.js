@@ -1,4 +1,3 @@
-// @ts-check
 /** The state of the page, and its listeners. The session is held by the server; this is what it sent last. */
 
 /** @typedef {import("./messages.js").View} View */

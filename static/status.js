@@ -1,4 +1,3 @@
-// @ts-check
 /** The header and the status line: recording, clock, buttons, status, progress, the pixel under the pointer. */
 
 import { longName, setLongName } from "./long_names.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /** What to do next: three steps while there is no calibration, one line on the frame, and the same text in the status line. */
 
 import { act, actionNamed } from "./actions.js";

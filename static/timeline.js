@@ -1,4 +1,3 @@
-// @ts-check
 /** The timeline: where a pointer is in time, and what is there; click to go there, wheel or two fingers to zoom. lanes.js draws it. */
 
 import { foldingOf, gapsOf, lengthWords, toFolded, toSeconds as unfolded } from "./folding.js";

@@ -1,4 +1,3 @@
-// @ts-check
 /**
  * Fingers on the frame: one pans, a tap places or selects, a long press drags a cross under the loupe, two zoom and pan.
  * Only what fingers do is here; static/clicking.js has the mouse and the pen, and what a click is.

@@ -1,4 +1,3 @@
-// @ts-check
 /** The verdict at the top of the panel: how far to trust the calibration, in one line, and what to do. It never scrolls away. */
 
 import { make } from "./notices.js";

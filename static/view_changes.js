@@ -1,4 +1,3 @@
-// @ts-check
 /** Applies what the server sends of a View: the whole, or what differs from the one before. */
 
 /** @typedef {import("./messages.js").View} View */

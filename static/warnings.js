@@ -1,4 +1,3 @@
-// @ts-check
 /** The warnings: one line each, the gravest first; one unfolds to its whole message and what to do about it. */
 
 import { showTab } from "./layout.js";
