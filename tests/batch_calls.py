@@ -3,6 +3,7 @@
 import os
 import signal
 import sys
+import tempfile
 import threading
 from pathlib import Path
 
@@ -11,7 +12,9 @@ from cocalib.batch.manifest import ManifestRow
 from cocalib.batch.outcome import Outcome, read_outcome
 from cocalib.batch.results_folder import OUTCOME_FILE, ResultsFolder
 
-__all__ = ["attempts", "dying", "dying_job", "endless", "failing", "quick_jobs", "squared", "written"]
+__all__ = [
+    *("attempts", "dying", "dying_job", "endless", "failing", "quick_jobs", "squared", "temporary_file", "written"),
+]
 
 
 def quick_jobs(folder: Path, count: int) -> tuple[Job, ...]:
@@ -32,9 +35,16 @@ def squared(number: int) -> int:
     return number * number
 
 
-def failing(number: int) -> int:
+def failing(*given: object) -> int:
     """Raise what a function may raise."""
-    raise ValueError(f"not {number}")
+    raise ValueError(f"not {given[0]}")
+
+
+def temporary_file(_: int) -> str:
+    """Leave a temporary file, as a call that is killed does; return its path."""
+    descriptor, path = tempfile.mkstemp()
+    os.close(descriptor)
+    return path
 
 
 def dying(folder: str, name: str, times: int) -> str:
@@ -46,7 +56,7 @@ def dying(folder: str, name: str, times: int) -> str:
     return name
 
 
-def dying_job(job: Job, results: Path, _: str) -> Outcome:
+def dying_job(job: Job, results: Path) -> Outcome:
     """Kill this worker whenever it runs the job of vehicle v001, as one that needs too much memory does."""
     from cocalib.batch.engines.one_job import run_once
 

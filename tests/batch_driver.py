@@ -2,7 +2,7 @@
 
 import signal
 
-from cocalib.batch.engines.dask_cluster import DaskCluster
+from cocalib.batch.engines.worker_processes import WorkerProcesses
 from cocalib.platform.process import stop_on_signals
 from tests.batch_calls import endless
 
@@ -10,5 +10,5 @@ if __name__ == "__main__":
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_DFL)  # tests may have been started in the background, where SIGINT is ignored
     stop_on_signals()
-    for call, _ in DaskCluster(workers=2).run_all(endless, [(0,), (1,), (2,)]):
+    for call, _ in WorkerProcesses(2).run_all(endless, [(0,), (1,), (2,)]):
         print(f"finished {call}", flush=True)

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 from benchmarks.accuracy.keeping import Keeper
 from benchmarks.accuracy.rows import Figures, Kept, Row
-from cocalib.batch.engines.dask_cluster import DaskCluster
 from cocalib.batch.engines.engine import Engine
 from cocalib.batch.engines.in_process import InProcess
+from cocalib.batch.engines.worker_processes import WorkerProcesses
 
 __all__ = ["kept_figures", "run"]
 
@@ -29,7 +29,7 @@ def run(rows: Sequence[Row], keeper: Keeper, *, jobs: int, most: int | None = No
     """
     chunks = [(row, chunk) for row in rows for chunk in _missing(row, keeper, most, first)]
     progress = _Progress(sum(len(chunk) for _, chunk in chunks))
-    engine: Engine = InProcess() if jobs == 1 else DaskCluster(jobs)
+    engine: Engine = InProcess() if jobs == 1 else WorkerProcesses(jobs)
     for number, measured in engine.run_all(_measure, chunks):
         row, _ = chunks[number]
         keeper.add(row.key, measured)

@@ -16,9 +16,9 @@ from benchmarks.fleet.simulated_session import Mounting
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.synthetic import simulate, write_recording
 from calib_core.synthetic.rig import nominal_rotation
-from cocalib.batch.engines.dask_cluster import DaskCluster
 from cocalib.batch.engines.engine import Engine
 from cocalib.batch.engines.in_process import InProcess
+from cocalib.batch.engines.worker_processes import WorkerProcesses
 
 __all__ = ["RECORDING", "main", "write_fleet"]
 
@@ -111,7 +111,7 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2, help="processes; 1 writes in this one")
     given = parser.parse_args(arguments)
-    engine: Engine = DaskCluster(given.workers) if given.workers > 1 else InProcess()
+    engine: Engine = WorkerProcesses(given.workers) if given.workers > 1 else InProcess()
     print(write_fleet(given.out, plan_fleet(given.vehicles, given.sessions, given.seed), engine))
     return 0
 

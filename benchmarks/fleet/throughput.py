@@ -4,6 +4,7 @@ python -m benchmarks.fleet.throughput FOLDER --vehicles 50 --sessions 3 --worker
 """
 
 import argparse
+import multiprocessing
 import os
 import shutil
 import sys
@@ -22,8 +23,8 @@ import psutil
 from benchmarks.fleet.plan import plan_fleet
 from benchmarks.fleet.simulated_fleet import write_fleet
 from cocalib.batch.driving import drive
-from cocalib.batch.engines.dask_cluster import DaskCluster
 from cocalib.batch.engines.in_process import InProcess
+from cocalib.batch.engines.worker_processes import WorkerProcesses
 from cocalib.batch.job import Job, jobs_of
 from cocalib.batch.manifest_files.reading import read_manifest
 from cocalib.batch.outcome import Outcome
@@ -34,7 +35,7 @@ __all__ = ["killing", "main"]
 
 _LONGEST_PAUSE_S = 3.0
 _LOOK_EVERY_S = 0.1
-_RUNS = ("loop", "none", "dask", "killed")
+_RUNS = ("loop", "one", "workers", "killed")
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,14 +97,7 @@ def _watching() -> Iterator[list[float]]:
 
 
 def _workers() -> list[psutil.Process]:
-    found = []
-    for child in psutil.Process(os.getpid()).children():
-        try:
-            if "spawn_main" in " ".join(child.cmdline()):
-                found.append(child)
-        except psutil.NoSuchProcess:
-            continue
-    return found
+    return [psutil.Process(one.pid) for one in multiprocessing.active_children() if psutil.pid_exists(one.pid or 0)]
 
 
 def _measured(name: str, folder: Path, run: Callable[[Path], Sequence[Outcome]]) -> _Measured:
@@ -146,19 +140,19 @@ def _files(folder: Path) -> dict[str, bytes]:
 def _measured_runs(
     jobs: Sequence[Job], folder: Path, names: Sequence[str], *, workers: int, kills: int, seed: int
 ) -> list[_Measured]:
-    def on(engine: InProcess | DaskCluster) -> Callable[[Path], Sequence[Outcome]]:
+    def on(engine: InProcess | WorkerProcesses) -> Callable[[Path], Sequence[Outcome]]:
         return lambda results: drive(jobs, engine, ResultsFolder(results))
 
     def killed() -> _Measured:
         with killing(kills, seed) as ended:
-            found = _measured("Dask, workers killed", folder, on(DaskCluster(workers)))
+            found = _measured("workers killed", folder, on(WorkerProcesses(workers)))
             count = len(ended)
         return replace(found, kills=count)
 
     runs: dict[str, Callable[[], _Measured]] = {
         "loop": lambda: _measured("plain loop", folder, lambda results: [run_job(job, results) for job in jobs]),
-        "none": lambda: _measured("engine none", folder, on(InProcess())),
-        "dask": lambda: _measured(f"Dask, {workers} workers", folder, on(DaskCluster(workers))),
+        "one": lambda: _measured("one process", folder, on(InProcess())),
+        "workers": lambda: _measured(f"{workers} workers", folder, on(WorkerProcesses(workers))),
         "killed": killed,
     }
     return [runs[name]() for name in names]
@@ -195,7 +189,9 @@ def main(arguments: list[str]) -> int:
     given = parser.parse_args(arguments)
     manifest = given.folder / "manifest.toml"
     if not manifest.exists():
-        write_fleet(given.folder, plan_fleet(given.vehicles, given.sessions, given.seed), DaskCluster(given.workers))
+        write_fleet(
+            given.folder, plan_fleet(given.vehicles, given.sessions, given.seed), WorkerProcesses(given.workers)
+        )
     jobs = jobs_of(read_manifest(manifest).rows, given.folder)
     measured = _measured_runs(jobs, given.folder, given.runs, workers=given.workers, kills=given.kills, seed=given.seed)
     print(_table(measured))

@@ -85,9 +85,8 @@ def test_a_first_manifest_is_never_written_over_another_file(fleet: Path, capsys
     ("flags", "fault"),
     [
         (["--workers", "2", "--scheduler", "tcp://127.0.0.1:1"], "give one of them"),
-        (["--engine", "none", "--workers", "2"], "leave out --workers"),
         (["--workers", "0"], "there must be at least 1"),
-        (["--engine", "ray"], "--engine takes"),
+        (["--scheduler", "tcp://10.0.0.7:8786"], "without TLS is refused"),
         (["--shard", "3/2"], "there is no such part"),
         (["--shard", "half"], "such as 3/16"),
     ],

@@ -4,24 +4,29 @@ import os
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass
-from importlib.util import find_spec
-from typing import Literal, TypeAlias
+from pathlib import Path
 
 from calib_core.errors import InputError, OptionError
-from cocalib.batch.engines.dask_cluster import DaskCluster
+from cocalib.batch.engines.dask_scheduler import DaskScheduler
 from cocalib.batch.engines.engine import Engine
 from cocalib.batch.engines.in_process import InProcess
+from cocalib.batch.engines.one_job import failed_outcome, run_once
+from cocalib.batch.engines.worker_processes import WorkerProcesses
 from cocalib.batch.job import Job
 from cocalib.batch.outcome import Outcome
 from cocalib.batch.results_folder import ResultsFolder
 
-EngineName: TypeAlias = Literal["dask", "none"]
-
 _SMALL = 8
-"""Fewer jobs than this are not worth the seconds that a cluster takes to start."""
+"""Fewer jobs than this are not worth the seconds that workers take to start."""
 _FEWEST_TIMED = 3
 """Finished jobs from which the time left can be told."""
+_DIED = "every worker that ran this job died of it or was killed"
+_DIED_HINT = (
+    "the most frequent cause is memory: run it with fewer --workers, or with --workers 1 to see it; "
+    "delete its folder in results/ to try it again"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,18 +65,30 @@ def drive(
     Raises:
         InputError: the engine cannot be used, or a result cannot be written.
     """
+    results.remove_leftovers()
     times = Counter(job.digest for job in jobs)
     found = {digest: kept for digest in times if (kept := results.outcome(digest)) is not None}
     done = sum(times[digest] for digest in found)
     progress(BatchProgress(done, len(jobs), left_s=0.0 if done == len(jobs) else None))
-    left = {job.digest: job for job in jobs if job.digest not in found}
-    begin_s, finished = clock_s(), 0
-    for outcome in engine.run(tuple(left.values()), results.path):
-        found[outcome.digest] = outcome
-        done, finished = done + times[outcome.digest], finished + 1
-        left_s = _left_s(clock_s() - begin_s, finished, len(left) - finished)
-        progress(BatchProgress(done, len(jobs), outcome, left_s))
+    left = tuple({job.digest: job for job in jobs if job.digest not in found}.values())
+    begin_s = clock_s()
+    folder = results.path.resolve()
+    folder.mkdir(parents=True, exist_ok=True)
+    calls = [(job, folder) for job in left]
+    try:
+        with closing(engine.run_all(run_once, calls, lambda number: _died(left[number], folder))) as outcomes:
+            for finished, (_, outcome) in enumerate(outcomes, start=1):
+                found[outcome.digest] = outcome
+                done += times[outcome.digest]
+                left_s = _left_s(clock_s() - begin_s, finished, len(left) - finished)
+                progress(BatchProgress(done, len(jobs), outcome, left_s))
+    finally:
+        results.remove_leftovers()
     return tuple(found[job.digest] for job in jobs)
+
+
+def _died(job: Job, results: Path) -> Outcome:
+    return failed_outcome(job, results, reason=_DIED, hint=_DIED_HINT)
 
 
 def shard_of(jobs: Sequence[Job], k: int, n: int) -> tuple[Job, ...]:
@@ -93,16 +110,13 @@ def shard_of(jobs: Sequence[Job], k: int, n: int) -> tuple[Job, ...]:
     return tuple(job for job in jobs if job.digest in mine)
 
 
-def chosen_engine(
-    count: int, *, engine: EngineName | None = None, workers: int | None = None, scheduler: str | None = None
-) -> Engine:
-    """Return the engine that was asked for; by default a cluster on this machine where that saves time.
+def chosen_engine(count: int, *, workers: int | None = None, scheduler: str | None = None) -> Engine:
+    """Return what runs the jobs.
 
     Args:
-        count: of the jobs that are to be run.
-        engine: by name; None for the one that fits.
-        workers: processes on this machine; None if nobody said.
-        scheduler: address of a scheduler that exists; None for none.
+        count: of the jobs.
+        workers: processes on this machine; 1 for this process; None for one per processor, if there are many jobs.
+        scheduler: address of a scheduler of Dask; None to use this machine.
 
     Raises:
         InputError: the flags do not go together.
@@ -112,15 +126,12 @@ def chosen_engine(
         raise InputError(
             f"--workers {workers} and --scheduler {scheduler}: give one of them; the scheduler has its own workers"
         )
-    if engine == "none" and (workers is not None or scheduler is not None):
-        raise InputError("--engine none runs in this process; leave out --workers and --scheduler, or --engine none")
+    if scheduler is not None:
+        return DaskScheduler(scheduler)
     if workers is not None and workers < 1:
         raise OptionError(f"--workers {workers}: there must be at least 1")
-    asked = engine == "dask" or workers is not None or scheduler is not None
-    several = count >= _SMALL and (os.cpu_count() or 1) > 1 and find_spec("distributed") is not None
-    if asked or (engine is None and several):
-        return DaskCluster(workers, scheduler)
-    return InProcess()
+    chosen = workers or ((os.cpu_count() or 1) if count >= _SMALL else 1)
+    return WorkerProcesses(chosen) if chosen > 1 else InProcess()
 
 
 def _left_s(passed_s: float, finished: int, left: int) -> float | None:

@@ -1,1 +1,1 @@
-"""What runs jobs: this process, or Dask."""
+"""What runs jobs: this process, worker processes, or Dask."""

@@ -49,8 +49,6 @@ def finished_calls(cluster: Connection, calls: Sequence[Call]) -> Iterator[tuple
             aside.append(call)
         else:
             yield call.number, found
-    if aside:
-        cluster.allow_no_more_deaths()
     for call, found in _round(cluster, aside, lambda: 1):
         yield call.number, found
 

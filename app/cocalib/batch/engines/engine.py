@@ -1,40 +1,65 @@
-"""What an engine is: it runs jobs somewhere and returns their outcomes as they come."""
+"""What an engine is: it calls a function many times somewhere, and returns what comes of each call as it comes."""
 
-from collections.abc import Callable, Iterator, Sequence
+import shutil
+import tempfile
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
-from cocalib.batch.job import Job
-from cocalib.batch.outcome import Outcome
+from calib_core.errors import InputError
+from cocalib.batch.writers import Writer, is_abandoned
 
 _Found = TypeVar("_Found")
+_OWN_FOLDER = "cocalib-batch"
+
+
+def workers_died(number: int) -> Any:
+    """Refuse to go on without the result of a call.
+
+    Raises:
+        InputError: always.
+    """
+    raise InputError(f"call {number}: every worker that ran it died or was killed; use fewer workers")
 
 
 class Engine(Protocol):
-    """Runs jobs. Results lie in a folder that all workers reach; outcomes come back in any order."""
-
-    def run(self, jobs: Sequence[Job], results: Path) -> Iterator[Outcome]:
-        """Run each job once; a worker that dies costs its job one more run.
-
-        Args:
-            jobs: to be run; no two have the same digest.
-            results: the folder of results.
-
-        Raises:
-            InputError: the engine cannot be used, or the results cannot be written.
-        """
-        ...
+    """Runs calls. What comes of them comes in any order."""
 
     def run_all(
-        self, function: Callable[..., _Found], arguments: Sequence[tuple[Any, ...]]
-    ) -> Iterator[tuple[int, _Found]]:
+        self,
+        function: Callable[..., _Found],
+        arguments: Sequence[tuple[Any, ...]],
+        if_died: Callable[[int], _Found] = workers_died,
+    ) -> Generator[tuple[int, _Found], None, None]:
         """Call a function with each of the arguments; yield the number of the arguments and what it returned.
 
         Args:
-            function: of a module, so that every worker can import it.
+            function: of a module, so that every worker can import it. What it raises is raised here.
             arguments: of each call.
+            if_died: gives the result of a call, by its number, of which every worker died.
 
         Raises:
-            InputError: the engine cannot be used, or workers died of a call.
+            InputError: the engine cannot be used.
         """
         ...
+
+
+@contextmanager
+def own_temporary_folder() -> Iterator[Path]:
+    """Keep the temporary files of this process in a folder of its own, which is gone afterwards.
+
+    If this process is killed, the next one that comes here removes the folder.
+    """
+    usual = Path(tempfile.gettempdir())
+    for left in usual.glob(f".{_OWN_FOLDER}.*"):
+        if is_abandoned(left):
+            shutil.rmtree(left, ignore_errors=True)
+    own = usual / Writer.this().folder_name(_OWN_FOLDER)
+    own.mkdir(mode=0o700)
+    tempfile.tempdir = str(own)
+    try:
+        yield own
+    finally:
+        tempfile.tempdir = str(usual)
+        shutil.rmtree(own, ignore_errors=True)

@@ -1,27 +1,23 @@
-"""The engine `none`: one job after the other, in this process."""
+"""The engine without workers: one call after the other, in this process."""
 
-from collections.abc import Callable, Iterator, Sequence
-from pathlib import Path
+from collections.abc import Callable, Generator, Sequence
 from typing import Any, TypeVar
 
-from cocalib.batch.engines.one_job import run_once
-from cocalib.batch.job import Job
-from cocalib.batch.outcome import Outcome
+from cocalib.batch.engines.engine import own_temporary_folder, workers_died
 
 _Found = TypeVar("_Found")
 
 
 class InProcess:
-    """Runs jobs in this process."""
-
-    def run(self, jobs: Sequence[Job], results: Path) -> Iterator[Outcome]:
-        """Run each job, in order."""
-        for job in jobs:
-            yield run_once(job, results)
+    """Runs calls in this process, in order."""
 
     def run_all(
-        self, function: Callable[..., _Found], arguments: Sequence[tuple[Any, ...]]
-    ) -> Iterator[tuple[int, _Found]]:
+        self,
+        function: Callable[..., _Found],
+        arguments: Sequence[tuple[Any, ...]],
+        if_died: Callable[[int], _Found] = workers_died,
+    ) -> Generator[tuple[int, _Found], None, None]:
         """Call a function with each of the arguments, in order."""
-        for number, given in enumerate(arguments):
-            yield number, function(*given)
+        with own_temporary_folder():
+            for number, given in enumerate(arguments):
+                yield number, function(*given)

@@ -20,8 +20,13 @@ def run_once(job: Job, results: Path) -> Outcome:
         results: the folder of results.
 
     Raises:
-        InputError: the result cannot be written.
+        InputError: the folder of results is not there, or cannot be written.
     """
+    if not results.is_dir():
+        raise InputError(
+            f"{results}: a worker does not reach this folder of results; "
+            "put it, and the recordings, on a file system that all workers share under the same path"
+        )
     kept = ResultsFolder(results).outcome(job.digest)
     if kept is not None:
         return kept

@@ -29,6 +29,6 @@ def checked_address(address: str) -> str:
         raise InputError(
             f"--scheduler {address}: another machine without TLS is refused, because whoever can reach an open Dask port "
             "can run code on every machine of the cluster; start the scheduler and its workers with certificates and write "
-            f"tls://{host}:{port}, or start the batch with --shard on each machine"
+            f"tls://{host}:{port}, or start a batch of its own on each machine"
         )
     return address

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
@@ -32,11 +32,9 @@ class Batch:
     init: Folder = None
     """Write the manifest from the recordings in this folder, for you to complete, and calibrate nothing."""
     workers: Annotated[int | None, called("N")] = None
-    """Worker processes on this machine (needs cocalib[fleet])."""
+    """Worker processes on this machine; 1: this process does the work; one per processor for many sessions, unless given."""
     scheduler: Annotated[str | None, called("ADDRESS")] = None
-    """Address of a Dask scheduler that exists, such as tls://host:8786 (needs cocalib[fleet])."""
-    engine: Annotated[Literal["auto", "none", "dask"], tyro.conf.arg(help_behavior_hint="")] = "auto"
-    """none: one session after the other in this process; dask: worker processes; auto: dask for many sessions, if installed."""
+    """Address of your own Dask scheduler, such as tls://host:8786 (needs cocalib[fleet]); who reaches it can run code."""
     shard: Annotated[str | None, called("K/N")] = None
     """Calibrate only the K-th of N parts, for SLURM, make or GNU parallel; all parts may share one folder of results."""
 
@@ -77,17 +75,11 @@ class Batch:
         require_priors_of_others(manifest)
         results = ResultsFolder(self.out or manifest.source.with_suffix(""))
         try:
-            results.remove_leftovers()
             with progress_bar("reading recordings") as progress_bytes:
                 jobs = jobs_of(manifest.rows, results.path, progress_bytes)
             write_plan(results.path, manifest.source, jobs)
             jobs = jobs if shard is None else shard_of(jobs, *shard)
-            engine = chosen_engine(
-                len(jobs),
-                engine=None if self.engine == "auto" else self.engine,
-                workers=self.workers,
-                scheduler=self.scheduler,
-            )
+            engine = chosen_engine(len(jobs), workers=self.workers, scheduler=self.scheduler)
             with shown_batch(len(jobs)) as show, self._indexed(results) as add:
 
                 def tell(now: "BatchProgress") -> None:

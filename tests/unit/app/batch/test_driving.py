@@ -1,24 +1,26 @@
 """Driving a batch: nothing is run twice, the order is kept, shards divide the work, and the time left is honest."""
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
+from typing import Any, TypeVar
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from calib_core.errors import InputError, OptionError
-from cocalib.batch import driving
 from cocalib.batch.driving import BatchProgress, chosen_engine, drive, shard_of
-from cocalib.batch.engines.dask_cluster import DaskCluster
+from cocalib.batch.engines.dask_scheduler import DaskScheduler
+from cocalib.batch.engines.engine import workers_died
 from cocalib.batch.engines.in_process import InProcess
-from cocalib.batch.engines.one_job import run_once
+from cocalib.batch.engines.worker_processes import WorkerProcesses
 from cocalib.batch.job import Job
 from cocalib.batch.manifest import ManifestRow
-from cocalib.batch.outcome import Outcome
 from cocalib.batch.results_folder import ResultsFolder
 from tests.batch_calls import quick_jobs
+
+_Found = TypeVar("_Found")
 
 
 class _Backwards(InProcess):
@@ -27,10 +29,15 @@ class _Backwards(InProcess):
     def __init__(self) -> None:
         self.ran: list[str] = []
 
-    def run(self, jobs: Sequence[Job], results: Path) -> Iterator[Outcome]:
-        for job in reversed(jobs):
+    def run_all(
+        self,
+        function: Callable[..., _Found],
+        arguments: Sequence[tuple[Any, ...]],
+        if_died: Callable[[int], _Found] = workers_died,
+    ) -> Generator[tuple[int, _Found], None, None]:
+        for number, (job, results) in reversed([*enumerate(arguments)]):
             self.ran.append(job.digest)
-            yield run_once(job, results)
+            yield number, function(job, results)
 
 
 def test_outcomes_are_in_the_order_of_the_jobs_and_equal_jobs_run_once(tmp_path: Path) -> None:
@@ -100,22 +107,17 @@ def test_a_shard_that_does_not_exist_is_refused_in_words(k: int, n: int) -> None
 def test_small_manifests_run_in_this_process_and_large_ones_on_all_processors(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "cpu_count", lambda: 4)
     assert isinstance(chosen_engine(7), InProcess)
-    assert chosen_engine(8) == DaskCluster()
-    monkeypatch.setattr(driving, "find_spec", lambda _: None)
-    assert isinstance(chosen_engine(8), InProcess)
+    assert chosen_engine(8) == WorkerProcesses(4)
 
 
 def test_what_is_asked_for_is_taken() -> None:
-    assert chosen_engine(1, workers=3) == DaskCluster(3)
-    assert chosen_engine(1, engine="dask") == DaskCluster()
-    assert chosen_engine(1, scheduler="tls://h:1") == DaskCluster(scheduler="tls://h:1")
-    assert isinstance(chosen_engine(10_000, engine="none"), InProcess)
+    assert chosen_engine(1, workers=3) == WorkerProcesses(3)
+    assert chosen_engine(1, scheduler="tls://h:1") == DaskScheduler("tls://h:1")
+    assert isinstance(chosen_engine(10_000, workers=1), InProcess)
 
 
 def test_flags_that_do_not_go_together_are_refused() -> None:
     with pytest.raises(InputError, match="give one of them"):
         chosen_engine(1, workers=2, scheduler="tls://h:1")
-    with pytest.raises(InputError, match="--engine none runs in this process"):
-        chosen_engine(1, engine="none", workers=2)
     with pytest.raises(OptionError, match="at least 1"):
         chosen_engine(1, workers=0)

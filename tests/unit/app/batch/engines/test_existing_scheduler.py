@@ -1,6 +1,7 @@
 """A scheduler and workers that others started, in processes of their own on loopback."""
 
 import socket
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import pytest
 from calib_core.errors import InputError
 from cocalib.batch.driving import drive
 from cocalib.batch.engines import dask_connection, worker_checks
-from cocalib.batch.engines.dask_cluster import DaskCluster
+from cocalib.batch.engines.dask_scheduler import DaskScheduler
 from cocalib.batch.engines.in_process import InProcess
 from cocalib.batch.results_folder import ResultsFolder
 from cocalib.platform.resources import version
@@ -42,7 +43,7 @@ def test_workers_of_a_scheduler_that_are_killed_change_no_outcome(address: str, 
             if alive and random.uniform() < 0.4:
                 alive.pop(int(random.integers(len(alive)))).kill()
 
-        found = drive(jobs, DaskCluster(scheduler=address), ResultsFolder(tmp_path / "dask"), kill)
+        found = drive(jobs, DaskScheduler(address), ResultsFolder(tmp_path / "dask"), kill)
     assert alive == []
     plain = drive(jobs, InProcess(), ResultsFolder(tmp_path / "none"))
     assert [msgspec.structs.replace(one, run=None) for one in found] == [
@@ -55,7 +56,7 @@ def test_a_scheduler_without_workers_is_told_with_the_command_that_starts_one(
     address: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(InputError, match=rf"--scheduler {address}: it has no workers; start some with `dask worker"):
-        list(DaskCluster(scheduler=address).run_all(squared, [(1,)]))
+        list(DaskScheduler(address).run_all(squared, [(1,)]))
     assert capsys.readouterr().err == f"{address} has no workers; waiting 1 s more for one to start\n"
 
 
@@ -68,7 +69,7 @@ def test_a_worker_of_another_version_is_told_before_any_job_runs(address: str, t
         worker_process(address, environment={"PYTHONPATH": f"{tmp_path / 'other'}:{root}"}),
         pytest.raises(InputError, match=rf"the worker at tcp://\S+ runs cocalib 9\.9 and this is cocalib {version()}"),
     ):
-        list(DaskCluster(scheduler=address).run(quick_jobs(tmp_path, 2), tmp_path / "out"))
+        drive(quick_jobs(tmp_path, 2), DaskScheduler(address), ResultsFolder(tmp_path / "out"))
     assert list((tmp_path / "out").iterdir()) == []
 
 
@@ -83,13 +84,13 @@ def test_a_scheduler_that_does_not_answer_is_told_within_seconds(listening: bool
         with pytest.raises(
             InputError, match=rf"--scheduler {address}: no Dask scheduler answers there within 1 s; start"
         ):
-            list(DaskCluster(scheduler=address).run_all(squared, [(1,)]))
+            list(DaskScheduler(address).run_all(squared, [(1,)]))
 
 
 @pytest.mark.usefixtures("impatient")
 def test_tls_without_certificates_is_told_in_words() -> None:
     with pytest.raises(InputError, match=r"--scheduler tls://127\.0\.0\.1:9: .*certificate"):
-        list(DaskCluster(scheduler="tls://127.0.0.1:9").run_all(squared, [(1,)]))
+        list(DaskScheduler("tls://127.0.0.1:9").run_all(squared, [(1,)]))
 
 
 def test_a_scheduler_that_ends_in_the_middle_is_told_and_what_is_done_is_kept(tmp_path: Path) -> None:
@@ -99,5 +100,11 @@ def test_a_scheduler_that_ends_in_the_middle_is_told_and_what_is_done_is_kept(tm
         worker_process(address),
         pytest.raises(InputError, match=r"stopped answering"),
     ):
-        drive(jobs, DaskCluster(scheduler=address), results, lambda now: scheduler.kill() if now.latest else None)
+        drive(jobs, DaskScheduler(address), results, lambda now: scheduler.kill() if now.latest else None)
     assert results.outcome(jobs[0].digest) is not None
+
+
+def test_dask_that_is_not_installed_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(InputError, match=r"Dask is not installed; install cocalib\[fleet\], or leave out --scheduler"):
+        list(DaskScheduler("tcp://127.0.0.1:9").run_all(squared, [(1,)]))

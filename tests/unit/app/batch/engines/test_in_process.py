@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from calib_core.errors import InputError
+from cocalib.batch.driving import drive
 from cocalib.batch.engines import one_job
 from cocalib.batch.engines.in_process import InProcess
 from cocalib.batch.engines.one_job import failed_outcome, run_once
@@ -16,7 +17,7 @@ from tests.batch_calls import quick_jobs, squared, written
 
 def test_jobs_run_in_order_and_leave_their_outcomes(tmp_path: Path) -> None:
     jobs = quick_jobs(tmp_path, 3)
-    outcomes = list(InProcess().run(jobs, tmp_path / "out"))
+    outcomes = list(drive(jobs, InProcess(), ResultsFolder(tmp_path / "out")))
     assert [outcome.digest for outcome in outcomes] == [job.digest for job in jobs]
     assert [ResultsFolder(tmp_path / "out").outcome(job.digest) for job in jobs] == outcomes
 
@@ -38,7 +39,7 @@ def test_a_bug_in_one_job_is_its_outcome(tmp_path: Path, monkeypatch: pytest.Mon
 
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     monkeypatch.setattr(one_job, "run_job", broken)
-    outcomes = list(InProcess().run(quick_jobs(tmp_path, 2), tmp_path))
+    outcomes = drive(quick_jobs(tmp_path, 2), InProcess(), ResultsFolder(tmp_path))
     assert [outcome.status for outcome in outcomes] == ["failed", "failed"]
     assert "RuntimeError: no such thing as v001" in outcomes[1].reason
     assert written(tmp_path, outcomes[1].digest) == outcomes[1]
@@ -49,3 +50,9 @@ def test_a_folder_that_cannot_be_written_is_told_in_words(tmp_path: Path) -> Non
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match=r"the result of v000 / s1 cannot be written .*what is done is kept"):
         failed_outcome(job, tmp_path / "file", reason="its worker died")
+
+
+def test_a_folder_that_a_worker_does_not_reach_is_told_in_words(tmp_path: Path) -> None:
+    (job,) = quick_jobs(tmp_path, 1)
+    with pytest.raises(InputError, match=r"out: a worker does not reach this folder of results; put it, and the rec"):
+        run_once(job, tmp_path / "out")
