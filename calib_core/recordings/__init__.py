@@ -14,8 +14,7 @@ from calib_core.recordings.selection import RecordingOptions
 from calib_core.recordings.summary import RecordingSummary, recording_summary
 from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis
 from calib_core.recordings.topics import TopicSummary
-from calib_core.recordings.verification import Verification, verify_recording
-from calib_core.recordings.verification_text import verification_text
+from calib_core.recordings.verification import Verification, verification_text, verify_recording
 from calib_core.recordings.video_writing import LeftOut, WrittenVideo, video_format, write_video
 
 __all__ = [

@@ -139,7 +139,7 @@ def recording_summary(recording: Recording) -> RecordingSummary:
     end = max((topic.end.time for topic in timed if topic.end is not None), default=None)
     shared = _shared(recording)
     return RecordingSummary(
-        files=tuple(FileSummary(name_text(s.path.name), s.size_bytes, s.container) for s in recording.sources),
+        files=files_of(recording),
         start=Stamp.of(start) if start is not None else None,
         end=Stamp.of(end) if end is not None else None,
         duration_s=(end - start) / NS_PER_S if start is not None and end is not None else 0.0,
@@ -152,6 +152,11 @@ def recording_summary(recording: Recording) -> RecordingSummary:
         warnings=recording.warnings,
         assumptions=recording.stated_assumptions,
     )
+
+
+def files_of(recording: Recording) -> tuple[FileSummary, ...]:
+    """Return its files, as opened; of a compressed one the size once decompressed."""
+    return tuple(FileSummary(name_text(s.path.name), s.size_bytes, s.container) for s in recording.sources)
 
 
 def _shared(recording: Recording) -> SharedTime | None:

@@ -1,7 +1,7 @@
-"""Read a whole recording and account for every message and every byte."""
+"""Read a whole recording, and say what is damaged, lost or undecodable: `cocalib info --verify`."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 import msgspec
@@ -10,11 +10,13 @@ import numpy as np
 from calib_core.errors import MessageError, RecordingError
 from calib_core.recordings.camera.images import ImageLayout, is_picture
 from calib_core.recordings.camera.picture_checks import PictureCheck
-from calib_core.recordings.containers.accounts import Progress
-from calib_core.recordings.containers.sources import Channel, Source
+from calib_core.recordings.containers.chunks import ChunkedSource
+from calib_core.recordings.containers.sources import Channel, Progress, Source
 from calib_core.recordings.messages.decoding import decode
 from calib_core.recordings.messages.definitions import Definition, definition_of
+from calib_core.recordings.plain_files.source import PlainSource
 from calib_core.recordings.recording import Recording
+from calib_core.recordings.summary import FileSummary, files_of
 from calib_core.results import DataWarning
 
 _LOSSES = frozenset({
@@ -23,26 +25,7 @@ _LOSSES = frozenset({
 })  # fmt: skip
 _PROGRESS_MESSAGES = 200
 _WORD = re.compile(r"\w+", re.ASCII)
-_UNDESCRIBED = "(topics that the file does not describe)"
-
-
-@dataclass(frozen=True, slots=True)
-class FileCheck:
-    """One file.
-
-    Attributes:
-        name: of the file or folder.
-        size_bytes: its size; of a compressed file, once decompressed.
-        container: its format.
-        bytes_by: number of bytes by what they belong to; the sum is the size.
-        faults: the first faults found.
-    """
-
-    name: str
-    size_bytes: int
-    container: str
-    bytes_by: Mapping[str, int]
-    faults: tuple[str, ...] = ()
+_COUNTS = ("read", "unread", "damaged", "undecodable")
 
 
 @dataclass(slots=True)
@@ -54,7 +37,6 @@ class TopicCheck:
         type: of its messages.
         read: number of messages that are whole and fit their definition; of pictures, that can be decoded.
         unread: number of whole messages whose type is unknown or whose encoding is not supported.
-        unindexed: number of messages in the file that its index does not name; they are not used.
         damaged: number of messages that are cut off, overwritten, or in a chunk with a wrong checksum.
         undecodable: number of messages that are there but do not fit their definition, or are no whole picture.
         fault: the first reason of all these; "" if there is none.
@@ -64,7 +46,6 @@ class TopicCheck:
     type: str = ""
     read: int = 0
     unread: int = 0
-    unindexed: int = 0
     damaged: int = 0
     undecodable: int = 0
     fault: str = ""
@@ -74,14 +55,14 @@ class Verification(msgspec.Struct, frozen=True):
     """The result for a whole recording.
 
     Attributes:
-        sound: nothing is damaged, lost, unindexed or undecodable.
+        sound: nothing is damaged, lost or undecodable.
         files: as opened.
         topics: by name.
         warnings: of opening and reading it.
     """
 
     sound: bool
-    files: tuple[FileCheck, ...]
+    files: tuple[FileSummary, ...]
     topics: tuple[TopicCheck, ...]
     warnings: tuple[DataWarning, ...]
 
@@ -108,7 +89,7 @@ class _Topics:
 def verify_recording(
     recording: Recording, *, decode_pictures: bool = False, progress: Progress | None = None
 ) -> Verification:
-    """Read every message of a recording and account for every byte of its files.
+    """Read every message of a recording, and check every checksum.
 
     Args:
         recording: open; it need not have a radar or a camera.
@@ -118,36 +99,28 @@ def verify_recording(
     topics = _Topics()
     problems = {one.name: one.problem for one in recording.topics if one.problem and one.problem != "no messages"}
     reading = _Reading(problems, decode_pictures, progress)
-    files = tuple(_file(source, topics, reading) for source in recording.sources)
+    for source in recording.sources:
+        _read_source(source, topics, reading)
     warnings = recording.warnings
     checks = tuple(sorted(topics.found.values(), key=lambda one: one.topic))
-    lost = any(one.unindexed or one.damaged or one.undecodable for one in checks)
-    sound = not (lost or any(file.faults or file.bytes_by.get("damaged") for file in files))
-    return Verification(sound and not any(warning.code in _LOSSES for warning in warnings), files, checks, warnings)
+    lost = any(one.damaged or one.undecodable for one in checks)
+    sound = not lost and not any(warning.code in _LOSSES for warning in warnings)
+    return Verification(sound, files_of(recording), checks, warnings)
 
 
-def _file(source: Source, topics: _Topics, reading: _Reading) -> FileCheck:
-    """Check one file, and count its messages."""
-    account = source.account(reading.progress)
+def _read_source(source: Source, topics: _Topics, reading: _Reading) -> None:
+    """Read one file, and count its messages."""
+    if isinstance(source, ChunkedSource):
+        source.check_stored_chunks(reading.progress)
     for channel in source.channels:
         check = topics.of(channel.topic, channel.type)
-        check.unindexed += account.unindexed.get(channel.id, 0)
-        check.damaged += account.skipped.get(channel.id, 0)
-        _read_channel(source, channel, check, account.damaged.get(channel.id, 0), reading)
-    known = {channel.id for channel in source.channels}
-    unindexed, damaged = (
-        sum(count for number, count in counted.items() if number not in known)
-        for counted in (account.unindexed, account.damaged)
-    )
-    if unindexed or damaged:
-        check = topics.of(_UNDESCRIBED, "")
-        check.unindexed += unindexed
-        check.damaged += damaged
-    by_kind = {str(kind): count for kind, count in account.bytes_by.items()}
-    return FileCheck(source.path.name, sum(by_kind.values()), source.container, by_kind, account.faults)
+        if isinstance(source, PlainSource) and source.unreadable:
+            check.damaged += len(source.unreadable)
+            check.fault = check.fault or " ".join(map(str, next(iter(source.unreadable.items()))))
+        _read_channel(source, channel, check, reading)
 
 
-def _read_channel(source: Source, channel: Channel, check: TopicCheck, damaged: int, reading: _Reading) -> None:
+def _read_channel(source: Source, channel: Channel, check: TopicCheck, reading: _Reading) -> None:
     """Read all messages of a channel in the order of the file."""
     index = source.index(channel.id)
     reader = _Reader(channel, reading)
@@ -168,7 +141,8 @@ def _read_channel(source: Source, channel: Channel, check: TopicCheck, damaged: 
             check.fault = check.fault or str(error)
     cut, why = reader.cut_off()
     check.fault = check.fault or why or reader.problem
-    broken = max(broken, damaged)
+    if isinstance(source, ChunkedSource):
+        broken = max(broken, source.wrong_checksums(channel.id))
     undecodable = min(undecodable + cut, len(index) - broken)
     whole = len(index) - broken - undecodable
     check.damaged += broken
@@ -224,3 +198,41 @@ class _Reader:
     def cut_off(self) -> tuple[int, str]:
         """Return how many pictures are cut off, and why."""
         return (0, "") if self._pictures is None else self._pictures.cut_off()
+
+
+def verification_text(found: Verification) -> str:
+    """Format a verification as text: files, messages by topic, the result last."""
+    lines = [f"file      {file.name}, {file.size_bytes} bytes, {file.container}" for file in found.files]
+    lines += ["", *_table(found), *_faults(found), ""]
+    for warning in found.warnings:
+        lines.append(f"warning   {warning.message}. [{warning.code}]")
+    lines.append(f"result    {_result(found)}")
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def _table(found: Verification) -> Iterator[str]:
+    rows = [("topic", *_COUNTS), *((one.topic, *map(str, _counts(one))) for one in found.topics)]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for name, *counts in rows:
+        cells = [count.rjust(width) for count, width in zip(counts, widths[1:], strict=True)]
+        yield "  ".join([name.ljust(widths[0]), *cells])
+
+
+def _counts(one: TopicCheck) -> tuple[int, ...]:
+    return one.read, one.unread, one.damaged, one.undecodable
+
+
+def _faults(found: Verification) -> Iterator[str]:
+    for one in found.topics:
+        if one.fault:
+            yield f"  {one.topic}: {one.fault}"
+
+
+def _result(found: Verification) -> str:
+    if found.sound:
+        return "sound: everything was read, and nothing is damaged or lost"
+    sums = [sum(column) for column in zip(*map(_counts, found.topics), strict=True)] or [0] * len(_COUNTS)
+    named = [
+        f"{count} messages {name}" for name, count in zip(_COUNTS, sums, strict=True) if count and name in _COUNTS[2:]
+    ]
+    return f"not sound: {', '.join(named) or 'see above'}; everything else is read"

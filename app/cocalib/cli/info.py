@@ -16,7 +16,7 @@ class Info:
     json: Switch = False
     """Print JSON instead of text."""
     verify: Switch = False
-    """Read the whole recording and account for every message and byte; exit code 1 if anything is damaged or lost."""
+    """Read every message and check every checksum; exit code 1 if anything is damaged, lost or undecodable."""
     decode_pictures: Switch = False
     """With --verify, decode every picture; otherwise only its first and last bytes are looked at."""
     topics: Topics = field(default_factory=TopicFlags)

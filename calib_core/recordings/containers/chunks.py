@@ -22,7 +22,7 @@ from calib_core.recordings.containers.compression import refuse_bomb, unpack, un
 from calib_core.recordings.containers.index_cache import cache_of
 from calib_core.recordings.containers.message_heads import gather_far, gather_heads
 from calib_core.recordings.containers.positioned_reads import FileBytes
-from calib_core.recordings.containers.sources import Channel, Heads, MessageIndex
+from calib_core.recordings.containers.sources import Channel, Heads, MessageIndex, Progress
 from calib_core.results import DataWarning
 
 ChannelFilter: TypeAlias = Callable[[Channel], bool]
@@ -33,6 +33,7 @@ FIRST_CHUNKS = 16
 _FEW_MESSAGES = 64
 _FAR_BYTES = 4096
 _MAX_CHECKED_BYTES = 1 << 24
+_CHECKED_PIECE_BYTES = 1 << 20
 MAX_MESSAGE_BYTES = 1 << 28
 """Larger than any sensor message; one that claims to exceed it is damaged or malicious."""
 
@@ -181,6 +182,25 @@ class ChunkedSource:
     def checksum(self, chunk: int) -> int:
         """Return the stored CRC-32 of a chunk's uncompressed bytes; 0 if the file has none."""
         return 0
+
+    def check_stored_chunks(self, progress: Progress | None = None) -> None:
+        """Check every uncompressed chunk, whatever its size; compressed ones are checked as they are read."""
+        for number, where in enumerate(self.chunks):
+            if progress is not None:
+                progress(where.position, self.size_bytes)
+            wanted = 0 if where.packed else self.checksum(number)
+            found = 0
+            for place in range(0, where.stored_bytes if wanted else 0, _CHECKED_PIECE_BYTES):
+                size = min(_CHECKED_PIECE_BYTES, where.stored_bytes - place)
+                found = zlib.crc32(self.file.up_to(where.position + place, size), found)
+            with self._lock:
+                self._checked[number] = self._checked.get(number, True) and wanted == found
+
+    def wrong_checksums(self, channel_id: int) -> int:
+        """Return how many messages of a channel are in chunks that failed their checksum so far."""
+        with self._lock:
+            bad = [chunk for chunk, sound in self._checked.items() if not sound]
+        return int(np.isin(self.index(channel_id).chunk, bad).sum())
 
     def _check(self, chunk: int, data: bytes) -> None:
         """Compare a whole decompressed chunk with its checksum, and record the result."""

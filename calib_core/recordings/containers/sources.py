@@ -1,18 +1,20 @@
 """The interface of every container: channels, an index of messages, and their bytes."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Literal, Protocol, TypeAlias
 
 import numpy as np
 
 from calib_core.arrays import Indices, TimesNs
 from calib_core.recordings.assumptions import Assumption
-from calib_core.recordings.containers.accounts import FileAccount, Progress
 from calib_core.results import DataWarning
 
 Encoding = Literal["ros1", "cdr"]
+
+Progress: TypeAlias = Callable[[int, int], None]
+"""Called with the amount done and the total."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,10 +149,6 @@ class Source(Protocol):
             size: number of bytes of each message.
             keep: store them in the user's cache, because the next opening will need the same ones.
         """
-        ...
-
-    def account(self, progress: Progress | None = None) -> FileAccount:
-        """Account for every byte, reading the whole file."""
         ...
 
     def close(self) -> None:

@@ -60,7 +60,6 @@ def open_picture_folder(
         counted=stamped.counted,
         numbers=stamped.numbers,
         camera=camera,
-        file_of=lambda row: stamped.files[row],
         unreadable=faults,
     )
 

@@ -59,7 +59,6 @@ def _open(folder: Path, stamped: StampedFiles, what: str, points: Callable[[Path
         assumptions=stamped.assumptions(topic),
         zoneless=stamped.zoneless,
         counted=stamped.counted,
-        file_of=lambda row: stamped.files[row],
     )
 
 

@@ -10,14 +10,12 @@ from calib_core.arrays import TimesNs
 from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.recordings.assumptions import Assumption
-from calib_core.recordings.containers.accounts import FileAccount, Progress
 from calib_core.recordings.containers.sources import Channel, Heads, MessageIndex
 from calib_core.recordings.plain_files.folder_cameras import FolderCamera
 from calib_core.recordings.plain_files.messages import header_bytes
 from calib_core.results import DataWarning
 
 _HEADER_BYTES = 16
-_MAX_FAULTS = 5
 
 
 def _no_faults() -> dict[Path, str]:
@@ -47,10 +45,8 @@ class PlainSource:
         mapped: whether --map was applied to it.
         numbers: times of its files by their numbers, for files of other folders that are only numbered.
         camera: the intrinsics that its data set publishes; None if there are none.
-        file_of: the file of a row, in a folder of one file per row.
         unreadable: files of the folder that were skipped on opening, and why.
         computed: what the fields of its messages were computed from, where they are not the file's own; "" if they are.
-        account_of: accounts for the bytes of a file whose format says what they are.
     """
 
     path: Path
@@ -67,10 +63,8 @@ class PlainSource:
     mapped: bool = False
     numbers: Mapping[int, TimeNs] = field(default_factory=_no_numbers)
     camera: FolderCamera | None = None
-    file_of: Callable[[int], Path] | None = None
     unreadable: Mapping[Path, str] = field(default_factory=_no_faults)
     computed: str = ""
-    account_of: Callable[[Progress | None], FileAccount] | None = None
 
     def __post_init__(self) -> None:
         """Refuse times that a message cannot represent.
@@ -126,38 +120,10 @@ class PlainSource:
             rows[place, : min(len(head), size)] = np.frombuffer(head[:size], dtype=np.uint8)
         return Heads(rows, lengths, fault)
 
-    def account(self, progress: Progress | None = None) -> FileAccount:
-        """Account for every byte: files that are read, damaged ones, and files of a folder that are not used."""
-        if self.account_of is not None:
-            return self.account_of(progress)
-        bad, faults = set(), []
-        for row in range(len(self.times_ns)):
-            if progress is not None:
-                progress(row, len(self.times_ns))
-            try:
-                self.message(row)
-            except RecordingError as error:
-                bad.add(self.file_of(row) if self.file_of is not None else self.path)
-                faults.append(str(error))
-        damaged = min(sum(path.stat().st_size for path in bad), self.size_bytes)
-        skipped = sum(path.stat().st_size for path in self.unreadable)
-        unused = _folder_bytes(self.path) - self.size_bytes - skipped if self.path.is_dir() else 0
-        faults += [f"{path.name} {fault}" for path, fault in self.unreadable.items()]
-        return FileAccount(
-            {"messages": self.size_bytes - damaged, "damaged": damaged + skipped, "unknown": max(0, unused)},
-            damaged={self.channel.id: len(faults) - len(self.unreadable)} if bad else {},
-            faults=tuple(faults[:_MAX_FAULTS]),
-            skipped={self.channel.id: len(self.unreadable)},
-        )
-
     def close(self) -> None:
         """Close the source."""
         if self.closed is not None:
             self.closed()
-
-
-def _folder_bytes(folder: Path) -> int:
-    return sum(file.stat().st_size for file in folder.iterdir() if file.is_file())
 
 
 def topic_of(path: Path, word: str) -> str:

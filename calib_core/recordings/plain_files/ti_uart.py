@@ -10,7 +10,6 @@ import numpy as np
 
 from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import TimeNs
-from calib_core.recordings.containers.accounts import AccountBuilder, ByteKind, FileAccount, Progress
 from calib_core.recordings.containers.positioned_reads import FileBytes, FileStretch
 from calib_core.recordings.plain_files.messages import cloud_channel, cloud_message
 from calib_core.recordings.plain_files.source import PlainSource, topic_of
@@ -28,6 +27,7 @@ from calib_core.results import DataWarning
 _SUFFIXES = (".bin", ".dat", ".raw", ".log", "")
 _FRAME = "radar"
 _LOOK_BYTES = 1 << 20
+_PIECE_BYTES = 1 << 16
 _DEPTH = 5
 _SAMPLED_FILES = 4  # of a folder below the one that was named
 _COMMANDS = re.compile(rb"mmwDemo:/>|^(?:sensorStart|sensorStop|profileCfg|frameCfg)\b", re.MULTILINE)
@@ -159,7 +159,6 @@ def _open(path: Path, chunks: Sequence[Path], radar_start: str | None) -> PlainS
     source = PlainSource(
         path, stream.size, _container(chunks, scan, stamped.clock), cloud_channel(topic_of(path, "radar")), times, message,
         (*_about_damage(path, scan), *stamped.warnings), stream.close, stamped.assumptions,
-        account_of=lambda progress: scan.account(progress),
     )  # fmt: skip
     return source
 
@@ -202,51 +201,29 @@ class _Scan:
     """
 
     def __init__(self, stream: "_Stream") -> None:
-        self._stream = stream
         self.packets: list[tuple[int, Packet]] = []
         self.broken = self.strange_bytes = 0
-        account = self.account(None, keep=True)
-        self.strange_bytes = account.bytes_by.get("unknown", 0)
-
-    def account(self, progress: Progress | None, *, keep: bool = False) -> FileAccount:
-        """Account for every byte: from one magic word to the next."""
-        builder = AccountBuilder(self._stream, progress)
-        place = self._stream.find(_WORD, 0)
-        broken = 0
+        after = 0
+        place = stream.find(_WORD, 0)
         while place >= 0:
-            builder.skip(place, "unknown")
-            following = self._stream.find(_WORD, place + len(MAGIC))
-            end = following if following >= 0 else self._stream.size
-            data = self._stream.up_to(place, min(end - place, MAX_PACKET_BYTES))
-            packet = packet_in(data)
+            self._note_between(stream, after, place)
+            following = stream.find(_WORD, place + len(MAGIC))
+            end = min(following if following >= 0 else stream.size, place + MAX_PACKET_BYTES)
+            packet = packet_in(stream.up_to(place, end - place))
             if packet is None:
-                broken += 1
-                builder.fault(f"the packet at byte {place} is damaged or cut off")
-                builder.claim(min(end, place + MAX_PACKET_BYTES), "damaged")
+                self.broken += 1
+                after = max(after, end)
             else:
-                _claim(builder, place, packet, data)
-                if keep:
-                    self.packets.append((place, packet))
+                self.packets.append((place, packet))
+                after = max(after, place + packet.size)
             place = following
-        if keep:
-            self.broken = broken
-        builder.skip(self._stream.size, "unknown")
-        account = builder.done()
-        return FileAccount(account.bytes_by, damaged={0: broken} if broken else {}, faults=account.faults)
+        self._note_between(stream, after, stream.size)
 
-
-def _claim(builder: AccountBuilder, place: int, packet: Packet, data: bytes) -> None:
-    """Claim the parts of a packet."""
-    end = 0
-    for item in packet.items:
-        kind: ByteKind = "messages" if item.kind in (1, 7) else "records"
-        builder.claim(place + item.start, "messages")
-        builder.claim(place + item.start + item.size, kind)
-        end = item.start + item.size
-    if not packet.items:
-        builder.claim(place + min(packet.size, 40), "messages")
-        end = min(packet.size, 40)
-    builder.claim(place + packet.size, "padding" if end else "messages")
+    def _note_between(self, stream: "_Stream", begin: int, end: int) -> None:
+        """Count the bytes between two packets, unless all of them are zero."""
+        pieces = (stream.up_to(place, min(_PIECE_BYTES, end - place)) for place in range(begin, end, _PIECE_BYTES))
+        if any(map(any, pieces)):
+            self.strange_bytes += end - begin
 
 
 class _Stream:

@@ -8,10 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calib_core.errors import RecordingError
-from calib_core.recordings.containers.accounts import FileAccount, Progress
 from calib_core.recordings.containers.chunks import FIRST_CHUNKS, ChannelFilter, Chunk, ChunkedSource
-from calib_core.recordings.containers.indexed_places import IndexedPlaces
-from calib_core.recordings.containers.mcap.account import account_for_mcap
 from calib_core.recordings.containers.mcap.records import (
     BETWEEN_CHUNKS,
     CHUNK_INDEX,
@@ -258,17 +255,16 @@ class McapSource(ChunkedSource):
             "check that the data you need is there; the rest was lost before or while the file was written",
         )
 
-    def account(self, progress: Progress | None = None) -> FileAccount:
-        """Account for every byte, reading the whole file."""
-        places = IndexedPlaces(self.indexes, [chunk.position for chunk in self.chunks])
-        return account_for_mcap(self.file, places, progress)
-
     # -- reading
 
     def checksum(self, chunk: int) -> int:
-        """Return the stored CRC-32 of a chunk's uncompressed records; 0 if the file has none."""
+        """Return the stored CRC-32 of a chunk's uncompressed records; 0 if the file has none, or the chunk is cut off."""
         where = self.chunks[chunk]
-        return int.from_bytes(self.file.up_to(crc_position(where.position, where.compression), 4), "little")
+        if not where.position:
+            return 0  # the whole file, for messages outside chunks
+        head = self.file.up_to(crc_position(where.position, where.compression) - 8, 12)
+        size, checksum = int.from_bytes(head[:8], "little"), int.from_bytes(head[8:], "little")
+        return checksum if size == where.size_bytes else 0
 
     def locate(self, chunk: int, offset: int) -> tuple[int, int]:
         """Return the offset of the message itself, and its length."""

@@ -8,11 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calib_core.errors import RecordingError
-from calib_core.recordings.containers.accounts import FileAccount, Progress
 from calib_core.recordings.containers.chunks import ChannelFilter, ChunkedSource
-from calib_core.recordings.containers.indexed_places import IndexedPlaces
 from calib_core.recordings.containers.recovery_warnings import about_recovery
-from calib_core.recordings.containers.rosbag1.account import account_for_bag
 from calib_core.recordings.containers.rosbag1.index import read_indexes
 from calib_core.recordings.containers.rosbag1.records import fields_of
 from calib_core.recordings.containers.rosbag1.recovery import FoundInBag, scan_bag
@@ -132,11 +129,6 @@ class Rosbag1Source(ChunkedSource):
             unknown=count - sum(map(len, known.values())),
         )
         self.warnings = (*self.file.warnings, warning)
-
-    def account(self, progress: Progress | None = None) -> FileAccount:
-        """Account for every byte, reading the whole file."""
-        places = IndexedPlaces(self.indexes, [chunk.position for chunk in self.chunks], leads=True)
-        return account_for_bag(self.file, places, progress)
 
     # -- opening
 

@@ -11,12 +11,10 @@ import numpy as np
 
 from calib_core.errors import RecordingError
 from calib_core.recordings.assumptions import Assumption
-from calib_core.recordings.containers.accounts import FileAccount, Progress
 from calib_core.recordings.containers.cached_indexes import heads_from, keep_heads
 from calib_core.recordings.containers.compression import unpack_message
 from calib_core.recordings.containers.index_cache import cache_of
 from calib_core.recordings.containers.sources import Channel, Heads, MessageIndex
-from calib_core.recordings.containers.sqlite.account import account_for_database
 from calib_core.recordings.containers.sqlite.recovery import (
     FoundRows,
     about_rows,
@@ -267,10 +265,6 @@ class SqliteSource:
                 return blob.read(size), len(blob)
         except sqlite3.Error as error:
             raise self._damaged(error) from error
-
-    def account(self, progress: Progress | None = None) -> FileAccount:
-        """Account for every byte of the database, reading the whole file; the log beside it is not part of it."""
-        return account_for_database(self._file, progress)
 
     def close(self) -> None:
         """Close the database."""

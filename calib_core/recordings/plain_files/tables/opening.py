@@ -127,7 +127,6 @@ def open_table_folder(
         zoneless=stamped.zoneless,
         counted=stamped.counted,
         mapped=any(column.mapped for column in (*columns.values, *columns.time)),
-        file_of=lambda row: stamped.files[row],
         computed=computed_words(columns),
     )
 

@@ -4,7 +4,7 @@ import struct
 
 import pytest
 
-from calib_core.recordings import inspect_recording, open_recording
+from calib_core.recordings import inspect_recording, open_recording, verify_recording
 from tests.unit.recordings.containers.mcap_writing import mcap
 
 CHUNK_ROWS = 15  # 5 clouds, 5 frames and 5 camera infos in each chunk
@@ -52,6 +52,17 @@ def test_a_chunk_with_a_wrong_checksum_gives_a_warning_with_its_message_count(co
         (warning,) = recording.warnings
     assert warning.code == "checksum"
     assert "1 of the chunks read so far, with 15 messages;" in warning.message
+
+
+def test_verification_checks_stored_chunks_of_a_file_without_a_summary(ros2, plain, jpeg, tmp_path):
+    with inspect_recording(
+        write(tmp_path, ros2, plain(ros2, jpeg, n=20), spoil_checksum(1), summary=False)
+    ) as recording:
+        assert recording.warnings == ()
+        found = verify_recording(recording)
+    assert not found.sound
+    assert [one.damaged for one in found.topics] == [5, 5, 5]
+    assert [warning.code for warning in found.warnings] == ["checksum"]
 
 
 def test_a_flipped_byte_in_a_picture_gives_a_warning(ros2, plain, jpeg, tmp_path):
