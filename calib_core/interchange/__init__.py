@@ -36,6 +36,7 @@ from calib_core.interchange.origin import missing_map
 from calib_core.interchange.own.calibration_json import (
     calibration_sha256,
     calibration_text,
+    consistent_file,
     read_calibration,
     write_calibration,
 )
@@ -105,6 +106,7 @@ __all__ = [
     "check_junit",
     "choose_check_point",
     "compare",
+    "consistent_file",
     "contents_text",
     "exit_code",
     "export",

@@ -7,7 +7,7 @@ from pathlib import Path
 from calib_core.errors import InputError
 from calib_core.input_files import read_input
 from calib_core.interchange.calibration_file import FrameNames
-from calib_core.interchange.formats.registry import readers
+from calib_core.interchange.formats.registry import is_ours, reader_of, readers
 from calib_core.interchange.imported import ImportedCalibration
 from calib_core.interchange.origin import stated_origin
 from calib_core.interchange.syntax.content import Content, readings
@@ -148,12 +148,12 @@ def _read(content: str | bytes, source: str, frames: WantedFrames, beside: Mappi
     seen = []
     for syntax in readings(content, source=source):
         reading = replace(syntax, beside=beside)
-        chained = chained_calibration(reading, frames, source=source)
+        reader = reader_of(reading)
+        chained = None if is_ours(reader) else chained_calibration(reading, frames, source=source)
         if chained is not None:
             return _with_origin(chained, reading)
-        for reader in readers():
-            if reader.recognizes(reading):
-                return _with_origin(_renamed(reader.read(reading, source), frames), reading)
+        if reader is not None:
+            return _with_origin(_renamed(reader.read(reading, source), frames), reading)
         seen.append(reading)
     raise _refusal(seen[-1], source)
 

@@ -213,7 +213,7 @@ def test_export_of_another_tools_file_says_how_to_convert_it(
     cocalib("export", calibration, "--to", "tf2", "--out", tmp_path / "old.sh")
     refused = cocalib("export", tmp_path / "old.sh", "--to", "urdf")
     assert refused.code == 2
-    assert "is tf2, but export takes calibration-1" in refused.err
+    assert "is tf2, not calibration-1" in refused.err
     assert "cocalib import old.sh --out calibration.json" in refused.err
 
 

@@ -160,13 +160,6 @@ def _print_warnings(file: "CalibrationFile") -> None:
 
 
 def _own_calibration(path: Path) -> "CalibrationFile":
-    from calib_core.interchange import adopt, calibration_bytes, read_any, read_calibration
+    from calib_core.interchange import consistent_file, read_any_file
 
-    data = calibration_bytes(path)
-    found = read_any(data, str(path))
-    if found.file is None:
-        raise InputError(
-            f"{path}: is {found.format}, but export takes calibration-1; convert it first: "
-            f"cocalib import {path.name} --out calibration.json"
-        )
-    return read_calibration(data, str(path)) if found.format == "json" else adopt(found, str(path))
+    return consistent_file(read_any_file(path), str(path))

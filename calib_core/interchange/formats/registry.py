@@ -38,8 +38,9 @@ from calib_core.interchange.formats.ros.camera_info import CAMERA_INFO
 from calib_core.interchange.formats.ros.launch_files import TF1_LAUNCH, TF2_LAUNCH_PY, TF2_LAUNCH_XML
 from calib_core.interchange.formats.ros.tf2_command import TF2
 from calib_core.interchange.formats.ros.urdf import URDF
-from calib_core.interchange.own.calibration_format import CALIBRATION_1
+from calib_core.interchange.own.calibration_json import CALIBRATION_1
 from calib_core.interchange.own.truth_json import TRUTH
+from calib_core.interchange.syntax.content import Content
 
 FORMATS: tuple[Format, ...] = (
     CALIBRATION_1,
@@ -70,10 +71,11 @@ FORMATS: tuple[Format, ...] = (
 CAMERA_ONLY: tuple[Format, ...] = (CAMERA_INFO,)
 """Formats of the camera without the pose: written after FORMATS, and not read as a calibration."""
 
-# Content is read as the first format that recognizes it. Most content fits only one, and the formats are tried in the
-# order above; where two could fit, the more specific one is tried first.
+# Content is read as the first format that recognizes it: ours name their schema and are asked first. Most content fits only
+# one, and the formats are tried in the order above; where two could fit, the more specific one is tried first.
+_OURS = (CALIBRATION_1, TRUTH)
 _TRIED_FIRST = (
-    *(CALIBRATION_1, TRUTH, PJLAB, KOIDE3, OPENLABEL, DRIVEWORKS, FOXGLOVE),  # JSON only
+    *(PJLAB, KOIDE3, OPENLABEL, DRIVEWORKS, FOXGLOVE),  # JSON only
     NUSCENES,  # takes any JSON list
     *(OPENCV, APOLLO, KALIBR, AUTOWARE),  # YAML, JSON or FileStorage
     TF2_LAUNCH_PY,  # mentions the publisher, as TF2 does
@@ -95,10 +97,21 @@ def written_formats() -> tuple[Format, ...]:
 
 def readers() -> Iterator[Reads]:
     """Yield the reader of each format in the order in which they are tried; packages come after most of ours."""
-    ours = [known for known in FORMATS if known not in (*_TRIED_FIRST, *_TRIED_LAST)]
+    others = [known for known in FORMATS if known not in (*_OURS, *_TRIED_FIRST, *_TRIED_LAST)]
+    yield from _reads(*_OURS)
     yield from _ONLY_READ
-    yield from _reads(*_TRIED_FIRST, *ours)
+    yield from _reads(*_TRIED_FIRST, *others)
     yield from _reads(*plugin_formats(_RESERVED), *_TRIED_LAST)
+
+
+def reader_of(content: Content) -> Reads | None:
+    """Return the reader of the first format that recognizes content; None if there is none."""
+    return next((reader for reader in readers() if reader.recognizes(content)), None)
+
+
+def is_ours(reader: Reads | None) -> bool:
+    """Return whether a reader is of a format that names our schema."""
+    return reader is not None and reader in tuple(_reads(*_OURS))
 
 
 def format_named(name: str) -> Format:

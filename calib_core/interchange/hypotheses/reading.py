@@ -13,7 +13,7 @@ from calib_core.interchange.formats.arrays.mat import MATLAB
 from calib_core.interchange.formats.arrays.npz import NUMPY
 from calib_core.interchange.formats.arrays.text_matrix import MATRIX
 from calib_core.interchange.formats.opencv import OPENCV
-from calib_core.interchange.formats.registry import readers
+from calib_core.interchange.formats.registry import reader_of
 from calib_core.interchange.formats.statement import stated_frames
 from calib_core.interchange.hypotheses.finding import find_poses
 from calib_core.interchange.hypotheses.found_poses import FoundPose, Unreadable
@@ -73,7 +73,7 @@ def read_unstated(content: str | bytes, source: str = "calibration") -> Unstated
     """
     unreadable: tuple[Unreadable, ...] = ()
     for reading in readings(content, source=source):
-        reader = next((one for one in readers() if one.recognizes(reading)), None)
+        reader = reader_of(reading)
         if (
             reader is not None
             and not (reader in _BARE and _states_nothing(reading))

@@ -1,8 +1,10 @@
-"""Write and read calibration-1, the file of a solved calibration."""
+"""calibration-1, the file of a solved calibration: written, read, and as a format of the registry."""
 
 import dataclasses
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from pathlib import PurePath
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -15,10 +17,11 @@ from calib_core.interchange.calibration_file import (
     EQUATION,
     CalibrationFile,
     FrameNames,
-    KeptResult,
     Provenance,
     choose_check_point,
 )
+from calib_core.interchange.format import Format, Reads
+from calib_core.interchange.imported import ImportedCalibration, WrittenPose, imported
 from calib_core.interchange.own import documents
 from calib_core.interchange.own.angle_map_document import angle_map_document, angle_map_of
 from calib_core.interchange.own.camera_document import camera_document, camera_of
@@ -37,9 +40,9 @@ from calib_core.interchange.own.radar_errors_document import (
 )
 from calib_core.interchange.own.transform_document import are_inverse, transform_document, transform_of
 from calib_core.interchange.own.vehicle_document import vehicle_document, vehicle_of
-from calib_core.interchange.syntax.content import decoded
+from calib_core.interchange.syntax.content import Content, decoded
 from calib_core.interchange.syntax.json_text import json_text
-from calib_core.interchange.syntax.strict_json import json_object, parse_document
+from calib_core.interchange.syntax.strict_json import document_in, json_object
 from calib_core.interchange.vehicle_note import VehicleNote
 from calib_core.measurements import ReflectorClick, Unpaired
 from calib_core.options import BoardOptions, MountingOptions, RefiningOptions
@@ -201,29 +204,64 @@ def read_calibration(content: str | bytes, source: str = "calibration") -> Calib
         InputError: invalid content, or transforms that disagree; the message names the file, the place and what to do.
     """
     text = decoded(content, source=source)
-    document = parse_document(text, documents.CalibrationDocument, source=source)
-    camera_from_radar = transform_of(document.camera_from_radar, source=source, place="camera_from_radar")
-    inverse = document.radar_from_camera
-    if inverse is not None and not are_inverse(
-        document.camera_from_radar, inverse, source=source, place="radar_from_camera"
-    ):
+    return consistent_file(_imported(json_object(text, source=source), source), source)
+
+
+def consistent_file(found: ImportedCalibration, source: str) -> CalibrationFile:
+    """Return the content of one of our calibrations; `read_any` reads one that contradicts itself, too.
+
+    Raises:
+        InputError: it contradicts itself, or is of another format.
+    """
+    if found.file is None:
         raise InputError(
-            f"{source}: radar_from_camera: is not the inverse of camera_from_radar; "
-            "cocalib check finds which is wrong; correct it or remove radar_from_camera"
+            f"{source}: is {found.format}, not calibration-1; convert it first: "
+            f"cocalib import {PurePath(source).name} --out calibration.json"
         )
-    file = calibration_file_of(document, camera_from_radar, source=source)
-    return dataclasses.replace(file, kept=kept_results_of(text, source=source))
+    for fault in found.faults:
+        raise InputError(f"{source}: {fault}; cocalib check finds which is wrong; correct it")
+    return found.file
 
 
-def kept_results_of(text: str, *, source: str) -> tuple[KeptResult, ...]:
-    """Return the results in the text of a calibration-1 file that stay as they are when it is rewritten."""
-    return kept_results(json_object(text, source=source), documents.CalibrationDocument)
+def _recognizes(content: Content) -> bool:
+    return str(content.json_mapping.get("schema", "")).startswith("cocalib/calibration-")
 
 
-def calibration_file_of(
+def _read(content: Content, source: str) -> ImportedCalibration:
+    return _imported(content.mapping, source)
+
+
+def _imported(content: Mapping[str, Any], source: str) -> ImportedCalibration:
+    """Return calibration-1 with its contradictions as faults, so that a check can report which part is wrong.
+
+    Raises:
+        InputError: invalid content; the message names the file, the place and what to do.
+    """
+    document = document_in(content, documents.CalibrationDocument, source=source)
+    stated, inverse = document.camera_from_radar, document.radar_from_camera
+    bare = documents.TransformDocument(stated.rotation, stated.translation_m)
+    pose = transform_of(bare, source=source, place="camera_from_radar")
+    faults = []
+    try:
+        transform_of(stated, source=source, place="camera_from_radar")
+    except InputError:
+        faults.append("camera_from_radar.quaternion_wxyz and camera_from_radar.rotation are different rotations")
+    try:
+        if inverse is not None and not are_inverse(stated, inverse, source=source, place="radar_from_camera"):
+            faults.append("radar_from_camera is not the inverse of camera_from_radar")
+    except InputError:
+        faults.append("radar_from_camera has contradictory rotations, or an invalid one")
+    file = _file(document, pose, source=source)
+    kept = kept_results(content, documents.CalibrationDocument)
+    as_written = WrittenPose("matrix", np.array(stated.rotation), np.array(stated.translation_m), "camera_from_radar")
+    found = imported(dataclasses.replace(file, kept=kept))
+    return dataclasses.replace(found, pose=as_written, faults=tuple(faults))
+
+
+def _file(
     document: documents.CalibrationDocument, camera_from_radar: RigidTransform, *, source: str
 ) -> CalibrationFile:
-    """Return the content of a parsed calibration-1 file, with a given pose.
+    """Return the content of a calibration-1 document, with a given pose.
 
     Raises:
         InputError: the camera, a frame name or what is said of the vehicle is invalid.
@@ -264,6 +302,22 @@ def calibration_file_of(
         evidence=document.evidence,
         vehicle=vehicle_of(document.vehicle, source=source),
     )
+
+
+CALIBRATION_1 = Format(
+    name="json",
+    title="cocalib's own calibration-1",
+    used_in="cocalib",
+    also="everything: pose, covariance, pairs, camera, angle map",
+    numbers="camera_from_radar and its inverse, both as matrix, translation and quaternion w x y z",
+    file_name="calibration.json",
+    camera="lens",
+    comment="keys",
+    write=write_calibration,
+    reads=Reads(_recognizes, _read),
+    holds_angle_map=True,
+)
+"""calibration-1 as a format of the registry."""
 
 
 def _given_camera(document: documents.CalibrationDocument, *, source: str) -> Camera | None:

@@ -34,7 +34,15 @@ def parse_document(text: str, document: type[Document], *, source: str) -> Docum
     Raises:
         InputError: not JSON, another format, an unknown or repeated key, a value of the wrong type, NaN or Infinity.
     """
-    content = json_object(text, source=source)
+    return document_in(json_object(text, source=source), document, source=source)
+
+
+def document_in(content: Mapping[str, Any], document: type[Document], *, source: str) -> Document:
+    """Check a parsed JSON object that names its schema against the document type of that schema.
+
+    Raises:
+        InputError: another format, an unknown key, a value of the wrong type, NaN or Infinity.
+    """
     wanted = _schema_of(document)
     found = content.get("schema")
     if found != wanted:

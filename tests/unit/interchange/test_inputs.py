@@ -241,12 +241,12 @@ def test_a_mirrored_rotation_is_refused(golden_text):
 def test_transforms_that_disagree_are_refused(golden_text):
     content = json.loads(golden_text)
     content["camera_from_radar"]["quaternion_wxyz"].reverse()
-    with pytest.raises(InputError, match="quaternion_wxyz: is a different rotation"):
+    with pytest.raises(InputError, match=r"quaternion_wxyz and camera_from_radar.rotation are different rotations"):
         read_calibration(json.dumps(content))
 
     content = json.loads(golden_text)
     content["radar_from_camera"] = content["camera_from_radar"]
-    with pytest.raises(InputError, match="radar_from_camera: is not the inverse of camera_from_radar"):
+    with pytest.raises(InputError, match="radar_from_camera is not the inverse of camera_from_radar"):
         read_calibration(json.dumps(content))
 
 

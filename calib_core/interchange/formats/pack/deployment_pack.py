@@ -17,8 +17,7 @@ from calib_core.interchange.formats.ros.launch_files import TF1_LAUNCH, TF2_LAUN
 from calib_core.interchange.formats.ros.tf2_command import TF2
 from calib_core.interchange.formats.ros.urdf import URDF
 from calib_core.interchange.imported import ImportedCalibration
-from calib_core.interchange.own.calibration_format import CALIBRATION_1
-from calib_core.interchange.own.calibration_json import write_calibration
+from calib_core.interchange.own.calibration_json import CALIBRATION_1, write_calibration
 from calib_core.interchange.syntax.content import Content, readings
 from calib_core.interchange.syntax.zip_archives import pack
 
