@@ -1,6 +1,6 @@
 """The whole pipeline: clicks and radar returns go in, camera_from_radar comes out."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,7 +32,7 @@ from calib_core.fleet.prior_answer import fleet_answer, fleet_warnings
 from calib_core.fleet_prior import FleetAnswer, FleetPrior
 from calib_core.measurements import MIN_PAIRS, Pair, RadarScans, ReflectorClick, Unpaired, Unsolvable
 from calib_core.option_checks import checked_options
-from calib_core.options import CalibrationOptions
+from calib_core.options import CalibrationOptions, Method
 from calib_core.pair_checks import checked_pairs
 from calib_core.plausibility import implausible_input
 from calib_core.radar import cartesian_from_polar
@@ -59,7 +59,7 @@ def calibrate(
         clicks: in any order; excluded ones are paired and shown, but not used.
         scans: at least those around the clicks.
         camera: the intrinsics.
-        options: None takes the defaults; method "paper" is Algorithm 1 as printed, "pmm" the pose of the mounting.
+        options: None takes the defaults; `METHODS` has the methods.
         background: scans of the whole recording, to tell what stands there before and after each placement; optional.
         fleet_prior: what the fleet says of this vehicle; optional.
 
@@ -103,24 +103,17 @@ def calibration_steps(
     """
     options = checked_options(options or CalibrationOptions())
     require_default(options, fleet_prior)
-    if options.method == "paper":
-        from calib_core.paper.algorithm_1 import calibrate_as_printed
-
-        yield calibrate_as_printed(clicks, scans, camera, options)
-        return
-    pairing = pair_clicks(clicks, scans, options, background=background)
-    excluded = frozenset(click.id for click in clicks if not click.counts)
-    if options.method in ("pmm", "ccm"):
-        yield _baseline(pairing.pairs, pairing.unpaired, excluded, camera, options)
-        return
-    task = _Task.of(pairing.pairs, pairing.unpaired, excluded, camera, options, fleet_prior)
-    for outcome in _steps(task, previous=previous, preview=preview):
-        if isinstance(outcome, Unsolvable):
-            yield replace(outcome, unpaired=pairing.unpaired, pairs=pairing.pairs)
-        elif outcome.checking:
-            yield outcome
-        else:
-            yield _with_clock_warnings(outcome, clocks(outcome, scans))
+    given = MethodInput(
+        camera,
+        options,
+        clicks=clicks,
+        scans=scans,
+        background=background,
+        previous=previous,
+        preview=preview,
+        fleet_prior=fleet_prior,
+    )
+    yield from METHODS[options.method](given)
 
 
 def calibrate_pairs(
@@ -136,7 +129,7 @@ def calibrate_pairs(
     Args:
         pairs: in any order; results come in order of image time, pairs without a time in the order given.
         camera: the intrinsics.
-        options: None takes the defaults; method "paper" is Algorithm 1 as printed, from its RANSAC on.
+        options: None takes the defaults; `METHODS` has the methods.
         excluded: ids of pairs that are shown, but not used.
         fleet_prior: what the fleet says of this vehicle; optional.
 
@@ -145,14 +138,75 @@ def calibrate_pairs(
     """
     options = checked_options(options or CalibrationOptions())
     require_default(options, fleet_prior)
-    if options.method == "paper":
-        from calib_core.paper.algorithm_1 import solve_pairs_as_printed
-
-        return solve_pairs_as_printed(checked_pairs(pairs, with_noise=False), camera, options, excluded)
-    if options.method in ("pmm", "ccm"):
-        return _baseline(_in_order(checked_pairs(pairs, with_noise=False)), (), excluded, camera, options)
-    *_, outcome = _steps(_task_of_pairs(pairs, camera, options, excluded, fleet_prior), previous=None, preview=False)
+    given = MethodInput(camera, options, pairs=pairs, excluded=excluded, fleet_prior=fleet_prior)
+    *_, outcome = METHODS[options.method](given)
     return outcome
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MethodInput:
+    """What a method is given: clicks and scans, or pairs.
+
+    Attributes:
+        camera: the intrinsics.
+        options: checked.
+        clicks: in any order; with scans.
+        scans: at least those around the clicks.
+        background: scans of the whole recording; optional.
+        pairs: instead of clicks and scans; not checked.
+        excluded: ids of pairs that are shown, but not used.
+        previous: the answer to nearly the same clicks.
+        preview: whether a preview is wanted.
+        fleet_prior: what the fleet says of this vehicle; optional.
+    """
+
+    camera: Camera
+    options: CalibrationOptions
+    clicks: Sequence[ReflectorClick] = ()
+    scans: RadarScans | None = None
+    background: RadarScans | None = None
+    pairs: Sequence[Pair] = ()
+    excluded: frozenset[str] = frozenset()
+    previous: Calibration | None = None
+    preview: bool = False
+    fleet_prior: FleetPrior | None = None
+
+
+def _robust(given: MethodInput) -> Iterator[Calibration | Unsolvable]:
+    """Solve by the default method: every pair judged by the others, noise estimated, covariance stated."""
+    camera, options, scans = given.camera, given.options, given.scans
+    if scans is None:
+        task = _task_of_pairs(given.pairs, camera, options, given.excluded, given.fleet_prior)
+        yield from _steps(task, previous=given.previous, preview=given.preview)
+        return
+    pairing = pair_clicks(given.clicks, scans, options, background=given.background)
+    excluded = frozenset(click.id for click in given.clicks if not click.counts)
+    task = _Task.of(pairing.pairs, pairing.unpaired, excluded, camera, options, given.fleet_prior)
+    for outcome in _steps(task, previous=given.previous, preview=given.preview):
+        if isinstance(outcome, Unsolvable):
+            yield replace(outcome, unpaired=pairing.unpaired, pairs=pairing.pairs)
+        elif outcome.checking:
+            yield outcome
+        else:
+            yield _with_clock_warnings(outcome, clocks(outcome, scans))
+
+
+def _as_printed(given: MethodInput) -> Iterator[Calibration | Unsolvable]:
+    """Solve by Algorithm 1 of the paper; existing pairs from its RANSAC on."""
+    from calib_core.paper.algorithm_1 import calibrate_as_printed, solve_pairs_as_printed
+
+    camera, options = given.camera, given.options
+    if given.scans is not None:
+        yield calibrate_as_printed(given.clicks, given.scans, camera, options)
+    else:
+        yield solve_pairs_as_printed(checked_pairs(given.pairs, with_noise=False), camera, options, given.excluded)
+
+
+METHODS: Mapping[Method, Callable[[MethodInput], Iterator[Calibration | Unsolvable]]] = {
+    "default": _robust,
+    "paper": _as_printed,
+}
+"""The methods: each yields a preview, if it has one and one is wanted, then the answer."""
 
 
 def require_default(options: CalibrationOptions, fleet_prior: FleetPrior | None) -> None:
@@ -165,21 +219,6 @@ def require_default(options: CalibrationOptions, fleet_prior: FleetPrior | None)
         raise InputError(
             f"a fleet's prior is used by the default method only, and the method is {options.method}; leave one of them out"
         )
-
-
-def _baseline(
-    pairs: Sequence[Pair],
-    unpaired: tuple[Unpaired, ...],
-    excluded: frozenset[str],
-    camera: Camera,
-    options: CalibrationOptions,
-) -> Calibration | Unsolvable:
-    """Run a baseline that needs no pictures; the one on the checkerboard starts where they are, in `calibrate_on_board`."""
-    from calib_core.baselines.mounting import calibrate_by_mounting
-
-    if options.method == "pmm":
-        return calibrate_by_mounting(pairs, camera, options, excluded=excluded, unpaired=unpaired)
-    return unsolved.no_board_pictures(tuple(pairs), unpaired)
 
 
 def preview_pairs(
@@ -244,7 +283,7 @@ def solve_again(
             "older versions and other tools wrote; solve from the recording and the clicks"
         )
     options = options or calibration.options
-    if options.method != "paper":
+    if options.models_noise:
         kept = [_with_noise(pair, options) for pair in kept]
     excluded = frozenset(pair.id for pair in calibration.pairs if pair.excluded)
     if fleet_prior is None and calibration.fleet is not None and options.method == "default":

@@ -216,6 +216,11 @@ class RigidTransform:
         return np.asarray(other) @ self.rotation.T + self.translation_m
 
 
+def mounting_rotation(roll_deg: float, pitch_deg: float, yaw_deg: float) -> Matrix33:
+    """Return the rotation of camera_from_radar of a camera turned by roll, then pitch, then yaw about the radar's axes."""
+    return np.asarray(OPTICAL_FROM_LINK @ rotation_from_euler(*np.deg2rad([roll_deg, pitch_deg, yaw_deg])).T)
+
+
 def rotation_jacobian(turned_m: np.ndarray, d_point: np.ndarray, out: np.ndarray) -> None:
     """Write d pixel / d theta (..., 3, 2, n): with R = Exp(dtheta) R_hat, a row j of d pixel / d point gives R p x j.
 

@@ -10,7 +10,7 @@ from functools import cache
 from typing import Any, Literal, TypeAlias
 
 from calib_core.errors import OptionError
-from calib_core.options import CalibrationOptions, CameraPositionPrior
+from calib_core.options import RETIRED_METHODS, CalibrationOptions, CameraPositionPrior
 
 OptionKind: TypeAlias = Literal["number", "integer", "yes-no", "choice", "camera-position"]
 
@@ -45,9 +45,6 @@ def checked_options(options: CalibrationOptions) -> CalibrationOptions:
     for leaf in option_fields().values():
         group = leaf.path.rpartition(".")[0]
         value = getattr(getattr(options, group) if group else options, leaf.field.name)
-        if kind_of(leaf) == "choice" and value not in typing.get_args(leaf.type):
-            choices = " or ".join(typing.get_args(leaf.type))
-            raise OptionError(f"option {leaf.path}: unknown value '{value}'; choose {choices}")
         for name, number in _numbers(leaf.path, value):
             low, high = RANGES[name]
             if not (math.isfinite(number) and low <= number <= high):
@@ -71,7 +68,7 @@ def _check_refining(options: CalibrationOptions) -> None:
     Raises:
         OptionError: the method takes them as they are, or every standard deviation is 0.
     """
-    if options.method != "default":
+    if not options.models_noise:
         raise OptionError(
             f"option refining.intrinsics: the method {options.method} takes the intrinsics as they are and cannot refine "
             "them; use the method default, or turn refining off"
@@ -92,12 +89,15 @@ _WANTED: Mapping[str, tuple[type, str]] = {
 
 
 def _check_type(leaf: OptionField, value: object) -> None:
-    """Refuse a value of another type than the option's.
+    """Refuse a value of another type than the option's, or none of its choices.
 
     Raises:
         OptionError: names the option and the value.
     """
     kind = kind_of(leaf)
+    if kind == "choice" and value not in typing.get_args(leaf.type):
+        fault = f"'{value}' was of older versions only" if value in RETIRED_METHODS else f"unknown value '{value}'"
+        raise OptionError(f"option {leaf.path}: {fault}; choose {' or '.join(typing.get_args(leaf.type))}")
     if kind == "camera-position":
         words = "a CameraPositionPrior or None"
         fits = value is None or isinstance(value, CameraPositionPrior)

@@ -2,9 +2,12 @@
 
 import math
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
-Method = Literal["default", "paper", "pmm", "ccm"]
+Method: TypeAlias = Literal["default", "paper"]
+"""The names of `METHODS`, in `calib_core.calibration`."""
+RETIRED_METHODS = ("pmm", "ccm")
+"""Methods of older versions. Calibrations that were made by them are still read, and cannot be solved again by them."""
 
 
 def option(default: Any, text: str, *, low: float = -math.inf, high: float = math.inf) -> Any:
@@ -222,7 +225,7 @@ class PaperOptions:
 
 @dataclass(frozen=True, slots=True)
 class MountingOptions:
-    """How the camera is mounted on the radar, for the method pmm: turned by roll, then pitch, then yaw about the radar's axes."""
+    """How the camera is mounted on the radar, nominally: turned by roll, then pitch, then yaw about the radar's axes."""
 
     roll_deg: float = option(0.0, "How far the camera leans to its right [deg].", low=-180.0, high=180.0)
     pitch_deg: float = option(
@@ -234,28 +237,12 @@ class MountingOptions:
 
 
 @dataclass(frozen=True, slots=True)
-class BoardOptions:
-    """The checkerboard that the reflector is put on, for the method ccm."""
-
-    columns: int = option(8, "Inner corners along the longer side of the checkerboard.", low=2, high=100)
-    rows: int = option(5, "Inner corners along its shorter side.", low=2, high=100)
-    square_m: float = option(0.1, "Side of a square [m].", low=0.001, high=10.0)
-    reach_squares: float = option(
-        0.35, "A click farther than this from every corner is not on one [squares].", low=0.01, high=0.5
-    )
-    registration: Literal["rigid", "linear"] = option(
-        "rigid",
-        "Register by the best rotation and shift, or by twelve free numbers made a rotation afterwards, which flat boards upset.",
-    )
-
-
-@dataclass(frozen=True, slots=True)
 class CalibrationOptions:
     """All options of a calibration."""
 
     method: Method = option(
         "default",
-        "The robust estimator; the paper's Algorithm 1 as printed; or a baseline: the mounting (pmm), a checkerboard (ccm).",
+        "The robust estimator, or the paper's Algorithm 1 as printed.",
     )
     gating: GatingOptions = field(default_factory=GatingOptions)
     locating: LocatingOptions = field(default_factory=LocatingOptions)
@@ -266,8 +253,12 @@ class CalibrationOptions:
     solving: SolvingOptions = field(default_factory=SolvingOptions)
     paper: PaperOptions = field(default_factory=PaperOptions)
     mounting: MountingOptions = field(default_factory=MountingOptions)
-    board: BoardOptions = field(default_factory=BoardOptions)
     refining: RefiningOptions = field(default_factory=RefiningOptions)
+
+    @property
+    def models_noise(self) -> bool:
+        """Whether the method has a noise model: it weighs pairs, states a covariance, and can refine the intrinsics."""
+        return self.method == "default"
 
 
 def without_systematic_errors(options: CalibrationOptions) -> CalibrationOptions:

@@ -1,7 +1,7 @@
 """The outcomes of a solve without an answer: what is missing, with figures, and what to do."""
 
 from calib_core.arrays import Vector3
-from calib_core.measurements import MIN_PAIRS, Pair, Unpaired, Unsolvable
+from calib_core.measurements import MIN_PAIRS, Unsolvable
 from calib_core.options import CameraPositionPrior
 
 DEGENERATE = "degenerate-placements"
@@ -68,15 +68,4 @@ def contradicted(measured: CameraPositionPrior, found_m: Vector3, agreeing: int,
         f"no pose fits the pairs and the measured camera position {given}; without it, {agreeing} of {count} "
         f"pairs agree on a pose with the camera at {found}",
         "measure again from the radar's antennas to the lens: forward, left, up, in metres",
-    )
-
-
-def no_board_pictures(pairs: tuple[Pair, ...], unpaired: tuple[Unpaired, ...]) -> Unsolvable:
-    """Pairs alone do not show a checkerboard."""
-    return Unsolvable(
-        "no-board",
-        "the method ccm needs the recording's pictures of the checkerboard, and pairs contain none",
-        "solve from the recording and the clicks, or choose another method",
-        unpaired,
-        pairs,
     )

@@ -89,7 +89,7 @@ def verdict_on(outcome: Calibration | Unsolvable | None, *, left: int | None = N
         return Verdict(level, outcome.reason, _capitalized(outcome.hint))
     warning = next(iter(by_consequence(outcome.warnings)), None)
     if warning is not None and consequence_of(warning.code) == "contradictory":
-        by_default = outcome.options.method == "default"
+        by_default = outcome.options.models_noise
         return Verdict("contradictory", warning.message, _capitalized(warning.hint) if by_default else _DEFAULT_METHOD)
     if unconfirmed:
         reason = f"{unconfirmed} of the recording's units or axes {'is' if unconfirmed == 1 else 'are'} assumed, not confirmed"

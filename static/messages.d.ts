@@ -124,20 +124,11 @@ export interface PaperOptions {
   ransac_confidence: number;
 }
 
-/** How the camera is mounted on the radar, for the method pmm: turned by roll, then pitch, then yaw about the radar's axes. */
+/** How the camera is mounted on the radar, nominally: turned by roll, then pitch, then yaw about the radar's axes. */
 export interface MountingOptions {
   roll_deg: number;
   pitch_deg: number;
   yaw_deg: number;
-}
-
-/** The checkerboard that the reflector is put on, for the method ccm. */
-export interface BoardOptions {
-  columns: number;
-  rows: number;
-  square_m: number;
-  reach_squares: number;
-  registration: "rigid" | "linear";
 }
 
 /** Estimate the intrinsics with the pose; the sigmas say how far off they may be if they come without a covariance. */
@@ -150,7 +141,7 @@ export interface RefiningOptions {
 
 /** All options of a calibration. */
 export interface CalibrationOptions {
-  method: "default" | "paper" | "pmm" | "ccm";
+  method: "default" | "paper";
   gating: GatingOptions;
   locating: LocatingOptions;
   noise: NoiseOptions;
@@ -160,7 +151,6 @@ export interface CalibrationOptions {
   solving: SolvingOptions;
   paper: PaperOptions;
   mounting: MountingOptions;
-  board: BoardOptions;
   refining: RefiningOptions;
 }
 
@@ -274,7 +264,7 @@ export interface View {
   can_undo: boolean;
   can_redo: boolean;
   has_calibration: boolean;
-  method: "default" | "paper" | "pmm" | "ccm";
+  method: "default" | "paper";
   clicks: ClickRow[];
   metrics: Figure[];
   pose: Figure[];

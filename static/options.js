@@ -53,7 +53,7 @@ const HEADINGS = {
   refining: "Refining the intrinsics: how far off they may be, ±, if they come without a covariance",
   reflector: "Reflector: what all clicks are off by, ±",
 };
-/** Those to choose from here; the paper's baselines are chosen on the command line. @type {Record<string, string>} */
+/** @type {Record<string, string>} */
 const METHODS = { default: "Default", paper: "Paper" };
 /** @type {Record<string, string>} */
 const METHOD_HINTS = {

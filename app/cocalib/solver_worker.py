@@ -91,7 +91,7 @@ class SolverWorker:
         if request.revision != self._newest_revision:
             return None
         latest = self._latest if self._latest_camera is request.camera else None
-        fleet_prior = self._fleet_prior if request.options.method == "default" else None
+        fleet_prior = self._fleet_prior if request.options.models_noise else None
         steps = solve_in_steps(
             self._recording, request.clicks, request.camera, request.options, previous=latest, fleet_prior=fleet_prior
         )

@@ -33,7 +33,6 @@ from calib_core.option_checks import checked_options
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording, about_assumptions
 from calib_core.results import Calibration, InputFile, PairResult, UnconfirmedClicks
-from cocalib.board_search import find_board
 from cocalib.platform.resources import version
 from cocalib.session import Outcome
 
@@ -114,30 +113,9 @@ def solve_in_steps(
         return
     times = sorted({click.image_time for click in clicks})
     scans = recording.radar_scans_around(times, half_window_s(options))
-    if options.method == "ccm":
-        yield _solved_on_board(recording, clicks, scans, camera, options)
-        return
     yield from calibration_steps(
         clicks, scans, camera, options, previous=previous, preview=preview, fleet_prior=fleet_prior
     )
-
-
-def _solved_on_board(
-    recording: RadarSource,
-    clicks: Sequence[ReflectorClick],
-    scans: RadarScans,
-    camera: Camera,
-    options: CalibrationOptions,
-) -> Outcome:
-    """Solve by the checkerboard that the recording's pictures show."""
-    from calib_core.baselines.checkerboard import calibrate_on_board
-
-    pairing = pair_clicks(clicks, scans, options)
-    excluded = frozenset(click.id for click in clicks if not click.counts)
-    corners_px = find_board(recording, options.board)
-    if isinstance(corners_px, Unsolvable):
-        return dataclasses.replace(corners_px, unpaired=pairing.unpaired, pairs=pairing.pairs)
-    return calibrate_on_board(pairing.pairs, corners_px, camera, options, excluded=excluded, unpaired=pairing.unpaired)
 
 
 def check_clicks(

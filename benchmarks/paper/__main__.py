@@ -14,9 +14,8 @@ from benchmarks.paper.measured import AccRow, Measured, read_measured, write_mea
 from benchmarks.paper.moving import MOVING, acc_of
 from benchmarks.paper.page import page
 from benchmarks.paper.pictures import write_pictures
-from benchmarks.paper.rows import Seed, calibrated, measure
-from benchmarks.paper.settings import FITTED, SEEDS, Dataset, Settings, pmm_options
-from calib_core.calibration import calibrate
+from benchmarks.paper.rows import Seed, by_mounting, calibrated, measure
+from benchmarks.paper.settings import FITTED, SEEDS, Dataset, Settings
 from calib_core.results import Calibration
 from calib_core.synthetic import PresetName
 
@@ -95,12 +94,11 @@ def _acc_row(name: PresetName, seeds: Sequence[tuple[float | None, ...]]) -> Acc
 def _draw(folder: Path) -> None:
     """Draw the figures of the first seed."""
     first, by_points = calibrated("d1", 1, FITTED)
-    by_mounting = calibrate(first.clicks, first.scans, first.camera, pmm_options(first))
     in_aisle = calibrated("d3", 1, FITTED)[1]
     ppm = _solved(by_points)
     calibrations = [
         ("D1 by PPM", ppm),
-        ("D1 by PMM", _solved(by_mounting)),
+        ("D1 by PMM", by_mounting(first)),
         ("D3 by PPM", _solved(in_aisle)),
     ]
     targets: tuple[PresetName, ...] = ("people", "cars-near", "cars-far")

@@ -15,7 +15,6 @@ __all__ = ["page"]
 
 _ENORMOUS = 1e6
 _NOT_AVAILABLE = "not available to us"
-_BOARD = "CCM+D1, 4 corners, linear"
 _RANGE = ("PPM+D1", "PPM+D3", "PMM+D1", "R_PPM+T_m+D1", "R_I+T_c+D1")
 
 
@@ -37,8 +36,7 @@ def page(measured: Measured, settings: Settings, places: Sequence[Fitted], *, co
         table="\n".join(_row(name, seeds) for name in PAPER),
         order=order_kept(seeds),
         missed=missed(seeds),
-        all_outside=sum(one.outside == 1.0 for one in figures_of(_BOARD, seeds)),
-        further="\n".join(_further_row(name, seeds) for name in [_BOARD, *others]),
+        further="\n".join(_further_row(name, seeds) for name in others),
         fitted=_fit_table(places),
         best=_best(places),
         highest_ratio=max(one.ratio_d2 for one in places),
@@ -62,8 +60,7 @@ def _row(name: str, seeds: Sequence[Seed]) -> str:
     figures = figures_of(name, seeds)
     aed, cdsd = median_of(figures, "aed_px"), median_of(figures, "cdsd_px")
     ours = [_spread(figures, "aed_px"), _spread(figures, "cdsd_px"), f"{aed / cdsd:.2f}"]
-    paper = "all points outside the picture" if name.startswith("CCM") else _stated(PAPER[name])
-    return f"| {name} | {paper} | {' | '.join(ours)} | {verdict_of(name, figures)} |"
+    return f"| {name} | {_stated(PAPER[name])} | {' | '.join(ours)} | {verdict_of(name, figures)} |"
 
 
 def _stated(stated: Paper) -> str:
@@ -78,7 +75,7 @@ def _stated(stated: Paper) -> str:
 def _further_row(name: str, seeds: Sequence[Seed]) -> str:
     figures = figures_of(name, seeds)
     outside = f"{100 * median_of(figures, 'outside'):.0f} %"
-    cells = [_spread(figures, "aed_px"), _spread(figures, "cdsd_px"), outside, _spread(figures, "condition", 0)]
+    cells = [_spread(figures, "aed_px"), _spread(figures, "cdsd_px"), outside]
     return f"| {name} | {' | '.join(cells)} |"
 
 
@@ -113,13 +110,13 @@ def _best(places: Sequence[Fitted]) -> str:
     return f"{place}, which is {'inside' if inside else 'at the edge of'} the grid"
 
 
-def _spread(figures: Sequence[Figures], name: str, digits: int = 1) -> str:
+def _spread(figures: Sequence[Figures], name: str) -> str:
     values = np.array([getattr(one, name) for one in figures])
     values = values[np.isfinite(values)]
     if not len(values):
         return "-"
     middle, low, high = (
-        f"{one:.{digits}f}" if one < _ENORMOUS else f"above {_ENORMOUS:.0f}"
+        f"{one:.1f}" if one < _ENORMOUS else f"above {_ENORMOUS:.0f}"
         for one in (np.median(values), values.min(), values.max())
     )
     return f"{middle} ({low} to {high})"

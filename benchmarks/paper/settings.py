@@ -4,13 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
-from calib_core.options import (
-    BoardOptions,
-    CalibrationOptions,
-    CameraPositionPrior,
-    PaperOptions,
-    SolvingOptions,
-)
+from calib_core.options import CalibrationOptions, CameraPositionPrior, PaperOptions, SolvingOptions
 from calib_core.synthetic import PRESETS, PresetName, SimulatedScans, SimulationOptions, simulate_scans
 
 __all__ = [
@@ -19,7 +13,6 @@ __all__ = [
     "SEEDS",
     "Dataset",
     "Settings",
-    "ccm_options",
     "pmm_options",
     "ppm_options",
     "session",
@@ -111,14 +104,4 @@ def ppm_options(settings: Settings) -> CalibrationOptions:
 def pmm_options(simulated: SimulatedScans) -> CalibrationOptions:
     """Return the options of the mounting: the nominal rotation, and the camera where the drawing of the mast has it."""
     tape = CameraPositionPrior(simulated.stage.options.rig.camera_offset_m)
-    return CalibrationOptions(method="pmm", solving=SolvingOptions(camera_position=tape))
-
-
-def ccm_options(simulated: SimulatedScans, *, linear: bool) -> CalibrationOptions:
-    """Return the options of the checkerboard in the scene."""
-    board = simulated.stage.scene.board
-    assert board is not None, "only D2 has a checkerboard"
-    registration: Literal["rigid", "linear"] = "linear" if linear else "rigid"
-    return CalibrationOptions(
-        method="ccm", board=BoardOptions(board.columns, board.rows, board.square_m, registration=registration)
-    )
+    return CalibrationOptions(method="paper", solving=SolvingOptions(camera_position=tape))

@@ -9,9 +9,10 @@ Written by `{command}`, measured on {date}; do not edit. Everything is simulated
 went through the whole path: windows around the clicks, radar positions, pose. `tests/paper/test_experiments.py` shows
 that recordings with pictures, read back from bags and solved by `cocalib solve`, give the same.
 
-PPM is the paper's method ([line by line](paper.md), `--method paper`), PMM the mounting (`--method pmm`), CCM the
-checkerboard (`--method ccm`). R_PPM + T_m has PPM's rotation and PMM's translation, R_I + T_c the reverse. D1 is a
-rooftop, D2 a checkerboard with the reflector on its corners, D3 an aisle with a larger reflector, DR two other rigs.
+PPM is the paper's method ([line by line](paper.md), `--method paper`), PMM the mounting
+(`calib_core/paper/other_methods.py`). R_PPM + T_m has PPM's rotation and PMM's translation, R_I + T_c the reverse. D1 is a
+rooftop, D2 a checkerboard with the reflector on its corners, D3 an aisle with a larger reflector, DR two other rigs. The
+paper's row by checkerboard (CCM) is not repeated.
 
 ## Table I
 
@@ -26,26 +27,18 @@ rooftop, D2 a checkerboard with the reflector on its corners, D3 an aisle with a
 The limit is 15 % for PPM, and 25 % for PMM and the swaps, of every figure that the paper gives. {order}
 
 Not every figure within its limit is evidence. PPM+D1 was fitted. PPM+D3's AED, PMM and R_I + T_c depend on assumptions
-that could as well be others ([below](#what-the-paper-does-not-say)). Neither fitted nor assumed are CCM's failure, the
-order, and how little R_PPM + T_m differs from PPM, though the last also depends on the number of placements.
+that could as well be others ([below](#what-the-paper-does-not-say)). Neither fitted nor assumed are the order, and how little R_PPM + T_m differs from PPM, though the last also depends on the number of placements.
 
 "Not available to us": only part of the paper's text was at hand. What is compared is AED and CDSD of D1 and D3, the
-ratio of D2, PMM's about 79 / 19, and the swaps' +0.55 px on PPM and up to +7.7 px on PMM. That the nine rows are these,
+ratio of D2, PMM's about 79 / 19, and the swaps' +0.55 px on PPM and up to +7.7 px on PMM. That the rows are these,
 that DR stands for two rows, and that T_c is PPM's translation is our reading. So is that a row "PPM+D2" is solved on D2
 and judged on it; D1's pose judged on D2 and D3 is among the further rows.
 
-Further rows, and what stands behind CCM: the share of D1's clicked radar positions that the pose puts outside the
-picture, and the condition number of the registration.
+Further rows, and the share of clicked radar positions that each pose puts outside the picture:
 
-| row | AED [px] | CDSD [px] | outside | condition number |
-|---|---|---|---|---|
+| row | AED [px] | CDSD [px] | outside |
+|---|---|---|---|
 {further}
-
-CCM "linear" solves the twelve numbers of [R | t] from four corners and takes the nearest rotation: a flat board leaves one
-column of R undetermined, and noise decides it. "Rigid" is the best rotation and shift (Kabsch), the default of
-`--method ccm`: from the same board it keeps the points in the picture. Which of the two the paper used is
-{not_available}; only the linear one comes near what it reports, with all points outside the picture in {all_outside} of
-{count} seeds.
 
 ## The fit
 

@@ -49,7 +49,7 @@ def learn_angle_map(calibration: Calibration) -> AngleMap | None:
         calibration: of the default method.
     """
     pairs = _thinned([pair for pair in calibration.pairs if pair.inlier and not pair.excluded])
-    if calibration.options.method == "paper" or len(pairs) < _LEAST_PAIRS:
+    if not calibration.options.models_noise or len(pairs) < _LEAST_PAIRS:
         return None
     observed = _angle_errors(calibration, pairs)
     if len(observed.polar) < _LEAST_PAIRS:

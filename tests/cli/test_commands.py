@@ -119,34 +119,27 @@ def test_a_method_that_takes_the_intrinsics_as_they_are_refuses_to_refine_them(
     assert "the method paper takes the intrinsics as they are" in answer.err
 
 
-def test_solve_takes_the_pose_of_the_mounting(
-    cocalib: Cocalib, made: Callable[..., Path], clicks_file: Path, tmp_path: Path
-) -> None:
-    out = tmp_path / "mounting.json"
-    position = ["--camera-position-m", 0.0, 0.0, 0.1]
-    angles = ["--mounting.pitch-deg", 2.0, "--mounting.yaw-deg", -1.0]
-    answer = cocalib("solve", made(), "--clicks", clicks_file, "--out", out, "--method", "pmm", *position, *angles)
-    assert answer.code == 0, answer.err
-    assert "states no error" in answer.out
-    document = json.loads(out.read_text())
-    assert document["options"]["mounting"] == {"roll_deg": 0.0, "pitch_deg": 2.0, "yaw_deg": -1.0}
-    assert document["radar_from_camera"]["translation_m"] == pytest.approx([0.0, 0.0, 0.1])
-    assert document["metrics"]["n"] == len(document["pairs"])
-    again = tmp_path / "again.json"
-    assert cocalib("solve", "--pairs", out, "--out", again).code == 0
-    assert json.loads(again.read_text())["metrics"] == document["metrics"]
+def test_a_method_of_older_versions_is_no_choice(cocalib: Cocalib, pairs_file: Callable[..., Path]) -> None:
+    answer = cocalib("solve", "--pairs", pairs_file(), "--method", "pmm")
+    assert answer.code == 2
+    assert "--method takes default or paper, not 'pmm'" in answer.err
 
 
-@pytest.mark.parametrize(
-    ("method", "words"), [("pmm", "--camera-position-m"), ("ccm", "checkerboard of 8 x 5 inner corners")]
-)
-def test_a_baseline_without_what_it_needs_says_what_that_is(
-    cocalib: Cocalib, made: Callable[..., Path], clicks_file: Path, tmp_path: Path, method: str, words: str
+def test_a_calibration_by_a_method_of_older_versions_is_read_and_solved_again_by_another(
+    cocalib: Cocalib, pairs_file: Callable[..., Path], tmp_path: Path
 ) -> None:
-    answer = cocalib("solve", made(), "--clicks", clicks_file, "--out", tmp_path / "none.json", "--method", method)
-    assert answer.code == 1
-    assert words in answer.err
-    assert not (tmp_path / "none.json").exists()
+    old, again = tmp_path / "old.json", tmp_path / "again.json"
+    assert cocalib("solve", "--pairs", pairs_file(), "--out", old).code == 0
+    document = json.loads(old.read_text())
+    document["options"] |= {"method": "ccm", "board": {"columns": 9, "registration": "linear"}}
+    old.write_text(json.dumps(document))
+    assert cocalib("check", old).code == 0
+    answer = cocalib("solve", "--pairs", old, "--out", again)
+    assert answer.code == 2
+    assert "'ccm' was of older versions" in answer.err
+    assert "choose default or paper" in answer.err
+    assert cocalib("solve", "--pairs", old, "--out", again, "--method", "default").code == 0
+    assert json.loads(again.read_text())["camera_from_radar"] == document["camera_from_radar"]
 
 
 def test_a_measured_camera_position_pulls_the_answer_to_it(

@@ -63,7 +63,7 @@ def test_a_vehicle_off_its_kind_is_named(
     assert [one["name"] for one in found["provenance"]["inputs"]][-1] == prior_file(30.0).name
 
 
-@pytest.mark.parametrize("method", ["paper", "pmm"])
+@pytest.mark.parametrize("method", ["paper"])
 def test_other_methods_refuse_it_before_anything_is_solved(
     cocalib: Cocalib, pairs_file: Callable[..., Path], prior_file: Callable[..., Path], method: str
 ) -> None:

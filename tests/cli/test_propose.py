@@ -281,7 +281,6 @@ def test_an_interrupt_leaves_no_file_and_no_traceback(
         (("solve", "--reflector-m", "0.3"), "--clicks-out and --reflector-m apply with --auto only"),
         (("solve", "--auto", "--pairs", "pairs.json"), "either a recording with --clicks or --auto, or --pairs"),
         (("solve",), "--auto to do without a person"),
-        (("solve", "--auto", "--method", "ccm"), "--method ccm takes clicks on the corners"),
     ],
 )
 def test_wrong_usage_is_one_line(

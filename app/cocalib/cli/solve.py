@@ -99,8 +99,6 @@ class Solve:
         vehicle = self.vehicle.note()
         if not self.auto and (self.clicks_out is not None or self.reflector_m != _REFLECTOR_M):
             raise InputError("--clicks-out and --reflector-m apply with --auto only; add it")
-        if self.auto and self.options.method == "ccm":
-            raise InputError("--method ccm takes clicks on the corners of a checkerboard, and --auto finds a reflector")
         if self.pairs is not None and (self.camera or self.topics != TopicFlags()):
             raise InputError(
                 "--camera and the options of a recording do not apply to --pairs, which brings its own camera"

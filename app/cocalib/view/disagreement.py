@@ -23,14 +23,9 @@ class Disagreement:
 
 def disagreement(options: CalibrationOptions) -> Disagreement:
     """Say what makes a pair an outlier: the pair itself, the paper's method, or options that allow too little noise."""
-    if options.method == "paper":
+    if not options.models_noise:
         return Disagreement(
             f"Outside the {options.paper.ransac_threshold_px:g} px of Algorithm 1's RANSAC, which uses it all the same",
-            "The default method tells whether it is wrong.",
-        )
-    if options.method in ("pmm", "ccm"):
-        return Disagreement(
-            "Farther from its reprojection than the assumed noise explains",
             "The default method tells whether it is wrong.",
         )
     usual, given = NoiseOptions(), options.noise

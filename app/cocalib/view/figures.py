@@ -151,7 +151,7 @@ def residual_limit_px(calibration: Calibration) -> float | None:
 
     With the paper's method, RANSAC's threshold; otherwise the median of the 95 % ellipses' semi-major axes.
     """
-    if calibration.options.method == "paper":
+    if not calibration.options.models_noise:
         return calibration.options.paper.ransac_threshold_px
     ellipses = (pair.ellipse for pair in reprojections(calibration.pairs).values())
     lengths = [ellipse.semi_major_px for ellipse in ellipses if ellipse is not None]

@@ -64,7 +64,7 @@ def _key(verdict: Verdict, session: Session, left: int | None) -> Literal["", "N
     if _is_done(verdict):
         return "E"
     outcome = session.outcome
-    if isinstance(outcome, Calibration) and outcome.options.method != "paper" and verdict.level == "contradictory":
+    if isinstance(outcome, Calibration) and outcome.options.models_noise and verdict.level == "contradictory":
         return "J" if outcome.warnings and by_consequence(outcome.warnings)[0].code in _OF_PAIRS else ""
     collecting = outcome is None or (isinstance(outcome, Unsolvable) and outcome.code == "too-few-pairs")
     return "N" if left and (collecting or verdict.action.startswith("Click the ")) else ""

@@ -27,7 +27,7 @@ def by_own_pairs(imported: ImportedCalibration) -> list[CheckResult]:
         hint = "pose, camera or pairs were changed after solving; solve again"
         return [CheckResult("error", "pairs-disagree", message, hint)]
     results = [CheckResult("good", "pairs", f"all {len(pairs)} pairs project where the file says")]
-    as_printed = file.calibration.options.method != "default"  # averages what disagrees, too
+    as_printed = not file.calibration.options.models_noise  # averages what disagrees, too
     averaged = [pair.distance_px for pair in pairs if (not pair.excluded if as_printed else pair.inlier)]
     aed_px = file.calibration.metrics.aed_px
     if averaged and np.isfinite(aed_px) and abs(np.mean(averaged) - aed_px) > tolerances.max():

@@ -45,7 +45,6 @@ from calib_core.interchange.syntax.json_text import json_text
 from calib_core.interchange.syntax.strict_json import document_in, json_object
 from calib_core.interchange.vehicle_note import VehicleNote
 from calib_core.measurements import ReflectorClick, Unpaired
-from calib_core.options import BoardOptions, MountingOptions, RefiningOptions
 from calib_core.radar import RadarErrors
 from calib_core.results import Calibration, CheckPoint, DataWarning, Metrics
 from calib_core.verdict import Verdict, verdict_on
@@ -140,7 +139,7 @@ def write_calibration(file: CalibrationFile) -> str:
         given_camera=camera_document(calibration.given_camera) if calibration.given_camera is not None else None,
         fleet_prior=fleet_answer_document(calibration.fleet),
         vehicle=vehicle_document(file.vehicle, file.kept),
-        options=calibration.options,
+        options=documents.StatedOptions.of(calibration.options),
         provenance=provenance_document(file.provenance),
     )
     content = msgspec.to_builtins(document)
@@ -150,8 +149,9 @@ def write_calibration(file: CalibrationFile) -> str:
         if not pair["candidates"]:
             for key in SOLVED_FROM_KEYS:
                 del pair[key]
-    for group, unset in (("mounting", MountingOptions()), ("board", BoardOptions()), ("refining", RefiningOptions())):
-        if getattr(calibration.options, group) == unset:
+    unset = documents.StatedOptions()
+    for group in ("mounting", "board", "refining"):
+        if getattr(document.options, group) == getattr(unset, group):
             del content["options"][group]
     absent = set() if calibration.angle_map is not None else {"radar_angle_map"}
     absent |= {"verdict"} if file.verdict is None else set()
@@ -278,7 +278,7 @@ def _file(
         pairs=tuple(solved_pair_of(pair, source=source, place=f"pairs[{i}]") for i, pair in enumerate(document.pairs)),
         unpaired=tuple(Unpaired(u.id, u.code, u.reason, u.hint) for u in document.unpaired),
         warnings=tuple(DataWarning(c.code, c.message, c.hint) for c in document.warnings),
-        options=document.options,
+        options=document.options.options(),
         noise_scale=(scale.click, scale.range, scale.azimuth, scale.elevation),
         covariance_quantile=nan_if_none(document.covariance_quantile),
         iterative_px=nan_if_none(document.paper.iterative_px),

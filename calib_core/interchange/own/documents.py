@@ -3,6 +3,8 @@
 Inputs and settings refuse unknown keys; results may contain more.
 """
 
+import dataclasses
+from dataclasses import dataclass
 from typing import Annotated, Final, Literal
 
 import msgspec
@@ -12,7 +14,7 @@ from calib_core.camera import CameraModel
 from calib_core.interchange.evidence import Evidence
 from calib_core.interchange.vehicle_note import MOST_CHARACTERS
 from calib_core.measurements import Mark
-from calib_core.options import CalibrationOptions
+from calib_core.options import RETIRED_METHODS, CalibrationOptions
 from calib_core.verdict import VerdictLevel
 
 CLICKS_SCHEMA: Final = "cocalib/clicks-1"
@@ -417,6 +419,42 @@ class FleetAnswerDocument(Struct, frozen=True, omit_defaults=True):
     data_alone: DataAloneDocument | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class BoardOptions:
+    """The checkerboard of the method ccm, which older versions had."""
+
+    columns: int = 8
+    rows: int = 5
+    square_m: float = 0.1
+    reach_squares: float = 0.35
+    registration: Literal["rigid", "linear"] = "rigid"
+
+
+@dataclass(frozen=True, slots=True)
+class StatedOptions(CalibrationOptions):
+    """The options that a file states: those of a calibration, and what older versions had as well."""
+
+    method: Literal["default", "paper", "pmm", "ccm"] = "default"  # type: ignore[assignment]
+    board: BoardOptions = dataclasses.field(default_factory=BoardOptions)
+
+    @classmethod
+    def of(cls, options: CalibrationOptions) -> "StatedOptions":
+        """Return the options of a calibration as a file states them."""
+        return (
+            options
+            if isinstance(options, cls)
+            else cls(**{one.name: getattr(options, one.name) for one in dataclasses.fields(options)})
+        )
+
+    def options(self) -> CalibrationOptions:
+        """Return the options of a calibration; those of a method of older versions stay as they were stated."""
+        if self.method in RETIRED_METHODS:
+            return self
+        return CalibrationOptions(
+            **{one.name: getattr(self, one.name) for one in dataclasses.fields(CalibrationOptions)}
+        )
+
+
 class CalibrationDocument(Struct, frozen=True):
     """A solved extrinsic calibration with its uncertainty."""
 
@@ -446,7 +484,7 @@ class CalibrationDocument(Struct, frozen=True):
     given_camera: CameraDocument | None = None
     fleet_prior: FleetAnswerDocument | None = None
     vehicle: VehicleDocument | None = None
-    options: CalibrationOptions = field(default_factory=CalibrationOptions)
+    options: StatedOptions = field(default_factory=StatedOptions)
     provenance: ProvenanceDocument = field(default_factory=ProvenanceDocument)
 
 

@@ -1,11 +1,11 @@
 """Mounting prior: where a camera next to a radar may be, and how far it may be turned from its nominal mounting."""
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 
 from calib_core.arrays import Matrix33, Values, Vector3, frozen_array
-from calib_core.baselines.mounting import mounting_rotation
+from calib_core.geometry import mounting_rotation
 from calib_core.options import CalibrationOptions
 
 MOST_TURNED_RAD = float(np.radians(26.0))
@@ -63,7 +63,7 @@ def mounting_prior(options: CalibrationOptions, *, is_flat: bool) -> MountingPri
         sigma = np.array([sigma[0], sigma[1], np.hypot(sigma[2], options.radar.height_sigma_m)])
         starts = centre + np.outer(_HEIGHTS_M, [0.0, 0.0, 1.0])
     return MountingPrior(
-        rotation=mounting_rotation(options.mounting),
+        rotation=mounting_rotation(*astuple(options.mounting)),
         rotation_sigma_rad=float(_TURNED_SIGMA_RAD),
         centre_radar_m=centre,
         centre_sigma_m=sigma,

@@ -16,6 +16,7 @@ from cocalib.option_changes import (
     OptionChange,
     changed_options,
     changes_from_tree,
+    kept_options,
     option_groups,
     options_from_tree,
 )
@@ -53,7 +54,7 @@ def test_a_camera_position_is_set_and_removed_as_a_whole() -> None:
     [
         ({"noise": {"sigma_pixel": 1.0}}, "unknown option 'noise.sigma_pixel'; did you mean 'noise.sigma_px'?"),
         ({"sigma_px": 1.0}, "did you mean 'noise.sigma_px'?"),
-        ({"xyzzy": 1.0}, "known: board.columns"),
+        ({"xyzzy": 1.0}, "known: gating.max_range_m"),
         ({"noise": {"sigma_px": "wide"}}, "option noise.sigma_px: expected `float`, got `str`"),
         ({"noise": {"sigma_px": None}}, "option noise.sigma_px"),
         ({"noise": {"estimate_scale": 1}}, "option noise.estimate_scale"),
@@ -95,9 +96,19 @@ def test_no_number_may_be_infinite_or_missing(path: str, value: float) -> None:
         changed_options(CalibrationOptions(), [OptionChange(path, value)])
 
 
+@pytest.mark.parametrize("method", ["pmm", "ccm"])
+def test_what_older_versions_offered_is_left_out_of_the_options_that_a_session_kept(method: str) -> None:
+    kept = kept_options(
+        {"method": method, "board": {"columns": 9, "registration": "linear"}, "noise": {"sigma_px": 3.0}}
+    )
+    assert kept == options_from_tree({"noise": {"sigma_px": 3.0}})
+    with pytest.raises(OptionError, match="board"):
+        options_from_tree({"board": {"columns": 9}})
+
+
 def test_a_choice_that_was_set_directly_is_checked_too() -> None:
     wrong = CalibrationOptions(method="best")  # type: ignore[arg-type]
-    with pytest.raises(OptionError, match="unknown value 'best'; choose default or paper or pmm or ccm"):
+    with pytest.raises(OptionError, match="unknown value 'best'; choose default or paper"):
         checked_options(wrong)
 
 

@@ -64,8 +64,6 @@ def given_files(row: ManifestRow) -> GivenFiles:
     Raises:
         InputError: one cannot be read, or they contradict the row.
     """
-    if row.auto and row.options.method == "ccm":
-        raise InputError("method ccm takes clicks on the corners of a checkerboard, and auto finds a reflector")
     camera = None if row.camera is None else CameraFile.read(row.camera, rescale=row.rescale_camera)
     clicks = None if row.clicks is None else file_of_clicks(row.clicks)
     if row.auto and clicks is not None and clicks.unconfirmed is not None:

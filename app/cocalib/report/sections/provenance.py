@@ -129,7 +129,7 @@ def _lens(camera: Camera) -> str:
 
 def _options(options: CalibrationOptions) -> str:
     """Return the method, and every option that is not at its default."""
-    changed = [f"{name} = {value}" for name, value in _changed(options, CalibrationOptions()) if name != "method"]
+    changed = [f"{name} = {value}" for name, value in _changed(options, type(options)()) if name != "method"]
     return f"method {options.method}; " + ("; ".join(changed) if changed else "all others at their defaults")
 
 

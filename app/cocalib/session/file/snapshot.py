@@ -13,7 +13,7 @@ from msgspec import Meta
 from calib_core.errors import CalibrationError
 from calib_core.measurements import ReflectorClick, Stamp, TimeNs
 from calib_core.options import CalibrationOptions
-from cocalib.option_changes import options_from_tree
+from cocalib.option_changes import kept_options
 from cocalib.session import (
     AssumptionsConfirmed,
     BoxesLoaded,
@@ -176,7 +176,7 @@ def read_snapshot(data: bytes, place: str) -> FoundSnapshot:
             recording=snapshot.recording,
             count=snapshot.steps,
             clicks=tuple(sorted(click_from_form(click) for click in snapshot.clicks)),
-            options=options_from_tree(snapshot.options),
+            options=kept_options(snapshot.options),
             last=snapshot.last,
             lines=snapshot.lines,
             column_map=snapshot.column_map,

@@ -7,7 +7,7 @@ import msgspec
 from msgspec import Meta
 
 from calib_core.measurements import ChosenReturn, Mark, ReflectorClick, Stamp
-from cocalib.option_changes import options_from_tree
+from cocalib.option_changes import kept_options
 from cocalib.session import (
     AssumptionsConfirmed,
     Cleared,
@@ -345,7 +345,7 @@ def _acknowledged(form: WarningsAcknowledgedForm) -> Step:
 
 @step_from_form.register
 def _options(form: OptionsChangedForm) -> Step:
-    return OptionsChanged(options_from_tree(form.options))
+    return OptionsChanged(kept_options(form.options))
 
 
 @step_from_form.register

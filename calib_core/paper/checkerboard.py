@@ -1,4 +1,4 @@
-"""Looking for the checkerboard in a recording's frames."""
+"""The checkerboard of the paper's other method (CCM) in the frames of a recording: where its inner corners are."""
 
 from collections.abc import Iterator
 from typing import Protocol, runtime_checkable
@@ -7,8 +7,6 @@ import numpy as np
 
 from calib_core.arrays import Points2, TimesNs
 from calib_core.measurements import Unsolvable
-from calib_core.options import BoardOptions
-from calib_core.vision.checkerboard import find_corners
 
 _MOST_FRAMES = 40
 _STRIDE = 17
@@ -27,14 +25,15 @@ class PictureSource(Protocol):
         """Return a frame's pixels: uint8 (h, w, 3), blue first."""
 
 
-def find_board(source: object, board: BoardOptions) -> Points2 | Unsolvable:
+def find_board(source: object, columns: int, rows: int) -> Points2 | Unsolvable:
     """Find a checkerboard that stands still: its inner corners (rows * columns, 2) [px], row by row.
 
     Up to 40 frames all over the recording are searched, until three show the whole board.
 
     Args:
         source: a recording; one without pictures shows no board.
-        board: how many corners it has.
+        columns: inner corners along the longer side of the board.
+        rows: inner corners along its shorter side.
 
     Raises:
         CalibrationError: a frame cannot be read.
@@ -43,7 +42,7 @@ def find_board(source: object, board: BoardOptions) -> Points2 | Unsolvable:
     views: list[Points2] = []
     for picture in _frames(source):
         searched += 1
-        corners = find_corners(picture, board.columns, board.rows)
+        corners = find_corners(picture, columns, rows)
         if corners is not None:
             views.append(corners if not views else _in_the_order_of(views[0], corners))
         if len(views) == _ENOUGH_VIEWS:
@@ -51,10 +50,10 @@ def find_board(source: object, board: BoardOptions) -> Points2 | Unsolvable:
     if not views:
         return Unsolvable(
             "no-board",
-            f"none of {searched} frames all over the recording shows a checkerboard of {board.columns} x {board.rows} inner "
+            f"none of {searched} frames all over the recording shows a checkerboard of {columns} x {rows} inner "
             "corners as a whole",
             "record some seconds in which nothing hides the board, near enough that its squares are 10 px wide, and state its "
-            "inner corners, which are one fewer than its squares (--board.columns, --board.rows)",
+            "inner corners, which are one fewer than its squares",
         )
     moved_px = max(float(np.linalg.norm(view - views[0], axis=1).max()) for view in views)
     if moved_px > _STILL_PX:
@@ -64,6 +63,21 @@ def find_board(source: object, board: BoardOptions) -> Points2 | Unsolvable:
             "leave board and sensors where they are while the reflector is put on its corners",
         )
     return np.asarray(np.mean(views, axis=0))
+
+
+def find_corners(picture: np.ndarray, columns: int, rows: int) -> Points2 | None:
+    """Find all inner corners of a checkerboard: (rows * columns, 2) [px], row by row; None if one of them is hidden.
+
+    Args:
+        picture: uint8 (h, w, 3), blue first.
+        columns: inner corners in a row.
+        rows: number of rows.
+    """
+    import cv2
+
+    grey = cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
+    found, corners = cv2.findChessboardCornersSB(grey, (columns, rows), flags=cv2.CALIB_CB_NORMALIZE_IMAGE)
+    return np.asarray(corners, dtype=np.float64).reshape(-1, 2) if found else None
 
 
 def _frames(source: object) -> Iterator[np.ndarray]:

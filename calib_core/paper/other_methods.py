@@ -1,14 +1,20 @@
-"""A pose from elsewhere, judged on pairs that it was not fitted to."""
+"""The paper's other methods, for its experiments: the mounting (PMM), and the exchange of translations.
+
+PMM takes rotation and offset as designed or measured, and no data at all. An exchange combines the rotation of one
+calibration with the translation of another, to see which of the two matters. Neither states an uncertainty; both are judged
+on pairs that they were not fitted to.
+"""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import astuple, replace
 
 import numpy as np
 
 from calib_core.arrays import Flags
 from calib_core.camera import Camera
+from calib_core.errors import InputError
 from calib_core.estimation.linearization import linearize
-from calib_core.geometry import RigidTransform
+from calib_core.geometry import RigidTransform, mounting_rotation
 from calib_core.measurements import Pair, Unpaired
 from calib_core.metrics import metrics_of
 from calib_core.options import CalibrationOptions
@@ -17,6 +23,66 @@ from calib_core.radar import polar_from_cartesian
 from calib_core.results import Calibration, DataWarning, PairResult
 
 _EXPLAINED = 11.83  # chi2 of 2 degrees of freedom that noise exceeds in 0.27 % of the pairs
+
+
+def calibrate_by_mounting(
+    pairs: Sequence[Pair],
+    camera: Camera,
+    options: CalibrationOptions,
+    *,
+    excluded: frozenset[str] = frozenset(),
+    unpaired: tuple[Unpaired, ...] = (),
+) -> Calibration:
+    """Return the pose of the mounting, judged on pairs that it does not depend on; there may be none.
+
+    Args:
+        pairs: in the order of the results.
+        camera: the intrinsics.
+        options: the mounting's angles, and the measured position of the camera.
+        excluded: ids of pairs that are shown, but not judged on.
+        unpaired: clicks without a radar position.
+
+    Raises:
+        InputError: the options state no measured position.
+    """
+    measured = options.solving.camera_position
+    if measured is None:
+        raise InputError(
+            "the mounting (PMM) takes the camera's position from a tape measure, and none is given; measure from the radar's "
+            "antennas to the lens: forward, left, up, in metres"
+        )
+    rotation = mounting_rotation(*astuple(options.mounting))
+    pose = RigidTransform(rotation, -rotation @ np.array(measured.position_m))
+    return judged(pose, pairs, unpaired, excluded, camera, options)
+
+
+def swapped(rotation_of: Calibration, translation_of: Calibration) -> Calibration:
+    """Combine two calibrations of one rig, and judge the result on the pairs of the first; no uncertainty is stated.
+
+    The translation is that of camera_from_radar, in camera axes, as the paper swaps it.
+
+    Args:
+        rotation_of: gives rotation, pairs, camera and options.
+        translation_of: gives the translation.
+
+    Raises:
+        InputError: the two were made with different intrinsics, so they cannot be of one camera.
+    """
+    first, second = rotation_of.camera, translation_of.camera
+    kinds = [(camera.model, camera.width_px, camera.height_px, camera.distortion.shape) for camera in (first, second)]
+    one_lens, other_lens = (np.append(camera.matrix_px, camera.distortion) for camera in (first, second))
+    if kinds[0] != kinds[1] or not np.allclose(one_lens, other_lens):
+        raise InputError(
+            "rotation and translation can be combined only for one camera: the two calibrations have different intrinsics; "
+            "solve both with the same camera file"
+        )
+    pose = RigidTransform(rotation_of.camera_from_radar.rotation, translation_of.camera_from_radar.translation_m)
+    note = DataWarning(
+        "swapped-parts",
+        "this pose has the rotation of one calibration and the translation of another",
+        "use it to see which part causes an error, not as a calibration",
+    )
+    return judged_again(rotation_of, pose, [note])
 
 
 def judged(

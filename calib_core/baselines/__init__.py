@@ -1,1 +1,0 @@
-"""The paper's other methods: by mounting (PMM), by checkerboard (CCM), and exchanges of their translations."""
