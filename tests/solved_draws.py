@@ -19,7 +19,7 @@ from calib_core.options import (
     without_systematic_errors,
 )
 from calib_core.synthetic import SimulatedPairs
-from calib_core.synthetic.pairs.simulated import PairsLayout
+from calib_core.synthetic.simulated_pairs import PairsLayout
 
 NARROW = PairsLayout(max_range_m=20.0, max_lateral_m=1.0)
 """An aisle of 2 m."""

@@ -17,7 +17,7 @@ from calib_core.measurements import Candidate, Pair
 from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, polar_from_cartesian
 from calib_core.results import Calibration
 from calib_core.synthetic import FIELD, NOISE_PROFILES, SimulatedPairs
-from calib_core.synthetic.pairs.simulated import NoiseName
+from calib_core.synthetic.simulated_pairs import NoiseName
 
 __all__ = ["ROWS", "Advised", "measure_advice", "section"]
 

@@ -19,7 +19,7 @@ from calib_core.options import (
 )
 from calib_core.radar import covariance_from_sigma_polar
 from calib_core.synthetic import AISLE, FIELD, NOISE_PROFILES, RigOptions, SimulatedPairs, random_rig, simulate_pairs
-from calib_core.synthetic.pairs.simulated import NoiseName, study_camera
+from calib_core.synthetic.simulated_pairs import NoiseName, study_camera
 
 __all__ = ["Bound", "Case", "SceneName", "bound_of", "draw", "exact_instruments", "options_of", "tape_measured"]
 

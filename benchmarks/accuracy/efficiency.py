@@ -25,7 +25,7 @@ from benchmarks.accuracy.rows import Figures, Kept, Part, Row, Section
 from calib_core.geometry import RigidTransform
 from calib_core.results import Calibration
 from calib_core.synthetic import SimulatedPairs
-from calib_core.synthetic.pairs.simulated import NoiseName
+from calib_core.synthetic.simulated_pairs import NoiseName
 
 __all__ = ["PEER_ROWS", "ROWS", "errors_of", "failed", "inside", "measure_ours", "peer_section", "section"]
 

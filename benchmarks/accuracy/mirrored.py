@@ -14,7 +14,7 @@ from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions, SolvingOptions
 from calib_core.results import Calibration
 from calib_core.synthetic import SimulatedPairs
-from calib_core.synthetic.pairs.simulated import NoiseName
+from calib_core.synthetic.simulated_pairs import NoiseName
 
 __all__ = ["ROWS", "Mirrored", "measure_mirrored", "section"]
 

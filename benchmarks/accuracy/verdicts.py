@@ -21,9 +21,8 @@ from calib_core.radar import cartesian_from_polar
 from calib_core.results import Calibration
 from calib_core.stated_error import stated_error
 from calib_core.synthetic import FIELD, PairsLayout, SimulatedPairs, simulate_pairs, simulate_scans
-from calib_core.synthetic.pairs.simulated import NoiseName
-from calib_core.synthetic.pairs.systematic_errors import draw_systematic_errors
 from calib_core.synthetic.presets import PRESETS, PresetName
+from calib_core.synthetic.simulated_pairs import NoiseName, draw_systematic_errors
 from calib_core.verdict import VerdictLevel, verdict_on
 
 __all__ = ["ROWS", "Verdicts", "measure_recording", "measure_verdict", "section", "share_inside"]

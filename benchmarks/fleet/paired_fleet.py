@@ -18,9 +18,8 @@ from calib_core.pose_difference import squared_distance
 from calib_core.results import Calibration
 from calib_core.stated_error import stated_error
 from calib_core.synthetic import simulate_pairs
-from calib_core.synthetic.pairs.simulated import study_camera
-from calib_core.synthetic.pairs.systematic_errors import SystematicErrors, draw_systematic_errors
 from calib_core.synthetic.rig import Rig, RigOptions, radar_stand
+from calib_core.synthetic.simulated_pairs import SystematicErrors, draw_systematic_errors, study_camera
 from calib_core.verdict import VerdictLevel, verdict_on
 
 __all__ = ["Answer", "Setting", "Vehicle", "answered", "draw_vehicle", "prior_from", "prior_holds", "sigmas"]

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.synthetic.options import Clutter, SceneName, SimulationOptions, Surroundings
-from calib_core.synthetic.radar_options import RadarName
+from calib_core.synthetic.options import Clutter, RadarName, SceneName, SimulationOptions, Surroundings
 
 __all__ = ["Case", "case_of"]
 

@@ -11,8 +11,7 @@ from calib_core.association.placements import Placement, find_placements
 from calib_core.measurements import RadarScans
 from calib_core.options import CalibrationOptions
 from calib_core.proposing import FrameSource
-from calib_core.synthetic.pictures import SimulatedPictures
-from calib_core.synthetic.recording import SimulatedRecording, simulate
+from calib_core.synthetic.recording import SimulatedPictures, SimulatedRecording, simulate
 from calib_core.synthetic.scene.placements import SimulatedPlacement
 
 __all__ = ["Drawn", "draw", "drawn_from", "true_placement"]

@@ -10,8 +10,7 @@ from benchmarks.proposing.cases import Case, case_of
 from benchmarks.proposing.drawn import Drawn, drawn_from
 from calib_core.arrays import TimesNs
 from calib_core.proposing import FrameSource
-from calib_core.synthetic.pictures import SimulatedPictures
-from calib_core.synthetic.recording import SimulatedRecording, simulate
+from calib_core.synthetic.recording import SimulatedPictures, SimulatedRecording, simulate
 from calib_core.synthetic.rendering.frames import FrameRenderer
 from calib_core.synthetic.rendering.light import sun_direction
 from calib_core.synthetic.rendering.still import Still, pixel_rays

@@ -8,13 +8,22 @@ from calib_core.synthetic.options import (
     Clutter,
     Container,
     IntrinsicsErrors,
+    RadarDefects,
+    RadarMessage,
+    RadarName,
     SceneName,
     SimulationOptions,
     Surroundings,
     Traffic,
     WavedBoard,
 )
-from calib_core.synthetic.pairs.simulated import (
+from calib_core.synthetic.presets import PRESETS, PresetName
+from calib_core.synthetic.radar_profiles import RADAR_PROFILES, RadarProfile
+from calib_core.synthetic.recording import SimulatedFrame, SimulatedRecording, simulate
+from calib_core.synthetic.rig import Rig, RigOptions, random_rig, typical_camera
+from calib_core.synthetic.scans import SimulatedScans, simulate_scans
+from calib_core.synthetic.scene.placements import SimulatedPlacement
+from calib_core.synthetic.simulated_pairs import (
     AISLE,
     FIELD,
     NOISE_PROFILES,
@@ -22,16 +31,10 @@ from calib_core.synthetic.pairs.simulated import (
     OutlierMix,
     PairsLayout,
     SimulatedPairs,
+    SystematicErrors,
+    draw_systematic_errors,
     simulate_pairs,
 )
-from calib_core.synthetic.pairs.systematic_errors import SystematicErrors, draw_systematic_errors
-from calib_core.synthetic.presets import PRESETS, PresetName
-from calib_core.synthetic.radar.profiles import RADAR_PROFILES, RadarProfile
-from calib_core.synthetic.radar_options import RadarDefects, RadarMessage, RadarName
-from calib_core.synthetic.recording import SimulatedFrame, SimulatedRecording, simulate
-from calib_core.synthetic.rig import Rig, RigOptions, random_rig, typical_camera
-from calib_core.synthetic.scans import SimulatedScans, simulate_scans
-from calib_core.synthetic.scene.placements import SimulatedPlacement
 
 __all__ = [
     "AISLE",

@@ -19,9 +19,9 @@ from calib_core.recordings.containers.recorded_messages import (
     VendorScanMessage,
 )
 from calib_core.recordings.radar.several_topics.merging import Spread, aligned, merged, moments_of
-from calib_core.synthetic.radar.antennas import Antenna
-from calib_core.synthetic.radar.defects import second_azimuths
-from calib_core.synthetic.radar_options import RadarDefects
+from calib_core.synthetic.options import RadarDefects
+from calib_core.synthetic.radar_profiles import Antenna
+from calib_core.synthetic.radar_returns import second_azimuths
 from calib_core.synthetic.recording import SimulatedFrame, SimulatedRecording
 from calib_core.synthetic.scans import side_scans
 

@@ -6,12 +6,12 @@ from typing import Literal, TypeAlias
 from calib_core.synthetic.options import (
     Clicking,
     IntrinsicsErrors,
+    RadarDefects,
     SimulationOptions,
     Surroundings,
     Traffic,
     WavedBoard,
 )
-from calib_core.synthetic.radar_options import RadarDefects
 from calib_core.synthetic.rig import RigOptions
 
 PresetName: TypeAlias = Literal[

@@ -12,9 +12,8 @@ from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, ReflectorClick, TimeNs
 from calib_core.synthetic.clicking import SimulatedClick, clicks_of
 from calib_core.synthetic.options import SimulationOptions
-from calib_core.synthetic.radar.antennas import Antenna
-from calib_core.synthetic.radar.defects import second_azimuths, second_is_true
-from calib_core.synthetic.radar.returns import Targets, measure
+from calib_core.synthetic.radar_profiles import Antenna
+from calib_core.synthetic.radar_returns import Targets, measure, second_azimuths, second_is_true
 from calib_core.synthetic.scene.person import PersonState, capsules
 from calib_core.synthetic.scene.placements import SimulatedPlacement, placements_of
 from calib_core.synthetic.scene.scenes import USUAL_EDGE_M

@@ -39,7 +39,7 @@ from calib_core.paper.algorithm_1 import (
 from calib_core.paper.pnp import project_points, refine_lm, solve_pnp_ransac
 from calib_core.results import Calibration
 from calib_core.synthetic import FIELD, SimulatedPairs, simulate_pairs
-from calib_core.synthetic.pairs.simulated import study_camera
+from calib_core.synthetic.simulated_pairs import study_camera
 
 START_NS = 1_700_000_000_123_456_789
 AS_PRINTED = PaperOptions()

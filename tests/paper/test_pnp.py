@@ -8,7 +8,7 @@ from calib_core.geometry import RigidTransform, rotation_angle_rad
 from calib_core.lens_models.registry import LENS_MODELS
 from calib_core.paper.pnp import PnPSolver, project_points, refine_lm, solve_pnp, solve_pnp_ransac, spans_a_plane
 from calib_core.synthetic import SimulatedPairs, simulate_pairs, typical_camera
-from calib_core.synthetic.pairs.simulated import study_camera
+from calib_core.synthetic.simulated_pairs import study_camera
 
 SOLVERS: tuple[PnPSolver, ...] = ("iterative", "sqpnp")
 

@@ -9,9 +9,9 @@ from hypothesis.extra.numpy import arrays
 from calib_core.measurements import TimeNs
 from calib_core.radar import direction_cosines
 from calib_core.synthetic import RADAR_PROFILES, simulate_pairs
-from calib_core.synthetic.radar.returns import Targets, measure
-from calib_core.synthetic.radar_options import RadarName
-from calib_core.synthetic.rendering.noise import line_coverage
+from calib_core.synthetic.options import RadarName
+from calib_core.synthetic.radar_returns import Targets, measure
+from calib_core.synthetic.rendering.surfaces import line_coverage
 from calib_core.synthetic.scene.person import PersonState, capsules
 from calib_core.synthetic.timeline import draw_islands, draw_times
 

@@ -14,9 +14,8 @@ from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
 from calib_core.synthetic import FIELD, PairsLayout, Rig, SimulatedPairs, SystematicErrors, simulate_pairs
-from calib_core.synthetic.pairs.simulated import NoiseName, study_camera
-from calib_core.synthetic.pairs.systematic_errors import draw_systematic_errors
 from calib_core.synthetic.rig import draw_flat_radar_rig, random_rig, random_rig_apart
+from calib_core.synthetic.simulated_pairs import NoiseName, draw_systematic_errors, study_camera
 
 __all__ = ["FLAT", "Adversary", "Change", "Draw", "Solved", "draw_flat", "generator"]
 

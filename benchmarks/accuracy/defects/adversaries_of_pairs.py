@@ -10,7 +10,7 @@ from benchmarks.accuracy.defects.adversaries import FLAT, Adversary, Change, Dra
 from calib_core.calibration import calibrate_pairs
 from calib_core.options import CalibrationOptions, CameraPositionPrior
 from calib_core.synthetic import AISLE, PairsLayout, SimulatedPairs, SystematicErrors, simulate_pairs
-from calib_core.synthetic.pairs.defects import (
+from calib_core.synthetic.pair_defects import (
     clicked_again,
     from_moved_camera,
     in_other_units,
@@ -19,7 +19,7 @@ from calib_core.synthetic.pairs.defects import (
     with_rounded_elevations,
     with_zero_pair,
 )
-from calib_core.synthetic.pairs.simulated import NoiseName
+from calib_core.synthetic.simulated_pairs import NoiseName
 
 __all__ = ["ADVERSARIES_OF_PAIRS"]
 

@@ -13,9 +13,8 @@ from benchmarks.accuracy.rows import Claim, Figures, Kept, Part, Row, Section
 from calib_core.calibration import calibrate_pairs
 from calib_core.options import CalibrationOptions
 from calib_core.synthetic import simulate_pairs
-from calib_core.synthetic.pairs.simulated import NoiseName, study_camera
-from calib_core.synthetic.pairs.systematic_errors import SystematicErrors, draw_systematic_errors
 from calib_core.synthetic.rig import random_rig_apart
+from calib_core.synthetic.simulated_pairs import NoiseName, SystematicErrors, draw_systematic_errors, study_camera
 
 __all__ = ["HANDEDNESS_CODES", "ROWS", "measure_apart", "measure_clean_draw", "section"]
 

@@ -14,7 +14,7 @@ from calib_core.calibration import calibrate_pairs
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
 from calib_core.synthetic import simulate_pairs
-from calib_core.synthetic.pairs.simulated import NoiseName
+from calib_core.synthetic.simulated_pairs import NoiseName
 
 __all__ = ["ROWS", "measure_drag", "section"]
 

@@ -15,7 +15,7 @@ from calib_core.calibration import calibrate_pairs
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
 from calib_core.synthetic import SimulatedPairs
-from calib_core.synthetic.pairs.simulated import NoiseName
+from calib_core.synthetic.simulated_pairs import NoiseName
 
 __all__ = ["ROWS", "measure_flat", "section"]
 

@@ -14,10 +14,9 @@ from benchmarks.accuracy.rows import Claim, Figures, Kept, Part, Row, Section
 from calib_core.calibration import calibrate_pairs
 from calib_core.options import CalibrationOptions, SolvingOptions
 from calib_core.synthetic import Rig, random_rig, simulate_pairs
-from calib_core.synthetic.pairs.defects import clicked_again, mirrored, with_zero_pair
-from calib_core.synthetic.pairs.simulated import NoiseName, study_camera
-from calib_core.synthetic.pairs.systematic_errors import draw_systematic_errors
+from calib_core.synthetic.pair_defects import clicked_again, mirrored, with_zero_pair
 from calib_core.synthetic.rig import random_rig_apart
+from calib_core.synthetic.simulated_pairs import NoiseName, draw_systematic_errors, study_camera
 
 __all__ = ["ROWS", "Hand", "measure_hand", "section"]
 

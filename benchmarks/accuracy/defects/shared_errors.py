@@ -16,8 +16,7 @@ from benchmarks.accuracy.rows import Claim, Figures, Kept, Part, Row, Section
 from calib_core.calibration import calibrate_pairs
 from calib_core.options import CalibrationOptions
 from calib_core.synthetic import FIELD, PairsLayout, SimulatedPairs, SystematicErrors, simulate_pairs
-from calib_core.synthetic.pairs.simulated import NoiseName
-from calib_core.synthetic.pairs.systematic_errors import draw_systematic_errors
+from calib_core.synthetic.simulated_pairs import NoiseName, draw_systematic_errors
 
 __all__ = ["CLEAN_ROWS", "ROWS", "Shared", "clean_section", "draw_shared", "measure_clean", "measure_shared", "section"]
 

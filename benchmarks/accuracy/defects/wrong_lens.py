@@ -16,8 +16,7 @@ from calib_core.camera import Camera, CameraCovariance
 from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions, LensOptions, RadarOptions, RefiningOptions
 from calib_core.synthetic import SimulatedPairs, simulate_pairs
-from calib_core.synthetic.pairs.simulated import NoiseName
-from calib_core.synthetic.pairs.systematic_errors import draw_systematic_errors
+from calib_core.synthetic.simulated_pairs import NoiseName, draw_systematic_errors
 
 __all__ = ["ROWS", "WrongLens", "board_covariance", "draw_wrong_lens", "measure_wrong_lens", "section"]
 

@@ -1,10 +1,9 @@
 """Pictures of calibration boards, and corners without pictures, with known truth."""
 
-from calib_core.synthetic.boards.board_film import BoardFilm, BoardShape
 from calib_core.synthetic.boards.board_picture import draw_board, render_board
 from calib_core.synthetic.boards.board_poses import Waving, waved_poses
-from calib_core.synthetic.boards.moving_board import MovingBoard, true_corners
-from calib_core.synthetic.boards.printed_board import PrintedBoard, printed_board
+from calib_core.synthetic.boards.moving_board import BoardFilm, MovingBoard, true_corners
+from calib_core.synthetic.boards.printed_board import BoardShape, PrintedBoard, printed_board
 from calib_core.synthetic.boards.simulated_views import CornerErrors, simulated_views
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""The picture of a board: every pixel through the lens to the board, smooth at its edges."""
+"""The picture of a board: every pixel through the lens to the board, smooth at its edges, and the cluttered room behind it."""
 
 import numpy as np
 
@@ -6,11 +6,8 @@ from calib_core.arrays import Values
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
 from calib_core.intrinsics import Board
-from calib_core.synthetic.boards.board_film import BoardFilm
-from calib_core.synthetic.boards.moving_board import MovingBoard
+from calib_core.synthetic.boards.moving_board import BoardFilm, MovingBoard
 from calib_core.synthetic.boards.printed_board import PrintedBoard, printed_board
-from calib_core.synthetic.boards.room import room_behind
-from calib_core.synthetic.boards.smooth_rays import grid_rays
 
 _FINE = 2
 """Samples per pixel along each axis; each is filtered over its own width, so that edges are exact."""
@@ -210,3 +207,59 @@ def _light(camera: Camera, film: BoardFilm) -> np.ndarray:
     slope = 1.0 + np.float32(film.gradient[0]) * u + np.float32(film.gradient[1]) * v
     dark = 1.0 - np.float32(film.vignetting) * (u * u + v * v) / corner
     return np.asarray(np.float32(film.exposure) * np.maximum(slope, 0.0) * dark, dtype=np.float32)
+
+
+_OCTAVES_PX = ((160, 28.0), (40, 14.0), (9, 6.0))
+_THINGS = 14
+
+
+def room_behind(rng: np.random.Generator, camera: Camera) -> np.ndarray:
+    """Draw grey levels (h, w), float32: clouds of three sizes, and things with straight edges."""
+    import cv2
+
+    width, height = camera.width_px, camera.height_px
+    levels = np.full((height, width), 110.0, dtype=np.float32)
+    for size, strength in _OCTAVES_PX:
+        small = rng.standard_normal((height // size + 3, width // size + 3), dtype=np.float32)
+        levels += np.float32(strength) * cv2.resize(small, (width, height), interpolation=cv2.INTER_CUBIC)
+    for _ in range(_THINGS):
+        u, v = rng.uniform([0.0, 0.0], [width, height]).tolist()
+        long, wide = (rng.uniform(0.02, 0.22, 2) * width).tolist()
+        corners = cv2.boxPoints(((u, v), (long, wide), float(rng.uniform(0.0, 180.0))))
+        cv2.fillConvexPoly(levels, np.round(corners).astype(np.int32), (float(rng.uniform(30.0, 210.0)),))
+    return np.clip(levels, 5.0, 245.0)
+
+
+_NODES = 20
+
+
+def grid_rays(camera: Camera, u_px: Values, v_px: Values) -> np.ndarray:
+    """Return the unit rays (3, rows, columns) that the pixels (u, v) see; NaN where the lens has none.
+
+    The lens is inverted at a few pixels only; the interpolation is exact to far below a thousandth of a pixel. Where the lens
+    has no rays at some of them, every pixel is inverted.
+    """
+    spans = [(float(one.min()), float(one.max())) for one in (u_px, v_px)]
+    nodes = np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)
+    at_u, at_v = (0.5 * (low + high) + 0.5 * (high - low) * nodes for low, high in spans)
+    rays = _exact(camera, at_u, at_v)
+    if not np.isfinite(rays).all():
+        return _exact(camera, u_px, v_px)
+    to_u, to_v = (_weights(one, span) for one, span in zip((u_px, v_px), spans, strict=True))
+    return np.asarray(to_v @ rays @ to_u.T)
+
+
+def _exact(camera: Camera, u_px: Values, v_px: Values) -> np.ndarray:
+    u, v = np.meshgrid(u_px, v_px)
+    rays = camera.rays(np.stack([u.ravel(), v.ravel()], axis=1))
+    return np.ascontiguousarray(rays.T).reshape(3, len(v_px), len(u_px))
+
+
+def _weights(places: Values, span: tuple[float, float]) -> np.ndarray:
+    """Return what each node contributes at places (n, nodes)."""
+    low, high = span
+    scaled = (2.0 * places - low - high) / max(high - low, 1e-9)
+    nodes = np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)
+    fit = np.polynomial.chebyshev.chebvander(nodes, _NODES - 1)
+    fit[:, 1:] *= 2.0
+    return np.asarray(np.polynomial.chebyshev.chebvander(scaled, _NODES - 1) @ fit.T / _NODES)

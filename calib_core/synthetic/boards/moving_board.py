@@ -1,6 +1,6 @@
-"""Where a moving board is at any time, and where its corners are in a picture whose rows are exposed one after the other."""
+"""A moving board: what a picture of it suffers, where it is, and where its corners are while rows are exposed one by one."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -8,8 +8,40 @@ from calib_core.arrays import Points2, Points3, Values, Vector3
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.intrinsics import Board
-from calib_core.synthetic.boards.board_film import BoardFilm
-from calib_core.synthetic.boards.printed_board import PrintedBoard, printed_board
+from calib_core.synthetic.boards.printed_board import BoardShape, PrintedBoard, printed_board
+
+
+@dataclass(frozen=True, slots=True)
+class BoardFilm:
+    """How a board is filmed.
+
+    Attributes:
+        shape: of the board.
+        blur_px: standard deviation of the lens blur [px].
+        noise_grey: standard deviation of the sensor's noise [grey levels], the same in all three channels.
+        exposure: brightness over the usual one.
+        gradient: by how much brighter than in the middle the light is at the right and at the lower border, as a share.
+        vignetting: share of the light that is missing in the corners.
+        black_grey, white_grey: levels of the board's ink and paper.
+        velocity_mps: (3,) of the board's middle, in the camera frame.
+        turning_radps: (3,) the board's rotation vector per second, in the camera frame.
+        rolling_shutter_s: from the exposure of the first row to that of the last; the pose is that at the middle row.
+        exposure_s: how long each row is exposed.
+    """
+
+    shape: BoardShape = field(default_factory=BoardShape)
+    blur_px: float = 0.0
+    noise_grey: float = 0.0
+    exposure: float = 1.0
+    gradient: tuple[float, float] = (0.0, 0.0)
+    vignetting: float = 0.0
+    black_grey: float = 35.0
+    white_grey: float = 205.0
+    velocity_mps: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    turning_radps: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    rolling_shutter_s: float = 0.0
+    exposure_s: float = 0.0
+
 
 _ROUNDS = 30
 _CLOSE_PX = 1e-9

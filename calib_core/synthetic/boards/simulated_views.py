@@ -9,8 +9,7 @@ from calib_core.arrays import Points2
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
 from calib_core.intrinsics import Board, BoardCorners
-from calib_core.synthetic.boards.board_film import BoardFilm
-from calib_core.synthetic.boards.moving_board import MovingBoard
+from calib_core.synthetic.boards.moving_board import BoardFilm, MovingBoard
 from calib_core.synthetic.boards.printed_board import printed_board
 
 

@@ -8,19 +8,19 @@ import numpy as np
 
 from calib_core.arrays import Vector3
 from calib_core.synthetic.options import ReflectorDesign, Surroundings
-from calib_core.synthetic.rendering.carts import cart_facets
-from calib_core.synthetic.rendering.facets import Facet
 from calib_core.synthetic.rendering.light import display, sun_direction
 from calib_core.synthetic.rendering.people import Window, draw_limbs, shade_ground
 from calib_core.synthetic.rendering.reflector import (
+    Facet,
     on_block,
+    pole_limbs,
     reflector_facets,
     shadow_limbs,
+    square_facets,
     stand_limbs,
 )
-from calib_core.synthetic.rendering.square_reflector import pole_limbs, square_facets
 from calib_core.synthetic.rendering.still import Still, trace_still
-from calib_core.synthetic.rendering.vehicles import vehicle_facets, vehicle_shadow
+from calib_core.synthetic.rendering.vehicles import cart_facets, vehicle_facets, vehicle_shadow
 from calib_core.synthetic.rig import Rig
 from calib_core.synthetic.scene.person import Capsule, PersonState, capsules
 from calib_core.synthetic.scene.scenes import USUAL_EDGE_M, Scene

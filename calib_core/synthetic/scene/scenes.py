@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from calib_core.synthetic.options import SceneName
-from calib_core.synthetic.pairs.simulated import PairsLayout
+from calib_core.synthetic.simulated_pairs import PairsLayout
 
 USUAL_EDGE_M = 0.16
 """Length of the three edges that meet at the apex of the usual reflector [m]."""

@@ -11,17 +11,15 @@ from calib_core.errors import OptionError
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.synthetic.options import IntrinsicsErrors, SimulationOptions
-from calib_core.synthetic.pairs.simulated import PairsLayout, draw_positions
-from calib_core.synthetic.radar.antennas import Antenna, antennas_of
-from calib_core.synthetic.radar.defects import radar_from_reported
-from calib_core.synthetic.radar.profiles import RadarProfile, profile_with
+from calib_core.synthetic.radar_profiles import Antenna, RadarProfile, antennas_of, profile_with
+from calib_core.synthetic.radar_returns import radar_from_reported
 from calib_core.synthetic.rig import Rig, random_rig, typical_camera
 from calib_core.synthetic.scene.built_scenes import scene_named
-from calib_core.synthetic.scene.passers_by import draw_passers_by
 from calib_core.synthetic.scene.scenes import STANDS_LOWER, USUAL_EDGE_M, Scatterer, Scene
 from calib_core.synthetic.scene.story import Story, tell_story
 from calib_core.synthetic.scene.surroundings import Flicker, draw_flickers, furnished, in_sight
-from calib_core.synthetic.scene.traffic import draw_movers
+from calib_core.synthetic.scene.traffic import draw_movers, draw_passers_by
+from calib_core.synthetic.simulated_pairs import PairsLayout, draw_positions
 from calib_core.synthetic.timeline import Islands, SensorTimes, draw_islands, draw_times
 
 if TYPE_CHECKING:  # boards need what calibrates a lens, which is slow to import

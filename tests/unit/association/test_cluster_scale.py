@@ -9,7 +9,7 @@ from calib_core.association.cluster_scale import cluster_scale
 from calib_core.association.clustering import CLUSTER_SCALE, clusters_of
 from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs
 from calib_core.synthetic import RADAR_PROFILES, RadarProfile
-from calib_core.synthetic.radar.returns import Targets, measure
+from calib_core.synthetic.radar_returns import Targets, measure
 
 COARSE = replace(
     RADAR_PROFILES["imaging"],

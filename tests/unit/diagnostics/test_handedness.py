@@ -12,7 +12,7 @@ from calib_core.options import CalibrationOptions, SolvingOptions
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration
 from calib_core.synthetic import FIELD, RigOptions, SimulatedPairs, simulate_pairs
-from calib_core.synthetic.pairs.simulated import NoiseName
+from calib_core.synthetic.simulated_pairs import NoiseName
 
 HANDEDNESS = {"mirrored-axes", "handedness-open", "handedness-assumed"}
 ANYWHERE = CalibrationOptions(solving=SolvingOptions(sensors_above_placements=False))

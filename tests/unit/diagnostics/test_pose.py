@@ -13,7 +13,7 @@ from calib_core.estimation.gnc import GncSolution
 from calib_core.measurements import Pair
 from calib_core.results import Calibration, DataWarning
 from calib_core.synthetic import RigOptions, SimulatedPairs, simulate_pairs
-from calib_core.synthetic.pairs.simulated import NoiseName
+from calib_core.synthetic.simulated_pairs import NoiseName
 
 
 def solved(simulated: SimulatedPairs, pairs: tuple[Pair, ...] | None = None) -> Calibration:

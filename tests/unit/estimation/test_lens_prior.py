@@ -13,7 +13,7 @@ from calib_core.estimation.systematic_errors import systematic_errors
 from calib_core.options import CalibrationOptions, LensOptions, RefiningOptions
 from calib_core.results import Calibration
 from calib_core.synthetic import simulate_pairs
-from calib_core.synthetic.pairs.simulated import study_camera
+from calib_core.synthetic.simulated_pairs import study_camera
 
 REFINING = CalibrationOptions(refining=RefiningOptions(intrinsics=True))
 TIED = np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 4.0]])

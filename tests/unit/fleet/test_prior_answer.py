@@ -15,7 +15,7 @@ from calib_core.geometry import RigidTransform
 from calib_core.measurements import Pair, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, DataWarning
-from calib_core.synthetic.pairs.simulated import NoiseName, SimulatedPairs, simulate_pairs
+from calib_core.synthetic.simulated_pairs import NoiseName, SimulatedPairs, simulate_pairs
 from calib_core.verdict import verdict_on
 
 NARROW = np.diag([5e-3] * 3 + [np.deg2rad(0.3)] * 3) ** 2

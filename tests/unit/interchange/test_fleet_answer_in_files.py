@@ -14,7 +14,7 @@ from calib_core.fleet_prior import FleetAnswer, FleetPrior
 from calib_core.interchange import calibration_text, read_calibration
 from calib_core.interchange.own.calibration_json import write_calibration
 from calib_core.results import Calibration
-from calib_core.synthetic.pairs.simulated import simulate_pairs
+from calib_core.synthetic.simulated_pairs import simulate_pairs
 
 SCATTER = np.diag([5e-3] * 3 + [5e-3] * 3) ** 2
 

@@ -8,7 +8,7 @@ import pytest
 
 from calib_core.interchange import read_clicks
 from calib_core.synthetic import Clicking, SimulatedScans, SimulationOptions, simulate, simulate_scans
-from calib_core.synthetic.truth import clicks_text, truth_text
+from calib_core.synthetic.files import clicks_text, truth_text
 
 QUIET = SimulationOptions(
     scene="field",

@@ -14,7 +14,7 @@ from calib_core.calibration import calibrate_pairs
 from calib_core.fleet_prior import FleetAnswer
 from calib_core.interchange import calibration_text
 from calib_core.results import Calibration
-from calib_core.synthetic.pairs.simulated import simulate_pairs
+from calib_core.synthetic.simulated_pairs import simulate_pairs
 from calib_core.verdict import verdict_on
 from cocalib.batch.outcome import OUTCOME_SCHEMA, Outcome, OutcomeFile, OutcomeRun, outcome_text
 from cocalib.batch.results_folder import OUTCOME_FILE, ResultsFolder

@@ -92,7 +92,7 @@ def test_nothing_in_the_recording_tells_of_the_lens(folder: Path) -> None:
 
 
 def test_a_folder_without_ros_has_no_camera_file_either(recording: SimulatedRecording, tmp_path: Path) -> None:
-    from calib_core.synthetic.plain_files import write_plain_files
+    from calib_core.synthetic.files import write_plain_files
 
     write_plain_files(recording, tmp_path / "plain", "csv", [])
     assert not (tmp_path / "plain" / "camera.yaml").exists()

@@ -9,7 +9,7 @@ from calib_core.calibration import calibrate_pairs
 from calib_core.fleet_prior import FleetPrior
 from calib_core.interchange import calibration_text, imported, read_calibration
 from calib_core.results import Calibration
-from calib_core.synthetic.pairs.simulated import simulate_pairs
+from calib_core.synthetic.simulated_pairs import simulate_pairs
 from calib_core.verdict import verdict_on
 from cocalib.batch.job import Job
 from cocalib.batch.manifest import ManifestRow

@@ -10,7 +10,7 @@ from calib_core.arrays import Flags, Points3
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.measurements import Candidate, Pair
 from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, polar_from_cartesian
-from calib_core.synthetic.pairs.simulated import SimulatedPairs
+from calib_core.synthetic.simulated_pairs import SimulatedPairs
 
 
 def clicked_again(

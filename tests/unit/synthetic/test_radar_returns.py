@@ -20,12 +20,11 @@ from calib_core.synthetic import (
     simulate,
     simulate_scans,
 )
+from calib_core.synthetic.files import truth_text
 from calib_core.synthetic.messages import CLOUD_TOPIC, SECOND_COLUMN, SECOND_SUFFIX, camera_messages, radar_messages
-from calib_core.synthetic.radar.defects import radar_from_reported, second_azimuths
-from calib_core.synthetic.radar.returns import Targets, measure
-from calib_core.synthetic.radar_options import SecondAzimuth
+from calib_core.synthetic.options import SecondAzimuth
+from calib_core.synthetic.radar_returns import Targets, measure, radar_from_reported, second_azimuths
 from calib_core.synthetic.rig import RigOptions, radar_stand
-from calib_core.synthetic.truth import truth_text
 
 QUIET = SimulationOptions(
     radar="imaging", placements=6, dwell_s=3.5, radar_rate_hz=5.0, clutter="none", person=False, seed=3

@@ -5,7 +5,7 @@ import pytest
 
 from calib_core.radar import polar_from_cartesian
 from calib_core.synthetic import SimulatedPairs, SystematicErrors, simulate_pairs
-from calib_core.synthetic.pairs.defects import (
+from calib_core.synthetic.pair_defects import (
     clicked_again,
     from_moved_camera,
     in_other_units,
