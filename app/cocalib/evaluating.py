@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from calib_core.arrays import TimesNs
-from calib_core.association.pairing import pair_clicks
+from calib_core.association.pairing import RadarSource, pair_clicks, scans_around
 from calib_core.camera import Camera
 from calib_core.detections import Boxes, ReturnLabels
 from calib_core.errors import InputError
@@ -26,7 +26,6 @@ from calib_core.evaluation.frame_scans import longest_gap_s
 from calib_core.measurements import NS_PER_S, RadarScans, ReflectorClick, TimeNs, Unpaired
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, DataWarning
-from cocalib.solving import half_window_s
 
 _AROUND_S = 3.0
 """Scans before the first and after the last annotated frame, for targets to be followed into the frames."""
@@ -35,7 +34,7 @@ _DOUBTFUL = frozenset({"other-lens", "no-target-in-a-box", "turned-from-boxes", 
 _TURNED_RAD = np.deg2rad(4.0)
 
 
-class RadarRecording(Protocol):
+class RadarRecording(RadarSource, Protocol):
     """The part of a Recording that an evaluation needs: its radar, and none of its pictures."""
 
     @property
@@ -44,9 +43,6 @@ class RadarRecording(Protocol):
 
     def radar_windows(self) -> Iterator[RadarScans]:
         """Yield all scans in order of time, a bounded number of returns at a time."""
-
-    def radar_scans_around(self, times: Sequence[TimeNs], half_window_s: float, /) -> RadarScans:
-        """Return the scans within the half window of any of the times, each once, in order of time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,8 +197,7 @@ def _pairs(
     counting = [click for click in clicks if click.counts]
     if not counting:
         return None, ()
-    scans = recording.radar_scans_around(sorted({click.image_time for click in counting}), half_window_s(options))
-    pairing = pair_clicks(counting, scans, options)
+    pairing = pair_clicks(counting, scans_around(recording, counting, options), options)
     if not pairing.pairs:
         return None, pairing.unpaired
     return associated_pairs(pairing.pairs, camera, options), pairing.unpaired

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from calib_core.association.pairing import pair_clicks
+from calib_core.association.pairing import RadarSource, pair_clicks, scans_around
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange import CheckReport, CheckResult, ImportedCalibration, adopted_calibration
@@ -13,7 +13,6 @@ from calib_core.interchange.check.pixel_differences import LOST_TEXT, far_outsid
 from calib_core.measurements import MIN_PAIRS, ReflectorClick
 from calib_core.residual_test import ResidualTest, residual_test
 from calib_core.results import Calibration, InputFile
-from cocalib.solving import RadarSource, half_window_s
 
 _LEAST_P = 0.01
 _MOST_MISFITS = 0.2
@@ -101,8 +100,7 @@ def with_recording(
     if report.imported.file is None and not report.ok:
         return report
     calibration = calibration_of(report.imported, source, camera)
-    times = sorted({click.image_time for click in clicks})
-    scans = recording.radar_scans_around(times, half_window_s(calibration.options))
+    scans = scans_around(recording, clicks, calibration.options)
     pairs = pair_clicks([click for click in clicks if click.counts], scans, calibration.options).pairs
     if len(pairs) < MIN_PAIRS:
         raise InputError(

@@ -7,6 +7,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 
+from calib_core.association.pairing import RadarSource
 from calib_core.camera import Camera
 from calib_core.errors import CalibrationError
 from calib_core.fleet_prior import FleetPrior
@@ -15,7 +16,7 @@ from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, PairResult
 from cocalib.platform.error_boundary import report_of
 from cocalib.session import Solved
-from cocalib.solving import RadarSource, check_clicks, solve_in_steps
+from cocalib.solving import check_clicks, solve_in_steps
 
 _log = logging.getLogger(__name__)
 

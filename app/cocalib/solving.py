@@ -6,11 +6,10 @@ import logging
 from collections.abc import Iterator, Sequence
 from operator import attrgetter
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
-from calib_core.association.pairing import pair_clicks
+from calib_core.association.pairing import RadarSource, pair_clicks, scans_around
 from calib_core.calibration import calibrate_pairs, calibration_steps, require_default, solve_again
 from calib_core.camera import Camera
 from calib_core.errors import InputError, OptionError
@@ -28,7 +27,7 @@ from calib_core.interchange import (
     read_pairs,
 )
 from calib_core.interchange import calibration_text as interchange_text
-from calib_core.measurements import Candidate, Pair, RadarScans, ReflectorClick, TimeNs, Unsolvable
+from calib_core.measurements import Candidate, Pair, RadarScans, ReflectorClick, Unsolvable
 from calib_core.option_checks import checked_options
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording, about_assumptions
@@ -43,13 +42,6 @@ _KEPT_WARNINGS = ("assumed", "nobody-confirmed")
 """What solving the same pairs again cannot change."""
 
 _log = logging.getLogger(__name__)
-
-
-class RadarSource(Protocol):
-    """The part of a Recording that a solve needs."""
-
-    def radar_scans_around(self, times: Sequence[TimeNs], half_window_s: float, /) -> RadarScans:
-        """Return the scans within the half window of any of the times, each once, in order of time."""
 
 
 def solve_clicks(
@@ -111,8 +103,7 @@ def solve_in_steps(
             "page, or start again with --camera FILE",
         )
         return
-    times = sorted({click.image_time for click in clicks})
-    scans = recording.radar_scans_around(times, half_window_s(options))
+    scans = scans_around(recording, clicks, options)
     yield from calibration_steps(
         clicks, scans, camera, options, previous=previous, preview=preview, fleet_prior=fleet_prior
     )
@@ -128,8 +119,7 @@ def check_clicks(
     Raises:
         CalibrationError: the recording cannot be read at the clicks.
     """
-    times = sorted({click.image_time for click in clicks})
-    scans = recording.radar_scans_around(times, half_window_s(options))
+    scans = scans_around(recording, clicks, options)
     return tuple(_under(pair, reference) for pair in pair_clicks(clicks, scans, options).pairs)
 
 
@@ -151,21 +141,12 @@ def window_candidates(
     Raises:
         CalibrationError: the recording cannot be read at the click.
     """
-    scans = recording.radar_scans_around([click.image_time], half_window_s(options))
+    scans = scans_around(recording, [click], options)
     all_of_them = dataclasses.replace(
         options, locating=dataclasses.replace(options.locating, max_candidates=_MOST_CANDIDATES)
     )
     alone = dataclasses.replace(click, chosen=None, mark="clicked")
     return tuple(one for pair in pair_clicks([alone], scans, all_of_them).pairs for one in pair.candidates)
-
-
-def half_window_s(options: CalibrationOptions) -> float:
-    """Return how far from a click radar scans can matter [s].
-
-    A window is centred on a scan up to `max_time_gap_s` away; the paper's may begin at a whole second instead.
-    """
-    longest_s = max(options.locating.window_s, options.paper.window_s)
-    return longest_s / 2 + options.locating.max_time_gap_s + 1.0
 
 
 _OPTIONS_OF_PAIRING = (

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -16,6 +17,13 @@ from calib_core.measurements import NS_PER_S, Candidate, Pair, RadarScans, Refle
 from calib_core.options import CalibrationOptions
 
 
+class RadarSource(Protocol):
+    """Where radar scans come from: the part of a recording that pairing needs."""
+
+    def radar_scans_around(self, times: Sequence[TimeNs], half_window_s: float, /) -> RadarScans:
+        """Return the scans within the half window of any of the times, each once, in order of time."""
+
+
 @dataclass(frozen=True, slots=True)
 class Pairing:
     """The clicks with and without a radar position, in order of image time.
@@ -27,6 +35,24 @@ class Pairing:
 
     pairs: tuple[Pair, ...]
     unpaired: tuple[Unpaired, ...]
+
+
+def scans_around(source: RadarSource, clicks: Sequence[ReflectorClick], options: CalibrationOptions) -> RadarScans:
+    """Read the scans that can matter to some clicks.
+
+    Raises:
+        CalibrationError: the recording cannot be read at the clicks.
+    """
+    return source.radar_scans_around(sorted({click.image_time for click in clicks}), half_window_s(options))
+
+
+def half_window_s(options: CalibrationOptions) -> float:
+    """Return how far from a click radar scans can matter [s].
+
+    A window is centred on a scan up to `max_time_gap_s` away; the paper's may begin at a whole second instead.
+    """
+    longest_s = max(options.locating.window_s, options.paper.window_s)
+    return longest_s / 2 + options.locating.max_time_gap_s + 1.0
 
 
 def pair_clicks(

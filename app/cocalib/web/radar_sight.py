@@ -7,12 +7,12 @@ import numpy as np
 
 from calib_core.arrays import Flags, Indices
 from calib_core.association.gating import static_returns
+from calib_core.association.pairing import RadarSource
 from calib_core.association.placements import Placement
 from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs
 from calib_core.options import CalibrationOptions, GatingOptions
 from calib_core.results import Calibration
 from cocalib.session import Session
-from cocalib.solving import RadarSource
 from cocalib.view import Reference, shown_calibration
 from cocalib.web.messages import Overlay, OverlayGuess, OverlayReturn, RadarLook, RadarReturn
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from calib_core.association.pairing import half_window_s
 from calib_core.camera import Camera
 from calib_core.errors import InputError, OptionError
 from calib_core.interchange import CameraFile, camera_info_text, read_calibration
@@ -23,7 +24,6 @@ from cocalib.solving import (
     calibration_text,
     calibration_text_of_pairs,
     camera_for,
-    half_window_s,
     solve_clicks,
     solve_in_steps,
     solve_pairs,

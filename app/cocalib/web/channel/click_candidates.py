@@ -1,10 +1,11 @@
 """The radar returns that may belong to the selected click, for the page: rings, rows, and points in the 3D view."""
 
+from calib_core.association.pairing import RadarSource
 from calib_core.errors import CalibrationError
 from calib_core.measurements import Candidate, ReflectorClick
 from calib_core.results import Calibration
 from cocalib.session import Session
-from cocalib.solving import RadarSource, window_candidates
+from cocalib.solving import window_candidates
 from cocalib.view import PairCandidates, click_candidates, pair_of_click
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TypeAlias
 
+from calib_core.association.pairing import RadarSource
 from calib_core.camera import Camera
 from calib_core.errors import CalibrationError, InputError
 from calib_core.interchange import adopted_calibration
@@ -16,7 +17,7 @@ from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
 from cocalib.session import Session
-from cocalib.solving import RadarSource, solve_clicks
+from cocalib.solving import solve_clicks
 from cocalib.view.contours import contour_maps
 from cocalib.view.review import review_of
 from cocalib.view.review_pair import PairReview, pair_review
