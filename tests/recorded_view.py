@@ -14,7 +14,7 @@ from calib_core.recordings import Recording, open_recording
 from calib_core.recordings.containers.writing import write_ros2
 from calib_core.results import Calibration
 from cocalib.recorded_view import RecordedView, recorded_view
-from cocalib.solving import solve_clicks
+from cocalib.solving.solving import solve_clicks
 from tests.cli.conftest import Made
 
 __all__ = ["boxes_around", "nearest_rows", "opened_view"]

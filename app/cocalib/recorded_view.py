@@ -13,7 +13,7 @@ from calib_core.recordings import Recording
 from calib_core.results import Calibration, PairResult
 from cocalib.evaluating import evaluate_recording
 from cocalib.seen_returns import ReturnColours, ReturnQuantity, return_colours
-from cocalib.solving import check_clicks
+from cocalib.solving.solving import check_clicks
 
 
 @dataclass(frozen=True, slots=True, eq=False)

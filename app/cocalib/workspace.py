@@ -21,7 +21,6 @@ from calib_core.results import Calibration, DataWarning
 from cocalib.box_tracks.carried import CarriedTrack, Followed, carried_boxes, carried_tracks
 from cocalib.box_tracks.loading import boxes_loaded, read_sent_boxes
 from cocalib.box_tracks.stretches import Start
-from cocalib.fleet_prior_file import FleetPriorFile
 from cocalib.hypothesis_sheet import OpenMeaning
 from cocalib.session import (
     AssumedReading,
@@ -40,7 +39,8 @@ from cocalib.session import (
     settled,
 )
 from cocalib.session.file import Closed, Restored, open_session_file
-from cocalib.solver_worker import SolverWorker
+from cocalib.solving.fleet_prior_file import FleetPriorFile
+from cocalib.solving.worker import SolverWorker
 from cocalib.view import AccPanel, Reference, View, shown_calibration, view
 
 Subscriber: TypeAlias = Callable[[View], None]
@@ -73,7 +73,7 @@ class _Unstored:
 
 
 class Solver(Protocol):
-    """Solves revisions: cocalib.solver_worker.SolverWorker, or a fake in a test."""
+    """Solves revisions: cocalib.solving.worker.SolverWorker, or a fake in a test."""
 
     def request(
         self,

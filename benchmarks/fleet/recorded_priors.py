@@ -27,9 +27,8 @@ from cocalib.batch.manifest_files.reading import read_manifest
 from cocalib.fleet.index import read_fleet
 from cocalib.fleet.kinds import prior_of_type
 from cocalib.fleet.records import FleetRecord
-from cocalib.recorded_clicks import clicks_in_recording, file_of_clicks
-from cocalib.required_camera import required_camera
-from cocalib.solving import solve_clicks
+from cocalib.solving.recorded_clicks import clicks_in_recording, file_of_clicks
+from cocalib.solving.solving import required_camera, solve_clicks
 
 __all__ = ["Given", "held_by", "main"]
 

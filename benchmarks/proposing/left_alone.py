@@ -18,7 +18,7 @@ from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.proposing import DwellView, Proposals, dwell_views, proposals_of
 from calib_core.proposing.automatic import automatic_clicks
-from cocalib.automatic_solving import refusal_of
+from cocalib.solving.automatic import refusal_of
 
 __all__ = ["automatic_figures", "measure_mismatched"]
 

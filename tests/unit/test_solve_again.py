@@ -15,7 +15,7 @@ from calib_core.measurements import RadarScans, Unsolvable
 from calib_core.options import CalibrationOptions, CameraPositionPrior, NoiseOptions, SolvingOptions
 from calib_core.results import Calibration
 from calib_core.synthetic import simulate_pairs
-from cocalib.solving import calibration_text_of_pairs, solve_pairs
+from cocalib.solving.solving import calibration_text_of_pairs, solve_pairs
 from tests.rooftop import read_rooftop
 
 OPTIONS = {

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from calib_core.errors import InputError
 from cocalib.batch.manifest import Manifest, ManifestRow
-from cocalib.fleet_prior_file import FleetPriorFile
+from cocalib.solving.fleet_prior_file import FleetPriorFile
 
 _MOST_NAMED = 5
 

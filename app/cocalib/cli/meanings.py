@@ -118,7 +118,7 @@ class MeaningFlags:
         """
         from calib_core.recordings import open_recording
         from cocalib.hypothesis_sheet import contact_sheet, frame_with_returns, png
-        from cocalib.required_camera import required_camera
+        from cocalib.solving.solving import required_camera
 
         if not self.recording:
             raise InputError("--sheet draws over a frame of a recording; give it with --recording RECORDING")

@@ -52,8 +52,8 @@ class Open:
         """Serve until Ctrl+C, SIGTERM or SIGHUP; return the exit code."""
         from calib_core.interchange import CameraFile
         from calib_core.recordings import require_files
-        from cocalib.fleet_prior_file import FleetPriorFile
         from cocalib.opening import Choice, GivenClicks
+        from cocalib.solving.fleet_prior_file import FleetPriorFile
 
         if not self.recording:
             return _serve(None, self.serving, self.root)

@@ -7,7 +7,7 @@ from calib_core.camera import Camera
 from calib_core.measurements import ReflectorClick
 from calib_core.recordings import Recording
 from cocalib.cli.output import tell_notes
-from cocalib.recorded_clicks import clicks_in_recording
+from cocalib.solving.recorded_clicks import clicks_in_recording
 
 
 def recorded_clicks(

@@ -59,7 +59,7 @@ def shown_recording(paths: Sequence[Path], topics: TopicFlags, files: ShownFlags
     from cocalib.boxes import find_boxes
     from cocalib.recorded_view import recorded_view
     from cocalib.recording_check import calibration_of
-    from cocalib.solving import camera_for
+    from cocalib.solving.solving import camera_for
 
     if not paths:
         raise InputError("RECORDING is missing; name one or more files or folders")

@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from calib_core.interchange import VehicleNote
     from calib_core.interchange.own.clicks_json import ClicksFile
     from calib_core.recordings import Recording
-    from cocalib.automatic_solving import PlacedClicks
-    from cocalib.fleet_prior_file import FleetPriorFile
+    from cocalib.solving.automatic import PlacedClicks
+    from cocalib.solving.fleet_prior_file import FleetPriorFile
 
 _REFLECTOR_M = 0.24
 
@@ -124,10 +124,9 @@ class Solve:
     def _solve_recording(self, vehicle: "VehicleNote") -> int:
         from calib_core.interchange import CameraFile
         from calib_core.recordings import open_recording
-        from cocalib.automatic_solving import solve_placed_clicks
-        from cocalib.recorded_clicks import require_confirmed
-        from cocalib.required_camera import required_camera
-        from cocalib.solving import calibration_text
+        from cocalib.solving.automatic import solve_placed_clicks
+        from cocalib.solving.recorded_clicks import require_confirmed
+        from cocalib.solving.solving import calibration_text, required_camera
 
         self._require_folders()
         camera_file = None if self.camera is None else CameraFile.read(self.camera, rescale=self.rescale_camera)
@@ -167,7 +166,7 @@ class Solve:
 
     def _clicks_file(self) -> "ClicksFile":
         from calib_core.interchange.own.clicks_json import ClicksFile
-        from cocalib.recorded_clicks import file_of_clicks
+        from cocalib.solving.recorded_clicks import file_of_clicks
 
         return ClicksFile(()) if self.clicks is None else file_of_clicks(self.clicks)
 
@@ -180,7 +179,7 @@ class Solve:
         if self.fleet_prior is None:
             return None
         from calib_core.calibration import require_default
-        from cocalib.fleet_prior_file import FleetPriorFile
+        from cocalib.solving.fleet_prior_file import FleetPriorFile
 
         fleet = FleetPriorFile.read(self.fleet_prior)
         require_default(self.options, fleet.prior)
@@ -198,9 +197,9 @@ class Solve:
         self, file: "ClicksFile", recording: "Recording", camera: Camera, options: CalibrationOptions
     ) -> "PlacedClicks | Unsolvable":
         """Return the clicks to solve with: those of the file, and with --auto the ones that are placed automatically."""
-        from cocalib.automatic_solving import PlacedClicks, place_clicks
         from cocalib.cli.proposing.flags import checked_reflector_m, shown_progress
         from cocalib.cli.recorded_clicks import recorded_clicks
+        from cocalib.solving.automatic import PlacedClicks, place_clicks
 
         clicks = file.clicks
         if self.clicks is not None:
@@ -231,7 +230,7 @@ class Solve:
         print(f"clicks written to {self.clicks_out}", file=sys.stderr)
 
     def _solve_pairs(self, path: Path, vehicle: "VehicleNote") -> int:
-        from cocalib.solving import calibration_text_of_pairs, solve_pairs
+        from cocalib.solving.solving import calibration_text_of_pairs, solve_pairs
 
         text = read_text(path) if self.pairs_text is None else self.pairs_text
         fleet = self._fleet_prior_file()
@@ -242,7 +241,7 @@ class Solve:
         return self._deliver(outcome, calibration_text_of_pairs(outcome, text, name_text(path.name), given, vehicle))
 
     def _deliver(self, calibration: Calibration, text: str) -> int:
-        from cocalib.automatic_solving import is_doubtful
+        from cocalib.solving.automatic import is_doubtful
 
         code = 3 if is_doubtful(calibration) else 0
         if self.out is None:

@@ -58,7 +58,7 @@ class Video:
             progress_bar("writing frames") as progress,
         ):
             written = write_video(recording, self.out, progress=progress)
-        from cocalib.recorded_clicks import seconds_text
+        from cocalib.solving.recorded_clicks import seconds_text
 
         print(f"{self.out}: {written.frames} frames, {written.duration_s:.3f} s, from {seconds_text(written.start)}")
         for warning in recording.warnings:

@@ -11,7 +11,7 @@ from calib_core.input_files import name_text
 from calib_core.interchange import CameraFile
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import RecordingOptions
-from cocalib.fleet_prior_file import FleetPriorFile
+from cocalib.solving.fleet_prior_file import FleetPriorFile
 from cocalib.web.messages import OpenWith, SessionPlan
 
 ChoicePart: TypeAlias = Literal["camera", "calibration", "clicks", "session"]

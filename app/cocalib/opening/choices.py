@@ -10,7 +10,7 @@ from calib_core.recordings import Recording, TopicSummary
 from cocalib.opening.choice import Choice
 from cocalib.opening.opened import Opened
 from cocalib.opening.sessions import session_offer
-from cocalib.solving import intrinsics_near
+from cocalib.solving.solving import intrinsics_near
 from cocalib.web.messages import OpeningChoices, TopicRow
 
 

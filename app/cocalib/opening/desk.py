@@ -11,7 +11,7 @@ from cocalib.opening.choice import Choice
 from cocalib.opening.opened import Opened
 from cocalib.opening.recent import RecentRecordings
 from cocalib.opening.root_folder import RootFolder
-from cocalib.solving import camera_for, intrinsics_near
+from cocalib.solving.solving import camera_for, intrinsics_near
 from cocalib.web.messages import (
     ChoicesWanted,
     DroppedFile,

@@ -22,7 +22,7 @@ from cocalib.opening.sessions import fitting_clicks, session_folder
 from cocalib.session import AssumptionsConfirmed, ClicksImported, ColumnsMapped, IntrinsicsChosen, OptionsChanged
 from cocalib.session.click_stamps import ClicksAtFrames, clicks_at_frames
 from cocalib.session.file import recording_session_folder, remembered_map
-from cocalib.solving import camera_for
+from cocalib.solving.solving import camera_for
 from cocalib.view import Reference, sentence
 from cocalib.workspace import Workspace, open_workspace, recording_facts
 

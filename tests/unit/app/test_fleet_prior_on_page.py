@@ -15,10 +15,10 @@ from calib_core.measurements import ReflectorClick, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording
 from calib_core.results import Calibration
-from cocalib.fleet_prior_file import FleetPriorFile
 from cocalib.session import History, RecordingFacts, Session, Solved
-from cocalib.solver_worker import SolverWorker
-from cocalib.solving import calibration_text, solve_clicks
+from cocalib.solving.fleet_prior_file import FleetPriorFile
+from cocalib.solving.solving import calibration_text, solve_clicks
+from cocalib.solving.worker import SolverWorker
 from cocalib.view import view
 from cocalib.web.port.routes import Routes
 

@@ -15,7 +15,7 @@ from calib_core.recordings import Recording
 from calib_core.results import Calibration
 from cocalib.evaluating import evaluate_recording
 from cocalib.session import History, RecordingFacts, Session
-from cocalib.solving import solve_clicks
+from cocalib.solving.solving import solve_clicks
 from cocalib.view import Reference, view
 from cocalib.view.acc import acc_panel
 from cocalib.view.number_format import plain, with_sigma

@@ -10,7 +10,7 @@ from pathlib import Path
 from calib_core.errors import InputError
 from calib_core.interchange import names_schema
 from calib_core.interchange.own.documents import CLICKS_SCHEMA
-from cocalib.solving import intrinsics_near
+from cocalib.solving.solving import intrinsics_near
 
 _SUFFIXES = (".bag", ".mcap", ".db3")
 _PLAIN_SUFFIXES = (".avi", ".csv", ".jpeg", ".jpg", ".jsonl", ".mp4", ".pcd", ".png")

@@ -11,12 +11,11 @@ from calib_core.interchange.own.clicks_json import ClicksFile, read_clicks_file,
 from calib_core.measurements import ReflectorClick, Unsolvable
 from calib_core.recordings import Recording
 from calib_core.results import Calibration
-from cocalib.automatic_solving import PlacedClicks, is_doubtful, place_clicks, solve_placed_clicks
 from cocalib.batch.manifest import ManifestRow
-from cocalib.fleet_prior_file import FleetPriorFile
-from cocalib.recorded_clicks import clicks_in_recording, file_of_clicks, require_confirmed
-from cocalib.required_camera import required_camera
-from cocalib.solving import calibration_text
+from cocalib.solving.automatic import PlacedClicks, is_doubtful, place_clicks, solve_placed_clicks
+from cocalib.solving.fleet_prior_file import FleetPriorFile
+from cocalib.solving.recorded_clicks import clicks_in_recording, file_of_clicks, require_confirmed
+from cocalib.solving.solving import calibration_text, required_camera
 
 CALIBRATION_FILE = "calibration.json"
 CLICKS_FILE = "clicks.json"

@@ -55,8 +55,8 @@ class Propose:
         from cocalib.cli.proposing.flags import checked_reflector_m, shown_progress
         from cocalib.cli.recorded_clicks import recorded_clicks
         from cocalib.proposing import find_proposals
-        from cocalib.recorded_clicks import file_of_clicks, require_confirmed
-        from cocalib.required_camera import required_camera
+        from cocalib.solving.recorded_clicks import file_of_clicks, require_confirmed
+        from cocalib.solving.solving import required_camera
 
         options = checked_options(self.measured.over(self.options))
         reflector_m = checked_reflector_m(self.reflector_m)

@@ -5,7 +5,7 @@ from calib_core.errors import CalibrationError
 from calib_core.measurements import Candidate, ReflectorClick
 from calib_core.results import Calibration
 from cocalib.session import Session
-from cocalib.solving import window_candidates
+from cocalib.solving.solving import window_candidates
 from cocalib.view import PairCandidates, click_candidates, pair_of_click
 
 

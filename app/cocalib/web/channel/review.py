@@ -17,7 +17,7 @@ from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
 from cocalib.session import Session
-from cocalib.solving import solve_clicks
+from cocalib.solving.solving import solve_clicks
 from cocalib.view.contours import contour_maps
 from cocalib.view.review import review_of
 from cocalib.view.review_pair import PairReview, pair_review

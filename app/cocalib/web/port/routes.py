@@ -21,7 +21,7 @@ from calib_core.recordings import Recording
 from calib_core.results import Calibration
 from cocalib.report import current_report
 from cocalib.session import Session
-from cocalib.solving import calibration_text
+from cocalib.solving.solving import calibration_text
 from cocalib.view import sentence
 from cocalib.web.channel.export_preview import NoPreview, export_preview, exported
 from cocalib.web.channel.lens import LensDesk

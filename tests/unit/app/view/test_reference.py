@@ -29,7 +29,7 @@ from calib_core.measurements import (
 from calib_core.radar import RadarErrors
 from cocalib.opening.reference import camera_in, reference_from
 from cocalib.session import History, RecordingFacts, Session
-from cocalib.solving import check_clicks
+from cocalib.solving.solving import check_clicks
 from cocalib.view import Reference, shown_calibration, view
 from cocalib.web.radar_sight import overlay_of
 

@@ -12,14 +12,14 @@ from calib_core.interchange import read_calibration
 from calib_core.interchange.own.fleet_prior_json import write_fleet_prior
 from calib_core.options import CalibrationOptions, CameraPositionPrior, RefiningOptions, SolvingOptions
 from calib_core.results import UnconfirmedClicks
-from cocalib import automatic_solving
-from cocalib.automatic_solving import PlacedClicks
 from cocalib.batch.job import jobs_of
 from cocalib.batch.manifest import ManifestRow
 from cocalib.batch.outcome import Outcome
 from cocalib.batch.results_folder import OUTCOME_FILE, ResultsFolder
 from cocalib.batch.running import run_job, solving
 from cocalib.cli import run
+from cocalib.solving import automatic as automatic_solving
+from cocalib.solving.automatic import PlacedClicks
 
 SAMPLE = Path(__file__).resolve().parents[5] / "sample_data" / "rooftop"
 BAGS = (SAMPLE / "radar.bag", SAMPLE / "camera.bag")

@@ -17,7 +17,7 @@ from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
 from calib_core.synthetic import simulate_pairs
 from cocalib.session import Solved
-from cocalib.solver_worker import SolverWorker
+from cocalib.solving.worker import SolverWorker
 
 CAMERA = Camera("pinhole", 640, 480, np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]]))
 CLICK = ReflectorClick(TimeNs(10**18), "c1", 1.0, 2.0)
@@ -145,7 +145,7 @@ def test_the_preview_is_delivered_before_the_answer_and_the_next_one_starts_from
         yield replace(answer, checking=True)
         yield answer
 
-    monkeypatch.setattr("cocalib.solver_worker.solve_in_steps", steps)
+    monkeypatch.setattr("cocalib.solving.worker.solve_in_steps", steps)
     answers = Answers()
     worker = SolverWorker(Radar(), CAMERA)
     for revision in (1, 2):

@@ -20,7 +20,7 @@ from calib_core.recordings import Recording, RecordingOptions, open_recording
 from calib_core.results import Calibration, DataWarning
 from cocalib.platform.resources import version
 from cocalib.session import ClicksImported, OptionsChanged
-from cocalib.solving import (
+from cocalib.solving.solving import (
     calibration_text,
     calibration_text_of_pairs,
     camera_for,

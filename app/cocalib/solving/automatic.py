@@ -19,7 +19,7 @@ from calib_core.proposing.automatic import automatic_clicks
 from calib_core.results import Calibration, UnconfirmedClicks
 from calib_core.verdict import verdict_on
 from cocalib.proposing import REFLECTOR_M, RecordedFrames, find_proposals
-from cocalib.solving import solve_clicks
+from cocalib.solving.solving import solve_clicks
 
 _FARTHEST_M = 0.3
 """Without a measured position, a camera that is certainly farther from the radar than this is not believed: whatever is carried

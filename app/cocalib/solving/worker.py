@@ -16,7 +16,7 @@ from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, PairResult
 from cocalib.platform.error_boundary import report_of
 from cocalib.session import Solved
-from cocalib.solving import check_clicks, solve_in_steps
+from cocalib.solving.solving import check_clicks, solve_in_steps
 
 _log = logging.getLogger(__name__)
 

@@ -34,6 +34,7 @@ from calib_core.recordings import Recording, about_assumptions
 from calib_core.results import Calibration, InputFile, PairResult, UnconfirmedClicks
 from cocalib.platform.resources import version
 from cocalib.session import Outcome
+from cocalib.solving.board_search import find_board
 
 _MOST_CANDIDATES = 50
 """As many as the option allows."""
@@ -324,3 +325,26 @@ def calibration_text_of_pairs(
         calibration = dataclasses.replace(calibration, warnings=(*calibration.warnings, *kept))
         return interchange_text(calibration, file.frames, provenance, vehicle=vehicle.over(file.vehicle))
     return interchange_text(calibration, provenance=Provenance(inputs=inputs, version=version()), vehicle=vehicle)
+
+
+def required_camera(recording: Recording, camera_file: CameraFile | None) -> Camera:
+    """Return the intrinsics: from the file if one is given, else from the recording.
+
+    Raises:
+        InputError: there are none.
+    """
+    camera = camera_for(recording, camera_file)
+    if camera is None:
+        found = (
+            f"{recording.camera_info_topic} has none that can be used"
+            if recording.camera_info_topic
+            else "it has no CameraInfo topic"
+        )
+        near = intrinsics_near(recording.paths)
+        raise InputError(
+            f"{recording.paths[0].name}: no intrinsics for {recording.image_topic}: {found}; "
+            "give them with --camera FILE (ROS camera_info YAML, OpenCV YAML or XML, Kalibr camchain, JSON)"
+            + (f", such as --camera {near}" if near else "")
+            + "; or calibrate the lens from pictures of a board: cocalib intrinsics --help"
+        )
+    return camera

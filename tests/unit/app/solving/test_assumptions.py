@@ -13,7 +13,7 @@ from calib_core.recordings import Recording, RecordingOptions, open_recording
 from calib_core.results import Calibration
 from cocalib.session import AssumptionsConfirmed, ColumnsMapped, RecordingFacts, Session
 from cocalib.session.file import remembered_map
-from cocalib.solving import calibration_text, calibration_text_of_pairs, solve_pairs
+from cocalib.solving.solving import calibration_text, calibration_text_of_pairs, solve_pairs
 from cocalib.workspace import Workspace, open_workspace
 from tests.vendor_recording import STATED, vendor_sample
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-import cocalib.automatic_solving as automatic_solving
+import cocalib.solving.automatic as automatic_solving
 from calib_core.association.placements import Placement
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
@@ -17,7 +17,7 @@ from calib_core.proposing import PictureCandidate, Proposal, Proposals
 from calib_core.proposing.automatic import AutomaticClicks
 from calib_core.results import Calibration, UnconfirmedClicks
 from calib_core.synthetic import simulate_pairs
-from cocalib.automatic_solving import PlacedClicks, place_clicks, solve_placed_clicks
+from cocalib.solving.automatic import PlacedClicks, place_clicks, solve_placed_clicks
 
 CAMERA = Camera("pinhole", 64, 48, np.array([[60.0, 0, 32], [0, 60, 24], [0, 0, 1]]), np.zeros(0))
 OPTIONS = CalibrationOptions()
