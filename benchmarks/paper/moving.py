@@ -12,7 +12,7 @@ from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 from calib_core.results import Calibration
 from calib_core.synthetic import PRESETS, PresetName, simulate
 from calib_core.synthetic.annotations import true_boxes, true_labels
-from cocalib.evaluating import evaluate_recording
+from cocalib.evaluation.evaluating import evaluate_recording
 
 __all__ = ["MOVING", "Judged", "acc_of"]
 

@@ -25,7 +25,7 @@ def test_an_interrupt_leaves_no_file_and_no_traceback(
     recording, pose = made(), tmp_path / "calibration.json"
     assert cocalib("solve", recording, "--clicks", clicks_file, "--out", pose).code == 0
     before = sorted(tmp_path.rglob("*"))
-    monkeypatch.setattr("cocalib.evaluating.pair_clicks", interrupted)
+    monkeypatch.setattr("cocalib.evaluation.evaluating.pair_clicks", interrupted)
     clicks = ("--clicks", clicks_file)
     arguments: dict[str, tuple[object, ...]] = {
         "evaluate": (pose, recording),

@@ -135,7 +135,7 @@ class Check:
         from dataclasses import replace
 
         from calib_core.recordings import open_recording
-        from cocalib.recording_check import other_camera, stale_inputs, with_recording
+        from cocalib.evaluation.recording_check import other_camera, stale_inputs, with_recording
 
         with open_recording(self.recording, self.topics) as recording:
             clicks = self._clicks(report, recording)
@@ -151,7 +151,7 @@ class Check:
             InputError: there are none.
         """
         from calib_core.interchange import read_clicks
-        from cocalib.recording_check import clicks_in
+        from cocalib.evaluation.recording_check import clicks_in
         from cocalib.session.file import inspect_session, recording_session_folder
 
         if self.clicks is not None:

@@ -56,9 +56,9 @@ def shown_recording(paths: Sequence[Path], topics: TopicFlags, files: ShownFlags
     """
     from calib_core.interchange import CameraFile, read_any_file, read_clicks
     from calib_core.recordings import open_recording
-    from cocalib.boxes import find_boxes
+    from cocalib.evaluation.boxes import find_boxes
+    from cocalib.evaluation.recording_check import calibration_of
     from cocalib.recorded_view import recorded_view
-    from cocalib.recording_check import calibration_of
     from cocalib.solving.solving import camera_for
 
     if not paths:

@@ -8,7 +8,7 @@ import numpy as np
 from calib_core.measurements import NS_PER_S, TimeNs
 from cocalib.colours import RETURN_RAMPS
 from cocalib.overlay_video.marks import label, label_width_px
-from cocalib.seen_returns import ReturnColours
+from cocalib.recorded_view import ReturnColours
 
 _BACKGROUND = (20, 16, 13)
 _TITLE_FROM = 0.5

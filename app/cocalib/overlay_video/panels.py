@@ -8,8 +8,7 @@ from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 from calib_core.results import Calibration, PairResult
 from cocalib.overlay_video.footer import footer_height_px, footers, time_text, write_changing
 from cocalib.overlay_video.marks import draw_boxes, draw_clicks, draw_returns, draw_trail
-from cocalib.recorded_view import RecordedView
-from cocalib.seen_returns import FrameBlock, SeenReturns, seen_in
+from cocalib.recorded_view import FrameBlock, RecordedView, SeenReturns, seen_in
 
 _HELD_S = 0.5
 """A click stays for so long after its frame, or nobody could see it."""

@@ -12,8 +12,7 @@ from calib_core.recordings import LeftOut, video_format
 from cocalib.overlay_video.encoding import encoding
 from cocalib.overlay_video.panels import Panels
 from cocalib.platform.files import whole_path
-from cocalib.recorded_view import RecordedView
-from cocalib.seen_returns import frame_blocks
+from cocalib.recorded_view import RecordedView, frame_blocks
 
 _LONGEST_SCAN_S = 0.25
 

@@ -6,8 +6,8 @@ from calib_core.camera import Camera
 from calib_core.input_files import name_text
 from calib_core.interchange import ImportedCalibration, compare
 from calib_core.results import Calibration, InputFile
+from cocalib.evaluation.recording_check import calibration_of
 from cocalib.platform.resources import version
-from cocalib.recording_check import calibration_of
 from cocalib.report.subject import Against, ReportSubject
 
 

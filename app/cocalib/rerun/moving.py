@@ -12,7 +12,7 @@ from calib_core.errors import InputError, MessageError
 from calib_core.measurements import TimeNs
 from calib_core.results import PairResult
 from cocalib.colours import residual_colours
-from cocalib.recorded_view import RecordedView, box_words
+from cocalib.recorded_view import FrameBlock, RecordedView, SeenReturns, box_words, frame_blocks, seen_in
 from cocalib.rerun.entities import (
     ACC,
     AED,
@@ -27,7 +27,6 @@ from cocalib.rerun.entities import (
     TIMELINE,
 )
 from cocalib.rerun.unmoving import HALF_PIXEL_PX, LARGE_PX, ellipse_strips
-from cocalib.seen_returns import FrameBlock, SeenReturns, frame_blocks, seen_in
 
 _AGAINST = (230, 120, 230)
 _CHUNK_BYTES = 4 << 20

@@ -13,7 +13,7 @@ from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording
 from calib_core.results import Calibration
-from cocalib.evaluating import evaluate_recording
+from cocalib.evaluation.evaluating import evaluate_recording
 from cocalib.session import History, RecordingFacts, Session
 from cocalib.solving.solving import solve_clicks
 from cocalib.view import Reference, view

@@ -7,9 +7,9 @@ from calib_core.evaluation import Evaluation, evaluation_json
 from calib_core.recordings import Recording
 from cocalib.batch.manifest import ManifestRow
 from cocalib.batch.running.solving import CALIBRATION_FILE, SolvedSession
-from cocalib.boxes import find_boxes
-from cocalib.evaluating import EvidenceOptions, evaluate_recording, evaluation_exit_code
-from cocalib.judged_calibration import judged_calibration
+from cocalib.evaluation.boxes import find_boxes
+from cocalib.evaluation.evaluating import EvidenceOptions, evaluate_recording, evaluation_exit_code
+from cocalib.evaluation.recording_check import judged_calibration
 
 EVALUATION_FILE = "evaluation.json"
 

@@ -8,8 +8,7 @@ from calib_core.recordings import Recording
 from calib_core.results import InputFile
 from cocalib.batch.running.judging import JudgedSession
 from cocalib.batch.running.solving import CALIBRATION_FILE, SolvedSession
-from cocalib.judged_calibration import judged_calibration
-from cocalib.recording_check import other_camera
+from cocalib.evaluation.recording_check import judged_calibration, other_camera
 from cocalib.report import Judged, report_html, subject_of, watched
 
 REPORT_FILE = "report.html"

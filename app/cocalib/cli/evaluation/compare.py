@@ -17,7 +17,7 @@ from cocalib.platform.terminal import print_exactly
 if TYPE_CHECKING:
     from calib_core.camera import Camera
     from calib_core.evaluation import PairedDifference
-    from cocalib.comparing import ComparedOnRecording
+    from cocalib.evaluation.comparing import ComparedOnRecording
 
 COMPARISON_SCHEMA = "cocalib/comparison-1"
 
@@ -63,7 +63,7 @@ class Compare:
             print_exactly(_json(self.a.name, self.b.name, figures, verdict, compared))
             return 0
         if compared is not None:
-            from cocalib.comparing import comparison_lines
+            from cocalib.evaluation.comparing import comparison_lines
 
             print("\n".join(comparison_lines(compared)))
         print("\n".join([*(f"{label}: {text}" for label, text in figures), verdict]))
@@ -72,8 +72,8 @@ class Compare:
     def _on_recording(self, a: Path, b: Path, camera: "Camera | None") -> "tuple[ComparedOnRecording, Camera]":
         """Judge both on the recording; also return the lens to compare their poses through."""
         from calib_core.recordings import open_recording
-        from cocalib.comparing import compare_on_recording
-        from cocalib.judged_calibration import judged_calibration
+        from cocalib.evaluation.comparing import compare_on_recording
+        from cocalib.evaluation.recording_check import judged_calibration
 
         options = self.evidence.options()
         with open_recording(self.recording, self.topics, require=("radar",)) as recording:

@@ -43,7 +43,7 @@ class Evaluate:
     def run(self) -> int:
         """Print the figures; return the exit code."""
         from calib_core.evaluation import evaluation_json, evaluation_lines
-        from cocalib.evaluating import evaluation_exit_code
+        from cocalib.evaluation.evaluating import evaluation_exit_code
 
         if self.calibration is None or not self.recording:
             raise InputError("evaluate needs a calibration and a recording; see cocalib evaluate --help")
@@ -61,8 +61,8 @@ class Evaluate:
     def _evaluation(self, path: Path) -> "Evaluation":
         from calib_core.interchange import read_camera_file
         from calib_core.recordings import open_recording
-        from cocalib.evaluating import evaluate_recording
-        from cocalib.judged_calibration import judged_calibration
+        from cocalib.evaluation.evaluating import evaluate_recording
+        from cocalib.evaluation.recording_check import judged_calibration
 
         options = self.evidence.options()
         camera = None if self.camera is None else read_camera_file(self.camera)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from calib_core.interchange import ImportedCalibration
     from calib_core.measurements import ReflectorClick
     from calib_core.recordings import Recording
-    from cocalib.evaluating import EvidenceOptions
+    from cocalib.evaluation.evaluating import EvidenceOptions
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ class EvidenceFlags:
             InputError: one is out of range.
         """
         from calib_core.evaluation import TargetOptions
-        from cocalib.evaluating import EvidenceOptions
+        from cocalib.evaluation.evaluating import EvidenceOptions
 
         if not 0.0 < self.min_speed_mps <= 100.0:
             raise InputError(f"--min-speed-mps: is {self.min_speed_mps:g}; give a speed from 0.01 to 100 m/s")
@@ -74,7 +74,7 @@ class EvidenceFlags:
                     raise InputError(f"{name} applies to boxes; give them with --boxes FILE_OR_TOPIC")
             return None, None
         from calib_core.evaluation import renamed_classes
-        from cocalib.boxes import find_boxes, find_labels
+        from cocalib.evaluation.boxes import find_boxes, find_labels
 
         with progress_bar("reading boxes") as progress:
             boxes = find_boxes(self.boxes, recording, progress=progress)
@@ -96,7 +96,7 @@ class EvidenceFlags:
             InputError: they cannot be read.
         """
         from calib_core.interchange import read_clicks
-        from cocalib.recording_check import clicks_in
+        from cocalib.evaluation.recording_check import clicks_in
         from cocalib.session.file import inspect_session, recording_session_folder
 
         if self.clicks is not None:

@@ -97,8 +97,7 @@ class Report:
     ) -> "tuple[ReportSubject, tuple[str, ...]]":
         """Return what is reported with what the recording says of it, and which of two calibrations is better on it."""
         from calib_core.recordings import open_recording
-        from cocalib.judged_calibration import require_size
-        from cocalib.recording_check import other_camera
+        from cocalib.evaluation.recording_check import other_camera, require_size
         from cocalib.report import known_calibration, subject_of, watched
 
         assert self.calibration is not None
@@ -124,8 +123,8 @@ class Report:
         recording: "Recording",
     ) -> "tuple[ReportSubject, tuple[str, ...]]":
         """Judge the calibration by clicks and boxes, if there are any, and compare it with the other one by them."""
-        from cocalib.comparing import compare_on_recording, comparison_lines
-        from cocalib.evaluating import evaluate_recording
+        from cocalib.evaluation.comparing import compare_on_recording, comparison_lines
+        from cocalib.evaluation.evaluating import evaluate_recording
         from cocalib.report import Judged, known_calibration
 
         options = self.evidence.options()

@@ -13,7 +13,7 @@ from calib_core.errors import CalibrationError
 from calib_core.evaluation import BoxFigures
 from calib_core.recordings import Recording
 from calib_core.results import Calibration
-from cocalib.evaluating import Evidence, evidence_in, judged
+from cocalib.evaluation.evaluating import Evidence, evidence_in, judged
 from cocalib.platform.error_boundary import error_boundary
 from cocalib.view import sentence
 from cocalib.view.acc import acc_panel, no_acc

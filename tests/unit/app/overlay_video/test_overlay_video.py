@@ -14,8 +14,7 @@ from cocalib.overlay_video import OverlayOptions, encoding, write_overlay
 from cocalib.overlay_video.footer import time_text
 from cocalib.overlay_video.marks import draw_boxes, draw_clicks, draw_returns
 from cocalib.overlay_video.panels import Panels
-from cocalib.recorded_view import RecordedView
-from cocalib.seen_returns import frame_blocks
+from cocalib.recorded_view import RecordedView, frame_blocks
 from tests.recorded_view import boxes_around, nearest_rows, opened_view
 
 GREY = 90

@@ -10,7 +10,7 @@ from calib_core.detections import Box, Boxes, FrameBoxes, LabelledScan, ReturnLa
 from calib_core.errors import InputError
 from calib_core.measurements import TimeNs
 from calib_core.recordings import Recording, inspect_recording
-from cocalib.boxes import find_boxes, find_labels
+from cocalib.evaluation.boxes import find_boxes, find_labels
 from tests.unit.recordings.box_messages import FIRST_FRAME_NS, recorded
 from tests.unit.recordings.conftest import Ros, write_rows
 

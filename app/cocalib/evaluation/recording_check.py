@@ -2,6 +2,8 @@
 
 import dataclasses
 from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -11,8 +13,9 @@ from calib_core.errors import InputError
 from calib_core.interchange import CheckReport, CheckResult, ImportedCalibration, adopted_calibration
 from calib_core.interchange.check.pixel_differences import LOST_TEXT, far_outside, lenses_of
 from calib_core.measurements import MIN_PAIRS, ReflectorClick
+from calib_core.recordings import Recording
 from calib_core.residual_test import ResidualTest, residual_test
-from calib_core.results import Calibration, InputFile
+from calib_core.results import Calibration, DataWarning, InputFile
 
 _LEAST_P = 0.01
 _MOST_MISFITS = 0.2
@@ -164,3 +167,58 @@ def _named(test: ResidualTest) -> str:
     misfits = [name for name, misfit in zip(test.ids, test.misfits, strict=True) if misfit]
     more = ", ..." if len(misfits) > _NAMED else ""
     return f"; far off: {', '.join(misfits[:_NAMED])}{more}" if misfits else ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JudgedCalibration:
+    """A calibration and what the recording says of its lens.
+
+    Attributes:
+        found: what was read.
+        calibration: with a lens.
+        warnings: about the lens, and about the recording if the calibration names another.
+    """
+
+    found: ImportedCalibration
+    calibration: Calibration
+    warnings: tuple[DataWarning, ...]
+
+
+def judged_calibration(
+    found: ImportedCalibration, path: Path, recording: Recording, *, camera: Camera | None = None
+) -> JudgedCalibration:
+    """Return what was read as a calibration that can be judged on a recording.
+
+    Args:
+        found: what was read.
+        path: of its file, for messages.
+        recording: that it is judged on.
+        camera: the intrinsics, if the file has none.
+
+    Raises:
+        InputError: there are no intrinsics, or they are of pictures of another size.
+    """
+    recorded = recording.camera()
+    calibration = calibration_of(found, str(path), camera or recorded)
+    require_size(calibration.camera, recording, path)
+    lens = other_camera(found, recorded)
+    return JudgedCalibration(
+        found, calibration, tuple(DataWarning(one.code, f"{path.name}: {one.message}", one.hint) for one in lens)
+    )
+
+
+def require_size(camera: Camera, recording: Recording, path: Path) -> None:
+    """Refuse a calibration for pictures of another size.
+
+    Raises:
+        InputError: the recording's camera has another size.
+    """
+    recorded = recording.camera()
+    if recorded is None:
+        return
+    size, wanted = (camera.width_px, camera.height_px), (recorded.width_px, recorded.height_px)
+    if size != wanted:
+        raise InputError(
+            f"{path}: calibrated for pictures of {size[0]} x {size[1]} px, but the recording's camera has {wanted[0]} x "
+            f"{wanted[1]} px; give the calibration of this camera"
+        )

@@ -11,7 +11,7 @@ from calib_core.evaluation import Evaluation, PairedDifference, acc_difference, 
 from calib_core.evaluation.paired_difference import Winner
 from calib_core.measurements import ReflectorClick
 from calib_core.results import Calibration, DataWarning
-from cocalib.evaluating import EvidenceOptions, RadarRecording, evidence_in, judged
+from cocalib.evaluation.evaluating import EvidenceOptions, RadarRecording, evidence_in, judged
 
 _FITTED_SHARE = 0.5
 
