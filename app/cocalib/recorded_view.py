@@ -1,4 +1,4 @@
-"""What overlay videos and Rerun show of a recording with its calibration: returns as the camera sees them, pairs, boxes, figures."""
+"""What overlay videos and Rerun show of a recording with its calibration: returns seen by the camera, pairs, boxes, figures."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass

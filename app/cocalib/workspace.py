@@ -1,5 +1,7 @@
 """The only mutable state of the program: the history of the session, and how every change is made."""
 
+import re
+import tempfile
 import threading
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
@@ -9,6 +11,7 @@ from typing import Protocol, TypeAlias
 
 from calib_core.arrays import TimesNs
 from calib_core.association.placements import Placement
+from calib_core.boxes import read_boxes
 from calib_core.camera import Camera
 from calib_core.detections import Boxes
 from calib_core.errors import InputError
@@ -18,9 +21,6 @@ from calib_core.measurements import NS_PER_S, ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording, assumption_hint
 from calib_core.results import Calibration, DataWarning
-from cocalib.box_tracks.carried import CarriedTrack, Followed, carried_boxes, carried_tracks
-from cocalib.box_tracks.loading import boxes_loaded, read_sent_boxes
-from cocalib.box_tracks.stretches import Start
 from cocalib.hypothesis_sheet import OpenMeaning
 from cocalib.session import (
     AssumedReading,
@@ -38,6 +38,7 @@ from cocalib.session import (
     advance,
     settled,
 )
+from cocalib.session.boxes_in_frames import CarriedTrack, Followed, Start, boxes_loaded, carried_boxes, carried_tracks
 from cocalib.session.file import Closed, Restored, open_session_file
 from cocalib.solving.fleet_prior_file import FleetPriorFile
 from cocalib.solving.worker import SolverWorker
@@ -448,3 +449,21 @@ def _source_of(camera: Camera | None, camera_file: CameraFile | None, recording:
     if camera_file is not None:
         return name_text(Path(camera_file.source).name)
     return recording.camera_info_topic or "the recording"
+
+
+def read_sent_boxes(data: bytes, name: str, facts: RecordingFacts) -> Boxes:
+    """Read a file of boxes that a page has sent.
+
+    Args:
+        data: its content.
+        name: its name, for messages and for what its ending says.
+        facts: the recording's frames.
+
+    Raises:
+        InputError: it cannot be read, is of no known format, or belongs to another recording.
+    """
+    plain = re.sub(r"[^A-Za-z0-9._-]", "_", Path(name).name).lstrip(".")[-80:] or "boxes"
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / plain
+        path.write_bytes(data)
+        return read_boxes(path, image_times=facts.image_times, image_size_px=(facts.width_px, facts.height_px))

@@ -73,7 +73,7 @@ def test_the_wheel_contains_the_page_the_sample_and_the_code_of_the_pack(wheel: 
 
 
 def test_the_installed_command_finds_its_own_page_and_sample(installed: Path, tmp_path: Path) -> None:
-    code = "from cocalib import resources; print(resources.static_folder()); print(resources.sample_folder())"
+    code = "from cocalib.platform import resources; print(resources.static_folder()); print(resources.sample_folder())"
     printed = subprocess.run(
         [installed / "bin" / "python", "-c", code],
         cwd=tmp_path,
@@ -130,7 +130,7 @@ def test_the_installed_command_serves_its_page(installed: Path, tmp_path: Path) 
 
 
 def test_the_installed_command_solves_its_sample_and_packs_it(installed: Path, tmp_path: Path) -> None:
-    code = "from cocalib import resources; print(resources.sample_folder() / 'rooftop')"
+    code = "from cocalib.platform import resources; print(resources.sample_folder() / 'rooftop')"
     sample = Path(
         subprocess.run(
             [installed / "bin" / "python", "-c", code], cwd=tmp_path, check=True, capture_output=True, text=True

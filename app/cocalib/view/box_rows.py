@@ -6,8 +6,8 @@ import msgspec
 import numpy as np
 
 from calib_core.evaluation import BoxFigures
-from cocalib.box_tracks.carried import BoxKind, CarriedTrack
 from cocalib.session import BoxTrack, RecordingFacts
+from cocalib.session.boxes_in_frames import BoxKind, CarriedTrack
 from cocalib.view.box_panel import BoxTrackRow
 
 _USUAL_LABELS = ("person", "car", "truck", "bicycle", "robot")

@@ -7,8 +7,8 @@ from calib_core.diagnostics.consequence import by_consequence
 from calib_core.measurements import MIN_PAIRS, Stamp, Unpaired, Unsolvable
 from calib_core.results import Calibration, DataWarning
 from calib_core.verdict import Verdict
-from cocalib.box_tracks.carried import CarriedTrack, carried_tracks
 from cocalib.session import History, RecordingFacts, Session
+from cocalib.session.boxes_in_frames import CarriedTrack, carried_tracks
 from cocalib.view.advice import advice_for
 from cocalib.view.box_panel import AccPanel
 from cocalib.view.box_rows import box_rows, known_labels

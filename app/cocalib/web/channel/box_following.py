@@ -1,15 +1,21 @@
-"""Following boxes in the background: a few pictures at a time, so that a newer box comes first and all of it can be stopped."""
+"""Following boxes through the pictures in the background: a few at a time, so that a newer box comes first."""
 
 import asyncio
 import logging
 import time
-from collections.abc import Callable
+from collections import OrderedDict
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
+from dataclasses import dataclass, field
+from typing import TypeAlias
 
+import numpy as np
+
+from calib_core.errors import CalibrationError, InputError
 from calib_core.recordings import Recording
-from cocalib.box_tracks.following import BoxFollower, GreyPictures
-from cocalib.box_tracks.stretches import Stretch, stretches_of
+from calib_core.vision import LostBox, TrackedBox, follow_box
 from cocalib.platform.error_boundary import error_boundary
+from cocalib.session.boxes_in_frames import Followed, PlacedBox, Start, Stretch, stretches_of
 from cocalib.web.messages import Progress
 from cocalib.workspace import Workspace
 
@@ -19,6 +25,12 @@ _TELL_EVERY_S = 0.6
 """Pages are told no more often [s]."""
 _FOLLOWING = "Following boxes"
 _log = logging.getLogger(__name__)
+_KEPT_PICTURES = 12
+"""Decoded pictures in memory, for boxes that are followed through the same frames."""
+_HALVED_ABOVE_PX = 1300
+"""Wider pictures are halved while they are decoded, which takes half the time [px]."""
+Picture: TypeAlias = tuple[np.ndarray, float]
+"""A grey picture of 8 bits, and its size relative to the recorded one."""
 
 
 class BoxFollowing:
@@ -91,3 +103,148 @@ class BoxFollowing:
     def _show(self) -> None:
         self._tell(Progress(_FOLLOWING, *self._follower.progress))
         self._workspace.show_followed(self._follower.followed)
+
+
+class GreyPictures:
+    """Decodes the frames of a recording as grey pictures; the last ones are kept."""
+
+    def __init__(self, recording: Recording) -> None:
+        self._recording = recording
+        self._kept: OrderedDict[int, Picture] = OrderedDict()
+
+    def __call__(self, frame: int) -> Picture:
+        """Return a picture.
+
+        Raises:
+            CalibrationError: it cannot be read or decoded.
+        """
+        import cv2
+
+        if frame in self._kept:
+            self._kept.move_to_end(frame)
+            return self._kept[frame]
+        encoded = self._recording.image_bytes(frame)
+        halved = encoded.width_px > _HALVED_ABOVE_PX
+        flag = cv2.IMREAD_REDUCED_GRAYSCALE_2 if halved else cv2.IMREAD_GRAYSCALE
+        grey = cv2.imdecode(np.frombuffer(encoded.data, dtype=np.uint8), flag | cv2.IMREAD_IGNORE_ORIENTATION)
+        if grey is None:
+            raise InputError(f"frame {frame + 1} cannot be decoded")
+        self._kept[frame] = (np.asarray(grey), 0.5 if halved else 1.0)
+        while len(self._kept) > _KEPT_PICTURES:
+            self._kept.popitem(last=False)
+        return self._kept[frame]
+
+
+@dataclass(slots=True)
+class _Run:
+    """One box that is being followed; `steps` is where the work goes on."""
+
+    start: Start
+    steps: Iterator[TrackedBox | LostBox]
+    boxes: list[PlacedBox] = field(default_factory=list)
+    ended: str = ""
+
+
+class BoxFollower:
+    """Follows boxes as far as they are wanted, and keeps what was followed. One caller at a time."""
+
+    def __init__(self, picture: Callable[[int], Picture], count: Callable[[], int]) -> None:
+        """Set up the work.
+
+        Args:
+            picture: decodes a frame.
+            count: number of frames that there are now.
+        """
+        self._picture = picture
+        self._count = count
+        self._runs: dict[Start, _Run] = {}
+        self._wanted: tuple[Stretch, ...] = ()
+
+    def want(self, stretches: Sequence[Stretch]) -> None:
+        """Follow these from now on, the last ones first; what belongs to none of them is dropped."""
+        self._wanted = tuple(stretches)
+        starts = {stretch.start for stretch in stretches}
+        self._runs = {start: run for start, run in self._runs.items() if start in starts}
+
+    def stop(self) -> None:
+        """End what is still being followed where it is now."""
+        for stretch in self._wanted:
+            if not self._is_done(stretch):
+                self._run(stretch.start).ended = "following it was stopped"
+
+    @property
+    def followed(self) -> dict[Start, Followed]:
+        """What is known from each start."""
+        return {start: Followed(tuple(run.boxes), run.ended) for start, run in list(self._runs.items())}
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        """How many frames of those wanted are done, and how many there are."""
+        done = sum(stretch.length if self._is_done(stretch) else len(self._boxes(stretch)) for stretch in self._wanted)
+        return done, sum(stretch.length for stretch in self._wanted)
+
+    @property
+    def is_done(self) -> bool:
+        """Whether everything wanted has been followed."""
+        return all(map(self._is_done, self._wanted))
+
+    def go_on(self, for_s: float) -> None:
+        """Follow some more.
+
+        Args:
+            for_s: return after so long [s], or when all is done.
+        """
+        end = time.monotonic() + for_s
+        for stretch in reversed(self._wanted):
+            while not self._is_done(stretch):
+                self._advance(self._run(stretch.start))
+                if time.monotonic() > end:
+                    return
+
+    def _is_done(self, stretch: Stretch) -> bool:
+        run = self._runs.get(stretch.start)
+        if run is None:
+            return stretch.length == 0
+        return run.ended != "" or len(run.boxes) >= stretch.length
+
+    def _boxes(self, stretch: Stretch) -> Sequence[PlacedBox]:
+        run = self._runs.get(stretch.start)
+        return run.boxes if run else ()
+
+    def _run(self, start: Start) -> _Run:
+        if start not in self._runs:
+            self._runs[start] = _Run(start, self._steps(start))
+        return self._runs[start]
+
+    def _steps(self, start: Start) -> Iterator[TrackedBox | LostBox]:
+        """Follow a box from its start on; edges are those of the recorded pictures."""
+        _, scale = self._picture(start.frame)
+        for step in follow_box(self._pictures(start.frame), _scaled(start.edges_px, scale)):
+            yield step if isinstance(step, LostBox) else TrackedBox(_scaled(step.edges_px, 1 / scale), step.confidence)
+
+    def _pictures(self, first: int) -> Iterator[np.ndarray]:
+        frame = first
+        while frame < self._count():
+            yield self._picture(frame)[0]
+            frame += 1
+
+    def _advance(self, run: _Run) -> None:
+        try:
+            step = next(run.steps, None)
+        except CalibrationError as error:
+            run.ended = str(error)
+            return
+        if step is None:
+            run.ended = "the recording ends"
+        elif isinstance(step, LostBox):
+            run.ended = step.reason
+        else:
+            left, top, right, bottom = (round(value, 2) for value in step.edges_px)
+            frame = run.start.frame + len(run.boxes) + 1
+            run.boxes.append(PlacedBox(frame, (left, top, right, bottom), "followed", round(step.confidence, 3)))
+
+
+def _scaled(edges_px: tuple[float, float, float, float], scale: float) -> tuple[float, float, float, float]:
+    """Return the edges in a picture of another size; the picture's own edge is half a pixel outside the outermost centres."""
+    left, top, right, bottom = (scale * (value + 0.5) - 0.5 for value in edges_px)
+    return left, top, right, bottom

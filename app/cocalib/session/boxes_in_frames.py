@@ -1,6 +1,7 @@
-"""Boxes in every frame, as a value: those that a person stated, those that were followed, and those in between."""
+"""Boxes in every frame, as a value: those that a person or a file stated, those that were followed, and those in between."""
 
 from bisect import bisect_left
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -10,11 +11,72 @@ import numpy as np
 
 from calib_core.detections import Box, Boxes, FrameBoxes
 from calib_core.measurements import TimeNs
-from cocalib.box_tracks.stretches import MOST_FRAMES, Start, Stretch, stretches_of
-from cocalib.session import BoxEdges, BoxTrack, RecordingFacts, Session
+from cocalib.session.box_tracks import BoxEdges, BoxKeyframe, BoxTrack
+from cocalib.session.events import BoxesLoaded
+from cocalib.session.state import RecordingFacts, Session
 
-_NOTHING: Mapping[Start, "Followed"] = MappingProxyType({})
+MOST_FRAMES = 900
+"""A box is followed through so many frames at most after it was drawn: half a minute at 30 Hz."""
+_LEAST_PX = 3.0
+"""Boxes of a file that are narrower or lower than this, after what is beyond the picture is cut off, are left out [px]."""
 BoxKind: TypeAlias = Literal["stated", "followed", "between"]
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """A box that a person stated: what comes of following it depends on nothing else.
+
+    Attributes:
+        frame: index of its frame.
+        edges_px: there.
+    """
+
+    frame: int
+    edges_px: BoxEdges
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """A box to be followed.
+
+    Attributes:
+        start: where it is stated.
+        last: index of the last frame to follow it to, at least that of the start.
+        next_edges_px: what is stated in that last frame; None if nothing is.
+        is_cut: it ends only because it is long enough.
+    """
+
+    start: Start
+    last: int
+    next_edges_px: BoxEdges | None = None
+    is_cut: bool = False
+
+    @property
+    def length(self) -> int:
+        """Number of frames to follow it through."""
+        return self.last - self.start.frame
+
+
+def stretches_of(track: BoxTrack, facts: RecordingFacts) -> Iterator[Stretch]:
+    """Yield the stretches of a track in order of time; those of a track that is not carried are one frame long.
+
+    Args:
+        track: with its keyframes.
+        facts: the recording's frames.
+    """
+    frames = [facts.frame_at(one.image_time) for one in track.keyframes]
+    stated = list(zip(track.keyframes, frames, strict=True))
+    for (keyframe, first), (following, stop) in zip(stated, (*stated[1:], (None, None)), strict=True):
+        if keyframe.edges_px is None or first is None:
+            continue
+        start = Start(first, keyframe.edges_px)
+        if not track.is_carried:
+            yield Stretch(start, first)
+            continue
+        edges = following.edges_px if following is not None else None
+        end = len(facts.image_times) - 1 if stop is None else stop if edges is not None else stop - 1
+        last = min(end, first + MOST_FRAMES)
+        yield Stretch(start, last, edges if last == end else None, last < end)
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +143,9 @@ class CarriedTrack:
         return self.boxes[place] if place < len(self.boxes) and self.boxes[place].frame == frame else None
 
 
+_NOTHING: Mapping[Start, Followed] = MappingProxyType({})
+
+
 def carried_tracks(
     tracks: Sequence[BoxTrack], facts: RecordingFacts, followed: Mapping[Start, Followed] = _NOTHING
 ) -> tuple[CarriedTrack, ...]:
@@ -110,6 +175,35 @@ def carried_boxes(tracks: Sequence[CarriedTrack], session: Session, facts: Recor
             frames.setdefault(time, []).append(box)
     found = tuple(FrameBoxes(time, tuple(frames[time])) for time in sorted(frames))
     return Boxes(found, "the boxes on the page", (facts.width_px, facts.height_px))
+
+
+def boxes_loaded(boxes: Boxes, facts: RecordingFacts) -> BoxesLoaded:
+    """Return the boxes of a file as a step of the session.
+
+    Boxes of one track and class belong to one object; each box without a track is an object of its own.
+
+    Args:
+        boxes: with the stamps of recorded frames.
+        facts: the recording's frames.
+    """
+    keyframes: dict[tuple[str, str, int], dict[TimeNs, BoxKeyframe]] = defaultdict(dict)
+    empty: list[TimeNs] = []
+    alone = 0
+    for frame in boxes:
+        seen = [(box, edges) for box in frame.boxes if (edges := _edges_within(box, facts)) is not None]
+        if not seen:
+            empty.append(frame.image_time)
+        for box, edges in seen:
+            key = (box.track, box.label, 0)
+            if not box.track or frame.image_time in keyframes[key]:
+                alone += 1
+                key = ("", box.label, alone)
+            keyframes[key][frame.image_time] = BoxKeyframe(frame.image_time, edges)
+    tracks = [
+        BoxTrack(name or f"b{number}", label, tuple(stated[time] for time in sorted(stated)), is_carried=False)
+        for (name, label, number), stated in keyframes.items()
+    ]
+    return BoxesLoaded(tuple(_named_apart(tracks)), tuple(empty))
 
 
 def _carried(track: BoxTrack, facts: RecordingFacts, followed: Mapping[Start, Followed]) -> CarriedTrack:
@@ -160,3 +254,23 @@ def _bridged(stretch: Stretch, next_edges: BoxEdges, found: Followed) -> Iterato
 def _edges(values: np.ndarray) -> BoxEdges:
     left, top, right, bottom = (round(float(value), 2) for value in values)
     return left, top, right, bottom
+
+
+def _named_apart(tracks: list[BoxTrack]) -> list[BoxTrack]:
+    """Give each track a name of its own."""
+    taken: set[str] = set()
+    named = []
+    for track in tracks:
+        name, number = track.id[:60], 2
+        while name in taken:
+            name, number = f"{track.id[:60]} ({number})", number + 1
+        taken.add(name)
+        named.append(BoxTrack(name, track.label[:60].strip(), track.keyframes, is_carried=False))
+    return named
+
+
+def _edges_within(box: Box, facts: RecordingFacts) -> tuple[float, float, float, float] | None:
+    """Return the edges as far as they are in the picture; None if too little of the box is."""
+    left, right = (min(max(value, -0.5), facts.width_px - 0.5) for value in (box.left_px, box.right_px))
+    top, bottom = (min(max(value, -0.5), facts.height_px - 0.5) for value in (box.top_px, box.bottom_px))
+    return (left, top, right, bottom) if right - left >= _LEAST_PX and bottom - top >= _LEAST_PX else None
