@@ -27,14 +27,13 @@ from calib_core.interchange import (
     read_pairs,
 )
 from calib_core.interchange import calibration_text as interchange_text
-from calib_core.measurements import Candidate, Pair, RadarScans, ReflectorClick, Unsolvable
+from calib_core.measurements import Candidate, Pair, ReflectorClick, Unsolvable
 from calib_core.option_checks import checked_options
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording, about_assumptions
 from calib_core.results import Calibration, InputFile, PairResult, UnconfirmedClicks
 from cocalib.platform.resources import version
 from cocalib.session import Outcome
-from cocalib.solving.board_search import find_board
 
 _MOST_CANDIDATES = 50
 """As many as the option allows."""
