@@ -8,8 +8,9 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct, field
 
+from calib_core.errors import CalibrationError
 from cocalib.batch.inputs import InputFile, InputPath
-from cocalib.platform.files import write_whole
+from cocalib.batch.results_folder import ResultsFolder
 
 _FILE = "inputs.json"
 _PIECE_BYTES = 1 << 22
@@ -43,7 +44,7 @@ class InputDigests:
             results: the folder of results.
             progress: called with the bytes done and their number.
         """
-        self._path = results / _FILE
+        self._results = ResultsFolder(results)
         self._kept = self._read()
         self._new: dict[str, _Kept] = {}
         self._progress = progress
@@ -87,13 +88,13 @@ class InputDigests:
         """Keep what is new, with what other drivers have kept meanwhile.
 
         Raises:
+            CalibrationError: what has the file's name is not a regular file.
             OSError: it cannot be written.
         """
         if not self._new:
             return
-        self._path.parent.mkdir(parents=True, exist_ok=True)
         document = _Document(_SCHEMA, {**self._read(), **self._new})
-        write_whole(self._path, msgspec.json.format(msgspec.json.encode(document), indent=1) + b"\n")
+        self._results.write(_FILE, data=msgspec.json.format(msgspec.json.encode(document), indent=1) + b"\n")
 
     def _known(self, key: str, files: Sequence[InputFile]) -> tuple[str, str | None]:
         state = _state(files)[0]
@@ -102,8 +103,8 @@ class InputDigests:
 
     def _read(self) -> dict[str, _Kept]:
         try:
-            document = msgspec.json.decode(self._path.read_bytes(), type=_Document)
-        except (OSError, msgspec.DecodeError):
+            document = msgspec.json.decode(self._results.read(_FILE) or b"", type=_Document)
+        except (OSError, msgspec.DecodeError, CalibrationError):
             return {}
         return document.inputs if document.schema == _SCHEMA else {}
 

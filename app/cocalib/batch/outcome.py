@@ -1,21 +1,23 @@
 """Outcome: what came of one job, as the file that every engine returns (cocalib/outcome-1)."""
 
-from typing import Final, Literal
+from typing import Annotated, Final, Literal
 
 import msgspec
-from msgspec import Struct, field
+from msgspec import Meta, Struct, field
 
 OUTCOME_SCHEMA: Final = "cocalib/outcome-1"
 Status = Literal["solved", "weak", "refused", "failed"]
 """A good or usable calibration; one not to rely on; the data give none; an input cannot be read or the program failed."""
 PriorUse = Literal["used", "untested", "contradicted"]
+_RELATIVE = r"^(?!\.{1,2}(/|$))[^/\\\x00]+(/(?!\.{1,2}(/|$))[^/\\\x00]+)*$"
+"""Names with slashes in between, none of them `.` or `..`."""
 StepState = Literal["done", "left out", "not available", "not asked", "failed"]
 
 
 class OutcomeFile(Struct, frozen=True, forbid_unknown_fields=True):
     """A file beside the outcome, by its relative name, and its sha256."""
 
-    name: str
+    name: Annotated[str, Meta(pattern=_RELATIVE)]
     sha256: str
 
 

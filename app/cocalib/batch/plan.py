@@ -13,8 +13,9 @@ from typing import Final, Literal
 import msgspec
 from msgspec import Struct
 
+from calib_core.errors import CalibrationError
 from cocalib.batch.job import Job
-from cocalib.platform.files import write_whole
+from cocalib.batch.results_folder import ResultsFolder
 
 PLANS: Final = "manifests"
 _SCHEMA: Final = "cocalib/batch-plan-1"
@@ -72,13 +73,13 @@ def write_plan(folder: Path, manifest: Path, jobs: Sequence[Job]) -> None:
         jobs: of all its sessions.
 
     Raises:
+        CalibrationError: what has its name is not a regular file, or its folder is a link.
         OSError: it cannot be written.
     """
     sessions = [PlannedSession(job.row.vehicle, job.row.session, job.digest) for job in jobs]
     document = PlanDocument(_SCHEMA, datetime.now(UTC).isoformat(), sessions)
-    place = folder / PLANS / f"{manifest.name}.json"
-    place.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(place, msgspec.json.format(msgspec.json.encode(document), indent=1) + b"\n")
+    data = msgspec.json.format(msgspec.json.encode(document), indent=1) + b"\n"
+    ResultsFolder(folder).write(PLANS, f"{manifest.name}.json", data=data)
 
 
 def read_plans(folder: Path) -> Plan:
@@ -90,8 +91,9 @@ def read_plans(folder: Path) -> Plan:
     found = []
     for path in sorted((folder / PLANS).glob("*.json")):
         try:
-            found.append((msgspec.json.decode(path.read_bytes(), type=PlanDocument), path.name.removesuffix(".json")))
-        except (OSError, msgspec.DecodeError):
+            content = ResultsFolder(folder).read(PLANS, path.name) or b""
+            found.append((msgspec.json.decode(content, type=PlanDocument), path.name.removesuffix(".json")))
+        except (OSError, msgspec.DecodeError, CalibrationError):
             continue
     sessions: dict[tuple[str, str], Wanted] = {}
     for document, _ in sorted(found, key=lambda one: one[0].started):

@@ -2,16 +2,20 @@
 
 import errno
 import hashlib
+import os
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
+from io import BufferedReader
 from pathlib import Path
 
 import msgspec
 
+from calib_core.errors import CalibrationError
 from cocalib.batch.outcome import Outcome, OutcomeFile, read_outcome
 from cocalib.batch.writers import Writer, is_abandoned
+from cocalib.session.file.guarded_folder import GuardedFolder
 
 OUTCOME_FILE = "outcome.json"
 LOG_FILE = "log.txt"
@@ -19,11 +23,15 @@ LOG_FILE = "log.txt"
 _RESULTS = "results"
 _OCCUPIED = frozenset({errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR})
 _ATTEMPTS = 50
+_ADVICE = "name another folder of results"
 
 
 @dataclass(frozen=True, slots=True)
 class ResultsFolder:
-    """Results that lie in a folder which drivers and workers share.
+    """Results that lie in a folder which drivers and workers share, with what else the program keeps there.
+
+    Below the folder no link is followed, and only regular files are read and written: whoever can write there could put a link to
+    a file elsewhere, a pipe or a device under the name of one.
 
     A result is written under a hidden name and renamed as a whole. A power failure can still damage it, as the files are not
     flushed one by one: reading compares them with what the outcome lists, and a damaged result is no result.
@@ -40,14 +48,65 @@ class ResultsFolder:
 
     def outcome(self, digest: str) -> Outcome | None:
         """Return what came of a job; None if it is to be run: it is not finished, damaged, or may go well another time."""
-        folder = self.folder_of(digest)
         try:
-            found = read_outcome((folder / OUTCOME_FILE).read_text(encoding="utf-8"))
+            found = read_outcome((self.read(_RESULTS, digest, OUTCOME_FILE) or b"").decode())
             if found.digest != digest or not found.is_final:
                 return None
-            return found if all(_sha256(folder / file.name) == file.sha256 for file in found.files) else None
-        except (OSError, ValueError, msgspec.DecodeError):
+            return found if all(self._sha256(digest, file.name) == file.sha256 for file in found.files) else None
+        except (OSError, ValueError, msgspec.DecodeError, CalibrationError):
             return None
+
+    def result_file(self, digest: str, name: str) -> bytes | None:
+        """Return the content of a file of a result; None if there is none.
+
+        Args:
+            digest: of the job.
+            name: relative, as the outcome lists it.
+
+        Raises:
+            CalibrationError: it is not a regular file, or a folder above it is a link; it was not read.
+            OSError: it cannot be read.
+        """
+        return self.read(_RESULTS, digest, *name.split("/"))
+
+    def read(self, *names: str) -> bytes | None:
+        """Return the content of a file, by the names of the folders below this one and its own; None if there is none.
+
+        Raises:
+            CalibrationError: it is not a regular file, or a folder above it is a link; it was not read.
+            OSError: it cannot be read.
+        """
+        try:
+            with self._opened(*names[:-1]) as folder:
+                return folder.read(names[-1])
+        except (FileNotFoundError, NotADirectoryError):
+            return None
+
+    def write(self, *names: str, data: bytes) -> None:
+        """Create or replace a file in one step, and the folders above it.
+
+        Args:
+            names: of the folders below this one, and its own.
+            data: its content.
+
+        Raises:
+            CalibrationError: what has this name is not a regular file, or a folder above it is a link; nothing was written.
+            OSError: it cannot be written.
+        """
+        with self._opened(*names[:-1], create=True) as folder:
+            folder.replace(names[-1], data)
+
+    @contextmanager
+    def _opened(self, *names: str, create: bool = False) -> Iterator[GuardedFolder]:
+        """Open a folder below this one; none of the names may be a link."""
+        here = self.path.resolve()
+        if not create:
+            here.stat()
+        with ExitStack() as opened:
+            folder = opened.enter_context(closing(GuardedFolder(here, create=create, shared=True, advice=_ADVICE)))
+            for name in names:
+                folder = opened.enter_context(closing(folder.subfolder(name, create=create)))
+            yield folder
 
     @contextmanager
     def writing(self, digest: str) -> Iterator[Path]:
@@ -56,11 +115,12 @@ class ResultsFolder:
         A final result that another process has written meanwhile stays; any other is replaced.
 
         Raises:
+            CalibrationError: the folder for it is a link.
             OSError: it cannot be written.
         """
         writer = Writer.this()
-        parent = self.folder_of(digest).parent
-        parent.mkdir(parents=True, exist_ok=True)
+        with self._opened(_RESULTS, create=True):
+            parent = self.folder_of(digest).parent
         unfinished = parent / writer.folder_name(digest)
         unfinished.mkdir()
         try:
@@ -70,13 +130,20 @@ class ResultsFolder:
             shutil.rmtree(unfinished, ignore_errors=True)
 
     def remove_leftovers(self) -> int:
-        """Remove what killed processes left unfinished; return how many folders."""
+        """Remove what killed processes left unfinished; return how many folders.
+
+        Raises:
+            CalibrationError: the folder for results is a link.
+        """
         parent = self.folder_of("")
         if not parent.is_dir():
             return 0
-        left = [one for one in parent.iterdir() if one.name.startswith(".") and one.is_dir() and is_abandoned(one)]
-        for folder in left:
-            shutil.rmtree(folder, ignore_errors=True)
+        with self._opened(_RESULTS):
+            left = [
+                one for one in parent.iterdir() if one.name.startswith(".") and _is_folder(one) and is_abandoned(one)
+            ]
+            for folder in left:
+                shutil.rmtree(folder, ignore_errors=True)
         return len(left)
 
     def _put(self, unfinished: Path, digest: str, writer: Writer) -> None:
@@ -96,19 +163,35 @@ class ResultsFolder:
                 final.rename(old)
             except FileNotFoundError:
                 continue
-            if old.is_dir():
+            if _is_folder(old):
                 shutil.rmtree(old, ignore_errors=True)
             else:
                 old.unlink()
         raise OSError(errno.EBUSY, "other processes write it again and again", str(final))
 
+    def _sha256(self, digest: str, name: str) -> str:
+        *folders, last = name.split("/")
+        with (
+            self._opened(_RESULTS, digest, *folders) as folder,
+            os.fdopen(folder.open(last, os.O_RDONLY), "rb") as file,
+        ):
+            return _sha256(file)
+
 
 def listed_files(folder: Path) -> tuple[OutcomeFile, ...]:
     """Return the files of a result with their sha256, in order of their names, without the outcome and the log."""
-    names = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
-    return tuple(OutcomeFile(name, _sha256(folder / name)) for name in names if name not in (OUTCOME_FILE, LOG_FILE))
+    found = []
+    for path in sorted(folder.rglob("*"), key=lambda path: path.relative_to(folder).as_posix()):
+        name = path.relative_to(folder).as_posix()
+        if path.is_file() and name not in (OUTCOME_FILE, LOG_FILE):
+            with path.open("rb") as file:
+                found.append(OutcomeFile(name, _sha256(file)))
+    return tuple(found)
 
 
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+def _is_folder(path: Path) -> bool:
+    return path.is_dir() and not path.is_symlink()
+
+
+def _sha256(file: BufferedReader) -> str:
+    return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,6 +1,8 @@
 """Read one result from its folder: the outcome, and the pose from calibration.json."""
 
+import errno
 import hashlib
+import os
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -52,9 +54,11 @@ def outcome_of(text: str, folder: Path, digest: str) -> Outcome | UnreadResult:
 def _text(folder: Path, digest: str) -> str | UnreadResult | None:
     """Return the text of an outcome; None if there is no such file."""
     try:
-        return (ResultsFolder(folder).folder_of(digest) / OUTCOME_FILE).read_text(encoding="utf-8")
-    except (FileNotFoundError, NotADirectoryError):
-        return None
+        found = ResultsFolder(folder).result_file(digest, OUTCOME_FILE)
+        return None if found is None else found.decode()
+    except CalibrationError as error:
+        place = _place(folder, digest)
+        return UnreadResult(place, str(error).rpartition(f"{place}: ")[2])
     except OSError as error:
         return UnreadResult(_place(folder, digest), f"{(error.strerror or str(error)).lower()}; check its permissions")
     except UnicodeDecodeError as error:
@@ -85,9 +89,10 @@ def with_pose(folder: Path, outcome: Outcome, place: int | None) -> SessionRecor
     listed = {file.name: file.sha256 for file in outcome.files}
     if _CALIBRATION not in listed:
         return record
-    path = ResultsFolder(folder).folder_of(outcome.digest) / _CALIBRATION
     try:
-        content = path.read_bytes()
+        content = ResultsFolder(folder).result_file(outcome.digest, _CALIBRATION)
+        if content is None:
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT))
         if hashlib.sha256(content).hexdigest() != listed[_CALIBRATION]:
             raise InputError("is not the file that the outcome lists; delete this result and run the batch again")
         found = session_pose(

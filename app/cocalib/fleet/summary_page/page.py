@@ -6,11 +6,11 @@ from functools import cache
 from pathlib import Path
 from typing import Final
 
+from cocalib.batch.results_folder import ResultsFolder
 from cocalib.fleet.kinds import Kind, kinds_of
 from cocalib.fleet.records import FleetRecord, UnreadResult
 from cocalib.fleet.standing import VehicleStanding, standings_of
 from cocalib.fleet.summary_page.tables import session_table, type_table, vehicle_table
-from cocalib.platform.files import write_whole
 from cocalib.platform.resources import version
 from cocalib.report.html_file import html_file
 from cocalib.report.markup import Child, Markup, tag
@@ -27,11 +27,11 @@ def write_summary(folder: Path, fleet: FleetRecord) -> Path:
         fleet: what they say.
 
     Raises:
+        CalibrationError: what has its name is not a regular file.
         OSError: it cannot be written.
     """
-    path = folder / SUMMARY_FILE
-    write_whole(path, summary_html(fleet).encode())
-    return path
+    ResultsFolder(folder).write(SUMMARY_FILE, data=summary_html(fleet).encode())
+    return folder / SUMMARY_FILE
 
 
 def summary_html(fleet: FleetRecord) -> str:

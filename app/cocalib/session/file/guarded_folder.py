@@ -1,13 +1,15 @@
-"""A session folder whose files are opened without following links, and only if they are regular files of this user.
+"""A folder whose files are opened without following links, and only if they are regular files of this user.
 
 Whoever can write next to a recording can put a link, a pipe or someone else's file where a session file belongs. None of them
-is read, written or waited for.
+is read, written or waited for. Folders of results are read and written like this, too; their files may be of other users.
 """
 
+import copy
 import errno
 import os
 import secrets
 import stat
+from contextlib import suppress
 from pathlib import Path
 
 from cocalib.session.file.errors import SessionFileError
@@ -34,31 +36,62 @@ _WINDOWS_LINKS = (getattr(stat, "IO_REPARSE_TAG_SYMLINK", -1), getattr(stat, "IO
 class GuardedFolder:
     """A folder that stays the same one while it is open, even if its name is given to another."""
 
-    def __init__(self, path: Path, *, create: bool = False) -> None:
+    def __init__(
+        self, path: Path, *, create: bool = False, shared: bool = False, advice: str = "give another --session folder"
+    ) -> None:
         """Open a folder.
 
         Args:
             path: the folder.
             create: make it if it is missing.
+            shared: folder and files may be of other users, and have several names (hard links).
+            advice: what else the user can do where a file is refused.
 
         Raises:
             SessionFileError: it is a link, no folder, of another user, missing, or cannot be created.
         """
-        self.path = path
+        self.path, self._shared, self._advice = path, shared, advice
         self._descriptor: int | None = None
         try:
             if create and not os.path.lexists(path):
                 path.mkdir(parents=True, exist_ok=True)
-            if fault := folder_fault(path):
+            if not shared and (fault := folder_fault(path)):
                 raise SessionFileError(f"{path}: {fault}")
             if _BY_DESCRIPTOR:
                 self._descriptor = os.open(path, os.O_RDONLY | _FOLDER)
-                if fault := _foreign(os.fstat(self._descriptor)):  # exchanged in the meantime
+                if not shared and (fault := _foreign(os.fstat(self._descriptor))):  # exchanged in the meantime
                     self.close()
                     raise SessionFileError(f"{path}: {fault}")
         except OSError as error:
             what = "cannot be created" if create else "cannot be opened"
-            raise SessionFileError(f"{path}: {what}: {error.strerror}; give another --session folder") from error
+            raise SessionFileError(f"{path}: {what}: {error.strerror}; {advice}") from error
+
+    def subfolder(self, name: str, *, create: bool = False) -> "GuardedFolder":
+        """Open a folder in this one.
+
+        Args:
+            name: of the folder.
+            create: make it if it is missing.
+
+        Raises:
+            SessionFileError: it is a link, or of another user.
+            OSError: it is missing, no folder, or cannot be created.
+        """
+        if name in ("", ".", "..") or name != Path(name).name:
+            raise self._refusal(name, "is not the name of a folder in it")
+        if create:
+            with suppress(FileExistsError):
+                os.mkdir(self._at(name), dir_fd=self._descriptor)
+        found = os.stat(self._at(name), dir_fd=self._descriptor, follow_symlinks=False)
+        if _is_link(found):
+            raise self._refusal(name, "is a symbolic link, which is not followed")
+        if not self._shared and (fault := _foreign(found)):
+            raise self._refusal(name, fault)
+        below = copy.copy(self)
+        below.path = self.path / name
+        if self._descriptor is not None:
+            below._descriptor = os.open(name, os.O_RDONLY | _FOLDER, dir_fd=self._descriptor)
+        return below
 
     def open(self, name: str, flags: int) -> int:
         """Open a file of the folder and return its descriptor.
@@ -73,7 +106,7 @@ class GuardedFolder:
         """
         self._require_plain(name)
         descriptor = os.open(self._at(name), flags | _SAFELY, 0o666, dir_fd=self._descriptor)
-        if fault := _file_fault(os.fstat(descriptor)):
+        if fault := self._file_fault(os.fstat(descriptor)):
             os.close(descriptor)
             raise self._refusal(name, fault)
         return descriptor
@@ -86,7 +119,7 @@ class GuardedFolder:
             at_most: read only so many bytes.
 
         Raises:
-            SessionFileError: as for `open`, or it is too large for a session.
+            SessionFileError: as for `open`, or it is too large.
             OSError: it cannot be read.
         """
         try:
@@ -102,11 +135,11 @@ class GuardedFolder:
         """Return the content of an open file.
 
         Raises:
-            SessionFileError: it is too large for a session.
+            SessionFileError: it is too large.
             OSError: it cannot be read.
         """
         if (size := os.fstat(descriptor).st_size) > _MAX_BYTES:
-            raise self._refusal(name, f"has {size / 1e6:.0f} MB, which is too large for a session")
+            raise self._refusal(name, f"has {size / 1e6:.0f} MB, which is too large")
         rest, parts = size if at_most is None else min(size, at_most), []
         os.lseek(descriptor, 0, os.SEEK_SET)
         while rest > 0 and (part := os.read(descriptor, rest)):
@@ -218,13 +251,23 @@ class GuardedFolder:
             found = os.stat(self._at(name), dir_fd=self._descriptor, follow_symlinks=False)
         except FileNotFoundError:
             return
-        if fault := _file_fault(found):
+        if fault := self._file_fault(found):
             raise self._refusal(name, fault)
+
+    def _file_fault(self, found: os.stat_result) -> str:
+        """Return why this is not a regular file of this user with one name; "" if it is."""
+        if _is_link(found) or not stat.S_ISREG(found.st_mode):
+            kind = "a symbolic link" if _is_link(found) else _KINDS.get(stat.S_IFMT(found.st_mode), "a device")
+            return f"is {kind}, not a file"
+        if self._shared:
+            return ""
+        if found.st_nlink > 1:
+            return f"has {found.st_nlink} names (hard links), so that other places would change with it"
+        return _foreign(found)
 
     def _refusal(self, name: str, fault: str) -> SessionFileError:
         return SessionFileError(
-            f"{self.path / name}: {fault}; it was neither read nor changed. Move it out of the folder, "
-            "or give another --session folder"
+            f"{self.path / name}: {fault}; it was neither read nor changed. Move it out of the folder, or {self._advice}"
         )
 
     def _sync(self) -> None:
@@ -247,16 +290,6 @@ def folder_fault(path: Path) -> str:
     if fault := _foreign(found):
         return f"{fault}; copy it to a folder of your own, and give that with --session"
     return ""
-
-
-def _file_fault(found: os.stat_result) -> str:
-    """Return why this is not a regular file of this user with one name; "" if it is."""
-    if _is_link(found) or not stat.S_ISREG(found.st_mode):
-        kind = "a symbolic link" if _is_link(found) else _KINDS.get(stat.S_IFMT(found.st_mode), "a device")
-        return f"is {kind}, not a file"
-    if found.st_nlink > 1:
-        return f"has {found.st_nlink} names (hard links), so that other places would change with it"
-    return _foreign(found)
 
 
 def _is_link(found: os.stat_result) -> bool:

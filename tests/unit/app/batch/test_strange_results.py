@@ -1,0 +1,153 @@
+"""A folder of results that somebody else can write to: links, pipes, devices and names that lead out of it."""
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from calib_core.errors import CalibrationError
+from cocalib.batch import input_digests
+from cocalib.batch.driving import drive
+from cocalib.batch.engines.in_process import InProcess
+from cocalib.batch.job import jobs_of
+from cocalib.batch.manifest import ManifestRow
+from cocalib.batch.plan import Plan, read_plans, write_plan
+from cocalib.batch.results_folder import OUTCOME_FILE, ResultsFolder
+from cocalib.cli import run
+from tests.batch_calls import quick_jobs
+from tests.unit.app.batch.test_results_folder import DIGEST, write
+
+pytestmark = [
+    pytest.mark.skipif(os.name == "nt", reason="no pipes and devices in folders"),
+    pytest.mark.timeout(60),  # what must not happen is that one of these is waited for
+]
+KINDS = ("link to /dev/zero", "link to a file", "pipe", "folder")
+
+
+def put(kind: str, place: Path) -> None:
+    """Put something that is not a regular file under a name."""
+    if place.exists():
+        place.unlink()
+    if kind == "link to /dev/zero":
+        place.symlink_to("/dev/zero")
+    elif kind == "link to a file":
+        other = place.parent.parent / "elsewhere.json"
+        other.write_text("theirs")
+        place.symlink_to(other)
+    elif kind == "pipe":
+        os.mkfifo(place)
+    else:
+        place.mkdir()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", [OUTCOME_FILE, "calibration.json", "export/tf2.sh"])
+def test_a_result_with_something_else_than_files_is_none_and_is_replaced(kind: str, name: str, tmp_path: Path) -> None:
+    folder = ResultsFolder(tmp_path)
+    write(folder)
+    put(kind, folder.folder_of(DIGEST) / name)
+    assert folder.outcome(DIGEST) is None
+    write(folder)
+    assert folder.outcome(DIGEST) is not None
+    assert not list(folder.folder_of("").glob(".*"))
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["/dev/zero", "../../elsewhere.json", "export/../calibration.json", "./calibration.json", "", "a//b", "a\\b"],
+)
+def test_an_outcome_that_lists_what_is_not_in_its_folder_is_none(name: str, tmp_path: Path) -> None:
+    folder = ResultsFolder(tmp_path)
+    write(folder)
+    place = folder.folder_of(DIGEST) / OUTCOME_FILE
+    outcome = json.loads(place.read_text())
+    outcome["files"][0]["name"] = name
+    place.write_text(json.dumps(outcome))
+    assert folder.outcome(DIGEST) is None
+
+
+@pytest.mark.parametrize("below", ["", "export"])
+def test_a_folder_of_a_result_that_is_a_link_is_not_followed(below: str, tmp_path: Path) -> None:
+    folder = ResultsFolder(tmp_path / "out")
+    write(folder)
+    place = folder.folder_of(DIGEST) / below
+    place.rename(tmp_path / "theirs")
+    place.symlink_to(tmp_path / "theirs")
+    assert folder.outcome(DIGEST) is None
+    write(folder)
+    assert folder.outcome(DIGEST) is not None
+    assert not folder.folder_of(DIGEST).is_symlink()
+    assert not list(folder.folder_of("").glob(".*"))
+    assert list((tmp_path / "theirs").iterdir())
+
+
+def test_results_behind_a_link_are_neither_read_nor_written(tmp_path: Path) -> None:
+    (tmp_path / "theirs").mkdir()
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "results").symlink_to(tmp_path / "theirs")
+    with pytest.raises(
+        CalibrationError, match=r"out/results: is a symbolic link, .* or name another folder of results"
+    ):
+        drive(quick_jobs(tmp_path, 1), InProcess(), ResultsFolder(tmp_path / "out"))
+    with pytest.raises(CalibrationError, match="is a symbolic link"):
+        write(ResultsFolder(tmp_path / "out"))
+    assert list((tmp_path / "theirs").iterdir()) == []
+
+
+def test_the_folder_itself_may_be_a_link_of_the_users(tmp_path: Path) -> None:
+    (tmp_path / "large-disk").mkdir()
+    (tmp_path / "out").symlink_to(tmp_path / "large-disk")
+    write(ResultsFolder(tmp_path / "out"))
+    assert ResultsFolder(tmp_path / "large-disk").outcome(DIGEST) is not None
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_digests_of_inputs_are_never_read_or_written_through_something_else(
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(input_digests, "_SETTLED_NS", -(10**15))  # files of this moment count as settled
+    (tmp_path / "out").mkdir()
+    put(kind, tmp_path / "out" / "inputs.json")
+    (tmp_path / "a.bag").write_bytes(b"x")
+    with pytest.raises(CalibrationError, match=r"inputs\.json: is .*, not a file; it was neither read nor changed"):
+        jobs_of([ManifestRow("v", "s", (tmp_path / "a.bag",))], tmp_path / "out")
+    if kind == "link to a file":
+        assert (tmp_path / "elsewhere.json").read_text() == "theirs"
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_a_manifest_wants_is_never_read_or_written_through_something_else(kind: str, tmp_path: Path) -> None:
+    (tmp_path / "out" / "manifests").mkdir(parents=True)
+    put(kind, tmp_path / "out" / "manifests" / "fleet.toml.json")
+    assert read_plans(tmp_path / "out") == Plan({})
+    with pytest.raises(
+        CalibrationError, match=r"fleet\.toml\.json: is .*, not a file; it was neither read nor changed"
+    ):
+        write_plan(tmp_path / "out", Path("fleet.toml"), ())
+    if kind == "link to a file":
+        assert (tmp_path / "out" / "elsewhere.json").read_text() == "theirs"
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_summary_is_never_written_through_something_else(
+    kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    write(ResultsFolder(out))
+    put(kind, out / "summary.html")
+    assert run(["fleet", "summary", str(out)]) == 2
+    assert "summary.html: is " in capsys.readouterr().err
+    if kind == "link to a file":
+        assert (tmp_path / "elsewhere.json").read_text() == "theirs"
+
+
+@pytest.mark.parametrize("kind", KINDS[:3])
+def test_an_outcome_that_is_no_file_is_named_and_left_out(
+    kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = ResultsFolder(tmp_path / "out")
+    write(folder)
+    put(kind, folder.folder_of(DIGEST) / OUTCOME_FILE)
+    assert run(["fleet", "status", str(tmp_path / "out")]) == 2
+    assert f"results/{DIGEST}/outcome.json: is a " in capsys.readouterr().err
