@@ -87,7 +87,7 @@ def test_every_option_that_the_program_names_exists(texts: dict[str, list[str]])
 
 
 def test_the_page_names_commands_that_exist(project_root: Path) -> None:
-    for path in sorted((project_root / "static").glob("*.js")):
+    for path in sorted((project_root / "static").rglob("*.js")):
         assert unknown_names(path.read_text(encoding="utf-8"), prose=PROSE) == [], path.name
 
 

@@ -7,7 +7,7 @@ from pathlib import Path, PurePosixPath
 
 import pytest
 
-ENTRIES = ("main.js", "pace.js")
+ENTRIES = ("main.js", "space/pace.js")
 """What a page loads by itself: ours, and viser's in the frame of the 3D view."""
 _IMPORT = re.compile(r'^import\s+(?:(?P<what>[\w*{][^"\';]*?)\s+from\s+)?"(?P<path>[^"]+)";', re.MULTILINE)
 _EXPORT = re.compile(
@@ -17,7 +17,7 @@ _LISTED = re.compile(r'^export\s+\{(?P<names>[^}]*)\}(?:\s+from\s+"(?P<path>[^"]
 _EITHER = re.compile(r"^(?:import|export)\b", re.MULTILINE)
 _COMMENT = re.compile(r"/\*.*?\*/|(?<![:\"'`\w\\/])//[^\n]*", re.DOTALL)
 _IN_COMMENT = re.compile(r'import\("(?P<path>\.[^"]+)"\)')
-_FROM_TEST = re.compile(r'const \{ (?P<names>[\w, ]+) \} = await import\("/(?P<path>[\w/]+\.js)"\)')
+_FROM_TEST = re.compile(r'const \{ (?P<names>[\w, ]+) \} = await import\(["\']/(?P<path>[\w/]+\.js)["\']\)')
 
 
 @dataclass(frozen=True, slots=True)

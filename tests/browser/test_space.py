@@ -18,8 +18,8 @@ from tests.browser.driving import Driver
 
 pytestmark = pytest.mark.browser
 CHANGED = (
-    "this version of viser has changed its private browser API; adapt static/space_hook.js, or lower the upper bound of viser in "
-    "pyproject.toml. Missing: "
+    "this version of viser has changed its private browser API; adapt static/space/viser_hook.js, or lower the upper bound "
+    "of viser in pyproject.toml. Missing: "
 )
 SETTLED = "__cocalibSpace.frameShown() === __cocalib.state.cursor && __cocalibSpace.lookShown().index === __cocalib.state.cursor"
 
@@ -58,7 +58,10 @@ def look_from(page: Driver, viewpoint: str) -> None:
 
 def test_viser_still_has_the_private_parts_that_labels_and_picking_use(solved: Driver) -> None:
     missing = solved.page.evaluate(
-        "async () => (await import('/space_hook.js')).missingParts(document.getElementById('space-view').contentWindow)"
+        """async () => {
+            const { missingParts } = await import("/space/viser_hook.js");
+            return missingParts(document.getElementById("space-view").contentWindow);
+        }"""
     )
     assert missing == [], CHANGED + ", ".join(missing)
     picking(solved)
@@ -235,7 +238,7 @@ def test_the_mathematics_of_picking_and_of_range_numbers(page: Driver) -> None:
 
 
 PICKING = """async () => {
-    const { nearest, describeReturn, ringPlaces, Board } = await import("/space_picking.js");
+    const { nearest, describeReturn, ringPlaces, Board } = await import("/space/layer.js");
     const item = (kind, x, y) => ({ kind, x, y, index: 0, key: kind, words: "" });
     const above = ([x, y]) => [200 - 10 * y, 290 - 10 * x];
     const size = () => [24, 16];

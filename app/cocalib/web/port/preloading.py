@@ -1,11 +1,12 @@
 """The page's modules, named in its head: the browser asks for all of them at once, not for each after the one that imports it."""
 
+import posixpath
 import re
 from collections.abc import Iterator
 from pathlib import Path
 
-_IMPORT = re.compile(r"""^(?:import|export)\b[^'"();]*?["']\./([a-z0-9_]+\.js)["']""", re.MULTILINE)
-_SCRIPT = re.compile(r'<script type="module" src="([a-z0-9_]+\.js)">')
+_IMPORT = re.compile(r"""^(?:import|export)\b[^'"();]*?["'](\.\.?/[a-z0-9_./]+\.js)["']""", re.MULTILINE)
+_SCRIPT = re.compile(r'<script type="module" src="([a-z0-9_/]+\.js)">')
 
 
 def with_preloaded_modules(page: str, folder: Path) -> str:
@@ -28,8 +29,9 @@ def _collect(name: str, folder: Path, names: dict[str, None]) -> None:
         return
     names[name] = None
     for imported in _imports(folder / name):
-        _collect(imported, folder, names)
+        _collect(posixpath.normpath(posixpath.join(posixpath.dirname(name), imported)), folder, names)
 
 
 def _imports(module: Path) -> Iterator[str]:
+    """Yield the paths that a module names, as it writes them."""
     yield from _IMPORT.findall(module.read_text(encoding="utf-8"))

@@ -143,7 +143,8 @@ class Routes:
     """Answers GET requests by path; every path that is served is listed explicitly."""
 
     def __init__(self, static: Path) -> None:
-        self._files = {f"/{path.name}": path for path in static.iterdir() if path.suffix in _TYPES and path.is_file()}
+        files = (path for path in static.rglob("*") if path.suffix in _TYPES and path.is_file())
+        self._files = {f"/{path.relative_to(static).as_posix()}": path for path in files}
         self._files["/"] = self._files[f"/{_PAGE}"]
         self._made: Mapping[str, Callable[[str], Reply]] | None = None
 
@@ -322,8 +323,8 @@ def _file_of(text: str) -> CalibrationFile:
 
 @cache
 def _viser_page() -> Reply:
-    """Return viser's own client with a limited drawing rate (static/pace.js)."""
-    page = client_page("../../pace.js")
+    """Return viser's own client with a limited drawing rate (static/space/pace.js)."""
+    page = client_page("../../space/pace.js")
     body = gzip.compress(page, mtime=0)
     return _reply(body, _TYPES[".html"], policy=_VISER_POLICY, more=(("Content-Encoding", "gzip"),))
 

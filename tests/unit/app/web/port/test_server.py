@@ -56,7 +56,7 @@ def test_the_page_and_its_parts_are_served_with_their_types_and_no_inline_script
     for path, kind in (
         ("/", "text/html"),
         ("/main.js", "text/javascript"),
-        ("/look.css", "text/css"),
+        ("/shell/look.css", "text/css"),
         ("/icon.svg", "image/svg+xml"),
     ):
         answer = get(server, path, Cookie=cookie)
@@ -65,7 +65,7 @@ def test_the_page_and_its_parts_are_served_with_their_types_and_no_inline_script
         assert answer.headers["X-Content-Type-Options"] == "nosniff"
         assert "script-src 'self';" in answer.headers["Content-Security-Policy"]
         assert "unsafe" not in answer.headers["Content-Security-Policy"]
-    page = re.sub(rb'<link rel="modulepreload" href="[a-z0-9_]+[.]js">', b"", get(server, "/", Cookie=cookie).body)
+    page = re.sub(rb'<link rel="modulepreload" href="[a-z0-9_/]+[.]js">', b"", get(server, "/", Cookie=cookie).body)
     assert page == (project_root / "static" / "index.html").read_bytes()
 
 
@@ -74,7 +74,7 @@ def test_viser_still_starts_its_server_as_the_hook_expects(server: RunningServer
 
     page = get(server, "/viser/tab1/", Cookie=cookie)
     scripts = re.findall(rb"<script[^>]*>", gzip.decompress(page.body) if page.body[:2] == b"\x1f\x8b" else page.body)
-    assert scripts[0] == b'<script src="../../pace.js">', "the pace must be set before viser's script runs"
+    assert scripts[0] == b'<script src="../../space/pace.js">', "the pace must be set before viser's script runs"
     assert len(scripts) > 1
     assert page.status == 200
     assert page.headers["X-Frame-Options"] == "SAMEORIGIN"
@@ -123,7 +123,8 @@ def test_a_websocket_without_the_cookie_is_refused(server: RunningServer) -> Non
 @pytest.mark.parametrize(
     "path",
     ["/../pyproject.toml", "/..%2fpyproject.toml", "/%2e%2e/pyproject.toml", "/..\\pyproject.toml", "//etc/passwd",
-     "/static/main.js", "/viser/../../app/cocalib/web/server.py", "/viser/", "/viser/a/b/", "/viser/%2e%2e/", "/api/",
+     "/static/main.js", "/shell", "/shell/", "/shell/../main.js", "/shell/..%2fmain.js", "/state.js",
+     "/viser/../../app/cocalib/web/server.py", "/viser/", "/viser/a/b/", "/viser/%2e%2e/", "/api/",
      "/api/export/nothing", "/api/export/../clicks.json"],
 )  # fmt: skip
 def test_no_other_path_exists(server: RunningServer, cookie: str, path: str) -> None:

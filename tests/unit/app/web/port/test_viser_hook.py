@@ -113,10 +113,10 @@ def test_a_client_that_has_left_has_no_address(server: viser.ViserServer) -> Non
 
 
 def test_visers_page_runs_our_script_first_and_hides_its_panels() -> None:
-    page = viser_hook.client_page("../../pace.js").decode()
+    page = viser_hook.client_page("../../space/pace.js").decode()
     head, _, rest = page.partition("</head>")
     scripts = re.findall(r"<script[^>]*>", page)
-    assert scripts[0] == '<script src="../../pace.js">'
+    assert scripts[0] == '<script src="../../space/pace.js">'
     assert len(scripts) > 1, CHANGED
     assert "mantine-Paper-root" in head, CHANGED
     assert "<body" in rest, CHANGED

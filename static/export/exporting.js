@@ -1,0 +1,383 @@
+/**
+ * The export panel: a preview of every format, with its numbers, its check point and what it rests on; the clicks, saved or added from
+ * a file.
+ */
+
+import { ask, BROKE_OFF, content, saveFile } from "../shell/asking.js";
+import { icon, make, toast } from "../shell/notices.js";
+import { send } from "../shell/socket.js";
+import { on, state } from "../shell/state.js";
+import { frameDrawing, IDENTITY, nameFields, parentFields, rectifiedBox, shape } from "./fields.js";
+import { drawFormats, focusFormats, formatColumn } from "./list.js";
+
+/** @typedef {import("./list.js").Format} Format */
+/** The server's preview of a format: ExportPreview in app/cocalib/web/channel/export_preview.py. @typedef {Record<string, any>} Preview */
+const KEPT = "cocalib-export";
+const CLICKS = "clicks";
+const REPORT = "report";
+const IN_REPORT = [
+  "Answer: verdict, transform both ways, error bars",
+  "Cautions: warnings, and what to do",
+  "Uncertainty in the picture at 5, 20 and 60 m",
+  "Residuals against range, azimuth, place and time",
+  "Coverage of picture and range",
+  "Pairs",
+  "Provenance: files by their hashes, options, versions",
+];
+/** What is downloaded as it is, without fields to fill in. @type {Record<string, string>} */
+const PLAIN = { [CLICKS]: "api/clicks.json", [REPORT]: "api/report.html" };
+const ASKING = "Asking the server for the file…";
+const dialog = /** @type {HTMLDialogElement} */ (document.getElementById("export-dialog"));
+const button = /** @type {HTMLButtonElement} */ (document.getElementById("export"));
+/** @type {Format[]} */
+let formats = [];
+/** @type {{format: string, parent: string[]}} */
+let kept = { format: "json", parent: [...IDENTITY] };
+let asked = 0;
+
+const head = make("div", "what", []);
+const names = nameFields(() => load());
+const rectified = rectifiedBox(() => load());
+/** @type {ReturnType<typeof parentFields>} */
+let parent;
+const before = make("div", "before", []);
+const text = make("pre", "text", "");
+const notes = make("ul", "notes", []);
+const side = make("aside", "", []);
+const fileName = make("input", "", []);
+const copy = make("button", "second", "Copy");
+const save = make("button", "first", "Download");
+const retry = make("button", "second", "Try again");
+
+export function startExporting() {
+  try {
+    kept = { ...kept, ...JSON.parse(localStorage.getItem(KEPT) ?? "{}") };
+  } catch {
+    // Without storage, the choice is just not remembered.
+  }
+  build();
+  dialog.addEventListener("keydown", trap);
+  dialog.addEventListener("cancel", () => /** @type {HTMLElement|null} */ (document.activeElement)?.blur()); // the next key is not for a field that is going
+  dialog.addEventListener("click", (event) => {
+    if (event.target === dialog) dialog.close();
+  });
+  retry.onclick = load;
+  on(["view"], () => {
+    button.classList.toggle("ready", state.view?.has_calibration ?? false);
+    if (dialog.open) load();
+  });
+  on(["recording"], () => {
+    names.typed.clear();
+    loadFormats();
+  });
+  on(["connection"], () => {
+    if (dialog.open) load(); // the server is back, or gone
+  });
+}
+
+/** Ask for the formats that the server can write. */
+async function loadFormats() {
+  const { answer } = await ask("api/formats.json");
+  const given = answer && (await content(answer.json()));
+  if (!given) return;
+  formats = given;
+  if (!formats.some((format) => format.key === kept.format) && !(kept.format in PLAIN)) kept.format = "json";
+  drawList();
+}
+
+export function openExport() {
+  if (dialog.open || !state.recording) return;
+  drawList();
+  drawReason(ASKING);
+  dialog.showModal();
+  focusFormats();
+  load();
+}
+
+function build() {
+  const close = make("button", "icon close", "×");
+  close.setAttribute("aria-label", "Close");
+  close.onclick = () => dialog.close();
+  const title = make("h2", "", "Export");
+  title.id = "export-title";
+  text.tabIndex = 0;
+  text.setAttribute("aria-label", "File content");
+  fileName.type = "text";
+  fileName.spellcheck = false;
+  fileName.setAttribute("aria-label", "File name");
+  fileName.addEventListener("keydown", (event) => {
+    if (event.key === "Enter") download();
+  });
+  copy.onclick = copyText;
+  save.onclick = download;
+  parent = parentFields(kept.parent, (values) => {
+    keep({ parent: values });
+    load();
+  });
+  const list = formatColumn((key) => {
+    keep({ format: key });
+    load();
+  });
+  const foot = make("div", "foot", [importer(), make("span", "gap", ""), make("label", "name", ["File name", fileName]), copy, save]);
+  dialog.append(make("div", "top", [title, close]), list, make("section", "", [head, names.element, rectified.row, parent.element, before, text, notes]), side, foot);
+}
+
+/** The formats, and the clicks and the report as two of them. */
+function drawList() {
+  const clicks = { key: CLICKS, label: "Clicks, to continue elsewhere", group: "Go on", also: "clicks.json session", takes_parent: false, takes_rectified: false };
+  const report = { key: REPORT, label: "Report: how good, where, and why", group: "Go on", also: "report.html pdf print quality", takes_parent: false, takes_rectified: false };
+  drawFormats([...formats, clicks, report], kept.format);
+}
+
+/** Keep Tab inside the panel. @param {KeyboardEvent} event */
+function trap(event) {
+  if (event.key !== "Tab") return;
+  const stops = /** @type {HTMLElement[]} */ ([...dialog.querySelectorAll("button, input:not([type=file]), label[tabindex], summary, pre")]).filter(
+    (stop) => stop.tabIndex >= 0 && !stop.hasAttribute("disabled") && stop.offsetParent !== null,
+  );
+  const [first, last] = [stops[0], stops[stops.length - 1]];
+  const leaving = event.shiftKey ? first : last;
+  if (document.activeElement !== leaving) return;
+  event.preventDefault();
+  (event.shiftKey ? last : first).focus();
+}
+
+/** Ask the server for the text of the chosen format; only the newest answer is drawn. */
+async function load() {
+  const mine = ++asked;
+  if (!formats.length) await loadFormats();
+  const key = kept.format;
+  const { answer, reason, isLost } = await ask(key === CLICKS ? PLAIN[key] : key === REPORT ? "api/preview/json" : address("preview"));
+  const said = answer && (await content(key === CLICKS ? answer.text() : answer.json()));
+  if (mine !== asked) return;
+  if (said === null) drawReason(reason || BROKE_OFF, isLost || !reason);
+  else if (key === CLICKS) drawClicks(said);
+  else if (said.reason) drawReason(said.reason, false, key === REPORT ? null : said.field);
+  else if (key === REPORT) drawReport(said);
+  else drawPreview(said);
+}
+
+/** @param {"preview"|"export"} kind */
+function address(kind) {
+  const query = new URLSearchParams();
+  if (takesParent() && kept.parent.join() !== IDENTITY.join()) query.set("parent_from_radar", kept.parent.join());
+  if (takesRectified() && rectified.box.checked) query.set("rectified", "1");
+  for (const [name, value] of names.typed) query.set(name, value);
+  return `api/${kind}/${encodeURIComponent(kept.format)}${query.size ? `?${query}` : ""}`;
+}
+
+const form = () => formats.find((format) => format.key === kept.format);
+const takesParent = () => form()?.takes_parent ?? false;
+const takesRectified = () => form()?.takes_rectified ?? false;
+
+/** @param {number} bytes */
+const size = (bytes) => (bytes < 1e6 ? `${Math.max(1, Math.round(bytes / 1e3))} kB` : `${(bytes / 1e6).toFixed(1)} MB`);
+
+/** @param {Preview} preview */
+function drawPreview(preview) {
+  const kind = preview.is_binary ? `binary, ${size(preview.size_bytes)}; contents shown below` : "";
+  head.replaceChildren(make("span", "", preview.numbers), make("span", "kind", kind));
+  names.draw(preview);
+  drawFields({ names: true, parent: takesParent(), rectified: preview.is_for_rectified });
+  before.replaceChildren(...beforeSaving(preview));
+  show(preview.text, preview.file_name, preview.is_binary);
+  notes.replaceChildren(...preview.notes.map((/** @type {string} */ note) => make("li", "", note)));
+  side.replaceChildren(
+    ...(preview.pose ? [frameDrawing(preview.pose), make("p", "direction", preview.pose.words), ...numbers(preview)] : []),
+    ...checkPoint(preview.check_point),
+    make("div", `check ${preview.check_is_good ? "good" : "bad"}`, [make("b", "", preview.check_is_good ? "✓" : "!"), make("span", "", preview.check)]),
+  );
+}
+
+/** @param {string} content */
+function drawClicks(content) {
+  const count = state.view?.clicks.length ?? 0;
+  head.replaceChildren(make("span", "", `${count} click${count === 1 ? "" : "s"} with the stamps of their frames, for cocalib solve or to load on another machine`));
+  drawFields({});
+  show(content, "clicks.json", false);
+  for (const part of [before, notes, side]) part.replaceChildren();
+}
+
+/** Say what the report contains; it is written when it is downloaded. @param {Preview} preview of calibration.json */
+function drawReport(preview) {
+  head.replaceChildren(make("span", "", "One HTML file for a colleague: opens in any browser without a network, prints to at most four pages"));
+  drawFields({});
+  show(IN_REPORT.join("\n"), "report.html", true);
+  notes.replaceChildren();
+  before.replaceChildren();
+  side.replaceChildren(...(preview.pose ? [frameDrawing(preview.pose), make("p", "direction", preview.pose.words)] : []));
+}
+
+/** Show why there is nothing to save yet. @param {string} reason @param {boolean} [canRetry] @param {"frames"|"parent"|"rectified"|null} [field] that has to be filled in or corrected */
+function drawReason(reason, canRetry = false, field = null) {
+  head.replaceChildren();
+  drawFields({ names: field === "frames", parent: field === "parent", rectified: field === "rectified" });
+  names.refuse(field === "frames" ? reason : "");
+  parent.refuse(field === "parent" ? reason : "");
+  const words = field === "frames" || field === "parent" ? "There is no file until the field above is corrected." : reason.trim();
+  text.replaceChildren(make("div", "reason", [...(reason === ASKING ? [] : [icon("warning")]), make("span", "", words), ...(canRetry ? [retry] : [])]));
+  for (const part of [before, notes, side]) part.replaceChildren();
+  fileName.value = "";
+  for (const control of [fileName, copy, save]) control.disabled = true;
+}
+
+/** Show these fields, with nothing wrong in them. @param {{names?: boolean, parent?: boolean, rectified?: boolean}} shown */
+function drawFields(shown) {
+  names.element.hidden = !shown.names;
+  parent.element.hidden = !shown.parent;
+  rectified.row.hidden = !shown.rectified;
+  for (const fields of [names, parent]) fields.refuse("");
+}
+
+/** @param {string} content @param {string} name @param {boolean} isBinary */
+function show(content, name, isBinary) {
+  if (fileName.dataset.suggested !== name || !fileName.value) fileName.value = name;
+  fileName.dataset.suggested = name;
+  text.replaceChildren(...lines(content));
+  text.scrollTop = 0;
+  for (const control of [fileName, save]) control.disabled = false;
+  copy.disabled = isBinary;
+}
+
+async function copyText() {
+  const content = text.textContent ?? "";
+  try {
+    await navigator.clipboard.writeText(content);
+  } catch {
+    getSelection()?.selectAllChildren(text); // without HTTPS, a page on another machine has only this clipboard
+    document.execCommand("copy");
+  }
+  copy.classList.add("done");
+  setTimeout(() => copy.classList.remove("done"), 1600);
+}
+
+/** Download the file under the name in the field; if the server refuses, show why. */
+async function download() {
+  if (save.disabled) return;
+  const name = fileName.value.trim() || String(fileName.dataset.suggested);
+  const unsaved = await saveFile(PLAIN[kept.format] ?? address("export"), name);
+  if (unsaved) drawReason(unsaved.reason, unsaved.isLost);
+}
+
+/** @param {Partial<typeof kept>} change */
+function keep(change) {
+  Object.assign(kept, change);
+  try {
+    localStorage.setItem(KEPT, JSON.stringify(kept));
+  } catch {
+    // Without storage, the choice is just not remembered.
+  }
+}
+
+const field = make("input", "", []);
+field.type = "file";
+field.accept = ".json,application/json";
+field.onchange = async () => {
+  const file = field.files?.[0];
+  if (!file) return;
+  const dialog = /** @type {HTMLDialogElement|null} */ (document.querySelector("dialog[open]"));
+  dialog?.close();
+  const refusal = await send({ type: "import_clicks", text: await file.text(), name: file.name });
+  if (refusal) toast(refusal);
+  field.value = "";
+};
+
+/** Ask for a file of clicks, and add them. */
+export function loadClicks() {
+  field.click();
+}
+
+/** The button of the export dialog, with the field behind it. */
+function importer() {
+  const open = make("button", "second", "Load clicks…");
+  open.dataset.hint = "Add the clicks from a clicks.json. In frames that already have a click, they replace it.";
+  open.onclick = loadClicks;
+  return make("span", "", [open, field]);
+}
+
+/** FileNumbers of app/cocalib/web/exports/file_numbers.py. @typedef {{title: string, rows: {name: string, values: string[], unit: string}[]}} Numbers */
+/** CheckPointRow of app/cocalib/web/exports/check_point.py. @typedef {{words: string, u_px: number, v_px: number, width_px: number, height_px: number, pair: string}} CheckPoint */
+/** How much of the picture's width the inset shows, and its shape. */
+const INSET = 0.36;
+const INSET_ASPECT = 0.34;
+
+/** The text with its comments dimmed. @param {string} content */
+function lines(content) {
+  let inside = false;
+  return content.split(/(?<=\n)/).map((line) => {
+    const opens = line.includes("<!--");
+    const isComment = inside || opens || /^\s*(#|%)/.test(line);
+    inside = (inside || opens) && !line.includes("-->");
+    return isComment ? make("i", "", line) : line;
+  });
+}
+
+/** The file's own numbers; folded below what follows from them, and the calibration's. @param {Record<string, any>} preview */
+function numbers({ pose, our_pose }) {
+  const isChained = pose.in_third_frame.length > 0;
+  const own = (isChained ? pose.in_third_frame : [pose.numbers]).map(table);
+  for (const one of own) one.dataset.hint = "Read back from the file: its own numbers in its own order and units. Matrices are rounded to 9 decimals here; the file has all digits.";
+  const below = isChained ? [pose.numbers, our_pose] : [our_pose];
+  return [...own, ...below.map((one) => make("details", "ours", [make("summary", "", one.title), table(one)]))];
+}
+
+/** @param {Numbers} given */
+function table({ title, rows }) {
+  const most = Math.max(...rows.map((row) => row.values.length));
+  const lines = rows.map(({ name, values, unit }) => {
+    const cells = values.map((value) => make("td", "", value));
+    if (cells.length === 1) cells[0].colSpan = most;
+    return make("tr", "", [make("th", "", unit ? `${name} [${unit}]` : name), ...cells]);
+  });
+  return make("table", "pose-numbers", [make("caption", "", title), ...lines]);
+}
+
+/** The check point: in a cut-out of the picture, and in one sentence. @param {CheckPoint|null} point */
+function checkPoint(point) {
+  if (!point) return [];
+  const figure = make("figure", "check-point", [make("figcaption", "", [make("b", "", "Check point. "), point.words])]);
+  if (point.pair) figure.append(inset(point, () => figure.querySelector("svg")?.remove()));
+  return [figure];
+}
+
+/** A cut-out of the picture around the check point, with a mark on it. @param {CheckPoint} point @param {() => void} failed */
+function inset({ u_px, v_px, width_px, height_px, pair }, failed) {
+  const width = Math.max(INSET * width_px, 160);
+  const height = width * INSET_ASPECT;
+  const [u, v] = [u_px + 0.5, v_px + 0.5]; // pixel (0, 0) is the centre of the first one
+  const left = Math.max(0, Math.min(width_px - width, u - width / 2));
+  const top = Math.max(0, Math.min(height_px - height, v - height / 2));
+  const svg = shape("svg", { viewBox: `${left} ${top} ${width} ${height}`, class: "inset", role: "img", "aria-label": "The check point in the picture" });
+  const image = shape("image", { href: `api/check_point_picture?${encodeURIComponent(pair)}`, width: width_px, height: height_px });
+  image.addEventListener("error", failed);
+  const radius = 0.035 * width;
+  const arm = (/** @type {number} */ from, /** @type {number} */ to) => `M${u + from} ${v}H${u + to}M${u} ${v + from}V${v + to}`;
+  const path = `${arm(-1.7 * radius, -0.35 * radius)}${arm(0.35 * radius, 1.7 * radius)}`;
+  svg.append(image);
+  for (const name of ["rim", "mark"]) {
+    const mark = shape("g", { class: name });
+    mark.append(shape("circle", { cx: u, cy: v, r: radius }), shape("path", { d: path }));
+    svg.append(mark);
+  }
+  return svg;
+}
+
+/** What is to be known before saving: what the pose rests on, what the file cannot hold, the warnings. @param {Record<string, any>} preview */
+function beforeSaving(preview) {
+  const missing = preview.missing ? [make("div", "missing", [icon("warning"), make("strong", "", preview.missing)])] : [];
+  return [make("div", "evidence", preview.evidence), ...missing, ...warningBox(preview.warnings)];
+}
+
+/** The warnings of the calibration. @param {import("../messages.js").DataWarning[]} rows */
+function warningBox(rows) {
+  if (!rows.length) return [];
+  const title = rows.length === 1 ? "This calibration has one warning" : `This calibration has ${rows.length} warnings`;
+  const items = rows.map((row) => {
+    const item = make("li", "", row.message);
+    item.dataset.hint = row.hint;
+    return item;
+  });
+  const box = make("details", "with-warnings", [make("summary", "", [icon("warning"), title]), make("ul", "", items)]);
+  box.open = true;
+  return [box];
+}

@@ -1,0 +1,177 @@
+/** The top of the panel: the verdict in one line and what to do, the metrics; and the tab with the pose. All in the server's text. */
+
+import { proposalAdvice } from "../proposals/words.js";
+import { make } from "../shell/notices.js";
+import { on, state } from "../shell/state.js";
+import { drawWarnings } from "./warnings.js";
+
+/** @typedef {import("../messages.js").Figure} Figure */
+const figures = /** @type {HTMLElement} */ (document.getElementById("figures"));
+const posePage = /** @type {HTMLElement} */ (document.getElementById("page-pose"));
+/** Placeholders before the first calibration, so that the layout does not jump. @type {[string, string][]} */
+const EMPTY = [
+  ["aed", "average distance (AED)"],
+  ["held_out_aed", "new placement (held-out AED)"],
+  ["cdsd", "spread (CDSD)"],
+  ["rms", "root mean square (RMS)"],
+  ["inliers", "pairs that agree"],
+];
+const poseTable = make("table", "", []);
+const poseHead = make("div", "pose-head", "");
+const apartTable = make("table", "", []);
+const apart = make("div", "apart", []);
+const assumedHead = make("div", "pose-head", "Not measured by this radar, assumed");
+const assumedTable = make("table", "", []);
+const fleetWords = make("div", "", []);
+const fleet = make("div", "prior", []);
+const systematicTable = make("tbody", "", []);
+const systematicWords = make("div", "", []);
+const systematicNote = make("p", "note", "");
+const systematic = make("div", "systematic", []);
+const adviceLine = make("p", "advice", "");
+const axesLine = make("p", "advice axes", "Relative to the radar's axes: x forward, y left, z up. With all angles at 0, the camera looks along x.");
+
+export function startFigures() {
+  const pose = make("div", "pose", [make("div", "", [poseTable, assumedHead, assumedTable]), axesLine, adviceLine]);
+  const heads = [["error", ""], ["estimate", "From the pairs, ± one standard deviation"], ["before", "Assumed before any pair: Options"], ["position", "Part of the variance of the position"], ["rotation", "Part of the variance of the rotation"]];
+  const head = make("tr", "", heads.map(([name, hint]) => hinted(make("th", "", name), hint)));
+  systematic.append(make("div", "pose-head", "Errors that all pairs share"), systematicWords, make("table", "", [make("thead", "", [head]), systematicTable]), systematicNote);
+  fleet.append(make("div", "pose-head", "With the fleet's prior"), fleetWords);
+  posePage.append(poseHead, apart, pose, fleet, systematic);
+  on(["view", "recording", "placements"], draw);
+}
+
+function draw() {
+  const view = state.view;
+  if (!view) return;
+  figures.classList.toggle("stale", view.solving && !view.checking && view.has_calibration);
+  if (state.looking) {
+    figures.replaceChildren(...state.placementFigures.map(cell));
+    return drawWarnings([{ code: "no-camera", message: view.status, hint: view.hint }], state.recording?.warnings ?? [], view.assumptions, view.acknowledged);
+  }
+  const shown = view.metrics.length ? view.metrics : EMPTY.map(([key, label]) => ({ key, label, value: "–", unit: "", hint: "Available after the first calibration.", level: "none" }));
+  figures.replaceChildren(...shown.map(cell));
+  poseTable.replaceChildren(...(view.pose.length ? view.pose.map(row) : [make("tr", "", [make("td", "", "Available after the first calibration.")])]));
+  assumedHead.hidden = assumedTable.hidden = view.pose_assumed.length === 0;
+  assumedTable.replaceChildren(...view.pose_assumed.map(row));
+  fleet.hidden = view.fleet.length === 0;
+  fleetWords.replaceChildren(...view.fleet.map((text) => make("p", "", text)));
+  drawSystematic(view.systematic_errors);
+  adviceLine.textContent = view.advice?.words ?? "";
+  drawReference(view);
+  const failure = view.stage === "unsolvable" ? [{ code: "unsolvable", message: view.status, hint: view.hint }] : [];
+  drawWarnings([...failure, ...view.warnings], state.recording?.warnings ?? [], view.assumptions, view.acknowledged);
+}
+
+/** Name the file that the pose comes from, or show how far the solved pose is from the one in it. @param {import("../messages.js").View} view */
+function drawReference(view) {
+  poseHead.hidden = !view.reference || view.has_calibration;
+  poseHead.textContent = `From ${view.reference}, not from the clicks`;
+  apart.hidden = view.comparison.length === 0;
+  apart.replaceChildren(make("div", "pose-head", `Difference from ${view.reference}`), apartTable);
+  apartTable.replaceChildren(...view.comparison.map(row));
+}
+
+/** The errors that do not average out: what is known of each, and its part in the uncertainty. @param {import("../messages.js").SystematicErrorTable} errors */
+function drawSystematic(errors) {
+  systematic.hidden = errors.rows.length === 0;
+  systematicTable.replaceChildren(...errors.rows.map(systematicRow));
+  systematicWords.replaceChildren(...errors.sentences.map((text) => make("p", "", text)));
+  systematicNote.textContent = errors.note;
+}
+
+/** @param {import("../messages.js").SystematicErrorRow} error */
+function systematicRow(error) {
+  const bar = (/** @type {number} */ percent) => {
+    const part = make("b", "", []);
+    part.style.width = `${Math.min(percent, 100)}%`;
+    return make("td", "", [make("span", "part", [make("i", "", [part]), make("span", "", percent > 0 ? `${percent} %` : "–")])]);
+  };
+  const line = make("tr", error.level, [
+    make("td", "", error.label),
+    make("td", "", error.value === "–" ? error.value : [error.value, make("span", "unit", error.unit)]),
+    make("td", "", [error.prior, make("span", "unit", error.unit)]),
+    bar(error.position_percent),
+    bar(error.rotation_percent),
+  ]);
+  line.dataset.key = error.key;
+  return hinted(line, error.hint);
+}
+
+/** @template {HTMLElement} T @param {T} element @param {string} hint @returns {T} */
+function hinted(element, hint) {
+  if (hint) element.dataset.hint = hint;
+  return element;
+}
+
+/** @param {Omit<Figure, "level"> & {level: string}} figure */
+function cell(figure) {
+  const value = make("dd", "", [figure.value, make("span", "unit", figure.unit)]);
+  const box = make("dl", `figure ${figure.level}`, [make("dt", "", inTwoLines(figure.label)), value]);
+  box.style.margin = "0";
+  box.dataset.key = figure.key;
+  box.dataset.hint = figure.hint;
+  return box;
+}
+
+/** The paper's abbreviation goes below the name. @param {string} label @returns {(string|Node)[]} */
+function inTwoLines(label) {
+  const [name, abbreviation] = label.split(/ (?=\()/);
+  return abbreviation ? [`${name} `, make("span", "abbreviation", abbreviation)] : [name];
+}
+
+/** @param {Figure} figure */
+function row(figure) {
+  const line = make("tr", figure.level, [make("td", "", figure.label), make("td", "", figure.value), make("td", "", figure.unit)]);
+  line.dataset.key = figure.key;
+  line.dataset.hint = figure.hint;
+  return line;
+}
+
+/** @typedef {import("../messages.js").VerdictRow} VerdictRow */
+const box = /** @type {HTMLElement} */ (document.getElementById("verdict"));
+/** The shape of each level, so that colour is not needed to tell them apart. @type {Record<VerdictRow["level"], string[]>} */
+const SHAPES = {
+  good: ["M8 1.5a6.5 6.5 0 1 0 .01 0z", "M4.8 8.2 7.2 10.6 11.4 5.6"],
+  usable: ["M8 1.5a6.5 6.5 0 1 0 .01 0z", "M8 4.4v7.2M4.4 8h7.2"],
+  weak: ["M8 1.6 15 14H1z", "M8 6v4M8 11.4v1.2"],
+  contradictory: ["M8 .8 15.2 8 8 15.2.8 8z", "M5.6 5.6l4.8 4.8M10.4 5.6 5.6 10.4"],
+  nothing: ["M8 1.8a6.2 6.2 0 1 0 .01 0z"],
+};
+let drawn = "";
+
+export function startVerdict() {
+  on(["view", "recording", "proposals"], drawVerdict);
+}
+
+function drawVerdict() {
+  const view = state.view;
+  box.hidden = !view || state.looking;
+  if (!view || state.looking) return;
+  box.classList.toggle("stale", view.solving && view.has_calibration);
+  const { level, line, action, key, done } = view.verdict;
+  const proposed = key === "N" ? proposalAdvice() : "";
+  const text = JSON.stringify(view.verdict) + proposed;
+  if (text === drawn) return;
+  drawn = text;
+  box.dataset.level = level;
+  box.dataset.hint = [line, proposed ? `N${proposed}` : action].filter(Boolean).join("\n");
+  const rest = line.startsWith(level) ? line.slice(level.length) : ` ${line}`;
+  const next = make("p", done ? "next done" : "next", proposed ? [make("span", "key", key), make("span", "", proposed)] : [make("span", "", action)]);
+  if (key && !proposed) next.append(make("span", "key", key));
+  box.replaceChildren(shape(level), make("div", "words", [make("p", "line", [make("strong", "", level), rest]), next]));
+}
+
+/** @param {VerdictRow["level"]} level */
+function shape(level) {
+  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+  svg.setAttribute("viewBox", "0 0 16 16");
+  svg.setAttribute("aria-hidden", "true");
+  for (const [number, outline] of SHAPES[level].entries()) {
+    const path = document.createElementNS("http://www.w3.org/2000/svg", "path");
+    path.setAttribute("d", outline);
+    path.setAttribute("class", number ? "sign" : "body");
+    svg.append(path);
+  }
+  return svg;
+}

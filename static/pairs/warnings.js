@@ -1,0 +1,178 @@
+/**
+ * The warnings: one line each, the gravest first; one unfolds to its whole message and what to do about it. Where a calibration does not
+ * state what its numbers mean, one picks the meaning here, each drawn over the frame on the screen.
+ */
+
+import { ask, content } from "../shell/asking.js";
+import { showTab } from "../shell/layout.js";
+import { icon, make, toast } from "../shell/notices.js";
+import { openAgain } from "../shell/opening.js";
+import { send } from "../shell/socket.js";
+import { on, state } from "../shell/state.js";
+
+/** @typedef {import("../messages.js").DataWarning} WarningRow */
+/** @typedef {import("../messages.js").AssumptionRow} AssumptionRow */
+const box = /** @type {HTMLElement} */ (document.getElementById("warnings"));
+/** What the user has unfolded stays so. @type {Set<string>} */
+const openCodes = new Set(["unsolvable", "no-camera", "assumed", "calibration-ambiguous"]);
+/** What is no warning of a calibration, but why there is none. */
+const NOT_TO_ACKNOWLEDGE = ["unsolvable", "no-camera"];
+/** What leaves open what a calibration means: a person picks. */
+const TO_PICK = ["calibration-ambiguous", "calibration-picked"];
+/** What speaks of the lens. */
+const OF_THE_LENS = ["intrinsics-suspected", "lens-or-radar-scale"];
+let drawn = "";
+
+/**
+ * @param {WarningRow[]} ofPose about the calibration, the gravest first
+ * @param {WarningRow[]} ofRecording
+ * @param {AssumptionRow[]} assumptions
+ * @param {string[]} acknowledged codes of the warnings that the user has read
+ */
+export function drawWarnings(ofPose, ofRecording, assumptions, acknowledged) {
+  const text = JSON.stringify([ofPose, ofRecording, assumptions, acknowledged]);
+  if (text === drawn) return;
+  drawn = text;
+  const all = [...ofPose.map((warning) => ({ warning, kind: "" })), ...ofRecording.map((warning) => ({ warning, kind: "note" }))];
+  const read = all.filter(({ warning }) => acknowledged.includes(warning.code));
+  const unread = all.filter(({ warning }) => !acknowledged.includes(warning.code));
+  const total = unread.length + (assumptions.length ? 1 : 0);
+  if (!total && !read.length) return box.replaceChildren();
+  const held = document.activeElement?.closest("#warnings [data-code]")?.getAttribute("data-code");
+  const ofThePose = unread.filter(({ kind }) => !kind);
+  const rows = make("div", "rows", [
+    ...ofThePose.map(({ warning, kind }) => row(warning, kind, false)),
+    ...(assumptions.length ? [assumptionBox(assumptions)] : []),
+    ...unread.filter(({ kind }) => kind).map(({ warning, kind }) => row(warning, kind, false)),
+    ...(read.length ? [folded("acknowledged", "acknowledged", `${read.length} acknowledged`, read.map(({ warning, kind }) => row(warning, kind, true)))] : []),
+  ]);
+  const count = make("div", "count", `${total} warnings, the gravest first`);
+  box.replaceChildren(...(total > 1 ? [count] : []), rows);
+  if (held) /** @type {HTMLElement|null} */ (box.querySelector(`[data-code="${CSS.escape(held)}"] > summary`))?.focus({ preventScroll: true });
+}
+
+/** @param {WarningRow} warning @param {string} kind @param {boolean} read */
+function row(warning, kind, read) {
+  /** @type {HTMLElement[]} */
+  const inside = [make("div", "hint", warning.hint)];
+  if (TO_PICK.includes(warning.code)) {
+    const pick = make("button", "pick", "Pick a meaning…");
+    pick.onclick = openMeanings;
+    inside.push(pick);
+  }
+  if (OF_THE_LENS.includes(warning.code) || (warning.code === "unsolvable" && state.lens && !state.lens.intrinsics)) {
+    const open = make("button", "pick", "Open the tab Lens");
+    open.onclick = () => showTab("tab-lens");
+    inside.push(open);
+  }
+  if (!NOT_TO_ACKNOWLEDGE.includes(warning.code)) {
+    const button = make("button", "acknowledge", read ? "Show again" : "Acknowledge");
+    button.onclick = async () => {
+      const refusal = await send({ type: "warnings_acknowledged", codes: [warning.code], acknowledged: !read });
+      if (refusal) toast(refusal);
+    };
+    inside.push(button);
+  }
+  return folded(warning.code, `warning ${kind}`, warning.message, inside);
+}
+
+/** A line that unfolds. @param {string} code @param {string} className @param {string} line @param {HTMLElement[]} inside */
+function folded(code, className, line, inside) {
+  const made = make("details", className.trim(), [make("summary", "", [icon("warning"), make("span", "", line)]), ...inside]);
+  made.dataset.code = code;
+  made.open = openCodes.has(code);
+  made.ontoggle = () => (made.open ? openCodes.add(code) : openCodes.delete(code));
+  return made;
+}
+
+/** What the recording does not state, with a button that confirms all of it. @param {AssumptionRow[]} rows */
+function assumptionBox(rows) {
+  const confirm = make("button", "", "Confirm");
+  confirm.id = "confirm-assumptions";
+  confirm.onclick = async () => {
+    const refusal = await send({ type: "assumptions_confirmed", texts: rows.map((one) => one.text) });
+    if (refusal) toast(refusal);
+  };
+  const title = rows.length === 1 ? "One assumption about the recording is unconfirmed" : `${rows.length} assumptions about the recording are unconfirmed`;
+  const items = rows.map((one) => make("li", "", [one.words, make("div", "hint", one.hint)]));
+  return folded("assumed", "warning", title, [confirm, make("ul", "", items)]);
+}
+
+/** @typedef {{meaning: string, place: string, score: string, words: string, mounting: string, is_shown: boolean}} Row */
+
+const dialog = /** @type {HTMLDialogElement} */ (document.getElementById("meanings-dialog"));
+/** @type {{name: string, rows: Row[]}|null} */
+let known = null;
+/** The frame that is drawn on. */
+let frame = -1;
+
+export function startMeanings() {
+  on(["recording"], look);
+}
+
+/** Show the meanings once if the calibration needs a pick. */
+function look() {
+  const waits = state.recording?.warnings.some((warning) => warning.code === "calibration-ambiguous");
+  if (waits && !known) openMeanings();
+}
+
+/** Show the meanings to pick from, drawn over the frame on the screen. */
+async function openMeanings() {
+  const { answer, reason } = await ask("api/meanings.json");
+  const given = answer && (await content(answer.json()));
+  if (!given?.rows.length) return toast(reason || "This calibration states what its numbers mean.");
+  known = given;
+  draw();
+  if (!dialog.open) dialog.showModal();
+}
+
+function draw() {
+  if (!known) return;
+  frame = Math.max(0, state.shown?.index ?? 0);
+  const title = make("h2", "", `What does ${known.name} mean?`);
+  title.id = "meanings-title";
+  const close = make("button", "icon close", "×");
+  close.setAttribute("aria-label", "Close");
+  close.onclick = () => dialog.close();
+  const why = make("p", "why", "The file does not state it. Pick the picture in which the radar returns lie on what they come from; other frames may tell more.");
+  const rows = make("div", "meanings", known.rows.map(card));
+  dialog.replaceChildren(make("div", "top", [title, close]), why, frames(), rows);
+}
+
+/** Go to another frame: some moments tell more than others. */
+function frames() {
+  const slider = make("input", "", []);
+  const count = state.recording?.frame_times.sec.length ?? 1;
+  Object.assign(slider, { type: "range", min: "0", max: String(count - 1), value: String(frame) });
+  slider.setAttribute("aria-label", "Frame to draw on");
+  slider.onchange = () => {
+    frame = Number(slider.value);
+    dialog.querySelectorAll("img").forEach((picture, number) => (picture.src = address(number)));
+  };
+  return make("label", "frames", [make("span", "", "frame"), slider]);
+}
+
+/** @param {number} number */
+const address = (number) => `/api/meaning.jpg?number=${number}&frame=${frame}`;
+
+/** @param {Row} row @param {number} number */
+function card(row, number) {
+  const picture = make("img", "", []);
+  picture.src = address(number);
+  picture.alt = `Returns under ${row.meaning}: ${row.mounting}`;
+  const shown = row.is_shown ? [make("em", "", "Shown now")] : [];
+  const parts = [picture, make("strong", "", `${row.score}: ${row.mounting}`), make("small", "", row.words), ...shown];
+  if (known && new Set(known.rows.map((one) => one.place)).size > 1) parts.push(make("small", "", `at ${row.place}`));
+  const button = make("button", "meaning", parts);
+  button.dataset.meaning = row.meaning;
+  if (row.is_shown) button.setAttribute("aria-current", "true");
+  button.onclick = () => (row.is_shown ? dialog.close() : pick(row));
+  return button;
+}
+
+/** @param {Row} row */
+async function pick(row) {
+  dialog.classList.add("busy");
+  await openAgain({ meaning: row.meaning, meaning_place: row.place });
+  dialog.classList.remove("busy");
+}

@@ -1,0 +1,184 @@
+/**
+ * The camera frame on its canvas, with the layers that others draw over it: size, zoom, pan and redrawing; and the frame in words, for
+ * those who do not see it.
+ */
+
+import { clicksIn, emit, isClicked, on, placementAt, state } from "../shell/state.js";
+import * as geometry from "./geometry.js";
+
+const { viewport } = geometry;
+const pane = /** @type {HTMLElement} */ (document.getElementById("picture-pane"));
+const picture = /** @type {HTMLCanvasElement} */ (document.getElementById("picture"));
+export const marks = /** @type {HTMLCanvasElement} */ (document.getElementById("marks"));
+const paper = /** @type {CanvasRenderingContext2D} */ (picture.getContext("2d", { alpha: false }));
+const ink = /** @type {CanvasRenderingContext2D} */ (marks.getContext("2d"));
+/** From this many device px per image px on, pixels are shown as squares; not below, since their edges snap to device px. */
+const SQUARES_FROM = 8;
+/** What is drawn over the frame, from the bottom to the top. @type {{draw: (pen: CanvasRenderingContext2D) => void, when: () => boolean}[]} */
+const layers = [];
+let drawPicture = false;
+let drawInk = false;
+const words = /** @type {HTMLElement} */ (document.getElementById("picture-words"));
+/** The picture is described once nothing has changed for this long [ms], so that a screen reader can finish. */
+const REST_MS = 500;
+/** @type {Record<string, string>} */
+const STATES = { inlier: "agrees with the others", outlier: "does not agree with the others", excluded: "excluded", unpaired: "no radar return belongs to it", pending: "not in the calibration yet" };
+let timer = 0;
+
+export function startPicture() {
+  new ResizeObserver(measure).observe(pane);
+  watchRatio();
+  on(["shown", "opening"], () => {
+    if (state.shown) dropPreview();
+    takeSize();
+    redraw();
+  });
+  on(["view", "overlay", "selected", "layers", "hover", "placements", "theme", "candidates", "cross", "boxes", "lens", "proposals"], redrawMarks);
+  on(["theme"], redraw);
+  measure();
+}
+
+/** Draw something over every frame, above what was added before. @param {(pen: CanvasRenderingContext2D) => void} draw @param {() => boolean} when it is drawn */
+export const addLayer = (draw, when) => layers.push({ draw, when });
+
+/** Follow the ratio of device to CSS pixels, which changes with the browser's zoom and the monitor. */
+function watchRatio() {
+  matchMedia(`(resolution: ${window.devicePixelRatio}dppx)`).addEventListener(
+    "change",
+    () => {
+      measure();
+      watchRatio();
+    },
+    { once: true },
+  );
+}
+
+function measure() {
+  if (!geometry.resize(pane.clientWidth, pane.clientHeight)) return;
+  for (const canvas of [picture, marks]) {
+    canvas.width = Math.round(viewport.width * viewport.ratio);
+    canvas.height = Math.round(viewport.height * viewport.ratio);
+    canvas.style.width = `${viewport.width}px`;
+    canvas.style.height = `${viewport.height}px`;
+  }
+  paint();
+  emit("box");
+}
+
+/** Discard the preview once the first frame is shown. */
+function dropPreview() {
+  state.preview?.bitmap.close();
+  state.preview = null;
+}
+
+/** Take the size of the picture from the first frame. */
+function takeSize() {
+  const shown = state.shown ?? state.preview;
+  if (!shown || (shown.width === viewport.imageWidth && shown.height === viewport.imageHeight)) return;
+  viewport.imageWidth = shown.width;
+  viewport.imageHeight = shown.height;
+  geometry.fit();
+  emit("box");
+}
+
+/** Draw everything with the next screen frame. */
+export function redraw() {
+  drawPicture = true;
+  redrawMarks();
+}
+
+function redrawMarks() {
+  if (drawInk) return;
+  drawInk = true;
+  requestAnimationFrame(paint);
+}
+
+function paint() {
+  if (drawPicture || !drawInk) paintPicture();
+  drawPicture = drawInk = false;
+  ink.setTransform(1, 0, 0, 1, 0, 0);
+  ink.clearRect(0, 0, marks.width, marks.height);
+  if (state.shown) for (const { draw, when } of layers) if (when()) draw(ink);
+}
+
+function paintPicture() {
+  paper.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--ground").trim() || "#000";
+  paper.fillRect(0, 0, picture.width, picture.height);
+  const shown = state.shown ?? state.preview;
+  if (!shown) return;
+  paper.imageSmoothingEnabled = viewport.scale < SQUARES_FROM * shown.scale;
+  paper.imageSmoothingQuality = state.playing ? "low" : "high";
+  const [x, y] = geometry.toDevice(-0.5, -0.5);
+  paper.drawImage(shown.bitmap, x, y, shown.width * viewport.scale, shown.height * viewport.scale);
+}
+
+/** Fit the picture into its box. */
+export function fit() {
+  geometry.fit();
+  redraw();
+  emit("box");
+}
+
+/** Zoom at a point of the box, by default in the middle. @param {number} factor @param {number} [x] @param {number} [y] CSS px */
+export function zoomBy(factor, x = viewport.width / 2, y = viewport.height / 2) {
+  geometry.zoomAt(factor, x, y);
+  redraw();
+  emit("box");
+}
+
+export function startDescribing() {
+  on(["shown", "view", "overlay", "look", "selected", "placements", "playing", "cursor"], () => {
+    clearTimeout(timer);
+    if (!state.playing) timer = window.setTimeout(drawWords, REST_MS);
+  });
+}
+
+function drawWords() {
+  const text = state.looking ? lookWords() : pictureWords();
+  if (words.textContent !== text) words.textContent = text;
+}
+
+/** The frame, its placement and its marks, in sentences. */
+function pictureWords() {
+  const index = state.shown?.index;
+  if (index === undefined) return "";
+  const returns = state.overlay?.index === index ? (state.overlay.returns?.length ?? 0) : 0;
+  const others = (state.view?.clicks ?? []).filter((click) => click.frame !== index).length;
+  return [moment(index), placementWords(index), ...markWords(index), plural(others, "mark in other frames", "marks in other frames"), plural(returns, "radar return in the picture", "radar returns in the picture")].filter(Boolean).join(". ") + ".";
+}
+
+/** The same for a recording without pictures. */
+function lookWords() {
+  const returns = state.look?.index === state.cursor ? state.look : null;
+  return returns ? `${[moment(state.cursor), placementWords(state.cursor)].filter(Boolean).join(". ")}.` : "";
+}
+
+/** @param {number} index */
+const moment = (index) => `Frame ${index + 1} of ${state.seconds.length}, ${(state.seconds[index] ?? 0).toFixed(1)} s`;
+
+/** @param {number} index */
+function placementWords(index) {
+  const placement = placementAt(index);
+  if (!placement) return state.placementsKnown ? "Between placements" : "";
+  const marked = state.looking || isClicked(placement) ? "" : ", not clicked yet";
+  return `Placement ${state.placements.indexOf(placement) + 1} of ${state.placements.length}, ${placement.range_m.toFixed(1)} m away${marked}`;
+}
+
+/** @param {number} index @returns {string[]} */
+function markWords(index) {
+  const here = clicksIn(index);
+  if (here.length) return here.flatMap((click) => [oneMark(click), click.note]);
+  const guess = state.overlay?.index === index ? state.overlay.guesses[0] : undefined;
+  return [guess ? `No mark in this frame; the reflector is expected at column ${guess[0].toFixed(0)}, row ${guess[1].toFixed(0)}` : "No mark in this frame"];
+}
+
+/** @param {import("../messages.js").ClickRow} click */
+function oneMark(click) {
+  const residual = click.residual_px === null ? "" : `, ${click.residual_px.toFixed(1)} px from where the radar expects it`;
+  const guessed = click.mark === "untouched" ? "a guess that does not count" : (STATES[click.state] ?? click.state);
+  const selected = click.id !== "" && click.id === state.selected ? ", selected" : "";
+  return `Mark ${click.id} at column ${click.u_px.toFixed(1)}, row ${click.v_px.toFixed(1)}${selected}: ${guessed}${residual}`;
+}
+
+/** @param {number} count @param {string} one @param {string} many */
+const plural = (count, one, many) => (count ? `${count} ${count === 1 ? one : many}` : "");

@@ -1,0 +1,46 @@
+/** Draws a proposal on the frame: a dashed cross with its 95 % ring, and faint numbers at the other places in question. */
+
+import { toDevice, viewport } from "../picture/geometry.js";
+import { cross, outlined } from "../picture/marks.js";
+import { ink } from "../shell/colours.js";
+import { shownOffer } from "./proposals.js";
+
+/** A ring of this many standard deviations contains 95 %. */
+const RING = 2.45;
+/** Arms begin this far from the middle, in widths of the reflector, so that they do not cover it. */
+const CLEAR = 0.3;
+const RADIUS = 8;
+
+/** @param {CanvasRenderingContext2D} pen */
+export function drawProposal(pen) {
+  const offer = shownOffer();
+  if (!offer) return;
+  const { ratio, scale } = viewport;
+  offer.row.places.forEach((place, index) => {
+    if (index !== offer.number) drawOther(pen, place, index + 1);
+  });
+  const [x, y] = toDevice(offer.place.u_px, offer.place.v_px);
+  const radius = Math.max(3 * ratio, RING * offer.place.sigma_px * scale);
+  const gap = Math.max(4 * ratio, radius + 2 * ratio, CLEAR * offer.row.width_px * scale);
+  outlined(pen, ink.guess, 1.2, () => pen.arc(x, y, radius, 0, 2 * Math.PI), [], 1.6);
+  outlined(pen, ink.click, 1.8, () => cross(pen, x, y, gap + 18 * ratio, gap), [4 * ratio, 3 * ratio]);
+}
+
+/** @param {CanvasRenderingContext2D} pen @param {import("../messages.js").ProposalPlace} place @param {number} number */
+function drawOther(pen, place, number) {
+  const { ratio } = viewport;
+  const [x, y] = toDevice(place.u_px, place.v_px);
+  pen.globalAlpha = 0.7;
+  outlined(pen, ink.guess, 1, () => pen.arc(x, y, 3 * ratio, 0, 2 * Math.PI), [2 * ratio, 2 * ratio], 1.4);
+  const [bx, by] = [x + 11 * ratio, y - 11 * ratio];
+  pen.beginPath();
+  pen.arc(bx, by, RADIUS * ratio, 0, 2 * Math.PI);
+  pen.fillStyle = "rgb(20 26 32 / 75%)";
+  pen.fill();
+  pen.font = `600 ${10 * ratio}px ${getComputedStyle(document.body).fontFamily}`;
+  [pen.textAlign, pen.textBaseline] = ["center", "middle"];
+  pen.fillStyle = "#ffffff";
+  pen.fillText(String(number), bx, by + 0.5 * ratio);
+  pen.textBaseline = "alphabetic";
+  pen.globalAlpha = 1;
+}

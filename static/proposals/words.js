@@ -1,0 +1,92 @@
+/** What is said of proposals: the line on the frame, how far they are, why there are none; and their switch, a chip among the layers. */
+
+import { marks } from "../picture/picture.js";
+import { make, toast } from "../shell/notices.js";
+import { send } from "../shell/socket.js";
+import { on, state } from "../shell/state.js";
+import { counted, heldBack, isSearching, openProposals, saidWords, say, searchWords, shownOffer } from "./proposals.js";
+
+/** @typedef {import("../pairs/steps.js").Words} Words */
+
+/** How many proposals there are, for sentences. */
+const howMany = () => `${openProposals().length} proposal${openProposals().length === 1 ? "" : "s"}${isSearching() ? " so far" : ""}`;
+
+/** N found no proposal: say why, if that is not because all are decided. */
+export function sayNone() {
+  const news = state.proposals;
+  if (!news?.on) return;
+  if (news.problem) say(`No proposals: ${[news.problem.replace(/\.$/, ""), news.hint.replace(/\.$/, "")].filter(Boolean).join(". ")}`);
+  else if (isSearching()) say(searchWords());
+}
+
+/** What N does where proposals wait, after the key; "" if none does. */
+export const proposalAdvice = () => (openProposals().length ? ` goes to the first of ${howMany()}.` : "");
+
+/** What is proposed, and what to do, for the line on the frame; null if nothing is. @returns {Words|null} */
+export function proposalWords() {
+  const waiting = heldBack();
+  if (waiting) return [`${waiting}; sent when the server is back`];
+  const offer = shownOffer();
+  if (!offer) return null;
+  const { row, number } = offer;
+  const { number: at, total } = counted(row);
+  const several = row.places.length > 1;
+  const sure = number ? `place ${number + 1} of ${row.places.length}` : surely(row.confidence);
+  const why = row.reason && !number ? `: ${row.reason}` : "";
+  const head = `${saidWords()}Proposal ${at} of ${total}${isSearching() ? " so far" : ""}, ${state.placements[row.placement].range_m.toFixed(1)} m away, ${sure}${why}.\n`;
+  return [head, { key: "Enter", action: "accept-proposal" }, " accepts it, ", ...(several ? [{ key: "C", action: "next-place" }, ` other place${row.places.length > 2 ? "s" : ""}, `] : []), { key: "X", action: "reject-proposal" }, " no reflector, ", { key: "N", action: "next-proposal" }, " next; or click the inner corner"];
+}
+
+/** A probability in words; none is certain. @param {number} confidence */
+const surely = (confidence) => (confidence > 0.99 ? "over 99 % sure" : `${Math.round(100 * confidence)} % sure`);
+
+/** Why a placement has no proposal, as a sentence; "" if it has one or nothing is known. @param {number} placement */
+export function silentWords(placement) {
+  const news = state.proposals;
+  if (!news?.on) return "";
+  if (isSearching()) return `Not compared yet: pictures of ${news.done} of ${news.count} placements looked at.`;
+  const reason = news.unproposed.find((one) => one.placement === placement)?.reason;
+  return reason ? `Not proposed: ${reason}.` : "";
+}
+
+/** How far the proposals are, in one line; "" if they are not being made. */
+function progressWords() {
+  const news = state.proposals;
+  if (!news?.on) return "";
+  if (news.problem) return [news.problem, news.hint].filter(Boolean).join(" ");
+  if (news.stage === "off") return "Waits for the placements in the radar data.";
+  if (news.stage === "looking") return `Looks at the pictures of placement ${Math.min(news.done + 1, news.count)} of ${news.count}.`;
+  if (news.stage === "comparing") return `Compares ${news.done} of ${news.count} placements with what was confirmed.`;
+  return `${openProposals().length} to decide${news.unproposed.length ? `; for ${news.unproposed.length} nothing can be proposed` : ""}.`;
+}
+
+/** Made at the start. @type {HTMLButtonElement} */
+let chip;
+
+export function startSwitch() {
+  chip = /** @type {HTMLButtonElement} */ (make("button", "chip", ""));
+  chip.dataset.layer = "proposals";
+  chip.onclick = (event) => {
+    toggleProposals();
+    if (event.detail) /** @type {HTMLElement} */ (marks.parentElement).focus({ preventScroll: true }); // Enter is for the picture then
+  };
+  document.getElementById("layers")?.append(chip);
+  drawChip();
+  on(["proposals", "recording", "placements"], drawChip);
+}
+
+/** O: propose, or do not. */
+export async function toggleProposals() {
+  const refusal = await send({ type: "propose", on: !state.proposals?.on });
+  if (refusal) toast(refusal);
+}
+
+function drawChip() {
+  const news = state.proposals;
+  const busy = news?.on && (news.stage === "looking" || news.stage === "comparing");
+  chip.hidden = !news || state.looking;
+  chip.setAttribute("aria-pressed", String(Boolean(news?.on)));
+  chip.classList.toggle("troubled", Boolean(news?.on && news.problem));
+  chip.replaceChildren(make("kbd", "", "O"), busy ? `Proposals ${news.done}/${news.count}` : news?.on && news.problem ? "Proposals: none" : "Proposals");
+  chip.dataset.hint = ["Proposes where the reflector stood: the radar says when, the picture shows where. Nothing counts before it is accepted. (O)", progressWords()].filter(Boolean).join("\n");
+}

@@ -1,0 +1,340 @@
+/** The review of all pairs: linked plots of the residuals with a filter, and why the selected pair uses its return. */
+
+import { comeTo } from "../picture/arriving.js";
+import { showTab } from "../shell/layout.js";
+import { make } from "../shell/notices.js";
+import { tell } from "../shell/socket.js";
+import { clicks, on, select, state } from "../shell/state.js";
+import { Plot } from "./plots.js";
+
+/** @typedef {import("../messages.js").ClickRow} Click */
+/** @typedef {import("../messages.js").Review} Review */
+/** @typedef {import("./plots.js").Mark} Mark */
+/** @typedef {import("./plots.js").Content} Content */
+/** @typedef {import("./plots.js").Kind} Kind */
+/** A pair that is drawn. @typedef {{click: Click, kind: Kind, right: number, down: number, length: number, order: number, influence: number|null, heldOut: number|null}} Row */
+
+const page = /** @type {HTMLElement} */ (document.getElementById("page-review"));
+/** @type {[Kind, string, string][]} */
+const KINDS = [
+  ["agreeing", "Agreeing", "Pairs that take part in the pose: filled dots."],
+  ["outlier", "Outliers", "Pairs that disagree with the others: diamonds."],
+  ["excluded", "Excluded", "Pairs that you left out: hollow dots."],
+  ["untouched", "Untouched", "Marks that stand where the radar expected them: hollow dots, without weight."],
+];
+/** @type {["length"|"right"|"down", string, string][]} */
+const PARTS = [
+  ["length", "Length", "Length of the residual [px]."],
+  ["right", "Right", "How far right of the click the reprojection is [px]."],
+  ["down", "Down", "How far below the click the reprojection is [px]."],
+];
+/** Plots of the residual: key, title, label of the axis, and where a pair is on it. @type {[string, string, string, (row: Row) => number|null][]} */
+const AGAINST = [
+  ["range", "Residual against range", "range [m]", (row) => row.click.range_m],
+  ["azimuth", "Residual against azimuth", "azimuth, left positive [°]", (row) => row.click.azimuth_deg],
+  ["column", "Residual against image column", "column [px]", (row) => row.click.u_px],
+  ["row", "Residual against image row", "row [px]", (row) => row.click.v_px],
+  ["time", "Residual against time", "time [s]", (row) => state.seconds[row.click.frame] ?? null],
+];
+
+const shown = { kinds: new Set(KINDS.map(([kind]) => kind)), low: 0, high: Infinity, part: /** @type {(typeof PARTS)[number][0]} */ ("length") };
+/** @type {import("./plots.js").Highlight} */
+const highlight = { hovered: new Set(), brushed: new Set(), selected: null };
+/** @type {Review|null} */
+let review = null;
+/** @type {import("../messages.js").PairReview|null} */
+let pair = null;
+/** What was asked for last, so that it is asked for once. */
+const asked = { review: "", pair: "" };
+/** @type {Map<string, Plot>} */
+export const plots = new Map();
+/** Whether the tab was shown when it was looked at last. */
+let open = false;
+/** The drawing that comes with the next screen frame. */
+let pending = 0;
+const filters = make("div", "review-filters", []);
+const grid = make("div", "review-plots", []);
+const readout = make("div", "review-readout", "");
+const wordsLine = make("p", "review-words", "");
+const why = make("section", "review-pair", []);
+
+export function startReview() {
+  readout.id = "review-readout";
+  readout.setAttribute("aria-live", "polite");
+  const listener = { hover: hovered, go, brush };
+  for (const [key, title] of [["histogram", "Residual lengths"], ...AGAINST, ["influence", "Influence of each pair"]]) {
+    const plot = new Plot(key, title, listener);
+    plots.set(key, plot);
+    grid.append(make("figure", "", [make("figcaption", "", title), plot.canvas]));
+  }
+  why.setAttribute("aria-label", "The selected pair");
+  page.append(filters, wordsLine, grid, readout, why);
+  drawFilters();
+  new ResizeObserver(() => visible() && drawPlots()).observe(grid);
+  on(["view", "selected", "theme", "recording"], refresh);
+  on(["box"], () => void (visible() !== open && refresh())); // a tab was shown; the box also changes while the picture is moved
+  on(["connection"], () => {
+    asked.review = asked.pair = "";
+    refresh();
+  });
+}
+
+/** Whether the tab is shown. */
+export const visible = () => !page.hidden;
+
+/** @param {Review} message */
+export function takeReview(message) {
+  review = message;
+  draw();
+}
+
+/** @param {import("../messages.js").PairReview} message */
+export function takePair(message) {
+  pair = message;
+  drawPair();
+}
+
+function refresh() {
+  open = visible();
+  if (!visible() || !state.view || !state.connected) return;
+  const answer = `${state.view.solved_revision} ${state.view.checking}`;
+  if (asked.review !== answer) tell({ type: "review" });
+  const wanted = state.selected ? `${answer} ${state.selected}` : "";
+  if (wanted && asked.pair !== wanted) tell({ type: "review_pair", id: state.selected });
+  Object.assign(asked, { review: answer, pair: wanted });
+  draw();
+}
+
+/** Draw everything with the next screen frame: a mark that is dragged changes the view many times. */
+function draw() {
+  pending ||= requestAnimationFrame(drawAll);
+}
+
+function drawAll() {
+  pending = 0;
+  if (!visible()) return;
+  highlight.selected = state.selected;
+  wordsLine.textContent = review?.words ?? "";
+  drawFilters();
+  drawPlots();
+  drawPair();
+}
+
+/** All pairs with a reprojection, in order of time. @returns {Row[]} */
+function rows() {
+  const more = new Map((review?.rows ?? []).map((row) => [row[0], row]));
+  const drawn = clicks().filter((click) => click.projected_px && click.state !== "pending" && click.state !== "unpaired");
+  return drawn.sort((a, b) => a.frame - b.frame).map((click, index) => {
+    const [u, v] = /** @type {[number, number]} */ (click.projected_px);
+    const [, influence, heldOut] = more.get(click.id) ?? ["", null, null];
+    return { click, kind: kindOf(click), right: u - click.u_px, down: v - click.v_px, length: click.residual_px ?? 0, order: index + 1, influence, heldOut };
+  });
+}
+
+/** @param {Click} click @returns {Kind} */
+function kindOf(click) {
+  if (click.mark === "untouched") return "untouched";
+  return click.state === "inlier" ? "agreeing" : click.state === "outlier" ? "outlier" : "excluded";
+}
+
+/** @param {Row} row */
+const passes = (row) => shown.kinds.has(row.kind) && (row.click.range_m ?? 0) >= shown.low && (row.click.range_m ?? 0) <= shown.high;
+
+/** Chips that say what is shown, made again when the counts change. */
+function drawFilters() {
+  const all = rows();
+  const held = /** @type {HTMLElement|null} */ (document.activeElement)?.dataset.filter;
+  if (document.activeElement instanceof HTMLInputElement && filters.contains(document.activeElement)) return;
+  const kinds = KINDS.filter(([kind]) => kind === "agreeing" || all.some((row) => row.kind === kind)).map(([kind, label, hint]) => {
+    const count = all.filter((row) => row.kind === kind).length;
+    return chip(kind, `${label} ${count}`, hint, shown.kinds.has(kind), () => void (shown.kinds.delete(kind) || shown.kinds.add(kind)));
+  });
+  const parts = PARTS.map(([part, label, hint]) => {
+    const button = make("button", "", label);
+    button.setAttribute("aria-pressed", String(shown.part === part));
+    button.dataset.filter = part;
+    button.dataset.hint = hint;
+    button.onclick = () => change(() => (shown.part = part));
+    return button;
+  });
+  const segments = make("div", "segmented", parts);
+  segments.setAttribute("role", "group");
+  segments.setAttribute("aria-label", "Part of the residual");
+  const large = chip("enlarge", "⤢", "Use the whole column for this tab, or give the 3D view its place back.", document.body.classList.contains("review-large"), enlargeReview);
+  large.setAttribute("aria-label", "Enlarge");
+  filters.replaceChildren(...kinds, make("span", "review-range", ["range", limit("low", "from"), "–", limit("high", "to"), "m"]), segments, large);
+  if (held) /** @type {HTMLElement|null} */ (filters.querySelector(`[data-filter="${held}"]`))?.focus({ preventScroll: true });
+}
+
+/** @param {string} key @param {string} label @param {string} hint @param {boolean} pressed @param {() => void} toggle */
+function chip(key, label, hint, pressed, toggle) {
+  const button = make("button", "chip", label);
+  button.dataset.filter = key;
+  button.dataset.hint = hint;
+  button.setAttribute("aria-pressed", String(pressed));
+  button.onclick = () => change(toggle);
+  return button;
+}
+
+/** @param {"low"|"high"} end @param {string} label */
+function limit(end, label) {
+  const field = make("input", "", []);
+  field.type = "number";
+  field.min = "0";
+  field.step = "1";
+  field.dataset.filter = end;
+  field.setAttribute("aria-label", `Range ${label} [m]`);
+  field.placeholder = end === "low" ? "0" : "∞";
+  field.value = Number.isFinite(shown[end]) && shown[end] > 0 ? String(shown[end]) : "";
+  field.oninput = () => {
+    shown[end] = field.value === "" ? (end === "low" ? 0 : Infinity) : Number(field.value);
+    drawPlots();
+  };
+  return field;
+}
+
+/** @param {() => unknown} what */
+function change(what) {
+  what();
+  draw();
+}
+
+/** Give the tab the whole column, or the 3D view its place back. */
+export function enlargeReview() {
+  if (!visible()) showTab("tab-review");
+  document.body.classList.toggle("review-large");
+  draw();
+}
+
+function drawPlots() {
+  const drawn = rows().filter(passes);
+  plots.get("histogram")?.show(histogram(drawn), highlight);
+  for (const [key, , label, at] of AGAINST) plots.get(key)?.show(scatter(drawn, label, at), highlight);
+  plots.get("influence")?.show(influences(drawn), highlight);
+}
+
+const EMPTY = "no pairs to show";
+
+/** How many residuals of each length, and how many the noise model expects. @param {Row[]} drawn @returns {Content} */
+function histogram(drawn) {
+  const { edges_px: edges, expected } = review?.histogram ?? { edges_px: [0, 1], expected: [] };
+  const width = edges[1] - edges[0];
+  const last = edges[edges.length - 1];
+  const judged = drawn.filter((row) => row.kind === "agreeing" || row.kind === "outlier");
+  const agreeing = judged.filter((row) => row.kind === "agreeing").length;
+  const bins = [...edges.slice(0, -1), last].map((edge, index) => {
+    const inside = judged.filter((row) => row.length >= edge && (edge === last || row.length < edge + width));
+    const between = edge === last ? `longer than ${digits(last)} px` : `from ${digits(edge)} to ${digits(edge + width)} px`;
+    const model = expected[index] === undefined ? "" : `, ${digits(expected[index] * agreeing)} expected`;
+    const kind = /** @type {Kind} */ (edge === last ? "outlier" : "agreeing");
+    return { ids: inside.map((row) => row.click.id), x: edge + width / 2, y: inside.length, kind, text: `${count(inside.length)} ${between}${model}` };
+  });
+  const curve = expected.map((share, index) => /** @type {[number, number]} */ ([edges[index] + width / 2, share * agreeing]));
+  const high = Math.max(1, ...bins.map((bin) => bin.y), ...curve.map(([, y]) => y)) * 1.08;
+  const axis = { label: curve.length ? "residual [px]; line: expected" : "residual [px]", low: 0, high: last + width };
+  return { marks: review?.histogram ? bins : [], x: axis, y: { label: "pairs", low: 0, high }, bar: width, curve, limit: null, empty: EMPTY };
+}
+
+/** @param {Row[]} drawn @param {string} label @param {(row: Row) => number|null} at @returns {Content} */
+function scatter(drawn, label, at) {
+  const marks = drawn.filter((row) => at(row) !== null).map((row) => ({ ids: [row.click.id], x: Number(at(row)), y: row[shown.part], kind: row.kind, text: told(row) }));
+  const limitPx = state.view?.residual_limit_px ?? null;
+  const usual = drawn.filter((row) => row.kind === "agreeing").map((row) => Math.abs(row[shown.part]));
+  const most = 1.12 * Math.max(1e-3, ...(usual.length ? usual : drawn.map((row) => Math.abs(row[shown.part]))));
+  const y = { label: `${shown.part === "length" ? "residual" : `residual ${shown.part}`} [px]`, low: shown.part === "length" ? 0 : -most, high: most };
+  return { marks, x: { label, ...spread(marks.map((mark) => mark.x)) }, y, bar: 0, curve: [], limit: shown.part === "length" ? limitPx : null, empty: EMPTY };
+}
+
+/** @param {Row[]} drawn @returns {Content} */
+function influences(drawn) {
+  const known = drawn.filter((row) => row.influence !== null);
+  const marks = known.map((row) => ({ ids: [row.click.id], x: row.order, y: Number(row.influence), kind: row.kind, text: told(row) }));
+  const high = 1.12 * Math.max(0.1, ...marks.map((mark) => mark.y));
+  return { marks, x: { label: "pair, in order of time", ...spread(marks.map((mark) => mark.x)) }, y: { label: "pose moves without it [σ]", low: 0, high }, bar: 0, curve: [], limit: null, empty: "this method states none" };
+}
+
+/** @param {Mark|null} mark */
+function hovered(mark) {
+  const ids = mark?.ids ?? [];
+  if (ids.length === highlight.hovered.size && ids.every((id) => highlight.hovered.has(id))) return;
+  highlight.hovered = new Set(ids);
+  readout.textContent = mark?.text ?? brushedText();
+  redraw();
+}
+
+const brushedText = () => (highlight.brushed.size ? `${count(highlight.brushed.size)} marked. Click beside the marks, or Esc, to end.` : "");
+
+/** @param {string[]} ids */
+function brush(ids) {
+  highlight.brushed = new Set(ids);
+  readout.textContent = brushedText();
+  redraw();
+}
+
+/** Go to a pair; of several, to the one with the longest residual, and mark the others. @param {Mark} mark */
+function go(mark) {
+  const met = clicks().filter((click) => mark.ids.includes(click.id)).sort((a, b) => (b.residual_px ?? 0) - (a.residual_px ?? 0));
+  if (!met.length) return;
+  if (met.length > 1) brush(mark.ids);
+  select(met[0].id);
+  comeTo(met[0].frame);
+}
+
+function redraw() {
+  for (const plot of plots.values()) plot.draw();
+}
+
+/** Which return the selected pair uses, and why. */
+function drawPair() {
+  why.hidden = !state.selected;
+  if (!state.selected) return;
+  if (pair?.id !== state.selected) return why.replaceChildren(make("h2", "", state.selected));
+  why.replaceChildren(...pairParts(pair));
+}
+
+/** @param {import("../messages.js").PairReview} pair @returns {HTMLElement[]} */
+function pairParts(pair) {
+  const facts = pair.facts.map((fact) => {
+    const box = make("div", "", [make("dt", "", fact.label), make("dd", "", fact.value)]);
+    box.dataset.hint = fact.hint;
+    return box;
+  });
+  const heads = ["used", "range", "direction", "score", "SNR", "returns in scans", "from the click"];
+  const head = make("tr", "", heads.map((name) => {
+    const cell = make("th", "", name);
+    cell.scope = "col";
+    return cell;
+  }));
+  const lines = pair.candidates.map((one) => {
+    const mark = make("td", "", one.chosen ? "●" : "○");
+    mark.setAttribute("aria-label", one.chosen ? "used" : "not used");
+    return make("tr", one.chosen ? "chosen" : "", [mark, ...[one.range, one.direction, one.score, one.snr, one.seen, one.distance].map((text) => make("td", "", text))]);
+  });
+  const scroll = make("div", "review-scroll", [make("table", "review-candidates", [make("thead", "", [head]), make("tbody", "", lines)])]);
+  scroll.tabIndex = 0; // a narrow panel scrolls it
+  scroll.setAttribute("role", "region");
+  scroll.setAttribute("aria-label", `Returns that ${pair.id} may use`);
+  return [make("h2", "", `Pair ${pair.id}`), make("p", "", pair.why), make("dl", "", facts), ...(pair.candidates.length ? [scroll] : [])];
+}
+
+/** Limits of an axis, a little beyond its values. @param {number[]} values */
+function spread(values) {
+  if (!values.length) return { low: 0, high: 1 };
+  const [low, high] = [Math.min(...values), Math.max(...values)];
+  const margin = 0.05 * (high - low) || 0.5;
+  return { low: low - margin, high: high + margin };
+}
+
+/** A pair in one line. @param {Row} row */
+function told(row) {
+  const { click } = row;
+  const side = (/** @type {number|null} */ angle, /** @type {string} */ plus, /** @type {string} */ minus) => `${Math.abs(angle ?? 0).toFixed(1)}° ${(angle ?? 0) >= 0 ? plus : minus}`;
+  const more = [row.heldOut === null ? "" : `held out ${digits(row.heldOut)} px`, row.influence === null ? "" : `influence ${digits(row.influence)} σ`];
+  return [`${click.id}: ${digits(row.length)} px`, `${click.range_m?.toFixed(1)} m, ${side(click.azimuth_deg, "left", "right")}`, ...more.filter(Boolean)].join(" · ");
+}
+
+/** Three significant digits. @param {number} value */
+const digits = (value) => (Math.abs(value) < 0.995 ? String(Number(value.toFixed(2))) : String(Number(value.toPrecision(3))));
+
+/** @param {number} number */
+const count = (number) => `${number} pair${number === 1 ? "" : "s"}`;

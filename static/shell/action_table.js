@@ -1,0 +1,153 @@
+/** The table of actions, once: words, keys, what runs and when it can be done. */
+
+import { boxing, selectBox } from "../boxes/boxes.js";
+import { forgetHere, goToKeyframe, hideHere, newBox, nextBox, nudgeBox, removeBox, withoutBox } from "../boxes/boxing.js";
+import { chooseBoxes, downloadBoxes, editLabel, stopFollowing, toggleEvaluate } from "../boxes/evaluating.js";
+import { loadClicks, openExport } from "../export/exporting.js";
+import { saveCamera } from "../lens/result.js";
+import { choose, nextCandidate, withoutCandidates } from "../pairs/candidates.js";
+import { nextWorst } from "../pairs/pairs.js";
+import { toPlacement } from "../picture/arriving.js";
+import { fitEye, zoomEye } from "../picture/birdseye.js";
+import { nudgeBy, removeSelected, snap, toggleExcluded, turnBack, withoutSnappable } from "../picture/clicking.js";
+import { toggleContours } from "../picture/contours.js";
+import { enterCross, toggleCross } from "../picture/cross.js";
+import { magnify, stretchContrast } from "../picture/loupe.js";
+import { toggleLayer } from "../picture/marks.js";
+import { fit, zoomBy } from "../picture/picture.js";
+import { toggleRectified, withoutRectified } from "../picture/rectified.js";
+import { dismissHere, withoutPlacement } from "../proposals/dismissing.js";
+import { acceptProposal, nextPlace, nextProposal, openProposals, previousProposal, rejectProposal, shownOffer, takesEnter, takesKeys } from "../proposals/proposals.js";
+import { sayNone, toggleProposals } from "../proposals/words.js";
+import { enlargeReview } from "../review/review.js";
+import { lookFrom, setCamera, toggleHidden, toggleLarge } from "../space/space.js";
+import { goLive, goTo, pause, play, step } from "../time/player.js";
+import { register } from "./actions.js";
+import { toggleHelp } from "./help.js";
+import { showTab } from "./layout.js";
+import { chooseRecording } from "./opening.js";
+import { togglePalette } from "./palette.js";
+import { clickIn, clicks, selectedClick, state } from "./state.js";
+
+const opened = () => (state.recording ? "" : "The recording is not open yet");
+const withPictures = () => opened() || (state.looking ? "There are no pictures in this recording" : "");
+const withFrames = () => opened() || (state.seconds.length > 1 ? "" : "There is only one frame");
+const withPlacements = () => opened() || (state.placements.length ? "" : "No placement was found in the radar data");
+const withMark = () => withPictures() || (clickIn(state.cursor) ? "" : "There is no mark in this frame");
+const withSnappable = () => withPictures() || withoutSnappable();
+const withSelected = () => withPictures() || (selectedClick() ? "" : "No pair is selected: go to one first");
+const withResiduals = () => withPictures() || (clicks().some((click) => click.residual_px !== null) ? "" : "There is no calibration yet");
+const undoable = () => withPictures() || (state.view?.can_undo ? "" : "There is nothing to undo");
+const redoable = () => withPictures() || (state.view?.can_redo ? "" : "There is nothing to redo");
+const withProposal = () => withPictures() || (shownOffer() ? "" : openProposals().length ? "No proposal is on screen: N goes to one" : "There is no proposal to decide");
+const withBoxes = () => withPictures() || (boxing.on ? "" : "Open the tab Evaluate first (A)");
+const withBox = () => withPictures() || withoutBox();
+const following = () => (state.following && !["complete", "ended"].includes(state.following.state) ? "" : "The recording is complete: no new frames come");
+
+/** @param {number} du @param {number} dv image px */
+const nudge = (du, dv) => () => (boxing.on ? nudgeBox(10 * du, 10 * dv) : nudgeBy(du, dv));
+/** @param {string} id of a button on the page */
+const press = (id) => () => document.getElementById(id)?.click();
+const zoom = (/** @type {number} */ factor) => (state.looking ? zoomEye(factor) : zoomBy(factor));
+
+const FRAMES = { help: "Step one frame", when: withFrames };
+const TENS = { help: "Step ten frames", when: withFrames };
+const ENDS = { help: "First or last frame", when: withFrames };
+const PLACES = { help: "Next or previous placement", when: withPlacements };
+const FINE = { group: "Mark", help: "Move the mark by 0.1 px", also: "nudge shift subpixel fine", when: () => (boxing.on ? withBox() : withMark()) };
+const COARSE = { group: "Mark", help: "Move the mark by 1 px", also: "nudge shift", when: () => (boxing.on ? withBox() : withMark()) };
+const ZOOM = { group: "Picture", help: "Zoom", when: opened };
+const OVERLAY = { group: "Picture", help: "Toggle overlays", when: withPictures };
+const SPACE = { group: "3D view", when: opened };
+
+/** Make the actions known, in the order of the help. */
+export function registerActions() {
+  register(
+    { id: "play", group: "Time", words: "Play or pause", keys: ["Space"], also: "start stop run video", run: () => (state.playing ? pause() : play()), when: withFrames },
+    { id: "frame-back", group: "Time", words: "One frame back", keys: ["ArrowLeft"], also: "previous step", run: () => step(-1), ...FRAMES },
+    { id: "frame-forward", group: "Time", words: "One frame forward", keys: ["ArrowRight"], also: "next step", run: () => step(1), ...FRAMES },
+    { id: "ten-back", group: "Time", words: "Ten frames back", keys: ["Shift+ArrowLeft"], also: "previous jump rewind", run: () => step(-10), ...TENS },
+    { id: "ten-forward", group: "Time", words: "Ten frames forward", keys: ["Shift+ArrowRight"], also: "next jump skip", run: () => step(10), ...TENS },
+    { id: "first-frame", group: "Time", words: "Go to the first frame", keys: ["Home"], also: "start beginning", run: () => goTo(0), ...ENDS },
+    { id: "last-frame", group: "Time", words: "Go to the last frame", keys: ["End"], also: "finish newest", run: () => goTo(state.seconds.length - 1), ...ENDS },
+    { id: "next-placement", group: "Time", words: "Next placement", keys: ["N"], also: "reflector position forward proposal", run: () => nextProposal() || (sayNone(), toPlacement(1)), ...PLACES },
+    { id: "previous-placement", group: "Time", words: "Previous placement", keys: ["P"], also: "reflector position back", run: () => previousProposal() || toPlacement(-1), ...PLACES },
+    { id: "live", group: "Time", words: "Show the newest frame as it comes", also: "live follow recording now", run: goLive, when: following },
+
+    { id: "place-mark", group: "Mark", words: "Show the keyboard's cross, then set the mark there", keys: ["Enter"], also: "click place add", run: () => (boxing.on ? newBox() : takesEnter() && !state.cross ? acceptProposal() : enterCross()), when: withPictures },
+    { id: "cross", group: "Mark", words: "Keyboard's cross: 1 to 9 zoom into a field, arrows move it, Backspace zooms out, Esc ends", keys: ["G"], also: "grid nine fields marking without mouse", run: toggleCross, when: withPictures },
+    { id: "next-candidate", group: "Mark", words: "Take the return that fits better, or the next one", keys: ["C"], also: "candidate choose radar association", run: () => (takesKeys() ? nextPlace() : nextCandidate()), when: () => withPictures() || (takesKeys() ? "" : withoutCandidates()) },
+    { id: "free-candidate", group: "Mark", words: "Leave the choice of the return to the program", keys: ["Shift+C"], also: "candidate automatic unchoose", run: () => choose(-1), when: () => withPictures() || (selectedClick()?.chosen ? "" : "No return was chosen for this mark") },
+    { id: "snap", group: "Mark", words: "Snap the mark, or the keyboard's cross, to the reflector's apex", keys: ["S"], also: "corner magnet refine subpixel image", run: snap, when: withSnappable },
+    { id: "mark-left", words: "Move the mark left by 0.1 px", keys: ["Alt+ArrowLeft"], run: nudge(-0.1, 0), ...FINE },
+    { id: "mark-right", words: "Move the mark right by 0.1 px", keys: ["Alt+ArrowRight"], run: nudge(0.1, 0), ...FINE },
+    { id: "mark-up", words: "Move the mark up by 0.1 px", keys: ["Alt+ArrowUp"], run: nudge(0, -0.1), ...FINE },
+    { id: "mark-down", words: "Move the mark down by 0.1 px", keys: ["Alt+ArrowDown"], run: nudge(0, 0.1), ...FINE },
+    { id: "mark-left-1", words: "Move the mark left by 1 px", keys: ["Alt+Shift+ArrowLeft"], run: nudge(-1, 0), ...COARSE },
+    { id: "mark-right-1", words: "Move the mark right by 1 px", keys: ["Alt+Shift+ArrowRight"], run: nudge(1, 0), ...COARSE },
+    { id: "mark-up-1", words: "Move the mark up by 1 px", keys: ["Alt+Shift+ArrowUp"], run: nudge(0, -1), ...COARSE },
+    { id: "mark-down-1", words: "Move the mark down by 1 px", keys: ["Alt+Shift+ArrowDown"], run: nudge(0, 1), ...COARSE },
+    { id: "delete", group: "Mark", words: "Delete the click", keys: ["Delete", "Backspace"], also: "remove mark erase", run: () => (boxing.on ? removeBox() : removeSelected()), when: () => (boxing.on ? withBox() : withSelected()) },
+    { id: "undo", group: "Mark", words: "Undo", keys: ["Ctrl+Z"], also: "back revert take back", run: () => turnBack("undo"), when: undoable },
+    { id: "redo", group: "Mark", words: "Redo", keys: ["Ctrl+Shift+Z", "Ctrl+Y"], also: "again repeat", run: () => turnBack("redo"), when: redoable },
+
+    { id: "next-proposal", group: "Proposal on screen", words: "Go to the next proposal, zoomed; P goes back", shows: ["N"], also: "reflector found suggestion", run: nextProposal, when: () => withPictures() || (openProposals().length ? "" : "There is no proposal to decide") },
+    { id: "accept-proposal", group: "Proposal on screen", words: "Accept the place that the picture shows", shows: ["Enter"], also: "confirm yes", run: acceptProposal, when: withProposal },
+    { id: "next-place", group: "Proposal on screen", words: "Take the next place where the reflector may stand", shows: ["C"], also: "candidate other", run: nextPlace, when: withProposal },
+    { id: "reject-proposal", group: "Proposal on screen", words: "It is not the reflector: dismiss the placement", shows: ["X"], also: "no wrong", run: rejectProposal, when: withProposal },
+    { id: "proposals", group: "Proposal on screen", words: "Propose where the reflector stood, or do not", keys: ["O"], also: "automatic find suggest off on switch", run: toggleProposals, when: withPictures },
+
+    { id: "worst", group: "Pairs", words: "Next worst pair", keys: ["J"], also: "outlier residual largest wrong bad", run: nextWorst, when: withResiduals },
+    { id: "exclude", group: "Pairs", words: "Exclude the pair, or include it again; without a mark, dismiss the placement", keys: ["X"], also: "leave out use ignore disable spurious", run: () => (takesKeys() ? rejectProposal() : clickIn(state.cursor) ? toggleExcluded() : dismissHere()), when: () => withPictures() || (takesKeys() ? "" : clickIn(state.cursor) ? withSelected() : withoutPlacement()) },
+
+    { id: "evaluate", group: "Boxes", words: "Draw boxes and judge the calibration by them, or go back to the clicks", keys: ["A"], also: "tab evaluate annotate acc accuracy bounding people cars moving", run: toggleEvaluate, when: withPictures },
+    { id: "next-box", group: "Boxes", words: "Select the next box in this frame", keys: ["Q"], also: "object cycle", run: nextBox, when: withBoxes },
+    { id: "deselect-box", group: "Boxes", words: "Select no box, so that the next one is another object (Esc)", also: "unselect none", run: () => selectBox(null), when: withBox },
+    { id: "new-box", group: "Boxes", words: "New box in the middle; Alt+arrows move it by 1 px, with Shift by 10", also: "draw add keyboard enter", run: newBox, when: withBoxes },
+    { id: "box-class", group: "Boxes", words: "Name the class of the box", keys: ["R"], also: "label rename person car", run: editLabel, when: withBoxes },
+    { id: "hide-box", group: "Boxes", words: "The object is hidden from this frame on", keys: ["H"], also: "end occluded left gone", run: hideHere, when: withBox },
+    { id: "keyframe-back", group: "Boxes", words: "Previous keyframe of the box", keys: [","], help: "Previous or next keyframe", also: "correction jump", run: () => goToKeyframe(-1), when: withBox },
+    { id: "keyframe-forward", group: "Boxes", words: "Next keyframe of the box", keys: ["."], help: "Previous or next keyframe", also: "correction jump", run: () => goToKeyframe(1), when: withBox },
+    { id: "forget-keyframe", group: "Boxes", words: "Take back what was said about the box in this frame", keys: ["Shift+Delete"], also: "keyframe remove correction", run: forgetHere, when: withBox },
+    { id: "stop-following", group: "Boxes", words: "Follow the boxes no farther", also: "cancel tracking stop", run: stopFollowing, when: () => withPictures() || (state.view?.boxes.some((track) => track.following) ? "" : "No box is being followed") },
+    { id: "load-boxes", group: "Boxes", words: "Load boxes from a file", also: "import open coco yolo cvat kitti openlabel annotations", run: chooseBoxes, when: withPictures },
+    { id: "save-boxes", group: "Boxes", words: "Download the boxes", also: "export save boxes.json annotations", run: downloadBoxes, when: () => withPictures() || (state.view?.boxes.length ? "" : "There are no boxes yet") },
+    { id: "remove-box", group: "Boxes", words: "Delete all boxes of the object", also: "track erase", run: removeBox, when: withBox },
+
+    { id: "fit", group: "Picture", words: "Fit the picture", keys: ["F"], also: "zoom reset whole 100", run: () => (state.looking ? fitEye() : fit()), when: opened },
+    { id: "zoom-in", words: "Zoom in", keys: ["+", "="], also: "magnify closer larger", run: () => zoom(1.25), ...ZOOM },
+    { id: "zoom-out", words: "Zoom out", keys: ["-"], also: "smaller farther", run: () => zoom(0.8), ...ZOOM },
+    { id: "show-returns", words: "Show or hide the radar returns", keys: ["1"], also: "overlay layer points dots", run: () => toggleLayer("returns"), ...OVERLAY },
+    { id: "show-clicks", words: "Show or hide the clicks of other frames", keys: ["2"], also: "overlay layer marks all", run: () => toggleLayer("others"), ...OVERLAY },
+    { id: "show-ellipses", words: "Show or hide the 95 % ellipses", keys: ["3"], also: "overlay layer uncertainty covariance", run: () => toggleLayer("ellipses"), ...OVERLAY },
+    { id: "show-predictions", words: "Show or hide the expected positions", keys: ["4"], also: "overlay layer predicted guess next placement", run: () => toggleLayer("predictions"), ...OVERLAY },
+    { id: "show-uncertainty", words: "Show or hide the uncertainty in the picture", keys: ["5"], also: "overlay layer contours map 95 % lines", run: toggleContours, ...OVERLAY },
+    { id: "rectify", group: "Picture", words: "Show the picture rectified, or as taken; drag lines along straight edges", keys: ["U"], also: "undistort distortion lens straight ruler grid intrinsics", run: toggleRectified, when: () => withPictures() || (boxing.on ? "Leave the tab Evaluate first" : withoutRectified()) },
+    { id: "loupe-more", group: "Picture", words: "Loupe: magnify more", keys: ["]"], help: "Loupe: 4 to 16 times", also: "zoom magnifier larger", run: () => magnify(1), when: withPictures },
+    { id: "loupe-less", group: "Picture", words: "Loupe: magnify less", keys: ["["], help: "Loupe: 4 to 16 times", also: "zoom magnifier smaller", run: () => magnify(-1), when: withPictures },
+    { id: "loupe-contrast", group: "Picture", words: "Loupe: stretch the contrast, or not", keys: ["L"], also: "magnifier brightness enhance dark", run: stretchContrast, when: withPictures },
+
+    { id: "view-behind", words: "3D: look from behind the radar", also: "viewpoint", run: () => lookFrom("behind"), ...SPACE },
+    { id: "view-above", words: "3D: look down from above", also: "viewpoint top bird", run: () => lookFrom("above"), ...SPACE },
+    { id: "view-side", words: "3D: look from the side", also: "viewpoint right", run: () => lookFrom("side"), ...SPACE },
+    { id: "view-camera", words: "3D: look from the camera, over its picture", also: "viewpoint overlay reprojection", run: () => setCamera(true), group: "3D view", when: withPictures },
+    { id: "space-hide", words: "Hide or show the 3D view", keys: ["V"], also: "3D close", run: () => toggleHidden(), ...SPACE },
+    { id: "space-large", words: "Enlarge the 3D view, or give the picture its place back", keys: ["B"], also: "3D big maximize full", run: () => toggleLarge(), ...SPACE },
+
+    { id: "tab-pairs", group: "Panel", words: "Show the pairs", also: "tab table list clicks placements", run: () => showTab("tab-pairs") },
+    { id: "tab-pose", group: "Panel", words: "Show the pose", also: "tab transform extrinsics rotation translation errors advice", run: () => showTab("tab-pose"), when: withPictures },
+    { id: "tab-review", group: "Panel", words: "Show the review", also: "tab plots residuals histogram influence compare solutions a b", run: () => showTab("tab-review"), when: withPictures },
+    { id: "enlarge-review", group: "Panel", words: "Enlarge the review, or give the 3D view its place back", also: "tab plots large column", run: enlargeReview, when: withPictures },
+    { id: "tab-lens", group: "Panel", words: "Show the lens: intrinsics, and calibrating them from a board", also: "tab camera intrinsics checkerboard charuco aprilgrid calibrate focal length distortion", run: () => showTab("tab-lens"), when: withPictures },
+    { id: "tab-options", group: "Panel", words: "Show the options", also: "tab settings parameters method", run: () => showTab("tab-options"), when: withPictures },
+    { id: "theme", group: "Panel", words: "Light or dark theme", also: "colours colors bright night mode", run: press("theme") },
+
+    { id: "export", group: "File", words: "Export the calibration or the clicks", keys: ["E"], also: "save download write file json yaml urdf tf format", run: openExport, when: withPictures },
+    { id: "recording", group: "File", words: "Choose another recording, other topics, intrinsics or session", also: "open file folder recent camera radar topic intrinsics", run: chooseRecording },
+    { id: "save-camera", group: "File", words: "Save the intrinsics in use as camera.yaml", also: "export download camera_info lens", run: () => saveCamera(true), when: () => withPictures() || (state.lens?.intrinsics ? "" : "There are no intrinsics yet") },
+    { id: "load-clicks", group: "File", words: "Load clicks from a file", also: "import open clicks.json", run: loadClicks, when: withPictures },
+
+    { id: "palette", group: "Help", words: "Search for an action, placement, pair or option", keys: ["Ctrl+K"], also: "command palette find go to", run: togglePalette },
+    { id: "help", group: "Help", words: "Keys, mouse and marks", keys: ["?"], also: "help shortcuts legend manual", run: () => toggleHelp() },
+  );
+}

@@ -1,0 +1,43 @@
+/** Colours of the marks. The residual ramp from blue through sand to red-orange also works for colour-blind users; shapes carry the same information. */
+
+/** @type {[number, [number, number, number]][]} */
+const RAMP = [
+  [0, [74, 170, 235]],
+  [0.35, [143, 200, 226]],
+  [0.6, [236, 214, 150]],
+  [0.8, [240, 158, 66]],
+  [1, [226, 82, 44]],
+];
+
+export const ink = {
+  click: "#ffffff",
+  ring: "#ffb454",
+  line: "#ffb454",
+  edge: "rgb(0 0 0 / 70%)",
+  still: "#6cc7ff",
+  moving: "#ff9d5c",
+  guess: "#b9e3ff",
+  grey: "#9aa6b2",
+};
+
+/** Residuals from here on have the last colour of the ramp [px]. The scale is fixed, so that a colour means the same after every click. */
+export const LARGE_PX = 30;
+
+/** Colour of a residual. @param {number|null} residual px @returns {string} */
+export function residualColour(residual) {
+  if (residual === null || !Number.isFinite(residual)) return ink.grey;
+  return rampColour(residual / LARGE_PX);
+}
+
+/** @param {number} share of the ramp, 0 to 1 */
+export function rampColour(share) {
+  const at = Math.min(1, Math.max(0, share));
+  const upper = RAMP.findIndex(([stop]) => stop >= at);
+  if (upper <= 0) return `rgb(${RAMP[0][1].join(" ")})`;
+  const [[low, from], [high, to]] = [RAMP[upper - 1], RAMP[upper]];
+  const part = (at - low) / (high - low);
+  return `rgb(${from.map((value, index) => Math.round(value + part * (to[index] - value))).join(" ")})`;
+}
+
+/** A colour of the theme. @param {string} name */
+export const themeColour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();

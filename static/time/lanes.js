@@ -1,0 +1,272 @@
+/**
+ * Draws the timeline, lane by lane: ruler, placements, clicks with their residuals as height, radar activity, how much the picture
+ * changes, and the current frame.
+ */
+
+import { confidences } from "../proposals/proposals.js";
+import { ink, residualColour, themeColour } from "../shell/colours.js";
+import { clicks, emit, isLookedAt, on, state } from "../shell/state.js";
+import { drawGaps, drawRuler, pixelsPerSecond, RULER, text } from "./ruler.js";
+
+export const lanes = { left: 74, right: 14, gap: 4, bottom: 5 };
+/** Returns per slice of time, from the server; empty until known. @type {{step_s: number, returns: number[]}} */
+export const activity = { step_s: 1, returns: [] };
+/** How much the picture changes after some moments, from the server. @type {PictureChanges} */
+export const changes = { seconds: [], grey_levels: [], complete: false };
+/** Changes below this are noise of the camera, at least [grey levels]; so a recording in which nothing moves is not all bright. */
+const MUCH = 12;
+/** @typedef {"placements"|"clicks"|"radar"|"picture"} LaneName */
+/** @typedef {Record<LaneName, {top: number, bottom: number}>} Boxes */
+const NAMES = { placements: "Placements", clicks: "Clicks", radar: "Radar", picture: "Picture" };
+/** A dismissed placement is one at this place and time [m]. */
+const SAME_PLACE_M = 0.75;
+/** A timeline of this height has larger text [CSS px]. */
+const LARGE = 140;
+
+/** @typedef {CanvasRenderingContext2D} Ink */
+/** What is drawn from: the visible part of the folded axis, and the way from seconds to CSS px. @typedef {{toX: (seconds: number) => number, from_s: number, to_s: number, folding: import("./ruler.js").Folding}} Axis */
+
+/** Where each lane is; a low timeline has no room for the last ones. @param {number} height CSS px @returns {Boxes} */
+export function laneBoxes(height) {
+  const picture = height >= LARGE ? 15 : height >= 84 ? 9 : 0;
+  const radar = height >= 48 ? Math.min(24, Math.round(height * 0.15)) : 0;
+  const placements = Math.max(9, Math.min(20, Math.round(height * 0.15)));
+  const bottom = height - lanes.bottom;
+  const radarBottom = bottom - (picture ? picture + lanes.gap : 0);
+  const clicksBottom = radarBottom - (radar ? radar + lanes.gap : 0);
+  const top = RULER + 2;
+  return {
+    placements: { top, bottom: top + placements },
+    clicks: { top: top + placements + 2, bottom: clicksBottom },
+    radar: { top: radarBottom - radar, bottom: radarBottom },
+    picture: { top: bottom - picture, bottom },
+  };
+}
+
+/**
+ * Draw everything.
+ * @param {Ink} pen @param {number} width @param {number} height CSS px @param {Axis} axis @param {number|null} pointer
+ */
+export function drawLanes(pen, width, height, axis, pointer) {
+  pen.clearRect(0, 0, width, height);
+  if (!state.seconds.length) return;
+  const boxes = laneBoxes(height);
+  [text.px, lanes.left] = height >= LARGE ? [13.5, 96] : [10.5, 74];
+  pen.save();
+  pen.beginPath();
+  pen.rect(lanes.left - 8, 0, width - lanes.left + 8, height);
+  pen.clip();
+  drawRuler(pen, lanes.left, width, height, axis);
+  drawRadar(pen, boxes.radar, axis);
+  drawPicture(pen, boxes.picture, axis);
+  pen.fillStyle = themeColour("line-strong");
+  pen.fillRect(lanes.left, boxes.clicks.bottom, width - lanes.left - lanes.right, 1);
+  drawGaps(pen, height, axis);
+  const sure = confidences();
+  state.placements.forEach((placement, index) => drawPlacement(pen, placement, sure.get(index) ?? 0, boxes.placements, axis));
+  for (const click of clicks()) drawStem(pen, click, axis.toX(state.seconds[click.frame]), boxes.clicks);
+  if (pointer !== null && pointer >= lanes.left) {
+    pen.fillStyle = themeColour("line-strong");
+    pen.fillRect(Math.round(pointer), RULER, 1, height - RULER);
+  }
+  drawCursor(pen, height, axis.toX(state.seconds[state.cursor] ?? 0));
+  pen.restore();
+  drawNames(pen, boxes);
+}
+
+/** @param {Ink} pen @param {Boxes} boxes */
+function drawNames(pen, boxes) {
+  pen.font = `${text.px}px ${getComputedStyle(document.body).fontFamily}`;
+  pen.textAlign = "left";
+  pen.textBaseline = "middle";
+  pen.fillStyle = themeColour("muted");
+  for (const name of /** @type {LaneName[]} */ (Object.keys(NAMES))) {
+    const { top, bottom } = boxes[name];
+    if (bottom - top >= 8) pen.fillText(NAMES[name], 8, (top + bottom) / 2 + 0.5);
+  }
+}
+
+/** What became of a placement. @param {import("../messages.js").PlacementRow} placement @returns {"clicked"|"dismissed"|"open"} */
+export function fateOf(placement) {
+  if (isLookedAt(placement)) return "clicked";
+  return dismissals().some(({ seconds, at }) => placement.start_s <= seconds && seconds <= placement.end_s && apart(at, placement.position_radar_m) < SAME_PLACE_M) ? "dismissed" : "open";
+}
+
+/** The dismissed placements, each with its time [s]. */
+function dismissals() {
+  const first = state.recording?.frame_times;
+  if (!first?.sec.length) return [];
+  return (state.view?.dismissed ?? []).map(({ time, position_m }) => ({ seconds: time.sec - first.sec[0] + (time.nanosec - first.nanosec[0]) * 1e-9, at: position_m }));
+}
+
+/** @param {number[]} a @param {number[]} b */
+const apart = (a, b) => Math.hypot(...a.map((value, axis) => value - b[axis]));
+
+/**
+ * Clicked = solid, not clicked = hollow and dashed, dismissed = a line with a cross.
+ * With a proposal: a bar at the lower edge, the longer the surer it is.
+ * @param {Ink} pen @param {import("../messages.js").PlacementRow} placement @param {number} sure 0 to 1 @param {{top: number, bottom: number}} box @param {Axis} axis
+ */
+function drawPlacement(pen, placement, sure, { top, bottom }, axis) {
+  if (placement.end_s < axis.from_s || placement.start_s > axis.to_s) return;
+  const here = state.seconds[state.cursor];
+  const left = axis.toX(placement.start_s);
+  const wide = Math.max(5, axis.toX(placement.end_s) - left);
+  const [middle, height] = [left + wide / 2, bottom - top];
+  const fate = fateOf(placement);
+  const current = placement.start_s <= here && here <= placement.end_s;
+  pen.lineWidth = 1;
+  pen.beginPath();
+  pen.roundRect(left, top, wide, height, 3);
+  pen.strokeStyle = themeColour(current ? "ink" : fate === "dismissed" ? "faint" : "accent");
+  if (fate === "dismissed") return drawDismissed(pen, left, left + wide, (top + bottom) / 2);
+  pen.fillStyle = themeColour(fate === "clicked" ? "accent" : "accent-soft");
+  pen.globalAlpha = fate === "clicked" ? 0.55 : 1;
+  pen.fill();
+  pen.globalAlpha = 1;
+  pen.setLineDash(fate === "open" ? [3, 3] : []);
+  pen.stroke();
+  pen.setLineDash([]);
+  if (sure) {
+    pen.fillStyle = themeColour("accent");
+    pen.fillRect(left + 1, bottom - 3, Math.max(2, (wide - 2) * sure), 3);
+  }
+  if (wide < 15 || height < 9) return;
+  pen.font = `600 ${text.px - 0.5}px ${getComputedStyle(document.body).fontFamily}`;
+  [pen.textAlign, pen.textBaseline] = ["center", "middle"];
+  pen.fillStyle = themeColour("ink");
+  pen.fillText(`${state.placements.indexOf(placement) + 1}${placement.note && wide >= 28 ? " !" : ""}`, middle, (top + bottom) / 2 + 0.5);
+}
+
+/** @param {Ink} pen @param {number} left @param {number} right @param {number} y */
+function drawDismissed(pen, left, right, y) {
+  const [middle, arm] = [(left + right) / 2, 3.5];
+  pen.beginPath();
+  pen.moveTo(left, y);
+  pen.lineTo(right, y);
+  for (const [dx, dy] of [[arm, arm], [arm, -arm]]) {
+    pen.moveTo(middle - dx, y - dy);
+    pen.lineTo(middle + dx, y + dy);
+  }
+  pen.stroke();
+}
+
+/** @param {Ink} pen @param {{top: number, bottom: number}} box @param {Axis} axis */
+function drawRadar(pen, { top, bottom }, axis) {
+  if (bottom === top) return;
+  const most = Math.max(1, activity.returns.reduce((a, b) => Math.max(a, b), 0));
+  pen.fillStyle = themeColour("faint");
+  pen.globalAlpha = 0.6;
+  const bars = columns(axis, activity.returns.length, (slice) => slice * activity.step_s, (slice) => activity.returns[slice]);
+  for (const [x, value] of bars) {
+    const tall = Math.max(1, (value / most) * (bottom - top));
+    pen.fillRect(x, bottom - tall, Math.max(1, barWidth(axis, activity.step_s)), tall);
+  }
+  pen.globalAlpha = 1;
+}
+
+/** How much the picture changes: low where it stands still. @param {Ink} pen @param {{top: number, bottom: number}} box @param {Axis} axis */
+function drawPicture(pen, { top, bottom }, axis) {
+  if (bottom === top) return;
+  pen.fillStyle = themeColour("attention");
+  changes.seconds.forEach((at, index) => {
+    const stretch = axis.folding.stretches.find(({ from, to }) => from <= at && at <= to);
+    const next = Math.min(changes.seconds[index + 1] ?? Infinity, stretch?.to ?? at);
+    if (next < axis.from_s || at > axis.to_s) return;
+    const share = changeShare(index);
+    const tall = Math.max(1, share * (bottom - top));
+    pen.globalAlpha = 0.3 + 0.5 * share;
+    pen.fillRect(axis.toX(at), bottom - tall, Math.max(1, axis.toX(next) - axis.toX(at)), tall);
+  });
+  pen.globalAlpha = 1;
+}
+
+/** A change as a part of the most in the recording. @param {number} index */
+const changeShare = (index) => Math.min(1, changes.grey_levels[index] / Math.max(MUCH, ...changes.grey_levels));
+
+/** The greatest value in each column of pixels, as [x, value]. @param {Axis} axis @param {number} count @param {(index: number) => number} time @param {(index: number) => number} value @returns {Map<number, number>} */
+function columns(axis, count, time, value) {
+  /** @type {Map<number, number>} */
+  const found = new Map();
+  const step = count > 1 ? time(1) - time(0) : 1;
+  const first = Math.max(0, Math.floor((axis.from_s - time(0)) / step) - 1);
+  for (let index = first; index < count && time(index) <= axis.to_s; index += 1) {
+    if (!value(index)) continue;
+    const x = Math.floor(axis.toX(time(index)));
+    found.set(x, Math.max(found.get(x) ?? 0, value(index)));
+  }
+  return found;
+}
+
+/** @param {Axis} axis @param {number} step_s */
+const barWidth = (axis, step_s) => Math.ceil(pixelsPerSecond(axis) * step_s) - (pixelsPerSecond(axis) * step_s > 3 ? 0.5 : 0);
+
+/** @param {Ink} pen @param {import("../messages.js").ClickRow} click @param {number} x @param {{top: number, bottom: number}} box */
+function drawStem(pen, click, x, { top, bottom }) {
+  const limit = state.view?.residual_limit_px ?? 20;
+  const size = Math.min(text.px / 3, (bottom - top) / 3);
+  const room = bottom - top - size - 1;
+  const least = Math.min(6, room);
+  const tall = click.residual_px === null ? least : Math.min(room, Math.max(least, (click.residual_px / (1.5 * limit)) * room));
+  const colour = ["pending", "unpaired", "untouched"].includes(click.state) ? ink.grey : residualColour(click.residual_px);
+  const chosen = click.id !== "" && click.id === state.selected;
+  pen.strokeStyle = pen.fillStyle = colour;
+  pen.lineWidth = chosen ? 2.5 : 1.5;
+  pen.beginPath();
+  pen.moveTo(x, bottom);
+  pen.lineTo(x, bottom - tall);
+  pen.stroke();
+  pen.beginPath();
+  head(pen, click.state, x, bottom - tall, chosen ? size + 1 : size);
+  if (["excluded", "unpaired", "untouched"].includes(click.state)) {
+    pen.fillStyle = themeColour("surface");
+    pen.fill();
+    pen.lineWidth = 1.5;
+    pen.stroke();
+  } else pen.fill();
+}
+
+/** Inlier = disc, outlier = diamond. @param {Ink} pen @param {string} clickState @param {number} x @param {number} y @param {number} size */
+function head(pen, clickState, x, y, size) {
+  if (clickState !== "outlier") return pen.arc(x, y, size, 0, 2 * Math.PI);
+  const reach = size * 1.35;
+  pen.moveTo(x, y - reach);
+  pen.lineTo(x + reach, y);
+  pen.lineTo(x, y + reach);
+  pen.lineTo(x - reach, y);
+  pen.closePath();
+}
+
+/** @param {Ink} pen @param {number} height @param {number} x */
+function drawCursor(pen, height, x) {
+  pen.fillStyle = themeColour("ink");
+  pen.fillRect(Math.round(x), RULER, 1, height);
+  pen.beginPath();
+  pen.moveTo(x - 4.5, RULER - 4);
+  pen.lineTo(x + 5.5, RULER - 4);
+  pen.lineTo(x + 0.5, RULER + 3);
+  pen.closePath();
+  pen.fill();
+}
+
+/** @typedef {{seconds: number[], grey_levels: number[], complete: boolean}} PictureChanges */
+
+/** Until all frames are compared, ask this often [ms]. */
+const EVERY = 3000;
+let timer = 0;
+
+export function startPictureChanges() {
+  on(["placements"], () => {
+    clearTimeout(timer);
+    fetchChanges();
+  });
+}
+
+async function fetchChanges() {
+  if (state.looking || changes.complete) return;
+  const ready = state.connected && !state.opening; // the banner says that the server is gone, the status that it is still opening
+  const answer = ready ? await fetch("api/picture_changes.json").catch(() => null) : null;
+  if (answer?.ok) Object.assign(changes, await answer.json());
+  emit("cursor");
+  if (!changes.complete && !state.following) timer = window.setTimeout(fetchChanges, EVERY);
+}
