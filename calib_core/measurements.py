@@ -2,15 +2,21 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal, NewType, NoReturn, TypeAlias
+from typing import Annotated, Any, Literal, NoReturn, TypeAlias
 
+import msgspec
 import numpy as np
+from msgspec import Meta
 
 from calib_core.arrays import Indices, Matrix33, Points3, TimesNs, Values, Vector2, Vector3, frozen_array
 from calib_core.errors import UnsolvableError
 
-TimeNs = NewType("TimeNs", int)
-"""Nanoseconds since the epoch. Never a float: a float64 of the present time is off by up to 128 ns."""
+
+class TimeNs(int):
+    """Nanoseconds since the epoch. Never a float: a float64 of the present time is off by up to 128 ns."""
+
+    __slots__ = ()
+
 
 NS_PER_S = 1_000_000_000
 
@@ -28,12 +34,11 @@ def time_parts(time: TimeNs) -> tuple[int, int]:
     return divmod(int(time), NS_PER_S)
 
 
-@dataclass(frozen=True, slots=True)
-class Stamp:
+class Stamp(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A time as stored in JSON: two integers, because a JavaScript number cannot hold present times in nanoseconds."""
 
-    sec: int
-    nanosec: int
+    sec: Annotated[int, Meta(ge=0, le=9_223_372_035)]
+    nanosec: Annotated[int, Meta(ge=0, le=999_999_999)]
 
     @classmethod
     def of(cls, time: TimeNs) -> "Stamp":
@@ -46,13 +51,38 @@ class Stamp:
         return time_from_parts(self.sec, self.nanosec)
 
 
+def time_to_json(value: Any) -> Any:
+    """Give msgspec the JSON form of a time, as its `enc_hook`.
+
+    Raises:
+        NotImplementedError: the value is no time.
+    """
+    if isinstance(value, TimeNs):
+        return Stamp.of(value)
+    raise NotImplementedError(f"{type(value).__name__} has no JSON form")
+
+
+def time_from_json(kind: type, value: Any) -> Any:
+    """Read a time from its JSON form for msgspec, as its `dec_hook`.
+
+    Raises:
+        NotImplementedError: it is not a time that is wanted.
+        ValueError: it is not the JSON form of a time.
+    """
+    if kind is not TimeNs:
+        raise NotImplementedError(f"{kind.__name__} has no JSON form")
+    try:
+        return msgspec.convert(value, Stamp).time
+    except msgspec.ValidationError as error:
+        raise ValueError(str(error).replace(" - at `$.", " in `")) from error  # msgspec adds the place
+
+
 Mark: TypeAlias = Literal["clicked", "moved", "snapped", "untouched"]
 """How a click came to its pixel: set or moved by a person, snapped to the reflector's apex in the picture, or left untouched
 where the radar expected it; the last is no measurement."""
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class ChosenReturn:
+class ChosenReturn(msgspec.Struct, frozen=True, order=True, forbid_unknown_fields=True, omit_defaults=True):
     """The radar return that a person chose for a click.
 
     Attributes:
@@ -63,7 +93,7 @@ class ChosenReturn:
 
     position_m: tuple[float, float, float]
     radar_time: TimeNs | None = None
-    topic: str = ""
+    topic: Annotated[str, Meta(max_length=500)] = ""
 
 
 @dataclass(frozen=True, slots=True, order=True)

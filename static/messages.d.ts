@@ -879,24 +879,18 @@ export interface FrameHeader {
   rectified: boolean;
 }
 
-/** A time. */
-export interface StampForm {
-  sec: number;
-  nanosec: number;
-}
-
-/** A mark in a frame; without "mark" in a journal, the click that the frame already has is moved. */
-export interface ClickPlacedForm {
+/** The reflector's centre was marked in a frame; a frame may have several. */
+export interface ClickPlaced {
   type: "click_placed";
-  image_time: StampForm;
+  image_time: Stamp;
   pixel_px: [number, number];
   mark?: "clicked" | "moved" | "snapped" | "untouched" | null;
   sigma_px?: number | null;
   request?: number;
 }
 
-/** A click dragged, nudged or snapped. */
-export interface ClickMovedForm {
+/** A click was dragged, nudged or snapped; it then counts, also if it was a guess before. */
+export interface ClickMoved {
   type: "click_moved";
   id: string;
   pixel_px: [number, number];
@@ -905,68 +899,68 @@ export interface ClickMovedForm {
   request?: number;
 }
 
-/** A click deleted. */
-export interface ClickRemovedForm {
+/** A click was deleted. */
+export interface ClickRemoved {
   type: "click_removed";
   id: string;
   request?: number;
 }
 
-/** A click excluded, or included again. */
-export interface ClickExcludedForm {
+/** A click was excluded, or included again. */
+export interface ClickExcluded {
   type: "click_excluded";
   id: string;
   excluded: boolean;
   request?: number;
 }
 
-/** A chosen radar return, as in a clicks-1 file. */
-export interface ReturnForm {
+/** The radar return that a person chose for a click. */
+export interface ChosenReturn {
   position_m: [number, number, number];
-  radar_time?: StampForm | null;
+  radar_time?: Stamp | null;
   topic?: string;
 }
 
-/** A return chosen for a click; null takes the choice back. */
-export interface ReturnChosenForm {
+/** A person said which radar return a click belongs to, or took that back (None). */
+export interface ReturnChosen {
   type: "return_chosen";
   id: string;
-  return: ReturnForm | null;
+  return: ChosenReturn | null;
   request?: number;
 }
 
-/** A placement dismissed, or offered again. */
-export interface PlacementDismissedForm {
+/** A placement found in the radar data is not the reflector: it is not offered any more. */
+export interface PlacementDismissed {
   type: "placement_dismissed";
-  time: StampForm;
+  time: Stamp;
   position_m: [number, number, number];
   dismissed?: boolean;
   request?: number;
 }
 
-/** Warnings read, or shown again, by their codes. */
-export interface WarningsAcknowledgedForm {
+/** The user has read the warnings of these codes, or wants to see them again. Not undone with clicks. */
+export interface WarningsAcknowledged {
   type: "warnings_acknowledged";
   codes: string[];
   acknowledged?: boolean;
   request?: number;
 }
 
-/** Options by group and name; the journal contains all of them, a page may send only some. */
-export interface OptionsChangedForm {
+/** Options were set, by group and name; those that are not named stay. `settled` names all, so that the journal does. */
+export interface OptionsChanged {
   type: "options_changed";
   options: Record<string, unknown>;
   request?: number;
 }
 
-/** All clicks deleted. */
-export interface ClearedForm {
+/** All clicks were deleted; the options stay. */
+export interface Cleared {
   type: "cleared";
   request?: number;
 }
 
 /** A camera, and where it comes from. */
-export interface IntrinsicsForm {
+export interface ChosenIntrinsics {
   about: string;
   model: string;
   size_px: [number, number];
@@ -976,142 +970,155 @@ export interface IntrinsicsForm {
   covariance?: number[][];
 }
 
-/** Intrinsics chosen for the session; null goes back to those that it was opened with. */
-export interface IntrinsicsChosenForm {
+/** Intrinsics were chosen for the session; None goes back to those that it was opened with. */
+export interface IntrinsicsChosen {
   type: "intrinsics_chosen";
-  intrinsics: IntrinsicsForm | null;
+  intrinsics: ChosenIntrinsics | null;
   request?: number;
 }
 
-/** A click, as in a clicks-1 file. */
-export interface ClickForm {
+/** A stamp as in ROS 2: whole seconds since the epoch, and nanoseconds within the second. */
+export interface TimeDocument {
+  sec: number;
+  nanosec: number;
+}
+
+/** The radar return that a person chose for a click, at the position that the radar reports. */
+export interface ReturnDocument {
+  position_m: [number, number, number];
+  radar_time?: TimeDocument | null;
+  topic?: string;
+}
+
+/** The reflector's centre in one frame; pixel (0, 0) is the centre of the top-left pixel. */
+export interface ClickDocument {
   id: string;
-  image_time: StampForm;
+  image_time: TimeDocument;
   pixel_px: [number, number];
   sigma_px?: number | null;
   excluded?: boolean;
   mark?: "clicked" | "moved" | "snapped" | "untouched";
-  return?: ReturnForm | null;
+  return?: ReturnDocument | null;
 }
 
-/** Clicks from a file. */
-export interface ClicksImportedForm {
+/** Clicks from a file were added to the session; they replace clicks in the same frames. */
+export interface ClicksImported {
   type: "clicks_imported";
-  clicks: ClickForm[];
+  clicks: ClickDocument[];
   request?: number;
 }
 
-/** The recording is read with these columns. */
-export interface ColumnsMappedForm {
+/** The recording was opened with these values of --map; the next opening uses them again. Not undone with clicks. */
+export interface ColumnsMapped {
   type: "columns_mapped";
   column_map: string[];
   request?: number;
 }
 
-/** Assumptions about the recording confirmed, by their texts. */
-export interface AssumptionsConfirmedForm {
+/** The user confirmed assumptions about the recording, by their texts. Not undone with clicks. */
+export interface AssumptionsConfirmed {
   type: "assumptions_confirmed";
   texts: string[];
   request?: number;
 }
 
-/** A box drawn around an object that had none: left, top, right, bottom. */
-export interface BoxDrawnForm {
+/** A box was drawn around an object that had none so far. */
+export interface BoxDrawn {
   type: "box_drawn";
-  image_time: StampForm;
+  image_time: Stamp;
   box_px: [number, number, number, number];
   label: string;
   request?: number;
 }
 
-/** The box of an object corrected in a frame. */
-export interface BoxMovedForm {
+/** The box of an object was corrected in a frame, which makes that frame a keyframe. */
+export interface BoxMoved {
   type: "box_moved";
   id: string;
-  image_time: StampForm;
+  image_time: Stamp;
   box_px: [number, number, number, number];
   request?: number;
 }
 
-/** An object hidden from a frame on. */
-export interface BoxHiddenForm {
+/** An object is hidden, or out of the picture, from a frame on until its next keyframe. */
+export interface BoxHidden {
   type: "box_hidden";
   id: string;
-  image_time: StampForm;
+  image_time: Stamp;
   request?: number;
 }
 
-/** What was said about an object in a frame taken back. */
-export interface BoxKeyframeRemovedForm {
+/** What was said about an object in a frame was taken back; with its last box, the track goes. */
+export interface BoxKeyframeRemoved {
   type: "box_keyframe_removed";
   id: string;
-  image_time: StampForm;
+  image_time: Stamp;
   request?: number;
 }
 
-/** All boxes of an object deleted. */
-export interface BoxRemovedForm {
+/** All boxes of an object were deleted. */
+export interface BoxRemoved {
   type: "box_removed";
   id: string;
   request?: number;
 }
 
-/** An object given another class. */
-export interface BoxLabelledForm {
+/** An object was given another class. */
+export interface BoxLabelled {
   type: "box_labelled";
   id: string;
   label: string;
   request?: number;
 }
 
-/** A frame in which the box of an object is stated; null: it is hidden from there on. */
-export interface BoxKeyframeForm {
-  image_time: StampForm;
+/** A frame in which a person said where an object is. */
+export interface BoxKeyframe {
+  image_time: Stamp;
   box_px: [number, number, number, number] | null;
 }
 
 /** The boxes of one object. */
-export interface BoxTrackForm {
+export interface BoxTrack {
   id: string;
   label: string;
-  keyframes: BoxKeyframeForm[];
-  carried: boolean;
+  keyframes: BoxKeyframe[];
+  carried?: boolean;
 }
 
-/** Boxes from a file, in place of all others. */
-export interface BoxesLoadedForm {
+/** Boxes from a file took the place of all boxes. */
+export interface BoxesLoaded {
   type: "boxes_loaded";
-  tracks: BoxTrackForm[];
-  empty_frames?: StampForm[];
+  tracks: BoxTrack[];
+  empty_frames?: Stamp[];
   request?: number;
 }
 
-/** The last change undone. */
-export interface UndoForm {
+/** Undo the last change. */
+export interface Undo {
   type: "undo";
   request?: number;
 }
 
-/** The last undone change redone. */
-export interface RedoForm {
+/** Redo the change that was undone last. */
+export interface Redo {
   type: "redo";
   request?: number;
 }
 
-/** A page has opened. */
-export interface HelloForm {
+/** A page has opened: send it the recording and the view. */
+export interface Hello {
   type: "hello";
   request?: number;
 }
 
-/** A change of the View was missed. */
-export interface ViewForm {
+/** A page missed a change of the View: send it a whole one. */
+export interface ViewWanted {
   type: "view";
   request?: number;
 }
 
-/** The picture of a frame is requested; exactly one binary message answers, unless a newer request comes first. */
-export interface FrameForm {
+/** A page wants the picture of a frame; exactly one binary message answers, unless a newer request comes first. */
+export interface FrameWanted {
   type: "frame";
   index: number;
   request: number;
@@ -1119,8 +1126,8 @@ export interface FrameForm {
   size?: "full" | "half" | "rectified";
 }
 
-/** Another frame is shown. */
-export interface CursorForm {
+/** A page shows another frame: the 3D view and the overlay follow. */
+export interface CursorMoved {
   type: "cursor";
   index: number;
   playing?: boolean;
@@ -1133,15 +1140,15 @@ export interface CursorForm {
   request?: number;
 }
 
-/** Another viewpoint is requested for the 3D view. */
-export interface ViewpointForm {
+/** A page wants another viewpoint for its 3D view: behind, above or to the side of the radar. */
+export interface ViewpointWanted {
   type: "viewpoint";
   viewpoint: "behind" | "above" | "side";
   request?: number;
 }
 
-/** A file of clicks was read. */
-export interface ImportForm {
+/** A page read a file of clicks. */
+export interface ImportWanted {
   type: "import_clicks";
   text: string;
   name?: string;
@@ -1149,20 +1156,20 @@ export interface ImportForm {
 }
 
 /** The review of all pairs is requested. */
-export interface ReviewForm {
+export interface ReviewWanted {
   type: "review";
   request?: number;
 }
 
 /** The review of one pair is requested. */
-export interface PairReviewForm {
+export interface PairReviewWanted {
   type: "review_pair";
   id: string;
   request?: number;
 }
 
 /** Two solutions are to be compared; the content of a file is sent once, and kept for later requests of the page. */
-export interface CompareForm {
+export interface CompareWanted {
   type: "compare";
   a: "now" | "default" | "paper" | "toggled" | "before" | "reference" | "file";
   b: "now" | "default" | "paper" | "toggled" | "before" | "reference" | "file";
@@ -1173,7 +1180,7 @@ export interface CompareForm {
 }
 
 /** The contours of the uncertainty in the picture are requested. */
-export interface UncertaintyForm {
+export interface UncertaintyWanted {
   type: "uncertainty";
   request?: number;
 }
@@ -1209,24 +1216,24 @@ export interface ProposingSwitch {
   request?: number;
 }
 
-/** The reflector's apex near a pixel is requested; one message `snapped` answers. */
-export interface SnapForm {
+/** A page wants the reflector's apex near a pixel of a frame; one message `snapped` answers, and nothing is changed. */
+export interface SnapWanted {
   type: "snap_wanted";
-  image_time: StampForm;
+  image_time: Stamp;
   pixel_px: [number, number];
   id?: string | null;
   over_dwell?: boolean;
   request?: number;
 }
 
-/** Boxes are to be followed no farther. */
-export interface StopFollowingForm {
+/** A page wants boxes to be followed no farther than they have been. */
+export interface FollowingStopped {
   type: "stop_following";
   request?: number;
 }
 
-/** A file of boxes was read; they take the place of all boxes. */
-export interface LoadBoxesForm {
+/** A page read a file of boxes; they take the place of all boxes. */
+export interface BoxesWanted {
   type: "load_boxes";
   name: string;
   content_base64: string;
@@ -1305,45 +1312,45 @@ export type FromServer =
   | Done;
 
 export type FromPage =
-  | ClickPlacedForm
-  | ClickMovedForm
-  | ClickRemovedForm
-  | ClickExcludedForm
-  | ReturnChosenForm
-  | PlacementDismissedForm
-  | WarningsAcknowledgedForm
-  | OptionsChangedForm
-  | ClearedForm
-  | IntrinsicsChosenForm
-  | ClicksImportedForm
-  | ColumnsMappedForm
-  | AssumptionsConfirmedForm
-  | BoxDrawnForm
-  | BoxMovedForm
-  | BoxHiddenForm
-  | BoxKeyframeRemovedForm
-  | BoxRemovedForm
-  | BoxLabelledForm
-  | BoxesLoadedForm
-  | UndoForm
-  | RedoForm
-  | HelloForm
-  | ViewForm
-  | FrameForm
-  | CursorForm
-  | ViewpointForm
-  | ImportForm
-  | ReviewForm
-  | PairReviewForm
-  | CompareForm
-  | UncertaintyForm
+  | ClickPlaced
+  | ClickMoved
+  | ClickRemoved
+  | ClickExcluded
+  | ReturnChosen
+  | PlacementDismissed
+  | WarningsAcknowledged
+  | OptionsChanged
+  | Cleared
+  | IntrinsicsChosen
+  | ClicksImported
+  | ColumnsMapped
+  | AssumptionsConfirmed
+  | BoxDrawn
+  | BoxMoved
+  | BoxHidden
+  | BoxKeyframeRemoved
+  | BoxRemoved
+  | BoxLabelled
+  | BoxesLoaded
+  | Undo
+  | Redo
+  | Hello
+  | ViewWanted
+  | FrameWanted
+  | CursorMoved
+  | ViewpointWanted
+  | ImportWanted
+  | ReviewWanted
+  | PairReviewWanted
+  | CompareWanted
+  | UncertaintyWanted
   | LensCalibrate
   | LensCancel
   | LensUse
   | ProposingSwitch
-  | SnapForm
-  | StopFollowingForm
-  | LoadBoxesForm
+  | SnapWanted
+  | FollowingStopped
+  | BoxesWanted
   | ChoicesWanted
   | FolderWanted
   | RecentForgotten

@@ -329,7 +329,7 @@ class Workspace:
             InputError: the text is not a file of clicks.
             EventError: a click does not belong to a frame of this recording; nothing changed.
         """
-        self.dispatch(ClicksImported(read_clicks(text, source)))
+        self.dispatch(ClicksImported.of(read_clicks(text, source)))
 
     def load_boxes(self, data: bytes, name: str) -> None:
         """Put the boxes of a file in the place of all boxes.

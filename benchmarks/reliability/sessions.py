@@ -130,9 +130,11 @@ def _steps(count: int) -> Iterator[Step]:
         clicks = number // 5 * 2 + min(number % 5, 2)
         kind = number % 5
         if kind < 2:
-            yield ClickPlaced(TimeNs(int(FACTS.image_times[clicks])), 12.5 + number % 1900, 7.25 + number % 1000)
+            yield ClickPlaced(
+                TimeNs(int(FACTS.image_times[clicks])), (12.5 + number % 1900, 7.25 + number % 1000), "clicked"
+            )
         elif kind == 2:
-            yield ClickMoved(f"c{clicks}", 1.5 + number % 1900, 2.5 + number % 1000)
+            yield ClickMoved(f"c{clicks}", (1.5 + number % 1900, 2.5 + number % 1000))
         elif kind == 3:
             yield ClickRemoved(f"c{clicks}")
         else:

@@ -307,7 +307,7 @@ export function takeSnapped(message) {
   answer = message;
 }
 
-/** @param {Omit<import("../messages.js").SnapForm, "type">} wanted @returns {Promise<{found: import("../messages.js").Snapped|null, refusal: string|null|undefined}>} */
+/** @param {Omit<import("../messages.js").SnapWanted, "type">} wanted @returns {Promise<{found: import("../messages.js").Snapped|null, refusal: string|null|undefined}>} */
 async function askApex(wanted) {
   answer = null;
   const refusal = await send({ type: "snap_wanted", ...wanted });

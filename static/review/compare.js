@@ -6,7 +6,7 @@ import { tell } from "../shell/socket.js";
 import { clicksIn, emit, on, state } from "../shell/state.js";
 import { visible } from "./review.js";
 
-/** @typedef {import("../messages.js").CompareForm["a"]} Kind */
+/** @typedef {import("../messages.js").CompareWanted["a"]} Kind */
 /** @typedef {import("../messages.js").Compared} Compared */
 
 const A_COLOUR = "#4aaaeb";

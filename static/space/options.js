@@ -2,7 +2,7 @@
 
 import { state } from "../shell/state.js";
 
-/** @typedef {import("../messages.js").CursorForm["colour"]} Colour */
+/** @typedef {import("../messages.js").CursorMoved["colour"]} Colour */
 const KEPT = "cocalib-space";
 
 /** @type {{colour: Colour|null, trail_s: number, whole: boolean, hidden: boolean, large: boolean, camera: boolean}} */

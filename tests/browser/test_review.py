@@ -32,7 +32,7 @@ def clicks_of(truth: Any) -> list[ReflectorClick]:
 def reviewing(open_page: Callable[..., Driver], server: RunningServer, workspace: Workspace, truth: Any) -> Driver:
     """Open the review of twenty clicks."""
     page = open_page(server.url)
-    workspace.dispatch(ClicksImported(tuple(clicks_of(truth))))
+    workspace.dispatch(ClicksImported.of(tuple(clicks_of(truth))))
     page.until("__cocalib.state.view.has_calibration")
     page.settle()
     page.page.click("#tab-review")

@@ -37,7 +37,7 @@ def clicked(folder: Path, clicks: int = 12, facts: RecordingFacts = FACTS) -> Pa
     session_file = open_session_file(folder, facts)
     history = session_file.restored.history
     for frame in range(clicks):
-        step = ClickPlaced(TimeNs(int(facts.image_times[frame])), float(frame), 2.0)
+        step = ClickPlaced(TimeNs(int(facts.image_times[frame])), (float(frame), 2.0), "clicked")
         history = advance(history, step, facts)
         session_file.append(step, history)
     session_file.close()

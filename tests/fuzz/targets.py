@@ -247,7 +247,7 @@ def _sessions(folder: Path) -> list[bytes]:
     session = open_session_file(folder / "seed.cocalib-session", FACTS)
     history = session.restored.history
     times = [TimeNs(int(time)) for time in FACTS.image_times[:4]]
-    for step in (*(ClickPlaced(time, 10.5, 20.25) for time in times), ClickExcluded("c2", True), Undo()):
+    for step in (*(ClickPlaced(time, (10.5, 20.25), "clicked") for time in times), ClickExcluded("c2", True), Undo()):
         history = advance(history, step, FACTS)
         session.append(step, history)
     session.close()
@@ -284,7 +284,7 @@ def _messages(data: bytes, _folder: Path) -> None:
             if not isinstance(command, Hello | FrameWanted | CursorMoved | ViewpointWanted | ImportWanted):
                 history = advance(history, settled(command, history.present), FACTS)
             elif isinstance(command, ImportWanted):
-                history = advance(history, ClicksImported(read_clicks(command.text, command.name)), FACTS)
+                history = advance(history, ClicksImported.of(read_clicks(command.text, command.name)), FACTS)
         except CalibrationError as error:
             _require_words(error)
     view(history, FACTS, None)

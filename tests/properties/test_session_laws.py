@@ -14,7 +14,6 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 from calib_core.errors import CalibrationError
 from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions
-from cocalib.option_changes import OptionChange
 from cocalib.session import (
     BoxDrawn,
     BoxesLoaded,
@@ -32,7 +31,7 @@ from cocalib.session import (
     ClickRemoved,
     ClicksImported,
     History,
-    OptionsEdited,
+    OptionsChanged,
     RecordingFacts,
     Redo,
     Session,
@@ -53,8 +52,8 @@ columns = st.floats(-0.5, 63.5)
 rows = st.floats(-0.5, 47.5)
 ids = st.integers(1, 12).map(lambda number: f"c{number}")
 option_edits = st.one_of(
-    st.builds(OptionChange, st.just("noise.sigma_px"), st.floats(0.01, 1000.0)),
-    st.builds(OptionChange, st.just("method"), st.sampled_from(["default", "paper"])),
+    st.floats(0.01, 1000.0).map(lambda sigma_px: {"noise": {"sigma_px": sigma_px}}),
+    st.sampled_from(["default", "paper"]).map(lambda method: {"method": method}),
 )
 clicks_of_files = st.lists(
     st.builds(ReflectorClick, frames, st.one_of(ids, st.sampled_from(["p1", "c0", "c007", "č"])), columns, rows),
@@ -90,13 +89,13 @@ box_steps = st.one_of(
 )
 steps = st.one_of(
     box_steps,
-    st.builds(ClickPlaced, frames, columns, rows),
-    st.builds(ClickMoved, ids, columns, rows),
+    st.builds(ClickPlaced, frames, st.tuples(columns, rows), st.just("clicked")),
+    st.builds(ClickMoved, ids, st.tuples(columns, rows)),
     st.builds(ClickRemoved, ids),
     st.builds(ClickExcluded, ids, st.booleans()),
-    st.builds(OptionsEdited, st.tuples(option_edits)),
+    st.builds(OptionsChanged, option_edits),
     st.builds(Cleared),
-    st.builds(ClicksImported, clicks_of_files),
+    st.builds(ClicksImported.of, clicks_of_files),
     st.builds(Undo),
     st.builds(Redo),
 )

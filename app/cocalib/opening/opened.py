@@ -79,7 +79,7 @@ def open_choice(choice: Choice, stack: ExitStack, tell: Callable[[str], None]) -
         print(f"{sentence(warning.message)} {sentence(warning.hint)}")
     _prefer_given_intrinsics(workspace, choice)
     if choice.options is not None and choice.options != CalibrationOptions():
-        workspace.dispatch(OptionsChanged(choice.options))
+        workspace.dispatch(OptionsChanged.of(choice.options))
     if choice.clicks is not None and clicks is not None:
         _import_clicks(workspace, choice.clicks, clicks)
     return Opened(recording, workspace)
@@ -155,7 +155,7 @@ def _workspace(choice: Choice, recording: Recording) -> Workspace:
         )
     workspace.open_meaning = meaning
     if copied is not None and copied.clicks and workspace.restored.steps == 0:
-        workspace.dispatch(ClicksImported(copied.clicks))
+        workspace.dispatch(ClicksImported.of(copied.clicks))
     return workspace
 
 
@@ -205,7 +205,7 @@ def _import_clicks(workspace: Workspace, given: GivenClicks, found: ClicksAtFram
             f"note: {given.source}: nobody confirmed {len(unconfirmed.ids)} of these clicks: look at each",
             file=sys.stderr,
         )
-    workspace.dispatch(ClicksImported(found.clicks))
+    workspace.dispatch(ClicksImported.of(found.clicks))
 
 
 def _close(workspace: Workspace, kind: type[BaseException] | None, *_: object) -> None:

@@ -5,9 +5,9 @@ from dataclasses import replace
 from functools import singledispatch
 from typing import TypeAlias
 
+from calib_core.interchange.own.clicks_json import click_of
 from calib_core.measurements import Mark, ReflectorClick
-from calib_core.option_checks import checked_options
-from cocalib.option_changes import changed_options
+from cocalib.option_changes import changed_options, changes_from_tree
 from cocalib.session.box_applying import BoxEvent, apply_to_boxes
 from cocalib.session.event_checks import EventError, require_camera, require_frame, require_pixel
 from cocalib.session.events import (
@@ -19,14 +19,13 @@ from cocalib.session.events import (
     ClickRemoved,
     ClicksImported,
     ColumnsMapped,
-    Event,
     IntrinsicsChosen,
     OptionsChanged,
-    OptionsEdited,
     PlacementDismissed,
     ReturnChosen,
     ScansAdded,
     Solved,
+    Step,
     WarningsAcknowledged,
 )
 from cocalib.session.state import DismissedPlacement, RecordingFacts, Session
@@ -35,7 +34,7 @@ _Aside: TypeAlias = BoxEvent | ColumnsMapped | AssumptionsConfirmed | WarningsAc
 """Events that no pose depends on."""
 
 
-def apply(session: Session, event: Event, facts: RecordingFacts) -> Session:
+def apply(session: Session, event: Step, facts: RecordingFacts) -> Session:
     """Return the session after an event; the same object if the event changes nothing.
 
     Raises:
@@ -94,7 +93,7 @@ def _dismissed(event: PlacementDismissed, session: Session) -> Session:
 
 
 @singledispatch
-def _changed(event: Event, session: Session, facts: RecordingFacts) -> Session:
+def _changed(event: Step, session: Session, facts: RecordingFacts) -> Session:
     """Return the session with the event applied; `apply` increments the revision."""
     raise TypeError(f"not an event of the session: {event!r}")
 
@@ -102,19 +101,19 @@ def _changed(event: Event, session: Session, facts: RecordingFacts) -> Session:
 @_changed.register
 def _placed(event: ClickPlaced, session: Session, facts: RecordingFacts) -> Session:
     require_frame(event.image_time, facts)
-    require_pixel(event.u_px, event.v_px, facts)
+    u_px, v_px = require_pixel(event.pixel_px, facts)
     for click in session.clicks:
         if click.image_time != event.image_time:
             continue
         if event.mark is None:
-            return _with_click(session, replace(click, u_px=event.u_px, v_px=event.v_px))
-        if (click.u_px, click.v_px) == (event.u_px, event.v_px):
+            return _with_click(session, replace(click, u_px=u_px, v_px=v_px))
+        if (click.u_px, click.v_px) == event.pixel_px:
             return _with_click(session, _marked(click, event.mark, event.sigma_px))
     click = ReflectorClick(
         event.image_time,
         f"c{session.next_click}",
-        event.u_px,
-        event.v_px,
+        u_px,
+        v_px,
         sigma_px=event.sigma_px,
         mark=event.mark or "clicked",
     )
@@ -131,11 +130,11 @@ def _marked(click: ReflectorClick, mark: Mark, sigma_px: float | None) -> Reflec
 
 @_changed.register
 def _moved(event: ClickMoved, session: Session, facts: RecordingFacts) -> Session:
-    require_pixel(event.u_px, event.v_px, facts)
+    u_px, v_px = require_pixel(event.pixel_px, facts)
     click = _click(session, event.id)
-    if (click.u_px, click.v_px) == (event.u_px, event.v_px) and event.mark == "moved":
+    if (click.u_px, click.v_px) == event.pixel_px and event.mark == "moved":
         return session
-    moved = replace(click, u_px=event.u_px, v_px=event.v_px, mark=event.mark, sigma_px=event.sigma_px)
+    moved = replace(click, u_px=u_px, v_px=v_px, mark=event.mark, sigma_px=event.sigma_px)
     _require_sigma(moved)
     return _with_click(session, moved)
 
@@ -160,12 +159,7 @@ def _excluded(event: ClickExcluded, session: Session, facts: RecordingFacts) -> 
 
 @_changed.register
 def _options_changed(event: OptionsChanged, session: Session, facts: RecordingFacts) -> Session:
-    return replace(session, options=checked_options(event.options))
-
-
-@_changed.register
-def _options_edited(event: OptionsEdited, session: Session, facts: RecordingFacts) -> Session:
-    return replace(session, options=changed_options(session.options, event.changes))
+    return replace(session, options=changed_options(session.options, changes_from_tree(event.options)))
 
 
 @_changed.register
@@ -182,15 +176,16 @@ def _cleared(event: Cleared, session: Session, facts: RecordingFacts) -> Session
 
 @_changed.register
 def _imported(event: ClicksImported, session: Session, facts: RecordingFacts) -> Session:
-    for click in event.clicks:
+    imported = sorted(map(click_of, event.clicks))
+    for click in imported:
         require_frame(click.image_time, facts)
-        require_pixel(click.u_px, click.v_px, facts)
+        require_pixel((click.u_px, click.v_px), facts)
         _require_sigma(click)
-    times = {click.image_time for click in event.clicks}
+    times = {click.image_time for click in imported}
     clicks = [click for click in session.clicks if click.image_time not in times]
     taken = {click.id for click in clicks}
-    number = max([session.next_click, *(_number(click.id) + 1 for click in event.clicks)])
-    for click in sorted(event.clicks):
+    number = max([session.next_click, *(_number(click.id) + 1 for click in imported)])
+    for click in imported:
         if click.id in taken:
             click, number = replace(click, id=f"c{number}"), number + 1
         taken.add(click.id)

@@ -5,6 +5,8 @@ from dataclasses import replace
 from functools import singledispatch
 from typing import TypeAlias
 
+from msgspec.structs import replace as changed
+
 from calib_core.measurements import TimeNs
 from cocalib.session.box_tracks import BoxEdges, BoxKeyframe, BoxTrack
 from cocalib.session.event_checks import EventError, require_frame
@@ -70,7 +72,7 @@ def _keyframe_removed(event: BoxKeyframeRemoved, session: Session, facts: Record
     if all(one.edges_px is None for one in rest):
         return _without(session, track)
     first = next(index for index, one in enumerate(rest) if one.edges_px is not None)
-    return _with_track(session, replace(track, keyframes=rest[first:]))
+    return _with_track(session, changed(track, keyframes=rest[first:]))
 
 
 @apply_to_boxes.register
@@ -83,7 +85,7 @@ def _labelled(event: BoxLabelled, session: Session, facts: RecordingFacts) -> Se
     label = _checked_label(event.label)
     if not label:
         raise EventError("a box needs a class, such as person or car")
-    return _with_track(session, replace(_track(session, event.id), label=label))
+    return _with_track(session, changed(_track(session, event.id), label=label))
 
 
 @apply_to_boxes.register
@@ -107,13 +109,13 @@ def _checked_track(track: BoxTrack, facts: RecordingFacts) -> BoxTrack:
     times = [keyframe.image_time for keyframe in track.keyframes]
     if not times or track.keyframes[0].edges_px is None or sorted(set(times)) != times:
         raise EventError(f"track '{track.id}' has no box at its start, or two in one frame; give each frame one")
-    return replace(track, label=_checked_label(track.label))
+    return changed(track, label=_checked_label(track.label))
 
 
 def _with_keyframe(session: Session, track_id: str, keyframe: BoxKeyframe) -> Session:
     track = _track(session, track_id)
     others = (one for one in track.keyframes if one.image_time != keyframe.image_time)
-    return _with_track(session, replace(track, keyframes=tuple(sorted((*others, keyframe), key=_time))))
+    return _with_track(session, changed(track, keyframes=tuple(sorted((*others, keyframe), key=_time))))
 
 
 def _time(keyframe: BoxKeyframe) -> TimeNs:

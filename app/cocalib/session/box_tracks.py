@@ -1,7 +1,9 @@
 """Boxes that a person drew or loaded, as a value: one track per object, with the frames in which its box is known."""
 
-from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Annotated, TypeAlias
+
+import msgspec
+from msgspec import Meta
 
 from calib_core.measurements import TimeNs
 
@@ -9,8 +11,11 @@ BoxEdges: TypeAlias = tuple[float, float, float, float]
 """Left, top, right and bottom edge of a box [px]; pixel (0, 0) is the centre of the top-left pixel."""
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class BoxKeyframe:
+TrackId: TypeAlias = Annotated[str, Meta(min_length=1, max_length=100)]
+BoxLabel: TypeAlias = Annotated[str, Meta(max_length=100)]
+
+
+class BoxKeyframe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename={"edges_px": "box_px"}):
     """A frame in which a person said where an object is.
 
     Attributes:
@@ -22,8 +27,7 @@ class BoxKeyframe:
     edges_px: BoxEdges | None
 
 
-@dataclass(frozen=True, slots=True)
-class BoxTrack:
+class BoxTrack(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename={"is_carried": "carried"}):
     """The boxes of one object.
 
     Attributes:
@@ -34,7 +38,7 @@ class BoxTrack:
             for which the file states them.
     """
 
-    id: str
-    label: str
+    id: TrackId
+    label: BoxLabel
     keyframes: tuple[BoxKeyframe, ...]
     is_carried: bool = True

@@ -35,16 +35,18 @@ def require_frame(time: TimeNs, facts: RecordingFacts, what: str = "a click") ->
     )
 
 
-def require_pixel(u_px: float, v_px: float, facts: RecordingFacts) -> None:
-    """Check that a pixel is in the frame.
+def require_pixel(pixel_px: tuple[float, float], facts: RecordingFacts) -> tuple[float, float]:
+    """Return a pixel that is in the frame.
 
     Raises:
         EventError: it is not.
     """
+    u_px, v_px = pixel_px
     if not (math.isfinite(u_px) and math.isfinite(v_px) and facts.has_pixel(u_px, v_px)):
         raise EventError(
             f"({u_px:.1f}, {v_px:.1f}) px is outside the frame of {facts.width_px} x {facts.height_px} px; click inside it"
         )
+    return pixel_px
 
 
 def require_camera(intrinsics: ChosenIntrinsics, facts: RecordingFacts) -> None:

@@ -1,73 +1,79 @@
-"""What can happen to a session: one frozen class per event."""
+"""What can happen to a session: one frozen class per event, which is its own JSON form in the journal and from the page."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Annotated, Any, TypeAlias
 
+import msgspec
+from msgspec import Meta
+
+from calib_core.interchange.own.clicks_json import click_document
+from calib_core.interchange.own.documents import ClickDocument
 from calib_core.measurements import ChosenReturn, Mark, ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions
 from calib_core.results import PairResult
-from cocalib.option_changes import OptionChange
-from cocalib.session.box_tracks import BoxEdges, BoxTrack
+from cocalib.session.box_tracks import BoxEdges, BoxLabel, BoxTrack
 from cocalib.session.chosen_intrinsics import ChosenIntrinsics
 from cocalib.session.state import Outcome
 
+Id: TypeAlias = Annotated[str, Meta(min_length=1, max_length=100)]
 
-@dataclass(frozen=True, slots=True)
-class ClickPlaced:
+
+def _tag(name: str) -> str:
+    return "".join(f"_{letter.lower()}" if letter.isupper() else letter for letter in name).lstrip("_")
+
+
+class _Journalled(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="type", tag=_tag):
+    """An event with a line in the journal."""
+
+
+class ClickPlaced(_Journalled, frozen=True):
     """The reflector's centre was marked in a frame; a frame may have several.
 
     Attributes:
         image_time: stamp of the frame.
-        u_px: column.
-        v_px: row.
+        pixel_px: column and row.
         mark: how it came to this pixel; None in journals of versions that kept one click per frame: a click that the frame
             already has is then moved.
         sigma_px: its standard deviation per axis; None takes the options' value.
     """
 
     image_time: TimeNs
-    u_px: float
-    v_px: float
-    mark: Mark | None = "clicked"
+    pixel_px: tuple[float, float]
+    mark: Mark | None = None
     sigma_px: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class ClickMoved:
+class ClickMoved(_Journalled, frozen=True):
     """A click was dragged, nudged or snapped; it then counts, also if it was a guess before."""
 
-    id: str
-    u_px: float
-    v_px: float
+    id: Id
+    pixel_px: tuple[float, float]
     mark: Mark = "moved"
     sigma_px: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class ClickRemoved:
+class ClickRemoved(_Journalled, frozen=True):
     """A click was deleted."""
 
-    id: str
+    id: Id
 
 
-@dataclass(frozen=True, slots=True)
-class ClickExcluded:
+class ClickExcluded(_Journalled, frozen=True):
     """A click was excluded, or included again."""
 
-    id: str
+    id: Id
     excluded: bool
 
 
-@dataclass(frozen=True, slots=True)
-class ReturnChosen:
+class ReturnChosen(_Journalled, frozen=True, rename={"chosen": "return"}):
     """A person said which radar return a click belongs to, or took that back (None)."""
 
-    id: str
+    id: Id
     chosen: ChosenReturn | None
 
 
-@dataclass(frozen=True, slots=True)
-class PlacementDismissed:
+class PlacementDismissed(_Journalled, frozen=True):
     """A placement found in the radar data is not the reflector: it is not offered any more.
 
     Attributes:
@@ -81,42 +87,40 @@ class PlacementDismissed:
     dismissed: bool = True
 
 
-@dataclass(frozen=True, slots=True)
-class WarningsAcknowledged:
+class WarningsAcknowledged(_Journalled, frozen=True):
     """The user has read the warnings of these codes, or wants to see them again. Not undone with clicks."""
 
-    codes: tuple[str, ...]
+    codes: Annotated[tuple[Id, ...], Meta(max_length=100)]
     acknowledged: bool = True
 
 
-@dataclass(frozen=True, slots=True)
-class OptionsChanged:
-    """All options were set."""
+class OptionsChanged(_Journalled, frozen=True):
+    """Options were set, by group and name; those that are not named stay. `settled` names all, so that the journal does."""
 
-    options: CalibrationOptions
+    options: dict[str, Any]
 
-
-@dataclass(frozen=True, slots=True)
-class OptionsEdited:
-    """Some options were set; the others stay. `settled` turns this into OptionsChanged."""
-
-    changes: tuple[OptionChange, ...]
+    @classmethod
+    def of(cls, options: CalibrationOptions) -> "OptionsChanged":
+        """Set all options."""
+        return cls(msgspec.json.decode(msgspec.json.encode(options)))
 
 
-@dataclass(frozen=True, slots=True)
-class Cleared:
+class Cleared(_Journalled, frozen=True):
     """All clicks were deleted; the options stay."""
 
 
-@dataclass(frozen=True, slots=True)
-class ClicksImported:
+class ClicksImported(_Journalled, frozen=True):
     """Clicks from a file were added to the session; they replace clicks in the same frames."""
 
-    clicks: tuple[ReflectorClick, ...]
+    clicks: tuple[ClickDocument, ...]
+
+    @classmethod
+    def of(cls, clicks: Iterable[ReflectorClick]) -> "ClicksImported":
+        """Add these clicks."""
+        return cls(tuple(map(click_document, clicks)))
 
 
-@dataclass(frozen=True, slots=True)
-class BoxDrawn:
+class BoxDrawn(_Journalled, frozen=True, rename={"edges_px": "box_px"}):
     """A box was drawn around an object that had none so far.
 
     Attributes:
@@ -127,11 +131,10 @@ class BoxDrawn:
 
     image_time: TimeNs
     edges_px: BoxEdges
-    label: str
+    label: BoxLabel
 
 
-@dataclass(frozen=True, slots=True)
-class BoxMoved:
+class BoxMoved(_Journalled, frozen=True, rename={"edges_px": "box_px"}):
     """The box of an object was corrected in a frame, which makes that frame a keyframe.
 
     Attributes:
@@ -140,44 +143,39 @@ class BoxMoved:
         edges_px: of the box.
     """
 
-    id: str
+    id: Id
     image_time: TimeNs
     edges_px: BoxEdges
 
 
-@dataclass(frozen=True, slots=True)
-class BoxHidden:
+class BoxHidden(_Journalled, frozen=True):
     """An object is hidden, or out of the picture, from a frame on until its next keyframe."""
 
-    id: str
+    id: Id
     image_time: TimeNs
 
 
-@dataclass(frozen=True, slots=True)
-class BoxKeyframeRemoved:
+class BoxKeyframeRemoved(_Journalled, frozen=True):
     """What was said about an object in a frame was taken back; with its last box, the track goes."""
 
-    id: str
+    id: Id
     image_time: TimeNs
 
 
-@dataclass(frozen=True, slots=True)
-class BoxRemoved:
+class BoxRemoved(_Journalled, frozen=True):
     """All boxes of an object were deleted."""
 
-    id: str
+    id: Id
 
 
-@dataclass(frozen=True, slots=True)
-class BoxLabelled:
+class BoxLabelled(_Journalled, frozen=True):
     """An object was given another class."""
 
-    id: str
-    label: str
+    id: Id
+    label: BoxLabel
 
 
-@dataclass(frozen=True, slots=True)
-class BoxesLoaded:
+class BoxesLoaded(_Journalled, frozen=True):
     """Boxes from a file took the place of all boxes.
 
     Attributes:
@@ -189,25 +187,22 @@ class BoxesLoaded:
     empty_frames: tuple[TimeNs, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class ColumnsMapped:
+class ColumnsMapped(_Journalled, frozen=True):
     """The recording was opened with these values of --map; the next opening uses them again. Not undone with clicks."""
 
-    column_map: tuple[str, ...]
+    column_map: tuple[Annotated[str, Meta(max_length=500)], ...]
 
 
-@dataclass(frozen=True, slots=True)
-class IntrinsicsChosen:
+class IntrinsicsChosen(_Journalled, frozen=True):
     """Intrinsics were chosen for the session; None goes back to those that it was opened with."""
 
     intrinsics: ChosenIntrinsics | None
 
 
-@dataclass(frozen=True, slots=True)
-class AssumptionsConfirmed:
+class AssumptionsConfirmed(_Journalled, frozen=True):
     """The user confirmed assumptions about the recording, by their texts. Not undone with clicks."""
 
-    texts: tuple[str, ...]
+    texts: Annotated[tuple[Annotated[str, Meta(max_length=2000)], ...], Meta(max_length=100)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,17 +219,15 @@ class ScansAdded:
     """Scans have been written that belong to the window of a click: the clicks are solved again. It is not journalled."""
 
 
-@dataclass(frozen=True, slots=True)
-class Undo:
+class Undo(_Journalled, frozen=True):
     """Undo the last change."""
 
 
-@dataclass(frozen=True, slots=True)
-class Redo:
+class Redo(_Journalled, frozen=True):
     """Redo the change that was undone last."""
 
 
-Event: TypeAlias = (
+JournalStep: TypeAlias = (
     ClickPlaced
     | ClickMoved
     | ClickRemoved
@@ -243,10 +236,11 @@ Event: TypeAlias = (
     | PlacementDismissed
     | WarningsAcknowledged
     | OptionsChanged
-    | OptionsEdited
     | Cleared
-    | ClicksImported
     | IntrinsicsChosen
+    | ClicksImported
+    | ColumnsMapped
+    | AssumptionsConfirmed
     | BoxDrawn
     | BoxMoved
     | BoxHidden
@@ -254,9 +248,9 @@ Event: TypeAlias = (
     | BoxRemoved
     | BoxLabelled
     | BoxesLoaded
-    | ScansAdded
-    | ColumnsMapped
-    | AssumptionsConfirmed
-    | Solved
+    | Undo
+    | Redo
 )
-Step: TypeAlias = Event | Undo | Redo
+"""Steps with a line in the journal; the page may send them, too."""
+
+Step: TypeAlias = JournalStep | Solved | ScansAdded

@@ -2,13 +2,12 @@
 
 from dataclasses import dataclass, field, replace
 
-from cocalib.option_changes import changed_options
+from cocalib.option_changes import changed_options, changes_from_tree
 from cocalib.session.applying import apply
 from cocalib.session.events import (
     AssumptionsConfirmed,
     ColumnsMapped,
     OptionsChanged,
-    OptionsEdited,
     Redo,
     ScansAdded,
     Solved,
@@ -53,8 +52,8 @@ def settled(step: Step, session: Session) -> Step:
     Raises:
         OptionError: an option is unknown, of the wrong type or out of range.
     """
-    if isinstance(step, OptionsEdited):
-        return OptionsChanged(changed_options(session.options, step.changes))
+    if isinstance(step, OptionsChanged):
+        return OptionsChanged.of(changed_options(session.options, changes_from_tree(step.options)))
     return step
 
 

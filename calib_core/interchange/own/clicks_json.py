@@ -54,21 +54,7 @@ def read_clicks_file(text: str, source: str = "clicks") -> ClicksFile:
     """
     document = parse_document(text, ClicksDocument, source=source)
     refuse_repeated_ids([click.id for click in document.clicks], source=source, place="clicks")
-    clicks = tuple(
-        sorted(
-            ReflectorClick(
-                image_time=time_from_parts(click.image_time.sec, click.image_time.nanosec),
-                id=click.id,
-                u_px=click.pixel_px[0],
-                v_px=click.pixel_px[1],
-                sigma_px=click.sigma_px,
-                excluded=click.excluded,
-                mark=click.mark,
-                chosen=None if click.chosen is None else chosen_of(click.chosen),
-            )
-            for click in document.clicks
-        )
-    )
+    clicks = tuple(sorted(map(click_of, document.clicks)))
     return ClicksFile(clicks, unconfirmed_of(document.unconfirmed, [click.id for click in clicks]))
 
 
@@ -85,23 +71,39 @@ def write_clicks(
         radar_topics: of the radar they were made with; written only if there are several, for whoever reads the file.
         unconfirmed: those that nobody confirmed.
     """
-    documents = [
-        ClickDocument(
-            click.id,
-            TimeDocument(*time_parts(click.image_time)),
-            (click.u_px, click.v_px),
-            sigma_px=click.sigma_px,
-            excluded=click.excluded,
-            mark=click.mark,
-            chosen=None if click.chosen is None else return_document(click.chosen),
-        )
-        for click in sorted(clicks, key=lambda click: (click.image_time, click.id))
-    ]
+    documents = [click_document(click) for click in sorted(clicks, key=lambda click: (click.image_time, click.id))]
     topics = list(radar_topics) if len(radar_topics) > 1 else UNSET
     return json_text(
         msgspec.to_builtins(
             ClicksDocument(CLICKS_SCHEMA, documents, radar_topics=topics, unconfirmed=unconfirmed_document(unconfirmed))
         )
+    )
+
+
+def click_of(document: ClickDocument) -> ReflectorClick:
+    """Return the click of a JSON object."""
+    return ReflectorClick(
+        image_time=time_from_parts(document.image_time.sec, document.image_time.nanosec),
+        id=document.id,
+        u_px=document.pixel_px[0],
+        v_px=document.pixel_px[1],
+        sigma_px=document.sigma_px,
+        excluded=document.excluded,
+        mark=document.mark,
+        chosen=None if document.chosen is None else chosen_of(document.chosen),
+    )
+
+
+def click_document(click: ReflectorClick) -> ClickDocument:
+    """Return the document of a click."""
+    return ClickDocument(
+        click.id,
+        TimeDocument(*time_parts(click.image_time)),
+        (click.u_px, click.v_px),
+        sigma_px=click.sigma_px,
+        excluded=click.excluded,
+        mark=click.mark,
+        chosen=None if click.chosen is None else return_document(click.chosen),
     )
 
 

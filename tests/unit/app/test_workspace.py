@@ -10,14 +10,12 @@ import pytest
 from calib_core.errors import InputError
 from calib_core.interchange import read_clicks
 from calib_core.measurements import RadarScans, TimeNs, Unsolvable
-from cocalib.option_changes import OptionChange
 from cocalib.session import (
     ClickPlaced,
     ClickRemoved,
     EventError,
     History,
     OptionsChanged,
-    OptionsEdited,
     RecordingFacts,
     Solved,
     Step,
@@ -79,7 +77,7 @@ def workspace(journal: ListJournal, solver: HeldSolver) -> Workspace:
 def test_a_click_is_seen_at_once_and_the_answer_later(workspace: Workspace, solver: HeldSolver) -> None:
     seen: list[View] = []
     workspace.subscribe(seen.append)
-    workspace.dispatch(ClickPlaced(TIMES[3], 1.0, 2.0))
+    workspace.dispatch(ClickPlaced(TIMES[3], (1.0, 2.0), "clicked"))
     assert [shown.stage for shown in seen] == ["collecting", "solving"]
     solver.when_done(Solved(1, NO_ANSWER))
     assert [shown.solving for shown in seen] == [False, True, False]
@@ -89,7 +87,7 @@ def test_a_click_is_seen_at_once_and_the_answer_later(workspace: Workspace, solv
 def test_a_step_is_journalled_before_subscribers_are_notified(workspace: Workspace, journal: ListJournal) -> None:
     journalled: list[int] = []
     workspace.subscribe(lambda shown: journalled.append(len(journal.steps)))
-    workspace.dispatch(ClickPlaced(TIMES[3], 1.0, 2.0))
+    workspace.dispatch(ClickPlaced(TIMES[3], (1.0, 2.0), "clicked"))
     assert journalled == [0, 1]
 
 
@@ -100,7 +98,7 @@ def test_a_step_that_cannot_be_stored_is_not_made(
     workspace.subscribe(seen.append)
     journal.refuse = True
     with pytest.raises(SessionFileError):
-        workspace.dispatch(ClickPlaced(TIMES[3], 1.0, 2.0))
+        workspace.dispatch(ClickPlaced(TIMES[3], (1.0, 2.0), "clicked"))
     assert workspace.session.clicks == ()
     assert len(seen) == 1
     assert solver.revisions == []
@@ -112,12 +110,12 @@ def test_a_step_that_does_not_fit_changes_nothing_and_is_not_journalled(
     with pytest.raises(EventError):
         workspace.dispatch(ClickRemoved("c1"))
     assert journal.steps == []
-    workspace.dispatch(ClickPlaced(TIMES[3], 1.0, 2.0))
+    workspace.dispatch(ClickPlaced(TIMES[3], (1.0, 2.0), "clicked"))
     assert len(workspace.session.clicks) == 1
 
 
 def test_undo_and_redo_are_journalled_and_answers_are_not(workspace: Workspace, journal: ListJournal) -> None:
-    workspace.dispatch(ClickPlaced(TIMES[3], 1.0, 2.0))
+    workspace.dispatch(ClickPlaced(TIMES[3], (1.0, 2.0), "clicked"))
     workspace.dispatch(Solved(1, NO_ANSWER))
     workspace.undo()
     workspace.undo()
@@ -126,25 +124,25 @@ def test_undo_and_redo_are_journalled_and_answers_are_not(workspace: Workspace, 
 
 
 def test_edited_options_are_journalled_as_the_whole_of_the_options(workspace: Workspace, journal: ListJournal) -> None:
-    workspace.dispatch(OptionsEdited((OptionChange("method", "paper"),)))
-    assert journal.steps == [OptionsChanged(workspace.session.options)]
+    workspace.dispatch(OptionsChanged({"method": "paper"}))
+    assert journal.steps == [OptionsChanged.of(workspace.session.options)]
     assert workspace.session.options.method == "paper"
 
 
 def test_the_solver_is_asked_for_every_revision_with_clicks_and_only_for_those(
     workspace: Workspace, solver: HeldSolver
 ) -> None:
-    workspace.dispatch(OptionsEdited((OptionChange("method", "paper"),)))
-    workspace.dispatch(ClickPlaced(TIMES[3], 1.0, 2.0))
+    workspace.dispatch(OptionsChanged({"method": "paper"}))
+    workspace.dispatch(ClickPlaced(TIMES[3], (1.0, 2.0), "clicked"))
     workspace.dispatch(Solved(2, NO_ANSWER))
-    workspace.dispatch(ClickPlaced(TIMES[4], 1.0, 2.0))
+    workspace.dispatch(ClickPlaced(TIMES[4], (1.0, 2.0), "clicked"))
     workspace.undo()
     assert solver.revisions == [2, 3]
 
 
 def test_a_restored_session_is_solved_at_once(journal: ListJournal, solver: HeldSolver) -> None:
     first = Workspace(FACTS, Restored(Path("nowhere"), History()), journal, HeldSolver())
-    first.dispatch(ClickPlaced(TIMES[3], 1.0, 2.0))
+    first.dispatch(ClickPlaced(TIMES[3], (1.0, 2.0), "clicked"))
     Workspace(FACTS, Restored(Path("nowhere"), first.history), journal, solver)
     assert solver.revisions == [1]
 
@@ -155,7 +153,7 @@ def test_an_answer_that_comes_within_the_request_does_not_deadlock(journal: List
             when_done(Solved(revision, NO_ANSWER))
 
     workspace = Workspace(FACTS, Restored(Path("nowhere"), History()), journal, Immediate())
-    workspace.dispatch(ClickPlaced(TIMES[3], 1.0, 2.0))
+    workspace.dispatch(ClickPlaced(TIMES[3], (1.0, 2.0), "clicked"))
     assert workspace.session.is_solved
 
 
@@ -167,8 +165,8 @@ def test_a_subscriber_may_dispatch(workspace: Workspace) -> None:
     seen: list[int] = []
     workspace.subscribe(tidy)
     workspace.subscribe(lambda shown: seen.append(len(shown.clicks)))
-    workspace.dispatch(ClickPlaced(TIMES[3], 1.0, 2.0))
-    workspace.dispatch(ClickPlaced(TIMES[4], 1.0, 2.0))
+    workspace.dispatch(ClickPlaced(TIMES[3], (1.0, 2.0), "clicked"))
+    workspace.dispatch(ClickPlaced(TIMES[4], (1.0, 2.0), "clicked"))
     assert seen == [0, 1, 2, 1]
 
 
@@ -176,7 +174,7 @@ def test_an_ended_subscription_receives_nothing_more(workspace: Workspace) -> No
     seen: list[View] = []
     end = workspace.subscribe(seen.append)
     end()
-    workspace.dispatch(ClickPlaced(TIMES[3], 1.0, 2.0))
+    workspace.dispatch(ClickPlaced(TIMES[3], (1.0, 2.0), "clicked"))
     assert len(seen) == 1
 
 
@@ -189,7 +187,7 @@ def test_a_subscriber_that_fails_does_not_silence_the_workspace(workspace: Works
         workspace.subscribe(fail)
     workspace.subscribe(seen.append)
     with pytest.raises(ZeroDivisionError):
-        workspace.dispatch(ClickPlaced(TIMES[3], 1.0, 2.0))
+        workspace.dispatch(ClickPlaced(TIMES[3], (1.0, 2.0), "clicked"))
     assert len(workspace.session.clicks) == 1
 
 
@@ -201,7 +199,7 @@ def test_many_threads_at_once_lose_no_step_and_views_come_in_order(workspace: Wo
     def click(start: int) -> None:
         ready.wait()
         for frame in range(start, 48, 4):
-            workspace.dispatch(ClickPlaced(TIMES[frame], 1.0, 2.0))
+            workspace.dispatch(ClickPlaced(TIMES[frame], (1.0, 2.0), "clicked"))
 
     threads = [threading.Thread(target=click, args=(start,)) for start in range(4)]
     for thread in threads:
@@ -214,7 +212,7 @@ def test_many_threads_at_once_lose_no_step_and_views_come_in_order(workspace: Wo
 
 def test_downloaded_clicks_can_be_imported_again(workspace: Workspace) -> None:
     for frame in (3, 5):
-        workspace.dispatch(ClickPlaced(TIMES[frame], 1.5, 2.5))
+        workspace.dispatch(ClickPlaced(TIMES[frame], (1.5, 2.5), "clicked"))
     text, clicks = workspace.clicks_text(), workspace.session.clicks
     assert read_clicks(text) == clicks
     workspace.undo()
@@ -269,7 +267,7 @@ def test_a_workspace_opened_again_has_the_earlier_clicks(tmp_path: Path) -> None
     for expected in ([], ["c1"]):
         workspace = open_workspace(BareRecording(), camera=None, session_folder=tmp_path / "s", name="drive")
         assert [click.id for click in workspace.restored.history.present.clicks] == expected
-        workspace.dispatch(ClickPlaced(TIMES[3], 1.5, 2.5))
+        workspace.dispatch(ClickPlaced(TIMES[3], (1.5, 2.5), "clicked"))
         workspace.close()
 
 
@@ -283,7 +281,7 @@ def test_a_recording_without_pictures_can_be_looked_at_and_stores_nothing(tmp_pa
     assert workspace.view.status == "No camera in this recording: nothing can be clicked"
     assert "Add the camera's file" in workspace.view.hint
     with pytest.raises(EventError, match="no frame of drive"):
-        workspace.dispatch(ClickPlaced(TimeNs(int(recording.radar_times[0])), 1.0, 1.0))
+        workspace.dispatch(ClickPlaced(TimeNs(int(recording.radar_times[0])), (1.0, 1.0), "clicked"))
     workspace.close()
     assert not (tmp_path / "s").exists()
 
@@ -298,9 +296,9 @@ def test_a_recording_without_pictures_and_without_radar_is_refused_with_a_clear_
 def test_a_recording_that_grows_gets_frames_that_can_be_clicked(workspace: Workspace, journal: ListJournal) -> None:
     later = FACTS.image_times[-1] + 100_000_000
     with pytest.raises(EventError):
-        workspace.dispatch(ClickPlaced(TimeNs(int(later)), 1.0, 2.0))
+        workspace.dispatch(ClickPlaced(TimeNs(int(later)), (1.0, 2.0), "clicked"))
     workspace.extend(np.append(FACTS.image_times, later), None)
-    workspace.dispatch(ClickPlaced(TimeNs(int(later)), 1.0, 2.0))
+    workspace.dispatch(ClickPlaced(TimeNs(int(later)), (1.0, 2.0), "clicked"))
     assert workspace.view.clicks[0].frame == len(FACTS.image_times)
     assert len(journal.steps) == 1
 
@@ -308,7 +306,7 @@ def test_a_recording_that_grows_gets_frames_that_can_be_clicked(workspace: Works
 def test_clicks_are_solved_again_when_scans_of_their_windows_come(
     workspace: Workspace, solver: HeldSolver, journal: ListJournal
 ) -> None:
-    workspace.dispatch(ClickPlaced(TIMES[3], 1.0, 2.0))
+    workspace.dispatch(ClickPlaced(TIMES[3], (1.0, 2.0), "clicked"))
     second_ns = 1_000_000_000
     workspace.extend(FACTS.image_times, TimeNs(TIMES[3] + 10 * second_ns))
     workspace.extend(FACTS.image_times, None)

@@ -90,7 +90,7 @@ def _written(home: Path, session: Session, recording: RecordingForm) -> Path:
     folder = GuardedFolder(path, create=True)
     try:
         loaded = BoxesLoaded(session.boxes, session.empty_frames)
-        steps = (OptionsChanged(session.options), ClicksImported(session.clicks), loaded)
+        steps = (OptionsChanged.of(session.options), ClicksImported.of(session.clicks), loaded)
         sums = begin_journal(folder, recording, steps, cocalib=version())
         write_snapshot(folder, session, recording=recording, sums=sums, cocalib=version())
         if fault := snapshot_fault(folder, session.clicks):

@@ -11,7 +11,6 @@ from calib_core.arrays import TimesNs
 from calib_core.measurements import Stamp, TimeNs
 from cocalib.session import RecordingFacts
 from cocalib.session.file.errors import SessionFileError
-from cocalib.session.file.form_parts import StampForm
 
 _FIRST_DATE_S = 631_152_000
 """Earlier stamps count from the start of the recording, or of a simulation: 1990."""
@@ -35,7 +34,7 @@ class RecordingForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omi
     frames: int
     width_px: int
     height_px: int
-    start: StampForm | None
+    start: Stamp | None
     stamps_sha256: str
     radar_axes: str | None = None
     scans: int = 0
@@ -50,7 +49,7 @@ def recording_form(facts: RecordingFacts) -> RecordingForm:
         frames=frames,
         width_px=facts.width_px,
         height_px=facts.height_px,
-        start=StampForm.of(Stamp.of(TimeNs(int(times_ns[0])))) if len(times_ns) else None,
+        start=Stamp.of(TimeNs(int(times_ns[0]))) if len(times_ns) else None,
         stamps_sha256=_digest(times_ns),
         radar_axes=facts.radar_axes,
         scans=0 if frames else len(times_ns),

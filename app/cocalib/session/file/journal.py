@@ -9,13 +9,13 @@ from collections.abc import Sequence
 
 import msgspec
 
-from cocalib.session import Step
+from calib_core.measurements import time_to_json
+from cocalib.session import JournalStep, Step
 from cocalib.session.file.checksums import SealedLine, line_bytes, sealed
 from cocalib.session.file.errors import SessionFileError
 from cocalib.session.file.guarded_folder import GuardedFolder
 from cocalib.session.file.identity import RecordingForm
 from cocalib.session.file.journal_reading import JOURNAL, SCHEMA, Head, Line, read_journal
-from cocalib.session.file.step_json import form_of_step
 
 
 def begin_journal(
@@ -137,4 +137,6 @@ class Journal:
 
 
 def _content(number: int, step: Step) -> bytes:
-    return msgspec.json.encode(Line(number, form_of_step(step)))
+    if not isinstance(step, JournalStep):
+        raise TypeError(f"{type(step).__name__} is not journalled")
+    return msgspec.json.encode(Line(number, step), enc_hook=time_to_json)

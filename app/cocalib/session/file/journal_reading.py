@@ -6,11 +6,12 @@ from dataclasses import dataclass
 import msgspec
 
 from calib_core.errors import CalibrationError
-from cocalib.session import Step
+from calib_core.measurements import time_from_json
+from cocalib.option_changes import kept_options
+from cocalib.session import JournalStep, OptionsChanged, Step
 from cocalib.session.file.checksums import SealedLine, taken_apart
 from cocalib.session.file.errors import SessionFileError
 from cocalib.session.file.identity import RecordingForm
-from cocalib.session.file.step_json import StepForm, step_from_form
 
 JOURNAL = "journal.jsonl"
 SCHEMA, SCHEMA_1 = "cocalib/session-2", "cocalib/session-1"
@@ -35,7 +36,7 @@ class Line(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Any other line: the number of a step, and the step."""
 
     n: int
-    step: StepForm
+    step: JournalStep
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,8 +201,10 @@ def _step(content: bytes, number: int | None) -> Step:
         ValueError: it is none, or has another number.
     """
     try:
-        read = msgspec.json.decode(content, type=Line)
-        step = step_from_form(read.step)
+        read = msgspec.json.decode(content, type=Line, dec_hook=time_from_json)
+        step: Step = read.step
+        if isinstance(step, OptionsChanged):
+            step = OptionsChanged.of(kept_options(step.options))
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError, CalibrationError) as error:
         raise ValueError(str(error)) from error
     if number is not None and read.n != number:

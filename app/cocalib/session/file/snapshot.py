@@ -11,7 +11,9 @@ import msgspec
 from msgspec import Meta
 
 from calib_core.errors import CalibrationError
-from calib_core.measurements import ReflectorClick, Stamp, TimeNs
+from calib_core.interchange.own.clicks_json import click_document, click_of
+from calib_core.interchange.own.documents import ClickDocument
+from calib_core.measurements import ReflectorClick, TimeNs, time_from_json, time_to_json
 from calib_core.options import CalibrationOptions
 from cocalib.option_changes import kept_options
 from cocalib.session import (
@@ -29,15 +31,11 @@ from cocalib.session import (
     Step,
     WarningsAcknowledged,
 )
-from cocalib.session.file.box_json import BoxTrackForm, form_of_track, track_from_form
 from cocalib.session.file.checksums import line_bytes, sealed, taken_apart
 from cocalib.session.file.errors import SessionFileError
-from cocalib.session.file.form_parts import StampForm
 from cocalib.session.file.guarded_folder import GuardedFolder
 from cocalib.session.file.identity import RecordingForm
-from cocalib.session.file.intrinsics_json import IntrinsicsForm, form_of_intrinsics, intrinsics_from_form
 from cocalib.session.file.journal_reading import SCHEMA, SCHEMA_1
-from cocalib.session.file.step_json import ClickForm, PlacementDismissedForm, click_from_form, form_of_click
 
 SNAPSHOT = "session.json"
 _DIGITS = 8
@@ -49,16 +47,16 @@ class _Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     recording: RecordingForm
     steps: Annotated[int, Meta(ge=0)]
     options: dict[str, Any]
-    clicks: tuple[ClickForm, ...]
+    clicks: tuple[ClickDocument, ...]
     last: str = ""
     lines: str = ""
     column_map: tuple[str, ...] = ()
     confirmed: tuple[str, ...] = ()
-    dismissed: tuple[PlacementDismissedForm, ...] = ()
+    dismissed: tuple[PlacementDismissed, ...] = ()
     acknowledged: tuple[str, ...] = ()
-    boxes: tuple[BoxTrackForm, ...] = ()
-    empty_frames: tuple[StampForm, ...] = ()
-    intrinsics: IntrinsicsForm | None = None
+    boxes: tuple[BoxTrack, ...] = ()
+    empty_frames: tuple[TimeNs, ...] = ()
+    intrinsics: ChosenIntrinsics | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +105,14 @@ class FoundSnapshot:
         has_boxes = self.boxes or self.empty_frames
         loaded = (BoxesLoaded(self.boxes, self.empty_frames),) if has_boxes else ()
         chosen = (IntrinsicsChosen(self.intrinsics),) if self.intrinsics else ()
-        return (*reading, *chosen, OptionsChanged(self.options), ClicksImported(self.clicks), *dismissals, *loaded)
+        return (
+            *reading,
+            *chosen,
+            OptionsChanged.of(self.options),
+            ClicksImported.of(self.clicks),
+            *dismissals,
+            *loaded,
+        )
 
     def agrees_with(self, sums: Sequence[str]) -> bool:
         """Return whether the journal's lines are those of the snapshot, as far as both have them."""
@@ -137,20 +142,18 @@ def write_snapshot(
         recording=recording,
         steps=len(sums) - 1,
         options=msgspec.to_builtins(session.options),
-        clicks=tuple(form_of_click(click) for click in session.clicks),
+        clicks=tuple(map(click_document, session.clicks)),
         last=sums[-1],
         lines=_marks(sums),
         column_map=session.column_map,
         confirmed=session.confirmed,
-        dismissed=tuple(
-            PlacementDismissedForm(StampForm.of(Stamp.of(one.time)), one.position_m) for one in session.dismissed
-        ),
+        dismissed=tuple(PlacementDismissed(one.time, one.position_m) for one in session.dismissed),
         acknowledged=session.acknowledged,
-        boxes=tuple(map(form_of_track, session.boxes)),
-        empty_frames=tuple(StampForm.of(Stamp.of(time)) for time in session.empty_frames),
-        intrinsics=form_of_intrinsics(session.intrinsics),
+        boxes=session.boxes,
+        empty_frames=session.empty_frames,
+        intrinsics=session.intrinsics,
     )
-    folder.replace(SNAPSHOT, line_bytes(sealed(msgspec.json.encode(snapshot))) + b"\n")
+    folder.replace(SNAPSHOT, line_bytes(sealed(msgspec.json.encode(snapshot, enc_hook=time_to_json))) + b"\n")
 
 
 def read_snapshot(data: bytes, place: str) -> FoundSnapshot:
@@ -167,7 +170,7 @@ def read_snapshot(data: bytes, place: str) -> FoundSnapshot:
     if found.sum and (not found.follows("") or not data.endswith(b"\n")):
         raise _damaged(place, "its checksum is wrong")
     try:
-        snapshot = msgspec.json.decode(found.content, type=_Snapshot)
+        snapshot = msgspec.json.decode(found.content, type=_Snapshot, dec_hook=time_from_json)
         if snapshot.schema not in (SCHEMA, SCHEMA_1):
             raise SessionFileError(f"{place}: written as '{snapshot.schema}', but this version reads '{SCHEMA}'")
         if snapshot.schema != (SCHEMA if found.sum else SCHEMA_1):
@@ -175,17 +178,17 @@ def read_snapshot(data: bytes, place: str) -> FoundSnapshot:
         return FoundSnapshot(
             recording=snapshot.recording,
             count=snapshot.steps,
-            clicks=tuple(sorted(click_from_form(click) for click in snapshot.clicks)),
+            clicks=tuple(sorted(map(click_of, snapshot.clicks))),
             options=kept_options(snapshot.options),
             last=snapshot.last,
             lines=snapshot.lines,
             column_map=snapshot.column_map,
             confirmed=snapshot.confirmed,
-            dismissed=tuple(DismissedPlacement(one.time.stamp.time, one.position_m) for one in snapshot.dismissed),
+            dismissed=tuple(DismissedPlacement(one.time, one.position_m) for one in snapshot.dismissed),
             acknowledged=snapshot.acknowledged,
-            boxes=tuple(map(track_from_form, snapshot.boxes)),
-            empty_frames=tuple(form.stamp.time for form in snapshot.empty_frames),
-            intrinsics=intrinsics_from_form(snapshot.intrinsics),
+            boxes=snapshot.boxes,
+            empty_frames=snapshot.empty_frames,
+            intrinsics=snapshot.intrinsics,
             sum=found.sum or sealed(data).sum,
         )
     except SessionFileError:

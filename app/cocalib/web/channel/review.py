@@ -33,12 +33,12 @@ from cocalib.web.channel.newest import NewestWins
 from cocalib.web.channel.outbox import Outbox
 from cocalib.web.messages import Outgoing, Uncertainty, encode
 from cocalib.web.messages.review_messages import (
-    CompareForm,
-    PairReviewForm,
-    ReviewForm,
+    CompareWanted,
+    PairReviewWanted,
     ReviewRequest,
+    ReviewWanted,
     SolutionKind,
-    UncertaintyForm,
+    UncertaintyWanted,
 )
 from cocalib.workspace import Workspace
 
@@ -70,21 +70,21 @@ class ReviewDesk:
         self._recording = recording
         self._camera = camera
         self._outbox = outbox
-        self._sent: CompareForm | None = None
-        self._read: tuple[CompareForm, Solution] | None = None
+        self._sent: CompareWanted | None = None
+        self._read: tuple[CompareWanted, Solution] | None = None
         self._workers = {
             form: NewestWins(partial(self._send, kind), report)
             for form, kind in (
-                (ReviewForm, "review"),
-                (PairReviewForm, "pair_review"),
-                (CompareForm, "compared"),
-                (UncertaintyForm, "uncertainty"),
+                (ReviewWanted, "review"),
+                (PairReviewWanted, "pair_review"),
+                (CompareWanted, "compared"),
+                (UncertaintyWanted, "uncertainty"),
             )
         }
 
     def give(self, request: ReviewRequest) -> None:
         """Answer this as soon as the current request of its kind is done; of those that wait, only the newest counts."""
-        if isinstance(request, CompareForm) and request.file_name:
+        if isinstance(request, CompareWanted) and request.file_name:
             self._sent = request
         self._workers[type(request)].give(partial(self._answer, request))
 
@@ -100,15 +100,15 @@ class ReviewDesk:
     def _answer(self, request: ReviewRequest) -> Outgoing:
         session = self._workspace.session
         calibration = session.outcome if isinstance(session.outcome, Calibration) else None
-        if isinstance(request, ReviewForm):
+        if isinstance(request, ReviewWanted):
             return review_of(calibration, session.outcome_revision)
-        if isinstance(request, PairReviewForm):
+        if isinstance(request, PairReviewWanted):
             return pair_review(calibration, request.id) if calibration else PairReview(request.id, "Not solved yet.")
-        if isinstance(request, UncertaintyForm):
+        if isinstance(request, UncertaintyWanted):
             return Uncertainty(session.outcome_revision, contour_maps(calibration) if calibration else ())
         return self._compared(request)
 
-    def _compared(self, request: CompareForm) -> Compared:
+    def _compared(self, request: CompareWanted) -> Compared:
         session = self._workspace.session
         try:
             return compared(
@@ -119,7 +119,7 @@ class ReviewDesk:
         except CalibrationError as error:
             return not_compared(session.revision, _LABELS[request.a], _LABELS[request.b], str(error))
 
-    def _solution(self, kind: SolutionKind, request: CompareForm, session: Session) -> Solution:
+    def _solution(self, kind: SolutionKind, request: CompareWanted, session: Session) -> Solution:
         """Return one of the two solutions, solving for it if it is not there.
 
         Raises:

@@ -1,21 +1,18 @@
 """What a page may send: text in, commands out."""
 
-import base64
-import binascii
 import difflib
-from dataclasses import dataclass, replace
-from functools import singledispatch
-from typing import Annotated, Any, Literal, TypeAlias, get_args
+from dataclasses import dataclass
+from typing import Annotated, Literal, TypeAlias, get_args
 
 import msgspec
 from msgspec import Meta
+from msgspec.structs import replace
 
 from calib_core.errors import InputError
-from calib_core.measurements import TimeNs
+from calib_core.measurements import TimeNs, time_from_json
 from cocalib.option_changes import changes_from_tree
-from cocalib.session import ClickPlaced, OptionsEdited, Step
-from cocalib.session.file import step_json as forms
-from cocalib.session.file.form_parts import StampForm
+from cocalib.session import ClickPlaced, ColumnsMapped, JournalStep, OptionsChanged
+from cocalib.session.events import Id
 from cocalib.web.messages.lens_messages import LensRequest
 from cocalib.web.messages.opening_messages import ChoicesWanted, FolderWanted, OpeningCommand, OpenWith, RecentForgotten
 from cocalib.web.messages.proposal_messages import ProposingSwitch
@@ -28,19 +25,24 @@ RequestNumber: TypeAlias = Annotated[int, Meta(ge=0, le=2**53 - 1)]
 FrameIndex: TypeAlias = Annotated[int, Meta(ge=0, le=2**31 - 1)]
 
 
-@dataclass(frozen=True, slots=True)
-class Hello:
+ReturnColour: TypeAlias = Literal["speed", "range", "doppler", "amplitude", "height"]
+Viewpoint: TypeAlias = Literal["behind", "above", "side"]
+
+
+class _Request(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="type"):
+    """A message of the page that is not a step."""
+
+
+class Hello(_Request, frozen=True, tag="hello"):
     """A page has opened: send it the recording and the view."""
 
 
-@dataclass(frozen=True, slots=True)
-class ViewWanted:
+class ViewWanted(_Request, frozen=True, tag="view"):
     """A page missed a change of the View: send it a whole one."""
 
 
-@dataclass(frozen=True, slots=True)
-class FrameWanted:
-    """A page wants the picture of a frame.
+class FrameWanted(_Request, frozen=True, tag="frame"):
+    """A page wants the picture of a frame; exactly one binary message answers, unless a newer request comes first.
 
     Attributes:
         index: of the frame.
@@ -49,17 +51,13 @@ class FrameWanted:
         size: "half" is enough while playing; "rectified" is the whole picture without distortion.
     """
 
-    index: int
-    request: int
+    index: FrameIndex
+    request: RequestNumber
     playing: bool = False
     size: Literal["full", "half", "rectified"] = "full"
 
 
-ReturnColour: TypeAlias = Literal["speed", "range", "doppler", "amplitude", "height"]
-
-
-@dataclass(frozen=True, slots=True)
-class CursorMoved:
+class CursorMoved(_Request, frozen=True, tag="cursor"):
     """A page shows another frame: the 3D view and the overlay follow.
 
     Attributes:
@@ -73,32 +71,23 @@ class CursorMoved:
         hidden: the 3D view is hidden, and nothing needs to be sent to it.
     """
 
-    index: int
+    index: FrameIndex
     playing: bool = False
-    selected: str | None = None
+    selected: Annotated[str, Meta(max_length=100)] | None = None
     light: bool = False
-    trail_s: float = 0.0
+    trail_s: Annotated[float, Meta(ge=0, le=60)] = 0.0
     colour: ReturnColour = "speed"
     whole: bool = False
     hidden: bool = False
 
 
-Viewpoint: TypeAlias = Literal["behind", "above", "side"]
-
-
-@dataclass(frozen=True, slots=True)
-class ViewpointWanted:
-    """A page wants another viewpoint for its 3D view.
-
-    Attributes:
-        viewpoint: behind, above or to the side of the radar.
-    """
+class ViewpointWanted(_Request, frozen=True, tag="viewpoint"):
+    """A page wants another viewpoint for its 3D view: behind, above or to the side of the radar."""
 
     viewpoint: Viewpoint
 
 
-@dataclass(frozen=True, slots=True)
-class ImportWanted:
+class ImportWanted(_Request, frozen=True, tag="import_clicks"):
     """A page read a file of clicks.
 
     Attributes:
@@ -107,12 +96,11 @@ class ImportWanted:
     """
 
     text: str
-    name: str
+    name: Annotated[str, Meta(max_length=300)] = "the file"
 
 
-@dataclass(frozen=True, slots=True)
-class SnapWanted:
-    """A page wants the reflector's apex near a pixel of a frame; nothing is changed.
+class SnapWanted(_Request, frozen=True, tag="snap_wanted"):
+    """A page wants the reflector's apex near a pixel of a frame; one message `snapped` answers, and nothing is changed.
 
     Attributes:
         image_time: stamp of the frame.
@@ -123,30 +111,28 @@ class SnapWanted:
 
     image_time: TimeNs
     pixel_px: tuple[float, float]
-    id: str | None = None
+    id: Id | None = None
     over_dwell: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class BoxesWanted:
-    """A page read a file of boxes.
+class BoxesWanted(_Request, frozen=True, tag="load_boxes", rename={"content": "content_base64"}):
+    """A page read a file of boxes; they take the place of all boxes.
 
     Attributes:
+        name: of the file.
         content: of the file.
-        name: its name.
     """
 
+    name: Annotated[str, Meta(max_length=300)]
     content: bytes
-    name: str
 
 
-@dataclass(frozen=True, slots=True)
-class FollowingStopped:
+class FollowingStopped(_Request, frozen=True, tag="stop_following"):
     """A page wants boxes to be followed no farther than they have been."""
 
 
 Command: TypeAlias = (
-    Step
+    JournalStep
     | Hello
     | ViewWanted
     | FrameWanted
@@ -160,6 +146,7 @@ Command: TypeAlias = (
     | FollowingStopped
     | BoxesWanted
 )
+Message: TypeAlias = Command | ChoicesWanted | FolderWanted | RecentForgotten | OpenWith
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,97 +158,11 @@ class Incoming:
         request: the number to answer with; None when no answer is wanted.
     """
 
-    command: Command | OpeningCommand
+    command: Message
     request: int | None = None
 
 
-class _Form(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="type"):
-    """A message of the page that is not a step."""
-
-
-class HelloForm(_Form, frozen=True, tag="hello"):
-    """A page has opened."""
-
-
-class ViewForm(_Form, frozen=True, tag="view"):
-    """A change of the View was missed."""
-
-
-class FrameForm(_Form, frozen=True, tag="frame"):
-    """The picture of a frame is requested; exactly one binary message answers, unless a newer request comes first."""
-
-    index: FrameIndex
-    request: RequestNumber
-    playing: bool = False
-    size: Literal["full", "half", "rectified"] = "full"
-
-
-class CursorForm(_Form, frozen=True, tag="cursor"):
-    """Another frame is shown."""
-
-    index: FrameIndex
-    playing: bool = False
-    selected: Annotated[str, Meta(max_length=100)] | None = None
-    light: bool = False
-    trail_s: Annotated[float, Meta(ge=0, le=60)] = 0.0
-    colour: ReturnColour = "speed"
-    whole: bool = False
-    hidden: bool = False
-
-
-class ViewpointForm(_Form, frozen=True, tag="viewpoint"):
-    """Another viewpoint is requested for the 3D view."""
-
-    viewpoint: Viewpoint
-
-
-class ImportForm(_Form, frozen=True, tag="import_clicks"):
-    """A file of clicks was read."""
-
-    text: str
-    name: Annotated[str, Meta(max_length=300)] = "the file"
-
-
-class SnapForm(_Form, frozen=True, tag="snap_wanted"):
-    """The reflector's apex near a pixel is requested; one message `snapped` answers."""
-
-    image_time: StampForm
-    pixel_px: forms.PixelForm
-    id: forms.ClickId | None = None
-    over_dwell: bool = False
-
-
-class LoadBoxesForm(_Form, frozen=True, tag="load_boxes"):
-    """A file of boxes was read; they take the place of all boxes."""
-
-    name: Annotated[str, Meta(max_length=300)]
-    content_base64: str
-
-
-class StopFollowingForm(_Form, frozen=True, tag="stop_following"):
-    """Boxes are to be followed no farther."""
-
-
-OpeningForm: TypeAlias = ChoicesWanted | FolderWanted | RecentForgotten | OpenWith
-MessageForm: TypeAlias = (
-    forms.StepForm
-    | HelloForm
-    | ViewForm
-    | FrameForm
-    | CursorForm
-    | ViewpointForm
-    | ImportForm
-    | ReviewRequest
-    | LensRequest
-    | ProposingSwitch
-    | SnapForm
-    | StopFollowingForm
-    | LoadBoxesForm
-    | OpeningForm
-)
-
-
-_TYPES = {str(form.__struct_config__.tag): form for form in get_args(MessageForm)}
+_TYPES = {str(form.__struct_config__.tag): form for form in get_args(Message)}
 
 
 class _Envelope(msgspec.Struct):
@@ -288,8 +189,8 @@ def parse(text: str | bytes) -> Incoming:
     kind = _kind(fields)
     request = None if kind == "frame" else fields.pop("request", None)
     try:
-        form = msgspec.convert(fields, _TYPES[kind])
-        return Incoming(_command(form), msgspec.convert(request, RequestNumber | None))
+        command = msgspec.convert(fields, _TYPES[kind], dec_hook=time_from_json)
+        return Incoming(_checked(command), msgspec.convert(request, RequestNumber | None))
     except msgspec.ValidationError as error:
         raise InputError(f"invalid message '{kind}': {error}") from error
 
@@ -322,92 +223,17 @@ def _kind(fields: object) -> str:
     raise InputError(f"unknown message type '{str(kind)[:80]}'; {advice}")
 
 
-@singledispatch
-def _command(form: Any) -> Command | OpeningCommand:
-    return forms.step_from_form(form)
+def _checked(command: Message) -> Message:
+    """Return a command as it is carried out.
 
-
-@_command.register
-def _options(form: forms.OptionsChangedForm) -> Command:
-    return OptionsEdited(changes_from_tree(form.options))
-
-
-@_command.register
-def _placed(form: forms.ClickPlacedForm) -> Command:
-    step = forms.step_from_form(form)
-    return replace(step, mark=step.mark or "clicked") if isinstance(step, ClickPlaced) else step
-
-
-@_command.register
-def _mapped(form: forms.ColumnsMappedForm) -> Command:
-    raise InputError("the columns of the radar are given when the recording is opened, with --map")
-
-
-@_command.register
-def _hello(form: HelloForm) -> Command:
-    return Hello()
-
-
-@_command.register
-def _view(form: ViewForm) -> Command:
-    return ViewWanted()
-
-
-@_command.register
-def _frame(form: FrameForm) -> Command:
-    return FrameWanted(form.index, form.request, form.playing, form.size)
-
-
-@_command.register
-def _cursor(form: CursorForm) -> Command:
-    return CursorMoved(
-        form.index, form.playing, form.selected, form.light, form.trail_s, form.colour, form.whole, form.hidden
-    )
-
-
-@_command.register
-def _viewpoint(form: ViewpointForm) -> Command:
-    return ViewpointWanted(form.viewpoint)
-
-
-@_command.register
-def _review(form: ReviewRequest) -> Command:
-    return form
-
-
-@_command.register
-def _lens(form: LensRequest) -> Command:
-    return form
-
-
-@_command.register
-def _propose(form: ProposingSwitch) -> Command:
-    return form
-
-
-@_command.register
-def _import(form: ImportForm) -> Command:
-    return ImportWanted(form.text, form.name)
-
-
-@_command.register
-def _snap(form: SnapForm) -> Command:
-    return SnapWanted(form.image_time.stamp.time, form.pixel_px, form.id, form.over_dwell)
-
-
-@_command.register
-def _load_boxes(form: LoadBoxesForm) -> Command:
-    try:
-        return BoxesWanted(base64.b64decode(form.content_base64, validate=True), form.name)
-    except binascii.Error as error:
-        raise InputError(f"{form.name}: was not sent as base64: {error}") from None
-
-
-@_command.register
-def _stop_following(form: StopFollowingForm) -> Command:
-    return FollowingStopped()
-
-
-@_command.register
-def _opening(form: OpeningCommand) -> OpeningCommand:
-    return form
+    Raises:
+        InputError: the page may not send it.
+        OptionError: it names an option that does not exist or gives it a value of the wrong type.
+    """
+    if isinstance(command, ColumnsMapped):
+        raise InputError("the columns of the radar are given when the recording is opened, with --map")
+    if isinstance(command, OptionsChanged):
+        changes_from_tree(command.options)
+    if isinstance(command, ClickPlaced) and command.mark is None:
+        return replace(command, mark="clicked")
+    return command

@@ -15,17 +15,17 @@ class _Form(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="
     """A request; what it asks for is sent as a message of its own."""
 
 
-class ReviewForm(_Form, frozen=True, tag="review"):
+class ReviewWanted(_Form, frozen=True, tag="review"):
     """The review of all pairs is requested."""
 
 
-class PairReviewForm(_Form, frozen=True, tag="review_pair"):
+class PairReviewWanted(_Form, frozen=True, tag="review_pair"):
     """The review of one pair is requested."""
 
     id: Annotated[str, Meta(max_length=100)]
 
 
-class CompareForm(_Form, frozen=True, tag="compare"):
+class CompareWanted(_Form, frozen=True, tag="compare"):
     """Two solutions are to be compared; the content of a file is sent once, and kept for later requests of the page."""
 
     a: SolutionKind
@@ -35,11 +35,11 @@ class CompareForm(_Form, frozen=True, tag="compare"):
     file_base64: str = ""
 
 
-class UncertaintyForm(_Form, frozen=True, tag="uncertainty"):
+class UncertaintyWanted(_Form, frozen=True, tag="uncertainty"):
     """The contours of the uncertainty in the picture are requested."""
 
 
-ReviewRequest: TypeAlias = ReviewForm | PairReviewForm | CompareForm | UncertaintyForm
+ReviewRequest: TypeAlias = ReviewWanted | PairReviewWanted | CompareWanted | UncertaintyWanted
 
 
 @dataclass(frozen=True, slots=True)

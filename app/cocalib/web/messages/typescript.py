@@ -8,7 +8,8 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import msgspec
 
-from cocalib.web.messages.incoming import MessageForm
+from calib_core.measurements import Stamp, TimeNs
+from cocalib.web.messages.incoming import Message
 from cocalib.web.messages.outgoing import TYPES, FrameHeader, Outgoing
 
 _HEAD = """// The messages between the page and the server.
@@ -28,11 +29,11 @@ _PLAIN = {
 def declarations() -> str:
     """Return the text of `static/messages.d.ts`."""
     known: dict[str, str] = {}
-    for owner in (*get_args(Outgoing), FrameHeader, *get_args(MessageForm)):
+    for owner in (*get_args(Outgoing), FrameHeader, *get_args(Message)):
         _declare(owner, known)
     unions = [
         _union("FromServer", [owner.__name__ for owner in get_args(Outgoing)]),
-        _union("FromPage", [owner.__name__ for owner in get_args(MessageForm)]),
+        _union("FromPage", [owner.__name__ for owner in get_args(Message)]),
     ]
     return "\n".join([_HEAD, *known.values(), *unions])
 
@@ -92,6 +93,8 @@ def _type(hint: Any, known: dict[str, str]) -> str:
     origin, arguments = get_origin(hint), get_args(hint)
     if hint in _PLAIN:
         return _PLAIN[hint]
+    if hint is TimeNs:
+        return _type(Stamp, known)
     if origin is Annotated:
         return _type(arguments[0], known)
     if origin is Literal:

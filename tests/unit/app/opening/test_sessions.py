@@ -21,7 +21,7 @@ def path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder = tmp_path / "a.bag.cocalib-session"
     workspace = open_workspace(recording, camera=None, session_folder=folder, name="a.bag")
     for frame in (0, 2):
-        workspace.dispatch(ClickPlaced(TimeNs(int(recording.image_times[frame])), 5.0, 6.0))
+        workspace.dispatch(ClickPlaced(TimeNs(int(recording.image_times[frame])), (5.0, 6.0), "clicked"))
     workspace.close()
     (tmp_path / "a.bag").write_bytes(b"")
     return tmp_path / "a.bag"

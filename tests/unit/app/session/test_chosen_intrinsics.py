@@ -1,10 +1,10 @@
 """Intrinsics chosen for a session: kept on the disk, undone and redone, and refused where they do not fit the frames."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from calib_core.camera import Camera, CameraCovariance
 from cocalib.session import (

@@ -37,7 +37,7 @@ def home(tmp_path: Path) -> Path:
 def clicked(folder: Path, facts: RecordingFacts = FACTS, *, changed_at_s: float | None = None) -> Path:
     """Make a session with one click."""
     session_file = open_session_file(folder, facts)
-    step = ClickPlaced(TimeNs(int(facts.image_times[3])), 1.0, 2.0)
+    step = ClickPlaced(TimeNs(int(facts.image_times[3])), (1.0, 2.0), "clicked")
     session_file.append(step, advance(session_file.restored.history, step, facts))
     session_file.close()
     if changed_at_s is not None:
@@ -117,7 +117,7 @@ def test_a_recording_that_has_grown_keeps_its_session(home: Path) -> None:
     clicked(home / "drive.bag.cocalib-session", replace(FACTS, image_times=IMAGE_TIMES[:10]))
     assert find_session_folder([home / "renamed.bag"], FACTS).warnings
     session_file = open_session_file(home / "drive.bag.cocalib-session", FACTS)
-    step = ClickPlaced(TimeNs(int(IMAGE_TIMES[40])), 1.0, 2.0)
+    step = ClickPlaced(TimeNs(int(IMAGE_TIMES[40])), (1.0, 2.0), "clicked")
     session_file.append(step, advance(session_file.restored.history, step, FACTS))
     session_file.close()
     again = open_session_file(home / "drive.bag.cocalib-session", FACTS)

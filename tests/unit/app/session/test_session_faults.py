@@ -53,7 +53,7 @@ def own_state_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def clicked(session_file: SessionFile, *frames: int) -> History:
     history = session_file.restored.history
     for frame in frames:
-        step = ClickPlaced(TIMES[frame], float(frame), 1.0)
+        step = ClickPlaced(TIMES[frame], (float(frame), 1.0), "clicked")
         history = advance(history, step, FACTS)
         session_file.append(step, history)
     return history
@@ -222,7 +222,9 @@ def test_a_link_put_in_place_of_the_snapshot_while_the_session_is_open_is_not_fo
     target.write_bytes(b"precious\n")
     (folder / SNAPSHOT).unlink()
     (folder / SNAPSHOT).symlink_to(target)
-    session_file.append(step := ClickPlaced(TIMES[20], 1.0, 1.0), advance(session_file.restored.history, step, FACTS))
+    session_file.append(
+        step := ClickPlaced(TIMES[20], (1.0, 1.0), "clicked"), advance(session_file.restored.history, step, FACTS)
+    )
     assert session_file.close().note.startswith("all clicks are saved in ")
     assert target.read_bytes() == b"precious\n"
 
@@ -240,7 +242,7 @@ def test_a_step_is_refused_when_another_program_changed_the_journal(tmp_path: Pa
         with journal.open("r+b") as file:
             file.truncate(journal.stat().st_size + (1 if change == "longer" else -5))
     before = journal.read_bytes()
-    step = ClickPlaced(TIMES[4], 4.0, 1.0)
+    step = ClickPlaced(TIMES[4], (4.0, 1.0), "clicked")
     words = "deleted, moved or replaced" if change == "replaced" else "another program changed its length"
     with pytest.raises(SessionFileError, match=rf"was not made: .*{words}"):
         session_file.append(step, advance(history, step, FACTS))
@@ -278,7 +280,7 @@ def test_a_folder_that_went_away_is_written_to_the_users_folder_and_found_again(
         folder.rename(tmp_path / "moved")
     if how == "replaced":
         folder.mkdir()
-    step = ClickPlaced(TIMES[4], 4.0, 1.0)
+    step = ClickPlaced(TIMES[4], (4.0, 1.0), "clicked")
     with pytest.raises(SessionFileError, match="was not made"):
         session_file.append(step, advance(history, step, FACTS))
     left = session_file.close()
@@ -335,7 +337,7 @@ def test_odd_content_with_right_checksums_is_refused_or_read_but_never_crashes(
     folder = tmp_path / "s"
     session_file = open_session_file(folder, FACTS)
     history = clicked(session_file, 1)
-    step = OptionsChanged(CalibrationOptions(method="paper"))
+    step = OptionsChanged.of(CalibrationOptions(method="paper"))
     session_file.append(step, advance(history, step, FACTS))
     session_file.close()
     with_value = re.compile(re.escape(key) + rb"[^,\]}]*")

@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from calib_core.measurements import ChosenReturn, ReflectorClick, TimeNs, Unsolvable
+from calib_core.measurements import ChosenReturn, ReflectorClick, TimeNs, Unsolvable, time_from_json, time_to_json
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 from cocalib.session import (
     Cleared,
@@ -25,7 +25,6 @@ from cocalib.session import (
     ClicksImported,
     History,
     OptionsChanged,
-    OptionsEdited,
     PlacementDismissed,
     RecordingFacts,
     Redo,
@@ -44,20 +43,20 @@ from cocalib.session.file import (
     user_session_folder,
 )
 from cocalib.session.file.checksums import line_bytes, sealed, taken_apart
-from cocalib.session.file.step_json import StepForm, form_of_step, step_from_form
+from cocalib.session.file.journal_reading import Line
 
 START_NS = 1_700_000_000_123_456_789
 FACTS = RecordingFacts("drive", START_NS + 100_000_000 * np.arange(50), width_px=640, height_px=480)
 TIMES = [TimeNs(int(time)) for time in FACTS.image_times]
 EARLIER_STEPS = (
-    ClickPlaced(TIMES[3], 100.1, 200.2, None),
-    ClickPlaced(TIMES[1], 0.1 + 0.2, 1e-17, None),
-    ClickMoved("c1", 101.0, 201.0),
-    OptionsChanged(CalibrationOptions(method="paper", solving=SolvingOptions(CameraPositionPrior((0.1, 0.2, 0.3))))),
+    ClickPlaced(TIMES[3], (100.1, 200.2), None),
+    ClickPlaced(TIMES[1], (0.1 + 0.2, 1e-17), None),
+    ClickMoved("c1", (101.0, 201.0)),
+    OptionsChanged.of(CalibrationOptions(method="paper", solving=SolvingOptions(CameraPositionPrior((0.1, 0.2, 0.3))))),
     ClickExcluded("c2", True),
     Undo(),
     Redo(),
-    ClicksImported((ReflectorClick(TIMES[9], "p1", 5.0, 6.0, 0.5, True),)),
+    ClicksImported.of((ReflectorClick(TIMES[9], "p1", 5.0, 6.0, 0.5, True),)),
     ClickRemoved("c1"),
     Cleared(),
     Undo(),
@@ -66,8 +65,8 @@ EARLIER_STEPS = (
 STEPS = (
     *EARLIER_STEPS,
     Undo(),
-    ClickPlaced(TIMES[3], 300.5, 20.25, "snapped", 0.3),
-    ClickPlaced(TIMES[4], 30.5, 20.25, "untouched"),
+    ClickPlaced(TIMES[3], (300.5, 20.25), "snapped", 0.3),
+    ClickPlaced(TIMES[4], (30.5, 20.25), "untouched"),
     ReturnChosen("p1", ChosenReturn((20.0, 0.1 + 0.2, -0.5), TIMES[9], "/radar")),
     PlacementDismissed(TIMES[7], (5.0, 1.0, 0.1 + 0.2)),
     WarningsAcknowledged(("few-pairs", "weak-geometry")),
@@ -95,14 +94,15 @@ def kept(folder: Path, *steps) -> History:
 
 @pytest.mark.parametrize("step", STEPS, ids=lambda step: type(step).__name__)
 def test_a_step_comes_back_from_its_json_form_bit_for_bit(step) -> None:
-    text = msgspec.json.encode(form_of_step(step))
-    assert step_from_form(msgspec.json.decode(text, type=StepForm)) == step
+    text = msgspec.json.encode(Line(1, step), enc_hook=time_to_json)
+    assert msgspec.json.decode(text, type=Line, dec_hook=time_from_json).step == step
 
 
-@pytest.mark.parametrize("step", [Solved(1, Unsolvable("a", "b", "c")), OptionsEdited(())])
-def test_answers_and_partial_edits_are_not_journalled(step) -> None:
-    with pytest.raises(TypeError, match="is not journalled"):
-        form_of_step(step)
+def test_answers_are_not_journalled(tmp_path: Path) -> None:
+    session_file = open_session_file(tmp_path, FACTS)
+    with pytest.raises(TypeError, match="Solved is not journalled"):
+        session_file.append(Solved(1, Unsolvable("a", "b", "c")), History())
+    session_file.close()
 
 
 def test_a_session_comes_back_with_everything_that_can_be_undone_and_redone(tmp_path: Path) -> None:
@@ -115,8 +115,8 @@ def test_a_session_comes_back_with_everything_that_can_be_undone_and_redone(tmp_
 
 
 def test_a_session_continues_where_it_stopped(tmp_path: Path) -> None:
-    kept(tmp_path, ClickPlaced(TIMES[1], 1.0, 1.0))
-    kept(tmp_path, ClickPlaced(TIMES[2], 2.0, 2.0))
+    kept(tmp_path, ClickPlaced(TIMES[1], (1.0, 1.0), "clicked"))
+    kept(tmp_path, ClickPlaced(TIMES[2], (2.0, 2.0), "clicked"))
     history = kept(tmp_path, Undo())
     assert [click.id for click in history.present.clicks] == ["c1"]
     assert (tmp_path / "journal.jsonl").read_text().count("\n") == 4
@@ -142,13 +142,14 @@ def test_a_process_killed_outright_loses_nothing_that_was_confirmed(tmp_path: Pa
         f"""
         import os, signal
         import numpy as np
+        from calib_core.measurements import TimeNs
         from pathlib import Path
         from cocalib.session import ClickPlaced, History, RecordingFacts, advance
         from cocalib.session.file import open_session_file
         facts = RecordingFacts("drive", {START_NS} + 100_000_000 * np.arange(50), 640, 480)
         session_file, history = open_session_file(Path({str(tmp_path)!r}), facts), History()
         for frame in range(13):
-            step = ClickPlaced(int(facts.image_times[frame]), float(frame), 1.0)
+            step = ClickPlaced(TimeNs(facts.image_times[frame]), (float(frame), 1.0), "clicked")
             history = advance(history, step, facts)
             session_file.append(step, history)
         os.kill(os.getpid(), signal.SIGKILL)
@@ -302,7 +303,7 @@ def test_a_journal_of_another_version_is_refused_with_that_version_named(tmp_pat
 
 
 def test_a_journal_cut_to_its_first_line_gives_the_clicks_of_the_snapshot(tmp_path: Path) -> None:
-    history = kept(tmp_path, *(ClickPlaced(time, 1.0, 1.0) for time in TIMES[:20]))
+    history = kept(tmp_path, *(ClickPlaced(time, (1.0, 1.0), "clicked") for time in TIMES[:20]))
     journal = tmp_path / "journal.jsonl"
     cut = journal.read_bytes().partition(b"\n")[0] + b"\n"
     journal.write_bytes(cut)
@@ -385,7 +386,7 @@ def test_a_damaged_snapshot_is_refused_only_when_it_is_needed(tmp_path: Path) ->
 
 def test_the_snapshot_is_at_most_ten_steps_behind(tmp_path: Path) -> None:
     session_file = open_session_file(tmp_path, FACTS)
-    keep(session_file, *(ClickPlaced(time, 1.0, 1.0) for time in TIMES[:14]))
+    keep(session_file, *(ClickPlaced(time, (1.0, 1.0), "clicked") for time in TIMES[:14]))
     assert msgspec.json.decode((tmp_path / "session.json").read_bytes())["steps"] == 10
     session_file.close()
     assert msgspec.json.decode((tmp_path / "session.json").read_bytes())["steps"] == 14

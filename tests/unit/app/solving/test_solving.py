@@ -104,8 +104,8 @@ def test_page_and_command_line_give_the_same_bytes(
     assert isinstance(by_command, Calibration)
     answered = threading.Event()
     workspace = open_workspace(recording, camera=recording.camera(), session_folder=tmp_path / "s", name="sample")
-    workspace.dispatch(OptionsChanged(options))
-    workspace.dispatch(ClicksImported(clicks))
+    workspace.dispatch(OptionsChanged.of(options))
+    workspace.dispatch(ClicksImported.of(clicks))
     workspace.subscribe(lambda shown: answered.set() if shown.stage == "solved" else None)
     assert answered.wait(60)
     by_page = workspace.session.outcome

@@ -146,10 +146,10 @@ def test_a_solution_without_pairs_draws_those_of_the_other(solved: Calibration) 
 def test_the_answer_before_the_last_change_is_found(solved: Calibration) -> None:
     facts = RecordingFacts("drive", 10**9 * np.arange(1, 50), width_px=1920, height_px=1080)
     earlier = replace(solved)
-    history = advance(History(), ClickPlaced(TimeNs(10**9), 10.0, 20.0), facts)
+    history = advance(History(), ClickPlaced(TimeNs(10**9), (10.0, 20.0), "clicked"), facts)
     history = advance(history, Solved(history.present.revision, earlier), facts)
     assert previous_calibration(history) is None
-    history = advance(history, ClickPlaced(TimeNs(2 * 10**9), 10.0, 20.0), facts)
+    history = advance(history, ClickPlaced(TimeNs(2 * 10**9), (10.0, 20.0), "clicked"), facts)
     history = advance(history, Solved(history.present.revision, solved), facts)
 
     assert previous_calibration(history) is earlier

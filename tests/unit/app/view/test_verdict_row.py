@@ -25,7 +25,7 @@ def placement(start_s: int, x_m: float = 5.0) -> Placement:
 
 def test_a_placement_is_left_until_it_is_clicked_or_dismissed() -> None:
     found = [placement(1), placement(11), placement(21), placement(31)]
-    history = advance(History(), ClickPlaced(TimeNs(12 * 10**9), 1.0, 1.0), FACTS)
+    history = advance(History(), ClickPlaced(TimeNs(12 * 10**9), (1.0, 1.0), "clicked"), FACTS)
     assert placements_left(history.present, found) == 3
     history = advance(history, PlacementDismissed(TimeNs(32 * 10**9), (5.0, 0.0, 0.0)), FACTS)
     assert placements_left(history.present, found) == 2

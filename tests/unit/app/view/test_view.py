@@ -55,7 +55,7 @@ def calibration(*pairs: PairResult, unpaired: tuple[Unpaired, ...] = (), warning
 def clicked(count: int, *steps) -> History:
     history = History()
     for number in range(1, count + 1):
-        history = advance(history, ClickPlaced(TIMES[number], 10.0 * number, 20.0), FACTS)
+        history = advance(history, ClickPlaced(TIMES[number], (10.0 * number, 20.0), "clicked"), FACTS)
     for step in steps:
         history = advance(history, step, FACTS)
     return history
@@ -136,7 +136,7 @@ def test_clicks_that_the_radar_did_not_see_do_not_count_and_say_why() -> None:
 
 
 def test_figures_stay_while_a_newer_answer_is_computed() -> None:
-    seen = shown(5, calibration(*FIVE), ClickMoved("c1", 11.0, 20.0))
+    seen = shown(5, calibration(*FIVE), ClickMoved("c1", (11.0, 20.0)))
     assert (seen.stage, seen.status, seen.solving) == ("solving", "Solving…", True)
     assert seen.has_calibration
     assert seen.solved_revision == seen.revision - 1
@@ -178,7 +178,7 @@ def test_a_row_of_a_solved_pair_carries_residual_position_and_ellipse() -> None:
 
 
 def test_the_residual_follows_a_moved_click_at_once() -> None:
-    row = shown(5, calibration(*FIVE), ClickMoved("c1", 13.0, 22.0)).clicks[0]
+    row = shown(5, calibration(*FIVE), ClickMoved("c1", (13.0, 22.0))).clicks[0]
     assert row.residual_px == pytest.approx(2.0)
 
 

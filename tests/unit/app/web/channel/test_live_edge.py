@@ -131,7 +131,7 @@ async def _windows(recording: FollowedRecording, pages: ToldPages):  # type: ign
 
 def test_a_file_that_was_truncated_ends_the_following_in_words(tmp_path: Path) -> None:
     async def story(writer: SampleWriter, pages: ToldPages, workspace: Workspace, recording: FollowedRecording) -> None:
-        workspace.dispatch(ClickPlaced(TimeNs(int(recording.image_times[0])), 1.0, 2.0))
+        workspace.dispatch(ClickPlaced(TimeNs(int(recording.image_times[0])), (1.0, 2.0), "clicked"))
         with (tmp_path / "drive.mcap").open("r+b") as file:
             file.truncate(50)
         await until(lambda: pages.note.state == "ended")

@@ -16,7 +16,7 @@ from calib_core.synthetic import simulate_pairs
 from cocalib.session import History, Session
 from cocalib.web.channel.outbox import Outbox
 from cocalib.web.channel.review import ReviewDesk
-from cocalib.web.messages.review_messages import CompareForm, ReviewForm, ReviewRequest, UncertaintyForm
+from cocalib.web.messages.review_messages import CompareWanted, ReviewRequest, ReviewWanted, UncertaintyWanted
 
 
 @dataclass
@@ -73,7 +73,7 @@ def answers(session: Session, *requests: ReviewRequest, camera: Any = None) -> l
 
 def test_now_and_the_method_in_use_are_the_same_answer(solved: Calibration) -> None:
     session = Session(revision=3, outcome=solved, outcome_revision=3)
-    (both,) = answers(session, CompareForm("now", "default"))
+    (both,) = answers(session, CompareWanted("now", "default"))
 
     assert both["type"] == "compared"
     assert both["problem"] == ""
@@ -83,17 +83,17 @@ def test_now_and_the_method_in_use_are_the_same_answer(solved: Calibration) -> N
 @pytest.mark.parametrize(
     ("request_", "words"),
     [
-        (CompareForm("now", "before"), "no earlier answer"),
-        (CompareForm("now", "reference"), "--calibration FILE"),
-        (CompareForm("now", "file"), "drop one here"),
-        (CompareForm("now", "toggled"), "no pair is selected"),
-        (CompareForm("now", "toggled", pair="c1"), "c1 is an untouched guess"),
-        (CompareForm("now", "file", file_name="a.json", file_base64="!"), "a.json"),
-        (CompareForm("now", "file", file_name="empty.json"), "empty.json"),
-        (CompareForm("now", "paper"), "intrinsics are missing"),
+        (CompareWanted("now", "before"), "no earlier answer"),
+        (CompareWanted("now", "reference"), "--calibration FILE"),
+        (CompareWanted("now", "file"), "drop one here"),
+        (CompareWanted("now", "toggled"), "no pair is selected"),
+        (CompareWanted("now", "toggled", pair="c1"), "c1 is an untouched guess"),
+        (CompareWanted("now", "file", file_name="a.json", file_base64="!"), "a.json"),
+        (CompareWanted("now", "file", file_name="empty.json"), "empty.json"),
+        (CompareWanted("now", "paper"), "intrinsics are missing"),
     ],
 )
-def test_a_solution_that_does_not_exist_is_explained(solved: Calibration, request_: CompareForm, words: str) -> None:
+def test_a_solution_that_does_not_exist_is_explained(solved: Calibration, request_: CompareWanted, words: str) -> None:
     guess = ReflectorClick(TimeNs(1), "c1", 1.0, 1.0, mark="untouched")
     (both,) = answers(Session(clicks=(guess,), revision=3, outcome=solved, outcome_revision=3), request_)
 
@@ -103,15 +103,15 @@ def test_a_solution_that_does_not_exist_is_explained(solved: Calibration, reques
 
 def test_without_an_answer_nothing_is_compared_and_nothing_drawn(solved: Calibration) -> None:
     for outcome in (None, replace(solved, checking=True)):
-        (both,) = answers(Session(outcome=outcome), CompareForm("now", "now"))
+        (both,) = answers(Session(outcome=outcome), CompareWanted("now", "now"))
         assert "no checked calibration yet" in both["problem"]
-    review, uncertainty = answers(Session(), ReviewForm(), UncertaintyForm())
+    review, uncertainty = answers(Session(), ReviewWanted(), UncertaintyWanted())
 
     assert (review["rows"], uncertainty["maps"]) == ([], [])
 
 
 def test_only_the_newest_of_several_requests_is_answered(solved: Calibration) -> None:
     session = Session(revision=3, outcome=solved, outcome_revision=3)
-    (both,) = answers(session, CompareForm("now", "before"), CompareForm("now", "default"))
+    (both,) = answers(session, CompareWanted("now", "before"), CompareWanted("now", "default"))
 
     assert both["b"] == "default method"

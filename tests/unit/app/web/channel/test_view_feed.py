@@ -47,7 +47,7 @@ views = st.builds(
 def clicked(count: int) -> View:
     history = History()
     for frame in range(count):
-        history = advance(history, ClickPlaced(TimeNs(int(FACTS.image_times[frame])), 1.0, 2.0), FACTS)
+        history = advance(history, ClickPlaced(TimeNs(int(FACTS.image_times[frame])), (1.0, 2.0), "clicked"), FACTS)
     return view(history, FACTS)
 
 

@@ -213,7 +213,7 @@ def test_the_end_says_where_the_clicks_are_if_the_session_folder_was_deleted(
     workspace: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def click_delete_and_stop(*_: Any) -> None:
-        workspace.dispatch(ClickPlaced(TimeNs(int(RECORDING.image_times[1])), 1.0, 1.0))
+        workspace.dispatch(ClickPlaced(TimeNs(int(RECORDING.image_times[1])), (1.0, 1.0), "clicked"))
         shutil.rmtree(tmp_path / "session")
         raise KeyboardInterrupt
 
@@ -232,7 +232,7 @@ def test_an_error_that_ends_the_program_does_not_hide_where_the_clicks_are(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def click_delete_and_fail(_: Service, workspace: Workspace, recording: Any) -> None:
-        workspace.dispatch(ClickPlaced(TimeNs(int(recording.image_times[1])), 1.0, 1.0))
+        workspace.dispatch(ClickPlaced(TimeNs(int(recording.image_times[1])), (1.0, 1.0), "clicked"))
         shutil.rmtree(tmp_path / "session")
         raise OSError("no port is free")
 
