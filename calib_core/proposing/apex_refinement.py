@@ -7,10 +7,8 @@ import numpy as np
 
 from calib_core.arrays import Indices
 from calib_core.errors import CalibrationError
-from calib_core.proposing.frame_source import FrameSource
-from calib_core.proposing.light import in_light_of
 from calib_core.proposing.picture_candidates import PictureCandidate, surroundings_of
-from calib_core.proposing.stack_median import stack_median
+from calib_core.proposing.still_pictures import FrameSource, in_light_of, stack_median
 from calib_core.vision.apex import Apex, find_apex
 
 _REACHES = (0.45, 0.25)

@@ -8,11 +8,9 @@ import numpy as np
 from calib_core.camera import Camera
 from calib_core.measurements import ReflectorClick, Unsolvable
 from calib_core.options import CalibrationOptions
-from calib_core.proposing.agreement.apex_evidence import apex_log_odds
 from calib_core.proposing.agreement.candidate_rays import candidate_rays
-from calib_core.proposing.agreement.chance_agreement import chance_score, chance_scores
 from calib_core.proposing.agreement.mounting_prior import mounting_prior
-from calib_core.proposing.agreement.pose_agreement import pose_agreement
+from calib_core.proposing.agreement.pose_agreement import apex_log_odds, chance_score, chance_scores, pose_agreement
 from calib_core.proposing.dwell_views import DwellView
 from calib_core.proposing.proposals import Proposal, Proposals
 

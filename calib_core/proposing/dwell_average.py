@@ -8,7 +8,7 @@ import numpy as np
 from calib_core.arrays import Vector2, frozen_array
 from calib_core.errors import CalibrationError
 from calib_core.proposing.dwell_views import DwellView
-from calib_core.proposing.frame_source import FrameSource
+from calib_core.proposing.still_pictures import FrameSource
 from calib_core.vision.apex import Apex, find_apex
 
 _REACH, _LEAST_REACH_PX = 0.1, 4.0

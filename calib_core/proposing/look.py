@@ -9,8 +9,8 @@ from calib_core.arrays import Vector2, frozen_array
 from calib_core.camera import Camera
 from calib_core.proposing.apex_refinement import full_picture
 from calib_core.proposing.dwell_views import DwellView
-from calib_core.proposing.frame_source import FrameSource
 from calib_core.proposing.picture_candidates import PictureCandidate, Surroundings
+from calib_core.proposing.still_pictures import FrameSource
 from calib_core.vision.apex import Apex, find_apex
 
 _HALF = 0.75

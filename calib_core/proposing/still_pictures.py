@@ -1,11 +1,13 @@
 """Still pictures: what the camera saw during a stretch of a dwell, without whoever walked past.
 
 While two reflectors are moved in turn, their dwells overlap; a dwell then has a still picture for every set of placements
-that stood together, so that what changed can be told apart.
+that stood together, so that what changed can be told apart. Pictures are brought to one light before they are compared.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Protocol
 
 import numpy as np
 
@@ -13,9 +15,24 @@ from calib_core.arrays import Indices, TimesNs
 from calib_core.association.placements import Placement
 from calib_core.errors import CalibrationError
 from calib_core.measurements import NS_PER_S, TimeNs
-from calib_core.proposing.frame_source import FrameSource
-from calib_core.proposing.light import in_light_of
-from calib_core.proposing.stack_median import stack_median
+
+
+class FrameSource(Protocol):
+    """Camera frames by number; a `Recording` is one. Only the frames that are asked for are decoded."""
+
+    @property
+    def image_times(self) -> TimesNs:
+        """Their stamps, ascending [ns]."""
+        ...
+
+    def image(self, index: int, /) -> np.ndarray:
+        """Return a frame's pixels: uint8 (h, w, 3), blue first. Several threads may call it at once.
+
+        Raises:
+            CalibrationError: it cannot be read.
+        """
+        ...
+
 
 _FRAMES = 7
 """Pictures whose median shows a dwell without whoever walks past."""
@@ -134,3 +151,121 @@ def still_pictures(
         for standing, rows in groups.items()
         if len(rows) >= least
     )
+
+
+def stack_median(pictures: Sequence[np.ndarray]) -> np.ndarray:
+    """Return the median of pictures of one shape and type; of an even number the mean of both middle ones.
+
+    Args:
+        pictures: at least one; uint8, uint16 or float32.
+    """
+    import cv2
+
+    stack = list(pictures)
+    for low, high in _exchanges(len(stack)):
+        stack[low], stack[high] = cv2.min(stack[low], stack[high]), cv2.max(stack[low], stack[high])
+    middle = len(stack) // 2
+    if len(stack) % 2:
+        return np.asarray(stack[middle])
+    return np.asarray(cv2.addWeighted(stack[middle - 1], 0.5, stack[middle], 0.5, 0.0))
+
+
+@lru_cache(maxsize=32)
+def _exchanges(count: int) -> tuple[tuple[int, int], ...]:
+    """Return the exchanges of Batcher's merge sort of so many rows."""
+    return tuple(_merge_exchange(count))
+
+
+def _merge_exchange(count: int) -> Iterator[tuple[int, int]]:
+    first = 1 << max(count - 1, 0).bit_length() >> 1
+    step = first
+    while step:
+        wide, part, apart = first, 0, step
+        while True:
+            yield from ((row, row + apart) for row in range(count - apart) if row & step == part)
+            if wide == step:
+                break
+            apart, wide, part = wide - step, wide >> 1, step
+        step >>= 1
+
+
+_EVERY_PIXEL = 6
+"""A gain is fitted to one row and column in so many."""
+_DARK_GREY, _BRIGHT_GREY = 12, 243
+_SHADE_SHARE = 0.16
+"""Side of the square over which the light is compared, of the picture's width: what is smaller is not a change of light."""
+_REDUCED = 8
+_SAME_LIGHT = 0.015
+_LEAST_SHADE, _MOST_SHADE = 0.7, 1.4
+
+
+def channel_gains(picture: np.ndarray, reference: np.ndarray) -> np.ndarray:
+    """Return by how much to multiply each channel of a reference so that most of it looks like a picture: (3,).
+
+    Args:
+        picture: (h, w, 3) uint8.
+        reference: (h, w, 3) uint8.
+    """
+    one, other = (
+        each[_EVERY_PIXEL // 2 :: _EVERY_PIXEL, _EVERY_PIXEL // 2 :: _EVERY_PIXEL] for each in (picture, reference)
+    )
+    gains = np.ones(3)
+    for channel in range(3):
+        a, b = one[..., channel], other[..., channel]
+        told = (np.minimum(a, b) > _DARK_GREY) & (np.maximum(a, b) < _BRIGHT_GREY)
+        if np.count_nonzero(told) >= 50:
+            gains[channel] = float(np.median(a[told].astype(np.float32) / b[told]))
+    return gains
+
+
+def in_same_light(picture: np.ndarray, gains: np.ndarray, *, levels_per_grey: float) -> np.ndarray:
+    """Return a picture with its channels multiplied: (h, w, 3) uint16, so many levels per level of grey.
+
+    Args:
+        picture: (h, w, 3) uint8.
+        gains: (3,) of its channels.
+        levels_per_grey: how fine.
+    """
+    import cv2
+
+    factors = np.array([*(levels_per_grey * gains), 0.0])
+    return np.asarray(cv2.multiply(picture, factors, dtype=cv2.CV_16U))
+
+
+def in_light_of(reference: np.ndarray, picture: np.ndarray) -> np.ndarray:
+    """Return a picture in the light of another one: (h, w, 3) uint8; the picture itself if that hardly differs.
+
+    Args:
+        reference: (h, w, 3) uint8.
+        picture: (h, w, 3) uint8.
+    """
+    import cv2
+
+    gains = channel_gains(reference, picture)
+    if picture is reference or np.abs(gains - 1.0).max() < _SAME_LIGHT:
+        return picture
+    return np.asarray(cv2.convertScaleAbs(in_same_light(picture, gains, levels_per_grey=64.0), alpha=1.0 / 64.0))
+
+
+def local_light(picture: np.ndarray, usual: np.ndarray) -> np.ndarray:
+    """Return how much brighter the surroundings of each pixel are than usual: (h, w, 1) float32, about 1.
+
+    Args:
+        picture: (h, w, 3) float32.
+        usual: (h, w, 3) float32, with the gains of the channels applied.
+    """
+    import cv2
+
+    height, width = picture.shape[:2]
+    small = (max(1, width // _REDUCED), max(1, height // _REDUCED))
+    one, other = (
+        cv2.cvtColor(cv2.resize(each, small, interpolation=cv2.INTER_AREA), cv2.COLOR_BGR2GRAY)
+        for each in (picture, usual)
+    )
+    share = (np.clip((one + 4.0) / (other + 4.0), _LEAST_SHADE, _MOST_SHADE) - _LEAST_SHADE) / (
+        _MOST_SHADE - _LEAST_SHADE
+    )
+    side = max(3, round(_SHADE_SHARE * small[0]) | 1)
+    levels = cv2.medianBlur(np.round(255.0 * share).astype(np.uint8), side).astype(np.float32)
+    ratio = _LEAST_SHADE + (_MOST_SHADE - _LEAST_SHADE) / 255.0 * cv2.blur(levels, (side, side))
+    return np.asarray(cv2.resize(ratio, (width, height), interpolation=cv2.INTER_LINEAR))[..., None]

@@ -7,10 +7,16 @@ import numpy as np
 import pytest
 
 from calib_core.intrinsics.solving.adjustment import adjust, reduced
-from calib_core.intrinsics.solving.board_warp import possible_warps
-from calib_core.intrinsics.solving.linearization import Freedom, LensState, linearize, residuals_of
+from calib_core.intrinsics.solving.linearization import (
+    Freedom,
+    LensState,
+    ViewStack,
+    linearize,
+    possible_warps,
+    residuals_of,
+    stack_views,
+)
 from calib_core.intrinsics.solving.starting import pose_views, start
-from calib_core.intrinsics.solving.view_stack import ViewStack, stack_views
 from tests.unit.intrinsics.corner_draws import BOARD, CAMERAS, SIZE_PX, drawn_views
 
 

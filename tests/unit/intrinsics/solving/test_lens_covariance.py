@@ -6,9 +6,8 @@ import pytest
 from calib_core.camera import Camera
 from calib_core.intrinsics.solving.adjustment import adjust, reduced
 from calib_core.intrinsics.solving.lens_covariance import SharedCovariance, shared_covariance
-from calib_core.intrinsics.solving.linearization import Freedom, linearize
+from calib_core.intrinsics.solving.linearization import Freedom, linearize, stack_views
 from calib_core.intrinsics.solving.starting import pose_views
-from calib_core.intrinsics.solving.view_stack import stack_views
 from tests.unit.intrinsics.corner_draws import BOARD, CAMERAS, SIZE_PX, Errors, drawn_views
 
 CAMERA = CAMERAS["pinhole"]

@@ -7,9 +7,8 @@ from calib_core.camera import Camera
 from calib_core.geometry import rotation_exp
 from calib_core.intrinsics import BoardCorners
 from calib_core.intrinsics.solving.adjustment import adjust
-from calib_core.intrinsics.solving.linearization import Freedom, residuals_of
+from calib_core.intrinsics.solving.linearization import Freedom, residuals_of, stack_views
 from calib_core.intrinsics.solving.starting import pose_views, start
-from calib_core.intrinsics.solving.view_stack import stack_views
 from tests.unit.intrinsics.corner_draws import BOARD, CAMERAS, SIZE_PX, Errors, drawn_views
 
 

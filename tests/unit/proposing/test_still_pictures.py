@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from calib_core.proposing.stack_median import stack_median
+from calib_core.proposing.still_pictures import stack_median
 
 
 @given(st.integers(1, 14), st.integers(0, 2**32 - 1), st.sampled_from([np.uint8, np.uint16]))
