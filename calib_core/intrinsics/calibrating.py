@@ -9,21 +9,34 @@ from calib_core.arrays import Points3, Values
 from calib_core.camera import Camera, CameraCovariance
 from calib_core.intrinsics.board_pictures import BoardCorners, LeftOutPicture
 from calib_core.intrinsics.calibrated_lens import CalibratedLens, LensView
+from calib_core.intrinsics.coverage import BoardSearch
 from calib_core.intrinsics.lens_warnings import lens_warnings, shape_warnings, skew_warnings, worst_focal_sigma
 from calib_core.intrinsics.options import IntrinsicsOptions
-from calib_core.intrinsics.searching.search_result import BoardSearch
-from calib_core.intrinsics.solving.adjustment import reduced
+from calib_core.intrinsics.solving.adjustment import reduced, typical_sigma
 from calib_core.intrinsics.solving.bad_views import JudgedViews, judge_views
 from calib_core.intrinsics.solving.board_shape import ShapeTest, try_shapes
-from calib_core.intrinsics.solving.board_warp import FLAT, BoardWarp, possible_warps
-from calib_core.intrinsics.solving.held_out import held_out_squares, view_folds
 from calib_core.intrinsics.solving.lens_covariance import SharedCovariance, shared_covariance
-from calib_core.intrinsics.solving.linearization import LensState, linearize, residuals_of
-from calib_core.intrinsics.solving.model_choice import MODELS, ChosenModel, LensFit, choose_model, fit_model
-from calib_core.intrinsics.solving.robust import typical_sigma
+from calib_core.intrinsics.solving.linearization import (
+    FLAT,
+    BoardWarp,
+    LensState,
+    ViewStack,
+    linearize,
+    possible_warps,
+    residuals_of,
+    stack_views,
+)
+from calib_core.intrinsics.solving.model_choice import (
+    MODELS,
+    ChosenModel,
+    LensFit,
+    choose_model,
+    fit_model,
+    held_out_squares,
+    view_folds,
+)
 from calib_core.intrinsics.solving.row_skew import row_skew
 from calib_core.intrinsics.solving.starting import start
-from calib_core.intrinsics.solving.view_stack import ViewStack, stack_views
 from calib_core.measurements import Unsolvable
 
 _LEAST_VIEWS = 3

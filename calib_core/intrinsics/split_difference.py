@@ -11,8 +11,7 @@ from calib_core.intrinsics.calibrated_lens import CalibratedLens
 from calib_core.intrinsics.projection_uncertainty import far_point_slopes, found_pixels, grid_covariance, picture_grid
 from calib_core.intrinsics.solving.adjustment import adjust, reduced
 from calib_core.intrinsics.solving.lens_covariance import shared_covariance
-from calib_core.intrinsics.solving.linearization import Freedom, LensState, linearize
-from calib_core.intrinsics.solving.view_stack import ViewStack, stack_views
+from calib_core.intrinsics.solving.linearization import Freedom, LensState, ViewStack, linearize, stack_views
 from calib_core.measurements import Unsolvable
 
 _LEAST_VIEWS = 8

@@ -34,7 +34,7 @@ from calib_core.intrinsics import (
     residual_field,
     split_difference,
 )
-from calib_core.intrinsics.searching.coverage import Coverage
+from calib_core.intrinsics.coverage import Coverage
 from calib_core.measurements import Unsolvable
 
 

@@ -1,7 +1,5 @@
 """Boards in pictures: which corners, where, and how sharp."""
 
-from calib_core.intrinsics.detection.edge_width import blur_px
-from calib_core.intrinsics.detection.finding import find_board
-from calib_core.intrinsics.detection.other_boards import board_in
+from calib_core.intrinsics.detection.finding import blur_px, board_in, find_board
 
 __all__ = ["blur_px", "board_in", "find_board"]

@@ -6,11 +6,9 @@ import numpy as np
 
 from calib_core.arrays import Values, frozen_array
 from calib_core.intrinsics.solving.adjustment import adjust, reduced
-from calib_core.intrinsics.solving.board_warp import BoardWarp
 from calib_core.intrinsics.solving.lens_covariance import shared_covariance
-from calib_core.intrinsics.solving.linearization import LensState, linearize
+from calib_core.intrinsics.solving.linearization import BoardWarp, LensState, ViewStack, linearize
 from calib_core.intrinsics.solving.model_choice import LensFit
-from calib_core.intrinsics.solving.view_stack import ViewStack
 
 _CHANCE = 1e-4
 _BENDS = 3  # the first warps are of one kind, heights; the last is of lengths

@@ -1,19 +1,27 @@
-"""Fit lens models to the same views, and choose the simplest that predicts left-out views as well as any."""
+"""Fit lens models to the same views, and choose the simplest that predicts left-out views as well as any.
+
+A model whose distortion folds back, so that two directions share a pixel, is not chosen.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Values
+from calib_core.arrays import Flags, Indices, Points2, Values
+from calib_core.camera import Camera
 from calib_core.intrinsics.calibrated_lens import ModelTrial
 from calib_core.intrinsics.solving.adjustment import adjust, weighted_cost
-from calib_core.intrinsics.solving.board_warp import FLAT, BoardWarp
-from calib_core.intrinsics.solving.held_out import held_out_squares, view_folds
-from calib_core.intrinsics.solving.lens_folds import folds_where_seen
-from calib_core.intrinsics.solving.linearization import Freedom, LensState, residuals_of
+from calib_core.intrinsics.solving.linearization import (
+    FLAT,
+    BoardWarp,
+    Freedom,
+    LensState,
+    ViewStack,
+    residuals_of,
+    warped,
+)
 from calib_core.intrinsics.solving.starting import start
-from calib_core.intrinsics.solving.view_stack import ViewStack
 
 MODELS = ("pinhole", "plumb_bob", "equidistant", "rational_polynomial")
 """From the simplest to the most flexible."""
@@ -179,3 +187,68 @@ def _sentence(chosen: str, trials: Sequence[ModelTrial]) -> str:
         begin = "and " if simpler else f"it predicts left-out views to {own.held_out_rms_px:.3f} px, and "
         parts.append(f"{begin}{best.model} {how} ({best.held_out_rms_px:.3f} px)")
     return said + ", ".join(parts)
+
+
+_REFIT_STEPS = 4  # from the fit with all views
+_POSE_STEPS = 6
+
+
+def view_folds(views: int, most: int) -> Indices:
+    """Return the number of the fold of each view: as equal as possible, neighbours in time together."""
+    return np.arange(views) * min(views, most) // views
+
+
+def held_out_squares(state: LensState, stack: ViewStack, freedom: Freedom, folds: Indices) -> Values:
+    """Return the mean squared residual (v,) [px^2] of each view, with the lens of all other folds.
+
+    The lens and the shape of the board come from the other folds; the pose of a left-out view is fitted to its own corners.
+
+    Args:
+        state: the fit to all views.
+        stack: the views.
+        freedom: what the fit may change besides the poses.
+        folds: (v,) the number of each view's fold.
+    """
+    squares = np.full(len(stack), np.nan)
+    for fold in range(int(folds.max()) + 1):
+        out = folds == fold
+        others = adjust(state.of(~out), stack.of(~out), freedom, steps=_REFIT_STEPS)
+        left = warped(stack.of(out), freedom.warp, others.amounts)
+        start = LensState(others.camera, state.rotations[out], state.translations_m[out])
+        with np.errstate(all="ignore"):
+            posed = adjust(start, left, Freedom.none(others.camera), steps=_POSE_STEPS)
+        squares[out] = left.mean_square(residuals_of(posed, left))
+    return squares
+
+
+_PLACES = 24
+
+
+def picture_places(size_px: tuple[int, int], columns: int = _PLACES, rows: int = _PLACES) -> Points2:
+    """Return places all over a picture, its edges included: (rows * columns, 2) [px]."""
+    x, y = np.meshgrid(np.linspace(0, size_px[0] - 1, columns), np.linspace(0, size_px[1] - 1, rows))
+    return np.stack([x.ravel(), y.ravel()], axis=1)
+
+
+def folds_back(camera: Camera, pixels_px: Points2) -> Flags:
+    """Return at which pixels (n, 2) the lens has no ray, or one along which the picture runs backwards."""
+    rays = camera.rays(pixels_px)
+    wrong = ~np.isfinite(rays).all(axis=1)
+    with np.errstate(all="ignore"):
+        slopes = camera.project_with_jacobian(np.where(wrong[:, None], [0.0, 0.0, 1.0], rays))[1]
+        turned = np.linalg.det(np.concatenate([slopes, rays[:, None, :]], axis=1))
+    return np.asarray(wrong | ~(turned > 0))
+
+
+def folds_where_seen(camera: Camera, stack: ViewStack) -> str:
+    """Say if the distortion folds back within the circle about the principal point that the corners reach; "" if not."""
+    found = np.moveaxis(stack.pixels_px, 1, 2)[stack.weights > 0]
+    middle = camera.matrix_px[:2, 2]
+    places = picture_places(stack.size_px)
+    reach = np.linalg.norm(found - middle, axis=1).max()
+    inside = places[np.linalg.norm(places - middle, axis=1) <= reach]
+    if not len(inside):
+        return "its principal point is outside the picture"
+    if folds_back(camera, inside).any():
+        return "its distortion folds back where corners were found"
+    return ""

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.arrays import Values, frozen_array
-from calib_core.intrinsics.solving.linearization import Freedom, LensState, linearize, warped
+from calib_core.intrinsics.solving.linearization import Freedom, LensState, ViewStack, linearize, warped
 from calib_core.intrinsics.solving.model_choice import LensFit
-from calib_core.intrinsics.solving.view_stack import ViewStack
 
 _LEAST_SHARE = 0.2
 _LEAST_RATIO = 1.4  # correlated noise reaches 1.3; a wrong lens model may exceed it too

@@ -3,10 +3,8 @@
 import numpy as np
 
 from calib_core.camera import Camera
-from calib_core.intrinsics.solving.adjustment import adjust
-from calib_core.intrinsics.solving.linearization import Freedom, LensState, residuals_of
-from calib_core.intrinsics.solving.robust import adjust_robustly
-from calib_core.intrinsics.solving.view_stack import ViewStack
+from calib_core.intrinsics.solving.adjustment import adjust, adjust_robustly
+from calib_core.intrinsics.solving.linearization import Freedom, LensState, ViewStack, residuals_of
 from calib_core.lens_models.registry import LENS_MODELS
 
 _FOCAL_LENGTHS = (0.2, 0.26, 0.33, 0.42, 0.55, 0.75, 1.0, 1.4, 2.0, 2.8, 4.0)

@@ -20,7 +20,7 @@ from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
     from calib_core.intrinsics import BoardSearch, CalibratedLens
-    from calib_core.intrinsics.searching.coverage import Coverage
+    from calib_core.intrinsics.coverage import Coverage
     from calib_core.results import DataWarning
     from cocalib.intrinsics import OpenPictures
     from cocalib.intrinsics.resumed_search import ResumedSearch
@@ -134,7 +134,7 @@ class Intrinsics:
     ) -> int:
         """Write and print the lens; return the exit code."""
         from calib_core.interchange.own.intrinsics_json import write_intrinsics
-        from calib_core.intrinsics.searching.coverage import view_coverage
+        from calib_core.intrinsics.coverage import view_coverage
         from cocalib.cli.intrinsics.camera_files import write_camera
         from cocalib.cli.intrinsics.lens_text import DOUBTFUL, lens_lines
         from cocalib.intrinsics.field_of_view import field_of_view_deg

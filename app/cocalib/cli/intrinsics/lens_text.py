@@ -13,7 +13,7 @@ from calib_core.intrinsics import (
     residual_field,
     split_difference,
 )
-from calib_core.intrinsics.searching.coverage import Coverage
+from calib_core.intrinsics.coverage import Coverage
 from calib_core.measurements import Unsolvable
 from cocalib.intrinsics.field_of_view import field_of_view_text
 from cocalib.view.number_format import plain, with_sigma

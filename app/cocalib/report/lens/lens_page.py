@@ -2,7 +2,7 @@
 
 from calib_core.interchange.own.board_views_json import PictureSource
 from calib_core.intrinsics import CalibratedLens
-from calib_core.intrinsics.searching.coverage import Coverage
+from calib_core.intrinsics.coverage import Coverage
 from cocalib.intrinsics.field_of_view import field_of_view_text
 from cocalib.report.html_file import html_file
 from cocalib.report.lens.over_the_picture import residuals_over_the_picture, uncertainty_over_the_picture

@@ -11,7 +11,7 @@ from calib_core.intrinsics import (
     residual_field,
     split_difference,
 )
-from calib_core.intrinsics.searching.coverage import Coverage
+from calib_core.intrinsics.coverage import Coverage
 from calib_core.measurements import Unsolvable
 from cocalib.report.markup import Child, Markup, tag
 from cocalib.report.plots import Axes, captioned, drawing, text

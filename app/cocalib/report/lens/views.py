@@ -3,7 +3,7 @@
 import numpy as np
 
 from calib_core.intrinsics import CalibratedLens
-from calib_core.intrinsics.searching.coverage import Coverage
+from calib_core.intrinsics.coverage import Coverage
 from cocalib.report.lens.over_the_picture import covered
 from cocalib.report.markup import Child, Markup, tag
 from cocalib.report.plots import Axes, captioned, drawing, mark

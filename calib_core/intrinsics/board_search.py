@@ -1,19 +1,20 @@
-"""Look for a board in many pictures, and choose those to calibrate with."""
+"""Look for a board in many pictures, first all over a recording and then where it is, and choose those to calibrate with."""
 
 import os
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 
+import numpy as np
+
+from calib_core.arrays import Points2, Values
 from calib_core.errors import CalibrationError
 from calib_core.intrinsics.board import Board
 from calib_core.intrinsics.board_pictures import BoardCorners, BoardPictures, LeftOutPicture
+from calib_core.intrinsics.coverage import BoardSearch, SearchProgress, view_coverage
 from calib_core.intrinsics.detection import blur_px, board_in, find_board
-from calib_core.intrinsics.searching.coverage import view_coverage
-from calib_core.intrinsics.searching.picture_order import PictureOrder
-from calib_core.intrinsics.searching.search_result import BoardSearch, SearchProgress
-from calib_core.intrinsics.searching.view_choice import chosen_views
-from calib_core.measurements import Unsolvable
+from calib_core.measurements import NS_PER_S, TimeNs, Unsolvable
 
 _LISTED = 200  # of so few pictures, each one without a board is named
 _ASKED_FOR_OTHERS = 13
@@ -249,3 +250,170 @@ def _film(board: Board) -> str:
 
 def _size_text(size_px: tuple[int, int]) -> str:
     return f"{size_px[0]} x {size_px[1]}"
+
+
+_EVERY_ONE = 300
+_FIRST_PASS = 180
+_MOST = 420
+_FINEST_S = 0.3
+_USUAL_RATE_HZ = 30.0
+
+
+class PictureOrder:
+    """Batches of pictures to search, each chosen by what was found before. The order does not depend on how fast anything is."""
+
+    def __init__(self, count: int, time_ns: Callable[[int], TimeNs | None]) -> None:
+        """Set up the order.
+
+        Args:
+            count: of pictures.
+            time_ns: of a picture by its number; None if nothing says.
+        """
+        self._count = count
+        self._asked: set[int] = set()
+        self._finest = max(1, round(_FINEST_S * _rate_hz(count, time_ns)))
+        self.total = count if count <= _EVERY_ONE else _FIRST_PASS
+        """Pictures to search, as far as known."""
+
+    def next_batch(self, found: Collection[int]) -> list[int]:
+        """Return the numbers of the pictures to search next; none at the end.
+
+        Args:
+            found: numbers of the pictures in which the board was found so far.
+        """
+        if not self._asked:
+            batch = self._everywhere()
+        else:
+            batch = [] if self._count <= _EVERY_ONE else self._between(sorted(self._asked), set(found))
+        self._asked.update(batch)
+        self.total = max(self.total, len(self._asked))
+        return batch
+
+    def _everywhere(self) -> list[int]:
+        """Return pictures all over the recording, such that the first ones are far apart."""
+        if self._count <= _EVERY_ONE:
+            return list(range(self._count))
+        even = np.linspace(0, self._count - 1, _FIRST_PASS).round().astype(int)
+        return list(dict.fromkeys(even[_far_apart(len(even))].tolist()))
+
+    def _between(self, asked: list[int], found: set[int]) -> list[int]:
+        """Return the middles of the gaps beside pictures with the board, the widest first, as far as the number allows."""
+        gaps = [
+            (after - before, (before + after) // 2)
+            for before, after in pairwise(asked)
+            if after - before > self._finest and (before in found or after in found)
+        ]
+        gaps.sort(key=lambda gap: (-gap[0], gap[1]))
+        return [middle for _, middle in gaps[: _MOST - len(self._asked)]]
+
+
+def _rate_hz(count: int, time_ns: Callable[[int], TimeNs | None]) -> float:
+    first, last = (time_ns(0), time_ns(count - 1)) if count > 1 else (None, None)
+    if first is None or last is None or last <= first:
+        return _USUAL_RATE_HZ
+    return (count - 1) * NS_PER_S / (last - first)
+
+
+def _far_apart(count: int) -> np.ndarray:
+    """Return 0 to count - 1 in the order of their reversed binary digits."""
+    bits = max(1, int(count - 1).bit_length())
+    reversed_digits = [int(f"{number:0{bits}b}"[::-1], 2) for number in range(1 << bits)]
+    order = np.array(reversed_digits)
+    return np.asarray(order[order < count])
+
+
+MOST_VIEWS = 60
+_SHARP_SHARE = 0.3
+_BLURRED_FACTOR, _BLURRED_PX = 1.6, 0.8
+_SAME_SHARE, _SAME_PX = 0.004, 2.0  # of the width of the picture
+_SHARPER_FACTOR = 1.05
+
+
+def chosen_views(views: Sequence[BoardCorners], board: Board) -> tuple[list[BoardCorners], list[LeftOutPicture]]:
+    """Return the views to calibrate with, in order of their numbers, and the others with the reason.
+
+    Args:
+        views: of one size of picture, in order of their numbers.
+        board: that they show.
+    """
+    left_out: list[LeftOutPicture] = []
+    sharp_px = _usual_blur_px(views)
+    limit_px = max(_BLURRED_FACTOR * sharp_px, sharp_px + _BLURRED_PX)
+    sharp = []
+    for view in views:
+        if view.blur_px > limit_px:
+            reason = f"blurred: edges are {view.blur_px:.1f} px wide, those of the others {sharp_px:.1f} px"
+            left_out.append(LeftOutPicture(view.index, view.name, reason))
+        else:
+            sharp.append(view)
+    outlines = np.array([outline_px(view, board) for view in sharp]).reshape(len(sharp), -1)
+    kept = _without_duplicates(sharp, outlines, left_out)
+    if len(kept) > MOST_VIEWS:
+        different = set(_most_different(outlines[kept], np.array([sharp[row].blur_px for row in kept])))
+        for place, row in enumerate(kept):
+            if place not in different:
+                reason = f"not needed: {MOST_VIEWS} views that differ more from one another are used"
+                left_out.append(LeftOutPicture(sharp[row].index, sharp[row].name, reason))
+        kept = [row for place, row in enumerate(kept) if place in different]
+    return [sharp[row] for row in kept], left_out
+
+
+def outline_px(view: BoardCorners, board: Board) -> Points2:
+    """Return where the four outer corners of the board are in the picture, or would be: (4, 2) [px]."""
+    import cv2
+
+    plane_m = board.corners_m[:, :2]
+    (left, top), (right, bottom) = plane_m.min(axis=0), plane_m.max(axis=0)
+    outer = np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
+    homography, _ = cv2.findHomography(plane_m[view.corner_ids], view.pixels_px)
+    if homography is None:
+        middle = view.pixels_px.mean(axis=0)
+        return np.repeat(middle[None], 4, axis=0)
+    return np.asarray(cv2.perspectiveTransform(outer[:, None], homography)[:, 0])
+
+
+def _usual_blur_px(views: Sequence[BoardCorners]) -> float:
+    """Return the blur of the sharper ones; infinite where none was measured."""
+    known = np.array([view.blur_px for view in views])
+    known = known[np.isfinite(known)]
+    return float(np.quantile(known, _SHARP_SHARE)) if len(known) else float("inf")
+
+
+def _without_duplicates(
+    views: Sequence[BoardCorners], outlines: np.ndarray, left_out: list[LeftOutPicture]
+) -> list[int]:
+    """Return the rows of the views that are no repetition of a sharper one, ascending; name the others."""
+    sharpest_first = sorted(range(len(views)), key=lambda row: (np.nan_to_num(views[row].blur_px, nan=1e9), row))
+    kept: list[int] = []
+    for row in sharpest_first:
+        near_px = max(_SAME_PX, _SAME_SHARE * views[row].size_px[0])
+        turned = outlines[row].reshape(4, 2)[[2, 3, 0, 1]].ravel()  # a checkerboard looks the same from both ends
+        same = next(
+            (one for one in kept if min(_apart(outlines[one], outlines[row]), _apart(outlines[one], turned)) < near_px),
+            None,
+        )
+        if same is None:
+            kept.append(row)
+        else:
+            sharper = views[row].blur_px > _SHARPER_FACTOR * views[same].blur_px
+            reason = f"the same view as {views[same].name}{', which is sharper' if sharper else ''}"
+            left_out.append(LeftOutPicture(views[row].index, views[row].name, reason))
+    return sorted(kept)
+
+
+def _apart(a: Values, b: Values) -> float:
+    """Return the rms distance between two outlines (8,) [px]."""
+    return float(np.sqrt(np.square(a - b).sum() / 4.0))
+
+
+def _most_different(outlines: np.ndarray, blur_px: Values) -> list[int]:
+    """Choose views one by one, each as far from the chosen ones as possible; of equally far ones the sharper."""
+    size = np.ptp(outlines, axis=0).max()
+    apart = np.linalg.norm(outlines[:, None] - outlines[None], axis=2) / max(float(size), 1e-9)
+    worth = 1.0 / np.maximum(np.nan_to_num(blur_px, nan=np.nanmax(blur_px, initial=1.0)), 0.3)
+    chosen = [int(np.argmax(apart.sum(axis=1)))]
+    while len(chosen) < MOST_VIEWS:
+        nearest = apart[:, chosen].min(axis=1)
+        nearest[chosen] = -1.0
+        chosen.append(int(np.argmax(nearest * worth)))
+    return chosen

@@ -1,1 +1,0 @@
-"""Search pictures for a board: in which order, which views are kept, and what they cover."""
