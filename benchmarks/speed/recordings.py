@@ -127,7 +127,7 @@ def _flush(writer: Any) -> None:
 def _connections(writer: Any, returns: bool) -> dict[str, Any]:
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-    from calib_core.recordings.containers.message_building import RADAR_SCAN_DEFINITION, RADAR_SCAN_TYPE
+    from calib_core.recordings.containers.writing import RADAR_SCAN_DEFINITION, RADAR_SCAN_TYPE
 
     store = get_typestore(Stores.ROS1_NOETIC)
     store.register(get_types_from_msg(RADAR_SCAN_DEFINITION, RADAR_SCAN_TYPE))

@@ -11,9 +11,8 @@ from calib_core.deployment.recorded_frames import is_transforms
 from calib_core.measurements import time_parts
 from calib_core.recordings import Recording
 from calib_core.recordings.containers.copying import StoredMessage
-from calib_core.recordings.containers.message_building import MessageBuilder
-from calib_core.recordings.containers.recorded_messages import CameraInfoMessage, CloudMessage, TransformMessage
-from calib_core.recordings.containers.stored_channels import ChannelNotes, StoredChannel
+from calib_core.recordings.containers.sources import ChannelNotes, StoredChannel
+from calib_core.recordings.containers.writing import CameraInfoMessage, CloudMessage, MessageBuilder, TransformMessage
 from calib_core.results import Calibration
 
 TRANSFORM_TOPIC = "/tf_static"

@@ -16,9 +16,8 @@ from calib_core.interchange.formats.statement import statement
 from calib_core.recordings import Recording
 from calib_core.recordings.containers.copying import CopiedFile, Losses, StoredMessage, copied_file, merged_messages
 from calib_core.recordings.containers.mcap.writing import ChunkCompression, McapWriter
-from calib_core.recordings.containers.message_building import MessageBuilder
-from calib_core.recordings.containers.sources import MessageIndex
-from calib_core.recordings.containers.stored_channels import StoredChannel
+from calib_core.recordings.containers.sources import MessageIndex, StoredChannel
+from calib_core.recordings.containers.writing import MessageBuilder
 from calib_core.recordings.messages.stored_definitions import with_definition
 from calib_core.recordings.topics import join_topics
 

@@ -9,7 +9,7 @@ from calib_core.arrays import Points3
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.radar import RadarErrors
 from calib_core.recordings import Recording
-from calib_core.recordings.containers.recorded_messages import CloudMessage
+from calib_core.recordings.containers.writing import CloudMessage
 from calib_core.results import Calibration
 
 POINTS_TOPIC = "/cocalib/radar_points"

@@ -9,7 +9,7 @@ import numpy as np
 
 from calib_core.measurements import RadarScan, RadarScans, TimeNs
 from calib_core.radar import polar_from_cartesian
-from calib_core.recordings.containers.recorded_messages import (
+from calib_core.recordings.containers.writing import (
     CameraInfoMessage,
     CloudMessage,
     CompressedImageMessage,

@@ -12,13 +12,13 @@ import pytest
 
 from calib_core.boxes import boxes_text, labels_text
 from calib_core.measurements import TimeNs
-from calib_core.recordings.containers.recorded_messages import (
+from calib_core.recordings.containers.writing import (
     CameraInfoMessage,
     CloudMessage,
     CompressedImageMessage,
     RecordedMessage,
+    write_ros2,
 )
-from calib_core.recordings.containers.writing import write_ros2
 from tests.street import CAMERA, TRUE_POSE, Street, street, turned
 
 Cocalib = Callable[..., Any]

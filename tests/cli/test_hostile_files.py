@@ -14,8 +14,7 @@ import pytest
 from calib_core import input_files
 from calib_core.errors import InputError
 from calib_core.interchange import FrameNames
-from calib_core.recordings.containers.recorded_messages import RecordedMessage
-from calib_core.recordings.containers.writing import write_ros2
+from calib_core.recordings.containers.writing import RecordedMessage, write_ros2
 from tests.cli.conftest import Made
 
 Cocalib = Callable[..., Any]

@@ -1,14 +1,17 @@
 """Chunked containers: the common part of ROS 1 bags and MCAP files.
 
 Messages are stored consecutively in chunks, compressed or not. Decompressed chunks are kept in a cache of bounded size;
-from uncompressed chunks, only the requested bytes are read.
+from uncompressed chunks, only the requested bytes are read. The first bytes of many messages, for stamps and for drivers that
+send one return per message, are read at once.
 """
 
 import threading
 import zlib
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import TypeAlias
 
@@ -17,10 +20,15 @@ import numpy as np
 from calib_core.arrays import Indices
 from calib_core.errors import RecordingError
 from calib_core.recordings.assumptions import Assumption
-from calib_core.recordings.containers.cached_indexes import KeptIndex, heads_from, index_from, keep_heads, keep_index
 from calib_core.recordings.containers.compression import refuse_bomb, unpack, unpack_what_is_there
-from calib_core.recordings.containers.index_cache import cache_of
-from calib_core.recordings.containers.message_heads import gather_far, gather_heads
+from calib_core.recordings.containers.index_cache import (
+    KeptIndex,
+    cache_of,
+    heads_from,
+    index_from,
+    keep_heads,
+    keep_index,
+)
 from calib_core.recordings.containers.positioned_reads import FileBytes
 from calib_core.recordings.containers.sources import Channel, Heads, MessageIndex, Progress
 from calib_core.results import DataWarning
@@ -29,13 +37,17 @@ ChannelFilter: TypeAlias = Callable[[Channel], bool]
 CACHE_BYTES = 24 * 2**20
 FIRST_CHUNKS = 16
 """Number of chunks to read first if the beginning of a file is enough, and to add until everything wanted is found."""
-
 _FEW_MESSAGES = 64
 _FAR_BYTES = 4096
 _MAX_CHECKED_BYTES = 1 << 24
 _CHECKED_PIECE_BYTES = 1 << 20
 MAX_MESSAGE_BYTES = 1 << 28
 """Larger than any sensor message; one that claims to exceed it is damaged or malicious."""
+_NEAR_BYTES = 4096
+_RUN_MESSAGES = 4096
+_THREADS = 4
+_FEW_CHUNKS = 32
+_AHEAD = 256
 
 
 @dataclass(frozen=True, slots=True)
@@ -331,3 +343,184 @@ class ChunkedSource:
         places: Indices = starts[index.chunk] + index.offset
         far = np.diff(np.sort(places)) > self.lead_bytes + size + _FAR_BYTES
         return places if np.count_nonzero(far) > 0.5 * len(places) else None
+
+
+def gather_heads(source: ChunkedSource, index: MessageIndex, size: int) -> Heads:
+    """Read the first bytes of many messages.
+
+    From uncompressed chunks only the heads of records are read, adjacent ones together; each compressed chunk is
+    decompressed once. Many chunks are distributed over a few threads, so that disk access and decompression overlap.
+    Messages in an unreadable chunk get the length -1.
+    """
+    groups = _groups(index.chunk)
+    gather = _Gather(source, index, size, keep=len(groups) <= _FEW_CHUNKS)
+    if len(groups) <= _FEW_CHUNKS:
+        return Heads(gather.rows, gather.lengths, gather.chunks(groups))
+    batches = [groups[first : first + _FEW_CHUNKS] for first in range(0, len(groups), _FEW_CHUNKS)]
+    with ThreadPoolExecutor(_THREADS) as pool:
+        faults = [fault for fault in pool.map(gather.chunks, batches) if fault]
+    return Heads(gather.rows, gather.lengths, faults[0] if faults else "")
+
+
+def gather_far(source: ChunkedSource, file: FileBytes, index: MessageIndex, places: Indices, size: int) -> Heads:
+    """Read the first bytes of uncompressed messages that are far apart: one small read each.
+
+    Args:
+        source: the chunked file.
+        file: its bytes.
+        index: the messages.
+        places: (n,) positions of their records in the file.
+        size: number of bytes of each message.
+    """
+    width = source.lead_bytes + size
+    order = np.argsort(places)
+    read: list[bytes] = []
+    batches = [places[order[first : first + _AHEAD]].tolist() for first in range(0, len(order), _AHEAD)]
+    announced = 0
+    for number, batch in enumerate(batches):
+        for ahead in batches[announced : number + 2]:  # prefetch the next batch while this one is read
+            file.expect([(place, place + width) for place in ahead])
+        announced = number + 2
+        read.extend(file.up_to(place, width).ljust(width, b"\0") for place in batch)
+    gathered = np.zeros((len(order), width), dtype=np.uint8)
+    gathered[order] = np.frombuffer(b"".join(read), dtype=np.uint8).reshape(-1, width)
+    usual, lengths = source.usual(gathered[:, : source.lead_bytes])
+    gather = _Gather(source, index, size, keep=False)
+    gather.rows, gather.lengths = gathered[:, source.lead_bytes :], lengths
+    rooms = np.array([source.room(chunk) for chunk in range(int(index.chunk.max()) + 1)])[index.chunk]
+    past = index.offset + source.lead_bytes + lengths > rooms
+    lengths[past] = -1
+    faults = ["a chunk ends before its messages do"] if (past & usual).any() else []
+    for row in np.flatnonzero(~usual).tolist():
+        faults.append(gather.single(int(index.chunk[row]), int(index.offset[row]), row))
+    return Heads(gather.rows, gather.lengths, next((fault for fault in faults if fault), ""))
+
+
+def _taken(data: bytes, places: np.ndarray, width: int) -> np.ndarray:
+    """Copy width bytes from each place, as (n,) items of that size, which NumPy moves as units."""
+    windows: np.ndarray = np.ndarray((len(data) - width + 1,), np.dtype(f"V{width}"), data, 0, (1,))
+    return windows[places]
+
+
+def _as_slice(rows: np.ndarray) -> "np.ndarray | slice":
+    """Return consecutive rows as a slice, which is faster to write to; other rows unchanged."""
+    first, last = int(rows[0]), int(rows[-1])
+    together = last - first + 1 == len(rows) and bool((np.diff(rows) == 1).all())
+    return slice(first, last + 1) if together else rows
+
+
+def _groups(chunk: np.ndarray) -> list[np.ndarray]:
+    """Return the rows of the index grouped by chunk."""
+    if not len(chunk):
+        return []
+    order = np.argsort(chunk, kind="stable")
+    edges = [0, *(np.flatnonzero(np.diff(chunk[order])) + 1).tolist(), len(chunk)]
+    return [order[first:last] for first, last in pairwise(edges)]
+
+
+class _Gather:
+    """The table that the threads fill, each its own rows."""
+
+    def __init__(self, source: ChunkedSource, index: MessageIndex, size: int, *, keep: bool) -> None:
+        self.keep = keep
+        self.source = source
+        self.index = index
+        self.size = size
+        self.rows = np.zeros((len(index), size), dtype=np.uint8)
+        self.lengths = np.zeros(len(index), dtype=np.int64)
+
+    def chunks(self, groups: Iterable[np.ndarray]) -> str:
+        """Fill the rows of several chunks; return the first error."""
+        return next(iter([fault for group in groups if (fault := self.chunk(group))]), "")
+
+    def chunk(self, group: np.ndarray) -> str:
+        """Fill the rows of the messages in one chunk; return the error, if any."""
+        chunk = int(self.index.chunk[group[0]])
+        order = group[np.argsort(self.index.offset[group], kind="stable")]
+        try:
+            whole = self.source.in_memory(chunk, keep=self.keep)
+            room = self.source.room(chunk) if whole is None else len(whole)
+            faults = [self._run(chunk, order[a:b], whole, room) for a, b in pairwise(self._edges(order))]
+        except RecordingError as error:
+            self.lengths[group] = -1
+            return str(error)
+        fault = next((fault for fault in faults if fault), "")
+        return fault and (self.source.fault_of(chunk) or fault)
+
+    def _edges(self, order: np.ndarray) -> list[int]:
+        """Split messages into runs of adjacent ones that are read together."""
+        if len(order) == 1:
+            return [0, 1]
+        far = np.diff(self.index.offset[order]) > self.source.lead_bytes + self.size + _NEAR_BYTES
+        cuts = {*(np.flatnonzero(far) + 1).tolist(), *range(_RUN_MESSAGES, len(order), _RUN_MESSAGES)}
+        return [0, *sorted(cuts), len(order)]
+
+    def _run(self, chunk: int, order: np.ndarray, whole: bytes | None, room: int) -> str:
+        """Fill the rows of adjacent messages; return why one of them cannot be read."""
+        lead = self.source.lead_bytes
+        offsets = self.index.offset[order]
+        base, end = int(offsets[0]), int(offsets[-1]) + lead + self.size
+        data = self.source.piece(chunk, base, end - base) if whole is None else whole[base:end]
+        data = data.ljust(end - base, b"\0")
+        usual, lengths = self.source.usual(_taken(data, offsets - base, lead).view(np.uint8).reshape(-1, lead))
+        past = offsets + lead + lengths > room
+        lengths[past] = -1
+        self.lengths[order] = lengths
+        self.rows.view(f"V{self.size}")[_as_slice(order), 0] = _taken(data, offsets - base + lead, self.size)
+        fault = f"chunk {chunk} ends before its messages do" if (past & usual).any() else ""
+        for place in np.flatnonzero(~usual).tolist():
+            fault = self.single(chunk, int(offsets[place]), int(order[place])) or fault
+        return fault
+
+    def single(self, chunk: int, offset: int, row: int) -> str:
+        """Read the head of a message whose record has an unusual layout; return why it cannot be read."""
+        try:
+            start, length = self.source.locate(chunk, offset)
+        except RecordingError as error:
+            self.lengths[row] = -1
+            return str(error)
+        head = self.source.piece(chunk, start, min(self.size, length))
+        self.rows[row, : len(head)] = np.frombuffer(head, dtype=np.uint8)
+        self.lengths[row] = length if len(head) == min(self.size, length) else -1
+        return "" if self.lengths[row] >= 0 else f"chunk {chunk} ends before its messages do"
+
+
+def about_recovery(
+    path: Path,
+    *,
+    messages: int,
+    lost_bytes: int,
+    tool: str,
+    damaged_chunks: int = 0,
+    fault: str = "",
+    unknown: int = 0,
+) -> DataWarning:
+    """Describe what was recovered by reading the whole file, and what was lost.
+
+    Args:
+        path: the file.
+        messages: number of messages recovered.
+        lost_bytes: number of bytes that could not be parsed.
+        tool: the command that repairs such a file.
+        damaged_chunks: number of compressed chunks that could not be fully decompressed.
+        fault: why the first of those could not.
+        unknown: number of messages of connections or channels that the file does not describe.
+    """
+    parts = [
+        f"{path.name} has no usable index (it was not closed properly, or is truncated or damaged): {messages} complete messages "
+        "were recovered by reading the whole file"
+    ]
+    if damaged_chunks:
+        parts.append(
+            f"{damaged_chunks} chunk{'s are' if damaged_chunks > 1 else ' is'} damaged, and everything after the damage in "
+            f"{'them' if damaged_chunks > 1 else 'it'} is lost ({fault})"
+        )
+    if unknown:
+        parts.append(f"{unknown} of the messages belong to topics that the file does not describe, and are skipped")
+    if lost_bytes:
+        parts.append(f"{lost_bytes} bytes could not be parsed and are lost")
+    return DataWarning(
+        "not-closed",
+        "; ".join(parts),
+        f"check that the data you need is there; repair the file to open it quickly again: {tool} {path.name}",
+    )

@@ -1,27 +1,51 @@
-"""The files of a recording that is still being written: they grow, are renamed when they are closed, and further ones appear."""
+"""Follow the files of a recording that is being written: they grow, are renamed when closed, and further ones appear.
+
+Chunked files only grow, and what has been read of them does not change. A database is read without holding the recorder up: with
+a write-ahead log readers and the writer never wait for each other. Without one, a reader's lock can make the recorder's next
+write fail, so such a file is refused. The database is open only while it is read: the recorder merges its log when it closes
+the file, and cannot if somebody else has it open at that moment.
+"""
 
 import contextlib
+import re
+import sqlite3
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
+import numpy as np
+
 from calib_core.errors import RecordingError
-from calib_core.recordings.containers.mcap import records as mcap_records
-from calib_core.recordings.containers.mcap.growing import GrowingMcap
+from calib_core.recordings.containers.chunks import ChannelFilter, Chunk
+from calib_core.recordings.containers.compression import packing_of
+from calib_core.recordings.containers.mcap.reader import McapSource
+from calib_core.recordings.containers.mcap.records import MAGIC, Declarations
+from calib_core.recordings.containers.mcap.recovery import FoundInMcap, scan_mcap_further
 from calib_core.recordings.containers.positioned_reads import FileBytes
-from calib_core.recordings.containers.rosbag1.growing import GrowingBag
-from calib_core.recordings.containers.sources import GrowingSource, Source
-from calib_core.recordings.containers.sqlite import reader as sqlite_bag
-from calib_core.recordings.containers.sqlite.growing import GrowingDatabase
+from calib_core.recordings.containers.rosbag1.reader import Rosbag1Source, channels_of
+from calib_core.recordings.containers.rosbag1.recovery import FoundInBag, scan_bag_further
+from calib_core.recordings.containers.sources import GrowingSource, Heads, MessageIndex, Source
+from calib_core.recordings.containers.sqlite.reader import MAGIC as SQLITE_MAGIC
+from calib_core.recordings.containers.sqlite.reader import SqliteSource
+from calib_core.recordings.containers.sqlite.recovery import open_database, rows_after
+from calib_core.results import DataWarning
 
 _SUFFIXES = (".bag", ".mcap", ".db3", ".active")
 _METADATA = "metadata.yaml"
 _ACTIVE = ".active"
 _BEGINNING_BYTES = 1 << 14
 """A longer file that cannot be opened is damaged; a shorter one may only have begun."""
-
 _Identity: TypeAlias = tuple[int, int]
+_REMEMBERED_BYTES = 64
+_OFFSET_BITS = 40  # a file of a terabyte
+_INDEX_POSITION = re.compile(rb"index_pos=([\x00-\xff]{8})")
+_HEADER_BYTES = 4096
+_LOOKS_AFTER_A_CHANGE = 5
+_NOT_SEEN = (-1, -1)
+_VERSIONS = slice(18, 20)
+_LOGGED = b"\x02\x02"
 
 
 @dataclass(slots=True)
@@ -138,9 +162,9 @@ def _kind(file: FileBytes) -> Callable[[FileBytes], GrowingSource] | None:
     head = file.up_to(0, 16)
     if head.startswith(b"#ROSBAG V"):
         return GrowingBag
-    if head.startswith(mcap_records.MAGIC):
+    if head.startswith(MAGIC):
         return GrowingMcap
-    if head == sqlite_bag.MAGIC:
+    if head == SQLITE_MAGIC:
         return GrowingDatabase
     if len(head) < 16 or not any(head):
         return None
@@ -186,3 +210,304 @@ def _is_unfinished_folder(path: Path) -> bool:
 def _gone(path: Path) -> str:
     there = "was replaced by another file" if path.exists() else "is no longer there"
     return f"{path}: {there} while it was being followed; what had been read is still shown; open the recording again"
+
+
+class AppendedFile:
+    """The part of a file that has been read, up to a position that only moves forward.
+
+    Args:
+        file: the file.
+        place: the end of what has been read.
+    """
+
+    def __init__(self, file: FileBytes, place: int) -> None:
+        self._file = file
+        self.move_to(place)
+
+    def look_again(self) -> bool:
+        """Return whether the file has grown beyond what has been read.
+
+        Raises:
+            RecordingError: it has been truncated or overwritten.
+        """
+        self._file.look_again()
+        if self._file.size_bytes < self.place:
+            raise RecordingError(
+                f"{self._file.path}: was truncated to {self._file.size_bytes} bytes after {self.place} bytes had been read; "
+                "open the recording again"
+            )
+        if self._last_bytes() != self._before:
+            raise RecordingError(
+                f"{self._file.path}: was overwritten after {self.place} bytes had been read; open the recording again"
+            )
+        return self._file.size_bytes > self.place
+
+    def move_to(self, place: int) -> None:
+        """Move forward to the end of what has been read now."""
+        self.place = place
+        self._before = self._last_bytes()
+
+    def _last_bytes(self) -> bytes:
+        count = min(_REMEMBERED_BYTES, self.place)
+        return self._file.up_to(self.place - count, count)
+
+
+def with_messages(index: MessageIndex, found: Sequence[tuple[int, int, int]]) -> MessageIndex:
+    """Return an index with further messages, as (receive time [ns], chunk, offset)."""
+    new = np.array(found, dtype=np.int64)
+    return index.followed_by(MessageIndex.sorted_from(new[:, 0], new[:, 1], new[:, 2]))
+
+
+def damaged_chunks(path: Path, count: int, fault: str) -> tuple[DataWarning, ...]:
+    """Warn about chunks that could not be read in full; empty if there are none.
+
+    Args:
+        path: of the file.
+        count: number of these chunks.
+        fault: what is wrong with the first of them.
+    """
+    if not count:
+        return ()
+    message = f"{path.name}: {count} of the chunks read so far {'are' if count > 1 else 'is'} damaged ({fault})"
+    return (DataWarning("damaged-file", message, "check the disk of the recorder; what was read of them is used"),)
+
+
+class KeptHeads:
+    """Heads by message, for one number of bytes at a time. Not thread-safe.
+
+    Args:
+        by_row: messages are told apart by their chunk alone, as the rows of a database are.
+    """
+
+    def __init__(self, *, by_row: bool = False) -> None:
+        self._shift = 0 if by_row else _OFFSET_BITS
+        self._forget(0)
+
+    def _forget(self, size: int) -> None:
+        self._size = size
+        self._keys = np.zeros(0, dtype=np.int64)
+        self._rows = np.zeros((0, size), dtype=np.uint8)
+        self._lengths = np.zeros(0, dtype=np.int64)
+
+    def read(self, index: MessageIndex, size: int, read: Callable[[MessageIndex, int], Heads]) -> Heads:
+        """Return the heads of messages in the order of the index; read those that are not kept yet.
+
+        Args:
+            index: the messages.
+            size: number of bytes of each.
+            read: reads the heads of messages.
+        """
+        if size != self._size:
+            self._forget(size)
+        keys = (index.chunk << self._shift) | index.offset
+        new = np.flatnonzero(~self._kept(keys))
+        fault = ""
+        if len(new):
+            heads = read(index.take(new), size)
+            fault = heads.fault
+            self._keep(keys[new], heads)
+        places = np.searchsorted(self._keys, keys)
+        return Heads(self._rows[places], self._lengths[places], fault)
+
+    def _kept(self, keys: np.ndarray) -> np.ndarray:
+        if not len(self._keys):
+            return np.zeros(len(keys), dtype=bool)
+        places = np.minimum(np.searchsorted(self._keys, keys), len(self._keys) - 1)
+        return np.asarray(self._keys[places] == keys)
+
+    def _keep(self, keys: np.ndarray, heads: Heads) -> None:
+        all_keys = np.concatenate([self._keys, keys])
+        order = np.argsort(all_keys, kind="stable")
+        self._keys = all_keys[order]
+        self._rows = np.concatenate([self._rows, heads.rows])[order]
+        self._lengths = np.concatenate([self._lengths, heads.lengths])[order]
+
+
+class GrowingMcap(McapSource):
+    """An MCAP file that is still being written: its complete records are indexed as they come."""
+
+    def _open(self) -> None:
+        self._kept = None
+        self.recovered = True
+        self._heads = KeptHeads()
+        self._scanned = FoundInMcap(Declarations(), [Chunk(0, self.size_bytes, self.size_bytes, "")])
+        self.chunks = self._scanned.chunks
+        self._read = AppendedFile(self.file, len(MAGIC))
+
+    def restore(self) -> bool:
+        """Return False: the index of a growing file is not cached."""
+        return False
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether the data section has ended and the file ends as a closed one does."""
+        end = self.file.size_bytes - len(MAGIC)
+        return self._scanned.ended and end > self._read.place and self.file.up_to(end, len(MAGIC)) == MAGIC
+
+    @property
+    def later_warnings(self) -> tuple[DataWarning, ...]:
+        """Chunks that could not be decompressed, or have the wrong checksum."""
+        return damaged_chunks(self.path, self._scanned.damaged_chunks, self._scanned.fault)
+
+    def grow(self) -> int:
+        """Index the messages that have been written completely since; return how many there are."""
+        if not self._read.look_again() or self._scanned.ended:
+            return 0
+        place = scan_mcap_further(self.file, self._read.place, self._scanned)
+        self._read.move_to(place)
+        found, self._scanned.messages = self._scanned.messages, {}
+        for channel, entries in found.items():
+            self.indexes[channel] = with_messages(self.index(channel), entries)
+        self.channels = self._scanned.declarations.channels
+        return sum(map(len, found.values()))
+
+    def heads(self, index: MessageIndex, size: int, *, keep: bool = False) -> Heads:
+        """Read the first bytes of messages; those to be kept are read once while the file grows."""
+        return self._heads.read(index, size, super().heads) if keep else super().heads(index, size)
+
+    def renamed(self, path: Path) -> None:
+        """Take note that the writer has renamed the file."""
+        self.file.path = path
+
+
+class GrowingBag(Rosbag1Source):
+    """A bag that is still being written: its complete records are indexed as they come."""
+
+    def _open(self, header: Mapping[str, bytes], start: int, first_of: ChannelFilter | None) -> None:
+        self.file.at(0, start)  # the whole header
+        self._kept = None
+        self.recovered = True
+        self._heads = KeptHeads()
+        self._scanned = FoundInBag([Chunk(0, self.size_bytes, self.size_bytes, "none")])
+        self.chunks = self._scanned.chunks
+        self._read = AppendedFile(self.file, start)
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether the recorder has written the position of the index into the header, which it does last."""
+        found = _INDEX_POSITION.search(self.file.up_to(0, _HEADER_BYTES))
+        position = int.from_bytes(found[1], "little") if found else 0
+        return 0 < position <= self._read.place
+
+    @property
+    def later_warnings(self) -> tuple[DataWarning, ...]:
+        """Chunks that could not be decompressed."""
+        return damaged_chunks(self.path, self._scanned.damaged_chunks, self._scanned.fault)
+
+    def grow(self) -> int:
+        """Index the messages that have been written completely since; return how many there are."""
+        if not self._read.look_again():
+            return 0
+        place = scan_bag_further(self.file, self._read.place, self._scanned)
+        self._read.move_to(place)
+        found, self._scanned.messages = self._scanned.messages, {}
+        for connection, entries in found.items():
+            self.indexes[connection] = with_messages(self.index(connection), entries)
+        self.channels = tuple(channels_of(self._scanned).values())
+        return sum(map(len, found.values()))
+
+    def heads(self, index: MessageIndex, size: int, *, keep: bool = False) -> Heads:
+        """Read the first bytes of messages; those to be kept are read once while the file grows."""
+        return self._heads.read(index, size, super().heads) if keep else super().heads(index, size)
+
+    def renamed(self, path: Path) -> None:
+        """Take note that the recorder has renamed the file, as it does when it closes a bag."""
+        self.file.path = path
+
+
+class GrowingDatabase(SqliteSource):
+    """A .db3 file that is still being written: the rows of finished transactions are indexed as they come."""
+
+    def _connect(self) -> None:
+        if self._file.up_to(0, 20)[_VERSIONS] != _LOGGED:
+            raise RecordingError(
+                f"{self.path}: is written without a write-ahead log, so reading it now could make the recorder lose messages; "
+                "open it without --follow once it is complete, or record with the storage preset resilient, or as MCAP"
+            )
+        self._kept = None
+        self._indexes = {}
+        self._heads = KeptHeads(by_row=True)
+        self._last_row, self._strange = 0, 0
+        self._seen, self._looks = (_NOT_SEEN, _NOT_SEEN), _LOOKS_AFTER_A_CHANGE
+
+    @contextmanager
+    def _database(self) -> Iterator[sqlite3.Connection]:
+        """Open the database, for one thread at a time, until it has been read; a file without a log does not change."""
+        with self._lock:
+            mode = "mode=ro" if self._log.exists() else "mode=ro&immutable=1"
+            connection = open_database(self.path, self._file.stored, mode)
+            try:
+                yield connection
+            finally:
+                connection.close()
+
+    @property
+    def _log(self) -> Path:
+        return Path(f"{self._file.stored}-wal")
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether the recorder has closed the database: it then removes the log."""
+        return not self._log.exists()
+
+    @property
+    def later_warnings(self) -> tuple[DataWarning, ...]:
+        """Rows that are not messages."""
+        if not self._strange:
+            return ()
+        message = f"{self.path.name}: {self._strange} rows without a time or a topic are skipped"
+        return (DataWarning("damaged-file", message, "check the disk of the recorder"),)
+
+    def grow(self) -> int:
+        """Index the messages that have been committed since; return how many there are."""
+        self._file.look_again()
+        self.size_bytes = self._file.size_bytes
+        seen = (_state(self._file.stored), _state(self._log))
+        self._looks = _LOOKS_AFTER_A_CHANGE if seen != self._seen else self._looks - 1
+        self._seen = seen
+        if self._looks < 0:
+            return 0
+        try:
+            with self._database() as database:
+                found = rows_after(database, self._last_row)
+                last = database.execute("SELECT max(id) FROM messages").fetchone()[0] or 0
+        except sqlite3.Error as error:
+            raise self._damaged(error) from error
+        if last < self._last_row:
+            raise RecordingError(f"{self.path}: rows that had been read are gone; open the recording again")
+        if not len(found.columns):
+            return 0
+        self._strange += found.strange
+        self._add(found.columns)
+        return len(found.columns)
+
+    def _add(self, columns: np.ndarray) -> None:
+        if not self._last_row:
+            self._packed = self._packed or packing_of(self._first_message(int(columns[0, 2]))) is not None
+        if not {channel.id for channel in self.channels} >= set(np.unique(columns[:, 0]).tolist()):
+            self.channels = self._read_channels()
+        assert self._indexes is not None
+        for number, new in self._sorted(columns).items():
+            self._indexes[number] = self.index(number).followed_by(new)
+        self._last_row = int(columns[-1, 2])
+
+    def _first_message(self, row: int) -> bytes:
+        rows = self._rows("SELECT data FROM messages WHERE id = ?", row)
+        return rows[0][0] if rows and isinstance(rows[0][0], bytes) else b""
+
+    def heads(self, index: MessageIndex, size: int, *, keep: bool = False) -> Heads:
+        """Read the first bytes of messages; those to be kept are read once while the file grows."""
+        return self._heads.read(index, size, super().heads) if keep else super().heads(index, size)
+
+    def renamed(self, path: Path) -> None:
+        """Take note that the recorder has renamed the file."""
+        self.path = self._file.path = self._file.stored = path
+
+
+def _state(path: Path) -> tuple[int, int]:
+    """Return size and modification time of a file; zeros if there is none."""
+    try:
+        stat = path.stat()
+    except OSError:
+        return 0, 0
+    return stat.st_size, stat.st_mtime_ns

@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 from calib_core.errors import RecordingError
 from calib_core.recordings.containers.chunks import ChannelFilter
-from calib_core.recordings.containers.compressed_files import packing_of, unpacked_file
+from calib_core.recordings.containers.compression import packing_of, unpacked_file
 from calib_core.recordings.containers.mcap import reader as mcap
 from calib_core.recordings.containers.mcap import records as mcap_records
 from calib_core.recordings.containers.positioned_reads import FileBytes

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from calib_core.recordings.containers.stored_channels import StoredChannel
+from calib_core.recordings.containers.sources import StoredChannel
 from calib_core.recordings.messages.definitions import short_type
 from calib_core.recordings.messages.known_definitions import KNOWN_DEFINITIONS
 

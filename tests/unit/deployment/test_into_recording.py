@@ -21,7 +21,7 @@ from calib_core.errors import InputError
 from calib_core.interchange import read_calibration, write_calibration
 from calib_core.radar import RadarErrors
 from calib_core.recordings import open_recording
-from calib_core.recordings.containers.message_building import RADAR_SCAN_DEFINITION, RADAR_SCAN_TYPE
+from calib_core.recordings.containers.writing import RADAR_SCAN_DEFINITION, RADAR_SCAN_TYPE
 from tests.unit.deployment.conftest import RECORDED, SEEING, START_NS, Ros, calibration_file, exported, without_info
 from tests.unit.recordings.conftest import CONTAINERS
 

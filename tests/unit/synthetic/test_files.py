@@ -17,8 +17,7 @@ from rosbags.typesys import Stores, get_typestore
 from calib_core.errors import RecordingError
 from calib_core.measurements import RadarScan, TimeNs
 from calib_core.radar import polar_from_cartesian
-from calib_core.recordings.containers.recorded_messages import RadarReturnMessage, RecordedMessage
-from calib_core.recordings.containers.writing import write_ros1_bag
+from calib_core.recordings.containers.writing import RadarReturnMessage, RecordedMessage, write_ros1_bag
 from calib_core.synthetic import SimulatedFrame, SimulatedRecording, SimulationOptions, simulate, write_recording
 
 OPTIONS = SimulationOptions(placements=2, dwell_s=4.0, width_px=128, height_px=80, camera_rate_hz=2.0, seed=5)

@@ -10,8 +10,7 @@ import pytest
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.radar import cartesian_from_polar, direction_cosines, polar_from_cartesian
 from calib_core.recordings import RecordingOptions, open_recording
-from calib_core.recordings.containers.recorded_messages import CameraInfoMessage, CloudMessage
-from calib_core.recordings.containers.writing import write_ros1_bag
+from calib_core.recordings.containers.writing import CameraInfoMessage, CloudMessage, write_ros1_bag
 from calib_core.synthetic import (
     RADAR_PROFILES,
     IntrinsicsErrors,

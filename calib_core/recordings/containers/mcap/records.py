@@ -5,8 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from calib_core.recordings.containers.positioned_reads import Stretch
-from calib_core.recordings.containers.sources import Channel
-from calib_core.recordings.containers.stored_channels import ChannelNotes, StoredChannel
+from calib_core.recordings.containers.sources import Channel, ChannelNotes, StoredChannel
 
 MAGIC = b"\x89MCAP0\r\n"
 FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = 2, 3, 4, 5, 6, 7, 8

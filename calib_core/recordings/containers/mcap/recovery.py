@@ -126,7 +126,7 @@ def parts_of_mcap(file: FileBytes, found: FoundInMcap) -> Iterator[Part]:
         yield Part(0, place, place, stretch.size)
 
 
-def scan_further(file: FileBytes, place: int, found: FoundInMcap) -> int:
+def scan_mcap_further(file: FileBytes, place: int, found: FoundInMcap) -> int:
     """Scan the complete records of a file that is being written; return the position of the first incomplete one.
 
     Args:

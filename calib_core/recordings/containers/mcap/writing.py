@@ -27,7 +27,7 @@ from calib_core.recordings.containers.mcap.records import (
     STATISTICS,
     SUMMARY_OFFSET,
 )
-from calib_core.recordings.containers.stored_channels import StoredChannel
+from calib_core.recordings.containers.sources import StoredChannel
 
 ChunkCompression = Literal["", "lz4", "zstd"]
 

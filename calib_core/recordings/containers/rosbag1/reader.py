@@ -8,20 +8,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calib_core.errors import RecordingError
-from calib_core.recordings.containers.chunks import ChannelFilter, ChunkedSource
-from calib_core.recordings.containers.recovery_warnings import about_recovery
-from calib_core.recordings.containers.rosbag1.index import read_indexes
-from calib_core.recordings.containers.rosbag1.records import fields_of
-from calib_core.recordings.containers.rosbag1.recovery import FoundInBag, scan_bag
-from calib_core.recordings.containers.rosbag1.tail import (
+from calib_core.recordings.containers.chunks import ChannelFilter, ChunkedSource, about_recovery
+from calib_core.recordings.containers.rosbag1.index import (
     CONNECTION,
     ChunkInfo,
     channel_of,
     counts_of,
     damaged,
+    fields_of,
     first_chunks,
+    read_indexes,
     read_tail,
 )
+from calib_core.recordings.containers.rosbag1.recovery import FoundInBag, scan_bag
 from calib_core.recordings.containers.sources import Channel, MessageIndex
 
 if TYPE_CHECKING:

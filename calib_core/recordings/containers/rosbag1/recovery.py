@@ -13,7 +13,7 @@ from calib_core.errors import RecordingError
 from calib_core.recordings.containers.chunks import Chunk
 from calib_core.recordings.containers.compression import refuse_bomb, unpack, unpack_what_is_there
 from calib_core.recordings.containers.positioned_reads import FileBytes, FileStretch, MemoryStretch, Stretch
-from calib_core.recordings.containers.rosbag1.records import fields_of
+from calib_core.recordings.containers.rosbag1.index import fields_of
 
 _MESSAGE, _CHUNK, _CONNECTION = 2, 5, 7
 _OTHER_KINDS = frozenset({3, 4, 6})  # the bag's header, and its index
@@ -142,7 +142,7 @@ def scan_bag(file: FileBytes, start: int) -> FoundInBag:
     return found
 
 
-def scan_further(file: FileBytes, place: int, found: FoundInBag) -> int:
+def scan_bag_further(file: FileBytes, place: int, found: FoundInBag) -> int:
     """Scan the complete records of a bag that is being written; return the position of the first incomplete one.
 
     A recorder writes the header of a chunk with a size of 0 and replaces it once the chunk is complete.

@@ -11,10 +11,9 @@ import numpy as np
 
 from calib_core.errors import RecordingError
 from calib_core.recordings.assumptions import Assumption
-from calib_core.recordings.containers.cached_indexes import heads_from, keep_heads
 from calib_core.recordings.containers.compression import unpack_message
-from calib_core.recordings.containers.index_cache import cache_of
-from calib_core.recordings.containers.sources import Channel, Heads, MessageIndex
+from calib_core.recordings.containers.index_cache import cache_of, heads_from, keep_heads
+from calib_core.recordings.containers.sources import Channel, Heads, MessageIndex, StoredChannel
 from calib_core.recordings.containers.sqlite.recovery import (
     FoundRows,
     about_rows,
@@ -23,7 +22,6 @@ from calib_core.recordings.containers.sqlite.recovery import (
     first_rows,
     scan_rows,
 )
-from calib_core.recordings.containers.stored_channels import StoredChannel
 from calib_core.results import DataWarning
 
 if TYPE_CHECKING:
