@@ -15,7 +15,7 @@ from calib_core.boxes.file_frames import FileBoxes, FileFrame
 from calib_core.detections import Box, Boxes, FrameBoxes
 from calib_core.errors import InputError
 from calib_core.measurements import TimeNs
-from calib_core.recordings.boxes.stamp_matching import frames_of_stamps
+from calib_core.recordings.box_topics import frames_of_stamps
 from calib_core.recordings.plain_files.name_times import times_in_names
 
 _LEAST_INSIDE = 0.5

@@ -8,7 +8,7 @@ from calib_core.camera import Camera
 from calib_core.errors import RecordingError
 from calib_core.measurements import TimeNs
 from calib_core.recordings import Recording
-from calib_core.recordings.camera.camera_info import camera_from_info, is_camera_info
+from calib_core.recordings.camera.recorded_intrinsics import camera_from_info, is_camera_info
 from calib_core.recordings.containers.writing import CameraInfoMessage, MessageBuilder
 from calib_core.recordings.messages.decoding import Message
 from calib_core.recordings.topics import Topic, join_topics

@@ -18,7 +18,7 @@ from calib_core.recordings.containers.copying import CopiedFile, Losses, StoredM
 from calib_core.recordings.containers.mcap.writing import ChunkCompression, McapWriter
 from calib_core.recordings.containers.sources import MessageIndex, StoredChannel
 from calib_core.recordings.containers.writing import MessageBuilder
-from calib_core.recordings.messages.stored_definitions import with_definition
+from calib_core.recordings.messages.definitions import with_definition
 from calib_core.recordings.topics import join_topics
 
 _PROGRESS_MESSAGES = 256

@@ -12,11 +12,9 @@ from calib_core.camera import Camera
 from calib_core.errors import RecordingError
 from calib_core.measurements import Stamp, TimeNs
 from calib_core.recordings.assumptions import Assumption, about_assumptions
-from calib_core.recordings.camera.image_stream import ImageStream
+from calib_core.recordings.camera.image_stream import ImageStream, about_video, frames_of_one_size, image_stream
 from calib_core.recordings.camera.images import ImageLayout
-from calib_core.recordings.camera.picture_sizes import frames_of_one_size
 from calib_core.recordings.camera.recorded_intrinsics import published_camera, recorded_camera
-from calib_core.recordings.camera.video_stream import about_video, image_stream
 from calib_core.recordings.checks import about_images, about_lost, about_radar, check_overlap, without_certain_zone
 from calib_core.recordings.column_map import parse_column_map
 from calib_core.recordings.containers.sources import Source
@@ -34,9 +32,8 @@ from calib_core.recordings.radar.several_topics.sensors import RadarSensor, othe
 from calib_core.recordings.radar_choice import RadarChoice, choose_radar
 from calib_core.recordings.selection import Inventory, Need, RecordingOptions, Selection, select
 from calib_core.recordings.stamping import StampedTopic, read_stamps
-from calib_core.recordings.time.clock_choice import ClockChoice, choose_clock, choose_clocks
+from calib_core.recordings.time.clock_choice import ClockChoice, Stamps, choose_clock, choose_clocks
 from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis, about_clocks, diagnose
-from calib_core.recordings.time.clock_faults import Stamps
 from calib_core.recordings.topics import BOX_LAYOUT, Rhythm, Topic, TopicSummary, join_topics
 from calib_core.recordings.usages import Usage, usage_of
 from calib_core.results import DataWarning

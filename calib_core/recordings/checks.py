@@ -12,7 +12,7 @@ from calib_core.recordings.camera.image_stream import ImageStream
 from calib_core.recordings.radar.scan_stream import RadarStream
 from calib_core.recordings.radar.several_topics.merged_stream import MergedStream
 from calib_core.recordings.stamping import StampedTopic
-from calib_core.recordings.time.dates import utc
+from calib_core.recordings.time.written_times import utc
 from calib_core.results import DataWarning
 
 _SAMPLED_SCANS = 12

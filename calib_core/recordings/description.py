@@ -12,7 +12,7 @@ from calib_core.recordings.summary import (
     recording_summary,
 )
 from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis
-from calib_core.recordings.time.dates import span_text, utc
+from calib_core.recordings.time.written_times import span_text, utc
 from calib_core.recordings.topics import TopicSummary
 
 _CLOCKS = {"header": "stamps", "receive": "receive times"}

@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from calib_core.errors import RecordingError
-from calib_core.recordings.camera.camera_info import is_camera_info
 from calib_core.recordings.camera.images import EncodedImage, is_picture
+from calib_core.recordings.camera.recorded_intrinsics import is_camera_info
 from calib_core.recordings.containers.opening import open_beginnings
 from calib_core.recordings.containers.sources import Channel, Source
 from calib_core.recordings.messages.definitions import definition_of

@@ -18,7 +18,7 @@ from calib_core.input_files import name_text, special_kind
 from calib_core.measurements import RadarScans, TimeNs
 from calib_core.recordings.assembly import Assembly, assemble
 from calib_core.recordings.assumptions import Assumption, StatedAssumption
-from calib_core.recordings.boxes.topic_boxes import boxes_in_topic
+from calib_core.recordings.box_topics import boxes_in_topic
 from calib_core.recordings.camera.image_stream import ImageStream
 from calib_core.recordings.camera.images import EncodedImage
 from calib_core.recordings.column_map import parse_column_map
@@ -35,7 +35,7 @@ from calib_core.recordings.radar.several_topics.merged_stream import MergedStrea
 from calib_core.recordings.radar.several_topics.sensors import RadarSensor, figures_of
 from calib_core.recordings.selection import Need, RecordingOptions
 from calib_core.recordings.stamping import read_stamps
-from calib_core.recordings.time.written_dates import parse_zone
+from calib_core.recordings.time.written_times import parse_zone
 from calib_core.recordings.topics import TopicSummary, join_topics
 from calib_core.results import DataWarning, InputFile
 

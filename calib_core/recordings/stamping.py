@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.arrays import TimesNs
-from calib_core.recordings.time.clock_faults import Stamps
+from calib_core.recordings.time.clock_choice import Stamps
 from calib_core.recordings.topics import Topic, read_heads
 
 

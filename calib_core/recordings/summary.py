@@ -1,23 +1,39 @@
 """The contents of a recording as plain values, for `cocalib info` and `cocalib info --json`."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import msgspec
 import numpy as np
 
+from calib_core.arrays import TimesNs
 from calib_core.errors import RecordingError
 from calib_core.input_files import name_text
 from calib_core.measurements import NS_PER_S, Stamp, TimeNs
 from calib_core.recordings.assumptions import StatedAssumption
-from calib_core.recordings.other_clocks import with_other_clocks
 from calib_core.recordings.radar.column_plan import ColumnReading
+from calib_core.recordings.radar.message_layouts.single_returns import PointLayout, first_of_scans
 from calib_core.recordings.radar.several_topics.sensors import RadarSensor
 from calib_core.recordings.recording import Recording
-from calib_core.recordings.time.shared_time import SharedTime, shared_time
-from calib_core.recordings.topics import Rhythm, TopicSummary
+from calib_core.recordings.stamping import StampedTopic, read_stamps
+from calib_core.recordings.time.clock_choice import choose_clock
+from calib_core.recordings.time.clock_diagnosis import diagnose
+from calib_core.recordings.topics import Rhythm, TopicSummary, join_topics
+from calib_core.recordings.usages import usage_of
 from calib_core.results import DataWarning
 
+_GAP_PERIODS = 5.0
+
+
+_STRETCH_GAP_NS = NS_PER_S
+
+
 _SAMPLED_SCANS = 200
+
+
+_STAMP_BYTES = 12
+
+
+_KINDS = ("radar", "image")
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,6 +175,19 @@ def files_of(recording: Recording) -> tuple[FileSummary, ...]:
     return tuple(FileSummary(name_text(s.path.name), s.size_bytes, s.container) for s in recording.sources)
 
 
+@dataclass(frozen=True, slots=True)
+class SharedTime:
+    """When both sensors have data.
+
+    Attributes:
+        seconds: total time [s], without gaps of more than five cycles of either sensor.
+        stretches: number of stretches, separated by more than a second.
+    """
+
+    seconds: float
+    stretches: int
+
+
 def _shared(recording: Recording) -> SharedTime | None:
     radar, images = recording.radar_times, recording.image_times
     return shared_time(radar, images) if len(radar) and len(images) else None
@@ -215,3 +244,81 @@ def _camera(recording: Recording) -> CameraSummary | None:
         matrix_px=tuple(tuple(float(value) for value in row) for row in camera.matrix_px) if camera else None,
         distortion=tuple(float(value) for value in camera.distortion) if camera else None,
     )
+
+
+def with_other_clocks(recording: Recording) -> tuple[TopicSummary, ...]:
+    """Return all topics; the times of usable ones that are not in use are by the clock that would be chosen for them.
+
+    Their stamps are read in one pass. Topics whose messages cannot be read are left as they are.
+    """
+    spare = {
+        topic.name: topic
+        for topic in recording.topics
+        if topic.clocks is None and topic.kind in _KINDS and topic.problem is None and topic.count
+    }
+    topics = [topic for topic in join_topics(recording.sources)[0] if topic.name in spare] if spare else []
+    try:
+        stamped = read_stamps([(topic, _STAMP_BYTES) for topic in topics])
+    except RecordingError:
+        return recording.topics
+    timed = {both.topic.name: _timed(spare[both.topic.name], both) for both in stamped if len(both.topic)}
+    return tuple(timed.get(topic.name, topic) for topic in recording.topics)
+
+
+def _timed(topic: TopicSummary, both: StampedTopic) -> TopicSummary:
+    usage = usage_of(both.topic)
+    one_per_return = isinstance(usage.radar, PointLayout)
+    stamps = both.clocks(usage.distinct_times)
+    clock = choose_clock(stamps).clocks[0]
+    times = both.header_ns if clock == "header" and both.header_ns is not None else both.topic.receive_ns
+    scans = np.sort(times[first_of_scans(times)] if one_per_return else times)
+    rhythm = Rhythm.of(times)
+    return replace(
+        topic,
+        start=Stamp.of(TimeNs(int(times.min()))),
+        end=Stamp.of(TimeNs(int(times.max()))),
+        clock=clock,
+        rate_hz=rhythm.rate_hz,
+        longest_gap_s=rhythm.longest_gap_s,
+        jitter_s=rhythm.jitter_s,
+        clocks=diagnose(stamps, times_ns=scans, chosen=clock, requested="auto", one_per_return=one_per_return),
+    )
+
+
+def shared_time(a_ns: TimesNs, b_ns: TimesNs) -> SharedTime:
+    """Measure the time covered by both series.
+
+    Args:
+        a_ns: (n,) stamps, ascending.
+        b_ns: (m,) stamps, ascending.
+    """
+    both = _intersections(_stretches(a_ns), _stretches(b_ns))
+    if not len(both):
+        return SharedTime(0.0, 0)
+    apart = both[1:, 0] - both[:-1, 1] > _STRETCH_GAP_NS
+    return SharedTime(float((both[:, 1] - both[:, 0]).sum()) / NS_PER_S, 1 + int(np.count_nonzero(apart)))
+
+
+def _stretches(times_ns: TimesNs) -> np.ndarray:
+    """Return begin and end (k, 2) of each stretch of stamps without a gap of more than five cycles."""
+    if not len(times_ns):
+        return np.zeros((0, 2), dtype=np.int64)
+    steps = np.diff(times_ns)
+    moving = steps[steps > 0]
+    cut = np.flatnonzero(steps > _GAP_PERIODS * np.median(moving)) if len(moving) else np.zeros(0, dtype=np.int64)
+    return np.stack([times_ns[np.append(0, cut + 1)], times_ns[np.append(cut, len(times_ns) - 1)]], axis=1)
+
+
+def _intersections(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Intersect two ascending lists of intervals (n, 2) and (m, 2)."""
+    found = []
+    first = second = 0
+    while first < len(a) and second < len(b):
+        begin, end = max(a[first, 0], b[second, 0]), min(a[first, 1], b[second, 1])
+        if begin <= end:
+            found.append((begin, end))
+        if a[first, 1] <= b[second, 1]:
+            first += 1
+        else:
+            second += 1
+    return np.array(found, dtype=np.int64).reshape(-1, 2)

@@ -7,16 +7,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib_core.errors import MessageError, RecordingError
-from calib_core.recordings.boxes.layouts import BoxLayout, box_layout
-from calib_core.recordings.camera.camera_info import is_camera_info
+from calib_core.recordings.box_topics import BoxLayout, box_layout
 from calib_core.recordings.camera.images import ImageLayout, is_picture
+from calib_core.recordings.camera.recorded_intrinsics import is_camera_info
 from calib_core.recordings.messages.definitions import PRIMITIVES, Definition
 from calib_core.recordings.radar.column_mapping import StatedReading
 from calib_core.recordings.radar.layouts import RadarLayout, recognise
 from calib_core.recordings.radar.message_layouts.samples import leaf_names
 from calib_core.recordings.radar.message_layouts.single_returns import PointLayout
 from calib_core.recordings.radar.message_layouts.struct_lists import struct_lists
-from calib_core.recordings.time.clock_faults import HALF_DISTINCT, RETURNS_DISTINCT
+from calib_core.recordings.time.clock_choice import HALF_DISTINCT, RETURNS_DISTINCT
 from calib_core.recordings.topics import Topic, TopicKind
 
 

@@ -5,9 +5,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from calib_core.measurements import NS_PER_S
-from calib_core.recordings.time.clock_choice import choose_clock, choose_clocks
-from calib_core.recordings.time.clock_faults import (
+from calib_core.recordings.time.clock_choice import (
     Stamps,
+    choose_clock,
+    choose_clocks,
     distinct_times,
     header_fault,
     receive_fault,

@@ -1,5 +1,7 @@
-"""The stream of images of a recording, accessed by frame."""
+"""The stream of images or of video packets of a recording, accessed by frame; frames of another size are left out."""
 
+import contextlib
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -7,10 +9,17 @@ import numpy as np
 
 from calib_core.arrays import Indices, TimesNs, frozen_array
 from calib_core.errors import MessageError, RecordingError
-from calib_core.recordings.camera.images import EncodedImage, ImageLayout
+from calib_core.measurements import TimeNs
+from calib_core.recordings.camera.images import EncodedImage, ImageLayout, encoded_pixels
+from calib_core.recordings.camera.video_packets import Packet, PacketDecoder
+from calib_core.recordings.time.written_times import utc
 from calib_core.recordings.topics import Topic
+from calib_core.results import DataWarning
 
 _HEAD_BYTES = 4096
+_SOUGHT_MESSAGES = 2000
+_SAMPLED_FRAMES = 64
+_SHOWN_TIMES = 3
 
 
 def _no_layouts() -> dict[int, ImageLayout]:
@@ -112,3 +121,145 @@ class ImageStream:
         """Return a frame's message and its layout."""
         row = int(self.row[index])
         return self.layouts[int(self.topic.part[row])], self.topic.payload(row)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VideoStream(ImageStream):
+    """Frames of a video, decoded on demand.
+
+    Attributes:
+        decoder: returns the pixels of a message's frame.
+        before_key: how many frames at the beginning were skipped because no key frame precedes them.
+    """
+
+    decoder: PacketDecoder | None = None
+    before_key: int = 0
+
+    def encoded(self, index: int) -> EncodedImage:
+        """Return a frame encoded as JPEG."""
+        return encoded_pixels(self.picture(index))
+
+    def picture(self, index: int) -> np.ndarray:
+        """Return a frame's pixels, blue first.
+
+        Raises:
+            MessageError: it cannot be decoded.
+        """
+        assert self.decoder is not None
+        try:
+            return self.decoder.picture(int(self.row[index]))
+        except MessageError as error:
+            raise MessageError(f"topic {self.topic.name}: {error}") from error
+
+    def size_px(self, index: int) -> tuple[int, int]:
+        """Return a frame's width and height."""
+        height, width = self.picture(index).shape[:2]
+        return width, height
+
+
+def image_stream(topic: Topic, layouts: Sequence[ImageLayout], stamps_ns: TimesNs) -> ImageStream:
+    """Build the stream of an image topic with pictures or video."""
+    stream = ImageStream.build(topic, layouts, stamps_ns)
+
+    def packet(number: int) -> Packet | None:
+        return layouts[int(topic.part[number])].packet(topic.payload(number))
+
+    def video_packet(number: int) -> Packet:
+        found = packet(number)
+        if found is None:
+            raise MessageError(f"frame {number} of the video is not a video packet")
+        return found
+
+    key = None
+    for number in range(min(len(topic), _SOUGHT_MESSAGES)):
+        with contextlib.suppress(RecordingError):  # reported when the frame itself is read
+            found = packet(number)
+            if found is None:
+                return stream
+            if found.key:
+                key = number
+                break
+    if key is None:
+        return stream
+    kept = stream.row >= key
+    return VideoStream(
+        topic, layouts, stream.times_ns[kept], stream.row[kept], stream.repeated,
+        decoder=PacketDecoder(video_packet, len(topic)), before_key=int((~kept).sum()),
+    )  # fmt: skip
+
+
+def about_video(images: ImageStream | None) -> list[DataWarning]:
+    """Warn about frames that cannot be decoded because the recording began between key frames."""
+    if not isinstance(images, VideoStream) or not images.before_key:
+        return []
+    return [
+        DataWarning(
+            "video-before-key",
+            f"the first {images.before_key} frames of {images.topic.name} precede its first key frame and are skipped",
+            "no action needed unless a placement is there; in that case have the encoder send key frames more often",
+        )
+    ]
+
+
+def frames_of_one_size(images: ImageStream | None) -> tuple[ImageStream | None, list[DataWarning]]:
+    """Drop frames of an unusual size and frames that are no pictures, with a warning for each kind.
+
+    All frames of a short recording are examined. Of a longer one, frames spread over it are examined, and all if those
+    differ; a frame that differs from them all is refused when it is read.
+    """
+    if images is None or isinstance(images, VideoStream) or not len(images.times_ns):
+        return images, []
+    count = len(images.times_ns)
+    indices = np.unique(np.linspace(0, count - 1, min(_SAMPLED_FRAMES, count)).astype(np.int64))
+    found = images.sizes_px(indices)
+    sizes = Counter(size for size in found if not isinstance(size, MessageError))
+    if not sizes:
+        return images, []  # reported for the topic
+    if len(indices) < count and (len(sizes) > 1 or sizes.total() < len(found)):
+        found = images.sizes_px(np.arange(count))
+        sizes = Counter(size for size in found if not isinstance(size, MessageError))
+    usual = sizes.most_common(1)[0][0]
+    if sizes[usual] == len(found):
+        return images.keep(np.ones(count, dtype=bool), usual), []
+    kept = np.array([size == usual for size in found])
+    warnings = [*_about_sizes(images, found, usual), *_about_unreadable(images, found)]
+    return images.keep(kept, usual), warnings
+
+
+def _about_sizes(
+    images: ImageStream, found: Sequence[tuple[int, int] | MessageError], usual: tuple[int, int]
+) -> list[DataWarning]:
+    sizes = Counter(size for size in found if not isinstance(size, MessageError))
+    if len(sizes) == 1:
+        return []
+    others = [
+        f"{count} have {width} x {height} ({_times(images, [n for n, size in enumerate(found) if size == (width, height)])})"
+        for (width, height), count in sizes.most_common()[1:]
+    ]
+    return [
+        DataWarning(
+            "picture-sizes",
+            f"{images.topic.name} has pictures of several sizes: {sizes[usual]} have {usual[0]} x {usual[1]} pixels and are "
+            f"used; {', '.join(others)} and are skipped",
+            "if the skipped ones are those you need, record again with one size, or open their part of the recording alone",
+        )
+    ]
+
+
+def _about_unreadable(images: ImageStream, found: Sequence[tuple[int, int] | MessageError]) -> list[DataWarning]:
+    rows = [number for number, size in enumerate(found) if isinstance(size, MessageError)]
+    if not rows:
+        return []
+    return [
+        DataWarning(
+            "unreadable-pictures",
+            f"{len(rows)} of {len(found)} pictures of {images.topic.name} cannot be read and are skipped "
+            f"({_times(images, rows)}): {found[rows[0]]}",
+            "no action needed unless a placement is there; if there are many, copy the recording again from its source",
+        )
+    ]
+
+
+def _times(images: ImageStream, rows: Sequence[int]) -> str:
+    times = [utc(TimeNs(int(images.times_ns[row]))) for row in rows[:_SHOWN_TIMES]]
+    return ", ".join(times) + (f" and {len(rows) - _SHOWN_TIMES} more" if len(rows) > _SHOWN_TIMES else "")

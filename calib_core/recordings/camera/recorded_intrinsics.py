@@ -1,16 +1,119 @@
-"""Read the recorded intrinsics and check them against the images."""
+"""Read the recorded intrinsics (sensor_msgs/CameraInfo) and check them against the images."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 
-from calib_core.camera import Camera
+from calib_core.camera import Camera, CameraModel
 from calib_core.errors import RecordingError
-from calib_core.recordings.camera.camera_info import CameraReading, camera_from_info
+from calib_core.lens_models.naming import lenses_of_opencv, names_in, opencv_lens
+from calib_core.lens_models.registry import LENS_MODELS
 from calib_core.recordings.camera.image_stream import ImageStream
+from calib_core.recordings.messages.decoding import Message
+from calib_core.recordings.messages.definitions import Definition
 from calib_core.recordings.topics import Topic
 from calib_core.results import DataWarning
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraReading:
+    """The result of reading a CameraInfo: a camera, or None, with warnings."""
+
+    camera: Camera | None
+    warnings: tuple[DataWarning, ...] = ()
+
+
+def is_camera_info(definition: Definition) -> bool:
+    """Return whether a message is laid out as sensor_msgs/CameraInfo, of ROS 1 (D K R P) or ROS 2 (d k r p)."""
+    return {"distortion_model", "height", "width"} <= definition.names and {"k", "d"} <= {
+        name.lower() for name in definition.names
+    }
+
+
+def camera_from_info(message: Message, *, topic: str, rectified: bool = False) -> CameraReading:
+    """Build the camera, for the pixels of the image as it was published.
+
+    Region of interest and binning are applied to K.
+
+    Args:
+        message: a decoded CameraInfo.
+        topic: its name, for the warnings.
+        rectified: the image topic is rectified, so P applies and there is no distortion.
+    """
+    upper = "K" in message
+    matrix = message.numbers("K" if upper else "k", 9).reshape(3, 3)
+    projection = message.numbers("P" if upper else "p", 12).reshape(3, 4)
+    distortion = message.numbers("D" if upper else "d", message.count("D" if upper else "d"))
+    model_name = message.text("distortion_model").strip().lower()
+    if rectified and projection[0, 0] > 0:
+        matrix, distortion, model_name = projection[:, :3].copy(), np.zeros(0), ""
+    if not (matrix[0, 0] > 0 and matrix[1, 1] > 0 and np.all(np.isfinite(matrix))):
+        return _none(topic, "camera-uncalibrated", "has no focal length: the camera was never calibrated")
+    model = _model(model_name, distortion)
+    if isinstance(model, str):
+        return _none(topic, "camera-model", model)
+    offset_px, size_px, binning = _window(message)
+    if size_px[0] < binning[0] or size_px[1] < binning[1]:
+        return _none(topic, "camera-size", f"gives an image size of {size_px[0]} x {size_px[1]} pixels")
+    name, coefficients = model
+    try:
+        camera = Camera(name, *size_px, matrix, coefficients)
+        return CameraReading(camera.windowed(offset_px, size_px, binning))
+    except ValueError as error:
+        return _none(topic, "camera-model", f"cannot be used: {error}")
+
+
+def _none(topic: str, code: str, what: str) -> CameraReading:
+    hint = "give the intrinsics with --camera FILE: camera_info YAML, OpenCV YAML or XML, Kalibr camchain, JSON"
+    return CameraReading(None, (DataWarning(code, f"{topic} {what}", hint),))
+
+
+def _model(name: str, distortion: np.ndarray) -> "tuple[CameraModel, np.ndarray] | str":
+    """Return the lens model and its coefficients, or a phrase saying what is wrong."""
+    if not np.all(np.isfinite(distortion)):
+        return "has distortion coefficients that are not numbers"
+    lens = next((lens for lens in LENS_MODELS.values() if name in lens.names_in_messages), None)
+    if lens is None:
+        return f"has unknown lens model '{name}'; {_listed(names_in('camera_info'), 'and')} are supported"
+    if lens.opencv == "projectPoints":
+        return _model_by_count(name, distortion)
+    kept = next((count for count in reversed(lens.counts) if count <= len(distortion)), None)
+    if kept is None or np.any(distortion[kept:]):
+        expected = _listed([str(count) for count in lens.counts], "or")
+        return f"has lens model '{name}' with {len(distortion)} coefficients; {expected} are expected"
+    return lens.name, distortion[:kept]
+
+
+def _model_by_count(name: str, distortion: np.ndarray) -> "tuple[CameraModel, np.ndarray] | str":
+    """Use the number of coefficients alone, as OpenCV does: drivers mix up the names of these lens models."""
+    if not np.any(distortion):
+        return opencv_lens(0).name, np.zeros(0)
+    lenses = lenses_of_opencv()
+    longest = lenses[-1].counts[-1]
+    if not np.any(distortion[longest:]):
+        distortion = distortion[:longest]
+    lens = next((lens for lens in lenses if len(distortion) in lens.counts), None)
+    if lens is None:
+        known = _listed([str(count) for lens in lenses for count in lens.counts if count], "or")
+        return f"has lens model '{name or 'none'}' with {len(distortion)} coefficients; {known} are supported"
+    return lens.name, distortion
+
+
+def _listed(words: Sequence[str], conjunction: str) -> str:
+    *first, last = words
+    return f"{', '.join(first)} {conjunction} {last}" if first else last
+
+
+def _window(message: Message) -> tuple[tuple[int, int], tuple[int, int], tuple[int, int]]:
+    """Return offset, size and binning of the part of the full sensor that was published."""
+    binning = max(message.whole("binning_x"), 1), max(message.whole("binning_y"), 1)
+    roi = message.message("roi")
+    if roi.whole("width") and roi.whole("height"):
+        return (roi.whole("x_offset"), roi.whole("y_offset")), (roi.whole("width"), roi.whole("height")), binning
+    return (0, 0), (message.whole("width"), message.whole("height")), binning
 
 
 class PublishedCamera(Protocol):

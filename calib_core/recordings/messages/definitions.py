@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 
 from calib_core.errors import MessageError
-from calib_core.recordings.containers.sources import Channel, Encoding
+from calib_core.recordings.containers.sources import Channel, Encoding, StoredChannel
 from calib_core.recordings.messages.known_definitions import KNOWN_DEFINITIONS
 
 PRIMITIVES: Mapping[str, str] = {
@@ -15,7 +15,6 @@ PRIMITIVES: Mapping[str, str] = {
     "int64": "i8", "uint64": "u8", "float32": "f4", "float64": "f8",
 }  # fmt: skip
 """NumPy's name of each fixed-size type."""
-
 _FIELD = re.compile(
     r"^(?P<type>[A-Za-z]\w*(?:/\w+){0,2})(?:<=(?P<bound>\d+))?(?P<array>\[(?:<=)?(?P<count>\d*)\])?\s+"
     r"(?P<name>[A-Za-z]\w*)(?P<rest>\s.*|=.*|)$"
@@ -23,6 +22,7 @@ _FIELD = re.compile(
 _SEPARATOR = re.compile(r"^={3,}\s*$", re.MULTILINE)
 _MAX_TEXT = 1 << 20
 _MAX_FIXED = 1 << 24
+_UNCHANGED = ("tf2_msgs/TFMessage",)
 
 
 @dataclass(frozen=True, slots=True)
@@ -265,3 +265,18 @@ def _check(definition: Definition, name: str, above: tuple[str, ...]) -> None:
             )
         if one.type in definition.types:
             _check(definition, one.type, (*above, name))
+
+
+def with_definition(channel: StoredChannel) -> StoredChannel:
+    """Return the channel with the well-known definition of its type, where it has none and there is one."""
+    kind = short_type(channel.schema_name)
+    if channel.schema_data.strip() or channel.encoding != "cdr" or kind not in (*KNOWN_DEFINITIONS, *_UNCHANGED):
+        return channel
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    name = kind.replace("/", "/msg/")
+    if name not in store.types:
+        return channel
+    definition, _ = store.generate_msgdef(name, ros_version=2)
+    return replace(channel, schema_encoding="ros2msg", schema_data=definition.encode())

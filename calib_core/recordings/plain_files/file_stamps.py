@@ -14,8 +14,7 @@ from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.recordings.assumptions import Assumption
 from calib_core.recordings.plain_files.name_times import NamedTimes, times_in_names
 from calib_core.recordings.plain_files.reading_options import PlainOptions
-from calib_core.recordings.time.written_dates import date_text
-from calib_core.recordings.time.written_times import TimeUnit, read_time
+from calib_core.recordings.time.written_times import TimeUnit, date_text, read_time
 from calib_core.results import DataWarning
 
 _FILE_NAMES = ("file", "filename", "file_name", "image", "name", "path", "frame", "image_name", "filepath")

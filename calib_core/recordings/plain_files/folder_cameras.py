@@ -11,7 +11,7 @@ import numpy as np
 
 from calib_core.arrays import Matrix33, Values
 from calib_core.camera import Camera
-from calib_core.recordings.camera.picture_files import picture_size_px
+from calib_core.recordings.camera.jpeg import picture_size_px
 
 _MAX_BYTES = 1 << 29
 _LEVELS = 4

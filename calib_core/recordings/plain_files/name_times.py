@@ -8,8 +8,7 @@ import numpy as np
 
 from calib_core.arrays import TimesNs
 from calib_core.measurements import NS_PER_S
-from calib_core.recordings.time.written_dates import WrittenMoment, moments_in
-from calib_core.recordings.time.written_times import epoch_in_name
+from calib_core.recordings.time.written_times import WrittenMoment, epoch_in_name, moments_in
 
 _FRACTIONS = (3, 6, 9)
 _MOST_PER_SECOND = 250

@@ -7,8 +7,7 @@ import numpy as np
 
 from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import TimeNs
-from calib_core.recordings.camera.jpeg import JPEG_MAGIC, PNG_MAGIC
-from calib_core.recordings.camera.picture_files import picture_fault, picture_size_px
+from calib_core.recordings.camera.jpeg import JPEG_MAGIC, PNG_MAGIC, picture_fault, picture_size_px
 from calib_core.recordings.plain_files.file_stamps import stamp_files
 from calib_core.recordings.plain_files.folder_cameras import FolderCamera, camera_beside
 from calib_core.recordings.plain_files.messages import picture_channel, picture_message

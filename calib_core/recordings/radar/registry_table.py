@@ -9,7 +9,7 @@ from pathlib import Path
 from calib_core.recordings.plain_files.tables.csv_files import CSV_EXAMPLE, csv_columns
 from calib_core.recordings.radar.column_plans import plan_for
 from calib_core.recordings.radar.registry import DECODERS, Decoder, MessageKind
-from calib_core.recordings.time.written_dates import DATE_SPELLINGS
+from calib_core.recordings.time.written_times import DATE_SPELLINGS
 
 _KINDS: dict[MessageKind, str] = {
     "cloud": "Clouds: sensor_msgs/PointCloud2",

@@ -8,9 +8,8 @@ import numpy as np
 
 from calib_core.arrays import TimesNs, Values
 from calib_core.measurements import NS_PER_S
-from calib_core.recordings.time.clock_choice import Clock
-from calib_core.recordings.time.clock_faults import YEAR_2000_NS, Stamps, header_fault, receive_fault
-from calib_core.recordings.time.dates import span_text
+from calib_core.recordings.time.clock_choice import YEAR_2000_NS, Clock, Stamps, header_fault, receive_fault
+from calib_core.recordings.time.written_times import span_text
 from calib_core.results import DataWarning
 
 _GAP_PERIODS = 5.0

@@ -10,8 +10,7 @@ from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.recordings.assumptions import Assumption
 from calib_core.recordings.plain_files.tables.columns import TableColumn, TableColumns
-from calib_core.recordings.time.written_dates import date_text
-from calib_core.recordings.time.written_times import TimeUnit, read_time, unit_of_epoch
+from calib_core.recordings.time.written_times import TimeUnit, date_text, read_time, unit_of_epoch
 
 _SCALES: dict[TimeUnit, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _USUAL_STEP_S = 0.07

@@ -13,8 +13,7 @@ from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S
 from calib_core.recordings import RecordingOptions, open_recording
 from calib_core.recordings.plain_files.name_times import times_in_names
-from calib_core.recordings.time.written_dates import DATE_SPELLINGS, moments_in
-from calib_core.recordings.time.written_times import read_time
+from calib_core.recordings.time.written_times import DATE_SPELLINGS, moments_in, read_time
 
 MOMENT = datetime(2024, 5, 17, 9, 42, 31, 208764, UTC)
 MOMENT_NS = 1_715_938_951_208_764_000

@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S
 from calib_core.recordings import RecordingOptions, open_recording
-from calib_core.recordings.time.clock_choice import choose_clock, choose_clocks
-from calib_core.recordings.time.clock_faults import Stamps, header_fault
+from calib_core.recordings.time.clock_choice import Stamps, choose_clock, choose_clocks, header_fault
 
 START_NS = 1_700_000_000 * NS_PER_S
 YEAR_NS = 365 * 86_400 * NS_PER_S

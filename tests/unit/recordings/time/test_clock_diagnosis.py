@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from calib_core.measurements import NS_PER_S
 from calib_core.recordings import describe, inspect_recording, open_recording, recording_summary
+from calib_core.recordings.time.clock_choice import Stamps
 from calib_core.recordings.time.clock_diagnosis import about_clocks, diagnose
-from calib_core.recordings.time.clock_faults import Stamps
 from calib_core.recordings.topics import Rhythm
 
 START_NS = 1_700_000_000 * NS_PER_S

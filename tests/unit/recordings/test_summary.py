@@ -5,7 +5,7 @@ import pytest
 
 from calib_core.measurements import NS_PER_S
 from calib_core.recordings import describe, inspect_recording
-from calib_core.recordings.time.shared_time import shared_time
+from calib_core.recordings.summary import shared_time
 
 
 def at(*parts):
