@@ -1,14 +1,30 @@
-"""Read boxes from a file, folder or zip archive of any known format, and match them to recorded frames."""
+"""Read boxes from a file, folder or zip archive of any known format, and match them to recorded frames.
 
+The rule, which docs/boxes.md states: a stamp, or a time in a picture's name, is the recorded frame within 1 ms of it; a
+number counts the recorded frames from 0 or 1. A file whose stamps, count or pictures differ is of another recording.
+"""
+
+import io
+import re
+import zipfile
+import zlib
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
+from xml.etree import ElementTree
 
-from calib_core.arrays import TimesNs
-from calib_core.boxes.box_files import load_box_file
+import numpy as np
+
+from calib_core.arrays import Indices, TimesNs
+from calib_core.boxes.formats.box_format import BoxFile, FileBoxes, FileFrame
 from calib_core.boxes.formats.registry import BOX_FORMATS
-from calib_core.boxes.matching import matched_boxes
-from calib_core.detections import Boxes
+from calib_core.detections import Box, Boxes, FrameBoxes
 from calib_core.errors import InputError
-from calib_core.input_files import name_text
+from calib_core.input_files import file_text, name_text, read_input
+from calib_core.interchange.syntax.strict_json import json_value
+from calib_core.measurements import TimeNs
+from calib_core.recordings.box_topics import frames_of_stamps
+from calib_core.recordings.plain_files.name_times import times_in_names
 
 
 def read_boxes(path: str | Path, *, image_times: TimesNs, image_size_px: tuple[int, int] | None) -> Boxes:
@@ -29,3 +45,265 @@ def read_boxes(path: str | Path, *, image_times: TimesNs, image_size_px: tuple[i
             return matched_boxes(found, file.source, image_times=image_times, image_size_px=image_size_px)
     names = ", ".join(known.name for known in BOX_FORMATS)
     raise InputError(f"{name_text(Path(path))}: is no known file of boxes; known: {names}")
+
+
+_MAX_BYTES = 256 * 1024 * 1024
+_MAX_XML_BYTES = 64 * 1024 * 1024
+_MOST_MEMBERS = 200_000
+_IS_WHAT = "a file of boxes"
+_SUFFIXES = (".txt", ".yaml", ".yml", ".json", ".xml", ".names")
+_DAMAGED = (
+    EOFError,
+    LookupError,
+    NotImplementedError,
+    OSError,
+    RuntimeError,
+    ValueError,
+    zlib.error,
+    zipfile.BadZipFile,
+)
+
+
+def load_box_file(path: Path, *, image_size_px: tuple[int, int] | None) -> BoxFile:
+    """Load what a user names.
+
+    Args:
+        path: of a file, a folder or a zip archive.
+        image_size_px: width and height of the recorded pictures; None if unknown.
+
+    Raises:
+        InputError: it cannot be read, is damaged, or is too large.
+    """
+    source = name_text(path.name or path)
+    try:
+        if path.is_dir():
+            members = _folder(path)
+        else:
+            data = read_input(path, max_bytes=_MAX_BYTES, is_what=_IS_WHAT)
+            members = _archive(data, source) if data.startswith(b"PK") else {path.name: data}
+    except OSError as error:
+        raise InputError(f"{name_text(path)}: cannot be read: {error.strerror}; check the path") from None
+    alone = next(iter(members.items())) if len(members) == 1 else None
+    text = _text(alone[1], source) if alone else ""
+    start = text.lstrip()[:1]
+    if start in ("{", "["):
+        return BoxFile(source, value=json_value(text, source=source), image_size_px=image_size_px)
+    if start == "<":
+        return BoxFile(source, root=_xml(text, source), image_size_px=image_size_px)
+    texts = {name_text(name): _text(data, f"{source}/{name_text(name)}") for name, data in members.items()}
+    return BoxFile(source, members=texts, image_size_px=image_size_px)
+
+
+def _folder(path: Path) -> dict[str, bytes]:
+    """Read the text files of a folder and its subfolders."""
+    members: dict[str, bytes] = {}
+    total = 0
+    for inner in _text_files(path):
+        data = read_input(inner, max_bytes=_MAX_BYTES - total, is_what=_IS_WHAT)
+        total += len(data)
+        members[inner.relative_to(path).as_posix()] = data
+        if len(members) > _MOST_MEMBERS:
+            raise InputError(
+                f"{name_text(path)}: has more than {_MOST_MEMBERS} files; give the folder of one recording"
+            )
+    if not members:
+        raise InputError(f"{name_text(path)}: has no file of boxes ({', '.join(_SUFFIXES)}); is it the right folder?")
+    return members
+
+
+def _text_files(path: Path) -> Iterator[Path]:
+    """Yield the text files of a folder, sorted, at most two folders down."""
+    for pattern in ("*", "*/*", "*/*/*"):
+        yield from sorted(
+            inner for inner in path.glob(pattern) if inner.suffix.lower() in _SUFFIXES and inner.is_file()
+        )
+
+
+def _archive(data: bytes, source: str) -> dict[str, bytes]:
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            wanted = [
+                member
+                for member in archive.infolist()
+                if member.filename.lower().endswith(_SUFFIXES) and not member.filename.startswith("__MACOSX")
+            ]
+            if len(wanted) > _MOST_MEMBERS or sum(member.file_size for member in wanted) > _MAX_BYTES:
+                raise InputError(
+                    f"{source}: unpacks to more than {_MAX_BYTES >> 20} MB; give the boxes without pictures"
+                )
+            members = {member.filename: archive.open(member).read(member.file_size) for member in wanted}
+    except _DAMAGED as error:
+        raise InputError(f"{source}: a damaged zip archive ({error}); export it again") from None
+    if not members:
+        raise InputError(f"{source}: contains no file of boxes ({', '.join(_SUFFIXES)}); is it the right archive?")
+    return members
+
+
+def _text(data: bytes, source: str) -> str:
+    try:
+        return file_text(data)
+    except UnicodeDecodeError as error:
+        raise InputError(f"{source}: not text (byte {error.start} is not UTF-8); give {_IS_WHAT}") from None
+
+
+def _xml(text: str, source: str) -> ElementTree.Element:
+    """Parse XML that has no document type, so no entity in it expands."""
+    if len(text) > _MAX_XML_BYTES or "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise InputError(
+            f"{source}: larger than {_MAX_XML_BYTES >> 20} MB, or declares a document type; give plain XML"
+        )
+    try:
+        return ElementTree.fromstring(text.lstrip("\ufeff \t\r\n"))
+    except (ElementTree.ParseError, ValueError) as error:
+        raise InputError(f"{source}: not XML ({error}); correct it there") from None
+
+
+_LEAST_INSIDE = 0.5
+_DIGITS = re.compile(r"[0-9]+")
+_OTHER = "is it of another recording?"
+
+
+def matched_boxes(
+    found: FileBoxes, source: str, *, image_times: TimesNs, image_size_px: tuple[int, int] | None
+) -> Boxes:
+    """Give the frames of a file the stamps of recorded frames.
+
+    Args:
+        found: the file's content.
+        source: its name, for messages.
+        image_times: (m,) stamps of the recorded frames, ascending.
+        image_size_px: width and height of the recorded pictures; None if unknown.
+
+    Raises:
+        InputError: the file does not belong to the recording.
+    """
+    if not len(image_times):
+        raise InputError(
+            f"{source}: the recording has no camera frames that boxes could belong to; add the camera's file"
+        )
+    if not found.frames:
+        raise InputError(f"{source}: has no annotated frame; export it again with its frames")
+    _refuse_other_pictures(found, source, image_size_px)
+    stamps = _stamps_of(found.frames)
+    if stamps is not None:
+        places, notes = frames_of_stamps(stamps, source, image_times)
+    else:
+        places, notes = _by_number(found, source, len(image_times))
+    frames = _joined(found.frames, places, image_times)
+    return Boxes(frames, source, image_size_px or found.image_size_px, (*found.notes, *notes))
+
+
+def _refuse_other_pictures(found: FileBoxes, source: str, image_size_px: tuple[int, int] | None) -> None:
+    """Refuse boxes that were made on pictures of another size, or that lie beside the picture.
+
+    Raises:
+        InputError: they were.
+    """
+    if image_size_px is None:
+        return
+    width, height = image_size_px
+    if found.image_size_px is not None and found.image_size_px != image_size_px:
+        made_width, made_height = found.image_size_px
+        raise InputError(
+            f"{source}: its boxes were made on pictures of {made_width} x {made_height} px, the recorded ones have "
+            f"{width} x {height}; export the boxes for the recorded pictures, or give the other camera's topic"
+        )
+    boxes = [box for frame in found.frames for box in frame.boxes]
+    inside = sum(_touches(box, width, height) for box in boxes)
+    if boxes and inside < _LEAST_INSIDE * len(boxes):
+        raise InputError(
+            f"{source}: {len(boxes) - inside} of {len(boxes)} boxes lie outside the picture of {width} x {height} px; "
+            f"{_OTHER}"
+        )
+
+
+def _touches(box: Box, width_px: int, height_px: int) -> bool:
+    centre_u_px, centre_v_px = (box.left_px + box.right_px) / 2, (box.top_px + box.bottom_px) / 2
+    return -0.5 <= centre_u_px <= width_px - 0.5 and -0.5 <= centre_v_px <= height_px - 0.5
+
+
+def _stamps_of(frames: Sequence[FileFrame]) -> TimesNs | None:
+    """Return the stamp of each frame: stated, or in its picture's name; None if any frame has none."""
+    if all(frame.stamp is not None for frame in frames):
+        return np.array([frame.stamp for frame in frames], dtype=np.int64)
+    names = [frame.name for frame in frames]
+    named = times_in_names(names) if all(names) else None
+    return named.times_ns if named is not None and len(named.places) == len(names) else None
+
+
+def _by_number(found: FileBoxes, source: str, count: int) -> tuple[Indices, tuple[str, ...]]:
+    """Return the recorded frame of each frame by its number, and what was assumed.
+
+    Raises:
+        InputError: frames have no number, or the numbers do not fit the recorded frames.
+    """
+    numbers = _numbers_of(found.frames, source)
+    if found.frame_count is not None and found.frame_count != count:
+        raise InputError(
+            f"{source}: is for a sequence of {found.frame_count} frames, the recording has {count}; {_OTHER}"
+        )
+    first, why = _first_number(found, numbers, count)
+    places = numbers - first
+    if places.min() < 0 or places.max() >= count:
+        raise InputError(
+            f"{source}: has frames numbered {numbers.min()} to {numbers.max()}, which do not fit the recording's {count} "
+            f"frames counted from {first}; {_OTHER}"
+        )
+    listed = len(np.unique(numbers))
+    note = f"the file has no stamps; its frame number {first} is taken for the first recorded frame ({why})"
+    part = f"{listed} of the recording's {count} frames are annotated"
+    return places, (note, part) if listed < count else (note,)
+
+
+def _numbers_of(frames: Sequence[FileFrame], source: str) -> Indices:
+    """Return the number of each frame: stated, else in its picture's name.
+
+    Raises:
+        InputError: a picture's name has no number.
+    """
+    groups = [_DIGITS.findall(frame.name) for frame in frames]
+    for frame, found in zip(frames, groups, strict=True):
+        if frame.number is None and not found:
+            raise InputError(
+                f"{source}: the picture {frame.name!r} has neither a time nor a number in its name, so its recorded frame "
+                "is unknown; name the pictures by their stamps in nanoseconds"
+            )
+    which = _counting_group([found for frame, found in zip(frames, groups, strict=True) if frame.number is None])
+    numbers = [
+        int(found[which][-18:]) if frame.number is None else frame.number
+        for frame, found in zip(frames, groups, strict=True)
+    ]
+    return np.array(numbers, dtype=np.int64)
+
+
+def _counting_group(groups: Sequence[Sequence[str]]) -> int:
+    """Return which number in a name counts the frames: the last that differs between all, as in 000012_camera0; else the last."""
+    for which in range(-1, -1 - min(map(len, groups), default=0), -1):
+        if len({found[which] for found in groups}) == len(groups):
+            return which
+    return -1
+
+
+def _first_number(found: FileBoxes, numbers: Indices, count: int) -> tuple[int, str]:
+    """Return the number of the sequence's first frame, and how it is known."""
+    lowest, highest = int(numbers.min()), int(numbers.max())
+    if found.first_number is not None:
+        return found.first_number, "as the format defines"
+    if len(np.unique(numbers)) == count and highest - lowest == count - 1:
+        return lowest, "there are as many as recorded frames"
+    if lowest == 0:
+        return 0, "the file counts from 0"
+    if highest == count:
+        return 1, "its last number is the number of recorded frames"
+    if lowest == 1:
+        return 1, "the file begins with 1"
+    return 0, "assumed; check a box in the overlay"
+
+
+def _joined(frames: Sequence[FileFrame], places: Indices, image_times: TimesNs) -> tuple[FrameBoxes, ...]:
+    """Return the boxes by recorded frame; a box that is given twice counts once."""
+    boxes: dict[int, dict[Box, None]] = {}
+    for frame, place in zip(frames, places.tolist(), strict=True):
+        if place >= 0:
+            boxes.setdefault(place, {}).update(dict.fromkeys(replace(box) for box in frame.boxes))
+    return tuple(FrameBoxes(TimeNs(int(image_times[place])), tuple(boxes[place])) for place in sorted(boxes))

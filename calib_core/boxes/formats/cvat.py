@@ -6,9 +6,16 @@ from dataclasses import dataclass, replace
 from pathlib import PurePosixPath
 from xml.etree.ElementTree import Element
 
-from calib_core.boxes.file_frames import FileBoxes, FileFrame
-from calib_core.boxes.formats.box_format import BoxFile, BoxFormat
-from calib_core.boxes.formats.box_values import edge_box, finite_number, rotated_box, whole_number
+from calib_core.boxes.formats.box_format import (
+    BoxFile,
+    BoxFormat,
+    FileBoxes,
+    FileFrame,
+    edge_box,
+    finite_number,
+    rotated_box,
+    whole_number,
+)
 from calib_core.detections import Box
 from calib_core.errors import InputError
 

@@ -5,9 +5,16 @@ Its boxes are pixel indices counted from 0, so they are ours without a shift. Re
 
 from pathlib import PurePosixPath
 
-from calib_core.boxes.file_frames import FileBoxes, FileFrame
-from calib_core.boxes.formats.box_format import BoxFile, BoxFormat
-from calib_core.boxes.formats.box_values import edge_box, finite_number, score_of, whole_number
+from calib_core.boxes.formats.box_format import (
+    BoxFile,
+    BoxFormat,
+    FileBoxes,
+    FileFrame,
+    edge_box,
+    finite_number,
+    score_of,
+    whole_number,
+)
 from calib_core.detections import Box
 from calib_core.errors import InputError
 

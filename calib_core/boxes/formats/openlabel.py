@@ -4,9 +4,15 @@ from collections.abc import Iterator, Mapping
 from pathlib import PurePosixPath
 from typing import Any
 
-from calib_core.boxes.file_frames import FileBoxes, FileFrame
-from calib_core.boxes.formats.box_format import BoxFile, BoxFormat
-from calib_core.boxes.formats.box_values import finite_number, rotated_box, whole_number
+from calib_core.boxes.formats.box_format import (
+    BoxFile,
+    BoxFormat,
+    FileBoxes,
+    FileFrame,
+    finite_number,
+    rotated_box,
+    whole_number,
+)
 from calib_core.detections import Box
 from calib_core.errors import InputError, RecordingError
 from calib_core.measurements import TimeNs

@@ -4,9 +4,15 @@ import re
 from collections.abc import Mapping
 from pathlib import PurePosixPath
 
-from calib_core.boxes.file_frames import FileBoxes, FileFrame
-from calib_core.boxes.formats.box_format import BoxFile, BoxFormat
-from calib_core.boxes.formats.box_values import edge_box, finite_number, score_of
+from calib_core.boxes.formats.box_format import (
+    BoxFile,
+    BoxFormat,
+    FileBoxes,
+    FileFrame,
+    edge_box,
+    finite_number,
+    score_of,
+)
 from calib_core.detections import Box
 from calib_core.errors import InputError
 from calib_core.interchange.syntax.yaml_text import load_yaml_documents

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from calib_core.boxes import boxes_text, labels_text, read_labels
-from calib_core.boxes.own_files import own_boxes
+from calib_core.boxes.formats.own import own_boxes
 from calib_core.detections import Box, Boxes, FrameBoxes, LabelledScan, ReturnLabels
 from calib_core.errors import InputError
 from calib_core.measurements import TimeNs
