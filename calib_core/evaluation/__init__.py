@@ -15,6 +15,7 @@ from calib_core.evaluation.figures import (
     Share,
     Spread,
 )
+from calib_core.evaluation.moving_returns import TargetOptions
 from calib_core.evaluation.paired_difference import PairedDifference, acc_difference, residual_difference
 from calib_core.evaluation.residuals import AssociatedPairs, associated_pairs, residual_figures
 from calib_core.evaluation.sentences import (
@@ -24,7 +25,7 @@ from calib_core.evaluation.sentences import (
     residual_sentence,
     sensitivity_sentences,
 )
-from calib_core.evaluation.targets import FoundTargets, TargetOptions, TargetTrack, find_targets, moving_targets
+from calib_core.evaluation.target_tracking import FoundTargets, TargetTrack, find_targets, moving_targets
 
 __all__ = [
     "EVALUATION_SCHEMA",

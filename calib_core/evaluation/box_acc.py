@@ -8,10 +8,19 @@ import numpy as np
 from calib_core.arrays import Flags, Indices, Points2, Points3, TimesNs, Values, Vector3
 from calib_core.camera import Camera
 from calib_core.detections import Boxes, ReturnLabels
-from calib_core.evaluation.bins import edges_of
 from calib_core.evaluation.counted_returns import CountedReturns, counted_returns
-from calib_core.evaluation.figures import Axis, BoxedReturns, BoxFigures, ClassFigure, FrameFigure, Sensitivity, Share
-from calib_core.evaluation.targets import TargetOptions, TargetTrack, moving_targets
+from calib_core.evaluation.figures import (
+    Axis,
+    BoxedReturns,
+    BoxFigures,
+    ClassFigure,
+    FrameFigure,
+    Sensitivity,
+    Share,
+    edges_of,
+)
+from calib_core.evaluation.moving_returns import TargetOptions
+from calib_core.evaluation.target_tracking import TargetTrack, moving_targets
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 from calib_core.radar import RadarErrors

@@ -9,11 +9,9 @@ from calib_core.arrays import Indices, Points3, TimesNs, frozen_array
 from calib_core.camera import Camera
 from calib_core.detections import Boxes, ReturnLabels
 from calib_core.errors import InputError
-from calib_core.evaluation.box_tracks import box_table
-from calib_core.evaluation.frame_scans import frame_scans, longest_gap_s
-from calib_core.evaluation.matching import Bearings, match_by_bearing, match_by_name
+from calib_core.evaluation.matching import Bearings, box_table, match_by_bearing, match_by_name
 from calib_core.evaluation.sightings import labelled_sightings, tracked_sightings
-from calib_core.evaluation.targets.target_track import TargetTrack
+from calib_core.evaluation.target_tracking import TargetTrack
 from calib_core.measurements import NS_PER_S, RadarScans
 
 
@@ -182,3 +180,32 @@ def _require_common_time(boxes: Boxes, scans: RadarScans, scans_of_frames: Indic
         f"frames run from {first:.3f} to {last:.3f} s, the scans from {begin:.3f} to {end:.3f} s; give the boxes of this "
         "recording, or check that both sensors have one clock"
     )
+
+
+_USUAL_GAP_S = 0.05  # of a single scan
+
+
+def longest_gap_s(radar_times: TimesNs) -> float:
+    """Return half the median period of the scans [s]: a frame farther than this from every scan has none."""
+    periods = np.diff(radar_times)
+    periods = periods[periods > 0]
+    return float(np.median(periods)) / 2.0 / NS_PER_S if len(periods) else _USUAL_GAP_S
+
+
+def frame_scans(image_times: TimesNs, radar_times: TimesNs, *, max_gap_s: float | None = None) -> Indices:
+    """Return the index of the scan that is nearest to each frame (n,), of two equally near the earlier one; -1 for none.
+
+    Args:
+        image_times: (n,) stamps of the frames.
+        radar_times: (m,) stamps of the scans, ascending.
+        max_gap_s: longest time between a frame and its scan; None takes half the period of the scans.
+    """
+    if not len(radar_times):
+        return np.full(len(image_times), -1, dtype=np.int64)
+    limit_ns = round((longest_gap_s(radar_times) if max_gap_s is None else max_gap_s) * NS_PER_S)
+    after = np.searchsorted(radar_times, image_times)
+    before = np.maximum(after - 1, 0)
+    after = np.minimum(after, len(radar_times) - 1)
+    to_before, to_after = np.abs(image_times - radar_times[before]), np.abs(radar_times[after] - image_times)
+    nearest = np.where(to_before <= to_after, before, after)
+    return np.asarray(np.where(np.minimum(to_before, to_after) <= limit_ns, nearest, -1))

@@ -13,8 +13,7 @@ from calib_core.arrays import Indices, Values, frozen_array
 from calib_core.association.placement_groups import linked_clicks
 from calib_core.calibration import preview_pairs
 from calib_core.camera import Camera
-from calib_core.evaluation.bins import spreads
-from calib_core.evaluation.figures import HeldOut, ResidualFigures
+from calib_core.evaluation.figures import HeldOut, ResidualFigures, spreads
 from calib_core.measurements import MIN_PAIRS, Pair, Unpaired
 from calib_core.metrics import aed, metrics_of
 from calib_core.options import CalibrationOptions

@@ -22,7 +22,7 @@ from calib_core.evaluation import (
     judged_by_boxes,
     residual_figures,
 )
-from calib_core.evaluation.frame_scans import longest_gap_s
+from calib_core.evaluation.counted_returns import longest_gap_s
 from calib_core.measurements import NS_PER_S, RadarScans, ReflectorClick, TimeNs, Unpaired
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, DataWarning

@@ -1,4 +1,4 @@
-"""Our own files: boxes (boxes-1: frames by their stamps, edges in our pixels), and the true origin of simulated returns (labels-1)."""
+"""Our own files: boxes (boxes-1: by stamp, edges in our pixels), and the true origin of simulated returns (labels-1)."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any

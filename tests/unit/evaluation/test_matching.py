@@ -4,8 +4,7 @@ import numpy as np
 
 from calib_core.camera import Camera
 from calib_core.detections import Box, Boxes, FrameBoxes
-from calib_core.evaluation.box_tracks import box_table
-from calib_core.evaluation.matching import match_by_bearing
+from calib_core.evaluation.matching import box_table, match_by_bearing
 from calib_core.evaluation.sightings import Sightings
 from calib_core.measurements import NS_PER_S, TimeNs
 

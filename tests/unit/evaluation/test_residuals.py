@@ -9,7 +9,7 @@ from calib_core.association.clustering import candidate_at
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
 from calib_core.evaluation import associated_pairs, residual_figures
-from calib_core.evaluation.bins import edges_of, spreads
+from calib_core.evaluation.figures import edges_of, spreads
 from calib_core.evaluation.residuals import held_out
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import NS_PER_S, Pair, TimeNs

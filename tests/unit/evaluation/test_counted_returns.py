@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from calib_core.evaluation.frame_scans import frame_scans, longest_gap_s
+from calib_core.evaluation.counted_returns import frame_scans, longest_gap_s
 
 SCANS = np.array([0, 100, 200, 300, 700], dtype=np.int64) * 1_000_000
 

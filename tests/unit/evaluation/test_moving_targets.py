@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from calib_core.errors import InputError
-from calib_core.evaluation.targets import TargetOptions, find_targets, moving_targets
+from calib_core.evaluation.moving_returns import TargetOptions
+from calib_core.evaluation.target_tracking import find_targets, moving_targets
 from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs
 from tests.street import Street, street
 
