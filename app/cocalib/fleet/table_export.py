@@ -43,6 +43,8 @@ _CHANGE = (
     *("rotation_deg", "rotation_sigma_deg", "position_cm", "position_sigma_cm", "picture_px", "picture_sigma_px"),
     *("squared", "limit"),
 )
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""With what spreadsheets begin a formula."""
 _LISTS = ("covariance", "change", "change_covariance")
 
 
@@ -115,4 +117,17 @@ def _row(record: SessionRecord, change: Transition | None) -> dict[str, Any]:
 
 
 def _cell(value: Any) -> Any:
-    return " ".join(map(repr, value)) if isinstance(value, list) else value
+    """Return a cell of a CSV file; a text that a spreadsheet would take for a formula begins with an apostrophe."""
+    if isinstance(value, list):
+        return " ".join(map(repr, value))
+    if isinstance(value, str) and value.startswith(_FORMULA) and not _is_number(value):
+        return f"'{value}"
+    return value
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

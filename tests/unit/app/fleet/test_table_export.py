@@ -67,3 +67,13 @@ def test_without_pyarrow_the_way_out_is_named(fleet: FleetRecord, monkeypatch: p
 
 def test_an_empty_fleet_is_a_table_without_rows(tmp_path: Path) -> None:
     assert pyarrow.parquet.read_table(io.BytesIO(parquet_bytes(FleetRecord(())))).num_rows == 0
+
+
+def test_a_text_that_a_spreadsheet_would_compute_is_escaped_and_numbers_stay(tmp_path: Path) -> None:
+    make_result(tmp_path, "=HYPERLINK(1)", "-2", radar_serial="+cmd", camera_serial="@a", reason="-1+2")
+    text = csv_bytes(read_fleet(tmp_path)).decode()
+    (row,) = csv.DictReader(io.StringIO(text))
+    assert (row["vehicle"], row["session"], row["radar_serial"]) == ("'=HYPERLINK(1)", "-2", "'+cmd")
+    assert (row["camera_serial"], row["reason"]) == ("'@a", "'-1+2")
+    assert len([float(one) for one in row["covariance"].split()]) == 36
+    assert all(float(row[name]) <= 10.0 for name in ("qw", "qx", "x_m", "sigma_cm"))
