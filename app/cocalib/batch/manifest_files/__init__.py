@@ -1,1 +1,1 @@
-"""Files of manifests: TOML and CSV are read, and a first one is written from a folder of recordings."""
+"""Files of manifests: TOML is read, and a first one is written from a folder of recordings."""

@@ -1,4 +1,4 @@
-"""The keys of a manifest. A TOML file has them as they are, a CSV file as columns."""
+"""The keys of a manifest."""
 
 from typing import Annotated
 

@@ -1,14 +1,10 @@
 """Read a manifest; every error names the file, the session in it and what to do."""
 
-import csv
-import io
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
-
-import msgspec
 
 from calib_core.errors import CalibrationError, InputError
 from calib_core.interchange import format_named
@@ -21,28 +17,20 @@ from cocalib.option_changes import options_from_tree
 from cocalib.platform.files import read_text
 
 _MOST_BYTES = 64 * 1024 * 1024
-_SEPARATOR = ";"
-_SEVERAL = ("recording", "exports", "camera_position_m", "map")
-"""Columns of a CSV manifest that hold several values."""
 _TEXTS = ("vehicle", "session", "vehicle_type", "radar_serial", "camera_serial")
-_SWITCHES = ("auto", "rescale_camera", "confirm_assumptions")
-_YES_NO = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
 _TAPE_SIGMA_M = 0.01
 
 
 def read_manifest(path: Path) -> Manifest:
-    """Read a TOML or CSV manifest. Paths in it are relative to its folder; whether they exist is not looked at.
+    """Read a TOML manifest. Paths in it are relative to its folder; whether they exist is not looked at.
 
     Raises:
         InputError: it cannot be read; a key is unknown or has a wrong value; two rows are of one session.
     """
     text = _text(path)
-    if path.suffix.lower() == ".toml":
-        places, content = _toml(text, path)
-    elif path.suffix.lower() == ".csv":
-        places, content = _csv(text, path)
-    else:
-        raise InputError(f"{path}: a manifest is a .toml or .csv file; name it so")
+    if path.suffix.lower() != ".toml":
+        raise InputError(f"{path}: a manifest is a .toml file; cocalib batch FILE.toml --init FOLDER writes one")
+    places, content = _toml(text, path)
     document = checked(content, ManifestDocument, source=str(path))
     if not document.session:
         raise InputError(f"{path}: no session in it; add one, or let cocalib batch {path} --init FOLDER write the file")
@@ -63,7 +51,7 @@ def _text(path: Path) -> str:
         is_what="a manifest",
         max_bytes=_MOST_BYTES,
         if_missing=f"cocalib batch {path} --init FOLDER writes one",
-        if_no_text="save it as UTF-8 (Excel: CSV UTF-8)",
+        if_no_text="save it as UTF-8",
     )
 
 
@@ -91,89 +79,6 @@ def _require_quoted(table: object, where: str) -> None:
     for key, value in table.items() if isinstance(table, dict) else ():
         if key in _TEXTS and not isinstance(value, str):
             raise InputError(f'{where}: {key}: {value} is no text; write it in quotes: {key} = "{value}"')
-
-
-def _delimiter(text: str) -> str:
-    """Return what stands between the columns: Excel writes semicolons where the comma is the decimal sign, others write tabs."""
-    head = text.partition("\n")[0]
-    return max(",;\t", key=head.count)
-
-
-def _csv(text: str, path: Path) -> tuple[list[str], dict[str, Any]]:
-    """Read a CSV file: a key for each column, such as `vehicle` or `options.noise.sigma_px`; empty cells say nothing."""
-    try:
-        text = text.removeprefix("\ufeff")
-        lines = csv.reader(io.StringIO(text, newline=""), strict=True, delimiter=_delimiter(text))
-        head = next(lines, [])
-        rows = [(lines.line_num, cells) for cells in lines if any(cell.strip() for cell in cells)]
-    except csv.Error as error:
-        raise InputError(f"{path}: not valid CSV: {error}") from None
-    names = [_as_known(name.strip()) for name in head]
-    if len(set(names)) < len(names):
-        twice = next(name for name in names if names.count(name) > 1)
-        raise InputError(f"{path}: line 1: the column '{twice}' stands twice; remove one")
-    places, sessions = [], []
-    for number, cells in rows:
-        if len(cells) != len(names):
-            raise InputError(
-                f"{path}: line {number}: {len(cells)} cells, but {len(names)} columns; quote cells that contain what "
-                "stands between the columns"
-            )
-        places.append(f"line {number}")
-        sessions.append(_from_cells(names, cells, f"{path}: line {number}"))
-    return places, {"session": sessions}
-
-
-def _as_known(name: str) -> str:
-    """Return the name of a column without capitals if that is the key of a session."""
-    return name.lower() if name.lower() in SessionDocument.__struct_fields__ else name
-
-
-def _from_cells(names: Sequence[str], cells: Sequence[str], where: str) -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    for name, cell in zip(names, cells, strict=True):
-        if not cell.strip():
-            continue
-        *groups, key = name.split(".")
-        inner = found
-        for group in groups:
-            inner = inner.setdefault(group, {})
-            if not isinstance(inner, dict):
-                raise InputError(f"{where}: the column '{name}' contradicts the column '{group}'; remove one")
-        inner[key] = _value(name, cell.strip(), where)
-    return found
-
-
-def _value(name: str, cell: str, where: str) -> Any:
-    """Return the value of a cell: text, unless the column is of numbers or switches."""
-    key = name.rpartition(".")[2]
-    if key in _SEVERAL:
-        values = [part.strip() for part in cell.split(_SEPARATOR) if part.strip()]
-        return [_number(part, where, name) for part in values] if key == "camera_position_m" else values
-    if key in _SWITCHES:
-        if cell.lower() not in _YES_NO:
-            raise InputError(f"{where}: {name}: '{cell}'; write yes or no")
-        return _YES_NO[cell.lower()]
-    if key in ("camera_position_sigma_m", "reflector_m"):
-        return _number(cell, where, name)
-    return _scalar(cell) if name.startswith("options.") else cell
-
-
-def _number(cell: str, where: str, name: str) -> float:
-    try:
-        return float(cell)
-    except ValueError:
-        raise InputError(
-            f"{where}: {name}: '{cell}' is not a number; write it with a point, values apart by ;"
-        ) from None
-
-
-def _scalar(cell: str) -> object:
-    """Return an option's value as TOML would: a number, a switch, or text."""
-    try:
-        return msgspec.json.decode(cell.lower())
-    except msgspec.DecodeError:
-        return cell
 
 
 def _merged(under: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:

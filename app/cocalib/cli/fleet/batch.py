@@ -26,7 +26,7 @@ class Batch:
     """
 
     manifest: Annotated[Path | None, tyro.conf.Positional, called("MANIFEST")] = None
-    """Sessions to calibrate (.toml or .csv): vehicle, session, recording, clicks or auto, camera, options."""
+    """Sessions to calibrate (.toml): vehicle, session, recording, clicks or auto, camera, options."""
     out: Folder = None
     """Folder for the results; beside the manifest, with its name, unless given."""
     init: Folder = None

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 _WEAK_CODE, _FAILED_FROM, _MOST_CODE = 3, 10, 99
 _WITHOUT = ("refused", "failed")
 _KEYS_OF = {
-    "--map": "map under [session.topics] (CSV: the column topics.map)",
-    "--confirm-assumptions": "confirm_assumptions = true under [session.topics] (CSV: the column topics.confirm_assumptions)",
+    "--map": "map under [session.topics]",
+    "--confirm-assumptions": "confirm_assumptions = true under [session.topics]",
     "--radar-topic": "radar_topic under [session.topics]",
     "--image-topic": "image_topic under [session.topics]",
     "--camera ": "camera",

@@ -1,7 +1,6 @@
-"""Manifests as a person writes them: TOML and CSV say the same, and every mistake is named with its place."""
+"""Manifests as a person writes them: every mistake is named with its place."""
 
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -33,12 +32,6 @@ auto = true
 vehicle_type = "lorry"
 options.noise.sigma_px = 3
 """
-CSV = """\
-vehicle,session,recording,clicks,auto,vehicle_type,radar_serial,camera_position_m,exports,\
-options.noise.sigma_px,options.gating.max_range_m,topics.radar_topic
-van 7,spring,a/radar.bag;a/camera.bag,a/clicks.json,,van,R-1,0.1;0;-0.2,tf2,1.5,30,/radar
-van 8,,b.mcap,,yes,lorry,,,,3,,
-"""
 
 
 def rows_of(text: str, folder: Path, name: str = "fleet.toml") -> tuple[ManifestRow, ...]:
@@ -65,18 +58,6 @@ def test_a_session_has_what_the_file_says_and_what_the_defaults_say(tmp_path: Pa
     assert (first.topics.radar_topic, first.exports, first.auto) == ("/radar", ("tf2",), False)
     assert (second.session, second.vehicle_type, second.auto) == ("b", "lorry", True)
     assert (second.options.noise.sigma_px, second.options.gating.max_range_m) == (3.0, 60.0)
-
-
-def test_toml_and_csv_say_the_same(tmp_path: Path) -> None:
-    def said(rows: tuple[ManifestRow, ...]) -> list[tuple[object, ...]]:
-        return [tuple(getattr(row, name) for name in ManifestRow.__slots__ if name != "place") for row in rows]
-
-    assert said(rows_of(TOML, tmp_path)) == said(rows_of(CSV, tmp_path, "fleet.csv"))
-
-
-def test_a_table_saved_by_a_spreadsheet_is_read(tmp_path: Path) -> None:
-    (row,) = rows_of('\ufeffvehicle,recording\r\n"van, old",a.bag\r\n,\r\n', tmp_path, "fleet.csv")
-    assert (row.vehicle, row.session) == ("van, old", "a")
 
 
 def test_an_absolute_path_stays_as_it_is(tmp_path: Path) -> None:
@@ -143,28 +124,9 @@ def test_a_mistake_is_named_with_its_place(text: str, fault: str, tmp_path: Path
     assert fault_of(text, tmp_path).startswith(fault)
 
 
-@pytest.mark.parametrize(
-    ("text", "fault"),
-    [
-        ("vehicle,recording\na,b.bag,c", "line 2: 3 cells, but 2 columns"),
-        ("vehicle,vehicle\na,b", "line 1: the column 'vehicle' stands twice"),
-        ("vehicle,recording,auto\na,b.bag,maybe", "line 2: auto: 'maybe'; write yes or no"),
-        ("vehicle,recording,camera_position_m\na,b.bag,0;x;1", "line 2: camera_position_m: 'x' is not a number"),
-        (
-            "vehicle,recording,options,options.method\na,b.bag,1,paper",
-            "line 2: the column 'options.method' contradicts",
-        ),
-        ('vehicle,recording\na,"b.bag', "not valid CSV: "),
-        ("vehicle,recording", "no session in it"),
-        ("", "no session in it"),
-    ],
-)
-def test_a_mistake_in_a_table_is_named_with_its_line(text: str, fault: str, tmp_path: Path) -> None:
-    assert fault_of(text, tmp_path, "fleet.csv").startswith(fault)
-
-
 def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
-    assert fault_of("a: 1", tmp_path, "fleet.yaml").startswith("a manifest is a .toml or .csv file")
+    for name in ("fleet.yaml", "fleet.csv"):
+        assert fault_of("a: 1", tmp_path, name).startswith("a manifest is a .toml file; cocalib batch FILE.toml --init")
     with pytest.raises(InputError, match=r"no such file; cocalib batch .*absent\.toml --init FOLDER writes one"):
         read_manifest(tmp_path / "absent.toml")
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
@@ -173,41 +135,20 @@ def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
 
 
 def test_the_size_of_the_reflector_and_resized_pictures(tmp_path: Path) -> None:
-    toml, table = tmp_path / "fleet.toml", tmp_path / "fleet.csv"
-    toml.write_text(
+    path = tmp_path / "fleet.toml"
+    path.write_text(
         '[defaults]\nreflector_m = 0.3\n[[session]]\nvehicle = "a"\nrecording = "a.bag"\nrescale_camera = true\n'
     )
-    table.write_text("vehicle,recording,reflector_m,rescale_camera\na,a.bag,0.3,yes\n")
-    for path in (toml, table):
-        (row,) = read_manifest(path).rows
-        assert (row.reflector_m, row.rescale_camera) == (0.3, True)
-    toml.write_text('[[session]]\nvehicle = "a"\nrecording = "a.bag"\nreflector_m = 24\n')
+    (row,) = read_manifest(path).rows
+    assert (row.reflector_m, row.rescale_camera) == (0.3, True)
+    path.write_text('[[session]]\nvehicle = "a"\nrecording = "a.bag"\nreflector_m = 24\n')
     with pytest.raises(InputError, match="reflector_m"):
-        read_manifest(toml)
+        read_manifest(path)
 
 
-@pytest.mark.parametrize("delimiter", [";", "\t"])
-def test_what_excel_writes_is_read(tmp_path: Path, delimiter: str) -> None:
-    head, *rows = CSV.splitlines()
-    cells = [delimiter.join(f'"{cell}"' if ";" in cell else cell for cell in row.split(",")) for row in rows]
-    text = "\ufeff" + "\r\n".join([head.replace(",", delimiter).replace("vehicle,", "Vehicle,"), *cells, ""])
-    text = text.replace("vehicle" + delimiter, "Vehicle" + delimiter, 1)
-    path = tmp_path / "fleet.csv"
-    path.write_bytes(text.encode())
-    (tmp_path / "plain").mkdir()
-    assert read_manifest(path).rows == tuple(
-        replace(
-            row,
-            recording=tuple(tmp_path / one.relative_to(tmp_path / "plain") for one in row.recording),
-            clicks=row.clicks and tmp_path / row.clicks.relative_to(tmp_path / "plain"),
-        )
-        for row in rows_of(CSV, tmp_path / "plain", "fleet.csv")
-    )
-
-
-def test_what_excel_writes_in_another_encoding_is_named_with_what_to_do(tmp_path: Path) -> None:
-    path = tmp_path / "fleet.csv"
-    path.write_bytes("vehicle,recording\nK\xe4fer,a.bag\n".encode("latin-1"))
+def test_another_encoding_is_named_with_what_to_do(tmp_path: Path) -> None:
+    path = tmp_path / "fleet.toml"
+    path.write_bytes('[[session]]\nvehicle = "K\xe4fer"\n'.encode("latin-1"))
     with pytest.raises(InputError, match="save it as UTF-8"):
         read_manifest(path)
 
