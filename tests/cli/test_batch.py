@@ -39,17 +39,6 @@ def test_from_a_folder_to_a_table(fleet: Path, capsys: pytest.CaptureFixture[str
     assert "not-clicked" in capsys.readouterr().out
 
 
-def test_parts_leave_the_index_to_one_process_afterwards(fleet: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    manifest = fleet / "fleet.toml"
-    assert run(["batch", str(manifest), "--init", str(fleet)]) == 0
-    codes = [run(["batch", str(manifest), "--shard", f"{part}/2"]) for part in (1, 2)]
-    assert sum(max(code - 10, 0) for code in codes) == 2
-    assert "cocalib fleet rebuild" in capsys.readouterr().out
-    assert not (fleet / "fleet" / "fleet.sqlite").exists()
-    assert run(["fleet", "rebuild", str(fleet / "fleet")]) == 0
-    assert (fleet / "fleet" / "fleet.sqlite").is_file()
-
-
 def test_what_is_done_is_not_done_again(fleet: Path, capsys: pytest.CaptureFixture[str]) -> None:
     manifest = fleet / "fleet.toml"
     manifest.write_text(
@@ -87,8 +76,6 @@ def test_a_first_manifest_is_never_written_over_another_file(fleet: Path, capsys
         (["--workers", "2", "--scheduler", "tcp://127.0.0.1:1"], "give one of them"),
         (["--workers", "0"], "there must be at least 1"),
         (["--scheduler", "tcp://10.0.0.7:8786"], "without TLS is refused"),
-        (["--shard", "3/2"], "there is no such part"),
-        (["--shard", "half"], "such as 3/16"),
     ],
 )
 def test_flags_that_contradict_each_other_are_refused(
@@ -118,8 +105,7 @@ def test_what_the_last_batch_wanted_counts_and_what_it_lacks_is_named(
     manifest.write_text(
         manifest.read_text().replace('"van"', '"VAN"', 1) + '[[session]]\nvehicle = "b"\nrecording = "broken.bag"\n'
     )
-    run(["batch", str(manifest), "--out", str(out), "--shard", "1/2"])
-    run(["batch", str(manifest), "--out", str(out), "--shard", "2/2"])
+    run(["batch", str(manifest), "--out", str(out)])
     (broken,) = (path.parent for path in out.rglob("outcome.json") if '"vehicle": "b"' in path.read_text())
     shutil.rmtree(broken)
     capsys.readouterr()

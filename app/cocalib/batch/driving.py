@@ -56,7 +56,7 @@ def drive(
     """Return an outcome for each job, in their order; only jobs without one are run, and equal ones once.
 
     Args:
-        jobs: of the manifest, or of a shard of it.
+        jobs: of the manifest.
         engine: runs them.
         results: where results lie.
         progress: called at the beginning and after each job.
@@ -89,25 +89,6 @@ def drive(
 
 def _died(job: Job, results: Path) -> Outcome:
     return failed_outcome(job, results, reason=_DIED, hint=_DIED_HINT)
-
-
-def shard_of(jobs: Sequence[Job], k: int, n: int) -> tuple[Job, ...]:
-    """Return the k-th of n parts of the jobs: the n parts have all jobs, none has one of another's, all are equally large.
-
-    Which part a job is in depends on the digests of the jobs only. Equal jobs are in one part, and count once.
-
-    Args:
-        jobs: of the whole manifest.
-        k: number of the part, from 1.
-        n: number of parts.
-
-    Raises:
-        OptionError: there is no such part.
-    """
-    if n < 1 or not 1 <= k <= n:
-        raise OptionError(f"--shard {k}/{n}: there is no such part; write 1/{max(n, 1)} to {max(n, 1)}/{max(n, 1)}")
-    mine = set(sorted({job.digest for job in jobs})[k - 1 :: n])
-    return tuple(job for job in jobs if job.digest in mine)
 
 
 def chosen_engine(count: int, *, workers: int | None = None, scheduler: str | None = None) -> Engine:

@@ -19,7 +19,7 @@ from cocalib.fleet.records import FleetRecord, SessionRecord, UnreadResult, Vehi
 def read_fleet(folder: Path) -> FleetRecord:
     """Return what the results of a folder say.
 
-    Results that the index does not have yet, such as those of shards or after a driver was killed, are read from the folder
+    Results that the index does not have yet, as while another batch runs or after a driver was killed, are read from the folder
     itself; the index is not changed.
 
     Args:

@@ -1,4 +1,4 @@
-"""Driving a batch: nothing is run twice, the order is kept, shards divide the work, and the time left is honest."""
+"""Driving a batch: nothing is run twice, the order is kept, and the time left is honest."""
 
 import os
 from collections.abc import Callable, Generator, Sequence
@@ -6,17 +6,13 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from calib_core.errors import InputError, OptionError
-from cocalib.batch.driving import BatchProgress, chosen_engine, drive, shard_of
+from cocalib.batch.driving import BatchProgress, chosen_engine, drive
 from cocalib.batch.engines.dask_scheduler import DaskScheduler
 from cocalib.batch.engines.engine import workers_died
 from cocalib.batch.engines.in_process import InProcess
 from cocalib.batch.engines.worker_processes import WorkerProcesses
-from cocalib.batch.job import Job
-from cocalib.batch.manifest import ManifestRow
 from cocalib.batch.results_folder import ResultsFolder
 from tests.batch_calls import quick_jobs
 
@@ -85,23 +81,6 @@ def test_kept_outcomes_do_not_make_the_rest_look_quick(tmp_path: Path) -> None:
     told: list[BatchProgress] = []
     drive(jobs, InProcess(), results, told.append, lambda: float(next(clock)))
     assert [now.left_s for now in told] == [None, None, None, 10.0, 0.0]
-
-
-@given(st.lists(st.integers(0, 60), max_size=60), st.integers(1, 9))
-def test_shards_are_complete_disjoint_balanced_and_do_not_depend_on_the_order(numbers: list[int], n: int) -> None:
-    jobs = [Job(ManifestRow("v", str(number), ()), f"{number * 7919 % 101:032x}") for number in numbers]
-    shards = [shard_of(jobs, k, n) for k in range(1, n + 1)]
-    digests = [{job.digest for job in shard} for shard in shards]
-    assert sorted(job.digest for shard in shards for job in shard) == sorted(job.digest for job in jobs)
-    assert sum(map(len, digests)) == len({job.digest for job in jobs})
-    assert max(map(len, digests)) - min(map(len, digests)) <= 1
-    assert [{job.digest for job in shard_of(jobs[::-1], k, n)} for k in range(1, n + 1)] == digests
-
-
-@pytest.mark.parametrize(("k", "n"), [(0, 3), (4, 3), (-1, 3), (1, 0), (1, -2)])
-def test_a_shard_that_does_not_exist_is_refused_in_words(k: int, n: int) -> None:
-    with pytest.raises(OptionError, match=rf"--shard {k}/{n}: there is no such part; write 1/"):
-        shard_of((), k, n)
 
 
 def test_small_manifests_run_in_this_process_and_large_ones_on_all_processors(monkeypatch: pytest.MonkeyPatch) -> None:
