@@ -80,7 +80,7 @@ def write_video(
         written = _write(recording, part, form, progress)
         part.replace(path)
     except OSError as error:
-        raise InputError(f"{path}: cannot be written: {(error.strerror or str(error)).lower()}") from error
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
     finally:
         if part.parent.is_dir():
             part.unlink(missing_ok=True)

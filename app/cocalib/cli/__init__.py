@@ -47,7 +47,7 @@ def _ended(arguments: Sequence[str]) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:
-        return refuse(f"{error.filename or 'a file'}: {(error.strerror or str(error)).lower()}")
+        return refuse(f"{error.filename or 'a file'}: {error.strerror or error}")
     except KeyboardInterrupt as stop:  # carries the signal number if it was not Ctrl+C
         with contextlib.suppress(OSError):  # the terminal may be gone
             print(f"\n{_STOPPED[arguments[0]]}" if arguments and arguments[0] in _STOPPED else "", file=sys.stderr)

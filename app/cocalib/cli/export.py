@@ -133,7 +133,7 @@ def _write_all(
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{folder}: cannot be made: {(error.strerror or str(error)).lower()}") from error
+        raise InputError(f"{folder}: cannot be made: {error.strerror or error}") from error
     for name, made in written.items():
         write_whole(folder / made.file_name, made.data)
         print(f"{name}: written to {folder / made.file_name}")

@@ -101,7 +101,7 @@ def _why(error: OSError, recording: "Recording") -> str:
             f"the disk is full: the new recording needs about {size_gb:.3g} GB; nothing was left behind. Free some space, or "
             "write to another disk"
         )
-    return f"cannot be written: {(error.strerror or str(error)).lower()}"
+    return f"cannot be written: {error.strerror or error}"
 
 
 def _report(recording: "Recording", written: "RecordingWritten", out: Path, layout: Path) -> None:

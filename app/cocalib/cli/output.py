@@ -39,7 +39,7 @@ def write_whole(path: Path, content: str | bytes) -> None:
     try:
         files.write_whole(path, content.encode("utf-8") if isinstance(content, str) else content)
     except OSError as error:
-        raise InputError(f"{path}: cannot be written: {(error.strerror or str(error)).lower()}") from error
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
 @contextmanager

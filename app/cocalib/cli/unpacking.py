@@ -29,7 +29,7 @@ def write_unpacked(folder: Path, archive: bytes) -> tuple[str, ...]:
         for parent in sorted({(folder / name).parent for name in members}):
             parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{folder}: cannot be written: {(error.strerror or str(error)).lower()}") from error
+        raise InputError(f"{folder}: cannot be written: {error.strerror or error}") from error
     for name, data in members.items():
         write_whole(folder / name, data)
     return tuple(members)

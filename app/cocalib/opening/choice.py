@@ -42,7 +42,7 @@ def part_of_choice(part: ChoicePart) -> Iterator[None]:
     except CalibrationError as error:
         raise UnusablePartError(part, str(error)) from error
     except OSError as error:
-        words = f"{error.filename or 'a file'}: {(error.strerror or str(error)).lower()}"
+        words = f"{error.filename or 'a file'}: {error.strerror or error}"
         raise UnusablePartError(part, words) from error
 
 

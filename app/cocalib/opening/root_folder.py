@@ -154,7 +154,7 @@ def _why(error: OSError | RuntimeError) -> str:
         return "is not there any more"
     if isinstance(error, PermissionError):
         return "you may not look into it (permission denied)"
-    return (error.strerror or str(error)).lower() if isinstance(error, OSError) else "its links lead in a circle"
+    return error.strerror or str(error) if isinstance(error, OSError) else "its links lead in a circle"
 
 
 def _shown(inside: str) -> str:

@@ -108,7 +108,7 @@ class _Problem:
                 self._keep(str(error))
                 self.part = error.part if isinstance(error, UnusablePartError) else None
             except OSError as error:
-                self._keep(f"{error.filename or 'a file'}: {(error.strerror or str(error)).lower()}")
+                self._keep(f"{error.filename or 'a file'}: {error.strerror or error}")
 
     def _keep(self, line: str) -> None:
         print(f"cocalib: {' '.join(line.split())}", file=sys.stderr)

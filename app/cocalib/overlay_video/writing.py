@@ -77,7 +77,7 @@ def write_overlay(
         with whole_path(path) as part:
             return _write(view, part, options, progress)
     except OSError as error:
-        raise InputError(f"{path}: cannot be written: {(error.strerror or str(error)).lower()}") from error
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
 def _write(

@@ -132,7 +132,7 @@ def _saved(text: str) -> str:
             file.write(text)
         _remove_old(folder)
     except OSError as error:
-        return f"and its report could not be saved ({(error.strerror or str(error)).lower()}); {_DEBUG}=1 shows it"
+        return f"and its report could not be saved ({error.strerror or error}); {_DEBUG}=1 shows it"
     return f"and a report is saved in {path}"
 
 

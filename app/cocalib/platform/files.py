@@ -137,7 +137,7 @@ def read_text(
     except FileNotFoundError:
         raise InputError(f"{path}: no such file; {if_missing}") from None
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from error
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
     except UnicodeDecodeError as error:
         hint = f"; {if_no_text}" if if_no_text else ""
         raise InputError(f"{path}: not a text file (byte {error.start} is not UTF-8){hint}") from error

@@ -78,7 +78,7 @@ def print_pdf(html: str) -> bytes:
             ) from None
         except OSError as error:
             raise PrintingError(
-                f"{browser} cannot be started: {(error.strerror or str(error)).lower()}; set {_VARIABLE} to another browser"
+                f"{browser} cannot be started: {error.strerror or error}; set {_VARIABLE} to another browser"
             ) from error
         if not pdf.is_file():
             said = answer.stderr.decode("utf-8", "replace").strip().splitlines()

@@ -71,7 +71,7 @@ def serve_view(path: Path, port: int = 0) -> Iterator[ServedView]:
     try:
         server = ThreadingHTTPServer((_HOST, port), partial(_Handler, token, assets, path))
     except OSError as error:
-        raise InputError(f"port {port}: cannot be used: {(error.strerror or str(error)).lower()}") from error
+        raise InputError(f"port {port}: cannot be used: {error.strerror or error}") from error
     server.daemon_threads = True
     try:
         base = f"http://{_HOST}:{server.server_address[1]}/{token}/"
@@ -94,7 +94,7 @@ def _assets() -> Mapping[str, bytes]:
             command, env=offline_environment(os.environ), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )
     except OSError as error:
-        raise InputError(f"{command[0]}: cannot be started: {(error.strerror or str(error)).lower()}") from error
+        raise InputError(f"{command[0]}: cannot be started: {error.strerror or error}") from error
     try:
         return {name: _fetched(f"http://{_HOST}:{page_port}/{name}", process) for name in _ASSETS}
     finally:

@@ -57,7 +57,7 @@ def write_view(view: RecordedView, path: Path, *, progress: Callable[[int, int],
             stream.disconnect()
             _require_complete(part, path)
     except OSError as error:
-        raise InputError(f"{path}: cannot be written: {(error.strerror or str(error)).lower()}") from error
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
     return written
 
 

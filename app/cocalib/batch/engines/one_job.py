@@ -68,7 +68,7 @@ def failed_outcome(job: Job, results: Path, *, reason: str, hint: str = "") -> O
             (unfinished / OUTCOME_FILE).write_text(outcome_text(outcome), encoding="utf-8")
     except OSError as error:
         raise InputError(
-            f"{results}: the result of {row.name} cannot be written ({(error.strerror or str(error)).lower()}); "
+            f"{results}: the result of {row.name} cannot be written ({error.strerror or error}); "
             "make room or choose another folder, and start the batch again: what is done is kept"
         ) from error
     return outcome

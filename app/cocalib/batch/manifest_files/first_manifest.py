@@ -119,7 +119,7 @@ def _recordings(folder: Path, seen: set[Path] | None = None) -> Iterator[Path]:
     try:
         inside = sorted(folder.iterdir(), key=lambda path: (path.is_symlink(), path))
     except OSError as error:
-        raise InputError(f"{folder}: cannot be read: {(error.strerror or str(error)).lower()}") from error
+        raise InputError(f"{folder}: cannot be read: {error.strerror or error}") from error
     for path in inside:
         real = path.resolve()
         if path.name.startswith(".") or real in seen:

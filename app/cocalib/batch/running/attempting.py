@@ -75,7 +75,7 @@ def attempted(doing: str, work: Callable[[], _Made], log: list[str]) -> _Made | 
             if error.errno not in _UNREACHED:
                 raise
             where = f"{error.filename}: " if error.filename else ""
-            return Failure(f"{where}{(error.strerror or str(error)).lower()}", "check that the worker reaches the file")
+            return Failure(f"{where}{error.strerror or error}", "check that the worker reaches the file")
     return Failure(lines[0])
 
 

@@ -69,6 +69,6 @@ def _changed(job: Job) -> Failure:
 
 def _unwritten(results: Path, error: OSError) -> Failure:
     return Failure(
-        f"{results}: the result cannot be written: {(error.strerror or str(error)).lower()}",
+        f"{results}: the result cannot be written: {error.strerror or error}",
         "make room, or name another folder with --out, and run the batch again: what is done is kept",
     )

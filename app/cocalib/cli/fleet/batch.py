@@ -82,7 +82,7 @@ class Batch:
 
                 outcomes = drive(jobs, engine, results, tell)
         except OSError as error:
-            raise InputError(f"{results.path}: cannot be written: {(error.strerror or str(error)).lower()}") from error
+            raise InputError(f"{results.path}: cannot be written: {error.strerror or error}") from error
         print("\n".join([*batch_lines(outcomes), "", _next_line(results.path)]))
         return exit_code(outcomes)
 

@@ -60,7 +60,7 @@ def _text(folder: Path, digest: str) -> str | UnreadResult | None:
         place = _place(folder, digest)
         return UnreadResult(place, str(error).rpartition(f"{place}: ")[2])
     except OSError as error:
-        return UnreadResult(_place(folder, digest), f"{(error.strerror or str(error)).lower()}; check its permissions")
+        return UnreadResult(_place(folder, digest), f"{error.strerror or error}; check its permissions")
     except UnicodeDecodeError as error:
         return UnreadResult(_place(folder, digest), _not_ours(error))
 
@@ -104,7 +104,7 @@ def with_pose(folder: Path, outcome: Outcome, place: int | None) -> SessionRecor
             camera_serial=outcome.camera_serial,
         )
     except OSError as error:
-        return replace(record, pose_problem=f"{_CALIBRATION}: {(error.strerror or str(error)).lower()}")
+        return replace(record, pose_problem=f"{_CALIBRATION}: {error.strerror or error}")
     except CalibrationError as error:
         return replace(record, pose_problem=str(error).removeprefix(f"{_CALIBRATION}: "))
     return replace(record, pose=found)

@@ -76,7 +76,7 @@ def rescued(folder: Path, session: Session, recording: RecordingForm, fault: str
         try:
             return Closed(folder, count, fault, _written(home, session, recording))
         except OSError as error:
-            fault = f"{fault}; {home}: {(error.strerror or str(error)).lower()}"
+            fault = f"{fault}; {home}: {error.strerror or error}"
         except SessionFileError as error:
             fault = f"{fault}; {error}"
     return Closed(folder, count, fault)

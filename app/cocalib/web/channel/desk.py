@@ -37,6 +37,6 @@ async def answer_of(desk: Desk, incoming: Incoming) -> list[str]:
     try:
         answer = await asyncio.get_running_loop().run_in_executor(None, desk.answer, incoming.command)
     except OSError as error:
-        raise InputError(f"{error.filename or 'a file'}: {(error.strerror or str(error)).lower()}") from error
+        raise InputError(f"{error.filename or 'a file'}: {error.strerror or error}") from error
     texts = [] if answer is None else [encode(answer)]
     return texts if incoming.request is None else [*texts, encode(Done(incoming.request))]

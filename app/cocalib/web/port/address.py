@@ -36,7 +36,7 @@ def require_address(host: str, port: int) -> None:
             trial.bind(address)
     except OSError as error:
         raise AddressError(
-            f"--host {host}: cannot serve on this address ({(error.strerror or str(error)).lower()}); "
+            f"--host {host}: cannot serve on this address ({error.strerror or error}); "
             "give an address of this machine, such as 127.0.0.1, or 0.0.0.0 for all of them"
         ) from None
 
@@ -59,7 +59,7 @@ def listening_at(host: str, port: int) -> socket.socket:
             reason = error
     raise AddressError(
         f"--port {port}: neither this port nor the {_PORTS_TRIED} after it can be used "
-        f"({(reason.strerror or str(reason)).lower()}); give another one, or 0 for any free port"
+        f"({reason.strerror or reason}); give another one, or 0 for any free port"
     )
 
 

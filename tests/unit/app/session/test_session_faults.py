@@ -306,7 +306,7 @@ def test_without_any_place_to_write_the_end_says_that_the_clicks_are_lost(
     left = session_file.close()
     assert left.kept_in is None
     assert left.note.startswith("the clicks (2) could not be saved: ")
-    assert "no space left on device" in left.note
+    assert "No space left on device" in left.note
 
 
 def test_a_full_disk_at_the_end_costs_only_the_snapshot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

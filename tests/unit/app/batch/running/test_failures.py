@@ -118,7 +118,7 @@ def test_too_few_clicks_are_refused_with_a_hint(row: ManifestRow, tmp_path: Path
     [
         (MemoryError(), "not enough memory"),
         (np.exceptions.AxisError("a\nb"), "internal error (AxisError: a b)"),
-        (PermissionError(errno.EACCES, "Permission denied", "camera.bag"), "camera.bag: permission denied"),
+        (PermissionError(errno.EACCES, "Permission denied", "camera.bag"), "camera.bag: Permission denied"),
         (OSError("av: invalid data"), "internal error (OSError: av: invalid data)"),
     ],
 )
@@ -206,6 +206,6 @@ def test_a_full_disk_is_an_outcome_that_nobody_keeps(
     monkeypatch.setattr(running_job, "listed_files", raising(OSError(errno.ENOSPC, "No space left on device")))
     outcome = outcome_of(row, tmp_path / "results")
     assert (outcome.status, outcome.is_final) == ("failed", False)
-    assert outcome.reason == f"{tmp_path / 'results'}: the result cannot be written: no space left on device"
+    assert outcome.reason == f"{tmp_path / 'results'}: the result cannot be written: No space left on device"
     assert "make room" in outcome.hint
     assert list((tmp_path / "results" / "results").iterdir()) == []
