@@ -308,7 +308,7 @@ def started(arguments: Sequence[object], *, patch: str, sigint: str) -> subproce
     """
     program = f"import signal, threading\nsignal.signal(signal.SIGINT, signal.{sigint})\n{patch}"
     return subprocess.Popen(
-        [sys.executable, "-c", f"{program}\nfrom app.__main__ import main\nmain()", *map(str, arguments)],
+        [sys.executable, "-c", f"{program}\nfrom cocalib.__main__ import main\nmain()", *map(str, arguments)],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         env={**os.environ, "PYTHONUNBUFFERED": "1"},
     )  # fmt: skip
