@@ -28,17 +28,13 @@ from calib_core.estimation.lens_prior import useless_covariance
 from calib_core.estimation.measurement_model import PairMeasurements, pair_measurements
 from calib_core.estimation.pair_results import excluded_pair_results, fit_metrics, used_pair_results
 from calib_core.estimation.posterior.beyond_the_fit import look_beyond
-from calib_core.fleet.prior_answer import fleet_answer, fleet_warnings
-from calib_core.fleet_prior import FleetAnswer, FleetPrior
 from calib_core.measurements import MIN_PAIRS, Pair, RadarScans, ReflectorClick, Unpaired, Unsolvable
 from calib_core.option_checks import checked_options
 from calib_core.options import CalibrationOptions, Method
 from calib_core.pair_checks import checked_pairs
 from calib_core.plausibility import implausible_input
 from calib_core.radar import cartesian_from_polar
-from calib_core.results import Calibration, DataWarning
-from calib_core.unsolved import DEGENERATE
-from calib_core.verdict import verdict_on
+from calib_core.results import Calibration
 
 _UNDETERMINED_ROTATION_RAD = 0.5  # a larger standard deviation means that the pairs do not determine the rotation
 _AGREEING_SHARE = 0.9
@@ -51,7 +47,6 @@ def calibrate(
     options: CalibrationOptions | None = None,
     *,
     background: RadarScans | None = None,
-    fleet_prior: FleetPrior | None = None,
 ) -> Calibration | Unsolvable:
     """Calibrate from clicks and radar scans.
 
@@ -61,14 +56,8 @@ def calibrate(
         camera: the intrinsics.
         options: None takes the defaults; `METHODS` has the methods.
         background: scans of the whole recording, to tell what stands there before and after each placement; optional.
-        fleet_prior: what the fleet says of this vehicle; optional.
-
-    Raises:
-        InputError: the method takes no fleet's prior.
     """
-    *_, outcome = calibration_steps(
-        clicks, scans, camera, options, background=background, preview=False, fleet_prior=fleet_prior
-    )
+    *_, outcome = calibration_steps(clicks, scans, camera, options, background=background, preview=False)
     return outcome
 
 
@@ -81,7 +70,6 @@ def calibration_steps(
     background: RadarScans | None = None,
     previous: Calibration | None = None,
     preview: bool = True,
-    fleet_prior: FleetPrior | None = None,
 ) -> Iterator[Calibration | Unsolvable]:
     """Calibrate in two steps: first a preview with pose and local covariance, then the answer, the same as `calibrate`'s.
 
@@ -96,13 +84,8 @@ def calibration_steps(
         background: scans of the whole recording, to tell what stands there before and after each placement; optional.
         previous: the answer to nearly the same clicks, to start the preview from.
         preview: make one.
-        fleet_prior: what the fleet says of this vehicle; optional.
-
-    Raises:
-        InputError: the method takes no fleet's prior.
     """
     options = checked_options(options or CalibrationOptions())
-    require_default(options, fleet_prior)
     given = MethodInput(
         camera,
         options,
@@ -111,7 +94,6 @@ def calibration_steps(
         background=background,
         previous=previous,
         preview=preview,
-        fleet_prior=fleet_prior,
     )
     yield from METHODS[options.method](given)
 
@@ -121,8 +103,6 @@ def calibrate_pairs(
     camera: Camera,
     options: CalibrationOptions | None = None,
     excluded: frozenset[str] = frozenset(),
-    *,
-    fleet_prior: FleetPrior | None = None,
 ) -> Calibration | Unsolvable:
     """Calibrate from existing pairs, such as those of a pairs file.
 
@@ -131,14 +111,12 @@ def calibrate_pairs(
         camera: the intrinsics.
         options: None takes the defaults; `METHODS` has the methods.
         excluded: ids of pairs that are shown, but not used.
-        fleet_prior: what the fleet says of this vehicle; optional.
 
     Raises:
-        InputError: a pair contains a number that is impossible, an id occurs twice, or the method takes no fleet's prior.
+        InputError: a pair contains a number that is impossible, or an id occurs twice.
     """
     options = checked_options(options or CalibrationOptions())
-    require_default(options, fleet_prior)
-    given = MethodInput(camera, options, pairs=pairs, excluded=excluded, fleet_prior=fleet_prior)
+    given = MethodInput(camera, options, pairs=pairs, excluded=excluded)
     *_, outcome = METHODS[options.method](given)
     return outcome
 
@@ -157,7 +135,6 @@ class MethodInput:
         excluded: ids of pairs that are shown, but not used.
         previous: the answer to nearly the same clicks.
         preview: whether a preview is wanted.
-        fleet_prior: what the fleet says of this vehicle; optional.
     """
 
     camera: Camera
@@ -169,26 +146,25 @@ class MethodInput:
     excluded: frozenset[str] = frozenset()
     previous: Calibration | None = None
     preview: bool = False
-    fleet_prior: FleetPrior | None = None
 
 
 def _robust(given: MethodInput) -> Iterator[Calibration | Unsolvable]:
     """Solve by the default method: every pair judged by the others, noise estimated, covariance stated."""
     camera, options, scans = given.camera, given.options, given.scans
     if scans is None:
-        task = _task_of_pairs(given.pairs, camera, options, given.excluded, given.fleet_prior)
+        task = _task_of_pairs(given.pairs, camera, options, given.excluded)
         yield from _steps(task, previous=given.previous, preview=given.preview)
         return
     pairing = pair_clicks(given.clicks, scans, options, background=given.background)
     excluded = frozenset(click.id for click in given.clicks if not click.counts)
-    task = _Task.of(pairing.pairs, pairing.unpaired, excluded, camera, options, given.fleet_prior)
+    task = _Task.of(pairing.pairs, pairing.unpaired, excluded, camera, options)
     for outcome in _steps(task, previous=given.previous, preview=given.preview):
         if isinstance(outcome, Unsolvable):
             yield replace(outcome, unpaired=pairing.unpaired, pairs=pairing.pairs)
         elif outcome.checking:
             yield outcome
         else:
-            yield _with_clock_warnings(outcome, clocks(outcome, scans))
+            yield replace(outcome, warnings=(*outcome.warnings, *clocks(outcome, scans)))
 
 
 def _as_printed(given: MethodInput) -> Iterator[Calibration | Unsolvable]:
@@ -207,18 +183,6 @@ METHODS: Mapping[Method, Callable[[MethodInput], Iterator[Calibration | Unsolvab
     "paper": _as_printed,
 }
 """The methods: each yields a preview, if it has one and one is wanted, then the answer."""
-
-
-def require_default(options: CalibrationOptions, fleet_prior: FleetPrior | None) -> None:
-    """Refuse a fleet's prior for a method that cannot use it.
-
-    Raises:
-        InputError: it cannot.
-    """
-    if fleet_prior is not None and options.method != "default":
-        raise InputError(
-            f"a fleet's prior is used by the default method only, and the method is {options.method}; leave one of them out"
-        )
 
 
 def preview_pairs(
@@ -244,14 +208,10 @@ def preview_pairs(
 
 
 def _task_of_pairs(
-    pairs: Sequence[Pair],
-    camera: Camera,
-    options: CalibrationOptions,
-    excluded: frozenset[str],
-    fleet_prior: FleetPrior | None = None,
+    pairs: Sequence[Pair], camera: Camera, options: CalibrationOptions, excluded: frozenset[str]
 ) -> "_Task":
     checked_pairs(pairs, with_noise=True)
-    return _Task.of(tuple(_in_order(pairs)), (), excluded, camera, options, fleet_prior)
+    return _Task.of(tuple(_in_order(pairs)), (), excluded, camera, options)
 
 
 def _in_order(pairs: Sequence[Pair]) -> list[Pair]:
@@ -259,9 +219,7 @@ def _in_order(pairs: Sequence[Pair]) -> list[Pair]:
     return sorted(pairs, key=lambda pair: (pair.image_time is not None, pair.image_time or 0))
 
 
-def solve_again(
-    calibration: Calibration, options: CalibrationOptions | None = None, fleet_prior: FleetPrior | None = None
-) -> Calibration | Unsolvable:
+def solve_again(calibration: Calibration, options: CalibrationOptions | None = None) -> Calibration | Unsolvable:
     """Solve again from the pairs that a calibration kept; with the same options the result is the same, bit for bit.
 
     Whatever depends on the recording is copied: clicks without a radar position, and the warnings about clocks.
@@ -269,10 +227,9 @@ def solve_again(
     Args:
         calibration: solved here, or read from a calibration-1 file.
         options: None takes the calibration's own. Refined intrinsics are taken as they were before.
-        fleet_prior: None takes the one that the calibration was given, if any.
 
     Raises:
-        InputError: the method takes no fleet's prior, or the calibration does not contain the candidates of its pairs.
+        InputError: the calibration does not contain the candidates of its pairs.
     """
     kept = [pair.measured for pair in calibration.pairs if pair.measured is not None]
     if not calibration.pairs:
@@ -286,25 +243,12 @@ def solve_again(
     if options.models_noise:
         kept = [_with_noise(pair, options) for pair in kept]
     excluded = frozenset(pair.id for pair in calibration.pairs if pair.excluded)
-    if fleet_prior is None and calibration.fleet is not None and options.method == "default":
-        fleet_prior = calibration.fleet.prior
     camera = calibration.given_camera or calibration.camera
-    outcome = calibrate_pairs(kept, camera, options, excluded, fleet_prior=fleet_prior)
+    outcome = calibrate_pairs(kept, camera, options, excluded)
     if isinstance(outcome, Unsolvable):
         return replace(outcome, unpaired=calibration.unpaired)
     clock_warnings = [warning for warning in calibration.warnings if warning.code in CLOCK_CODES]
-    return _with_clock_warnings(replace(outcome, unpaired=calibration.unpaired), clock_warnings)
-
-
-def _with_clock_warnings(calibration: Calibration, warnings: Sequence[DataWarning]) -> Calibration:
-    """Add the warnings about clocks, which are no better for the data alone than for an answer with a fleet's prior."""
-    warned = replace(calibration, warnings=(*calibration.warnings, *warnings))
-    fleet = calibration.fleet
-    if not warnings or fleet is None or fleet.data_alone is None or fleet.data_alone.verdict not in ("good", "usable"):
-        return warned
-    return replace(
-        warned, fleet=replace(fleet, data_alone=replace(fleet.data_alone, verdict="weak", reason=warnings[0].message))
-    )
+    return replace(outcome, unpaired=calibration.unpaired, warnings=(*outcome.warnings, *clock_warnings))
 
 
 def _with_noise(pair: Pair, options: CalibrationOptions) -> Pair:
@@ -325,8 +269,6 @@ class _Task:
         clicked: the pairs that are used, in an order that the input order does not change.
         camera: the intrinsics.
         options: checked.
-        fleet_prior: what the fleet says of this vehicle; None without.
-        fleet: what that prior does; None as long as it is not known, or without a prior.
     """
 
     shown: tuple[Pair, ...]
@@ -335,8 +277,6 @@ class _Task:
     clicked: tuple[Pair, ...]
     camera: Camera
     options: CalibrationOptions
-    fleet_prior: FleetPrior | None = None
-    fleet: FleetAnswer | None = None
 
     @classmethod
     def of(
@@ -346,21 +286,9 @@ class _Task:
         excluded: frozenset[str],
         camera: Camera,
         options: CalibrationOptions,
-        fleet_prior: FleetPrior | None = None,
     ) -> "_Task":
         clicked = sorted((pair for pair in shown if pair.id not in excluded), key=_canonical)
-        return cls(shown, unpaired, excluded, tuple(clicked), camera, options, fleet_prior)
-
-    def expecting(self, previous: Calibration | None) -> "_Task":
-        """Return the task for a preview: the fleet's prior does what it did in the previous answer."""
-        if self.fleet_prior is None or previous is None or previous.fleet is None:
-            return self
-        return replace(self, fleet=previous.fleet)
-
-    def measurements(self, groups: Sequence[PlacementGroup]) -> PairMeasurements:
-        """Stack the placements, with the fleet's prior once it is known to apply."""
-        prior = self.fleet.prior if self.fleet is not None and self.fleet.used else None
-        return pair_measurements([group.pair for group in groups], self.camera, self.options, prior)
+        return cls(shown, unpaired, excluded, tuple(clicked), camera, options)
 
 
 def _steps(task: _Task, *, previous: Calibration | None, preview: bool) -> Iterator[Calibration | Unsolvable]:
@@ -377,38 +305,15 @@ def _steps(task: _Task, *, previous: Calibration | None, preview: bool) -> Itera
     if len(groups) < MIN_PAIRS:
         yield unsolved.one_place(len(task.clicked), len(groups))
         return
-    measurements = task.measurements(groups)
+    measurements = pair_measurements([group.pair for group in groups], task.camera, task.options)
     if preview:
-        shown = task.expecting(previous)
-        expected = measurements if shown is task else shown.measurements(groups)
-        quick = quick_fit(expected, task.options, previous)
+        quick = quick_fit(measurements, task.options, previous)
         if quick is not None:
             solution = _Solution.local(quick, task.options, smooth=False)
-            described = _described(shown, groups, expected, solution)
+            described = _described(task, groups, measurements, solution)
             first = flat_radar(quick, solution.uncertainty, task.options.radar)
             yield _preview(described, previous or replace(described, warnings=tuple(first)))
-    answer = _answer(task, groups, measurements)
-    yield answer if task.fleet_prior is None else _with_fleet(task, groups, answer, task.fleet_prior)
-
-
-def _with_fleet(
-    task: _Task, groups: Sequence[PlacementGroup], alone: Calibration | Unsolvable, prior: FleetPrior
-) -> Calibration | Unsolvable:
-    """Test the answer of the data alone against the fleet's prior, and solve with the prior unless it is contradicted.
-
-    Pairs that agree on no pose are refused with a prior as without one: it only replaces what placements leave open.
-    """
-    if isinstance(alone, Unsolvable) and alone.code != DEGENERATE:
-        return alone
-    judged = verdict_on(alone)
-    fleet = fleet_answer(prior, alone, judged.level, judged.reason)
-    if not fleet.used and isinstance(alone, Calibration):
-        return replace(alone, fleet=fleet, warnings=(*fleet_warnings(fleet, alone), *alone.warnings))
-    informed = replace(task, fleet=fleet)
-    answer = _answer(informed, groups, informed.measurements(groups))
-    if isinstance(answer, Unsolvable):
-        return answer
-    return replace(answer, warnings=(*fleet_warnings(fleet, answer), *answer.warnings))
+    yield _answer(task, groups, measurements)
 
 
 def _preview(calibration: Calibration, previous: Calibration) -> Calibration:
@@ -501,7 +406,6 @@ def _described(
         radar_errors=refined.measurements.errors.radar,
         systematic_errors=uncertainty.systematic_errors,
         given_camera=task.camera if camera is not None else None,
-        fleet=task.fleet,
         covariance_parts=uncertainty.parts.within(uncertainty.covariance),
     )
     return replace(calibration, pairs=click_results(calibration, groups, task.shown))

@@ -9,7 +9,6 @@ from calib_core.arrays import Matrix66, Points2, Points3, Vector2, Vector3, froz
 from calib_core.camera import Camera
 from calib_core.covariance_parts import CovarianceParts
 from calib_core.errors import InputError
-from calib_core.fleet_prior import DataAlone, FleetAnswer, FleetPrior
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 from calib_core.measurements import Pair, TimeNs, Unpaired
 from calib_core.options import CalibrationOptions
@@ -198,7 +197,6 @@ class Calibration:
         systematic_errors: every error that the pairs share, and its part in the uncertainty.
         checking: whether this is a preview: its warnings and advice are those of the previous answer.
         given_camera: the intrinsics before they were refined; None if they were not.
-        fleet: what a fleet's prior did; None if none was given.
         covariance_parts: what of the covariance rests on stated standard deviations; None if unknown.
     """
 
@@ -220,7 +218,6 @@ class Calibration:
     systematic_errors: tuple[SystematicErrorResult, ...] = ()
     checking: bool = False
     given_camera: Camera | None = None
-    fleet: FleetAnswer | None = None
     covariance_parts: CovarianceParts | None = None
 
     def __post_init__(self) -> None:
@@ -257,22 +254,6 @@ class Calibration:
         """The camera, as well known as it was before any pair: to weigh these pairs, or others, with it once more."""
         given = self.given_camera
         return self.camera if given is None else replace(self.camera, covariance=given.covariance)
-
-    @property
-    def fleet_prior(self) -> FleetPrior | None:
-        """The fleet's prior that the pose rests on; None if it rests on none."""
-        return self.fleet.prior if self.fleet is not None and self.fleet.used else None
-
-    def of_data_alone(self, alone: DataAlone) -> "Calibration":
-        """Return it with the pose of the data alone and what is known of that; its errors are not, figures and pairs stay."""
-        return replace(
-            self,
-            camera_from_radar=alone.camera_from_radar,
-            covariance=alone.covariance,
-            covariance_quantile=alone.covariance_quantile,
-            covariance_parts=alone.covariance_parts,
-            systematic_errors=(),
-        )
 
     @property
     def sees_elevation(self) -> bool:

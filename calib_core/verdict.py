@@ -5,7 +5,7 @@ each warning decide the level; docs/warnings.md lists both, and the measured sha
 """
 
 from dataclasses import dataclass
-from typing import Literal, TypeAlias, get_args
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -23,15 +23,12 @@ USABLE_DEG, USABLE_CM = 3.0, 30.0
 does not depend on how it is mounted, its position does."""
 SURE_PAIRS = 8
 """With fewer pairs neither a wrong pair nor a wrong noise level can be detected: the verdict is weak."""
-SURE_PAIRS_OF_KIND = 5
-"""The same for a pose that rests on a fleet's prior: its six parameters take nothing from the pairs' residuals."""
 HELD_OUT_RATIO = 2.0
 """With a held-out error above this many times the fitted one, single pairs decide: the verdict is not good."""
 
 _CONTRADICTIONS = ("mirrored-axes", "no-pose", "camera-position-contradicted", "no-consensus", "refinement-diverged")
 _ABOUT_FIGURES = ("weak-geometry", "few-pairs")
 _MORE_PAIRS_HELP = (*_ABOUT_FIGURES, "one-pair-decides")
-_PRIOR_DECIDES = "fleet-prior-decides"
 _BETWEEN = {"good": " to ", "usable": " to ", "nothing": " yet: "}
 _LEAST_VARIANCE, _MOST_VARIANCE = 1e-18, 1e12
 _CORNER = "the reflector's inner corner, where its three sheets meet"
@@ -64,11 +61,6 @@ class Verdict:
 
     def __str__(self) -> str:
         return f"{self.line}\n  {self.action}"
-
-
-def level_named(name: str) -> VerdictLevel | None:
-    """Return the level with a name; None if there is none."""
-    return next((level for level in get_args(VerdictLevel) if level == name), None)
 
 
 def verdict_on(outcome: Calibration | Unsolvable | None, *, left: int | None = None, unconfirmed: int = 0) -> Verdict:
@@ -140,7 +132,7 @@ def _judged(calibration: Calibration, error: StatedError, warning: DataWarning |
             return Verdict("weak", warning.message, action)
         few = f", from only {count} pairs" if warning.code == "few-pairs" else ""
         return Verdict("weak", f"uncertain to {error.text}{few}", action)
-    if count < (SURE_PAIRS if calibration.fleet_prior is None else SURE_PAIRS_OF_KIND):
+    if count < SURE_PAIRS:
         return Verdict("weak", f"uncertain to {error.text}, from only {count} pairs", _most_helpful(calibration, left))
     if error.rotation_deg > USABLE_DEG or error.position_cm > USABLE_CM:
         return Verdict("weak", f"uncertain to {error.text}", _most_helpful(calibration, left))
@@ -148,14 +140,10 @@ def _judged(calibration: Calibration, error: StatedError, warning: DataWarning |
     small = error.rotation_deg <= GOOD_DEG and error.position_cm <= GOOD_CM and steady
     if small and consequence == "note":
         return Verdict("good", error.text, _when_good(calibration, left))
-    decides = next((one for one in calibration.warnings if one.code == _PRIOR_DECIDES), None)
-    reason = error.text if decides is None else f"{error.text}, if it is mounted like the others of its type"
-    if decides is not None and decides == warning:  # it hides what further placements would tell
-        return Verdict("usable", reason, _click_the_rest(left) if left else _capitalized(decides.hint))
     better = (
         _capitalized(warning.hint) if small and warning is not None and not left else _most_helpful(calibration, left)
     )
-    return Verdict("usable", reason, f"{ALL_CLICKED}. {better}" if left == 0 else better)
+    return Verdict("usable", error.text, f"{ALL_CLICKED}. {better}" if left == 0 else better)
 
 
 def _click_the_rest(left: int) -> str:

@@ -282,7 +282,6 @@ export interface View {
   box_labels: string[];
   acc: AccPanel;
   systematic_errors: SystematicErrorTable;
-  fleet: string[];
   verdict: VerdictRow;
 }
 

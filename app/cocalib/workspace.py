@@ -40,7 +40,6 @@ from cocalib.session import (
 )
 from cocalib.session.boxes_in_frames import CarriedTrack, Followed, Start, boxes_loaded, carried_boxes, carried_tracks
 from cocalib.session.file import Closed, Restored, open_session_file
-from cocalib.solving.fleet_prior_file import FleetPriorFile
 from cocalib.solving.worker import SolverWorker
 from cocalib.view import AccPanel, Reference, View, shown_calibration, view
 
@@ -119,7 +118,6 @@ class Workspace:
         restored: what was found in the session's folder at the start.
         reference: a calibration to show until the clicks give a new one; None if there is none.
         given: the intrinsics that the recording was opened with.
-        fleet_prior: what the fleet says of this vehicle, with its file; None if none was given.
         acc: what the boxes say about the calibration, as last judged.
         open_meaning: a calibration that does not state what its numbers mean, for a person to pick; None if there is none.
     """
@@ -135,13 +133,11 @@ class Workspace:
         solver: Solver,
         reference: Reference | None = None,
         given: GivenIntrinsics | None = None,
-        fleet_prior: FleetPriorFile | None = None,
     ) -> None:
         self.facts = facts
         self.restored = restored
         self.reference = reference
         self.given = given or GivenIntrinsics()
-        self.fleet_prior = fleet_prior
         self._chosen: tuple[ChosenIntrinsics, Camera] | None = None
         self._history = restored.history
         self._placements: tuple[Placement, ...] | None = None
@@ -410,7 +406,6 @@ def open_workspace(
     warnings: tuple[DataWarning, ...] = (),
     camera_file: CameraFile | None = None,
     intrinsics: str = "",
-    fleet_prior: FleetPriorFile | None = None,
 ) -> Workspace:
     """Open or start the session of a recording, with its solver.
 
@@ -423,7 +418,6 @@ def open_workspace(
         warnings: what is known about the choice of the session folder.
         camera_file: the file that the intrinsics come from; None for the recording's own.
         intrinsics: where they come from, in words; by default, that file or the recording's topic.
-        fleet_prior: what the fleet says of this vehicle; optional.
 
     Without pictures there is nothing to click and nothing to store: the session folder is not touched.
 
@@ -436,10 +430,9 @@ def open_workspace(
         nothing = _Unstored(session_folder)
         return Workspace(facts, Restored(session_folder, History()), nothing, SolverWorker(recording, None))
     session_file = open_session_file(session_folder, facts, warnings)
-    prior = fleet_prior.prior if fleet_prior else None
-    solver = SolverWorker(recording, camera, reference.calibration if reference else None, prior)
+    solver = SolverWorker(recording, camera, reference.calibration if reference else None)
     given = GivenIntrinsics(camera, camera_file, intrinsics or _source_of(camera, camera_file, recording))
-    return Workspace(facts, session_file.restored, session_file, solver, reference, given, fleet_prior)
+    return Workspace(facts, session_file.restored, session_file, solver, reference, given)
 
 
 def _source_of(camera: Camera | None, camera_file: CameraFile | None, recording: Recording) -> str:

@@ -12,7 +12,6 @@ import numpy as np
 from benchmarks.fleet.simulated_poses import Accuracy, Spread, simulated_fleet, simulated_mounting, simulated_session
 from calib_core.fleet import (
     MountingScatter,
-    fleet_prior_of,
     mounting_of,
     mounting_scatter,
     mountings_of,
@@ -21,7 +20,6 @@ from calib_core.fleet import (
     transitions_of,
 )
 from calib_core.fleet.mountings import Mounting
-from calib_core.fleet.session_pose import CHI2_95
 from calib_core.geometry import RigidTransform
 
 _NEW = 50
@@ -30,7 +28,7 @@ _ACCURACIES = (Accuracy(0.001, 0.05), Accuracy(0.02, 0.15), Accuracy(0.07, 0.6))
 
 
 def main() -> None:
-    """Print the three tables."""
+    """Print the two tables."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.fleet", description=__doc__)
     parser.add_argument(
         "--fleets",
@@ -42,8 +40,7 @@ def main() -> None:
     given = parser.parse_args()
     tables = (
         named(max(1, given.fleets // 4), given.seed),
-        predicted(given.fleets, given.seed),
-        gained(given.seed),
+        called_off(given.fleets, given.seed),
     )
     for line in chain.from_iterable(tables):
         print(line, flush=True)
@@ -79,55 +76,30 @@ def named(fleets: int, seed: int) -> Iterator[str]:
         )
 
 
-def predicted(fleets: int, seed: int) -> Iterator[str]:
-    """Say how often the next vehicle lies within the prior's 95 %, and how often a sound one is called off its kind."""
+def called_off(fleets: int, seed: int) -> Iterator[str]:
+    """Say how often a sound vehicle that is not of the fleet is called off its kind."""
     yield ""
-    yield "| vehicles | scatter | calibrations | coverage of the prior | sound vehicles called off their kind | no answer |"
-    yield "|---|---|---|---|---|---|"
+    yield "| vehicles | scatter | calibrations | sound vehicles called off their kind | no answer |"
+    yield "|---|---|---|---|---|"
     for vehicles in (5, 10, 49):
         for spread in (_NARROW, _WIDE):
             for accuracy in _ACCURACIES:
                 rng = np.random.default_rng(seed)
-                inside = called = silent = 0
+                called = silent = 0
                 for _ in range(fleets):
                     scatter = _scatter(vehicles, spread, accuracy, rng)
                     if scatter is None:
                         silent += 1
                         continue
-                    prior = fleet_prior_of(scatter)
-                    weight = np.linalg.inv(prior.covariance)
                     for _ in range(_NEW):
                         truth = simulated_mounting(spread, rng)
-                        error = truth.error_from(prior.camera_from_radar)
-                        inside += bool(error @ weight @ error <= CHI2_95)
                         outcome = off_kind(_calibrated(truth, accuracy, rng, "next"), scatter)
                         called += not hasattr(outcome, "is_off") or outcome.is_off
                 count = (fleets - silent) * _NEW
                 yield (
                     f"| {vehicles} | {100 * spread.position_m:g} cm, {spread.rotation_deg:g} deg | {_text(accuracy)} | "
-                    f"{100 * inside / count:.1f} % | {called} of {count} | {silent} of {fleets} |"
+                    f"{called} of {count} | {silent} of {fleets} |"
                 )
-
-
-def gained(seed: int) -> Iterator[str]:
-    """Say what the prior of 49 others does to the standard deviations of the next vehicle's calibration."""
-    yield ""
-    yield "| scatter | its calibration | sigma of position, without and with the prior | sigma of rotation |"
-    yield "|---|---|---|---|"
-    for spread in (_NARROW, _WIDE):
-        for own in (Accuracy(0.07, 0.6), Accuracy(0.14, 1.2)):
-            rng = np.random.default_rng(seed)
-            scatter = _scatter(49, spread, Accuracy(0.07, 0.6), rng)
-            assert scatter is not None
-            prior = fleet_prior_of(scatter)
-            alone = simulated_session(simulated_mounting(spread, rng), own, rng, vehicle="next").covariance
-            both = np.linalg.inv(np.linalg.inv(alone) + np.linalg.inv(prior.covariance))
-            figures = [
-                f"{unit * np.sqrt(np.trace(one[part, part])):.2f} -> {unit * np.sqrt(np.trace(other[part, part])):.2f} {name}"
-                for part, unit, name in ((slice(0, 3), 100.0, "cm"), (slice(3, 6), 180.0 / np.pi, "deg"))
-                for one, other in ((alone, both),)
-            ]
-            yield f"| {100 * spread.position_m:g} cm, {spread.rotation_deg:g} deg | {_text(own)} | {' | '.join(figures)} |"
 
 
 def _scatter(vehicles: int, spread: Spread, accuracy: Accuracy, rng: np.random.Generator) -> MountingScatter | None:

@@ -77,7 +77,7 @@ class _Design:
 def _design(used: Sequence[Pair], calibration: Calibration) -> _Design:
     """Invert the information of the used pairs and of all priors, with the estimated noise."""
     pose, camera = calibration.camera_from_radar, calibration.prior_camera
-    measurements = pair_measurements(used, camera, calibration.options, calibration.fleet_prior)
+    measurements = pair_measurements(used, camera, calibration.options)
     measurements = measurements.scaled(calibration.noise_scale)
     shared = measurements.errors
     errors = SystematicErrors((*shared.estimated, *shared.widening), lens=shared.lens)

@@ -26,7 +26,6 @@ _WEAK_POSITION_M = 0.3
 _NOISE_EXCESS = 2.5
 _NOTABLE_GROWTH = 2.5
 _FEW_INLIERS = 8
-_FEW_EXPECTED = 5  # of a pose that a fleet's prior predicts: its six parameters cost these pairs nothing
 _MANY_PLACES = 500  # of more, neighbours come from a tree: all distances would take too long
 _FOLLOWS_FROM_PIXELS = {"mirrored-axes", "handedness-open", "handedness-assumed", "intrinsics-suspected"}
 
@@ -90,8 +89,8 @@ def _many_outliers(fit: SolvedFit) -> list[DataWarning]:
 
 
 def _few_inliers(fit: SolvedFit) -> list[DataWarning]:
-    count, expected = int(fit.inliers.sum()), fit.measurements.prior.fleet is not None
-    if count >= (_FEW_EXPECTED if expected else _FEW_INLIERS):
+    count = int(fit.inliers.sum())
+    if count >= _FEW_INLIERS:
         return []
     return [
         DataWarning(
@@ -142,8 +141,7 @@ def _weak_geometry(fit: SolvedFit) -> list[DataWarning]:
         covariance = without_mounting(refined.camera_from_radar, covariance, refined.placements_z_m, fit.options.radar)
     sigma = np.sqrt(np.diag(covariance))
     rotation_rad, position_m = float(np.linalg.norm(sigma[3:])), float(np.linalg.norm(sigma[:3]))
-    given = fit.measurements.prior.measured or fit.measurements.prior.fleet is not None
-    narrow = fit.uncertainty.condition > _NARROW_CONDITION and not given
+    narrow = fit.uncertainty.condition > _NARROW_CONDITION and not fit.measurements.prior.measured
     if rotation_rad <= _WEAK_ROTATION_RAD and position_m <= _WEAK_POSITION_M and not narrow:
         return []
     range_m, azimuth_rad, _ = fit.measurements.polar[fit.refined.rows[fit.inliers]].T

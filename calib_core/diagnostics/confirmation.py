@@ -1,4 +1,4 @@
-"""Whether a person has confirmed the clicks that a pose rests on."""
+"""What a pose rests on beside its pairs: clicks that nobody confirmed, or the fleet's prior of an older version."""
 
 from calib_core.results import DataWarning, UnconfirmedClicks
 
@@ -23,4 +23,18 @@ def nobody_confirmed(unconfirmed: UnconfirmedClicks, count: int) -> DataWarning:
         "nobody-confirmed",
         f"{of_all} placed automatically (confidence {probability_text(unconfirmed.confidence)}), and nobody confirmed them",
         "look at each of them on the page: open the recording with the clicks that solve --auto --clicks-out wrote",
+    )
+
+
+def rests_on_fleet_prior(vehicle_type: str) -> DataWarning:
+    """Warn that an older version drew the pose of a file to the mean of other vehicles.
+
+    Args:
+        vehicle_type: of the vehicles.
+    """
+    return DataWarning(
+        "rests-on-fleet-prior",
+        f"an older version drew this pose to a fleet's prior of type {vehicle_type}, so it may hide how this vehicle differs "
+        "from the others",
+        "solve it again, from its recording or with solve --pairs from this file: the pose then rests on its own pairs",
     )

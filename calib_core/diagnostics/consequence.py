@@ -25,9 +25,8 @@ _CODES: dict[Consequence, tuple[str, ...]] = {
         "doubtful-pair",
     ),
     "weak": (
+        "rests-on-fleet-prior",
         "off-its-kind",
-        "far-from-its-kind",
-        "fleet-prior-untested",
         "weak-geometry",
         "swapped-parts",
         "one-pair-decides",
@@ -48,7 +47,6 @@ _CODES: dict[Consequence, tuple[str, ...]] = {
         "clicks-off-centre",
         "handedness-assumed",
         "nobody-confirmed",
-        "fleet-prior-decides",
     ),
 }
 """The codes of each consequence, the gravest first."""

@@ -90,8 +90,8 @@ class GroundSides:
 
 def mirrored_axes(fit: SolvedFit) -> list[DataWarning]:
     """Warn if mirrored radar axes are more likely, or about as likely."""
-    if fit.measurements.flat or fit.measurements.prior.fleet is not None:
-        return []  # a mirrored axis is then a rotation, which the pose absorbs; or the pose would be far from the fleet's
+    if fit.measurements.flat:
+        return []  # a mirrored axis is then a rotation, which the pose absorbs
     plane = _plane(fit)
     sides, heights_decide = _expected_sides(plane, fit), _heights_decide(plane)
     if sides is not None and sides.same and not heights_decide:
@@ -122,7 +122,7 @@ def assumed_axes(fit: SolvedFit) -> list[DataWarning]:
     """Warn if only the expected camera distance, and not the pairs, rules out mirrored axes."""
     already_warned = fit.mirror_gain > NOT_MIRRORED_GAIN or fit.measurements.flat
     prior, plane = fit.measurements.prior, _plane(fit)
-    if already_warned or prior.measured or prior.fleet is not None or _heights_decide(plane):
+    if already_warned or prior.measured or _heights_decide(plane):
         return []
     sides = _expected_sides(plane, fit)
     if sides is not None and (sides.same or sides.opposite):

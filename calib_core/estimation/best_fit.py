@@ -45,15 +45,12 @@ def best_fit(measurements: PairMeasurements, options: CalibrationOptions) -> Bes
     few = _some_pairs(measurements)
     most = _STARTS_MEASURED if measurements.prior.measured else _STARTS_FREE
     starts = initial_poses(few, most=most, rng=np.random.default_rng(seed))
-    fleet = measurements.prior.fleet
-    if fleet is not None:
-        starts = (*starts, fleet.mean)
     found = solve_gnc(few, starts, estimate_scale=estimate_scale)
     if not found:
         return degenerate(len(measurements))
     refined = fit_errors_in_variables(measurements, found[0], estimate_scale=estimate_scale)
     gain = -np.inf
-    if fleet is None and not _clearly_not_mirrored(measurements, refined):
+    if not _clearly_not_mirrored(measurements, refined):
         fitted = refined if few is measurements else None
         gain = mirror_gain(few, found[0], plain=fitted, estimate_scale=estimate_scale, seed=seed)
     inliers = int(refined.inliers.sum())
@@ -99,7 +96,7 @@ def _clearly_not_mirrored(measurements: PairMeasurements, refined: ErrorsInVaria
     corrected = measurements.with_errors(refined.measurements.errors.values)
     assumed = associate(corrected, refined.camera_from_radar)[1].squared.mean() / 2.0
     agreeing = agreeing and float(assumed) < _PLAUSIBLE_SCALE**2
-    prior_residual = measurements.prior.centre_rows(refined.camera_from_radar)[0]
+    prior_residual = measurements.prior.rows(refined.camera_from_radar)[0]
     return measurements.prior.measured and bool(agreeing) and float(np.linalg.norm(prior_residual)) < _NEAR_PRIOR
 
 

@@ -173,7 +173,7 @@ def _parts(refined: ErrorsInVariablesFit, plain: np.ndarray, assumed: Matrix66) 
     to_pose = _symmetric_inverse(plain)[:6]
     of_errors = to_pose[:, 6:] / refined.measurements.errors.sigma
     prior = refined.measurements.prior
-    of_position = to_pose[:, :6] @ prior.centre_rows(refined.camera_from_radar)[1].T * float(prior.measured)
+    of_position = to_pose[:, :6] @ prior.rows(refined.camera_from_radar)[1].T * float(prior.measured)
     return CovarianceParts(of_errors @ of_errors.T + assumed, of_position @ of_position.T)
 
 

@@ -5,15 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib_core.arrays import Indices, Matrix33, Points2, Points3, Values, Vector3, frozen_array
+from calib_core.arrays import Indices, Points2, Points3, Values, Vector3, frozen_array
 from calib_core.association.exclusive_returns import shared_returns
 from calib_core.camera import Camera
 from calib_core.estimation.click_density import click_density
-from calib_core.estimation.fleet_rows import FleetRows
 from calib_core.estimation.linearization import MeasurementPlanes
 from calib_core.estimation.systematic_errors import NO_ERRORS, SystematicErrors, systematic_errors
 from calib_core.estimation.unmeasured_elevation import OWN_SIGMA_RAD, is_flat
-from calib_core.fleet_prior import FleetPrior
 from calib_core.geometry import RigidTransform, skew
 from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions
@@ -22,7 +20,7 @@ from calib_core.radar import polar_from_cartesian
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraPrior:
-    """What is known of the pose before any pair: of the camera centre, and of the whole pose if a fleet's prior is used.
+    """What is known of the camera centre before any pair.
 
     Attributes:
         position_m: (3,) in the radar frame.
@@ -30,28 +28,18 @@ class CameraPrior:
         measured: whether it was measured with a tape and is fully used by the estimate; otherwise it only selects between
             poses, and its weight in the estimate decreases with the distance.
         height_sigma_m: what is added to the variance of its up coordinate, for a radar that does not measure elevation.
-        fleet: the prior of the whole pose; None if no fleet's prior is used.
     """
 
     position_m: Vector3
     sigma_m: float
     measured: bool
     height_sigma_m: float = 0.0
-    fleet: FleetRows | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "position_m", frozen_array(self.position_m, (3,)))
 
-    def rows(self, camera_from_radar: RigidTransform) -> tuple[Values, np.ndarray]:
-        """Return the whitened residual (3,) and its Jacobian (3, 6) for (dt, dtheta); nine rows with a fleet's prior."""
-        residual, jacobian = self.centre_rows(camera_from_radar)
-        if self.fleet is None:
-            return residual, jacobian
-        more, turned = self.fleet.rows(camera_from_radar.rotation, camera_from_radar.translation_m)
-        return np.concatenate([residual, more]), np.concatenate([jacobian, turned])
-
-    def centre_rows(self, camera_from_radar: RigidTransform) -> tuple[Vector3, Matrix33]:
-        """Return the same of the camera centre alone: (3,) and (3, 6)."""
+    def rows(self, camera_from_radar: RigidTransform) -> tuple[Vector3, np.ndarray]:
+        """Return the whitened residual (3,) and its Jacobian (3, 6) for (dt, dtheta)."""
         away_m = self.position_m + camera_from_radar.rotation.T @ camera_from_radar.translation_m
         sigma_m = np.sqrt(self._variance_m2(away_m))
         return away_m / sigma_m, self.centre_jacobian(camera_from_radar) / sigma_m[:, None]
@@ -71,15 +59,7 @@ class CameraPrior:
         return variance
 
     def information(self, rotations: np.ndarray, translations_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return J^T J (..., 6, 6) and J^T residual (..., 6) of `rows` at poses (..., 3, 3) and (..., 3)."""
-        hessians, gradients = self.centre_information(rotations, translations_m)
-        if self.fleet is None:
-            return hessians, gradients
-        more, pulls = self.fleet.information(rotations, translations_m)
-        return hessians + more, gradients + pulls
-
-    def centre_information(self, rotations: np.ndarray, translations_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the same of the camera centre alone.
+        """Return J^T J (..., 6, 6) and J^T residual (..., 6) of `rows` at poses (..., 3, 3) and (..., 3).
 
         In camera axes the residual is -(R c0 + t), its Jacobian (I, [t]x) and its precision R diag(1 / sigma^2) R^T.
         """
@@ -102,21 +82,11 @@ class CameraPrior:
         return np.asarray((rotations / variance[..., None, :]) @ to_radar)
 
     def weakened(self) -> "CameraPrior":
-        """Return the same position as a weak prior, with a sigma of at least 1 m, and without the fleet's."""
-        return replace(self, sigma_m=max(self.sigma_m, 1.0), measured=False, fleet=None)
+        """Return the same position as a weak prior, with a sigma of at least 1 m."""
+        return replace(self, sigma_m=max(self.sigma_m, 1.0), measured=False)
 
     def costs(self, rotations: np.ndarray, translations_m: np.ndarray) -> Values:
         """Return twice the negative log-probability of each pose (s,), up to a constant."""
-        return self.centre_costs(rotations, translations_m) + self.fleet_costs(rotations, translations_m)
-
-    def fleet_costs(self, rotations: np.ndarray, translations_m: np.ndarray) -> Values:
-        """Return the fleet's share of `costs`; zeros without its prior."""
-        if self.fleet is None:
-            return np.zeros(translations_m.shape[:-1])
-        return self.fleet.costs(rotations, translations_m)
-
-    def centre_costs(self, rotations: np.ndarray, translations_m: np.ndarray) -> Values:
-        """Return the share of the camera centre in `costs`."""
         away_m = (np.swapaxes(rotations, -1, -2) @ translations_m[..., None])[..., 0] + self.position_m
         sigma_m = np.array([self.sigma_m, self.sigma_m, np.hypot(self.sigma_m, self.height_sigma_m)])
         return np.asarray(((away_m / sigma_m) ** 2).sum(axis=-1))
@@ -209,9 +179,9 @@ class PairMeasurements:
         )
 
     def mirrored(self) -> "PairMeasurements":
-        """Return the pairs with the radar's y axis mirrored, without the fleet's prior: its pose is of the axes as given."""
+        """Return the pairs with the radar's y axis mirrored."""
         left_right = np.array([1.0, -1.0, 1.0])
-        prior = replace(self.prior, position_m=self.prior.position_m * left_right, fleet=None)
+        prior = replace(self.prior, position_m=self.prior.position_m * left_right)
         return replace(self, reported=self.reported * left_right, prior=prior)
 
     def with_errors(self, values: Values) -> "PairMeasurements":
@@ -247,9 +217,7 @@ class PairMeasurements:
         return replace(self, sigma_px=self.sigma_px * scale[0], sigma_polar=self.sigma_polar * scale[1:])
 
 
-def pair_measurements(
-    pairs: Sequence[Pair], camera: Camera, options: CalibrationOptions, fleet_prior: FleetPrior | None = None
-) -> PairMeasurements:
+def pair_measurements(pairs: Sequence[Pair], camera: Camera, options: CalibrationOptions) -> PairMeasurements:
     """Stack pairs into arrays; a missing click sigma is replaced by the assumed one."""
     candidates = [candidate for pair in pairs for candidate in pair.candidates]
     points = np.array([candidate.position_radar_m for candidate in candidates]).reshape(-1, 3)
@@ -269,7 +237,7 @@ def pair_measurements(
         reported=polar_from_cartesian(points),
         sigma_polar=sigma_polar,
         log_score=np.log(np.clip(score, 1e-6, 1.0)),
-        prior=_prior(options, fleet_prior, flat=flat),
+        prior=_prior(options, flat=flat),
         log_outlier=np.log(click_density(pixels_px, sigma_px, camera)),
         returns=shared_returns(pairs, window_s=options.locating.window_s),
         errors=systematic_errors(options, camera, flat=flat),
@@ -277,10 +245,9 @@ def pair_measurements(
     )
 
 
-def _prior(options: CalibrationOptions, fleet_prior: FleetPrior | None, *, flat: bool) -> CameraPrior:
-    fleet = None if fleet_prior is None else FleetRows.of(fleet_prior)
+def _prior(options: CalibrationOptions, *, flat: bool) -> CameraPrior:
     height_sigma_m = options.radar.height_sigma_m if flat else 0.0
     measured = options.solving.camera_position
     if measured is None:
-        return CameraPrior(np.zeros(3), options.solving.nominal_camera_distance_m, False, height_sigma_m, fleet)
-    return CameraPrior(np.array(measured.position_m), measured.sigma_m, True, height_sigma_m, fleet)
+        return CameraPrior(np.zeros(3), options.solving.nominal_camera_distance_m, False, height_sigma_m)
+    return CameraPrior(np.array(measured.position_m), measured.sigma_m, True, height_sigma_m)

@@ -25,13 +25,12 @@ def fit_metrics(measurements: PairMeasurements, refined: ErrorsInVariablesFit, l
     points = cartesian_from_polar(measurements.polar[refined.rows])
     projected = measurements.camera.project(refined.camera_from_radar @ points)
     errors = distances(projected, measurements.pixels_px)
-    prior, pose = measurements.prior, refined.camera_from_radar
     assumed = associate(measurements, refined.camera_from_radar)[1]
     return metrics_of(
         errors[inliers],
         held_out_distances_px=left_out.distance_px[inliers],
-        chi2=float(assumed.squared[inliers].sum()) + float(prior.fleet_costs(pose.rotation, pose.translation_m)),
-        degrees_of_freedom=2 * int(inliers.sum()) - (3 if prior.measured else 6) + (0 if prior.fleet is None else 6),
+        chi2=float(assumed.squared[inliers].sum()),
+        degrees_of_freedom=2 * int(inliers.sum()) - (3 if measurements.prior.measured else 6),
     )
 
 

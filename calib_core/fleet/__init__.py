@@ -1,8 +1,7 @@
-"""A fleet: how the mountings of a vehicle type scatter, what that says about the next vehicle, and which vehicle is off."""
+"""A fleet: what was remounted, how the mountings of a vehicle type scatter, and which vehicle is off its kind."""
 
 from calib_core.fleet.mounting_scatter import LeftOut, MountingScatter, mounting_scatter
 from calib_core.fleet.mountings import Mounting, mounting_of, mountings_of, transitions_of
-from calib_core.fleet.next_vehicle import fleet_prior_of
 from calib_core.fleet.off_kind import OffKind, off_kind, off_kinds
 from calib_core.fleet.radar_scale import KnownScale, RadarScale, radar_scales
 from calib_core.fleet.session_pose import SessionPose, session_pose
@@ -18,7 +17,6 @@ __all__ = [
     "RelevantChange",
     "SessionPose",
     "Transition",
-    "fleet_prior_of",
     "mounting_of",
     "mounting_scatter",
     "mountings_of",

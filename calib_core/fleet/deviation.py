@@ -73,31 +73,11 @@ def deviation(effects: RandomEffects, vector: Values, covariance: Matrix66, *, f
         covariance: (6, 6) of its calibration, in these coordinates.
         freedom: degrees of freedom of that.
     """
-    return departure(
-        vector - effects.mean,
-        effects.covariance,
-        covariance,
-        predicted_freedom=effects.freedom,
-        freedom=freedom,
-    )
-
-
-def departure(
-    away: Values, predicted: Matrix66, covariance: Matrix66, *, predicted_freedom: float, freedom: float
-) -> Deviation:
-    """Judge how far one mounting is from the mean of others, as `deviation` does.
-
-    Args:
-        away: (6,) coordinates of this one from that mean.
-        predicted: (6, 6) covariance of a further mounting about it.
-        covariance: (6, 6) of this one's calibration.
-        predicted_freedom: degrees of freedom of the scatter in `predicted`.
-        freedom: degrees of freedom of `covariance`.
-    """
+    away, predicted = vector - effects.mean, effects.covariance
     total = predicted + covariance
     squared = float(away @ np.linalg.solve(total, away))
     share = float(np.trace(np.linalg.solve(total, predicted))) / DIMENSIONS
-    nu = 1.0 / (share**2 / min(predicted_freedom, _MOST_KNOWN) + (1.0 - share) ** 2 / freedom)
+    nu = 1.0 / (share**2 / min(effects.freedom, _MOST_KNOWN) + (1.0 - share) ** 2 / freedom)
     whole = min(_WHOLE * share, _MOST_OF_FREEDOM * nu)
     limit = quantile(1.0 - FALSE_RATE, nu, whole=whole)
     return Deviation(away, total, squared, limit, tail(squared, nu, whole=whole))

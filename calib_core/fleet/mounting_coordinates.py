@@ -45,13 +45,6 @@ def coordinate_jacobian(camera_from_radar: RigidTransform, common: RigidTransfor
     return jacobian
 
 
-def pose_covariance(covariance: Matrix66, camera_from_radar: RigidTransform) -> Matrix66:
-    """Convert a covariance (6, 6) of coordinates about a mounting to one of (dt, dtheta) [m, rad] of its pose."""
-    back = np.linalg.inv(coordinate_jacobian(camera_from_radar, camera_from_radar))
-    converted = back @ covariance @ back.T
-    return np.asarray((converted + converted.T) / 2.0)
-
-
 def _log_jacobian(vector_rad: np.ndarray) -> np.ndarray:
     """Return d log(Exp(d) Exp(v)) / d d (3, 3): the inverse of the left Jacobian of the rotations."""
     angle, cross = float(np.linalg.norm(vector_rad)), skew(vector_rad)

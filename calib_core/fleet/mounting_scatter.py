@@ -202,7 +202,7 @@ def _too_few(count: int, left_out: int) -> Unsolvable:
     return Unsolvable(
         "too-few-vehicles",
         f"{count} of at least {MIN_MOUNTINGS} required mountings{without}: too few to tell how they scatter",
-        "calibrate more vehicles of this type, or go on without a prior",
+        "calibrate more vehicles of this type",
     )
 
 

@@ -36,7 +36,7 @@ def off_kind(mounting: Mounting, scatter: MountingScatter) -> OffKind | Unsolvab
     """Test one mounting against the other vehicles of its type: none of its own vehicle's mountings counts among them.
 
     Args:
-        mounting: the mounting, as calibrated without the fleet's prior.
+        mounting: the mounting.
         scatter: of the type, with or without this vehicle.
     """
     others = scatter.without(mounting.vehicle)
@@ -74,6 +74,5 @@ def _judged(mounting: Mounting, others: MountingScatter) -> OffKind:
         count,
         True,
         f"{mounting.vehicle} is off its kind: {away.text} ({figures})",
-        "check that radar, camera and intrinsics are this vehicle's and that the type is right; if the mounting really is so, "
-        "calibrate it without the fleet's prior",
+        "check that radar, camera and intrinsics are this vehicle's and that the type is right",
     )

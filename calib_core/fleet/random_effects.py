@@ -13,10 +13,6 @@ follows by EM: restricted maximum likelihood with an inverse-Wishart prior that 
 S_0, q at its posterior mean. Where the errors hide the scatter, S stays at S_0, which the flat prior keeps from collapsing to
 zero.
 
-A further vector is farther out than S + cov(mu) says, for two reasons. Given the data, it is a mixture of normal vectors, one for
-each level, with wider tails than one normal vector with the mixture's covariance. And the shape of S is a guess: with exactly
-known vectors it is (8 S_0 + n S_data) / (n + 8), which varies as a covariance from (n + 8)^2 / n vectors does, and Hotelling's
-T^2 with these degrees of freedom says how far out a vector then is. Each reason gives one factor.
 """
 
 from dataclasses import dataclass
@@ -24,7 +20,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.arrays import Matrix66, Values, frozen_array
-from calib_core.fleet.tails import DIMENSIONS, mixture_quantile, quantile
 
 PRIOR_VECTORS = 8.0
 """Vectors that the prior on the shape of the scatter counts for."""
@@ -35,8 +30,6 @@ _REACH = 5.0  # times the root mean square of the vectors
 _NEGLIGIBLE = 1e-5
 _LEAST_SPREAD = 1e-6  # m and rad: below what anything is mounted to
 _ITERATIONS, _CONVERGED = 60, 1e-4
-_INSIDE = 0.95
-_LEAST_GROWN = 1e-9
 _BLOCKS = (slice(0, 3), slice(3, 6))
 
 
@@ -49,9 +42,6 @@ class RandomEffects:
         mean_covariance: (6, 6) of the mean.
         scatter: (6, 6) of the vectors about it.
         informative: how many exactly known vectors say as much about the scatter, 0 to n.
-        level_widened: the 95 % quantile of a further vector's squared distance with all levels that the data allow, over that
-            with one level: the covariance is wider by that much because the level is not known.
-        shape_freedom: degrees of freedom with which the shape of `covariance` varies.
         of_stated: how much of the stated variances there is, 0 to 1: the posterior mean; 1 if nothing was stated.
     """
 
@@ -59,8 +49,6 @@ class RandomEffects:
     mean_covariance: Matrix66
     scatter: Matrix66
     informative: float
-    level_widened: float = 1.0
-    shape_freedom: float = float("inf")
     of_stated: float = 1.0
 
     def __post_init__(self) -> None:
@@ -77,12 +65,6 @@ class RandomEffects:
     def freedom(self) -> float:
         """Degrees of freedom of the estimated scatter."""
         return PRIOR_VECTORS + max(self.informative - 1.0, 0.0)
-
-    @property
-    def widened(self) -> float:
-        """By how much `covariance` is to be wider, so that its 95 % ellipsoid contains a further vector in 95 % of cases."""
-        known = quantile(_INSIDE, float("inf"))
-        return self.level_widened * quantile(_INSIDE, self.shape_freedom, whole=DIMENSIONS - 1.0) / known
 
 
 def random_effects(vectors: np.ndarray, covariances: np.ndarray, stated: np.ndarray | None = None) -> RandomEffects:
@@ -120,31 +102,8 @@ def random_effects(vectors: np.ndarray, covariances: np.ndarray, stated: np.ndar
         mean_covariance=(mean_covariance + mean_covariance.T) / 2.0,
         scatter=scatter,
         informative=float(np.einsum("nij,nji->", shares, shares)) / vectors.shape[1],
-        level_widened=levels.widened,
-        shape_freedom=_shape_freedom(scatter, weights),
         of_stated=levels.of_stated,
     )
-
-
-def _shape_freedom(scatter: np.ndarray, weights: np.ndarray) -> float:
-    """Return with how many degrees of freedom the shape of a further vector's covariance varies.
-
-    Along the axes in which the mean's information is diagonal, m_ij vectors tell the scatter's element ij, so it varies with
-    (m_ij + 8)^2 / m_ij degrees of freedom; in the covariance of a further vector it counts by its share s_i s_j. A squared
-    distance grows by the sum of (1 + d_ij) s_i s_j m_ij / (m_ij + 8)^2, and by p (p + 1) / nu if all have nu.
-
-    Args:
-        scatter: (6, 6).
-        weights: (n, 6, 6) inverse covariances of the vectors about their mean.
-    """
-    root = np.linalg.cholesky(scatter)
-    shares = root.T @ weights @ root  # of the scatter in what each vector varies by
-    information, axes = np.linalg.eigh(shares.sum(axis=0))
-    along = np.einsum("ai,nab,bi->ni", axes, shares, axes)
-    vectors = along.T @ along
-    of_scatter = information / (information + 1.0)
-    grown = np.outer(of_scatter, of_scatter) * vectors / (vectors + PRIOR_VECTORS) ** 2 * (1.0 + np.eye(DIMENSIONS))
-    return DIMENSIONS * (DIMENSIONS + 1) / max(float(grown.sum()), _LEAST_GROWN)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -154,12 +113,10 @@ class _Levels:
     Attributes:
         variances: (2,) per axis of position and rotation, posterior means.
         of_stated: how much of the stated variances there is, posterior mean.
-        widened: by how much the tails of a further vector are wider.
     """
 
     variances: np.ndarray
     of_stated: float
-    widened: float
 
 
 def _levels(vectors: np.ndarray, covariances: np.ndarray, stated: np.ndarray) -> _Levels:
@@ -173,8 +130,7 @@ def _levels(vectors: np.ndarray, covariances: np.ndarray, stated: np.ndarray) ->
         steps = (high - low) / _NODES
         axes = low[:, None] + steps[:, None] * (np.arange(_NODES) + 0.5)
         grid = np.stack(np.meshgrid(*axes, parts, indexing="ij"), axis=-1)
-        nodes = _Nodes.at(centred, covariances, stated, grid.reshape(-1, 3))
-        likelihood = nodes.log_likelihood.reshape(grid.shape[:3])
+        likelihood = _log_likelihood(centred, covariances, stated, grid.reshape(-1, 3)).reshape(grid.shape[:3])
         density = np.exp(likelihood - likelihood.max())
         for block in range(2):
             marginal = density.sum(axis=(1 - block, 2))
@@ -185,51 +141,25 @@ def _levels(vectors: np.ndarray, covariances: np.ndarray, stated: np.ndarray) ->
     return _Levels(
         variances=(density[..., None] * grid[..., :2] ** 2).sum(axis=(0, 1, 2)),
         of_stated=float((density * grid[..., 2]).sum()),
-        widened=nodes.widened(density.ravel()),
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Nodes:
-    """Levels of the scatter, and what the data say with each.
+def _log_likelihood(vectors: np.ndarray, covariances: np.ndarray, stated: np.ndarray, levels: np.ndarray) -> Values:
+    """Return what the data say (g,) of levels (g, 3), with the mean integrated out.
 
-    Attributes:
-        log_likelihood: (g,) with the mean integrated out.
-        variances: (g, 6) of the scatter.
-        means: (g, 6) estimated means.
-        mean_covariances: (g, 6, 6) of these.
+    Args:
+        vectors: (n, 6).
+        covariances: (n, 6, 6) of each.
+        stated: (n, 6, 6) what of it is an upper limit.
+        levels: (g, 3) standard deviations of position and rotation, and how much of the stated variances there is.
     """
-
-    log_likelihood: np.ndarray
-    variances: np.ndarray
-    means: np.ndarray
-    mean_covariances: np.ndarray
-
-    @classmethod
-    def at(cls, vectors: np.ndarray, covariances: np.ndarray, stated: np.ndarray, levels: np.ndarray) -> "_Nodes":
-        """Weigh (g, 3): standard deviations of position and rotation, and how much of the stated variances there is."""
-        variances = np.repeat(levels[:, :2] ** 2, 3, axis=1)
-        unused = (1.0 - levels[:, 2])[:, None, None, None] * stated
-        total = covariances - unused + variances[:, None, :, None] * np.eye(6)
-        weights = np.linalg.inv(total)
-        information = weights.sum(axis=1)
-        weighted = np.einsum("gnij,nj->gi", weights, vectors)
-        mean_covariances = np.linalg.inv(information)
-        means = np.einsum("gij,gj->gi", mean_covariances, weighted)
-        squared = np.einsum("ni,gnij,nj->g", vectors, weights, vectors, optimize=True) - (weighted * means).sum(axis=1)
-        log_volume = np.linalg.slogdet(total)[1].sum(axis=1) + np.linalg.slogdet(information)[1]
-        return cls(-0.5 * (log_volume + squared), variances, means, mean_covariances)
-
-    def widened(self, probabilities: np.ndarray) -> float:
-        """Return the 95 % quantile of a further vector's squared distance over that of a normal vector.
-
-        Args:
-            probabilities: (g,) of the levels, given the data.
-        """
-        each = self.mean_covariances + self.variances[:, :, None] * np.eye(6)
-        away = self.means - probabilities @ self.means
-        covariance = np.einsum("g,gij->ij", probabilities, each + away[:, :, None] * away[:, None, :])
-        scale = np.sqrt(np.diag(covariance))
-        whitening = np.linalg.inv(np.linalg.cholesky(covariance / np.outer(scale, scale))) / scale
-        squares = np.linalg.eigvalsh(whitening @ each @ whitening.T)
-        return max(1.0, mixture_quantile(_INSIDE, squares, probabilities) / quantile(_INSIDE, float("inf")))
+    variances = np.repeat(levels[:, :2] ** 2, 3, axis=1)
+    unused = (1.0 - levels[:, 2])[:, None, None, None] * stated
+    total = covariances - unused + variances[:, None, :, None] * np.eye(6)
+    weights = np.linalg.inv(total)
+    information = weights.sum(axis=1)
+    weighted = np.einsum("gnij,nj->gi", weights, vectors)
+    means = np.einsum("gij,gj->gi", np.linalg.inv(information), weighted)
+    squared = np.einsum("ni,gnij,nj->g", vectors, weights, vectors, optimize=True) - (weighted * means).sum(axis=1)
+    log_volume = np.linalg.slogdet(total)[1].sum(axis=1) + np.linalg.slogdet(information)[1]
+    return np.asarray(-0.5 * (log_volume + squared))

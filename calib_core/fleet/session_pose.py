@@ -42,7 +42,6 @@ class SessionPose:
         reference_radar_m: (3,) the position in the radar frame where these are stated; None if unknown.
         angle_scales: what is known of the radar's azimuth and elevation scale.
         measured: the camera position in the radar frame that was measured with a tape, and its standard deviation; None without.
-        of_data_alone: the calibration was made with a fleet's prior, and this is the answer of its data without it.
 
     Raises:
         InputError: pose and covariance cannot be used: a number is not finite, or the covariance is singular.
@@ -61,7 +60,6 @@ class SessionPose:
     reference_radar_m: Vector3 | None = None
     angle_scales: tuple[SystematicErrorResult, ...] = ()
     measured: CameraPositionPrior | None = None
-    of_data_alone: bool = False
     of_tape: Matrix66 = field(default_factory=lambda: np.zeros((6, 6)))
 
     def __post_init__(self) -> None:
@@ -115,9 +113,6 @@ def session_pose(
     session with these sensors, so further sessions do not average them out; `Calibration.covariance_parts` says what they come
     to. Where a file does not state that, all of its covariance is taken.
 
-    Of a calibration that rests on a fleet's prior it is the answer of the data alone: its pose is drawn to the fleet's mean,
-    which would hide scatter and remounts.
-
     Args:
         calibration: with a covariance.
         vehicle: its name.
@@ -127,10 +122,13 @@ def session_pose(
         camera_serial: of the camera.
 
     Raises:
-        InputError: the calibration states no uncertainty, or a singular one, or nothing but a fleet's prior gives its pose.
+        InputError: the calibration states no uncertainty, or a singular one; or a fleet's prior, which hides scatter and
+            remounts, drew its pose to the others'.
     """
-    if calibration.fleet_prior is not None:
-        calibration = _of_data_alone(calibration, f"vehicle {vehicle!r}, session {session!r}")
+    if any(warning.code == "rests-on-fleet-prior" for warning in calibration.warnings):
+        raise InputError(
+            f"vehicle {vehicle!r}, session {session!r}: an older version drew its pose to a fleet's prior; solve it again"
+        )
     parts = calibration.covariance_parts or CovarianceParts(calibration.covariance, np.zeros((6, 6)))
     places_m = [pair.point_radar_m for pair in calibration.pairs if pair.inlier]
     return SessionPose(
@@ -147,18 +145,5 @@ def session_pose(
         reference_radar_m=np.median(places_m, axis=0) if places_m else None,
         angle_scales=tuple(one for one in calibration.systematic_errors if one.name in _SCALES and one.estimated),
         measured=calibration.options.solving.camera_position,
-        of_data_alone=calibration.fleet_prior is not None,
         of_tape=parts.camera_position,
     )
-
-
-def _of_data_alone(calibration: Calibration, where: str) -> Calibration:
-    """Return a calibration with the pose of its data alone, as far as the fleet needs it.
-
-    Raises:
-        InputError: they give none.
-    """
-    alone = calibration.fleet.data_alone if calibration.fleet is not None else None
-    if alone is None:
-        raise InputError(f"{where}: only the fleet's prior closes what its placements leave open; add placements")
-    return calibration.of_data_alone(alone)

@@ -1,13 +1,10 @@
 """How far out an estimate may be if its covariance was itself estimated: quantiles of Hotelling's T2 in six dimensions."""
 
-import numpy as np
-
 DIMENSIONS = 6
 FALSE_RATE = 1e-4
 """How often a sound calibration is named by one test: the point beyond which a change or a vehicle is."""
 
 _MOST_FREEDOM = 1e7
-_HALVINGS = 50
 
 
 def quantile(probability: float, freedom: float, *, whole: float = 0.0) -> float:
@@ -34,26 +31,3 @@ def tail(squared: float, freedom: float, *, whole: float = 0.0) -> float:
     return (
         float(fdtrc(DIMENSIONS, nu - whole, value)) if value > 1.0 else 1.0 - float(fdtr(DIMENSIONS, nu - whole, value))
     )
-
-
-def mixture_quantile(probability: float, variances: np.ndarray, weights: np.ndarray) -> float:
-    """Return what the squared length of a mixture of normal vectors is below with a probability.
-
-    Each part's squared length is a sum of chi-squares, taken as one chi-square with its mean and variance (Satterthwaite).
-
-    Args:
-        probability: 0 to 1.
-        variances: (g, k) of each part along its axes.
-        weights: (g,) of the parts; they add up to 1.
-    """
-    from scipy.special import chdtr
-
-    sums, squares = variances.sum(axis=1), (variances**2).sum(axis=1)
-    freedoms, scales = sums**2 / squares, squares / sums
-    low, high = 0.0, float(sums.max())
-    while weights @ chdtr(freedoms, high / scales) < probability:
-        high *= 2.0
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if weights @ chdtr(freedoms, middle / scales) < probability else (low, middle)
-    return high

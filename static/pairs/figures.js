@@ -22,8 +22,6 @@ const apartTable = make("table", "", []);
 const apart = make("div", "apart", []);
 const assumedHead = make("div", "pose-head", "Not measured by this radar, assumed");
 const assumedTable = make("table", "", []);
-const fleetWords = make("div", "", []);
-const fleet = make("div", "prior", []);
 const systematicTable = make("tbody", "", []);
 const systematicWords = make("div", "", []);
 const systematicNote = make("p", "note", "");
@@ -36,8 +34,7 @@ export function startFigures() {
   const heads = [["error", ""], ["estimate", "From the pairs, ± one standard deviation"], ["before", "Assumed before any pair: Options"], ["position", "Part of the variance of the position"], ["rotation", "Part of the variance of the rotation"]];
   const head = make("tr", "", heads.map(([name, hint]) => hinted(make("th", "", name), hint)));
   systematic.append(make("div", "pose-head", "Errors that all pairs share"), systematicWords, make("table", "", [make("thead", "", [head]), systematicTable]), systematicNote);
-  fleet.append(make("div", "pose-head", "With the fleet's prior"), fleetWords);
-  posePage.append(poseHead, apart, pose, fleet, systematic);
+  posePage.append(poseHead, apart, pose, systematic);
   on(["view", "recording", "placements"], draw);
 }
 
@@ -54,8 +51,6 @@ function draw() {
   poseTable.replaceChildren(...(view.pose.length ? view.pose.map(row) : [make("tr", "", [make("td", "", "Available after the first calibration.")])]));
   assumedHead.hidden = assumedTable.hidden = view.pose_assumed.length === 0;
   assumedTable.replaceChildren(...view.pose_assumed.map(row));
-  fleet.hidden = view.fleet.length === 0;
-  fleetWords.replaceChildren(...view.fleet.map((text) => make("p", "", text)));
   drawSystematic(view.systematic_errors);
   adviceLine.textContent = view.advice?.words ?? "";
   drawReference(view);

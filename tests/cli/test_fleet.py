@@ -10,7 +10,6 @@ import numpy as np
 import pyarrow.parquet
 import pytest
 
-from calib_core.interchange.own.fleet_prior_json import read_fleet_prior
 from cocalib.batch.results_folder import ResultsFolder
 from cocalib.fleet.index import index_path
 from tests.unit.app.fleet.made_results import digest_of, make_fleet, make_result
@@ -96,20 +95,6 @@ def test_compare_says_whether_two_differ(cocalib: Cocalib, moved: Path) -> None:
     assert "V000 and V001" in vehicles.out
 
 
-def test_the_prior_of_a_type_is_told_with_what_it_rests_on(cocalib: Cocalib, sound: Path, moved: Path) -> None:
-    text = cocalib("fleet", "prior", "van", sound)
-    assert text.code == 0, text.err
-    assert text.out.startswith("the next vehicle of type van, from 6 vehicles:")
-    found = json.loads(cocalib("fleet", "prior", "van", sound, "--json").out)
-    assert found["vehicles"] == [f"V00{index}" for index in range(6)]
-    assert np.linalg.eigvalsh(np.array(found["covariance"]))[0] > 0
-    assert all(one > 0 for one in found["sigma"].values())
-    few = cocalib("fleet", "prior", "van", moved)
-    assert few.code == 1
-    assert "too few to tell how they scatter" in few.err
-    assert cocalib("fleet", "prior", "lorry", sound).code == 2
-
-
 def test_rebuild_writes_index_and_summary(cocalib: Cocalib, moved: Path) -> None:
     answer = cocalib("fleet", "rebuild", moved)
     assert answer.code == 0, answer.err
@@ -154,7 +139,7 @@ def test_results_of_another_version_are_named(cocalib: Cocalib, tmp_path: Path) 
         (("compare", "A", "OUT"), "fleet compare takes A B OUT; 2 given"),
         (("status", "/nowhere"), "/nowhere: no such folder"),
         (("export", "OUT"), "--parquet FILE or --csv FILE"),
-        (("export", "OUT", "--json"), "--json applies to fleet status, history, compare, prior only"),
+        (("export", "OUT", "--json"), "--json applies to fleet status, history, compare only"),
         (("history", "V9", "OUT"), "no vehicle 'V9' among 6"),
         (("walk", "OUT"), "not 'walk'"),
     ],
@@ -171,27 +156,3 @@ def test_a_folder_without_results_is_refused(cocalib: Cocalib, tmp_path: Path) -
         answer = cocalib("fleet", action, tmp_path)
         assert answer.code == 2
         assert "no results" in answer.err
-
-
-def test_the_prior_is_written_for_solve_and_can_leave_the_vehicle_itself_out(
-    cocalib: Cocalib, sound: Path, pairs_file: Callable[..., Path], tmp_path: Path
-) -> None:
-    whole, other = tmp_path / "van.json", tmp_path / "without.json"
-    answer = cocalib("fleet", "prior", "van", sound, "--out", whole)
-    assert answer.code == 0
-    assert "the next vehicle of type van, from 6 vehicles" in answer.out
-    assert f"{whole} written" in answer.err
-    assert cocalib("fleet", "prior", "van", sound, "--without", "V003", "--out", other).code == 0
-    assert read_fleet_prior(whole.read_text()).vehicles == tuple(f"V00{index}" for index in range(6))
-    assert read_fleet_prior(other.read_text()).vehicles == ("V000", "V001", "V002", "V004", "V005")
-    assert read_fleet_prior(whole.read_text()).widened > 1.0
-    solve = ("solve", "--pairs", pairs_file(), "--out", tmp_path / "calibration.json", "--vehicle", "V003")
-    refused = cocalib(*solve, "--fleet-prior", whole)
-    assert refused.code == 2
-    assert "van.json: the prior rests on V003 itself" in refused.err
-    assert "cocalib fleet prior van OUT --without V003 --out FILE" in refused.err
-    assert cocalib(*solve, "--fleet-prior", other).code == 0
-    unknown = cocalib("fleet", "prior", "van", sound, "--without", "V9")
-    assert unknown.code == 2
-    assert "--without V9: no vehicle of type van has this name; there are V000, V001" in unknown.err
-    assert cocalib("fleet", "status", sound, "--out", whole).code == 2

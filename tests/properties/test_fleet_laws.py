@@ -8,7 +8,6 @@ from benchmarks.fleet.simulated_poses import NOMINAL, Accuracy, Spread, simulate
 from calib_core.fleet import (
     MountingScatter,
     SessionPose,
-    fleet_prior_of,
     mounting_of,
     mounting_scatter,
     mountings_of,
@@ -17,7 +16,6 @@ from calib_core.fleet import (
 from calib_core.fleet.mounting_coordinates import (
     coordinate_jacobian,
     coordinates,
-    pose_covariance,
     pose_from_coordinates,
 )
 from calib_core.geometry import RigidTransform, rotation_exp
@@ -82,28 +80,6 @@ def test_the_jacobian_of_the_coordinates_is_the_slope_of_the_numbers(one: np.nda
         for axis in np.eye(6)
     ]
     np.testing.assert_allclose(coordinate_jacobian(pose, common), np.stack(columns, axis=-1), atol=2e-6)
-
-
-@given(_vectors, _seeds)
-def test_a_covariance_in_coordinates_and_back(pose: np.ndarray, seed: int) -> None:
-    centre, root = _poses(pose), np.random.default_rng(seed).standard_normal((6, 6))
-    jacobian = coordinate_jacobian(centre, centre)
-    there = jacobian @ pose_covariance(root @ root.T, centre) @ jacobian.T
-    np.testing.assert_allclose(there, root @ root.T, atol=1e-9)
-
-
-@_few
-@given(_seeds, _vectors, _vectors)
-def test_the_prior_follows_a_common_change_of_frames(seed: int, camera: np.ndarray, radar: np.ndarray) -> None:
-    sessions, camera_turned, radar_from_other = _sessions(seed), rotation_exp(camera[3:]), _poses(radar)
-    plain = fleet_prior_of(_scatter(sessions))
-    moved = fleet_prior_of(_scatter([_moved(one, camera_turned, radar_from_other) for one in sessions]))
-    as_session = SessionPose("van", "mean", plain.camera_from_radar, plain.covariance)
-    expected = _moved(as_session, camera_turned, radar_from_other)
-    error = moved.camera_from_radar.error_from(expected.camera_from_radar)
-    assert error @ np.linalg.solve(expected.covariance, error) < 1e-4
-    root = np.linalg.inv(np.linalg.cholesky(expected.covariance))
-    np.testing.assert_allclose(root @ moved.covariance @ root.T, np.eye(6), atol=2e-2)
 
 
 @_few

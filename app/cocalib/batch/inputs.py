@@ -34,7 +34,7 @@ class InputPath:
     """A file or folder that a row names.
 
     Attributes:
-        role: recording, clicks, camera, boxes or fleet_prior.
+        role: recording, clicks, camera, or boxes.
         path: as the row has it.
     """
 
@@ -68,7 +68,7 @@ class InputPath:
 
 def inputs_of(row: ManifestRow) -> tuple[InputPath, ...]:
     """Return what a row names, in the order in which it is read."""
-    single = {"clicks": row.clicks, "camera": row.camera, "boxes": row.boxes, "fleet_prior": row.fleet_prior}
+    single = {"clicks": row.clicks, "camera": row.camera, "boxes": row.boxes}
     return (
         *(InputPath("recording", path) for path in row.recording),
         *(InputPath(role, path) for role, path in single.items() if path is not None),

@@ -16,7 +16,7 @@ from cocalib.platform.resources import version
 _RESULT_VERSION = 2
 """Counts up when the same inputs give other files."""
 _DIGITS = 32
-_SINGLE = ("clicks", "camera", "boxes", "fleet_prior")
+_SINGLE = ("clicks", "camera", "boxes")
 _UNREAD = "cannot be read"
 
 

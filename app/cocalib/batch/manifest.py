@@ -24,7 +24,6 @@ class ManifestRow:
         rescale_camera: scale these intrinsics to the recorded pictures, if they are the calibrated ones resized.
         reflector_m: width of the reflector as the camera sees it [m], for auto.
         boxes: file of boxes to evaluate by; None without.
-        fleet_prior: file of what the fleet says of the vehicle; None without.
         topics: which topics, and how they are read.
         options: of the calibration, the tape-measured camera position included.
         exports: names of export formats.
@@ -41,7 +40,6 @@ class ManifestRow:
     auto: bool = False
     camera: Path | None = None
     boxes: Path | None = None
-    fleet_prior: Path | None = None
     topics: RecordingOptions = field(default_factory=RecordingOptions)
     options: CalibrationOptions = field(default_factory=CalibrationOptions)
     exports: tuple[str, ...] = ()

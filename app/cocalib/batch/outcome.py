@@ -8,7 +8,6 @@ from msgspec import Meta, Struct, field
 OUTCOME_SCHEMA: Final = "cocalib/outcome-1"
 Status = Literal["solved", "weak", "refused", "failed"]
 """A good or usable calibration; one not to rely on; the data give none; an input cannot be read or the program failed."""
-PriorUse = Literal["used", "untested", "contradicted"]
 _RELATIVE = r"^(?!\.{1,2}(/|$))[^/\\\x00]+(/(?!\.{1,2}(/|$))[^/\\\x00]+)*$"
 """Names with slashes in between, none of them `.` or `..`."""
 StepState = Literal["done", "left out", "not available", "not asked", "failed"]
@@ -30,7 +29,7 @@ class OutcomeRun(Struct, frozen=True, forbid_unknown_fields=True):
     seconds: float
 
 
-class Outcome(Struct, frozen=True, forbid_unknown_fields=True):
+class Outcome(Struct, frozen=True):
     """What came of one job."""
 
     schema: Literal["cocalib/outcome-1"]
@@ -58,14 +57,6 @@ class Outcome(Struct, frozen=True, forbid_unknown_fields=True):
     """Mean residual of the used pairs [px]."""
     pairs: int = 0
     """How many were used."""
-    fleet_prior: PriorUse | None = None
-    """What a fleet's prior did: the pose rests on it, on it alone in part, or not, as the data contradict it; None without."""
-    alone_verdict: str | None = None
-    """On the answer of the data without the fleet's prior; None without a prior, or if they give no pose."""
-    alone_sigma_deg: float | None = None
-    """Largest standard deviation of the rotation of that answer about an axis [deg]."""
-    alone_sigma_cm: float | None = None
-    """Largest standard deviation of its position along an axis [cm]."""
     warnings: tuple[str, ...] = ()
     """Codes of the calibration's warnings, in order."""
     steps: dict[str, StepState] = field(default_factory=dict)

@@ -134,7 +134,7 @@ COMMANDS: Mapping[str, Command] = {
         Command(
             "fleet",
             "cocalib.cli.fleet.fleet:Fleet",
-            "Tell how a fleet is calibrated, from the results of a batch: status, history, comparisons, prior, summary page.",
+            "Tell how a fleet is calibrated, from the results of a batch: status, history, comparisons, summary page.",
         ),
         Command(
             "simulate",

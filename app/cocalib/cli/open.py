@@ -31,8 +31,6 @@ class Open:
     """With --camera: scale its intrinsics to the recorded pictures, if these are the calibrated ones resized."""
     calibration: File = None
     """A calibration to show, in any format: drawn until the clicks give a new one, then compared with it."""
-    fleet_prior: File = None
-    """What the fleet says of this vehicle (cocalib/fleet-prior-1 JSON, written by fleet prior); the data alone are shown, too."""
     clicks: File = None
     """Clicks to start a new session with (cocalib/clicks-1 JSON)."""
     session: Folder = None
@@ -53,7 +51,6 @@ class Open:
         from calib_core.interchange import CameraFile
         from calib_core.recordings import require_files
         from cocalib.opening import Choice, GivenClicks
-        from cocalib.solving.fleet_prior_file import FleetPriorFile
 
         if not self.recording:
             return _serve(None, self.serving, self.root)
@@ -63,7 +60,6 @@ class Open:
             paths,
             topics=self.topics,
             camera_file=None if self.camera is None else CameraFile.read(self.camera, rescale=self.rescale_camera),
-            fleet_prior=None if self.fleet_prior is None else FleetPriorFile.read(self.fleet_prior),
             calibration_file=self.calibration,
             clicks=None if self.clicks is None else GivenClicks(read_text(self.clicks), str(self.clicks)),
             options=self.measured.over(self.options),

@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from calib_core.interchange.own.clicks_json import ClicksFile
     from calib_core.recordings import Recording
     from cocalib.solving.automatic import PlacedClicks
-    from cocalib.solving.fleet_prior_file import FleetPriorFile
 
 _REFLECTOR_M = 0.24
 
@@ -68,8 +67,6 @@ class Solve:
     """Output file (cocalib/calibration-1 JSON); stdout if omitted."""
     refine_intrinsics: Switch = False
     """Estimate focal length, principal point and k1 with the pose; their covariance or the refining options say how sure."""
-    fleet_prior: File = None
-    """What the fleet says of this vehicle (cocalib/fleet-prior-1 JSON, written by fleet prior); the data alone are shown, too."""
     measured: CameraPosition = field(default_factory=MeasuredCamera)
     vehicle: Vehicle = field(default_factory=VehicleFlags)
     topics: Topics = field(default_factory=TopicFlags)
@@ -131,7 +128,7 @@ class Solve:
         self._require_folders()
         camera_file = None if self.camera is None else CameraFile.read(self.camera, rescale=self.rescale_camera)
         options = self._all_options()
-        file, fleet = self._clicks_file(), self._fleet_prior_file()
+        file = self._clicks_file()
         with open_recording(self.recording, self.topics) as recording:
             require_confirmed(recording)
             if recording.radar_choice:
@@ -140,7 +137,7 @@ class Solve:
             placed = self._placed(file, recording, camera, options)
             if isinstance(placed, Unsolvable):
                 return explain_unsolvable(placed)
-            outcome = solve_placed_clicks(recording, placed, camera, options, fleet.prior if fleet else None)
+            outcome = solve_placed_clicks(recording, placed, camera, options)
             if isinstance(outcome, Unsolvable):
                 return explain_unsolvable(outcome)
             self._write_clicks(placed, recording)
@@ -149,7 +146,6 @@ class Solve:
                 recording,
                 camera_file=camera_file,
                 unconfirmed=placed.unconfirmed,
-                fleet_prior=fleet.file if fleet else None,
                 vehicle=vehicle,
             )
             return self._deliver(outcome, text)
@@ -169,29 +165,6 @@ class Solve:
         from cocalib.solving.recorded_clicks import file_of_clicks
 
         return ClicksFile(()) if self.clicks is None else file_of_clicks(self.clicks)
-
-    def _fleet_prior_file(self) -> "FleetPriorFile | None":
-        """Read the fleet's prior, unless the method cannot use it; None without.
-
-        Raises:
-            InputError: it cannot be read, or used.
-        """
-        if self.fleet_prior is None:
-            return None
-        from calib_core.calibration import require_default
-        from cocalib.solving.fleet_prior_file import FleetPriorFile
-
-        fleet = FleetPriorFile.read(self.fleet_prior)
-        require_default(self.options, fleet.prior)
-        fleet.require_of_type(self.vehicle.vehicle_type)
-        fleet.require_not_of(self.vehicle.vehicle)
-        if self.vehicle.vehicle is None:
-            print(
-                f"{self.fleet_prior}: a prior must not rest on the vehicle that it is used for, and nobody said which this is: "
-                "name it with --vehicle",
-                file=sys.stderr,
-            )
-        return fleet
 
     def _placed(
         self, file: "ClicksFile", recording: "Recording", camera: Camera, options: CalibrationOptions
@@ -233,12 +206,10 @@ class Solve:
         from cocalib.solving.solving import calibration_text_of_pairs, solve_pairs
 
         text = read_text(path) if self.pairs_text is None else self.pairs_text
-        fleet = self._fleet_prior_file()
-        outcome = solve_pairs(text, str(path), self._all_options(), fleet.prior if fleet else None)
+        outcome = solve_pairs(text, str(path), self._all_options())
         if isinstance(outcome, Unsolvable):
             return explain_unsolvable(outcome)
-        given = fleet.file if fleet else None
-        return self._deliver(outcome, calibration_text_of_pairs(outcome, text, name_text(path.name), given, vehicle))
+        return self._deliver(outcome, calibration_text_of_pairs(outcome, text, name_text(path.name), vehicle))
 
     def _deliver(self, calibration: Calibration, text: str) -> int:
         from cocalib.solving.automatic import is_doubtful

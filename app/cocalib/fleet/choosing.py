@@ -30,15 +30,6 @@ class ComparedSessions:
     outcome: _Outcome
     words: str
 
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Which of the two was solved with a fleet's prior, to whose mean its stated pose is drawn."""
-        return tuple(
-            f"{one.vehicle}/{one.session} was solved with a fleet's prior; the answer of its data alone is compared"
-            for one in (self.a, self.b)
-            if one.of_data_alone
-        )
-
 
 def vehicle_named(fleet: FleetRecord, name: str) -> VehicleRecord:
     """Return the vehicle with a name.

@@ -7,14 +7,13 @@ from typing import Any, Final
 from calib_core.fleet import MountingScatter, OffKind, SessionPose, Transition
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 from cocalib.fleet.choosing import ComparedSessions
-from cocalib.fleet.kinds import Kind, NotCounted, PriorOfType, prior_sigma
+from cocalib.fleet.kinds import Kind, NotCounted
 from cocalib.fleet.records import FleetRecord, SessionRecord, UnreadResult, VehicleRecord
 from cocalib.fleet.standing import VehicleStanding, age_days
 
 STATUS_SCHEMA: Final = "cocalib/fleet-status-1"
 HISTORY_SCHEMA: Final = "cocalib/fleet-history-1"
 COMPARISON_SCHEMA: Final = "cocalib/fleet-comparison-1"
-PRIOR_SCHEMA: Final = "cocalib/fleet-mounting-1"
 _COORDINATES = ("forward_cm", "left_cm", "up_cm", "roll_deg", "pitch_deg", "yaw_deg")
 
 
@@ -69,23 +68,8 @@ def comparison_document(compared: ComparedSessions) -> dict[str, Any]:
     }
 
 
-def prior_document(found: PriorOfType) -> dict[str, Any]:
-    """Return what a type says of its next vehicle, and what that does not rest on."""
-    prior = found.prior
-    return {
-        "schema": PRIOR_SCHEMA,
-        "vehicle_type": prior.vehicle_type,
-        "camera_from_radar": _transform(prior.camera_from_radar),
-        "covariance": prior.covariance.tolist(),
-        "sigma": dict(zip(_COORDINATES, prior_sigma(prior), strict=True)),
-        "vehicles": list(prior.vehicles),
-        "not_counted": _not_counted(found.not_counted),
-        "shared_tape": found.shared_tape or None,
-    }
-
-
 def _compared(pose: SessionPose) -> dict[str, Any]:
-    return {"vehicle": pose.vehicle, "session": pose.session, "of_data_alone": pose.of_data_alone}
+    return {"vehicle": pose.vehicle, "session": pose.session}
 
 
 def _standing(standing: VehicleStanding, now_ns: int) -> dict[str, Any]:
@@ -119,14 +103,9 @@ def _session(record: SessionRecord) -> dict[str, Any]:
         "sigma_cm": outcome.sigma_cm,
         "aed_px": outcome.aed_px,
         "pairs": outcome.pairs,
-        "fleet_prior": outcome.fleet_prior,
-        "alone_verdict": outcome.alone_verdict,
-        "alone_sigma_deg": outcome.alone_sigma_deg,
-        "alone_sigma_cm": outcome.alone_sigma_cm,
         "report": record.report,
         "camera_from_radar": None if record.pose is None else _transform(record.pose.camera_from_radar),
         "covariance": None if record.pose is None else record.pose.covariance.tolist(),
-        "pose_of_data_alone": None if record.pose is None else record.pose.of_data_alone,
         "pose_problem": record.pose_problem or None,
     }
 

@@ -11,7 +11,7 @@ _NO_POSE_OF = frozenset({"contradictory", "nothing"})
 
 def is_compared(outcome: Outcome) -> bool:
     """Return whether the pose of a result is compared with others: not if its own data contradict it."""
-    return _NO_POSE_OF.isdisjoint({outcome.verdict, outcome.alone_verdict})
+    return outcome.verdict not in _NO_POSE_OF
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,18 +34,6 @@ class SessionRecord:
     def name(self) -> str:
         """The session's name."""
         return self.outcome.session
-
-    @property
-    def prior_words(self) -> str:
-        """What a fleet's prior did to its calibration, for a table; "" without one."""
-        return {"used": "with prior", "untested": "by prior", "contradicted": "off prior"}.get(
-            self.outcome.fleet_prior or "", ""
-        )
-
-    @property
-    def is_drawn(self) -> bool:
-        """Whether its pose is drawn to the mean of a fleet, so that figures of its data alone tell more of it."""
-        return self.outcome.fleet_prior in ("used", "untested")
 
     @property
     def compared_pose(self) -> SessionPose | None:

@@ -74,10 +74,6 @@ def _standing(vehicle: VehicleRecord, kind: OffKind | None) -> VehicleStanding:
 def _needs_of_session(record: SessionRecord) -> list[str]:
     """Return what is wrong with the last session itself."""
     outcome = record.outcome
-    if outcome.fleet_prior == "contradicted":
-        return [
-            f"{outcome.session} contradicts the fleet's prior, which was not used: {outcome.reason}; {outcome.hint}"
-        ]
     if outcome.status != "solved" or outcome.verdict in _POOR:
         poor = outcome.verdict if outcome.status in ("solved", "weak") and outcome.verdict else outcome.status
         why = "; ".join(filter(None, (outcome.reason, outcome.hint))) or "see its report"

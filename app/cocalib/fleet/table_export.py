@@ -21,15 +21,11 @@ _TEXT = (
     "verdict",
     "radar_serial",
     "camera_serial",
-    "fleet_prior",
-    "alone_verdict",
     "digest",
 )
 _REAL = (
     "sigma_deg",
     "sigma_cm",
-    "alone_sigma_deg",
-    "alone_sigma_cm",
     "aed_px",
     "qw",
     "qx",
@@ -74,7 +70,6 @@ def parquet_bytes(fleet: FleetRecord) -> bytes:
     kinds = {name: text for name in _TEXT} | {name: real for name in (*_REAL, *(f"change_{one}" for one in _CHANGE))}
     kinds |= {name: arrow.list_(real) for name in _LISTS}
     kinds |= {"recorded_ns": arrow.int64(), "pairs": arrow.int64(), "superseded": arrow.bool_()}
-    kinds |= {"pose_of_data_alone": arrow.bool_()}
     kinds |= {"change_from": text, "change_outcome": text}
     schema = arrow.schema([(name, kinds[name]) for name in _columns()])
     table = arrow.Table.from_pylist(list(_rows(fleet)), schema=schema)
@@ -85,7 +80,7 @@ def parquet_bytes(fleet: FleetRecord) -> bytes:
 
 def _columns() -> list[str]:
     change = ("change_from", "change_outcome", *(f"change_{one}" for one in _CHANGE))
-    before = (*_TEXT, "recorded_ns", "pairs", "superseded", *_REAL, "covariance", "pose_of_data_alone")
+    before = (*_TEXT, "recorded_ns", "pairs", "superseded", *_REAL, "covariance")
     return [*before, *change, "change", "change_covariance"]
 
 
@@ -100,14 +95,14 @@ def _rows(fleet: FleetRecord) -> Iterator[dict[str, Any]]:
 def _row(record: SessionRecord, change: Transition | None) -> dict[str, Any]:
     """Return every column of a result; None where nothing is known."""
     outcome = record.outcome
-    names = (*_TEXT, "recorded_ns", "pairs", "sigma_deg", "sigma_cm", "alone_sigma_deg", "alone_sigma_cm", "aed_px")
+    names = (*_TEXT, "recorded_ns", "pairs", "sigma_deg", "sigma_cm", "aed_px")
     row: dict[str, Any] = dict.fromkeys(_columns())
     row |= {name: getattr(outcome, name) for name in names} | {"superseded": False}
     if record.pose is not None:
         pose = record.pose.camera_from_radar
         numbers = [*quaternion_wxyz_from_matrix(pose.rotation).tolist(), *pose.translation_m.tolist()]
         row |= dict(zip(("qw", "qx", "qy", "qz", "x_m", "y_m", "z_m"), numbers, strict=True))
-        row |= {"covariance": record.pose.covariance.ravel().tolist(), "pose_of_data_alone": record.pose.of_data_alone}
+        row |= {"covariance": record.pose.covariance.ravel().tolist()}
     if change is not None:
         figures = {f"change_{one}": getattr(change, one) for one in _CHANGE}
         row |= {name: value if math.isfinite(value) else None for name, value in figures.items()}

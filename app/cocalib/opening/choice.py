@@ -11,7 +11,6 @@ from calib_core.input_files import name_text
 from calib_core.interchange import CameraFile
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import RecordingOptions
-from cocalib.solving.fleet_prior_file import FleetPriorFile
 from cocalib.web.messages import OpenWith, SessionPlan
 
 ChoicePart: TypeAlias = Literal["camera", "calibration", "clicks", "session"]
@@ -81,7 +80,6 @@ class Choice:
         name: what to call it; by default, the name of the first.
         topics: how to read it.
         camera_file: the intrinsics; None to use the recording's own.
-        fleet_prior: what the fleet says of the vehicle; None without.
         calibration_file: a calibration to show; None for none.
         pick: what its numbers mean, if it does not say and a person picked it.
         clicks: to start a new session with.
@@ -99,7 +97,6 @@ class Choice:
     name: str = ""
     topics: RecordingOptions = field(default_factory=RecordingOptions)
     camera_file: CameraFile | None = None
-    fleet_prior: FleetPriorFile | None = None
     calibration_file: Path | None = None
     pick: MeaningPick = MeaningPick()
     clicks: GivenClicks | None = None

@@ -150,7 +150,6 @@ def _workspace(choice: Choice, recording: Recording) -> Workspace:
                 *(about_calibration(calibration, shown, meaning) if len(recording.image_times) else ()),
             ),
             camera_file=choice.camera_file,
-            fleet_prior=choice.fleet_prior,
             intrinsics=name_text(calibration.name) if from_calibration and calibration else "",
         )
     workspace.open_meaning = meaning

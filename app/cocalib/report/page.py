@@ -11,7 +11,6 @@ from cocalib.report.sections.answer import answer
 from cocalib.report.sections.cautions import cautions
 from cocalib.report.sections.comparison import comparison
 from cocalib.report.sections.coverage import coverage
-from cocalib.report.sections.fleet_prior import fleet_prior
 from cocalib.report.sections.pairs import pair_table
 from cocalib.report.sections.provenance import provenance
 from cocalib.report.sections.residuals import residuals
@@ -39,8 +38,6 @@ def _sections(subject: ReportSubject) -> list[Child]:
     shown: list[Child] = [answer(subject), cautions(subject)]
     if subject.against is not None:
         shown.append(comparison(subject.against, subject.name))
-    if subject.calibration is not None:
-        shown.append(fleet_prior(subject.calibration))
     shown.append(uncertainty(subject))
     if subject.calibration is not None:
         shown += _of_pairs(subject, subject.calibration)

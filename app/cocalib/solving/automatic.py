@@ -10,7 +10,6 @@ import numpy as np
 from calib_core.association.pairing import RadarSource
 from calib_core.camera import Camera
 from calib_core.diagnostics.confirmation import nobody_confirmed
-from calib_core.fleet_prior import FleetPrior
 from calib_core.measurements import ReflectorClick, Unpaired, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.pose_difference import camera_position_jacobian
@@ -99,7 +98,6 @@ def solve_placed_clicks(
     placed: PlacedClicks,
     camera: Camera | None,
     options: CalibrationOptions,
-    fleet_prior: FleetPrior | None = None,
 ) -> Calibration | Unsolvable:
     """Solve with clicks that nobody may have confirmed: a pose that these contradict is refused.
 
@@ -108,13 +106,12 @@ def solve_placed_clicks(
         placed: the clicks.
         camera: the intrinsics.
         options: of the calibration.
-        fleet_prior: what the fleet says of this vehicle; optional. A far camera is believed if its kind is mounted so.
 
     Raises:
         OptionError: an option is out of range.
-        CalibrationError: the recording cannot be read at the clicks, or the method takes no fleet's prior.
+        CalibrationError: the recording cannot be read at the clicks.
     """
-    outcome = solve_clicks(recording, placed.clicks, camera, options, fleet_prior)
+    outcome = solve_clicks(recording, placed.clicks, camera, options)
     if isinstance(outcome, Unsolvable) or placed.unconfirmed is None:
         return outcome
     count = sum(click.counts for click in placed.clicks)
@@ -135,8 +132,7 @@ def refusal_of(calibration: Calibration, unpaired: tuple[Unpaired, ...] = ()) ->
         reason = f"nobody confirmed the clicks, and the pose from them is contradictory: {verdict.reason}"
         return Unsolvable("not-confident", reason, _BY_PERSON, unpaired)
     away_m = _least_distance_m(calibration)
-    expected = calibration.options.solving.camera_position is not None or calibration.fleet_prior is not None
-    if not expected and away_m > _FARTHEST_M:
+    if calibration.options.solving.camera_position is None and away_m > _FARTHEST_M:
         reason = (
             f"nobody confirmed the clicks, and by them the camera is at least {away_m:.1f} m from the radar: something that was "
             "carried along with the reflector would look the same"

@@ -10,10 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from calib_core.association.pairing import RadarSource, pair_clicks, scans_around
-from calib_core.calibration import calibrate_pairs, calibration_steps, require_default, solve_again
+from calib_core.calibration import calibrate_pairs, calibration_steps, solve_again
 from calib_core.camera import Camera
 from calib_core.errors import InputError, OptionError
-from calib_core.fleet_prior import FleetPrior
 from calib_core.input_files import name_text
 from calib_core.interchange import (
     CALIBRATION_SCHEMA,
@@ -49,7 +48,6 @@ def solve_clicks(
     clicks: Sequence[ReflectorClick],
     camera: Camera | None,
     options: CalibrationOptions,
-    fleet_prior: FleetPrior | None = None,
 ) -> Outcome:
     """Solve for camera_from_radar.
 
@@ -58,13 +56,12 @@ def solve_clicks(
         clicks: in any order; excluded ones are paired and shown, but not used.
         camera: the intrinsics; without them, the outcome says that they are missing.
         options: of the calibration.
-        fleet_prior: what the fleet says of this vehicle; optional.
 
     Raises:
         OptionError: an option is out of range.
-        CalibrationError: the recording cannot be read at the clicks, or the method takes no fleet's prior.
+        CalibrationError: the recording cannot be read at the clicks.
     """
-    *_, outcome = solve_in_steps(recording, clicks, camera, options, preview=False, fleet_prior=fleet_prior)
+    *_, outcome = solve_in_steps(recording, clicks, camera, options, preview=False)
     return outcome
 
 
@@ -76,7 +73,6 @@ def solve_in_steps(
     *,
     previous: Calibration | None = None,
     preview: bool = True,
-    fleet_prior: FleetPrior | None = None,
 ) -> Iterator[Outcome]:
     """Solve, with a preview of the answer first if there can be one; the last step is what `solve_clicks` returns.
 
@@ -87,13 +83,11 @@ def solve_in_steps(
         options: of the calibration.
         previous: the answer to nearly the same clicks.
         preview: make one.
-        fleet_prior: what the fleet says of this vehicle; optional.
 
     Raises:
         OptionError: an option is out of range.
-        CalibrationError: the recording cannot be read at the clicks, or the method takes no fleet's prior.
+        CalibrationError: the recording cannot be read at the clicks.
     """
-    require_default(options, fleet_prior)
     checked_options(options)
     if camera is None:
         yield Unsolvable(
@@ -104,9 +98,7 @@ def solve_in_steps(
         )
         return
     scans = scans_around(recording, clicks, options)
-    yield from calibration_steps(
-        clicks, scans, camera, options, previous=previous, preview=preview, fleet_prior=fleet_prior
-    )
+    yield from calibration_steps(clicks, scans, camera, options, previous=previous, preview=preview)
 
 
 def check_clicks(
@@ -157,9 +149,7 @@ _OPTIONS_OF_PAIRING = (
 """Options that choose radar returns: they cannot change pairs that exist already."""
 
 
-def solve_pairs(
-    text: str, source: str, options: CalibrationOptions | None = None, fleet_prior: FleetPrior | None = None
-) -> Outcome:
+def solve_pairs(text: str, source: str, options: CalibrationOptions | None = None) -> Outcome:
     """Solve for camera_from_radar from the text of a pairs-1 file, or again from that of a calibration-1 file.
 
     Args:
@@ -167,10 +157,9 @@ def solve_pairs(
         source: its name, for error messages.
         options: for the solver; None takes those of a calibration-1 file, and the defaults for a pairs-1 file, whose
             own statements about noise replace the options.
-        fleet_prior: what the fleet says of this vehicle; None takes that of a calibration-1 file, if it has one.
 
     Raises:
-        InputError: the text is neither, the method takes no fleet's prior, or a calibration without the candidates of its pairs.
+        InputError: the text is neither, or a calibration without the candidates of its pairs.
         OptionError: an option, or what the file says about noise, is out of range or cannot apply.
     """
     if names_schema(text, CALIBRATION_SCHEMA):
@@ -178,12 +167,12 @@ def solve_pairs(
         if options is not None:
             _require_same_pairing(calibration.options, options, source)
         try:
-            return solve_again(calibration, options, fleet_prior)
+            return solve_again(calibration, options)
         except InputError as error:
             raise InputError(f"{source}: {error}") from None
     options = checked_options(options or CalibrationOptions())
     pairs_file = read_pairs(text, source, noise=options.noise)
-    return calibrate_pairs(pairs_file.pairs, pairs_file.camera, pairs_file.options(options), fleet_prior=fleet_prior)
+    return calibrate_pairs(pairs_file.pairs, pairs_file.camera, pairs_file.options(options))
 
 
 def _require_same_pairing(kept: CalibrationOptions, given: CalibrationOptions, source: str) -> None:
@@ -234,7 +223,6 @@ def calibration_text(
     confirmed: Sequence[str] = (),
     camera_file: CameraFile | None = None,
     unconfirmed: UnconfirmedClicks | None = None,
-    fleet_prior: InputFile | None = None,
     vehicle: VehicleNote | None = None,
 ) -> str:
     """Write a calibration-1 file; the page and the command line give the same bytes for the same clicks.
@@ -245,7 +233,6 @@ def calibration_text(
         confirmed: texts of the assumptions that were confirmed after the recording was opened.
         camera_file: the file whose intrinsics were used; None for the recording's own.
         unconfirmed: clicks that nobody confirmed.
-        fleet_prior: the file of the fleet's prior; None without.
         vehicle: which vehicle it is of; None if nobody said.
     """
     assumed = [
@@ -258,7 +245,6 @@ def calibration_text(
         inputs=(
             *recording.fingerprint(),
             *([] if camera_file is None else [_input_file(camera_file)]),
-            *([] if fleet_prior is None else [fleet_prior]),
         ),
         radar_topic=recording.radar_topic,
         radar_topics=recording.radar_topics,
@@ -299,7 +285,6 @@ def calibration_text_of_pairs(
     calibration: Calibration,
     text: str,
     name: str,
-    fleet_prior: InputFile | None = None,
     vehicle: VehicleNote | None = None,
 ) -> str:
     """Write a calibration-1 file for a calibration solved from a pairs-1 file, or again from a calibration-1 file.
@@ -308,15 +293,11 @@ def calibration_text_of_pairs(
         calibration: what was solved.
         text: the content of the file of pairs.
         name: its name without the folder.
-        fleet_prior: the file of the fleet's prior, if one was given.
         vehicle: which vehicle it is of; what it leaves out is taken from a calibration-1 file.
     """
     vehicle = vehicle or VehicleNote()
     data = text.encode()
-    inputs = (
-        InputFile(name, len(data), hashlib.sha256(data).hexdigest()),
-        *([] if fleet_prior is None else [fleet_prior]),
-    )
+    inputs = (InputFile(name, len(data), hashlib.sha256(data).hexdigest()),)
     if names_schema(text, CALIBRATION_SCHEMA):
         file = read_calibration(text, name)
         provenance = dataclasses.replace(file.provenance, inputs=inputs, version=version())

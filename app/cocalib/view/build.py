@@ -14,7 +14,6 @@ from cocalib.view.box_panel import AccPanel
 from cocalib.view.box_rows import box_rows, known_labels
 from cocalib.view.click_rows import click_rows
 from cocalib.view.figures import assumed_figures, firm_text, metric_figures, pose_figures, residual_limit_px
-from cocalib.view.fleet_answer import fleet_sentences
 from cocalib.view.model import AssumptionRow, DismissedRow, Stage, SystematicErrorTable, View
 from cocalib.view.reference import Reference, comparison_figures, reference_words, shown_calibration
 from cocalib.view.systematic_errors import systematic_errors
@@ -71,7 +70,6 @@ def view(
         pose=pose_figures(shown) if shown else (),
         pose_assumed=assumed_figures(shown) if shown else (),
         systematic_errors=systematic_errors(shown) if shown else SystematicErrorTable(),
-        fleet=fleet_sentences(calibration) if calibration else (),
         warnings=_warnings(calibration) if calibration else (),
         options=session.options,
         residual_limit_px=residual_limit_px(calibration) if calibration else None,

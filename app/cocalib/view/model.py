@@ -208,7 +208,6 @@ class View:
         pose: the camera's position and angles relative to the radar, and the uncertainty in the picture.
         pose_assumed: the part of the pose that a radar without elevation does not show; empty for others.
         systematic_errors: the errors that all pairs share, and their parts in the uncertainty.
-        fleet: what the fleet's prior did, in sentences; empty without one.
         warnings: of the latest outcome, the gravest first.
         options: the current ones; changes are sent as a part of this tree.
         residual_limit_px: residuals above this should be checked; None without a calibration.
@@ -252,5 +251,4 @@ class View:
     box_labels: tuple[str, ...] = ()
     acc: AccPanel = field(default_factory=AccPanel)
     systematic_errors: SystematicErrorTable = field(default_factory=SystematicErrorTable)
-    fleet: tuple[str, ...] = ()
     verdict: VerdictRow = VerdictRow("nothing", "nothing yet", "")

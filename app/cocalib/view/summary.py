@@ -7,7 +7,6 @@ from calib_core.results import Calibration
 from calib_core.verdict import verdict_on
 from cocalib.view.figure import Figure
 from cocalib.view.figures import assumed_figures, metric_figures, pose_figures
-from cocalib.view.fleet_answer import fleet_sentences
 from cocalib.view.number_format import plain
 from cocalib.view.systematic_errors import refined_sentences, uncertainty_sentences
 from cocalib.view.wording import sentence
@@ -32,7 +31,6 @@ def summary_lines(calibration: Calibration) -> tuple[str, ...]:
         parts = ", ".join(f"{figure.label} {figure.value} {figure.unit}" for figure in assumed)
         lines.insert(len(pose), f"assumed, because this radar measures no elevation: {parts}")
     lines += [f"uncertainty: {line}" for line in uncertainty_sentences(calibration)]
-    lines += [f"fleet: {line}" for line in fleet_sentences(calibration)]
     lines += [f"intrinsics: {line}" for line in refined_sentences(calibration)]
     lines += [
         f"disagrees: {pair.id}: {plain(pair.distance_px)} px from its radar position"

@@ -171,22 +171,17 @@ class PosePosterior:
         return np.asarray(costs)
 
     def prior_costs(self, poses: Poses) -> Values:
-        """Return the share (s,) of the priors of camera centre and pose in the costs."""
+        """Return the share (s,) of the prior of the camera centre in the costs."""
         prior = self.measurements.prior
-        squared = prior.centre_costs(poses.rotations, poses.translations_m)
-        centre = squared if prior.measured else _TAIL * np.log1p(squared)
-        return np.asarray(centre + prior.fleet_costs(poses.rotations, poses.translations_m))
+        squared = prior.costs(poses.rotations, poses.translations_m)
+        return squared if prior.measured else np.asarray(_TAIL * np.log1p(squared))
 
     def prior_information(self, poses: Poses) -> tuple[np.ndarray, np.ndarray]:
         """Return its Hessians (s, 6, 6) and right-hand sides (s, 6) for Gauss-Newton steps."""
         prior = self.measurements.prior
-        hessians, gradients = prior.centre_information(poses.rotations, poses.translations_m)
+        hessians, gradients = prior.information(poses.rotations, poses.translations_m)
         factor = 1.0 if prior.measured else _TAIL
-        hessians, gradients = factor * hessians, factor * gradients
-        if prior.fleet is None:
-            return hessians, gradients
-        more, pulls = prior.fleet.information(poses.rotations, poses.translations_m)
-        return hessians + more, gradients + pulls
+        return factor * hessians, factor * gradients
 
     def pair_terms(self, poses: Poses, log_scales: np.ndarray) -> PairTerms:
         """Evaluate equation (6) at poses; log_scales is (s, 4), or (s, 0) for the assumed noise."""

@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 
 from calib_core.camera import Camera
+from calib_core.diagnostics.confirmation import rests_on_fleet_prior
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.input_files import encodable
@@ -27,7 +28,6 @@ from calib_core.interchange.own.angle_map_document import angle_map_document, an
 from calib_core.interchange.own.camera_document import camera_document, camera_of
 from calib_core.interchange.own.clicks_json import refuse_repeated_ids
 from calib_core.interchange.own.covariance_parts_document import covariance_parts_document, covariance_parts_of
-from calib_core.interchange.own.fleet_answer_document import fleet_answer_document, fleet_answer_of
 from calib_core.interchange.own.kept_results import kept_results, with_kept
 from calib_core.interchange.own.numbers import finite_or_none, nan_if_none, nested
 from calib_core.interchange.own.pair_document import SOLVED_FROM_KEYS, solved_pair_document, solved_pair_of
@@ -49,6 +49,7 @@ from calib_core.radar import RadarErrors
 from calib_core.results import Calibration, CheckPoint, DataWarning, Metrics
 from calib_core.verdict import Verdict, verdict_on
 
+_ABOUT_PRIOR = ("fleet-prior-untested", "fleet-prior-decides", "far-from-its-kind")
 COVARIANCE_CONVENTION = (
     "6x6, row-major, order (x, y, z, rotX, rotY, rotZ) [m, rad], of the error (dt, dtheta) of camera_from_radar "
     "in camera axes: t = t_hat + dt, R = Exp(dtheta) R_hat"
@@ -137,7 +138,6 @@ def write_calibration(file: CalibrationFile) -> str:
         pairs=[solved_pair_document(pair) for pair in calibration.pairs],
         camera=camera_document(calibration.camera),
         given_camera=camera_document(calibration.given_camera) if calibration.given_camera is not None else None,
-        fleet_prior=fleet_answer_document(calibration.fleet),
         vehicle=vehicle_document(file.vehicle, file.kept),
         options=documents.StatedOptions.of(calibration.options),
         provenance=provenance_document(file.provenance),
@@ -157,7 +157,6 @@ def write_calibration(file: CalibrationFile) -> str:
     absent |= {"verdict"} if file.verdict is None else set()
     absent |= {"evidence"} if file.evidence is None else set()
     absent |= {"given_camera"} if calibration.given_camera is None else set()
-    absent |= {"fleet_prior"} if calibration.fleet is None else set()
     absent |= {"vehicle"} if document.vehicle is None else set()
     absent |= {"covariance_parts"} if document.covariance_parts is None else set()
     if not calibration.systematic_errors and calibration.radar_errors == RadarErrors():
@@ -190,7 +189,6 @@ _KEY_ORDER = (
         "pairs",
         "camera",
         "given_camera",
-        "fleet_prior",
         "options",
     ),
     "provenance",
@@ -277,7 +275,7 @@ def _file(
         metrics=_metrics(document.metrics),
         pairs=tuple(solved_pair_of(pair, source=source, place=f"pairs[{i}]") for i, pair in enumerate(document.pairs)),
         unpaired=tuple(Unpaired(u.id, u.code, u.reason, u.hint) for u in document.unpaired),
-        warnings=tuple(DataWarning(c.code, c.message, c.hint) for c in document.warnings),
+        warnings=_warnings(document),
         options=document.options.options(),
         noise_scale=(scale.click, scale.range, scale.azimuth, scale.elevation),
         covariance_quantile=nan_if_none(document.covariance_quantile),
@@ -286,9 +284,9 @@ def _file(
         angle_map=angle_map_of(document.radar_angle_map, source=source),
         radar_errors=radar_errors_of(document.radar_errors),
         systematic_errors=tuple(map(systematic_error_of, document.systematic_errors)),
-        fleet=fleet_answer_of(document.fleet_prior, source=source),
         covariance_parts=covariance_parts_of(document.covariance_parts, source=source),
     )
+    rests_on_prior = document.fleet_prior is not None and document.fleet_prior.used
     try:
         frames = FrameNames(document.frames.radar, document.frames.camera)
     except InputError as error:
@@ -298,10 +296,19 @@ def _file(
         frames=frames,
         check_point=CheckPoint(np.array(check.radar_m), np.array(check.pixel_px)) if check else None,
         provenance=provenance_of(document.provenance),
-        verdict=_verdict_of(document.verdict),
+        verdict=verdict_on(calibration) if rests_on_prior else _verdict_of(document.verdict),
         evidence=document.evidence,
         vehicle=vehicle_of(document.vehicle, source=source),
     )
+
+
+def _warnings(document: documents.CalibrationDocument) -> tuple[DataWarning, ...]:
+    """Return the warnings; of a pose that rests on a fleet's prior one says so, instead of those about the prior."""
+    warnings = tuple(DataWarning(c.code, c.message, c.hint) for c in document.warnings)
+    prior = document.fleet_prior
+    if prior is None or not prior.used:
+        return warnings
+    return (rests_on_fleet_prior(prior.vehicle_type), *(one for one in warnings if one.code not in _ABOUT_PRIOR))
 
 
 CALIBRATION_1 = Format(

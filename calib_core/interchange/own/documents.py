@@ -49,9 +49,6 @@ Label = Annotated[str, Meta(extra_json_schema={"minLength": 1, "maxLength": MOST
 Positive = Annotated[float, Meta(ge=1e-12, le=1e9)]
 """A standard deviation; its square and the reciprocal of that are far from overflowing."""
 Count = Annotated[int, Meta(ge=0)]
-Widened = Annotated[float, Meta(ge=1.0, le=1e9)]
-"""How much wider an estimated covariance is for being estimated."""
-Freedom = Annotated[float, Meta(ge=1.0, le=1e9)]
 
 
 class TimeDocument(Struct, frozen=True, forbid_unknown_fields=True):
@@ -388,35 +385,11 @@ class CovariancePartsDocument(Struct, frozen=True, omit_defaults=True):
     camera_position: Matrix66 | None = None
 
 
-class DataAloneDocument(Struct, frozen=True, omit_defaults=True):
-    """The answer of the pairs without the fleet's prior, with level and reason of the verdict on it."""
-
-    camera_from_radar: TransformDocument
-    covariance: Matrix66
-    covariance_quantile: float | None = None
-    verdict: VerdictLevel | None = None
-    reason: str | None = None
-    covariance_parts: CovariancePartsDocument | None = None
-
-
-class FleetAnswerDocument(Struct, frozen=True, omit_defaults=True):
-    """A fleet's prior, and what it did: camera_from_radar and covariance are the prior's, as in fleet-prior-1.
-
-    used is false if the data alone contradict it: their squared distance from it is beyond limit. Without data_alone the data
-    gave no pose, so the prior was not tested.
-    """
+class FleetPriorDocument(Struct, frozen=True):
+    """What versions before this one wrote of a fleet's prior: read, so that a pose that rests on it is told, and not written."""
 
     vehicle_type: Name
     used: bool
-    camera_from_radar: TransformDocument
-    covariance: Matrix66
-    vehicles: Annotated[list[Name], Meta(min_length=1)]
-    left_out: list[Name] = []
-    widened: Widened | None = None
-    freedom: Freedom | None = None
-    squared_distance: float | None = None
-    limit: float | None = None
-    data_alone: DataAloneDocument | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -482,7 +455,7 @@ class CalibrationDocument(Struct, frozen=True):
     unpaired: list[UnpairedDocument] = []
     pairs: list[SolvedPairDocument] = []
     given_camera: CameraDocument | None = None
-    fleet_prior: FleetAnswerDocument | None = None
+    fleet_prior: FleetPriorDocument | None = None
     vehicle: VehicleDocument | None = None
     options: StatedOptions = field(default_factory=StatedOptions)
     provenance: ProvenanceDocument = field(default_factory=ProvenanceDocument)

@@ -15,7 +15,6 @@ from calib_core.interchange.own.documents import (
     ClicksDocument,
     PairsDocument,
 )
-from calib_core.interchange.own.fleet_prior_document import FLEET_PRIOR_SCHEMA, FleetPriorDocument
 from calib_core.interchange.own.lens_documents import (
     BOARD_VIEWS_SCHEMA,
     INTRINSICS_SCHEMA,
@@ -34,7 +33,6 @@ _DOCUMENTS: dict[str, Any] = {
     BOARD_VIEWS_SCHEMA: BoardViewsDocument,
     INTRINSICS_SCHEMA: IntrinsicsDocument,
     PROPOSALS_SCHEMA: ProposalsDocument,
-    FLEET_PRIOR_SCHEMA: FleetPriorDocument,
 }
 
 

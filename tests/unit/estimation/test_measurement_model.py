@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from calib_core.estimation.best_fit import BestFit, best_fit
 from calib_core.estimation.linearization import linearize
 from calib_core.estimation.measurement_model import CameraPrior, PairMeasurements, pair_measurements
-from calib_core.fleet_prior import FleetPrior
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.options import CalibrationOptions
 from calib_core.radar import cartesian_from_polar
@@ -122,38 +120,3 @@ def test_some_pairs_keep_their_candidates() -> None:
     assert few.first.tolist() == [0, 4, 8]
     assert few.polar[4:].tolist() == measurements.polar[20:24].tolist()
     assert few.owner.tolist() == [0, 0, 0, 0, 1, 1, 1, 1]
-
-
-def test_a_fleets_prior_adds_its_rows_to_those_of_the_camera_centre() -> None:
-    pairs, _ = simulated()
-    pose = pairs.camera_from_radar
-    fleet = FleetPrior("van", pose.perturbed(np.full(6, 0.01)), 1e-4 * np.eye(6), ("van 1",))
-    prior = pair_measurements(pairs.pairs, pairs.camera, CalibrationOptions(), fleet).prior
-    residual, jacobian = prior.rows(pose)
-    assert (residual.shape, jacobian.shape) == ((9,), (9, 6))
-    hessian, gradient = prior.information(pose.rotation, pose.translation_m)
-    centre, pull = prior.centre_information(pose.rotation, pose.translation_m)
-    assert hessian - centre == pytest.approx(jacobian[3:].T @ jacobian[3:])
-    assert gradient - pull == pytest.approx(jacobian[3:].T @ residual[3:])
-    assert prior.weakened().rows(pose)[0].shape == (3,)
-
-
-def test_a_fleets_prior_of_a_hundred_metres_and_turns_moves_the_fit_by_nothing() -> None:
-    pairs = simulate_pairs(12, rng=np.random.default_rng(3))
-    mean = pairs.camera_from_radar.perturbed(np.array([0.1, 0.1, -0.1, 0.05, -0.05, 0.05]))
-    wide = FleetPrior("van", mean, 1e10 * np.eye(6), ("van 1",))
-    options = CalibrationOptions()
-    fits = [best_fit(pair_measurements(pairs.pairs, pairs.camera, options, one), options) for one in (None, wide)]
-    alone, with_prior = (one.refined.camera_from_radar for one in fits if isinstance(one, BestFit))
-    assert np.abs(with_prior.error_from(alone)).max() < 1e-6
-
-
-def test_a_fleets_prior_pulls_less_the_more_pairs_there_are() -> None:
-    options, moved = CalibrationOptions(), []
-    for count in (8, 80):
-        pairs = simulate_pairs(count, rng=np.random.default_rng(4))
-        fleet = FleetPrior("van", pairs.camera_from_radar.perturbed(np.full(6, 0.01)), 1e-4 * np.eye(6), ("van 1",))
-        fits = [best_fit(pair_measurements(pairs.pairs, pairs.camera, options, one), options) for one in (None, fleet)]
-        alone, with_prior = (one.refined.camera_from_radar for one in fits if isinstance(one, BestFit))
-        moved.append(float(np.abs(with_prior.error_from(alone)[:3]).max()))
-    assert 0.0 < moved[1] < 0.5 * moved[0]

@@ -8,6 +8,7 @@ from calib_core.fleet.tails import quantile
 
 EQUAL = np.full(6, 0.005)
 UNEQUAL = np.array([0.01, 0.003, 0.001, 0.001, 0.01, 0.003])
+WHOLE = 5.0
 EXACT, ROUGH = 1e-7 * np.eye(6), np.diag(np.repeat([1e-4, 1e-4], 3))
 
 
@@ -24,18 +25,18 @@ def squared_of_new(
 
 
 def covered(count: int, fleets: int, sigma: np.ndarray, error: np.ndarray) -> float:
-    """Return the share of new vectors inside the widened covariance, as `fleet_prior_of` widens it."""
+    """Return the share of new vectors that are no farther out than 95 % are, as `deviation` judges it."""
     rng, shares = np.random.default_rng(count), []
     for _ in range(fleets):
         effects = estimated(count, sigma, error, rng)
-        limit = effects.widened * quantile(0.95, 1e7)
+        limit = quantile(0.95, effects.freedom, whole=WHOLE)
         shares.append((squared_of_new(effects, sigma, rng) <= limit).mean())
     return float(np.mean(shares))
 
 
 @pytest.mark.parametrize(("count", "fleets"), [(5, 120), (10, 80), (49, 20)])
-def test_a_further_vector_is_covered_in_95_percent(count: int, fleets: int) -> None:
-    assert 0.93 <= covered(count, fleets, EQUAL, EXACT) <= 0.98
+def test_a_further_vector_is_covered_in_at_least_95_percent(count: int, fleets: int) -> None:
+    assert covered(count, fleets, EQUAL, EXACT) >= 0.93
 
 
 @pytest.mark.parametrize("count", [10, 49])
@@ -55,7 +56,7 @@ def covered_with_stated(there: float, share: float, sigma: np.ndarray) -> float:
     for _ in range(12):
         vectors = sigma * rng.standard_normal((count, 6)) + rng.multivariate_normal(np.zeros(6), error, count)
         effects = random_effects(vectors, np.tile(ROUGH, (count, 1, 1)), np.tile(stated, (count, 1, 1)))
-        limit = effects.widened * quantile(0.95, 1e7)
+        limit = quantile(0.95, effects.freedom, whole=WHOLE)
         inside.append((squared_of_new(effects, sigma, rng) <= limit).mean())
     return float(np.mean(inside))
 
@@ -105,26 +106,10 @@ def test_vectors_that_are_all_the_same_have_next_to_no_scatter() -> None:
     assert np.linalg.eigvalsh(effects.scatter)[0] > 0.0
 
 
-def test_exact_vectors_vary_as_their_number_and_the_prior_say() -> None:
-    count = 49
-    effects = estimated(count, EQUAL, 1e-10 * np.eye(6), np.random.default_rng(5))
-    freedom = (count + PRIOR_VECTORS) ** 2 / count
-    assert effects.shape_freedom == pytest.approx(freedom * (1.0 + 1.0 / count) ** 2, rel=0.01)
-    assert effects.level_widened == pytest.approx(1.0, abs=0.03)
-    hotelling = quantile(0.95, effects.shape_freedom, whole=5.0) / quantile(0.95, 1e7)
-    assert effects.widened == pytest.approx(effects.level_widened * hotelling)
-
-
-def test_a_hidden_scatter_is_widened_for_its_level_and_hardly_for_its_shape() -> None:
-    effects = estimated(30, np.full(6, 1e-4), ROUGH, np.random.default_rng(4))
-    assert 1.05 < effects.level_widened < 1.4
-    assert effects.shape_freedom > 150.0
-
-
 def test_the_axes_in_which_vectors_are_given_do_not_matter() -> None:
     rng = np.random.default_rng(6)
     vectors, errors = EQUAL * rng.standard_normal((20, 6)), np.array([np.diag(row) for row in rng.random((20, 6))])
     turned = np.kron(np.eye(2), np.linalg.qr(rng.standard_normal((3, 3)))[0])
     one = random_effects(vectors, 1e-4 * errors)
     other = random_effects(vectors @ turned.T, 1e-4 * turned @ errors @ turned.T)
-    assert other.widened == pytest.approx(one.widened, rel=1e-4)
+    np.testing.assert_allclose(other.covariance, turned @ one.covariance @ turned.T, rtol=1e-3, atol=1e-8)

@@ -8,9 +8,8 @@ import pytest
 from calib_core.calibration import calibrate_pairs
 from calib_core.errors import InputError
 from calib_core.fleet import session_pose
-from calib_core.fleet_prior import FleetPrior
 from calib_core.options import CalibrationOptions
-from calib_core.results import Calibration
+from calib_core.results import Calibration, DataWarning
 from calib_core.synthetic import simulate_pairs
 
 
@@ -51,22 +50,7 @@ def test_a_method_without_a_noise_model_is_refused_with_what_to_do() -> None:
         session_pose(outcome, vehicle="van", session="spring")
 
 
-def test_of_a_calibration_with_a_fleets_prior_the_data_alone_count() -> None:
-    made = simulate_pairs(12, rng=np.random.default_rng(5), noise="ti")
-    prior = FleetPrior("van", made.camera_from_radar, np.diag([5e-3] * 6) ** 2, ("V1", "V2"))
-    alone = calibrate_pairs(made.pairs, made.camera).unwrap()
-    informed = calibrate_pairs(made.pairs, made.camera, fleet_prior=prior).unwrap()
-    pose = session_pose(informed, vehicle="van", session="spring")
-    assert pose.of_data_alone
-    np.testing.assert_array_equal(pose.camera_from_radar.translation_m, alone.camera_from_radar.translation_m)
-    np.testing.assert_array_equal(pose.covariance, alone.covariance)
-    assert alone.covariance_parts is not None
-    np.testing.assert_array_equal(pose.systematic, alone.covariance_parts.systematic)
-    assert pose.quantile == alone.covariance_quantile
-    assert pose.angle_scales == ()
-    assert informed.fleet is not None
-    refused = replace(informed, fleet=replace(informed.fleet, used=False))
-    assert not session_pose(refused, vehicle="van", session="spring").of_data_alone
-    untested = replace(informed, fleet=replace(informed.fleet, data_alone=None))
-    with pytest.raises(InputError, match="only the fleet's prior closes what its placements leave open"):
-        session_pose(untested, vehicle="van", session="spring")
+def test_a_pose_that_an_older_version_drew_to_a_fleets_prior_is_refused(calibration: Calibration) -> None:
+    drawn = replace(calibration, warnings=(DataWarning("rests-on-fleet-prior", "drawn", "solve it again"),))
+    with pytest.raises(InputError, match=r"vehicle 'van', session 'spring': .* solve it again"):
+        session_pose(drawn, vehicle="van", session="spring")

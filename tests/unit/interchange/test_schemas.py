@@ -34,6 +34,8 @@ def test_what_we_write_and_what_an_earlier_version_wrote_is_valid(project_root: 
 
     assert faults(golden) == []
     assert faults(json.loads(earlier)) == []
+    with_prior = (project_root / "tests/golden/calibration-1-fleet-prior.json").read_text(encoding="utf-8")
+    assert faults(json.loads(with_prior)) == []
     assert faults(json.loads(write_calibration(read_calibration(earlier)))) == []
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calib_core.calibration import calibrate_pairs
+from calib_core.calibration import calibrate_pairs, solve_again
 from calib_core.errors import InputError
 from calib_core.interchange import (
     AssumptionNote,
@@ -176,3 +176,28 @@ def test_the_radars_angle_errors_are_stored_with_the_calibration_if_correcting_t
     content["add_azimuth_rad"].pop()
     with pytest.raises(InputError, match="radar_angle_map"):
         read_calibration(json.dumps(json.loads(text) | {"radar_angle_map": content}))
+
+
+def test_a_pose_that_rests_on_a_fleets_prior_is_read_with_one_warning_and_solved_again_without(project_root: Path):
+    text = (project_root / "tests/golden/calibration-1-fleet-prior.json").read_text(encoding="utf-8")
+    file = read_calibration(text)
+    assert [one.code for one in file.calibration.warnings] == ["rests-on-fleet-prior"]
+    assert "of type van" in file.calibration.warnings[0].message
+    assert file.verdict is not None
+    assert file.verdict.level == "weak"
+    assert check(read_any(text)).ok
+
+    written = write_calibration(file)
+    assert "fleet_prior" not in json.loads(written)
+    again = read_calibration(written)
+    assert [one.code for one in again.calibration.warnings] == ["rests-on-fleet-prior"]
+    assert write_calibration(again) == written
+    assert "rests-on-fleet-prior" not in [one.code for one in solve_again(file.calibration).unwrap().warnings]
+
+
+def test_a_prior_that_an_older_version_left_out_changes_nothing(project_root: Path):
+    content = json.loads((project_root / "tests/golden/calibration-1-fleet-prior.json").read_text(encoding="utf-8"))
+    content["fleet_prior"]["used"] = False
+    file = read_calibration(json.dumps(content))
+    assert [one.code for one in file.calibration.warnings] == [one["code"] for one in content["warnings"]]
+    assert "fleet_prior" not in json.loads(write_calibration(file))

@@ -19,7 +19,6 @@ class SharedDocument(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     auto: bool = False
     camera: str | None = None
     rescale_camera: bool = False
-    fleet_prior: str | None = None
     reflector_m: Annotated[float, Meta(ge=0.02, le=2.0)] = 0.24
     camera_position_m: tuple[float, float, float] | None = None
     camera_position_sigma_m: float | None = None

@@ -25,8 +25,7 @@ _MOST_CLICKS_BYTES = 16 * 1024 * 1024
 _HEAD = """# Which sessions are calibrated, and how: complete it, then run cocalib batch on this file.
 # Paths are relative to this file. Keys of a session, beside those used below: vehicle_type (vehicles of a type are mounted
 # alike), radar_serial, camera_serial, boxes, exports = ["tf2"], camera_position_m = [forward, left, up] of the lens in the
-# radar frame with camera_position_sigma_m, fleet_prior = "van.json" (written by cocalib fleet prior), [session.options] and
-# [session.topics] as cocalib solve has them.
+# radar frame with camera_position_sigma_m, [session.options] and [session.topics] as cocalib solve has them.
 # What all sessions share stands once, under [defaults].
 
 [defaults]

@@ -118,7 +118,6 @@ def _row(document: SessionDocument, place: str, path: Path) -> ManifestRow:
         auto=document.auto,
         camera=_path(folder, document.camera),
         boxes=_path(folder, document.boxes),
-        fleet_prior=_path(folder, document.fleet_prior),
         topics=document.topics,
         options=_options(document, where),
         exports=document.exports,

@@ -5,10 +5,9 @@ from msgspec.structs import replace
 
 from calib_core.arrays import Matrix66
 from calib_core.measurements import Unsolvable
-from calib_core.results import Calibration
 from calib_core.verdict import verdict_on
 from cocalib.batch.job import Job
-from cocalib.batch.outcome import OUTCOME_SCHEMA, Outcome, PriorUse, Status
+from cocalib.batch.outcome import OUTCOME_SCHEMA, Outcome, Status
 from cocalib.batch.running.attempting import Failure
 from cocalib.batch.running.solving import SolvedSession
 from cocalib.batch.running.steps import SessionResult
@@ -42,9 +41,7 @@ def failed(job: Job, failure: Failure) -> Outcome:
 def _of_calibration(job: Job, solved: SolvedSession) -> Outcome:
     calibration, verdict = solved.calibration, verdict_on(solved.calibration)
     assert solved.found.file is not None
-    alone = calibration.fleet.data_alone if calibration.fleet is not None else None
     sigma_deg, sigma_cm = _largest_sigma(calibration.covariance)
-    alone_deg, alone_cm = (None, None) if alone is None else _largest_sigma(alone.covariance)
     doubtful = solved.is_weak or verdict.level not in ("good", "usable")
     return replace(
         _outcome(job, "weak" if doubtful else "solved"),
@@ -55,10 +52,6 @@ def _of_calibration(job: Job, solved: SolvedSession) -> Outcome:
         sigma_cm=sigma_cm,
         aed_px=calibration.metrics.aed_px,
         pairs=sum(pair.inlier for pair in calibration.pairs),
-        fleet_prior=_prior_use(calibration),
-        alone_verdict=(alone.verdict or None) if alone is not None else None,
-        alone_sigma_deg=alone_deg,
-        alone_sigma_cm=alone_cm,
         warnings=tuple(warning.code for warning in solved.found.file.calibration.warnings),
         notes=solved.notes,
     )
@@ -70,15 +63,6 @@ def _largest_sigma(covariance: Matrix66) -> tuple[float | None, float | None]:
     if not np.isfinite(sigma).all():
         return None, None
     return float(np.degrees(sigma[3:].max())), float(100.0 * sigma[:3].max())
-
-
-def _prior_use(calibration: Calibration) -> PriorUse | None:
-    fleet = calibration.fleet
-    if fleet is None:
-        return None
-    if not fleet.used:
-        return "contradicted"
-    return "untested" if any(one.code == "fleet-prior-untested" for one in calibration.warnings) else "used"
 
 
 def _outcome(job: Job, status: Status) -> Outcome:

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from calib_core.calibration import require_default
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange import CameraFile, ImportedCalibration, VehicleNote, imported, read_calibration
@@ -13,7 +12,6 @@ from calib_core.recordings import Recording
 from calib_core.results import Calibration
 from cocalib.batch.manifest import ManifestRow
 from cocalib.solving.automatic import PlacedClicks, is_doubtful, place_clicks, solve_placed_clicks
-from cocalib.solving.fleet_prior_file import FleetPriorFile
 from cocalib.solving.recorded_clicks import clicks_in_recording, file_of_clicks, require_confirmed
 from cocalib.solving.solving import calibration_text, required_camera
 
@@ -28,12 +26,10 @@ class GivenFiles:
     Attributes:
         camera: intrinsics; None for the recording's own.
         clicks: None without.
-        fleet_prior: None without.
     """
 
     camera: CameraFile | None
     clicks: ClicksFile | None
-    fleet_prior: FleetPriorFile | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,7 +54,7 @@ class SolvedSession:
 
 
 def given_files(row: ManifestRow) -> GivenFiles:
-    """Read the intrinsics, the clicks and the fleet's prior of a row.
+    """Read the intrinsics and the clicks of a row.
 
     Raises:
         InputError: one cannot be read, or they contradict the row.
@@ -70,22 +66,7 @@ def given_files(row: ManifestRow) -> GivenFiles:
             f"{row.clicks}: nobody confirmed {len(clicks.unconfirmed.ids)} of its clicks; with auto give only clicks that a "
             "person placed"
         )
-    return GivenFiles(camera, clicks, _fleet_prior(row))
-
-
-def _fleet_prior(row: ManifestRow) -> FleetPriorFile | None:
-    """Read the fleet's prior of a row.
-
-    Raises:
-        InputError: it cannot be read, or used for this vehicle or with this method.
-    """
-    if row.fleet_prior is None:
-        return None
-    found = FleetPriorFile.read(row.fleet_prior)
-    require_default(row.options, found.prior)
-    found.require_of_type(row.vehicle_type)
-    found.require_not_of(row.vehicle)
-    return found
+    return GivenFiles(camera, clicks)
 
 
 def solve_session(row: ManifestRow, given: GivenFiles, recording: Recording) -> SolvedSession | Unsolvable:
@@ -107,8 +88,7 @@ def solve_session(row: ManifestRow, given: GivenFiles, recording: Recording) -> 
     placed = _placed(row, given.clicks, recording, camera, notes)
     if isinstance(placed, Unsolvable):
         return placed
-    prior = given.fleet_prior.prior if given.fleet_prior is not None else None
-    outcome = solve_placed_clicks(recording, placed, camera, row.options, prior)
+    outcome = solve_placed_clicks(recording, placed, camera, row.options)
     if isinstance(outcome, Unsolvable):
         return outcome
     text = _calibration_text(row, outcome, recording, given, placed)
@@ -150,6 +130,5 @@ def _calibration_text(
         recording,
         camera_file=given.camera,
         unconfirmed=placed.unconfirmed,
-        fleet_prior=given.fleet_prior.file if given.fleet_prior is not None else None,
         vehicle=vehicle,
     )

@@ -60,14 +60,12 @@ class Batch:
 
     def _calibrate(self, manifest: "Manifest") -> int:
         from cocalib.batch.driving import chosen_engine, drive
-        from cocalib.batch.fleet_priors import require_priors_of_others
         from cocalib.batch.job import jobs_of
         from cocalib.batch.plan import write_plan
         from cocalib.batch.results_folder import ResultsFolder
         from cocalib.cli.fleet.batch_text import batch_lines, exit_code, shown_batch
         from cocalib.fleet.batch_index import indexed_batch
 
-        require_priors_of_others(manifest)
         results = ResultsFolder(self.out or manifest.source.with_suffix(""))
         try:
             with progress_bar("reading recordings") as progress_bytes:

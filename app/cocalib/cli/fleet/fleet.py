@@ -16,53 +16,45 @@ from cocalib.platform.terminal import print_exactly
 if TYPE_CHECKING:
     from cocalib.fleet.records import FleetRecord
 
-_Action: TypeAlias = Literal["status", "history", "compare", "prior", "export", "summary", "rebuild"]
+_Action: TypeAlias = Literal["status", "history", "compare", "export", "summary", "rebuild"]
 _NAMES: Final[dict[str, tuple[str, ...]]] = {
     "status": (),
     "history": ("VEHICLE",),
     "compare": ("A", "B"),
-    "prior": ("TYPE",),
     "export": (),
     "summary": (),
     "rebuild": (),
 }
 _FLAG_OF = {
-    "--json": ("status", "history", "compare", "prior"),
+    "--json": ("status", "history", "compare"),
     "--parquet": ("export",),
     "--csv": ("export",),
-    "--out": ("prior",),
-    "--without": ("prior",),
 }
 _LOOK: Final = 3
 
 
 @dataclass(frozen=True, slots=True)
 class Fleet:
-    """Tell how a fleet is calibrated, from the results of a batch: status, history, comparisons, prior, summary page.
+    """Tell how a fleet is calibrated, from the results of a batch: status, history, comparisons, summary page.
 
     OUT is the folder that batch wrote to. `status OUT`: where each vehicle stands. `history VEHICLE OUT`: its sessions and what
-    changed in between. `compare A B OUT`: two sessions VEHICLE/SESSION, or two vehicles of one type. `prior TYPE OUT`: what the
-    vehicles of a type say of the next one. `export OUT`: all sessions as a table. `summary OUT`: write
-    OUT/summary.html. `rebuild OUT`: write index and summary page from the results.
+    changed in between. `compare A B OUT`: two sessions VEHICLE/SESSION, or two vehicles of one type. `export OUT`: all
+    sessions as a table. `summary OUT`: write OUT/summary.html. `rebuild OUT`: write index and summary page from the results.
 
-    Exit codes: 0 done, and nothing to look at; 1 too few vehicles for a prior; 2 nothing can be read; 3 something needs a look:
+    Exit codes: 0 done, and nothing to look at; 2 nothing can be read; 3 something needs a look:
     a vehicle without a calibration to rely on, remounted, or off its kind; or two that differ.
     """
 
     action: Annotated[_Action, tyro.conf.Positional, called("ACTION")]
-    """What to do: status, history, compare, prior, export, summary or rebuild."""
+    """What to do: status, history, compare, export, summary or rebuild."""
     given: Annotated[tuple[str, ...], tyro.conf.Positional, called("NAME... OUT")] = ()
     """Names that the action takes, then the folder that batch wrote to."""
     json: Switch = False
-    """With status, history, compare, prior: print one JSON object instead of text."""
+    """With status, history, compare: print one JSON object instead of text."""
     parquet: File = None
     """With export: Parquet file to write."""
     csv: File = None
     """With export: CSV file to write."""
-    out: File = None
-    """With prior: file to write it to (cocalib/fleet-prior-1 JSON), for solve, open and batch."""
-    without: Annotated[tuple[str, ...], called("VEHICLE..."), tyro.conf.UseAppendAction] = ()
-    """With prior: leave a vehicle out, such as the one that it is for; repeat it for several."""
 
     def run(self) -> int:
         """Run the action; return the exit code."""
@@ -81,8 +73,6 @@ class Fleet:
             return self._history(fleet, names[0])
         if self.action == "compare":
             return self._compare(fleet, *names)
-        if self.action == "prior":
-            return self._prior(fleet, names[0])
         return self._export(fleet) if self.action == "export" else _summary(folder, fleet)
 
     def _fitting_folder(self) -> Path:
@@ -95,8 +85,6 @@ class Fleet:
             "--json": self.json,
             "--parquet": self.parquet,
             "--csv": self.csv,
-            "--out": self.out,
-            "--without": self.without,
         }
         for name, given in options.items():
             if given and self.action not in _FLAG_OF[name]:
@@ -150,28 +138,8 @@ class Fleet:
         if self.json:
             _print_json(comparison_document(compared))
         else:
-            print("\n".join([compared.words, *compared.notes]))
+            print(compared.words)
         return _LOOK if compared.outcome == "differs" else 0
-
-    def _prior(self, fleet: "FleetRecord", vehicle_type: str) -> int:
-        from calib_core.interchange.own.fleet_prior_json import write_fleet_prior
-        from calib_core.measurements import Unsolvable
-        from cocalib.cli.fleet.text_tables import prior_lines
-        from cocalib.cli.output import explain_unsolvable
-        from cocalib.fleet.json_documents import prior_document
-        from cocalib.fleet.kinds import prior_of_type
-
-        found = prior_of_type(fleet, vehicle_type, self.without)
-        if isinstance(found, Unsolvable):
-            return explain_unsolvable(found, what=f"no prior for {vehicle_type}")
-        if self.json:
-            _print_json(prior_document(found))
-        else:
-            print("\n".join(prior_lines(found)))
-        if self.out is not None:
-            write_whole(self.out, write_fleet_prior(found.prior))
-            print(f"{self.out} written: solve --fleet-prior takes it", file=sys.stderr)
-        return 0
 
     def _export(self, fleet: "FleetRecord") -> int:
         from cocalib.fleet.table_export import csv_bytes, parquet_bytes

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from calib_core.fleet import Transition
 from cocalib.fleet.dates import recorded_text
-from cocalib.fleet.kinds import Kind, PriorOfType, prior_sigma
+from cocalib.fleet.kinds import Kind
 from cocalib.fleet.records import FleetRecord, SessionRecord, VehicleRecord
 from cocalib.fleet.standing import VehicleStanding, age_days
 from cocalib.view.number_format import plain, with_sigma
@@ -78,21 +78,6 @@ def kind_lines(kinds: Sequence[Kind]) -> Iterator[str]:
             yield f"  {kind.shared_tape}"
 
 
-def prior_lines(found: PriorOfType) -> Iterator[str]:
-    """Return what a type says of its next vehicle, what that rests on, and what it does not."""
-    prior = found.prior
-    sigma = prior_sigma(prior)
-    forward, left, up = (plain(100.0 * one) for one in prior.camera_from_radar.inverse().translation_m)
-    yield f"the next vehicle of type {prior.vehicle_type}, from {_vehicles(len(prior.vehicles))}:"
-    yield f"  camera at {forward}, {left}, {up} cm from the radar (forward, left, up)"
-    yield f"  ± {', '.join(plain(one, 2) for one in sigma[:3])} cm (forward, left, up)"
-    yield f"  ± {', '.join(plain(one, 2) for one in sigma[3:])} deg (roll, pitch, yaw)"
-    if found.shared_tape:
-        yield f"  {found.shared_tape}"
-    for one in found.not_counted:
-        yield f"  not counted: {one.vehicle} ({one.session}): {one.reason}"
-
-
 def history_lines(vehicle: VehicleRecord, superseded: Sequence[SessionRecord]) -> Iterator[str]:
     """Return the sessions of a vehicle and what changed from one to the next."""
     heads = ("session", "recorded", "verdict", "sigma deg", "sigma cm", "change deg", "change cm", "change px", "since")
@@ -100,8 +85,6 @@ def history_lines(vehicle: VehicleRecord, superseded: Sequence[SessionRecord]) -
     for record in vehicle.sessions:
         for reason in filter(None, (record.outcome.reason, record.pose_problem)):
             yield f"  {record.name}: {reason}"
-        if record.pose is not None and record.pose.of_data_alone:
-            yield f"  {record.name}: solved with a fleet's prior; changes are measured with the answer of its data alone"
     yield from (f"  {change.words}" for change in vehicle.transitions)
     if superseded:
         yield f"  superseded by later runs: {', '.join(f'{one.name} ({one.outcome.digest})' for one in superseded)}"
@@ -136,18 +119,12 @@ def _session_cells(record: SessionRecord, change: Transition | None) -> tuple[st
 
 
 def _verdict(record: SessionRecord) -> str:
-    """Return verdict or status, and what a fleet's prior did."""
-    verdict = record.outcome.verdict or record.outcome.status
-    return f"{verdict} ({record.prior_words})" if record.prior_words else verdict
+    return record.outcome.verdict or record.outcome.status
 
 
 def _sigma_cells(record: SessionRecord) -> tuple[str, str]:
-    """Return the standard deviations of the answer [deg], [cm]; with a fleet's prior, those of the data alone, too."""
-    outcome = record.outcome
-    deg, cm = _number(outcome.sigma_deg), _number(outcome.sigma_cm)
-    if not record.is_drawn:
-        return deg, cm
-    return f"{deg} (alone {_number(outcome.alone_sigma_deg)})", f"{cm} (alone {_number(outcome.alone_sigma_cm)})"
+    """Return the standard deviations of the answer [deg], [cm]."""
+    return _number(record.outcome.sigma_deg), _number(record.outcome.sigma_cm)
 
 
 def _change_cells(change: Transition | None) -> tuple[str, str, str]:

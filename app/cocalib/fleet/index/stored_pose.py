@@ -26,7 +26,7 @@ def insert_pose(connection: sqlite3.Connection, digest: str, pose: SessionPose) 
     """Write the pose of a result."""
     place = pose.reference_radar_m
     connection.execute(
-        "INSERT INTO poses VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        "INSERT INTO poses VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
         (
             digest,
             _text(pose.camera_from_radar.rotation),
@@ -37,7 +37,6 @@ def insert_pose(connection: sqlite3.Connection, digest: str, pose: SessionPose) 
             None if place is None else _text(place),
             None if pose.camera is None else camera_content(pose.camera, "json"),
             msgspec.json.encode(pose.angle_scales).decode(),
-            pose.of_data_alone,
             None if pose.measured is None else msgspec.json.encode(pose.measured).decode(),
             _text(pose.of_tape),
         ),
@@ -64,7 +63,6 @@ def pose_of(row: sqlite3.Row, outcome: Outcome) -> SessionPose:
         camera=_camera(row["camera"]),
         reference_radar_m=None if place is None else _array(place),
         angle_scales=msgspec.json.decode(row["angle_scales"], type=tuple[SystematicErrorResult, ...]),
-        of_data_alone=bool(row["of_data_alone"]),
         measured=None if row["measured"] is None else msgspec.json.decode(row["measured"], type=CameraPositionPrior),
         of_tape=_array(row["of_tape"]),
     )

@@ -7,7 +7,7 @@ from typing import Final
 from calib_core.errors import InputError
 
 INDEX_FILE: Final = "fleet.sqlite"
-INDEX_VERSION: Final = 3
+INDEX_VERSION: Final = 4
 """SQLite's user_version. It counts up with every change of the tables."""
 
 _PATIENCE_S = 30.0
@@ -24,7 +24,7 @@ CREATE TABLE poses (
     digest TEXT PRIMARY KEY REFERENCES sessions ON DELETE CASCADE,
     rotation TEXT NOT NULL, translation_m TEXT NOT NULL, covariance TEXT NOT NULL, systematic TEXT NOT NULL,
     quantile REAL NOT NULL, reference_radar_m TEXT, camera TEXT, angle_scales TEXT NOT NULL,
-    of_data_alone INTEGER NOT NULL, measured TEXT, of_tape TEXT NOT NULL
+    measured TEXT, of_tape TEXT NOT NULL
 ) WITHOUT ROWID;
 CREATE TABLE transitions (
     after TEXT PRIMARY KEY REFERENCES sessions ON DELETE CASCADE, before TEXT NOT NULL REFERENCES sessions ON DELETE CASCADE,

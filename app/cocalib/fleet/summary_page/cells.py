@@ -78,13 +78,8 @@ def number_cell(value: float | None, shown: str | None = None) -> Markup:
 
 
 def sigma_cells(record: SessionRecord) -> list[Markup]:
-    """Return the standard deviations of the answer [deg], [cm]; with a fleet's prior, those of the data alone, too."""
-    outcome = record.outcome
-    cells = []
-    for answer, alone in ((outcome.sigma_deg, outcome.alone_sigma_deg), (outcome.sigma_cm, outcome.alone_sigma_cm)):
-        beside = f" (alone {_DASH if alone is None else plain(alone, 2)})" if record.is_drawn else ""
-        cells.append(number_cell(answer, None if answer is None else f"{plain(answer, 2)}{beside}"))
-    return cells
+    """Return the standard deviations of the answer [deg], [cm]."""
+    return [number_cell(record.outcome.sigma_deg), number_cell(record.outcome.sigma_cm)]
 
 
 def verdict_cell(record: SessionRecord) -> Markup:
@@ -93,8 +88,7 @@ def verdict_cell(record: SessionRecord) -> Markup:
     level = outcome.verdict if outcome.verdict in LEVEL_SIGNS else outcome.status
     sign = LEVEL_SIGNS.get(level) or _OTHER_SIGNS.get(level, "●")
     key = _ORDER.index(level) if level in _ORDER else len(_ORDER)
-    shown = f"{level} ({record.prior_words})" if record.prior_words else level
-    parts: list[Child] = [tag("span", sign, class_="sign", aria_hidden="true"), shown]
+    parts: list[Child] = [tag("span", sign, class_="sign", aria_hidden="true"), level]
     return tag("td", *parts, class_=f"state{' bad' if level in _BAD else ''}", data_key=str(key))
 
 

@@ -250,12 +250,8 @@ class _Downloads:
         session, camera_file = self._workspace.session, self._workspace.camera_file
         if not session.is_solved or not isinstance(session.outcome, Calibration):
             return refusal(409, _why_none(session))
-        given = self._workspace.fleet_prior
-        fleet_prior = given.file if given is not None and session.outcome.fleet is not None else None
         try:
-            text = calibration_text(
-                session.outcome, self._recording, session.confirmed, camera_file, fleet_prior=fleet_prior
-            )
+            text = calibration_text(session.outcome, self._recording, session.confirmed, camera_file)
             return make(text)
         except CalibrationError as error:
             return refusal(409, sentence(str(error)))

@@ -54,7 +54,6 @@ CHANGES: dict[str, Callable[[Path], object]] = {
     "auto": lambda _: True,
     "camera": lambda folder: put(folder / "camera.yaml"),
     "boxes": lambda folder: put(folder / "boxes.json"),
-    "fleet_prior": lambda folder: put(folder / "van.json"),
     "topics": lambda _: RecordingOptions(confirm_assumptions=True),
     "options": lambda _: CalibrationOptions(
         solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.1), 0.01))

@@ -11,7 +11,6 @@ import msgspec
 import numpy as np
 
 from calib_core.calibration import calibrate_pairs
-from calib_core.fleet_prior import FleetAnswer
 from calib_core.interchange import calibration_text
 from calib_core.results import Calibration
 from calib_core.synthetic.simulated_pairs import simulate_pairs
@@ -54,7 +53,6 @@ def make_result(
     *,
     error: np.ndarray = _AS_IT_IS,
     run: int = 0,
-    fleet: FleetAnswer | None = None,
     **changes: Any,
 ) -> Outcome:
     """Write the result of one job.
@@ -65,7 +63,6 @@ def make_result(
         session: its name.
         error: (6,) of the pose.
         run: a later run of the same session has a larger number.
-        fleet: what a fleet's prior did.
         changes: of the outcome; a status "failed" or "refused" leaves the calibration out.
     """
     digest = digest_of(vehicle, session, run)
@@ -73,7 +70,7 @@ def make_result(
     started = (_RUN + timedelta(minutes=run)).isoformat(timespec="seconds")
     with ResultsFolder(folder).writing(digest) as unfinished:
         if outcome.status in ("solved", "weak"):
-            outcome = _with_calibration(outcome, unfinished, error, fleet)
+            outcome = _with_calibration(outcome, unfinished, error)
             (unfinished / "report.html").write_text("<p>report</p>")
         files = tuple(
             OutcomeFile(path.name, hashlib.sha256(path.read_bytes()).hexdigest())
@@ -86,20 +83,11 @@ def make_result(
     return outcome
 
 
-def _with_calibration(outcome: Outcome, folder: Path, error: np.ndarray, fleet: FleetAnswer | None) -> Outcome:
+def _with_calibration(outcome: Outcome, folder: Path, error: np.ndarray) -> Outcome:
     base = calibration()
-    moved = dataclasses.replace(base, camera_from_radar=base.camera_from_radar.perturbed(error), fleet=fleet)
+    moved = dataclasses.replace(base, camera_from_radar=base.camera_from_radar.perturbed(error))
     (folder / "calibration.json").write_text(calibration_text(moved), encoding="utf-8")
     sigma = np.sqrt(np.diag(base.covariance))
-    alone = fleet.data_alone if fleet is not None else None
-    if alone is not None:
-        of_data = np.sqrt(np.diag(alone.covariance))
-        outcome = msgspec.structs.replace(
-            outcome,
-            alone_verdict=alone.verdict,
-            alone_sigma_deg=float(np.degrees(of_data[3:].max())),
-            alone_sigma_cm=float(100.0 * of_data[:3].max()),
-        )
     return msgspec.structs.replace(
         outcome,
         verdict=verdict_on(base).level,

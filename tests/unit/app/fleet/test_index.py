@@ -251,10 +251,10 @@ def test_an_index_of_results_that_a_newer_program_wrote_says_what_to_do(folder: 
     for place in (folder / "results").glob("*/outcome.json"):
         text = place.read_text()
         if '"session": "s0"' in text:
-            place.write_text(text.replace('"pairs"', '"couples"'))
+            place.write_text(text.replace('"status"', '"state"'))
     with closing(sqlite3.connect(index_path(folder))) as connection, connection:
         connection.execute(
-            "UPDATE sessions SET outcome = replace(outcome, '\"pairs\"', '\"couples\"') WHERE session = 's0'"
+            "UPDATE sessions SET outcome = replace(outcome, '\"status\"', '\"state\"') WHERE session = 's0'"
         )
     with pytest.raises(InputError, match="cocalib fleet rebuild"):
         read_fleet(folder)

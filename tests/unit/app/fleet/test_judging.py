@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.fleet.judging import judge, main
-from benchmarks.fleet.recorded_priors import held_by
 from benchmarks.fleet.truth import FleetTruth, TrueSession
-from calib_core.fleet_prior import FleetPrior
 from calib_core.geometry import RigidTransform
 from cocalib.fleet.index import read_fleet
 from tests.unit.app.fleet.made_results import make_fleet, make_result
@@ -107,11 +105,3 @@ def test_the_exit_code_says_whether_anything_is_wrong(
     truth.write_text(f'{{"sessions": [{", ".join([*rows, rows[0].replace("s0", "s9")])}]}}')
     assert main([str(tmp_path), str(sound)]) == 1
     assert "wrong: V000/s9: no result" in capsys.readouterr().out
-
-
-def test_a_true_mounting_is_held_by_a_prior_around_it_and_not_by_one_beside_it() -> None:
-    prior = FleetPrior("van", _POSE, np.diag([0.01] * 3 + [0.005] * 3) ** 2, ("V1",))
-    one = TrueSession("V2", "s1", False, None, _POSE.perturbed(np.array([0.01, 0.0, 0.0, 0.0, 0.0, 0.0])))
-    assert held_by(prior, one) == {"all": True, "position": True, "rotation": True}
-    turned = TrueSession("V2", "s1", False, None, _POSE.perturbed(np.array([0.0, 0.0, 0.0, 0.0, 0.03, 0.0])))
-    assert held_by(prior, turned) == {"all": False, "position": True, "rotation": False}

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from calib_core.errors import InputError
-from calib_core.measurements import Unsolvable
+from calib_core.fleet import MountingScatter
 from cocalib.cli.fleet.text_tables import plan_lines
 from cocalib.fleet.choosing import compare_sessions, vehicle_named
 from cocalib.fleet.index import read_fleet
 from cocalib.fleet.json_documents import status_document
-from cocalib.fleet.kinds import PriorOfType, kinds_of, prior_of_type
+from cocalib.fleet.kinds import kinds_of
 from cocalib.fleet.records import FleetRecord
 from cocalib.fleet.standing import age_days, standings_of
 from cocalib.fleet.summary_page import summary_html
@@ -69,13 +69,9 @@ def test_the_scatter_names_whom_it_does_not_rest_on_and_why(fleet: FleetRecord) 
     assert reasons[("V004", "s2")] == "the verdict is contradictory"
     assert reasons[("odd", "s0, s1")].startswith("off its kind: pitch ")
     assert reasons[("V002", "s1")].startswith("off its kind: yaw ")
-    found = prior_of_type(fleet, "van")
-    assert isinstance(found, PriorOfType)
-    assert found.prior.vehicles == tuple(f"V{index:03}" for index in range(7))
-    assert found.prior.left_out == ("odd",)
-    assert isinstance(prior_of_type(fleet, "truck"), Unsolvable)
-    with pytest.raises(InputError, match="the types are truck, van"):
-        prior_of_type(fleet, "lorry")
+    assert isinstance(van.scatter, MountingScatter)
+    assert {one.vehicle for one in van.scatter.mountings} == {f"V{index:03}" for index in range(7)}
+    assert "odd" in {one.mounting.vehicle for one in van.scatter.left_out}
 
 
 def test_two_sessions_of_a_vehicle_are_compared(fleet: FleetRecord) -> None:

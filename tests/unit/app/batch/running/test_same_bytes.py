@@ -1,15 +1,10 @@
 """A job gives the bytes of the commands."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from calib_core.fleet_prior import FleetPrior
-from calib_core.interchange import read_calibration
-from calib_core.interchange.own.fleet_prior_json import write_fleet_prior
 from calib_core.options import CalibrationOptions, CameraPositionPrior, RefiningOptions, SolvingOptions
 from calib_core.results import UnconfirmedClicks
 from cocalib.batch.job import jobs_of
@@ -121,36 +116,6 @@ def test_intrinsics_of_a_file_a_measured_position_and_options(commands: Commands
     assert json.loads(files["calibration.json"])["provenance"]["inputs"][-1]["name"] == "camera.yaml"
     assert files["report.html"] == commands.report("--clicks", CLICKS)
     assert outcome.steps["evaluate"] == "done"
-
-
-def test_the_prior_of_a_fleet(commands: Commands, tmp_path: Path) -> None:
-    whole = read_calibration(commands.solve("--clicks", CLICKS)).calibration
-    few = tmp_path / "few.json"
-    few.write_text(json.dumps({**(document := json.loads(CLICKS.read_text())), "clicks": document["clicks"][:6]}))
-    given = tmp_path / "long.json"
-    scatter = np.diag([0.005] * 6) ** 2
-    given.write_text(write_fleet_prior(FleetPrior("long", whole.camera_from_radar, scatter, ("V1", "V2"))))
-    row = ManifestRow("van", "1", BAGS, **SENSORS, clicks=few, fleet_prior=given)
-    outcome, files = done(row, tmp_path / "results")
-    assert files["calibration.json"] == commands.solve("--clicks", few, "--fleet-prior", given)
-    written = json.loads(files["calibration.json"])["fleet_prior"]
-    assert written["used"] is True
-    assert (outcome.fleet_prior, outcome.alone_verdict) == ("used", written["data_alone"]["verdict"])
-    assert outcome.alone_sigma_deg == pytest.approx(
-        np.degrees(np.sqrt(np.diag(written["data_alone"]["covariance"])[3:].max()))
-    )
-    assert b'id="fleet-prior"' in files["report.html"]
-    (job,), (without,) = jobs_of([row], tmp_path), jobs_of([replace(row, fleet_prior=None)], tmp_path)
-    assert job.digest != without.digest
-    given.write_text(write_fleet_prior(FleetPrior("long", whole.camera_from_radar, 2 * scatter, ("V1", "van"))))
-    assert jobs_of([row], tmp_path)[0].digest not in (job.digest, without.digest)
-    outcome, _ = done(row, tmp_path / "results")
-    assert outcome.status == "failed"
-    assert "long.json: the prior rests on van itself" in outcome.reason
-    outcome, _ = done(replace(row, vehicle_type="short"), tmp_path / "results")
-    assert "long.json: the prior is of vehicles of type long, and this vehicle is of type short" in outcome.reason
-    outcome, _ = done(replace(row, options=CalibrationOptions(method="paper")), tmp_path / "results")
-    assert "a fleet's prior is used by the default method only" in outcome.reason
 
 
 def test_clicks_of_a_person_and_of_nobody(commands: Commands, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

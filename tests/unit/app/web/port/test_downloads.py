@@ -40,9 +40,7 @@ CLICKS = tuple(ReflectorClick(TimeNs(index), f"c{index}", 10.0, 10.0) for index 
 @pytest.fixture
 def ask(project_root: Path) -> Callable[[Session, str], Reply]:
     def answer(session: Session, address: str) -> Reply:
-        workspace: Any = SimpleNamespace(
-            session=session, facts=SimpleNamespace(name="drive 7.mcap"), camera_file=None, fleet_prior=None
-        )
+        workspace: Any = SimpleNamespace(session=session, facts=SimpleNamespace(name="drive 7.mcap"), camera_file=None)
         hub: Any = SimpleNamespace(survey=None)
         routes = Routes(project_root / "static")
         routes.admit(workspace, PictureRecording(grey_pictures(1)), hub)
@@ -128,9 +126,7 @@ def test_the_picture_of_the_check_point_is_the_frame_in_which_it_was_clicked(fil
             for pair in file.calibration.pairs
         )
         session = Session(CLICKS, outcome=dataclasses.replace(file.calibration, pairs=pairs), outcome_revision=0)
-        workspace: Any = SimpleNamespace(
-            session=session, facts=SimpleNamespace(name="drive 7.mcap"), camera_file=None, fleet_prior=None
-        )
+        workspace: Any = SimpleNamespace(session=session, facts=SimpleNamespace(name="drive 7.mcap"), camera_file=None)
         routes, hub = Routes(project_root / "static"), SimpleNamespace(survey=None)
         routes.admit(workspace, recording, cast(Any, hub))
         return asyncio.run(routes.answer(f"/api/check_point_picture?{nearest}"))
