@@ -13,8 +13,8 @@ import numpy as np
 
 from benchmarks.fleet.truth import FleetTruth, read_truth
 from calib_core.fleet import MountingScatter, Transition
-from cocalib.fleet.index import read_fleet
 from cocalib.fleet.kinds import Kind, kinds_of
+from cocalib.fleet.reading import read_fleet
 from cocalib.fleet.records import FleetRecord, SessionRecord, VehicleRecord
 from cocalib.fleet.standing import VehicleStanding, standings_of
 

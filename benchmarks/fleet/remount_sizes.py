@@ -28,7 +28,7 @@ from cocalib.batch.engines.in_process import InProcess
 from cocalib.batch.job import jobs_of
 from cocalib.batch.manifest_files.reading import read_manifest
 from cocalib.batch.results_folder import ResultsFolder
-from cocalib.fleet.index import read_fleet
+from cocalib.fleet.reading import read_fleet
 
 __all__ = ["main", "recorded", "remounted_pose", "unchanged_transitions"]
 

@@ -18,7 +18,7 @@ from cocalib.batch.engines.in_process import InProcess
 from cocalib.batch.job import jobs_of
 from cocalib.batch.manifest_files.reading import read_manifest
 from cocalib.batch.results_folder import ResultsFolder
-from cocalib.fleet.index import read_fleet
+from cocalib.fleet.reading import read_fleet
 
 _SMALL = replace(RECORDING, width_px=240, height_px=150, placements=10, radar_rate_hz=2.0)
 _TURNED = Remount(12.0, 0.05)  # what 10 placements in pictures of 240 px show for certain

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from cocalib.fleet.index import read_fleet
+from cocalib.fleet.reading import read_fleet
 from cocalib.fleet.summary_page import summary_html
 from tests.browser.accessibility import page_violations
 from tests.unit.app.fleet.made_results import FIRST_NS, make_fleet, make_result

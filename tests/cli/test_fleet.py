@@ -7,11 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow.parquet
 import pytest
 
 from cocalib.batch.results_folder import ResultsFolder
-from cocalib.fleet.index import index_path
 from tests.unit.app.fleet.made_results import digest_of, make_fleet, make_result
 
 Cocalib = Callable[..., Any]
@@ -40,7 +38,6 @@ def test_a_sound_fleet_has_nothing_to_look_at(cocalib: Cocalib, sound: Path) -> 
     assert [line.split()[0] for line in lines[1:7]] == [f"V00{index}" for index in range(6)]
     assert lines[7] == "6 vehicles, nothing to look at"
     assert lines[8].startswith("type van, 6 vehicles: mountings scatter by ")
-    assert not index_path(sound).exists()
 
 
 def test_what_needs_a_look_is_exit_code_3(cocalib: Cocalib, moved: Path) -> None:
@@ -95,22 +92,14 @@ def test_compare_says_whether_two_differ(cocalib: Cocalib, moved: Path) -> None:
     assert "V000 and V001" in vehicles.out
 
 
-def test_rebuild_writes_index_and_summary(cocalib: Cocalib, moved: Path) -> None:
-    answer = cocalib("fleet", "rebuild", moved)
-    assert answer.code == 0, answer.err
-    assert index_path(moved).is_file()
-    assert "<html" in (moved / "summary.html").read_text()
-    (moved / "summary.html").unlink()
+def test_summary_writes_the_page(cocalib: Cocalib, moved: Path) -> None:
     assert cocalib("fleet", "summary", moved).code == 0
-    assert (moved / "summary.html").is_file()
-    assert cocalib("fleet", "status", moved).code == 3
+    assert "<html" in (moved / "summary.html").read_text()
 
 
-def test_export_writes_both_tables(cocalib: Cocalib, moved: Path, tmp_path: Path) -> None:
-    answer = cocalib("fleet", "export", moved, "--parquet", tmp_path / "f.parquet", "--csv", tmp_path / "f.csv")
+def test_export_writes_the_table(cocalib: Cocalib, moved: Path, tmp_path: Path) -> None:
+    answer = cocalib("fleet", "export", moved, "--csv", tmp_path / "f.csv")
     assert answer.code == 0, answer.err
-    table = pyarrow.parquet.read_table(tmp_path / "f.parquet")
-    assert table.num_rows == 5
     assert len((tmp_path / "f.csv").read_text().splitlines()) == 6
 
 
@@ -138,7 +127,7 @@ def test_results_of_another_version_are_named(cocalib: Cocalib, tmp_path: Path) 
         (("history", "OUT"), "fleet history takes VEHICLE OUT; 1 given"),
         (("compare", "A", "OUT"), "fleet compare takes A B OUT; 2 given"),
         (("status", "/nowhere"), "/nowhere: no such folder"),
-        (("export", "OUT"), "--parquet FILE or --csv FILE"),
+        (("export", "OUT"), "needs the name of the new file: --csv FILE"),
         (("export", "OUT", "--json"), "--json applies to fleet status, history, compare only"),
         (("history", "V9", "OUT"), "no vehicle 'V9' among 6"),
         (("walk", "OUT"), "not 'walk'"),
@@ -152,7 +141,7 @@ def test_wrong_usage_says_what_is_right(cocalib: Cocalib, sound: Path, arguments
 
 
 def test_a_folder_without_results_is_refused(cocalib: Cocalib, tmp_path: Path) -> None:
-    for action in ("status", "rebuild", "summary"):
+    for action in ("status", "summary"):
         answer = cocalib("fleet", action, tmp_path)
         assert answer.code == 2
         assert "no results" in answer.err

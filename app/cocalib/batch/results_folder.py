@@ -46,6 +46,12 @@ class ResultsFolder:
         """Return where the result of a job lies, or will lie."""
         return self.path / _RESULTS / digest
 
+    def digests(self) -> tuple[str, ...]:
+        """Return the names of the results in order; what a job is still writing has a hidden name."""
+        folder = self.folder_of("")
+        names = sorted(one.name for one in folder.iterdir()) if folder.is_dir() else []
+        return tuple(one for one in names if one[0] != "." and os.path.lexists(folder / one / OUTCOME_FILE))
+
     def outcome(self, digest: str) -> Outcome | None:
         """Return what came of a job; None if it is to be run: it is not finished, damaged, or may go well another time."""
         try:

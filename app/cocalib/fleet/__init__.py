@@ -1,1 +1,1 @@
-"""What is known of a fleet from the results of its sessions: index, history, comparison, summary page."""
+"""What is known of a fleet from the results of its sessions: status, history, comparison, summary page."""

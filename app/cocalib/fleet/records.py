@@ -42,7 +42,7 @@ class SessionRecord:
 
     @property
     def report(self) -> str | None:
-        """Where its report is, relative to the folder that holds the index; None without one."""
+        """Where its report is, relative to the folder that holds results/; None without one."""
         named = any(file.name == "report.html" for file in self.outcome.files)
         return f"results/{self.outcome.digest}/report.html" if named else None
 
@@ -91,7 +91,7 @@ class UnreadResult:
     """A folder of results that cannot be read.
 
     Attributes:
-        place: relative to the folder that holds the index.
+        place: relative to the folder that holds results/.
         reason: what was found, and what to do.
     """
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 
 from calib_core.fleet import OffKind, Transition
 from cocalib.fleet.kinds import Kind
@@ -58,6 +59,21 @@ def age_days(record: SessionRecord, now_ns: int) -> float | None:
     """Return how long ago a session was recorded [days]; None if its time is not known."""
     recorded = record.outcome.recorded_ns
     return None if recorded is None else (now_ns - recorded) / _DAY_NS
+
+
+def recorded_text(recorded_ns: int | None, *, unknown: str = "–") -> str:
+    """Write when a recording began, in UTC, to the minute.
+
+    Args:
+        recorded_ns: its first stamp [ns]; None if that is not known.
+        unknown: what to write then.
+    """
+    if recorded_ns is None:
+        return unknown
+    try:
+        return f"{datetime.fromtimestamp(recorded_ns // 1_000_000_000, UTC):%Y-%m-%d %H:%M}"
+    except (OverflowError, ValueError, OSError):  # a stamp that no calendar has
+        return unknown
 
 
 def _standing(vehicle: VehicleRecord, kind: OffKind | None) -> VehicleStanding:

@@ -1,13 +1,11 @@
-"""All sessions as one flat table: Parquet for programs, CSV for spreadsheets."""
+"""All sessions as one flat table, as CSV."""
 
 import csv
-import importlib
 import io
 import math
 from collections.abc import Iterator
 from typing import Any
 
-from calib_core.errors import InputError
 from calib_core.fleet import Transition
 from calib_core.geometry import quaternion_wxyz_from_matrix
 from cocalib.fleet.records import FleetRecord, SessionRecord
@@ -52,30 +50,6 @@ def csv_bytes(fleet: FleetRecord) -> bytes:
     for row in _rows(fleet):
         writer.writerow({name: _cell(value) for name, value in row.items()})
     return text.getvalue().encode()
-
-
-def parquet_bytes(fleet: FleetRecord) -> bytes:
-    """Write the same as Parquet; covariances are lists of 36 numbers, row by row.
-
-    Raises:
-        InputError: pyarrow is not installed.
-    """
-    try:
-        arrow, parquet = importlib.import_module("pyarrow"), importlib.import_module("pyarrow.parquet")
-    except ImportError as error:
-        raise InputError(
-            f"Parquet needs pyarrow, which cannot be loaded ({error}): pip install pyarrow, or write CSV with --csv"
-        ) from error
-    text, real = arrow.string(), arrow.float64()
-    kinds = {name: text for name in _TEXT} | {name: real for name in (*_REAL, *(f"change_{one}" for one in _CHANGE))}
-    kinds |= {name: arrow.list_(real) for name in _LISTS}
-    kinds |= {"recorded_ns": arrow.int64(), "pairs": arrow.int64(), "superseded": arrow.bool_()}
-    kinds |= {"change_from": text, "change_outcome": text}
-    schema = arrow.schema([(name, kinds[name]) for name in _columns()])
-    table = arrow.Table.from_pylist(list(_rows(fleet)), schema=schema)
-    buffer = io.BytesIO()
-    parquet.write_table(table, buffer)
-    return buffer.getvalue()
 
 
 def _columns() -> list[str]:

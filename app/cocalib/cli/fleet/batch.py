@@ -11,7 +11,6 @@ from cocalib.cli.flags import Folder, called
 from cocalib.cli.output import progress_bar, write_whole
 
 if TYPE_CHECKING:
-    from cocalib.batch.driving import BatchProgress
     from cocalib.batch.manifest import Manifest
 
 
@@ -64,7 +63,8 @@ class Batch:
         from cocalib.batch.plan import write_plan
         from cocalib.batch.results_folder import ResultsFolder
         from cocalib.cli.fleet.batch_text import batch_lines, exit_code, shown_batch
-        from cocalib.fleet.batch_index import indexed_batch
+        from cocalib.fleet.reading import read_fleet
+        from cocalib.fleet.summary_page import write_summary
 
         results = ResultsFolder(self.out or manifest.source.with_suffix(""))
         try:
@@ -72,13 +72,10 @@ class Batch:
                 jobs = jobs_of(manifest.rows, results.path, progress_bytes)
             write_plan(results.path, manifest.source, jobs)
             engine = chosen_engine(len(jobs), workers=self.workers, scheduler=self.scheduler)
-            with shown_batch(len(jobs)) as show, indexed_batch(results.path) as add:
-
-                def tell(now: "BatchProgress") -> None:
-                    show(now)
-                    add(now)
-
-                outcomes = drive(jobs, engine, results, tell)
+            with shown_batch(len(jobs)) as show:
+                outcomes = drive(jobs, engine, results, show)
+            if results.digests():
+                write_summary(results.path, read_fleet(results.path))
         except OSError as error:
             raise InputError(f"{results.path}: cannot be written: {error.strerror or error}") from error
         print("\n".join([*batch_lines(outcomes), "", _next_line(results.path)]))

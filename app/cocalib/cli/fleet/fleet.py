@@ -16,18 +16,16 @@ from cocalib.platform.terminal import print_exactly
 if TYPE_CHECKING:
     from cocalib.fleet.records import FleetRecord
 
-_Action: TypeAlias = Literal["status", "history", "compare", "export", "summary", "rebuild"]
+_Action: TypeAlias = Literal["status", "history", "compare", "export", "summary"]
 _NAMES: Final[dict[str, tuple[str, ...]]] = {
     "status": (),
     "history": ("VEHICLE",),
     "compare": ("A", "B"),
     "export": (),
     "summary": (),
-    "rebuild": (),
 }
 _FLAG_OF = {
     "--json": ("status", "history", "compare"),
-    "--parquet": ("export",),
     "--csv": ("export",),
 }
 _LOOK: Final = 3
@@ -39,31 +37,27 @@ class Fleet:
 
     OUT is the folder that batch wrote to. `status OUT`: where each vehicle stands. `history VEHICLE OUT`: its sessions and what
     changed in between. `compare A B OUT`: two sessions VEHICLE/SESSION, or two vehicles of one type. `export OUT`: all
-    sessions as a table. `summary OUT`: write OUT/summary.html. `rebuild OUT`: write index and summary page from the results.
+    sessions as a table. `summary OUT`: write OUT/summary.html.
 
     Exit codes: 0 done, and nothing to look at; 2 nothing can be read; 3 something needs a look:
     a vehicle without a calibration to rely on, remounted, or off its kind; or two that differ.
     """
 
     action: Annotated[_Action, tyro.conf.Positional, called("ACTION")]
-    """What to do: status, history, compare, export, summary or rebuild."""
+    """What to do: status, history, compare, export or summary."""
     given: Annotated[tuple[str, ...], tyro.conf.Positional, called("NAME... OUT")] = ()
     """Names that the action takes, then the folder that batch wrote to."""
     json: Switch = False
     """With status, history, compare: print one JSON object instead of text."""
-    parquet: File = None
-    """With export: Parquet file to write."""
     csv: File = None
     """With export: CSV file to write."""
 
     def run(self) -> int:
         """Run the action; return the exit code."""
+        from cocalib.fleet.reading import read_fleet
+
         folder = self._fitting_folder()
         names = self.given[:-1]
-        if self.action == "rebuild":
-            return _rebuild(folder)
-        from cocalib.fleet.index import read_fleet
-
         fleet = read_fleet(folder)
         for unread in fleet.unread:
             print(f"note: {unread.place} {unread.reason}", file=sys.stderr)
@@ -83,7 +77,6 @@ class Fleet:
         """
         options: dict[str, object] = {
             "--json": self.json,
-            "--parquet": self.parquet,
             "--csv": self.csv,
         }
         for name, given in options.items():
@@ -94,8 +87,8 @@ class Fleet:
             raise InputError(
                 f"fleet {self.action} takes {' '.join(wanted)}; {len(self.given)} given; OUT is the folder that batch wrote to"
             )
-        if self.action == "export" and self.parquet is None and self.csv is None:
-            raise InputError("fleet export needs the name of the new file: --parquet FILE or --csv FILE")
+        if self.action == "export" and self.csv is None:
+            raise InputError("fleet export needs the name of the new file: --csv FILE")
         folder = Path(self.given[-1])
         if not folder.is_dir():
             raise InputError(f"{folder}: no such folder; give the one that batch wrote to")
@@ -142,22 +135,12 @@ class Fleet:
         return _LOOK if compared.outcome == "differs" else 0
 
     def _export(self, fleet: "FleetRecord") -> int:
-        from cocalib.fleet.table_export import csv_bytes, parquet_bytes
+        from cocalib.fleet.table_export import csv_bytes
 
-        for path, write in ((self.parquet, parquet_bytes), (self.csv, csv_bytes)):
-            if path is not None:
-                write_whole(path, write(fleet))
-                print(f"{path} written", file=sys.stderr)
+        assert self.csv is not None, "export was refused without it"
+        write_whole(self.csv, csv_bytes(fleet))
+        print(f"{self.csv} written", file=sys.stderr)
         return 0
-
-
-def _rebuild(folder: Path) -> int:
-    from cocalib.fleet.index import index_path, read_fleet, rebuild_index
-
-    for unread in rebuild_index(folder):
-        print(f"note: {unread.place} {unread.reason}", file=sys.stderr)
-    print(f"{index_path(folder)} written", file=sys.stderr)
-    return _summary(folder, read_fleet(folder))
 
 
 def _summary(folder: Path, fleet: "FleetRecord") -> int:

@@ -3,10 +3,9 @@
 from collections.abc import Iterator, Sequence
 
 from calib_core.fleet import Transition
-from cocalib.fleet.dates import recorded_text
 from cocalib.fleet.kinds import Kind
 from cocalib.fleet.records import FleetRecord, SessionRecord, VehicleRecord
-from cocalib.fleet.standing import VehicleStanding, age_days
+from cocalib.fleet.standing import VehicleStanding, age_days, recorded_text
 from cocalib.view.number_format import plain, with_sigma
 
 _DASH = "–"

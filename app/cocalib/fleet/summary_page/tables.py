@@ -3,10 +3,9 @@
 from collections.abc import Sequence
 
 from calib_core.fleet import MountingScatter
-from cocalib.fleet.dates import recorded_text
 from cocalib.fleet.kinds import Kind
 from cocalib.fleet.records import FleetRecord
-from cocalib.fleet.standing import VehicleStanding
+from cocalib.fleet.standing import VehicleStanding, recorded_text
 from cocalib.fleet.summary_page.cells import (
     Column,
     change_cells,

@@ -8,7 +8,7 @@ import pytest
 from benchmarks.fleet.judging import judge, main
 from benchmarks.fleet.truth import FleetTruth, TrueSession
 from calib_core.geometry import RigidTransform
-from cocalib.fleet.index import read_fleet
+from cocalib.fleet.reading import read_fleet
 from tests.unit.app.fleet.made_results import make_fleet, make_result
 
 _TURNED = np.array([0.0, 0.0, 0.0, 0.1, 0.0, 0.0])

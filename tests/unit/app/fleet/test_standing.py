@@ -10,9 +10,9 @@ from calib_core.errors import InputError
 from calib_core.fleet import MountingScatter
 from cocalib.cli.fleet.text_tables import plan_lines
 from cocalib.fleet.choosing import compare_sessions, vehicle_named
-from cocalib.fleet.index import read_fleet
 from cocalib.fleet.json_documents import status_document
 from cocalib.fleet.kinds import kinds_of
+from cocalib.fleet.reading import read_fleet
 from cocalib.fleet.records import FleetRecord
 from cocalib.fleet.standing import age_days, standings_of
 from cocalib.fleet.summary_page import summary_html

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cocalib.fleet.index import read_fleet
+from cocalib.fleet.reading import read_fleet
 from cocalib.fleet.records import FleetRecord
 from cocalib.fleet.summary_page import summary_html
 from tests.unit.app.fleet.made_results import digest_of, make_fleet, make_result
