@@ -1014,6 +1014,13 @@ export interface ColumnsMapped {
   request?: number;
 }
 
+/** The recording is read with these --radar-axes from here on; None: without. It changes nothing in the session. */
+export interface AxesStated {
+  type: "axes_stated";
+  radar_axes: string | null;
+  request?: number;
+}
+
 /** The user confirmed assumptions about the recording, by their texts. Not undone with clicks. */
 export interface AssumptionsConfirmed {
   type: "assumptions_confirmed";
@@ -1323,6 +1330,7 @@ export type FromPage =
   | IntrinsicsChosen
   | ClicksImported
   | ColumnsMapped
+  | AxesStated
   | AssumptionsConfirmed
   | BoxDrawn
   | BoxMoved

@@ -341,7 +341,7 @@ class Workspace:
         self.dispatch(boxes_loaded(read_sent_boxes(data, name, self.facts), self.facts))
 
     def close(self) -> Closed:
-        """Stop the solver, write the snapshot and close the session file; return whether all clicks are on the disk.
+        """Stop the solver and close the session file; return whether all clicks are on the disk.
 
         Safe to call again.
         """

@@ -9,6 +9,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -16,10 +17,9 @@ import numpy as np
 from calib_core.measurements import TimeNs
 from cocalib.session import ClickMoved, ClickPlaced, ClickRemoved, History, RecordingFacts, Step, Undo, advance
 from cocalib.session.file import SessionFileError, open_session_file
+from cocalib.session.file.contents import read_contents
 from cocalib.session.file.guarded_folder import GuardedFolder
-from cocalib.session.file.journal_reading import JOURNAL
-from cocalib.session.file.reconciling import read_contents
-from cocalib.session.file.snapshot import SNAPSHOT
+from cocalib.session.file.journal import COPY, JOURNAL
 
 __all__ = ["Made", "every_bit", "every_kill", "every_length", "made_session", "sampled_bits"]
 
@@ -31,78 +31,82 @@ class Made:
     """A session that was written and closed.
 
     Attributes:
-        journal: its journal.
-        snapshot: its snapshot.
+        journal: its journal; the copy is the same.
         histories: the session after each step, the empty one first.
-        snapshots: the snapshot that was on the disk after each step; None before the first.
     """
 
     journal: bytes
-    snapshot: bytes
     histories: tuple[History, ...]
-    snapshots: tuple[bytes | None, ...]
 
 
 def made_session(steps: int, folder: Path) -> Made:
     """Write a session of clicks, moves, removals and undone steps, and close it."""
     session_file = open_session_file(folder, FACTS)
-    histories, snapshots = [History()], [_snapshot(folder)]
+    histories = [History()]
     for step in _steps(steps):
         history = advance(histories[-1], step, FACTS)
         session_file.append(step, history)
         histories.append(history)
-        snapshots.append(_snapshot(folder))
     session_file.close()
-    return Made((folder / JOURNAL).read_bytes(), (folder / SNAPSHOT).read_bytes(), tuple(histories), tuple(snapshots))
+    journal = (folder / JOURNAL).read_bytes()
+    assert (folder / COPY).read_bytes() == journal
+    return Made(journal, tuple(histories))
 
 
-def every_bit(made: Made, folder: Path, *, name: str, with_snapshot: bool = True, stride: int = 1) -> Counter[str]:
-    """Flip every single bit of the journal or of the snapshot, or one in `stride`, and count what becomes of it."""
-    bits = range(0, 8 * len(made.journal if name == JOURNAL else made.snapshot), stride)
-    return _flipped(made, folder, bits, name=name, with_snapshot=with_snapshot)
+def every_bit(made: Made, folder: Path, *, name: str, with_other: bool = True, stride: int = 1) -> Counter[str]:
+    """Flip every single bit of the journal or of its copy, or one in `stride`, and count what becomes of it."""
+    return _flipped(made, folder, range(0, 8 * len(made.journal), stride), name=name, with_other=with_other)
 
 
-def sampled_bits(made: Made, folder: Path, count: int, *, seed: int, with_snapshot: bool) -> Counter[str]:
+def sampled_bits(made: Made, folder: Path, count: int, *, seed: int, with_other: bool) -> Counter[str]:
     """Flip single bits of the journal, drawn with a seed."""
     bits = random.Random(seed).sample(range(8 * len(made.journal)), count)
-    return _flipped(made, folder, bits, name=JOURNAL, with_snapshot=with_snapshot)
+    return _flipped(made, folder, bits, name=JOURNAL, with_other=with_other)
 
 
-def every_length(made: Made, folder: Path) -> Counter[str]:
-    """Cut the journal of a closed session at every length; its snapshot knows all steps."""
+def every_length(made: Made, folder: Path, *, name: str) -> Counter[str]:
+    """Cut the journal or its copy at every length; the other one knows all steps."""
     lengths = range(len(made.journal))
-    return Counter(_outcome(folder, made.journal[:length], made.snapshot, made.histories[-1]) for length in lengths)
+    return Counter(
+        _outcome(folder, {**_both(made), name: made.journal[:length]}, made.histories[-1]) for length in lengths
+    )
 
 
 def every_kill(made: Made, folder: Path) -> Counter[str]:
-    """Stop the writing of every step at every byte, with the snapshot before and after its own writing."""
+    """Stop the writing of every step at every byte, first in the journal, then in its copy."""
     found: Counter[str] = Counter()
-    for length in range(made.journal.index(b"\n") + 1, len(made.journal) + 1):
-        whole = made.journal[:length].count(b"\n") - 1
-        for snapshot in dict.fromkeys((made.snapshots[max(0, whole - 1)], made.snapshots[whole])):
-            found[_outcome(folder, made.journal[:length], snapshot, made.histories[whole])] += 1
+    ends = [index + 1 for index, byte in enumerate(made.journal) if byte == ord("\n")]
+    for number, (before, after) in enumerate(pairwise(ends)):
+        for length in range(before, after + 1):
+            torn = made.journal[:length]
+            confirmed = made.histories[number + (length == after)]
+            found[_outcome(folder, {JOURNAL: torn, COPY: made.journal[:before]}, confirmed)] += 1
+            found[_outcome(folder, {JOURNAL: made.journal[:after], COPY: torn}, made.histories[number + 1])] += 1
     return found
 
 
-def _flipped(made: Made, folder: Path, bits: "range | list[int]", *, name: str, with_snapshot: bool) -> Counter[str]:
+def _both(made: Made) -> dict[str, bytes]:
+    return {JOURNAL: made.journal, COPY: made.journal}
+
+
+def _flipped(made: Made, folder: Path, bits: "range | list[int]", *, name: str, with_other: bool) -> Counter[str]:
     found: Counter[str] = Counter()
     for bit in bits:
-        data = bytearray(made.journal if name == JOURNAL else made.snapshot)
+        data = bytearray(made.journal)
         data[bit // 8] ^= 1 << bit % 8
-        journal, snapshot = (bytes(data), made.snapshot) if name == JOURNAL else (made.journal, bytes(data))
-        found[_outcome(folder, journal, snapshot if with_snapshot else None, made.histories[-1])] += 1
+        others = _both(made) if with_other else {}
+        found[_outcome(folder, {**others, name: bytes(data)}, made.histories[-1])] += 1
     return found
 
 
-def _outcome(folder: Path, journal: bytes, snapshot: bytes | None, confirmed: History) -> str:
-    """Return what an opening makes of two files."""
+def _outcome(folder: Path, files: dict[str, bytes], confirmed: History) -> str:
+    """Return what an opening makes of a folder with these files."""
     folder.mkdir(exist_ok=True)
-    for name, data in ((JOURNAL, journal), (SNAPSHOT, snapshot)):
-        (folder / name).unlink(
-            missing_ok=True
-        )  # a file that is cut and written again is flushed to the disk, which takes long
-        if data is not None:
-            (folder / name).write_bytes(data)
+    for name in (JOURNAL, COPY):
+        # a file that is cut and written again is flushed to the disk, which takes long
+        (folder / name).unlink(missing_ok=True)
+        if name in files:
+            (folder / name).write_bytes(files[name])
     guarded = GuardedFolder(folder)
     try:
         found = read_contents(guarded, FACTS)
@@ -113,15 +117,9 @@ def _outcome(folder: Path, journal: bytes, snapshot: bytes | None, confirmed: Hi
     assert found is not None
     if not found.is_complete:
         return "refused"
-    present, expected = found.history.present, confirmed.present
-    if (present.clicks, present.options) != (expected.clicks, expected.options):
+    if found.history != confirmed:
         return "silently changed"
     return "continued and told" if found.faults else "continued"
-
-
-def _snapshot(folder: Path) -> bytes | None:
-    path = folder / SNAPSHOT
-    return path.read_bytes() if path.exists() else None
 
 
 def _steps(count: int) -> Iterator[Step]:
@@ -147,13 +145,16 @@ def _main() -> None:
         short, long = made_session(12, home / "short"), made_session(300, home / "long")
         tried = home / "tried"
         rows = {
-            "every bit of a journal of 12 steps, closed": every_bit(short, tried, name=JOURNAL),
-            "the same, killed before its first snapshot": every_bit(short, tried, name=JOURNAL, with_snapshot=False),
-            "every bit of its snapshot": every_bit(short, tried, name=SNAPSHOT),
-            "3000 bits of a journal of 300 steps, closed": sampled_bits(long, tried, 3000, seed=1, with_snapshot=True),
-            "the same, without its snapshot": sampled_bits(long, tried, 3000, seed=2, with_snapshot=False),
-            "a journal of 12 steps cut at every length": every_length(short, tried),
-            "a kill at every byte of 12 steps": every_kill(short, tried),
+            "every fifth bit of a journal of 12 steps": every_bit(short, tried, name=JOURNAL, stride=5),
+            "every fifth bit of its copy": every_bit(short, tried, name=COPY, stride=5),
+            "every fifth bit of the journal, without its copy": every_bit(
+                short, tried, name=JOURNAL, with_other=False, stride=5
+            ),
+            "300 bits of a journal of 300 steps": sampled_bits(long, tried, 300, seed=1, with_other=True),
+            "the same, without its copy": sampled_bits(long, tried, 300, seed=2, with_other=False),
+            "a journal of 12 steps cut at every length": every_length(short, tried, name=JOURNAL),
+            "its copy cut at every length": every_length(short, tried, name=COPY),
+            "a kill at every byte of 12 steps, in both": every_kill(short, tried),
         }
     columns = ("continued", "continued and told", "refused", "silently changed")
     print(f"| what | tried | {' | '.join(columns)} |\n|---|---|{'---|' * len(columns)}")

@@ -44,14 +44,14 @@ def clicked(folder: Path, clicks: int = 12, facts: RecordingFacts = FACTS) -> Pa
     return folder
 
 
-def damaged(folder: Path, line: int, *, with_snapshot: bool = False) -> Path:
-    """Damage a line of the journal, and remove the snapshot unless it is to stay."""
+def damaged(folder: Path, line: int, *, with_copy: bool = False) -> Path:
+    """Damage a line of the journal, and remove the copy unless it is to stay."""
     journal = folder / "journal.jsonl"
     lines = journal.read_bytes().split(b"\n")
     lines[line - 1] = lines[line - 1].replace(b"2.0", b"3.0")
     journal.write_bytes(b"\n".join(lines))
-    if not with_snapshot:
-        (folder / "session.json").unlink()
+    if not with_copy:
+        (folder / "journal-copy.jsonl").unlink()
     return folder
 
 
@@ -156,7 +156,7 @@ def test_a_repair_with_yes_keeps_what_is_proven_and_the_old_files(cocalib: Cocal
 
 def test_two_files_that_do_not_belong_together_are_told_apart_by_hand(cocalib: Cocalib, home: Path) -> None:
     folder, other = clicked(home / "drive.bag.cocalib-session", 3), clicked(home / "other.cocalib-session", 9)
-    shutil.copy(damaged(other, 5, with_snapshot=True) / "session.json", folder)
+    shutil.copy(damaged(other, 5, with_copy=True) / "journal-copy.jsonl", folder)
     lines = (folder / "journal.jsonl").read_bytes().split(b"\n")
     (folder / "journal.jsonl").write_bytes(b"\n".join([lines[0], lines[2], *lines[1:2], b""]))
     before = files(folder)
@@ -189,7 +189,7 @@ def test_an_export_of_a_damaged_session_writes_what_is_proven_and_says_what_is_n
 
 def test_what_proves_nothing_is_not_exported(cocalib: Cocalib, home: Path, tmp_path: Path) -> None:
     folder = clicked(home / "drive.bag.cocalib-session")
-    (folder / "session.json").unlink()
+    (folder / "journal-copy.jsonl").unlink()
     (folder / "journal.jsonl").write_bytes(b"no\n")
     for arguments in (["export", folder, "--out", tmp_path / "clicks.json"], ["repair", folder, "--yes"]):
         answer = cocalib("session", *arguments)

@@ -228,15 +228,15 @@ def _own_files(_folder: Path) -> list[bytes]:
 
 
 def _session(data: bytes, folder: Path) -> None:
-    """Open a session whose journal is the input, and its snapshot the rest after a zero byte."""
+    """Open a session whose journal is the input, and its copy the rest after a zero byte."""
     inside = folder / "input.cocalib-session"
     inside.mkdir(exist_ok=True)
     for old in inside.iterdir():
         old.unlink()
-    journal, zero, snapshot = data.partition(b"\0")
+    journal, zero, copy = data.partition(b"\0")
     (inside / "journal.jsonl").write_bytes(journal)
     if zero:
-        (inside / "session.json").write_bytes(snapshot)
+        (inside / "journal-copy.jsonl").write_bytes(copy)
     try:
         open_session_file(inside, FACTS).close()
     except SessionFileError:
@@ -251,7 +251,7 @@ def _sessions(folder: Path) -> list[bytes]:
         history = advance(history, step, FACTS)
         session.append(step, history)
     session.close()
-    files = [(folder / "seed.cocalib-session" / name).read_bytes() for name in ("journal.jsonl", "session.json")]
+    files = [(folder / "seed.cocalib-session" / name).read_bytes() for name in ("journal.jsonl", "journal-copy.jsonl")]
     return [files[0], b"\0".join(files)]
 
 

@@ -255,7 +255,7 @@ def test_a_journal_cut_at_any_byte_gives_the_last_confirmed_session_back(taken: 
         for step, history in kept:
             session_file.append(step, history)
         session_file.close()
-        (folder / "session.json").unlink()  # it would know of steps beyond the cut
+        (folder / "journal-copy.jsonl").unlink()  # it would know of steps beyond the cut
         journal = folder / "journal.jsonl"
         whole = journal.read_bytes()
         first = whole.index(b"\n") + 1

@@ -113,11 +113,11 @@ def _session_folder(place: Path) -> Path:
     Raises:
         InputError: there is none.
     """
-    from cocalib.session.file import recording_session_folder
+    from cocalib.session.file import holds_session_files, recording_session_folder
 
     if not place.exists() and not place.is_symlink():
         raise InputError(f"{place}: no such folder; find sessions with cocalib session list FOLDER")
-    if ".cocalib-session" in place.name or any((place / name).exists() for name in ("journal.jsonl", "session.json")):
+    if ".cocalib-session" in place.name or holds_session_files(place):
         return place
     folder = recording_session_folder([place])
     if not folder.is_dir():

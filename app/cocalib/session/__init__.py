@@ -9,6 +9,7 @@ from cocalib.session.chosen_intrinsics import ChosenIntrinsics
 from cocalib.session.event_checks import EventError
 from cocalib.session.events import (
     AssumptionsConfirmed,
+    AxesStated,
     BoxDrawn,
     BoxesLoaded,
     BoxHidden,
@@ -41,6 +42,7 @@ from cocalib.session.state import AssumedReading, DismissedPlacement, Outcome, R
 __all__ = [
     "AssumedReading",
     "AssumptionsConfirmed",
+    "AxesStated",
     "BoxDrawn",
     "BoxEdges",
     "BoxHidden",

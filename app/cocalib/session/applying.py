@@ -12,6 +12,7 @@ from cocalib.session.box_applying import BoxEvent, apply_to_boxes
 from cocalib.session.event_checks import EventError, require_camera, require_frame, require_pixel
 from cocalib.session.events import (
     AssumptionsConfirmed,
+    AxesStated,
     Cleared,
     ClickExcluded,
     ClickMoved,
@@ -45,6 +46,8 @@ def apply(session: Session, event: Step, facts: RecordingFacts) -> Session:
         if event.revision != session.revision:
             return session
         return replace(session, outcome=event.outcome, outcome_revision=event.revision, checked=event.checked)
+    if isinstance(event, AxesStated):
+        return session
     if isinstance(event, ScansAdded):
         return replace(session, revision=session.revision + 1)
     if isinstance(event, _Aside):

@@ -193,6 +193,12 @@ class ColumnsMapped(_Journalled, frozen=True):
     column_map: tuple[Annotated[str, Meta(max_length=500)], ...]
 
 
+class AxesStated(_Journalled, frozen=True):
+    """The recording is read with these --radar-axes from here on; None: without. It changes nothing in the session."""
+
+    radar_axes: str | None
+
+
 class IntrinsicsChosen(_Journalled, frozen=True):
     """Intrinsics were chosen for the session; None goes back to those that it was opened with."""
 
@@ -240,6 +246,7 @@ JournalStep: TypeAlias = (
     | IntrinsicsChosen
     | ClicksImported
     | ColumnsMapped
+    | AxesStated
     | AssumptionsConfirmed
     | BoxDrawn
     | BoxMoved

@@ -1,19 +1,23 @@
-"""The session on disk: a journal of every step, written before the step is announced, and a snapshot to restart from.
+"""The session on disk: a journal of every step, written before the step is announced, and a copy to restart from.
 
-A session is a folder, `NAME.cocalib-session/`, with `journal.jsonl` (one line per step, only ever appended to), `session.json`
-(the clicks and options, replaced as a whole from time to time) and `lock` (held while a process has the session open). All of
-them are opened without following links, carry checksums, and are compared with each other before anything is overwritten.
+A session is a folder, `NAME.cocalib-session/`, with `journal.jsonl` (one line per step, only ever appended to),
+`journal-copy.jsonl` (the same lines) and `lock` (held while a process has the session open). All of them are opened without
+following links; every line carries a checksum, and both files are compared before anything is overwritten.
 """
 
 from cocalib.platform.resources import user_session_folder
-from cocalib.session.file.closing import Closed
+from cocalib.session.file.contents import Repair, inspect_session, repair_session
 from cocalib.session.file.errors import SessionFileError
-from cocalib.session.file.finding import FoundFolder, find_session_folder, has_session_of
+from cocalib.session.file.finding import (
+    FoundFolder,
+    find_session_folder,
+    has_session_of,
+    holds_session_files,
+    remembered_map,
+)
 from cocalib.session.file.folders import recording_session_folder, unused_session_folder
 from cocalib.session.file.listing import SessionSummary, session_summaries
-from cocalib.session.file.remembered import remembered_map
-from cocalib.session.file.repairing import Repair, inspect_session, repair_session
-from cocalib.session.file.session_file import Restored, SessionFile, open_session_file, set_aside
+from cocalib.session.file.session_file import Closed, Restored, SessionFile, open_session_file, set_aside
 
 __all__ = [
     "Closed",
@@ -25,6 +29,7 @@ __all__ = [
     "SessionSummary",
     "find_session_folder",
     "has_session_of",
+    "holds_session_files",
     "inspect_session",
     "open_session_file",
     "recording_session_folder",

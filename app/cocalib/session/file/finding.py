@@ -1,20 +1,22 @@
 """Find the session of a recording that was renamed or moved: by its content, next to it and in the user's folder."""
 
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
 from calib_core.results import DataWarning
 from cocalib.platform.resources import state_folder
-from cocalib.session import RecordingFacts
+from cocalib.session import ColumnsMapped, RecordingFacts
 from cocalib.session.file.errors import SessionFileError
 from cocalib.session.file.folders import is_writable, recording_session_folder, session_folders_in
 from cocalib.session.file.guarded_folder import GuardedFolder
 from cocalib.session.file.identity import RecordingForm, has_dates, is_same_recording
-from cocalib.session.file.journal_reading import JOURNAL, read_journal
+from cocalib.session.file.journal import COPY, JOURNAL, read_journal
 from cocalib.session.file.snapshot import SNAPSHOT, read_snapshot
 
 _HEAD_BYTES = 1 << 16
+_FILES = (JOURNAL, COPY, SNAPSHOT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +48,7 @@ def find_session_folder(paths: Sequence[Path], facts: RecordingFacts) -> FoundFo
     """
     named = recording_session_folder(paths)
     own = _candidate(named)
-    if named.is_symlink() or (own is None and _has_files(named)):
+    if named.is_symlink() or (own is None and holds_session_files(named)):
         return FoundFolder(named)  # opening it says what is wrong
     if own is not None and is_same_recording(own.recording, facts):
         return FoundFolder(named)
@@ -67,6 +69,21 @@ def has_session_of(folder: Path, facts: RecordingFacts) -> bool:
     """Return whether a folder has a session that can be read, of a recording with these frames."""
     candidate = _candidate(folder)
     return candidate is not None and is_same_recording(candidate.recording, facts)
+
+
+def remembered_map(folder: Path) -> tuple[str, ...]:
+    """Return the values of --map that a session was last opened with; none if it has none or cannot be read.
+
+    Args:
+        folder: of the session. Opening the session afterwards reports whatever is wrong with it.
+    """
+    try:
+        with closing(GuardedFolder(folder)) as guarded:
+            data = guarded.read(JOURNAL) or guarded.read(COPY) or b""
+            steps = read_journal(data, str(folder)).steps
+    except (SessionFileError, OSError):
+        return ()
+    return next((step.column_map for step in reversed(steps) if isinstance(step, ColumnsMapped)), ())
 
 
 def _chosen(named: Path, same: Sequence[_Candidate], facts: RecordingFacts) -> FoundFolder:
@@ -125,7 +142,7 @@ def _candidate(path: Path) -> _Candidate | None:
         return None
     try:
         recording = _recording(folder)
-        changed = max((folder.changed_at_s(name) or 0.0 for name in (JOURNAL, SNAPSHOT)), default=0.0)
+        changed = max((folder.changed_at_s(name) or 0.0 for name in _FILES), default=0.0)
         return None if recording is None else _Candidate(path, recording, changed)
     except (SessionFileError, OSError):
         return None
@@ -134,13 +151,15 @@ def _candidate(path: Path) -> _Candidate | None:
 
 
 def _recording(folder: GuardedFolder) -> RecordingForm | None:
-    head = (folder.read(JOURNAL, at_most=_HEAD_BYTES) or b"").partition(b"\n")[0]
-    recording = read_journal(head + b"\n", str(folder.path / JOURNAL)).recording if head else None
-    if recording is not None:
-        return recording
+    for name in (JOURNAL, COPY):
+        head = (folder.read(name, at_most=_HEAD_BYTES) or b"").partition(b"\n")[0]
+        recording = read_journal(head + b"\n", str(folder.path / name)).recording if head else None
+        if recording is not None:
+            return recording
     data = folder.read(SNAPSHOT)
     return None if data is None else read_snapshot(data, SNAPSHOT).recording
 
 
-def _has_files(folder: Path) -> bool:
-    return any((folder / name).exists() or (folder / name).is_symlink() for name in (JOURNAL, SNAPSHOT))
+def holds_session_files(folder: Path) -> bool:
+    """Return whether a folder has a file of a session, be it sound or not."""
+    return any((folder / name).exists() or (folder / name).is_symlink() for name in _FILES)

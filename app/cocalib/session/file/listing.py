@@ -5,12 +5,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cocalib.platform.resources import state_folder
+from cocalib.session.file.contents import inspect_session
 from cocalib.session.file.errors import SessionFileError
+from cocalib.session.file.finding import holds_session_files
 from cocalib.session.file.folders import recording_session_folder, session_folders_in
 from cocalib.session.file.guarded_folder import GuardedFolder
-from cocalib.session.file.journal_reading import JOURNAL
+from cocalib.session.file.journal import COPY, JOURNAL
 from cocalib.session.file.lock import lock_holder
-from cocalib.session.file.repairing import inspect_session
 from cocalib.session.file.snapshot import SNAPSHOT
 
 
@@ -48,7 +49,7 @@ def session_summaries(places: Sequence[Path]) -> tuple[SessionSummary, ...]:
 
 
 def _folders(place: Path) -> tuple[Path, ...]:
-    if any((place / name).exists() for name in (JOURNAL, SNAPSHOT)):
+    if holds_session_files(place):
         return (place,)
     inside = session_folders_in(place, set_aside=True)
     named = recording_session_folder([place]) if place.exists() else place
@@ -60,7 +61,7 @@ def _summary(path: Path) -> SessionSummary:
     try:
         folder = GuardedFolder(path)
         try:
-            changed = max(filter(None, map(folder.changed_at_s, (JOURNAL, SNAPSHOT))), default=None)
+            changed = max(filter(None, map(folder.changed_at_s, (JOURNAL, COPY, SNAPSHOT))), default=None)
             holder = lock_holder(folder)
         finally:
             folder.close()

@@ -1,27 +1,21 @@
 """An open session folder: what was in it, how new steps are added, and whether all of it is on the disk at the end."""
 
-import logging
 import os
-from contextlib import ExitStack
+import tempfile
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from calib_core.results import DataWarning
-from cocalib.platform.resources import version
-from cocalib.session import History, RecordingFacts, Step
-from cocalib.session.file.closing import Closed, rescued, snapshot_fault
+from cocalib.platform.resources import user_session_folder, version
+from cocalib.session import AxesStated, History, RecordingFacts, Step
+from cocalib.session.file.contents import Contents, read_contents, rewrite
 from cocalib.session.file.errors import SessionFileError
 from cocalib.session.file.guarded_folder import GuardedFolder
 from cocalib.session.file.identity import recording_form
-from cocalib.session.file.journal import Journal, begin_journal
-from cocalib.session.file.journal_reading import JOURNAL
+from cocalib.session.file.journal import COPY, JOURNAL, Journal, bytes_of, new_lines
 from cocalib.session.file.lock import FolderLock
-from cocalib.session.file.reconciling import Contents, read_contents
-from cocalib.session.file.rewriting import rewrite
-from cocalib.session.file.snapshot import SNAPSHOT, write_snapshot
-
-_STEPS_PER_SNAPSHOT = 10
-_log = logging.getLogger(__name__)
+from cocalib.session.file.snapshot import SNAPSHOT
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +27,7 @@ class Restored:
         history: the session, with what can be undone and redone.
         steps: how many steps the journal held; 0 for a new session.
         torn_bytes: length of a half-written last line that was dropped; it had never been confirmed.
-        from_snapshot: the journal was missing or shorter than the snapshot, so the snapshot was used.
+        from_snapshot: of an earlier version, whose journal was missing or shorter than its snapshot, which was used.
         warnings: what else the user must know before continuing.
     """
 
@@ -54,20 +48,49 @@ class Restored:
         return ""
 
 
+@dataclass(frozen=True, slots=True)
+class Closed:
+    """What is on the disk after a session was closed.
+
+    Attributes:
+        folder: of the session.
+        clicks: how many it has.
+        fault: what was wrong with the folder; "" if everything is there and was verified.
+        kept_in: where the clicks are instead; None if they could not be written anywhere.
+    """
+
+    folder: Path
+    clicks: int
+    fault: str = ""
+    kept_in: Path | None = None
+
+    @property
+    def note(self) -> str:
+        """What to tell the user, without a full stop at the end."""
+        if not self.fault:
+            return f"all clicks are saved in {self.folder}"
+        if not self.clicks and self.kept_in is None:
+            return f"there were no clicks to save, but {self.fault}"
+        if self.kept_in is None:
+            return f"the clicks ({self.clicks}) could not be saved: {self.fault}"
+        again = "they are used when it is opened again"
+        if self.kept_in.parent != self.folder:
+            again = f"to continue with them, open the recording with --session {self.kept_in}"
+        return f"{self.fault}. All clicks ({self.clicks}) are saved in {self.kept_in}; {again}"
+
+
 class SessionFile:
     """Stores the steps of one session, from `open_session_file` to `close`. To be used by one thread at a time."""
 
     def __init__(
-        self, facts: RecordingFacts, folder: GuardedFolder, lock: FolderLock, journal: Journal, restored: Restored
+        self, folder: GuardedFolder, lock: FolderLock, journal: Journal, restored: Restored, name: str
     ) -> None:
         self.restored = restored
-        self._recording = recording_form(facts)
         self._folder = folder
         self._lock = lock
         self._journal = journal
-        self._history = restored.history
-        self._snapshot_steps = -1
-        self._snapshot_identity = folder.identity(SNAPSHOT)
+        self._present = restored.history.present
+        self._name = name
         self._closed: Closed | None = None
 
     def append(self, step: Step, history: History) -> None:
@@ -77,12 +100,10 @@ class SessionFile:
             SessionFileError: it could not be written; the file is unchanged.
         """
         self._journal.append(step)
-        self._history = history
-        if self._journal.steps % _STEPS_PER_SNAPSHOT == 0:
-            self.keep_snapshot()
+        self._present = history.present
 
     def close(self) -> Closed:
-        """Write the snapshot, verify what is on the disk, and release the folder.
+        """Verify what is on the disk, write it elsewhere if it is not all there, and release the folder.
 
         Returns:
             whether everything is there; if not, where a copy was written. A second call returns the same.
@@ -94,42 +115,47 @@ class SessionFile:
             self._folder.close()
         return self._closed
 
-    def keep_snapshot(self) -> str:
-        """Write the snapshot unless it is up to date; return why that failed, or "".
-
-        The journal is complete without it, so a failure is only logged.
-        """
-        if self._snapshot_steps == self._journal.steps:
-            return ""
-        try:
-            if self._folder.identity(SNAPSHOT) != self._snapshot_identity:
-                raise SessionFileError("another program has changed it")
-            self._write_snapshot()
-            return ""
-        except OSError as error:
-            fault = error.strerror or str(error)
-        except SessionFileError as error:
-            fault = str(error)
-        _log.warning("%s: the snapshot could not be written: %s", self._folder.path / SNAPSHOT, fault)
-        return fault
-
-    def _write_snapshot(self) -> None:
-        present, sums = self._history.present, self._journal.sums
-        write_snapshot(self._folder, present, recording=self._recording, sums=sums, cocalib=version())
-        self._snapshot_identity = self._folder.identity(SNAPSHOT)
-        self._snapshot_steps = self._journal.steps
-
     def _verified(self) -> Closed:
-        present, path = self._history.present, self._folder.path
-        fault = self._journal.fault(whole=True)
+        path, clicks = self._folder.path, len(self._present.clicks)
         if not self._folder.is_in_place():
-            return rescued(path, present, self._recording, f"{path} was deleted, moved or replaced while it was open")
-        unwritten = self.keep_snapshot() or snapshot_fault(self._folder, present.clicks)
+            return self._rescued(f"{path} was deleted, moved or replaced while it was open")
+        fault, copy_fault = self._journal.fault(), self._journal.copy_fault()
         if not fault:
-            return Closed(path, len(present.clicks))
-        if not unwritten:
-            return Closed(path, len(present.clicks), f"{path / JOURNAL}: {fault}", path / SNAPSHOT)
-        return rescued(path, present, self._recording, f"{path / JOURNAL}: {fault}; {SNAPSHOT}: {unwritten}")
+            return Closed(path, clicks)
+        fault = f"{path / JOURNAL}: {fault}"
+        if not copy_fault:
+            return Closed(path, clicks, fault, path / COPY)
+        return self._rescued(f"{fault}; {COPY}: {copy_fault}")
+
+    def _rescued(self, fault: str) -> Closed:
+        """Write the session to the user's folder, or to the system's folder for temporary files."""
+        path, count = self._folder.path, len(self._present.clicks)
+        if not count and not self._present.boxes:
+            return Closed(path, 0, fault)
+        for home in (user_session_folder(f"{self._name}-rescued").parent, Path(tempfile.gettempdir())):
+            try:
+                return Closed(path, count, fault, self._written(home))
+            except OSError as error:
+                fault = f"{fault}; {home}: {error.strerror or error}"
+            except SessionFileError as error:
+                fault = f"{fault}; {error}"
+        return Closed(path, count, fault)
+
+    def _written(self, home: Path) -> Path:
+        number = 1
+        plain = "".join(letter if letter.isalnum() or letter in "._-" else "_" for letter in self._name)[:100]
+        while os.path.lexists(path := home / f"{plain}-rescued-{number}.cocalib-session"):
+            number += 1
+        folder = GuardedFolder(path, create=True)
+        try:
+            whole = bytes_of(self._journal.lines)
+            for name in (JOURNAL, COPY):
+                folder.replace(name, whole)
+            if folder.read(JOURNAL) != whole:
+                raise SessionFileError(f"{path}: another program has changed it")
+        finally:
+            folder.close()
+        return path
 
 
 def open_session_file(folder: Path, facts: RecordingFacts, warnings: tuple[DataWarning, ...] = ()) -> SessionFile:
@@ -189,35 +215,26 @@ def _opened(
     folder: GuardedFolder, lock: FolderLock, facts: RecordingFacts, warnings: tuple[DataWarning, ...]
 ) -> SessionFile:
     found = read_contents(folder, facts)
-    about = (*warnings, *(_about(found, facts, folder) if found else ()))
     if found is None:
-        sums, torn_bytes = begin_journal(folder, recording_form(facts), (), cocalib=version()), 0
-    elif found.needs_writing:
-        _, sums = rewrite(folder, found, recording_form(facts))
-        torn_bytes = 0
+        lines = new_lines(recording_form(facts), (), cocalib=version())
+        folder.replace(JOURNAL, bytes_of(lines))
+        restored = Restored(folder.path, History(), warnings=warnings)
     else:
-        assert found.journal is not None
-        sums, torn_bytes = found.journal.sums, found.journal.torn_bytes
-        if found.faults:
-            folder.back_up(SNAPSHOT)
-    journal = _continued(folder, sums, torn_bytes)
-    history = found.history if found else History()
-    from_snapshot = found is not None and found.from_snapshot
-    restored = Restored(folder.path, history, len(sums) - 1, torn_bytes, from_snapshot, about)
-    opened = SessionFile(facts, folder, lock, journal, restored)
-    if about:
-        opened.keep_snapshot()  # so that the current axes are stored even if the process is killed
+        lines = found.lines
+        about = (*warnings, *_about(found, facts, folder))
+        if not found.is_written:
+            rewrite(folder, found)
+        elif found.faults:
+            for name in (COPY, SNAPSHOT):
+                folder.back_up(name)
+        torn = found.torn_bytes if found.is_written else 0
+        restored = Restored(folder.path, found.history, len(lines) - 1, torn, found.from_snapshot, about)
+    journal = Journal(folder, lines)
+    opened = SessionFile(folder, lock, journal, restored, facts.name)
+    if found is not None and found.stated_axes != facts.radar_axes:
+        with suppress(SessionFileError):  # on a full disk, the next opening warns again
+            journal.append(AxesStated(facts.radar_axes))
     return opened
-
-
-def _continued(folder: GuardedFolder, sums: tuple[str, ...], torn_bytes: int) -> Journal:
-    """Open the journal that was read or written for appending."""
-    descriptor = folder.open(JOURNAL, os.O_RDWR)
-    try:
-        return Journal(folder, descriptor, sums, os.fstat(descriptor).st_size - torn_bytes)
-    except OSError:
-        os.close(descriptor)
-        raise
 
 
 def _about(found: Contents, facts: RecordingFacts, folder: GuardedFolder) -> tuple[DataWarning, ...]:
@@ -231,16 +248,15 @@ def _about(found: Contents, facts: RecordingFacts, folder: GuardedFolder) -> tup
             f"{folder.path}: the session is damaged: {'; '.join(found.faults)}; nothing was changed. "
             f"See what can be kept: cocalib session repair {folder.path}"
         )
-    before = found.snapshot.recording if found.snapshot else found.recording
     faults = _about_faults(found) if found.faults else ()
-    if not found.steps:
+    if all(isinstance(step, AxesStated) for step in found.steps):
         return faults
-    return (*faults, *_about_axes(before.radar_axes, facts.radar_axes))
+    return (*faults, *_about_axes(found.radar_axes, facts.radar_axes))
 
 
 def _about_faults(found: Contents) -> tuple[DataWarning, ...]:
     clicks = len(found.history.present.clicks)
-    source = "the snapshot, with what follows it in the journal" if found.from_snapshot else "the journal"
+    source = "the snapshot, with what follows it in the journal" if found.from_snapshot else "the journal and its copy"
     message = (
         f"the session was damaged: {'; '.join(found.faults)}; it continues with the {clicks} clicks in {source}; "
         "as far as the files show, none is missing"

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from calib_core.errors import InputError
 from calib_core.measurements import TimeNs, time_from_json
 from cocalib.option_changes import changes_from_tree
-from cocalib.session import ClickPlaced, ColumnsMapped, JournalStep, OptionsChanged
+from cocalib.session import AxesStated, ClickPlaced, ColumnsMapped, JournalStep, OptionsChanged
 from cocalib.session.events import Id
 from cocalib.web.messages.lens_messages import LensRequest
 from cocalib.web.messages.opening_messages import ChoicesWanted, FolderWanted, OpeningCommand, OpenWith, RecentForgotten
@@ -230,8 +230,8 @@ def _checked(command: Message) -> Message:
         InputError: the page may not send it.
         OptionError: it names an option that does not exist or gives it a value of the wrong type.
     """
-    if isinstance(command, ColumnsMapped):
-        raise InputError("the columns of the radar are given when the recording is opened, with --map")
+    if isinstance(command, ColumnsMapped | AxesStated):
+        raise InputError("how the radar is read is stated when the recording is opened, with --map and --radar-axes")
     if isinstance(command, OptionsChanged):
         changes_from_tree(command.options)
     if isinstance(command, ClickPlaced) and command.mark is None:

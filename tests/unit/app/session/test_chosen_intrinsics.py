@@ -66,8 +66,8 @@ def test_intrinsics_that_do_not_fit_are_refused_in_words(intrinsics: ChosenIntri
         apply(Session(), IntrinsicsChosen(intrinsics), FACTS)
 
 
-@pytest.mark.parametrize("lost", ["session.json", "journal.jsonl"])
-def test_chosen_intrinsics_survive_a_restart_from_the_journal_or_the_snapshot(tmp_path: Path, lost: str) -> None:
+@pytest.mark.parametrize("lost", ["journal-copy.jsonl", "journal.jsonl"])
+def test_chosen_intrinsics_survive_a_restart_from_the_journal_or_its_copy(tmp_path: Path, lost: str) -> None:
     file = open_session_file(tmp_path / "s", FACTS)
     step = IntrinsicsChosen(CHOSEN)
     file.append(step, advance(file.restored.history, step, FACTS))

@@ -41,7 +41,7 @@ def clicked(folder: Path, facts: RecordingFacts = FACTS, *, changed_at_s: float 
     session_file.append(step, advance(session_file.restored.history, step, facts))
     session_file.close()
     if changed_at_s is not None:
-        for name in ("journal.jsonl", "session.json"):
+        for name in ("journal.jsonl", "journal-copy.jsonl"):
             os.utime(folder / name, (changed_at_s, changed_at_s))
     return folder
 
@@ -184,7 +184,7 @@ def test_a_link_is_not_followed_while_searching(home: Path, tmp_path: Path) -> N
         open_session_file(found.path, FACTS)
 
 
-def test_a_session_whose_journal_lost_its_first_line_is_found_by_its_snapshot(home: Path) -> None:
+def test_a_session_whose_journal_lost_its_first_line_is_found_by_its_copy(home: Path) -> None:
     folder = clicked(home / "drive.bag.cocalib-session")
     (folder / "journal.jsonl").write_bytes(b"no\n")
     assert find_session_folder([home / "renamed.bag"], FACTS).path == folder

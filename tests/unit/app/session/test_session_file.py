@@ -42,8 +42,7 @@ from cocalib.session.file import (
     set_aside,
     user_session_folder,
 )
-from cocalib.session.file.checksums import line_bytes, sealed, taken_apart
-from cocalib.session.file.journal_reading import Line
+from cocalib.session.file.journal import Line, bytes_of, sealed, taken_apart
 
 START_NS = 1_700_000_000_123_456_789
 FACTS = RecordingFacts("drive", START_NS + 100_000_000 * np.arange(50), width_px=640, height_px=480)
@@ -137,31 +136,40 @@ def test_a_step_is_in_the_journal_before_append_returns(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
-def test_a_process_killed_outright_loses_nothing_that_was_confirmed(tmp_path: Path) -> None:
+@pytest.mark.parametrize("confirmed", [0, 1, 9, 23])
+def test_a_process_killed_outright_loses_nothing_that_was_confirmed(tmp_path: Path, confirmed: int) -> None:
     script = textwrap.dedent(
         f"""
-        import os, signal
         import numpy as np
         from calib_core.measurements import TimeNs
         from pathlib import Path
-        from cocalib.session import ClickPlaced, History, RecordingFacts, advance
+        from cocalib.session import ClickPlaced, RecordingFacts, advance
         from cocalib.session.file import open_session_file
         facts = RecordingFacts("drive", {START_NS} + 100_000_000 * np.arange(50), 640, 480)
-        session_file, history = open_session_file(Path({str(tmp_path)!r}), facts), History()
-        for frame in range(13):
-            step = ClickPlaced(TimeNs(facts.image_times[frame]), (float(frame), 1.0), "clicked")
+        session_file = open_session_file(Path({str(tmp_path)!r}), facts)
+        history = session_file.restored.history
+        print("open", flush=True)
+        for number in range(1_000_000):
+            step = ClickPlaced(TimeNs(facts.image_times[number % 50]), (float(number % 640), 1.0), "clicked")
             history = advance(history, step, facts)
             session_file.append(step, history)
-        os.kill(os.getpid(), signal.SIGKILL)
+            print(number, flush=True)
         """
     )
-    done = subprocess.run([sys.executable, "-c", script], check=False, timeout=60)
-    assert done.returncode == -signal.SIGKILL
+    with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        for _ in range(1 + confirmed):
+            assert process.stdout.readline()
+        process.kill()  # at whatever it is doing
+        confirmed += len(process.stdout.readlines())
+    assert process.returncode == -signal.SIGKILL
     session_file = open_session_file(tmp_path, FACTS)
-    assert [click.u_px for click in session_file.restored.history.present.clicks] == [
-        float(frame) for frame in range(13)
-    ]
+    clicks = session_file.restored.history.present.clicks
+    assert confirmed <= session_file.restored.steps <= confirmed + 1
+    assert {click.u_px for click in clicks} >= {float(number % 640) for number in range(confirmed)}
+    assert session_file.restored.warnings == ()
     session_file.close()
+    assert (tmp_path / "journal.jsonl").read_bytes() == (tmp_path / "journal-copy.jsonl").read_bytes()
 
 
 def test_a_half_written_last_line_is_dropped_and_reported(tmp_path: Path) -> None:
@@ -192,7 +200,7 @@ def reseal(line: int, content: bytes, whole: bytes) -> bytes:
     """Exchange the content of a line, with a right checksum as another version of the program would write it."""
     lines = [taken_apart(each) for each in whole.split(b"\n")[:-1]]
     lines[line] = sealed(content, lines[line - 1].sum if line else "")
-    return b"".join(line_bytes(each) + b"\n" for each in lines)
+    return bytes_of(lines)
 
 
 DAMAGE = [
@@ -207,11 +215,11 @@ DAMAGE = [
 
 
 @pytest.mark.parametrize(("line", "text", "words"), DAMAGE)
-def test_a_damaged_journal_without_a_snapshot_is_refused_and_left_alone(
+def test_a_damaged_journal_without_a_copy_is_refused_and_left_alone(
     tmp_path: Path, line: int, text: bytes, words: str
 ) -> None:
     kept(tmp_path, *STEPS[:4])
-    (tmp_path / "session.json").unlink()
+    (tmp_path / "journal-copy.jsonl").unlink()
     journal = tmp_path / "journal.jsonl"
     journal.write_bytes(damaged(line, text, journal.read_bytes()))
     before = files(tmp_path)
@@ -224,55 +232,68 @@ def test_a_damaged_journal_without_a_snapshot_is_refused_and_left_alone(
     assert files(tmp_path) == before
 
 
-@pytest.mark.parametrize(("line", "text", "words"), DAMAGE[:4])
-def test_a_damaged_journal_whose_snapshot_holds_its_steps_continues_with_both_kept(
+@pytest.mark.parametrize(("line", "text", "words"), DAMAGE)
+def test_a_damaged_journal_whose_copy_is_whole_continues_with_both_kept(
     tmp_path: Path, line: int, text: bytes, words: str
 ) -> None:
     history = kept(tmp_path, *STEPS[:4])
-    journal, snapshot = tmp_path / "journal.jsonl", tmp_path / "session.json"
+    journal, copy = tmp_path / "journal.jsonl", tmp_path / "journal-copy.jsonl"
     journal.write_bytes(damaged(line, text, journal.read_bytes()))
     before = files(tmp_path)
     session_file = open_session_file(tmp_path, FACTS)
     (warning,) = session_file.restored.warnings
     assert warning.code == "session-damaged"
     assert words in warning.message
-    assert session_file.restored.history.present.clicks == history.present.clicks
-    assert session_file.restored.history.present.options == history.present.options
-    assert "cannot be undone" in session_file.restored.note
+    assert session_file.restored.history == history
     assert (tmp_path / "journal.jsonl.backup-1").read_bytes() == before["journal.jsonl"]
-    assert (tmp_path / "session.json.backup-1").read_bytes() == before["session.json"]
+    assert (tmp_path / "journal-copy.jsonl.backup-1").read_bytes() == before["journal-copy.jsonl"]
     session_file.close()
     again = open_session_file(tmp_path, FACTS)
     assert again.restored.warnings == ()
-    assert again.restored.history.present.clicks == history.present.clicks
+    assert again.restored.history == history
     again.close()
-    assert snapshot.exists()
+    assert copy.read_bytes() == journal.read_bytes() == before["journal-copy.jsonl"]
 
 
-def test_steps_after_the_snapshot_are_kept_when_a_line_before_it_is_damaged(tmp_path: Path) -> None:
-    kept(tmp_path, *STEPS[:3])
-    snapshot = (tmp_path / "session.json").read_bytes()
-    history = kept(tmp_path, *STEPS[3:5])
-    (tmp_path / "session.json").write_bytes(snapshot)  # as a kill after the fifth step leaves it
-    journal = tmp_path / "journal.jsonl"
-    journal.write_bytes(damaged(2, b"", journal.read_bytes()))
+def test_what_one_file_has_lost_comes_from_the_other(tmp_path: Path) -> None:
+    history = kept(tmp_path, *STEPS[:6])
+    for name, line in (("journal.jsonl", 2), ("journal-copy.jsonl", 5)):
+        (tmp_path / name).write_bytes(damaged(line, b"", (tmp_path / name).read_bytes()))
     session_file = open_session_file(tmp_path, FACTS)
-    assert session_file.restored.history.present.clicks == history.present.clicks
-    assert session_file.restored.history.present.options == history.present.options
+    assert session_file.restored.history == history
+    assert "line 3 is damaged" in session_file.restored.warnings[0].message
+    assert "in the copy, line 6 is damaged" in session_file.restored.warnings[0].message
     session_file.close()
 
 
-def test_a_damaged_line_after_the_snapshot_is_refused(tmp_path: Path) -> None:
+def test_a_damaged_line_that_no_file_has_is_refused(tmp_path: Path) -> None:
     kept(tmp_path, *STEPS[:2])
-    snapshot = (tmp_path / "session.json").read_bytes()
+    copy = (tmp_path / "journal-copy.jsonl").read_bytes()
     kept(tmp_path, *STEPS[2:5])
-    (tmp_path / "session.json").write_bytes(snapshot)
+    (tmp_path / "journal-copy.jsonl").write_bytes(copy)  # as a power failure may leave it
     journal = tmp_path / "journal.jsonl"
     journal.write_bytes(damaged(4, b"", journal.read_bytes()))
     before = files(tmp_path)
     with pytest.raises(SessionFileError, match=r"line 5 is damaged .*cocalib session repair"):
         open_session_file(tmp_path, FACTS)
     assert files(tmp_path) == before
+
+
+def test_a_copy_that_is_behind_is_brought_up_to_date_without_a_word(tmp_path: Path) -> None:
+    history = kept(tmp_path, *STEPS[:5])
+    journal, copy = tmp_path / "journal.jsonl", tmp_path / "journal-copy.jsonl"
+    for length in range(len(copy.read_bytes())):
+        if length:
+            copy.write_bytes(journal.read_bytes()[:length])
+        else:
+            copy.unlink()
+        if 0 < length <= journal.read_bytes().index(b"\n"):
+            continue  # a copy without a first line is damaged
+        session_file = open_session_file(tmp_path, FACTS)
+        assert session_file.restored.history == history
+        assert session_file.restored.warnings == ()
+        session_file.close()
+        assert copy.read_bytes() == journal.read_bytes()
 
 
 @pytest.mark.parametrize(
@@ -285,7 +306,7 @@ def test_a_damaged_line_after_the_snapshot_is_refused(tmp_path: Path) -> None:
 )
 def test_a_step_that_this_version_does_not_understand_is_refused(tmp_path: Path, content: bytes, words: str) -> None:
     kept(tmp_path, *STEPS[:2])
-    (tmp_path / "session.json").unlink()
+    (tmp_path / "journal-copy.jsonl").unlink()
     journal = tmp_path / "journal.jsonl"
     journal.write_bytes(reseal(2, content, journal.read_bytes()))
     with pytest.raises(SessionFileError) as refused:
@@ -302,26 +323,82 @@ def test_a_journal_of_another_version_is_refused_with_that_version_named(tmp_pat
         open_session_file(tmp_path, FACTS)
 
 
-def test_a_journal_cut_to_its_first_line_gives_the_clicks_of_the_snapshot(tmp_path: Path) -> None:
+def test_a_journal_cut_to_its_first_line_gives_the_steps_of_the_copy(tmp_path: Path) -> None:
     history = kept(tmp_path, *(ClickPlaced(time, (1.0, 1.0), "clicked") for time in TIMES[:20]))
     journal = tmp_path / "journal.jsonl"
     cut = journal.read_bytes().partition(b"\n")[0] + b"\n"
     journal.write_bytes(cut)
     session_file = open_session_file(tmp_path, FACTS)
-    assert session_file.restored.history.present.clicks == history.present.clicks
-    assert "the journal holds 0 steps, its snapshot 20" in session_file.restored.warnings[0].message
+    assert session_file.restored.history == history
+    assert "the journal holds 0 steps, its copy 20" in session_file.restored.warnings[0].message
     session_file.close()
     assert (tmp_path / "journal.jsonl.backup-1").read_bytes() == cut
 
 
-def test_a_snapshot_of_another_journal_is_refused_until_a_person_decides(tmp_path: Path) -> None:
-    kept(tmp_path / "a", *STEPS[:4])
+@pytest.mark.parametrize("fork", [False, True])
+def test_a_copy_of_another_journal_is_refused_until_a_person_decides(tmp_path: Path, fork: bool) -> None:
+    kept(tmp_path / "a", *STEPS[:2])
+    if fork:
+        shutil.copytree(tmp_path / "a", tmp_path / "b")
+    kept(tmp_path / "a", *STEPS[2:4])
     kept(tmp_path / "b", *reversed(STEPS[:2]))
-    shutil.copy(tmp_path / "b" / "session.json", tmp_path / "a" / "session.json")
+    shutil.copy(tmp_path / "b" / "journal-copy.jsonl", tmp_path / "a" / "journal-copy.jsonl")
     before = files(tmp_path / "a")
     with pytest.raises(SessionFileError, match=r"do not belong together.*cocalib session repair"):
         open_session_file(tmp_path / "a", FACTS)
     assert files(tmp_path / "a") == before
+
+
+WITH_SNAPSHOT = {
+    "whole": (33, "", ""),
+    "killed": (33, "", ""),
+    "killed-early": (4, "", ""),
+    "repaired": (8, "", ""),
+    "torn": (33, "not in the session", ""),
+    "cut": (8, "from the last snapshot", "the journal holds 6 steps, its snapshot 33"),
+    "damaged": (10, "from the last snapshot", "line 6 is damaged"),
+    "snapshot-only": (8, "from the last snapshot", ""),
+}
+"""Steps, note and warning of the sessions in tests/golden/session-2, of a version that kept a snapshot."""
+
+
+@pytest.mark.parametrize("case", WITH_SNAPSHOT)
+def test_a_session_of_a_version_with_snapshots_is_opened(tmp_path: Path, project_root: Path, case: str) -> None:
+    steps, note, warning = WITH_SNAPSHOT[case]
+    shutil.copytree(project_root / "tests" / "golden" / "session-2" / case, tmp_path, dirs_exist_ok=True)
+    before = files(tmp_path)
+    session_file = open_session_file(tmp_path, FACTS)
+    restored = session_file.restored
+    present = restored.history.present
+    expected = ["p1"] if case == "killed-early" else ["p1", "c3", "c4", "c5", "c6", "c7"]
+    assert len(present.clicks) == (2 if case == "killed-early" else len(expected))
+    if case != "killed-early":
+        assert (present.column_map, present.confirmed, len(present.boxes)) == (("x=a",), ("metres",), 1)
+        assert present.intrinsics is not None
+    assert restored.steps == steps
+    assert note in restored.note
+    assert [warning in one.message for one in restored.warnings] == [True] * bool(warning)
+    session_file.close()
+    for name, content in files(tmp_path).items():
+        assert before.get(name.removesuffix(".backup-1"), content) == content or not name.endswith(".backup-1")
+    if not restored.from_snapshot and case != "torn":
+        assert {name: content for name, content in files(tmp_path).items() if "copy" not in name} == before
+    again = open_session_file(tmp_path, FACTS)
+    assert again.restored.history == restored.history
+    assert again.restored.warnings == ()
+    again.close()
+
+
+def test_a_session_of_a_version_with_snapshots_that_lost_a_confirmed_step_is_refused(
+    tmp_path: Path, project_root: Path
+) -> None:
+    shutil.copytree(
+        project_root / "tests" / "golden" / "session-2" / "damaged-at-the-end", tmp_path, dirs_exist_ok=True
+    )
+    before = files(tmp_path)
+    with pytest.raises(SessionFileError, match="line 34 is damaged"):
+        open_session_file(tmp_path, FACTS)
+    assert files(tmp_path) == before
 
 
 def test_a_session_of_the_earlier_version_is_opened_and_written_again_with_checksums(
@@ -356,40 +433,43 @@ def test_a_session_of_the_earlier_version_cut_to_its_first_line_gives_the_clicks
     session_file.close()
 
 
-def test_after_damage_the_snapshot_brings_the_clicks_back(tmp_path: Path) -> None:
+def test_after_the_journal_is_lost_the_copy_brings_the_session_back(tmp_path: Path) -> None:
     history = kept(tmp_path, *STEPS[:5])
     (tmp_path / "journal.jsonl").rename(tmp_path / "journal.damaged")
     session_file = open_session_file(tmp_path, FACTS)
-    assert session_file.restored.history.present.clicks == history.present.clicks
-    assert session_file.restored.history.present.options == history.present.options
-    assert "last snapshot" in session_file.restored.note
+    assert session_file.restored.history == history
+    assert "the journal is missing" in session_file.restored.warnings[0].message
     session_file.close()
     again = open_session_file(tmp_path, FACTS)
-    assert again.restored.history.present.clicks == history.present.clicks
-    assert again.restored.note == ""
+    assert again.restored.history == history
+    assert again.restored.warnings == ()
     again.close()
 
 
-def test_a_damaged_snapshot_is_refused_only_when_it_is_needed(tmp_path: Path) -> None:
+def test_a_damaged_copy_is_refused_only_when_it_is_needed(tmp_path: Path) -> None:
     kept(tmp_path, *STEPS[:2])
-    (tmp_path / "session.json").write_text("{")
+    copy = tmp_path / "journal-copy.jsonl"
+    copy.write_text("{")
     session_file = open_session_file(tmp_path, FACTS)
-    assert "the snapshot is damaged" in session_file.restored.warnings[0].message
-    assert (tmp_path / "session.json.backup-1").read_text() == "{"
+    assert "in the copy, line 1 is damaged" in session_file.restored.warnings[0].message
+    assert (tmp_path / "journal-copy.jsonl.backup-1").read_text() == "{"
     session_file.close()
-    (tmp_path / "session.json").write_text("{")
+    copy.write_text("{")
     (tmp_path / "journal.jsonl").unlink()
-    with pytest.raises(SessionFileError, match="the snapshot is damaged"):
+    with pytest.raises(SessionFileError, match="nothing of the session can be proven: line 1 is damaged"):
         open_session_file(tmp_path, FACTS)
     assert not (tmp_path / "journal.jsonl").exists()
 
 
-def test_the_snapshot_is_at_most_ten_steps_behind(tmp_path: Path) -> None:
+def test_the_copy_has_every_step_when_it_is_confirmed(tmp_path: Path) -> None:
     session_file = open_session_file(tmp_path, FACTS)
-    keep(session_file, *(ClickPlaced(time, (1.0, 1.0), "clicked") for time in TIMES[:14]))
-    assert msgspec.json.decode((tmp_path / "session.json").read_bytes())["steps"] == 10
+    history = History()
+    for time in TIMES[:14]:
+        step = ClickPlaced(time, (1.0, 1.0), "clicked")
+        history = advance(history, step, FACTS)
+        session_file.append(step, history)
+        assert (tmp_path / "journal-copy.jsonl").read_bytes() == (tmp_path / "journal.jsonl").read_bytes()
     session_file.close()
-    assert msgspec.json.decode((tmp_path / "session.json").read_bytes())["steps"] == 14
 
 
 @pytest.mark.parametrize(
@@ -455,7 +535,7 @@ def test_a_refused_session_is_not_left_locked(tmp_path: Path) -> None:
     journal = tmp_path / "journal.jsonl"
     good = journal.read_bytes()
     journal.write_bytes(b"no\n")
-    (tmp_path / "session.json").unlink()
+    (tmp_path / "journal-copy.jsonl").unlink()
     with pytest.raises(SessionFileError):
         open_session_file(tmp_path, FACTS)
     journal.write_bytes(good)

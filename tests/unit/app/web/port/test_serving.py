@@ -224,7 +224,7 @@ def test_the_end_says_where_the_clicks_are_if_the_session_folder_was_deleted(
     rescued = tmp_path / "state" / "cocalib" / "sessions" / "three_greys-rescued-1.cocalib-session"
     assert "all clicks are saved" not in note
     assert f"All clicks (1) are saved in {rescued}" in note
-    assert (rescued / "session.json").is_file()
+    assert (rescued / "journal-copy.jsonl").is_file()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows does not delete open files")
@@ -351,7 +351,7 @@ def test_a_signal_while_serving_closes_the_session(tmp_path: Path, sigint: str, 
     code, printed, errors = stopped(running, once_printed="serving", by=sent)
     assert (code, errors) == (0, "")
     assert "all clicks are saved" in printed
-    assert (tmp_path / "session" / "session.json").is_file()
+    assert (tmp_path / "session" / "journal-copy.jsonl").is_file()
 
 
 SLOW_TO_CLOSE = f"""{PRINTS_WHEN_IT_SERVES}
@@ -379,7 +379,7 @@ def test_a_second_signal_does_not_interrupt_the_closing(tmp_path: Path, second: 
     out, errors = running.communicate("\n", timeout=30)
     assert (running.returncode, errors) == (0, "")
     assert "all clicks are saved" in out
-    assert (tmp_path / "session" / "session.json").is_file()
+    assert (tmp_path / "session" / "journal-copy.jsonl").is_file()
 
 
 SIGNAL_IN_ANOTHER_THREAD = f"""{PRINTS_WHEN_IT_SERVES}
