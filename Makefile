@@ -43,6 +43,7 @@ check: dev  ## Check style, types, layers, frame names, spelling.
 	$(BIN)/lint-imports
 	$(BIN)/typos
 	$(BIN)/pytest -q tests/architecture
+	@$(BIN)/python .ci/structure.py grown
 	@$(BIN)/python .ci/installed_size
 
 test: dev  ## Run all tests, including those in the browser; those of the architecture belong to make check.

@@ -1,11 +1,13 @@
-"""Count and draw the structure of the packages from their imports: `python .ci/structure.py [count|draw] [CHECKOUT]`.
+"""Count and draw the structure of the packages from their imports: `python .ci/structure.py [count|draw|grown|keep] [CHECKOUT]`.
 
 A room is a module or package of a folder. `count` prints, for each folder, the number of its rooms, the number of floors (a
 room is on a floor above all rooms that it imports) and the number of imports between rooms. `draw` prints the layers declared
-in pyproject.toml, as shown in ARCHITECTURE.md. Nothing is imported: the sources are read as text.
+in pyproject.toml. `grown` warns reviewers of folders, and of the whole, that have 10 % more rooms or files than `keep` wrote in
+.ci/house.json the last time that somebody decided so. Nothing is imported: the sources are read as text.
 """
 
 import ast
+import json
 import sys
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -13,6 +15,7 @@ from pathlib import Path
 
 PACKAGES = {"calib_core": "calib_core", "cocalib": "app/cocalib"}  # import name: folder
 WIDTH = 118
+KEPT = ".ci/house.json"
 
 
 def modules(root: Path) -> dict[str, Path]:
@@ -84,6 +87,29 @@ def counted(root: Path) -> Iterator[str]:
     yield f"{len(folders)} packages, {len(graph)} modules, {total} imports between modules, {across} of them between packages"
 
 
+def house(root: Path) -> dict[str, int]:
+    """Return the number of rooms of each folder that has at least ten, and of all files of the product, the page included."""
+    graph = imports(root)
+    folders = {name.rpartition(".")[0] for name in graph} - {""}
+    rooms = {folder: len(between_rooms(graph, folder)) for folder in sorted(folders)}
+    page = [path for path in (root / "static").rglob("*") if path.suffix in {".js", ".css", ".html"}]
+    return {"files": len(graph) + len(page)} | {folder: count for folder, count in rooms.items() if count >= 10}
+
+
+def grown(root: Path) -> Iterator[str]:
+    """Yield a warning for each number of `house` that is 10 % above the one kept."""
+    kept = json.loads((root / KEPT).read_text(encoding="utf-8"))
+    for name, count in house(root).items():
+        if name in kept and count >= 1.1 * kept[name]:
+            yield f"warning for the reviewer: {name}: {count}, was {kept[name]}; join, or run: python .ci/structure.py keep"
+
+
+def keep(root: Path) -> Iterator[str]:
+    """Write the numbers of `house` down."""
+    (root / KEPT).write_text(json.dumps(house(root), indent=1) + "\n", encoding="utf-8")
+    yield f"{KEPT} is written"
+
+
 def drawn(root: Path) -> Iterator[str]:
     """Yield the layers of every contract in pyproject.toml, the top layer first."""
     settings = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))
@@ -106,10 +132,11 @@ def _wrapped(layers: list[str]) -> Iterator[str]:
 
 
 def main(arguments: list[str]) -> None:
-    """Print the counts or the drawing."""
+    """Print what is asked for."""
     what = arguments[0] if arguments else "count"
     root = Path(arguments[1]) if len(arguments) > 1 else Path(__file__).resolve().parents[1]
-    print("\n".join((drawn if what == "draw" else counted)(root)))
+    for line in {"count": counted, "draw": drawn, "grown": grown, "keep": keep}[what](root):
+        print(line)
 
 
 if __name__ == "__main__":

@@ -36,6 +36,20 @@ def test_rooms_have_no_circular_imports(structure: ModuleType, graph: dict[str, 
         structure.floors({"a": {"b"}, "b": {"a"}, "c": set()})
 
 
+def test_a_house_that_has_grown_by_a_tenth_is_named(structure: ModuleType, tmp_path: Path) -> None:
+    for folder in ("app/cocalib", "calib_core", "static", ".ci"):
+        (tmp_path / folder).mkdir(parents=True)
+    for number in range(10):
+        (tmp_path / "calib_core" / f"room_{number}.py").write_text("")
+    list(structure.keep(tmp_path))
+    assert list(structure.grown(tmp_path)) == []
+    (tmp_path / "calib_core" / "one_more.py").write_text("")
+    assert [line.split(": ")[1:3] for line in structure.grown(tmp_path)] == [
+        ["files", "11, was 10; join, or run"],
+        ["calib_core", "11, was 10; join, or run"],
+    ]
+
+
 def test_the_paths_it_names_exist(page: str, project_root: Path) -> None:
     named = set(re.findall(r"`((?:app|calib_core|static|docs|tests|\.ci)/[\w./]+)`", page))
     assert len(named) > 15
