@@ -8,7 +8,6 @@ import numpy as np
 
 from calib_core.interchange.exporting import Export
 from calib_core.interchange.syntax.mat_file import load_mat
-from calib_core.interchange.syntax.mcap_file import MCAP_MAGIC, McapFile, load_mcap
 from calib_core.interchange.syntax.zip_archives import unpack
 
 _MAT_TEXT_BYTES = 116
@@ -22,8 +21,6 @@ def contents_text(written: Export) -> str:
     if content.startswith(b"PK"):
         members = unpack(content, source=written.file_name)
         return "\n".join(_member(name, data) for name, data in members.items())
-    if content.startswith(MCAP_MAGIC):
-        return _mcap_text(load_mcap(content, source=written.file_name) or McapFile((), {}))
     if content.startswith(b"MATLAB"):
         comment = content[:_MAT_TEXT_BYTES].decode("ascii", errors="replace").rstrip("\0 ")
         return "\n".join([comment, "", *_variables(load_mat(content, source=written.file_name))]) + "\n"
@@ -38,12 +35,6 @@ def _member(name: str, data: bytes) -> str:
         return f"[{name}]\n{data.decode('utf-8', errors='replace')}"
     array = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
     return "\n".join(_variables({name.removesuffix(".npy"): array})) + "\n"
-
-
-def _mcap_text(file: McapFile) -> str:
-    messages = [f"[{one.topic}] {one.schema_name}\n{one.data.decode()}" for one in file.messages]
-    kept = [f"[metadata {name}]\n" + "\n".join(texts.values()) + "\n" for name, texts in file.metadata.items()]
-    return "\n".join([*messages, *kept])
 
 
 def _variables(values: Mapping[str, Any], owner: str = "") -> Iterator[str]:

@@ -45,7 +45,7 @@ def written_lens(lens: LensModel, distortion: Values, where: Elsewhere) -> Writt
     names = [known for known in lens.names_elsewhere if known.where == where]
     if not names:
         raise InputError(
-            f"{_TITLES[where]} has no name for the lens model {lens.name}; json, matlab and numpy can store every lens"
+            f"{_TITLES[where]} has no name for the lens model {lens.name}; json and matlab can store every lens"
         )
     for known in names:
         count = len(distortion) if known.coefficients is None else known.coefficients

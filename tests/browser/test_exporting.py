@@ -138,7 +138,7 @@ def test_a_format_is_found_by_typing_and_chosen_by_keyboard(solved: Driver) -> N
     everything = solved.value(names)
     for words, first, others in (
         ("nuscenes", "nuscenes", set()),
-        ("foxgl", "foxglove", set()),
+        ("pjl", "pjlab", set()),
         ("ros 2", "tf2", {"urdf", "autoware"}),
         ("c++", "pack", set()),
         ("ros2", "tf2", {"tf2-launch-py"}),
@@ -322,7 +322,7 @@ def test_the_panel_fits_the_screen(solved: Driver) -> None:
         )
         radar.fill(usual)
         expect(solved.page.locator(f"{DIALOG} .text")).to_contain_text(f"--frame-id {usual}")
-        for name in ("autoware", "numpy", "nuscenes", "kitti"):
+        for name in ("autoware", "matlab", "nuscenes", "kitti"):
             choose(solved, name)
             nothing_spills(solved)
         expect(solved.page.locator(f"{DIALOG} .first")).to_be_in_viewport()

@@ -27,7 +27,6 @@ from calib_core.interchange import (
 )
 from calib_core.interchange.calibration_file import choose_check_point
 from calib_core.interchange.check.slips import undone_slips
-from calib_core.interchange.syntax.mcap_file import MCAP_MAGIC, load_mcap, mcap_bytes
 from calib_core.interchange.syntax.zip_archives import pack, unpack
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, Metrics
@@ -175,11 +174,6 @@ def with_check_point_of(right: bytes, wrong: bytes) -> bytes:
         )
     if right.startswith(b"MATLAB"):
         return wrong  # whose keys have the point and the pixel of the right one
-    if right.startswith(MCAP_MAGIC):
-        stated, changed = (load_mcap(data, source="mcap") for data in (right, wrong))
-        assert stated is not None
-        assert changed is not None
-        return mcap_bytes(dataclasses.replace(changed, metadata=stated.metadata))
     if b"camera_intrinsic" in right:
         (_, stated_camera), (radar, camera) = json.loads(right), json.loads(wrong)
         return json.dumps([radar, {**camera, "cocalib": stated_camera["cocalib"]}]).encode()

@@ -1,83 +1,26 @@
-"""An MCAP file that Foxglove opens, with its FrameTransforms and CameraCalibration messages; both are also read as JSON."""
+"""Foxglove's FrameTransforms and CameraCalibration messages, as JSON or in an MCAP file of JSON messages."""
 
-import json
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
+from calib_core.interchange.calibration_file import FrameNames
 from calib_core.interchange.cameras.fields import find_cameras
 from calib_core.interchange.cameras.numbers import floats
-from calib_core.interchange.format import Format, Reads
-from calib_core.interchange.formats.statement import STATEMENT_KEY, stated_frames, statement, with_statement
+from calib_core.interchange.format import Reads
+from calib_core.interchange.formats.statement import STATEMENT_KEY, stated_frames, with_statement
 from calib_core.interchange.formats.transform_choice import Ends, choose_transform
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose, posed_between
-from calib_core.interchange.own.camera_document import refuse_skew
-from calib_core.interchange.rotations import quaternion_xyzw_from_matrix
 from calib_core.interchange.syntax.content import Content, decoded
-from calib_core.interchange.syntax.json_text import json_text
-from calib_core.interchange.syntax.mcap_file import McapFile, McapMessage, mcap_bytes
+from calib_core.interchange.syntax.mcap_file import McapFile
 from calib_core.interchange.syntax.strict_json import json_value
-from calib_core.lens_models.naming import written_lens
 
-_NOTES = (
-    "open it in Foxglove: /tf_static is the pose of the child (camera, optical) in the parent (radar), rotation named x y z w, "
-    "/camera_calibration the lens; the check point and where it comes from are in the file's metadata",
-)
 _TRANSFORMS, _CAMERA = "foxglove.FrameTransforms", "foxglove.CameraCalibration"
 _TRANSFORM = "foxglove.FrameTransform"
 _READ_SCHEMAS = (_TRANSFORMS, _TRANSFORM)
-_TOPICS = {_TRANSFORMS: "/tf_static", _CAMERA: "/camera_calibration"}
 _TEXT = "statement"
-
-
-def _write(file: CalibrationFile) -> bytes:
-    """Write an MCAP file with a message of each kind, at the time 0.
-
-    Raises:
-        InputError: CameraCalibration cannot store this camera's skew, or has no name for its lens.
-    """
-    refuse_skew(file.calibration.camera, "Foxglove's CameraCalibration has")
-    radar_from_camera = file.calibration.camera_from_radar.inverse()
-    quaternion = quaternion_xyzw_from_matrix(radar_from_camera.rotation) + 0.0
-    transform = {
-        "timestamp": {"sec": 0, "nsec": 0},
-        "parent_frame_id": file.frames.radar,
-        "child_frame_id": file.frames.camera,
-        "translation": dict(zip("xyz", (radar_from_camera.translation_m + 0.0).tolist(), strict=True)),
-        "rotation": dict(zip("xyzw", quaternion.tolist(), strict=True)),
-    }
-    meaning = (
-        "FrameTransform is the pose of the child (camera, optical) in the parent (radar); quaternion named x y z w"
-    )
-    messages = (
-        _message(_TRANSFORMS, {"transforms": [transform]}),
-        _message(_CAMERA, _camera_message(file.calibration.camera, file.frames.camera)),
-    )
-    return mcap_bytes(McapFile(messages, {STATEMENT_KEY: {_TEXT: "\n".join(statement(file, meaning))}}))
-
-
-def _message(name: str, content: dict[str, Any]) -> McapMessage:
-    schema = json.dumps({"title": name, **_SCHEMAS[name]}).encode()
-    return McapMessage(_TOPICS[name], name, schema, json_text(content).encode())
-
-
-def _camera_message(camera: Camera, frame: str) -> dict[str, Any]:
-    lens = written_lens(camera.lens, camera.distortion, "foxglove")
-    return {
-        "timestamp": {"sec": 0, "nsec": 0},
-        "frame_id": frame,
-        "width": camera.width_px,
-        "height": camera.height_px,
-        "distortion_model": lens.name,
-        "D": list(lens.coefficients),
-        "K": camera.matrix_px.ravel().tolist(),
-        "R": np.eye(3).ravel().tolist(),
-        "P": np.hstack([camera.matrix_px, np.zeros((3, 1))]).ravel().tolist(),
-    }
 
 
 def _recognizes(content: Content) -> bool:
@@ -163,47 +106,4 @@ def _frames_of(messages: Mapping[str, Any], parent: str, child: str) -> FrameNam
     return FrameNames(parent if frame == child else child, frame) if frame in (parent, child) else None
 
 
-_NUMBER, _INTEGER, _STRING = ({"type": name} for name in ("number", "integer", "string"))
-
-
-def _object(**properties: Any) -> dict[str, Any]:
-    return {"type": "object", "properties": properties}
-
-
-_TIME = _object(sec=_INTEGER, nsec=_INTEGER)
-_SCHEMAS: dict[str, dict[str, Any]] = {
-    _TRANSFORMS: _object(
-        transforms={
-            "type": "array",
-            "items": _object(
-                timestamp=_TIME,
-                parent_frame_id=_STRING,
-                child_frame_id=_STRING,
-                translation=_object(x=_NUMBER, y=_NUMBER, z=_NUMBER),
-                rotation=_object(x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER),
-            ),
-        }
-    ),
-    _CAMERA: _object(
-        timestamp=_TIME,
-        frame_id=_STRING,
-        width=_INTEGER,
-        height=_INTEGER,
-        distortion_model=_STRING,
-        **{key: {"type": "array", "items": _NUMBER} for key in "DKRP"},
-    ),
-}
-
-FOXGLOVE = Format(
-    name="foxglove",
-    title="Foxglove, MCAP",
-    used_in="Data sets and viewers",
-    also="Studio MCAP viewer",
-    numbers="FrameTransform: pose of the child (camera, optical) in the parent (radar); quaternion x y z w",
-    file_name="foxglove.mcap",
-    camera="lens",
-    comment="keys",
-    notes=_NOTES,
-    write=_write,
-    reads=Reads(_recognizes, _read),
-)
+FOXGLOVE = Reads(_recognizes, _read)

@@ -35,7 +35,7 @@ from calib_core.interchange.formats.opencv import OPENCV
 from calib_core.interchange.formats.pack.deployment_pack import PACK
 from calib_core.interchange.formats.plugins import plugin_formats
 from calib_core.interchange.formats.ros.camera_info import CAMERA_INFO
-from calib_core.interchange.formats.ros.launch_files import TF1_LAUNCH, TF2_LAUNCH_PY, TF2_LAUNCH_XML
+from calib_core.interchange.formats.ros.launch_files import LAUNCH_XML, TF2_LAUNCH_PY
 from calib_core.interchange.formats.ros.tf2_command import TF2
 from calib_core.interchange.formats.ros.urdf import URDF
 from calib_core.interchange.own.calibration_json import CALIBRATION_1
@@ -47,8 +47,6 @@ FORMATS: tuple[Format, ...] = (
     PACK,
     TF2,
     TF2_LAUNCH_PY,
-    TF2_LAUNCH_XML,
-    TF1_LAUNCH,
     URDF,
     AUTOWARE,
     APOLLO,
@@ -57,13 +55,9 @@ FORMATS: tuple[Format, ...] = (
     KITTI,
     NUSCENES,
     DRIVEWORKS,
-    FOXGLOVE,
     PJLAB,
-    KOIDE3,
-    OPENLABEL,
     COLMAP,
     MATLAB,
-    NUMPY,
     MATRIX,
 )
 """Our formats that can be written and read, in display order."""
@@ -75,7 +69,7 @@ CAMERA_ONLY: tuple[Format, ...] = (CAMERA_INFO,)
 # one, and the formats are tried in the order above; where two could fit, the more specific one is tried first.
 _OURS = (CALIBRATION_1, TRUTH)
 _TRIED_FIRST = (
-    *(PJLAB, KOIDE3, OPENLABEL, DRIVEWORKS, FOXGLOVE),  # JSON only
+    *(PJLAB, DRIVEWORKS),  # JSON only
     NUSCENES,  # takes any JSON list
     *(OPENCV, APOLLO, KALIBR, AUTOWARE),  # YAML, JSON or FileStorage
     TF2_LAUNCH_PY,  # mentions the publisher, as TF2 does
@@ -83,10 +77,10 @@ _TRIED_FIRST = (
 # Formats that are only read; each is recognized by keys or lines that no other tool writes.
 _ONLY_READ = (
     *(SCALE, SEGMENTS, EASY_HANDEYE, AUTOWARE_AI),
-    *(KITTI_RAW, KITTI_ODOMETRY, TF_ECHO, TUM_POSE),
+    *(KITTI_RAW, KITTI_ODOMETRY, TF_ECHO, TUM_POSE, LAUNCH_XML),
+    *(KOIDE3, OPENLABEL, FOXGLOVE),
     *(KALIBR_CHAIN, KITTI_CAMERAS, K_RADAR_CAMERA, K_RADAR_OFFSET),  # refused in words
 )
-_TRIED_LAST = (MATLAB, NUMPY)  # accept any mat file and any archive, to report what is wrong with it
 _RESERVED = frozenset({"list", "all", TRUTH.name, *(known.name for known in (*FORMATS, *CAMERA_ONLY))})
 
 
@@ -97,11 +91,12 @@ def written_formats() -> tuple[Format, ...]:
 
 def readers() -> Iterator[Reads]:
     """Yield the reader of each format in the order in which they are tried; packages come after most of ours."""
-    others = [known for known in FORMATS if known not in (*_OURS, *_TRIED_FIRST, *_TRIED_LAST)]
+    others = [known for known in FORMATS if known not in (*_OURS, *_TRIED_FIRST, MATLAB)]
     yield from _reads(*_OURS)
     yield from _ONLY_READ
     yield from _reads(*_TRIED_FIRST, *others)
-    yield from _reads(*plugin_formats(_RESERVED), *_TRIED_LAST)
+    yield from _reads(*plugin_formats(_RESERVED), MATLAB)
+    yield NUMPY  # accepts any archive, as MATLAB does any mat file, to report what is wrong with it
 
 
 def reader_of(content: Content) -> Reads | None:

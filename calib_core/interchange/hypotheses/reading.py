@@ -24,7 +24,7 @@ from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.importing import read_any
 from calib_core.interchange.syntax.content import Content, readings
 
-_BARE = tuple(known.reads for known in (MATRIX, NUMPY, MATLAB, OPENCV))
+_BARE = (MATRIX.reads, NUMPY, MATLAB.reads, OPENCV.reads)
 _SHOWN = 8
 
 BARE_POSE = "bare pose"

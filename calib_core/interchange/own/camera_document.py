@@ -21,7 +21,7 @@ def refuse_skew(camera: Camera, whose: str) -> None:
         InputError: it has skew.
     """
     if camera.matrix_px[0, 1] != 0.0:
-        raise InputError(f"{whose} no skew, but this camera has; export with --to json, matlab or numpy instead")
+        raise InputError(f"{whose} no skew, but this camera has; export with --to json or matlab instead")
 
 
 def camera_document(camera: Camera) -> CameraDocument:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.exporting import Export, export
-from calib_core.interchange.formats.ros.launch_files import write_python, write_ros1_xml, write_ros2_xml
+from calib_core.interchange.formats.ros.launch_files import write_python
 from calib_core.interchange.formats.ros.static_transform import ChildFrame, second_parent_notes
 from calib_core.interchange.formats.ros.tf2_command import write_command
 from calib_core.interchange.formats.ros.urdf import write_joint
@@ -15,8 +15,6 @@ from calib_core.interchange.trees.frame_tree import FrameTree
 _WRITERS: Mapping[str, Callable[[CalibrationFile, ChildFrame], str]] = {
     "tf2": write_command,
     "tf2-launch-py": write_python,
-    "tf2-launch-xml": write_ros2_xml,
-    "tf1-launch": write_ros1_xml,
     "urdf": write_joint,
 }
 

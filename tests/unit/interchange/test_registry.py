@@ -76,7 +76,7 @@ def test_content_that_fits_two_formats_is_read_as_the_more_specific_one(content:
     assert read_any(content).format == name
 
 
-@pytest.mark.parametrize("name", ["tf2", "tf2-launch-py", "tf2-launch-xml", "tf1-launch", "urdf"])
+@pytest.mark.parametrize("name", ["tf2", "tf2-launch-py", "urdf"])
 def test_a_frame_that_a_driver_publishes_gets_a_note_on_its_second_parent(file: CalibrationFile, name: str) -> None:
     def notes(camera: str) -> list[str]:
         written = export(dataclasses.replace(file, frames=FrameNames("radar", camera)), name)

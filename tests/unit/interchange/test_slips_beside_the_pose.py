@@ -22,6 +22,7 @@ from calib_core.interchange import (
     read_calibration,
 )
 from calib_core.interchange.check.report_json import CheckedFile, check_json
+from tests.kept_files import kept_file
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +73,7 @@ def test_another_matrix_in_a_file_of_rectified_pictures_misses_its_check_point(f
 
 @pytest.mark.parametrize("name", ["koide3", "openlabel"])
 def test_another_distortion_is_seen_at_the_check_point(file, name):
-    found = read_any(export(file, name).data)
+    found = read_any(kept_file(name))
     assert found.camera is not None
     other = dataclasses.replace(
         found, camera=dataclasses.replace(found.camera, distortion=found.camera.distortion * 0.9)
@@ -84,7 +85,7 @@ def test_another_distortion_is_seen_at_the_check_point(file, name):
 
 @pytest.mark.parametrize("key", ["R", "t"])
 def test_numbers_beside_the_matrix_of_an_npz_must_be_its_own(file, key):
-    arrays = dict(np.load(io.BytesIO(export(file, "numpy").data)))
+    arrays = dict(np.load(io.BytesIO(kept_file("numpy"))))
     buffer = io.BytesIO()
     np.savez(buffer, **{**arrays, key: arrays[key].T + (0.01 if key == "t" else 0.0)})
 
@@ -112,13 +113,13 @@ def test_the_rotation_vector_beside_a_matrix_must_be_its_own(file):
 
 
 def test_swapped_frame_names_are_an_error_and_renamed_ones_are_not(file):
-    data = export(file, "numpy").data
+    data = kept_file("numpy")
     names = {"radar_frame": file.frames.radar, "camera_frame": file.frames.camera}
     arrays = dict(np.load(io.BytesIO(data)))
     buffer = io.BytesIO()
     np.savez(buffer, **{**arrays, "radar_frame": names["camera_frame"], "camera_frame": names["radar_frame"]})
     swapped = check(read_any(buffer.getvalue()), of=imported(file))
-    renamed = check(read_any(export(file, "numpy", frames=FrameNames("front", "eye_optical")).data), of=imported(file))
+    renamed = check(read_any(export(file, "matlab", frames=FrameNames("front", "eye_optical")).data), of=imported(file))
 
     assert [result.code for result in swapped.results if result.level == "error"] == ["swapped-frames"]
     assert renamed.verdict == "right"

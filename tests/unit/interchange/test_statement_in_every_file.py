@@ -23,7 +23,8 @@ from calib_core.interchange import (
 )
 from calib_core.interchange.evidence import EVIDENCE_LEVELS
 from calib_core.interchange.own.calibration_json import calibration_sha256
-from calib_core.interchange.syntax.mcap_file import McapFile, McapMessage, load_mcap, mcap_bytes
+from calib_core.interchange.syntax.mcap_file import load_mcap
+from tests.kept_files import kept_file
 
 OTHERS = [known for known in FORMATS if known.name != "json"]
 
@@ -88,12 +89,11 @@ def test_a_file_of_another_tool_states_nothing(file: CalibrationFile) -> None:
         assert found.assumptions
 
 
-@pytest.mark.parametrize("name", ["numpy", "matlab"])
-def test_the_covariance_survives_arrays_with_its_order(file: CalibrationFile, name: str) -> None:
+def test_the_covariance_survives_arrays_with_its_order(file: CalibrationFile) -> None:
     covariance = np.diag([1.0, 2, 3, 4, 5, 6]) * 1e-6
     covariance[0, 4] = covariance[4, 0] = 3e-7
     calibration = dataclasses.replace(file.calibration, covariance=covariance)
-    found = read_any(export(dataclasses.replace(file, calibration=calibration), name).data)
+    found = read_any(export(dataclasses.replace(file, calibration=calibration), "matlab").data)
 
     assert found.covariance is not None
     np.testing.assert_array_equal(found.covariance, covariance)
@@ -108,8 +108,8 @@ def test_a_covariance_in_an_unknown_order_is_not_taken_for_ours(file: Calibratio
         assert read_any(buffer.getvalue()).covariance is None
 
 
-def test_foxglove_s_json_of_earlier_versions_is_still_read(file: CalibrationFile) -> None:
-    found = load_mcap(export(file, "foxglove").data, source="file")
+def test_foxglove_s_messages_are_read_as_json_too() -> None:
+    found = load_mcap(kept_file("foxglove"), source="file")
     assert found is not None
     transforms, camera = (json.loads(message.data) for message in found.messages)
 
@@ -117,15 +117,15 @@ def test_foxglove_s_json_of_earlier_versions_is_still_read(file: CalibrationFile
 
     assert earlier.format == "foxglove"
     np.testing.assert_array_equal(
-        earlier.camera_from_radar.as_matrix(), read_any(mcap_bytes(found)).camera_from_radar.as_matrix()
+        earlier.camera_from_radar.as_matrix(), read_any(kept_file("foxglove")).camera_from_radar.as_matrix()
     )
 
 
-def test_an_mcap_file_that_is_a_recording_or_damaged_is_refused_in_words(file: CalibrationFile) -> None:
-    data = export(file, "foxglove").data
-    other = McapFile((McapMessage("/a", "std_msgs/String", b"{}", b"{}"),), {})
+def test_an_mcap_file_that_is_a_recording_or_damaged_is_refused_in_words() -> None:
+    data = kept_file("foxglove")
+    other = data.replace(b"foxglove.FrameTransforms", b"std_msgs/FrameTransforms")
     for content, words in (
-        (mcap_bytes(other), "MCAP without foxglove.FrameTransforms .found std_msgs/String"),
+        (other, "MCAP without foxglove.FrameTransforms .found std_msgs/FrameTransforms"),
         (data.replace(b"\x04\x00\x00\x00json", b"\x04\x00\x00\x00ros1"), "neither text nor an archive"),
         (data[:200], "damaged MCAP file"),
     ):

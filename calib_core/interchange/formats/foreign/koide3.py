@@ -6,66 +6,22 @@ from typing import Any
 import numpy as np
 
 from calib_core.errors import InputError
-from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.cameras.camera_format import FoundCamera
 from calib_core.interchange.cameras.fields import lens_model_named
 from calib_core.interchange.cameras.numbers import floats
-from calib_core.interchange.format import Format, Reads
+from calib_core.interchange.format import Reads
 from calib_core.interchange.formats.foreign.found_lens import pinhole_matrix, with_camera
 from calib_core.interchange.formats.statement import (
     STATEMENT_KEY,
     stated_check_point,
     stated_frames,
     stated_lines,
-    statement,
 )
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose
-from calib_core.interchange.own.camera_document import refuse_skew
-from calib_core.interchange.rotations import quaternion_xyzw_from_matrix
 from calib_core.interchange.syntax.content import Content
-from calib_core.interchange.syntax.json_text import json_text
-from calib_core.lens_models.naming import written_lens
 
-_NUMBERS = "T_lidar_camera: pose of the camera (optical) in the radar, x y z qx qy qz qw"
-_NOTES = ("the radar takes the place of the lidar; image_size is our own key, the tool has none",)
 _KEY = "T_lidar_camera"
 _MODELS = ("plumb_bob", "rational_polynomial", "fisheye", "equidistant")
-
-
-def _write(file: CalibrationFile) -> str:
-    """Write calib.json with the radar as the lidar.
-
-    Raises:
-        InputError: the camera has skew, or the tool has no name for its lens.
-    """
-    camera, provenance = file.calibration.camera, file.provenance
-    refuse_skew(camera, "the camera models of direct_visual_lidar_calibration have")
-    lens = written_lens(camera.lens, camera.distortion, "camera_info")
-    k = camera.matrix_px
-    radar_from_camera = file.calibration.camera_from_radar.inverse()
-    quaternion = quaternion_xyzw_from_matrix(radar_from_camera.rotation)
-    return json_text(
-        {
-            "camera": {
-                "camera_model": lens.name,
-                "distortion_coeffs": list(lens.coefficients),
-                "intrinsics": [float(k[0, 0]), float(k[1, 1]), float(k[0, 2]), float(k[1, 2])],
-                "image_size": [camera.width_px, camera.height_px],
-            },
-            "meta": {
-                "bag_names": [],
-                "camera_info_topic": provenance.camera_info_topic or "",
-                "data_path": "",
-                "image_topic": provenance.image_topic or "",
-                "intensity_channel": "",
-                "points_topic": provenance.radar_topic or "",
-            },
-            "results": {
-                _KEY: [value + 0.0 for value in (*radar_from_camera.translation_m.tolist(), *quaternion.tolist())]
-            },
-            STATEMENT_KEY: list(statement(file, _NUMBERS)),
-        }
-    )
 
 
 def _recognizes(content: Content) -> bool:
@@ -122,16 +78,4 @@ def _camera(block: Any, *, source: str) -> tuple[FoundCamera | None, tuple[str, 
     return camera, ()
 
 
-KOIDE3 = Format(
-    name="koide3",
-    title="direct_visual_lidar_calibration",
-    used_in="Calibration tools and arrays",
-    also="ROS 2 lidar camera koide",
-    numbers=_NUMBERS,
-    file_name="calib.json",
-    camera="lens",
-    comment="keys",
-    notes=_NOTES,
-    write=_write,
-    reads=Reads(_recognizes, _read),
-)
+KOIDE3 = Reads(_recognizes, _read)

@@ -5,13 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
-from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
+from calib_core.interchange.calibration_file import FrameNames
 from calib_core.interchange.cameras.camera_format import FoundCamera
 from calib_core.interchange.cameras.numbers import floats
-from calib_core.interchange.format import Format, Reads
+from calib_core.interchange.format import Reads
 from calib_core.interchange.formats.foreign.found_lens import with_camera
 from calib_core.interchange.formats.foreign.pose_parts import direction_by_facing, rigid, rigid_matrix
 from calib_core.interchange.formats.statement import (
@@ -19,7 +18,6 @@ from calib_core.interchange.formats.statement import (
     stated_check_point,
     stated_frames,
     stated_lines,
-    statement,
 )
 from calib_core.interchange.imported import (
     ImportedCalibration,
@@ -28,63 +26,12 @@ from calib_core.interchange.imported import (
     looks_like_radar,
 )
 from calib_core.interchange.syntax.content import Content
-from calib_core.interchange.syntax.json_text import json_text
 
-_NUMBERS = "pose_wrt_parent: pose of the camera (optical) in its parent, the radar; matrix by rows"
 _ASSUMPTIONS = (
     "assumed that pose_wrt_parent is the pose in the parent, as the standard words it; some data sets write the inverse",
     "assumed a radar with x forward, y left, z up, and optical camera axes",
 )
 _UNTYPED = (None, "", "other")  # OpenLABEL's types of streams are camera, lidar, radar, gps_imu and other
-
-
-def _write(file: CalibrationFile) -> str:
-    """Write two coordinate systems, the camera in the radar, and a stream for each.
-
-    Raises:
-        InputError: the lens is not the pinhole with OpenCV's distortion that the standard defines.
-    """
-    frames = file.frames
-    pose = file.calibration.camera_from_radar.inverse().as_matrix() + 0.0
-    return json_text(
-        {
-            "openlabel": {
-                "metadata": {"schema_version": "1.0.0", STATEMENT_KEY: list(statement(file, _NUMBERS))},
-                "coordinate_systems": {
-                    frames.radar: {"type": "sensor_cs", "parent": "", "children": [frames.camera]},
-                    frames.camera: {
-                        "type": "sensor_cs",
-                        "parent": frames.radar,
-                        "children": [],
-                        "pose_wrt_parent": {"matrix4x4": pose.ravel().tolist()},
-                    },
-                },
-                "streams": {
-                    frames.radar: {"type": "radar"},
-                    frames.camera: {
-                        "type": "camera",
-                        "stream_properties": {"intrinsics_pinhole": _intrinsics(file.calibration.camera)},
-                    },
-                },
-            }
-        }
-    )
-
-
-def _intrinsics(camera: Camera) -> dict[str, Any]:
-    if not camera.lens.is_perspective or camera.lens.opencv != "projectPoints":
-        raise InputError(
-            f"OpenLABEL's intrinsics_pinhole has no {camera.model} model, which this camera uses; export with --to opencv or json"
-        )
-    projection = np.hstack([camera.matrix_px, np.zeros((3, 1))])
-    intrinsics: dict[str, Any] = {
-        "width_px": camera.width_px,
-        "height_px": camera.height_px,
-        "camera_matrix_3x4": projection.ravel().tolist(),
-    }
-    if len(camera.distortion):
-        intrinsics["distortion_coeffs_1xN"] = camera.distortion.tolist()
-    return intrinsics
 
 
 def _recognizes(content: Content) -> bool:
@@ -201,15 +148,4 @@ def _camera(stream: Mapping[str, Any], *, source: str) -> FoundCamera | None:
     )
 
 
-OPENLABEL = Format(
-    name="openlabel",
-    title="ASAM OpenLABEL",
-    used_in="Data sets and viewers",
-    also="annotation labels streams coordinate systems",
-    numbers=_NUMBERS,
-    file_name="openlabel.json",
-    camera="lens",
-    comment="keys",
-    write=_write,
-    reads=Reads(_recognizes, _read),
-)
+OPENLABEL = Reads(_recognizes, _read)

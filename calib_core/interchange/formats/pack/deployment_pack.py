@@ -13,7 +13,7 @@ from calib_core.interchange.formats.pack.correction_files import correction_file
 from calib_core.interchange.formats.pack.manifest import MANIFEST, manifest_text, verify
 from calib_core.interchange.formats.pack.readme import readme_text
 from calib_core.interchange.formats.pack.selftest_points import selftest_csv
-from calib_core.interchange.formats.ros.launch_files import TF1_LAUNCH, TF2_LAUNCH_PY, TF2_LAUNCH_XML
+from calib_core.interchange.formats.ros.launch_files import TF2_LAUNCH_PY
 from calib_core.interchange.formats.ros.tf2_command import TF2
 from calib_core.interchange.formats.ros.urdf import URDF
 from calib_core.interchange.imported import ImportedCalibration
@@ -23,7 +23,7 @@ from calib_core.interchange.syntax.zip_archives import pack
 
 _CALIBRATION = "calibration.json"
 _README = "README.txt"
-_TRANSFORMS = (TF2, TF2_LAUNCH_PY, TF2_LAUNCH_XML, TF1_LAUNCH, URDF)
+_TRANSFORMS = (TF2, TF2_LAUNCH_PY, URDF)
 _LENSES_OF_THE_SELFTEST = ("pinhole", "plumb_bob", "rational_polynomial", "equidistant")
 _DELIVERED = ("radar_correction.py", "radar_correction.hpp", "selftest.py", "selftest.cpp")
 _NOTES = (

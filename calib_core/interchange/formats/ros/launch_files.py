@@ -1,8 +1,7 @@
-"""Launch files with a static transform: ROS 2 in Python and XML, and ROS 1. One reader handles both kinds of XML."""
+"""Launch files with a static transform: ROS 2 in Python, written and read; ROS 2 and ROS 1 in XML, read alike."""
 
 import ast
 import shlex
-from xml.sax.saxutils import quoteattr
 
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile
@@ -18,7 +17,7 @@ from calib_core.interchange.formats.ros.static_transform import (
     pose_numbers,
     second_parent_notes,
 )
-from calib_core.interchange.formats.statement import POSE_ONLY, hash_comment, statement, xml_comment
+from calib_core.interchange.formats.statement import POSE_ONLY, hash_comment, statement
 from calib_core.interchange.imported import ImportedCalibration
 from calib_core.interchange.syntax.content import Content
 
@@ -38,29 +37,6 @@ def write_python(file: CalibrationFile, child: ChildFrame | None = None) -> str:
         + "                arguments=[\n"
         + "".join(rows)
         + "                ],\n            )\n        ]\n    )\n"
-    )
-
-
-def write_ros2_xml(file: CalibrationFile, child: ChildFrame | None = None) -> str:
-    """Write a ROS 2 launch file in XML."""
-    flags = [f"{label} {number}" for label, number in zip(LABELS, pose_numbers(file, child), strict=True)]
-    frames = f"--frame-id {shlex.quote(file.frames.radar)} --child-frame-id {shlex.quote(child_of(file, child).name)}"
-    arguments = quoteattr(" ".join([*flags, frames]))
-    return (
-        '<?xml version="1.0"?>\n'
-        + xml_comment(statement(file, meaning(file, child)))
-        + f'<launch>\n  <node pkg="tf2_ros" exec="{PUBLISHER}" args={arguments}/>\n</launch>\n'
-    )
-
-
-def write_ros1_xml(file: CalibrationFile, child: ChildFrame | None = None) -> str:
-    """Write a ROS 1 launch file; tf2_ros takes x y z qx qy qz qw parent child, and latches it."""
-    names = [shlex.quote(name) for name in (file.frames.radar, child_of(file, child).name)]
-    arguments = quoteattr(" ".join([*pose_numbers(file, child), *names]))
-    return (
-        '<?xml version="1.0"?>\n'
-        + xml_comment(statement(file, meaning(file, child)))
-        + f'<launch>\n  <node pkg="tf2_ros" type="{PUBLISHER}" name="camera_in_radar" args={arguments}/>\n</launch>\n'
     )
 
 
@@ -111,7 +87,7 @@ def _read_xml(content: Content, source: str) -> ImportedCalibration:
     return from_publishers(found, content.text, source=source, name=name)
 
 
-_READS_XML = Reads(_recognizes_xml, _read_xml)
+LAUNCH_XML = Reads(_recognizes_xml, _read_xml)
 
 TF2_LAUNCH_PY = Format(
     name="tf2-launch-py",
@@ -126,34 +102,4 @@ TF2_LAUNCH_PY = Format(
     notes_on=second_parent_notes,
     write=write_python,
     reads=Reads(_recognizes_python, _read_python),
-)
-
-TF2_LAUNCH_XML = Format(
-    name="tf2-launch-xml",
-    title="ROS 2 launch file, XML",
-    used_in="ROS",
-    also="tf tf_static transform broadcaster rviz",
-    numbers=NUMBERS,
-    file_name="radar_camera.launch.xml",
-    camera="none",
-    comment="<!-- -->",
-    notes=(POSE_ONLY,),
-    notes_on=second_parent_notes,
-    write=write_ros2_xml,
-    reads=_READS_XML,
-)
-
-TF1_LAUNCH = Format(
-    name="tf1-launch",
-    title="ROS 1 launch file",
-    used_in="ROS",
-    also="tf tf_static transform broadcaster rviz",
-    numbers=NUMBERS,
-    file_name="radar_camera.launch",
-    camera="none",
-    comment="<!-- -->",
-    notes=(POSE_ONLY,),
-    notes_on=second_parent_notes,
-    write=write_ros1_xml,
-    reads=_READS_XML,
 )

@@ -66,7 +66,7 @@ def test_the_transforms_and_the_camera_are_those_of_the_calibration(corrected, m
 
     transforms = [name for name in members if name.startswith("tf/")]
 
-    assert len(transforms) == 5
+    assert len(transforms) == 3
     for name in transforms:
         pose = read_any(members[name], name).camera_from_radar
         wanted = corrected.calibration.camera_from_radar

@@ -21,7 +21,7 @@ from calib_core.interchange.trees.frame_tree import FrameTree
 from calib_core.interchange.trees.reading import TreeFile, read_tree
 from tests.unit.interchange.trees import vehicles
 
-FORMATS = ("tf2", "tf2-launch-py", "tf2-launch-xml", "tf1-launch", "urdf")
+FORMATS = ("tf2", "tf2-launch-py", "urdf")
 ECHO = TreeFile(vehicles.REALSENSE_ECHO.encode(), "echo.yaml")
 
 

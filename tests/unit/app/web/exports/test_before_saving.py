@@ -25,7 +25,7 @@ def test_each_format_stands_once_under_the_heading_of_where_it_is_used():
     assert groups == sorted(groups, key=groups.index)
     assert "Other tools" not in groups
     found = {row.key for row in rows if "ros 2" in f"{row.label} {row.also}".lower()}
-    assert {"tf2", "tf2-launch-py", "tf2-launch-xml", "urdf", "autoware"} <= found
+    assert {"tf2", "tf2-launch-py", "urdf", "autoware"} <= found
 
 
 def test_the_evidence_is_said_with_the_verdict(file):

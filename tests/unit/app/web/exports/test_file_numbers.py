@@ -31,7 +31,7 @@ def preview(file, key, query=""):
     return export_preview(file, key, "&".join(part for part in (query, ticked) if part), "drive")
 
 
-@pytest.mark.parametrize("key", ["tf2", "tf2-launch-py", "tf1-launch", "urdf", "autoware", "apollo", "foxglove"])
+@pytest.mark.parametrize("key", ["tf2", "tf2-launch-py", "urdf", "autoware", "apollo"])
 def test_each_number_of_the_table_is_in_the_text_digit_by_digit(file, key):
     made = preview(file, key)
     rows = made.pose.numbers.rows

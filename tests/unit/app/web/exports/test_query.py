@@ -15,7 +15,7 @@ def file(project_root) -> CalibrationFile:
     return read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize("key", ["json", "tf2", "urdf", "autoware", "opencv", "numpy", "foxglove"])
+@pytest.mark.parametrize("key", ["json", "tf2", "urdf", "autoware", "opencv", "matlab", "pjlab"])
 def test_the_names_of_the_query_are_those_in_the_file(file, key):
     written = exported(file, key, "radar_frame=front_radar&camera_frame=%2Ffront%2Fcamera_optical")
     assert read_any(written.data).frames == FrameNames("front_radar", "front/camera_optical")
