@@ -6,7 +6,7 @@ import numpy as np
 
 from calib_core.arrays import Values
 from cocalib.report.residual_rows import ResidualRows
-from cocalib.view.number_format import plain
+from cocalib.view.wording import plain
 
 _FEWEST = 8
 """With fewer pairs a rank correlation shows nothing."""

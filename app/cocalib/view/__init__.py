@@ -1,13 +1,10 @@
 """What the screen shows, as a value: `view(session)` is pure, and every client draws the same View."""
 
-from cocalib.view.box_panel import AccPanel
-from cocalib.view.build import view
+from cocalib.view.build import summary_lines, view
 from cocalib.view.candidates import CandidateRow, PairCandidates, click_candidates, pair_of_click
-from cocalib.view.figure import Figure, Level
 from cocalib.view.following import FollowState, Pace, advice_words, pace_words
-from cocalib.view.model import Advice, ClickRow, ClickState, Ellipse, Stage, View
+from cocalib.view.model import AccPanel, Advice, ClickRow, ClickState, Ellipse, Figure, Level, Stage, View
 from cocalib.view.reference import Reference, shown_calibration
-from cocalib.view.summary import summary_lines
 from cocalib.view.verdict_row import is_dismissed
 from cocalib.view.wording import sentence, warning_in_sentences
 

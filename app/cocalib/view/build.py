@@ -1,24 +1,23 @@
-"""Build the View of a session, in one pure call."""
+"""Build the View of a session, in one pure call; and the same figures of a calibration as lines of text."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from calib_core.association.placements import Placement
 from calib_core.diagnostics.consequence import by_consequence
 from calib_core.measurements import MIN_PAIRS, Stamp, Unpaired, Unsolvable
 from calib_core.results import Calibration, DataWarning
-from calib_core.verdict import Verdict
+from calib_core.verdict import Verdict, verdict_on
 from cocalib.session import History, RecordingFacts, Session
 from cocalib.session.boxes_in_frames import CarriedTrack, carried_tracks
-from cocalib.view.advice import advice_for
-from cocalib.view.box_panel import AccPanel
 from cocalib.view.box_rows import box_rows, known_labels
 from cocalib.view.click_rows import click_rows
 from cocalib.view.figures import assumed_figures, firm_text, metric_figures, pose_figures, residual_limit_px
-from cocalib.view.model import AssumptionRow, DismissedRow, Stage, SystematicErrorTable, View
+from cocalib.view.model import AccPanel, AssumptionRow, DismissedRow, Figure, Stage, SystematicErrorTable, View
 from cocalib.view.reference import Reference, comparison_figures, reference_words, shown_calibration
-from cocalib.view.systematic_errors import systematic_errors
-from cocalib.view.verdict_row import shown_verdict, verdict_row
-from cocalib.view.wording import sentence, warning_in_sentences
+from cocalib.view.systematic_errors import refined_sentences, systematic_errors, uncertainty_sentences
+from cocalib.view.verdict_row import advice_for, shown_verdict, verdict_row
+from cocalib.view.wording import plain, sentence, warning_in_sentences
 
 _WITHOUT_PICTURES = (
     "No camera in this recording: nothing can be clicked",
@@ -162,3 +161,41 @@ def _agreement(calibration: Calibration, word: str) -> str:
 
 def _warnings(calibration: Calibration) -> tuple[DataWarning, ...]:
     return tuple(map(warning_in_sentences, by_consequence(calibration.warnings)))
+
+
+_PAPER_NAMES = {"aed": "AED", "held_out_aed": "held-out AED", "cdsd": "CDSD", "rms": "RMS"}
+"""In text there is no hover to say what a figure is called in the paper."""
+
+
+def summary_lines(calibration: Calibration) -> tuple[str, ...]:
+    """Return the verdict, the figures, aligned, then what they rest on, the pairs that disagree and the warnings, gravest first.
+
+    For a radar without elevation what it determines comes first, and what it does not follows in one line.
+    """
+    metrics, pose, assumed = metric_figures(calibration), pose_figures(calibration), assumed_figures(calibration)
+    figures = (*pose, *metrics) if assumed else (*metrics, *pose)
+    figures = tuple(replace(one, label=_PAPER_NAMES.get(one.key, one.label)) for one in figures)
+    width = max(len(figure.label) for figure in figures)
+    verdict = verdict_on(calibration)
+    head = (f"verdict: {verdict.line}", f"next: {sentence(verdict.action)}")
+    lines = [_line(figure, width) for figure in figures]
+    if assumed:
+        parts = ", ".join(f"{figure.label} {figure.value} {figure.unit}" for figure in assumed)
+        lines.insert(len(pose), f"assumed, because this radar measures no elevation: {parts}")
+    lines += [f"uncertainty: {line}" for line in uncertainty_sentences(calibration)]
+    lines += [f"intrinsics: {line}" for line in refined_sentences(calibration)]
+    lines += [
+        f"disagrees: {pair.id}: {plain(pair.distance_px)} px from its radar position"
+        for pair in calibration.pairs
+        if not pair.inlier and not pair.excluded
+    ]
+    lines += [
+        f"warning: {sentence(warning.message)} {sentence(warning.hint)}"
+        for warning in by_consequence(calibration.warnings)
+    ]
+    lines += [f"unpaired: {row.id}: {sentence(row.reason)} {sentence(row.hint)}" for row in calibration.unpaired]
+    return (*head, *lines)
+
+
+def _line(figure: Figure, width: int) -> str:
+    return f"{figure.label:<{width}}  {figure.value} {figure.unit}".rstrip()

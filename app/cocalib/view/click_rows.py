@@ -1,25 +1,39 @@
-"""One row per click: its state, its reprojection, its ellipse and a note."""
+"""One row per click: its state, its reprojection, its ellipse and a note, such as why it is an outlier."""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 
 from calib_core.measurements import Pair, ReflectorClick, Stamp, Unpaired, Unsolvable
+from calib_core.options import CalibrationOptions, NoiseOptions
 from calib_core.radar import polar_from_cartesian
 from calib_core.results import Calibration
 from cocalib.session import RecordingFacts, Session
-from cocalib.view.disagreement import Disagreement, disagreement
 from cocalib.view.model import ClickRow, ClickState
-from cocalib.view.number_format import plain
 from cocalib.view.reprojections import Reprojection, length_px, reprojections
-from cocalib.view.wording import sentence
+from cocalib.view.wording import plain, sentence
 
+_STRICT = 1.0 / 3.0
 _GUESS = (
     "It stands where the radar expects the reflector, and nobody has looked: it does not count. "
     "Move it to the reflector's inner corner."
 )
+_NOISE = {"sigma_px": "click noise", "sigma_range_m": "range noise", "sigma_azimuth_deg": "azimuth noise"}
+
+
+@dataclass(frozen=True, slots=True)
+class Disagreement:
+    """Why pairs are outliers under some options.
+
+    Attributes:
+        what: what is wrong, the beginning of a sentence.
+        action: what to do about it, a sentence.
+    """
+
+    what: str
+    action: str
 
 
 def click_rows(session: Session, facts: RecordingFacts) -> tuple[ClickRow, ...]:
@@ -125,3 +139,20 @@ def _note(state: ClickState, residual_px: float | None, pair: Reprojection, caus
     probability = pair.outlier_probability
     chance = "" if probability is None else f" (outlier probability {plain(100 * probability, 2)} %)"
     return f"{cause.what}{chance}: its radar position {where}. {cause.action}"
+
+
+def disagreement(options: CalibrationOptions) -> Disagreement:
+    """Say what makes a pair an outlier: the pair itself, the paper's method, or options that allow too little noise."""
+    if not options.models_noise:
+        return Disagreement(
+            f"Outside the {options.paper.ransac_threshold_px:g} px of Algorithm 1's RANSAC, which uses it all the same",
+            "The default method tells whether it is wrong.",
+        )
+    usual, given = NoiseOptions(), options.noise
+    strict = [text for name, text in _NOISE.items() if getattr(given, name) < _STRICT * getattr(usual, name)]
+    if not strict:
+        return Disagreement("Disagrees with the other pairs", "Check the click, or exclude it.")
+    return Disagreement(
+        f"Does not fit the noise that the options state ({' and '.join(strict)} far below the default)",
+        "Check these options before the click.",
+    )

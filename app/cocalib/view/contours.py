@@ -10,7 +10,7 @@ import numpy as np
 from calib_core.arrays import Values
 from calib_core.diagnostics.uncertainty_map import MAP_DISTANCES_M, uncertainty_map
 from calib_core.results import Calibration
-from cocalib.view.number_format import plain
+from cocalib.view.wording import plain
 
 _MOST_LEVELS = 6
 _STEPS = (1.0, 2.0, 5.0, 10.0)

@@ -8,8 +8,8 @@ import numpy as np
 from calib_core.interchange import CalibrationFile, Comparison, PixelDifference, compare, imported
 from calib_core.results import Calibration
 from cocalib.session import Session
-from cocalib.view.figure import Figure
-from cocalib.view.number_format import plain, with_sigma
+from cocalib.view.model import Figure
+from cocalib.view.wording import plain, with_sigma
 
 
 @dataclass(frozen=True, slots=True, eq=False)

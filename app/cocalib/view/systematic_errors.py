@@ -6,8 +6,7 @@ from calib_core.error_words import error_words
 from calib_core.results import Calibration
 from calib_core.systematic_errors import SystematicErrorResult, is_determined
 from cocalib.view.model import SystematicErrorRow, SystematicErrorTable
-from cocalib.view.number_format import plain, with_sigma
-from cocalib.view.wording import sentence
+from cocalib.view.wording import plain, sentence, with_sigma
 
 _SHOWN_SHARE = 0.03
 _DOMINANT_SHARE = 1.0 / 3.0

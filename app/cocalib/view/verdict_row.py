@@ -1,4 +1,4 @@
-"""The verdict as the page shows it: one line, the action, and the key that does it."""
+"""The verdict as the page shows it: one line, the action, the key that does it, and where to put the reflector next."""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -8,10 +8,10 @@ import numpy as np
 from calib_core.association.placements import Placement
 from calib_core.diagnostics.consequence import by_consequence
 from calib_core.measurements import Unsolvable
-from calib_core.results import Calibration
-from calib_core.verdict import ALL_CLICKED, DONE, Verdict, verdict_on
+from calib_core.results import Calibration, NextPlacement
+from calib_core.verdict import ALL_CLICKED, DONE, Verdict, placement_words, verdict_on
 from cocalib.session import RecordingFacts, Session
-from cocalib.view.model import VerdictRow
+from cocalib.view.model import Advice, VerdictRow
 from cocalib.view.wording import sentence
 
 _SAME_M = 0.5
@@ -68,3 +68,33 @@ def _key(verdict: Verdict, session: Session, left: int | None) -> Literal["", "N
         return "J" if outcome.warnings and by_consequence(outcome.warnings)[0].code in _OF_PAIRS else ""
     collecting = outcome is None or (isinstance(outcome, Unsolvable) and outcome.code == "too-few-pairs")
     return "N" if left and (collecting or verdict.action.startswith("Click the ")) else ""
+
+
+_NOTICEABLE = 0.05
+
+
+def advice_for(calibration: Calibration, verdict: Verdict) -> Advice | None:
+    """Return where the next placement would help most; None where that is unknown, as with the paper's method.
+
+    Args:
+        calibration: the latest outcome.
+        verdict: on it; its action comes first, so that the advice does not contradict it.
+    """
+    best = calibration.next_placement
+    if best is None:
+        return None
+    u_px, v_px = (round(float(value), 1) for value in best.pixel_px)
+    range_m = float(np.linalg.norm(best.position_radar_m))
+    position = tuple(best.position_radar_m.tolist())
+    return Advice(u_px, v_px, range_m, best.gain, best.may_stop, position, _words(best, verdict))
+
+
+def _words(best: NextPlacement, verdict: Verdict) -> str:
+    """Return the verdict's action, and where a placement would help most if it is another one."""
+    where = placement_words(best)
+    if where in verdict.action:
+        return sentence(verdict.action)
+    if best.may_stop:
+        return f"{sentence(verdict.action)} No further placement would reduce the pose uncertainty noticeably."
+    amount = f"by {100 * (1 - 1 / best.gain):.0f} %" if best.gain > 1 + _NOTICEABLE else "slightly"
+    return f"{sentence(verdict.action)} A placement {where}, would reduce the pose uncertainty {amount}."

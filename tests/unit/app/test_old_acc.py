@@ -8,7 +8,7 @@ import pytest
 from calib_core.measurements import TimeNs
 from cocalib.session import BoxDrawn
 from cocalib.view import AccPanel
-from cocalib.view.figure import Figure
+from cocalib.view.model import Figure
 from cocalib.workspace import Workspace, open_workspace
 from tests.street_recording import StreetRecording, reference_calibration
 

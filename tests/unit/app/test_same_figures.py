@@ -17,8 +17,8 @@ from cocalib.evaluation.evaluating import evaluate_recording
 from cocalib.session import History, RecordingFacts, Session
 from cocalib.solving.solving import solve_clicks
 from cocalib.view import Reference, view
-from cocalib.view.acc import acc_panel
-from cocalib.view.number_format import plain, with_sigma
+from cocalib.view.box_rows import acc_panel
+from cocalib.view.wording import plain, with_sigma
 from cocalib.web.messages import encode
 from tests.street_recording import StreetRecording, reference_calibration
 

@@ -6,7 +6,7 @@ from calib_core.fleet import Transition
 from cocalib.fleet.kinds import Kind
 from cocalib.fleet.records import FleetRecord, SessionRecord, VehicleRecord
 from cocalib.fleet.standing import VehicleStanding, age_days, recorded_text
-from cocalib.view.number_format import plain, with_sigma
+from cocalib.view.wording import plain, with_sigma
 
 _DASH = "–"
 _LONGEST = 32

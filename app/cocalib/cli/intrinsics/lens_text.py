@@ -16,8 +16,7 @@ from calib_core.intrinsics import (
 from calib_core.intrinsics.coverage import Coverage
 from calib_core.measurements import Unsolvable
 from cocalib.intrinsics.field_of_view import field_of_view_text
-from cocalib.view.number_format import plain, with_sigma
-from cocalib.view.wording import sentence
+from cocalib.view.wording import plain, sentence, with_sigma
 
 DOUBTFUL = frozenset(
     {

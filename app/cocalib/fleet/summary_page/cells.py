@@ -8,7 +8,7 @@ from calib_core.fleet import Transition
 from cocalib.fleet.records import SessionRecord
 from cocalib.report.markup import Child, Markup, scrolled, tag
 from cocalib.report.sections.answer import LEVEL_SIGNS
-from cocalib.view.number_format import plain, with_sigma
+from cocalib.view.wording import plain, with_sigma
 
 _DASH = "–"
 _LONG = 20

@@ -8,7 +8,7 @@ from calib_core.fleet import Transition, transition
 from cocalib.fleet.records import VehicleRecord
 from cocalib.report.markup import Markup, joined, tag
 from cocalib.report.plots import Axes, drawing, mark, polyline
-from cocalib.view.number_format import with_sigma
+from cocalib.view.wording import with_sigma
 
 _WIDTH, _HEIGHT = 128.0, 27.0
 _MOST = 2.0

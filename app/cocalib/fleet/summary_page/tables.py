@@ -18,7 +18,7 @@ from cocalib.fleet.summary_page.cells import (
 )
 from cocalib.fleet.summary_page.drift import drift_of, drift_plot
 from cocalib.report.markup import Markup, scrolled, tag
-from cocalib.view.number_format import plain
+from cocalib.view.wording import plain
 
 _FIGURES = (
     Column("σ deg", is_number=True, about="largest standard deviation of the rotation about an axis"),

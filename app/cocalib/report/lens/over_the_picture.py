@@ -15,7 +15,7 @@ from calib_core.intrinsics.coverage import Coverage
 from calib_core.measurements import Unsolvable
 from cocalib.report.markup import Child, Markup, tag
 from cocalib.report.plots import Axes, captioned, drawing, text
-from cocalib.view.number_format import plain
+from cocalib.view.wording import plain
 
 _WIDTH = 320.0
 _MOST_POINTS = 1500

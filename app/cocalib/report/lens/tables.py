@@ -4,8 +4,7 @@ import math
 
 from calib_core.intrinsics import CalibratedLens
 from cocalib.report.markup import Child, Markup, scrolled, tag
-from cocalib.view.number_format import plain, with_sigma
-from cocalib.view.wording import sentence
+from cocalib.view.wording import plain, sentence, with_sigma
 
 _MOST_ROWS = 400
 

@@ -7,8 +7,7 @@ from calib_core.intrinsics.coverage import Coverage
 from cocalib.report.lens.over_the_picture import covered
 from cocalib.report.markup import Child, Markup, tag
 from cocalib.report.plots import Axes, captioned, drawing, mark
-from cocalib.view.number_format import plain
-from cocalib.view.wording import sentence
+from cocalib.view.wording import plain, sentence
 
 
 def coverage_of_views(lens: CalibratedLens, coverage: Coverage) -> Markup:

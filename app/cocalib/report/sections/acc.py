@@ -7,8 +7,7 @@ import numpy as np
 from calib_core.evaluation import BoxFigures, Sensitivity, Share
 from cocalib.report.markup import Child, Markup, tag
 from cocalib.report.plots import Axes, captioned, drawing, polyline, text
-from cocalib.view.number_format import plain
-from cocalib.view.wording import sentence
+from cocalib.view.wording import plain, sentence
 
 _BINS = 10
 _LINES = ("contour a", "contour b", "contour c")

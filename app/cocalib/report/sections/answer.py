@@ -8,11 +8,9 @@ from calib_core.verdict import Verdict, verdict_on
 from cocalib.report.markup import Child, Markup, tag
 from cocalib.report.plots import drawing, rounded_step, text
 from cocalib.report.subject import ReportSubject
-from cocalib.view.figures import assumed_figures, metric_figures, pose_figures
-from cocalib.view.mounting import Mounting, mounting_of
-from cocalib.view.number_format import plain
+from cocalib.view.figures import Mounting, assumed_figures, metric_figures, mounting_of, pose_figures
 from cocalib.view.systematic_errors import uncertainty_sentences
-from cocalib.view.wording import sentence
+from cocalib.view.wording import plain, sentence
 
 LEVEL_SIGNS = {"good": "●", "usable": "◐", "weak": "○", "contradictory": "✕", "nothing": "–", "not judged": "–"}
 """The level as a shape, for print without colour."""

@@ -7,7 +7,7 @@ from cocalib.report.markup import Child, Markup, tag
 from cocalib.report.plots import captioned, drawing, mark, polyline, rounded_step, text
 from cocalib.report.residual_rows import ResidualRows
 from cocalib.report.sections.uncertainty import picture_layer
-from cocalib.view.number_format import plain
+from cocalib.view.wording import plain
 
 _WIDTH = 320.0
 _ROWS, _COLUMNS = ("upper", "middle", "lower"), ("left", "centre", "right")

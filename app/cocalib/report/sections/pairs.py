@@ -4,7 +4,7 @@ import numpy as np
 
 from cocalib.report.markup import Markup, scrolled, tag
 from cocalib.report.residual_rows import ResidualRows
-from cocalib.view.number_format import plain
+from cocalib.view.wording import plain
 
 _MOST = 30
 _WORDS = {"used": "● agrees", "disagrees": "✕ disagrees", "excluded": "□ left out"}

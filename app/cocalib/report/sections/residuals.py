@@ -9,7 +9,7 @@ from cocalib.report.plots import Axes, MarkKind, captioned, drawing, mark, round
 from cocalib.report.residual_rows import ResidualRows
 from cocalib.report.sections.uncertainty import picture_layer
 from cocalib.report.trends import azimuth_sentence, place_sentence, range_sentence, shift_sentence, time_sentence
-from cocalib.view.number_format import plain
+from cocalib.view.wording import plain
 
 _WIDTH = 320.0
 _LONGEST_SHARE = 0.12

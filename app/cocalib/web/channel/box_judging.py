@@ -16,9 +16,8 @@ from calib_core.results import Calibration
 from cocalib.evaluation.evaluating import Evidence, evidence_in, judged
 from cocalib.platform.error_boundary import error_boundary
 from cocalib.view import sentence
-from cocalib.view.acc import acc_panel, no_acc
-from cocalib.view.box_panel import AccPanel
-from cocalib.view.box_rows import BoxedReturn, returns_in_frame
+from cocalib.view.box_rows import BoxedReturn, acc_panel, no_acc, returns_in_frame
+from cocalib.view.model import AccPanel
 from cocalib.workspace import Judged, Workspace
 
 _log = logging.getLogger(__name__)

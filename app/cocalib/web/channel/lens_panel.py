@@ -13,7 +13,7 @@ from calib_core.intrinsics import (
 )
 from cocalib.intrinsics import LensSnapshot, field_of_view_text
 from cocalib.view import sentence, warning_in_sentences
-from cocalib.view.number_format import plain, with_sigma
+from cocalib.view.wording import plain, with_sigma
 from cocalib.web.messages import (
     LensCamera,
     LensCoverage,

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from calib_core.measurements import MIN_PAIRS
 from cocalib.view import Figure
-from cocalib.view.number_format import plain
+from cocalib.view.wording import plain
 from cocalib.web.messages import PlacementRow
 
 SHORTEST_S = 2.0

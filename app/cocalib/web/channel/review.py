@@ -19,14 +19,15 @@ from calib_core.results import Calibration
 from cocalib.session import Session
 from cocalib.solving.solving import solve_clicks
 from cocalib.view.contours import contour_maps
-from cocalib.view.review import review_of
-from cocalib.view.review_pair import PairReview, pair_review
-from cocalib.view.review_solutions import (
+from cocalib.view.review import (
     Compared,
+    PairReview,
     Solution,
     compared,
     not_compared,
+    pair_review,
     previous_calibration,
+    review_of,
     solution_of,
 )
 from cocalib.web.channel.newest import NewestWins

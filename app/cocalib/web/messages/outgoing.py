@@ -12,9 +12,7 @@ from calib_core.measurements import NS_PER_S, Stamp
 from calib_core.results import DataWarning
 from cocalib.option_changes import OptionGroup, option_groups
 from cocalib.view import FollowState, PairCandidates, View
-from cocalib.view.review import Review
-from cocalib.view.review_pair import PairReview
-from cocalib.view.review_solutions import Compared
+from cocalib.view.review import Compared, PairReview, Review
 from cocalib.web.messages.box_messages import FrameBoxes
 from cocalib.web.messages.lens_messages import LensResult, LensState
 from cocalib.web.messages.opening_messages import FolderListing, OpeningChoices

@@ -13,7 +13,7 @@ from calib_core.geometry import quaternion_wxyz_from_matrix
 from calib_core.interchange import AssumptionNote, Provenance, VehicleNote, compare, export, imported, read_any
 from calib_core.results import DataWarning
 from cocalib.report import Against, Judged, ReportSubject, known_calibration, report_html, subject_of
-from cocalib.view.number_format import plain
+from cocalib.view.wording import plain
 from tests.unit.app.report.planted import FILE, box_figures, golden, subject_for, watched_recording
 
 _HTML = "{http://www.w3.org/1999/xhtml}"

@@ -11,9 +11,7 @@ from calib_core.measurements import ChosenReturn, TimeNs
 from calib_core.results import Calibration
 from calib_core.synthetic import SimulatedPairs, simulate_pairs
 from cocalib.session import ClickPlaced, History, RecordingFacts, Solved, advance
-from cocalib.view.review import review_of
-from cocalib.view.review_pair import pair_review
-from cocalib.view.review_solutions import compared, previous_calibration, solution_of
+from cocalib.view.review import compared, pair_review, previous_calibration, review_of, solution_of
 
 
 @pytest.fixture(scope="module")

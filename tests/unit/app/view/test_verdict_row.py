@@ -10,7 +10,7 @@ from calib_core.measurements import ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions, NoiseOptions
 from calib_core.verdict import DONE, Verdict
 from cocalib.session import ClickPlaced, History, PlacementDismissed, RecordingFacts, Session, advance
-from cocalib.view.disagreement import disagreement
+from cocalib.view.click_rows import disagreement
 from cocalib.view.verdict_row import placements_left, verdict_row
 
 FACTS = RecordingFacts("drive", 1_000_000_000 * np.arange(50), width_px=640, height_px=480)

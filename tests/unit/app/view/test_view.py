@@ -17,11 +17,9 @@ from calib_core.synthetic import NoiseProfile, simulate_pairs
 from calib_core.verdict import verdict_on
 from cocalib.session import ClickExcluded, ClickMoved, ClickPlaced, History, RecordingFacts, Solved, Undo, advance
 from cocalib.view import View, summary_lines, view
-from cocalib.view.figures import pose_figures
-from cocalib.view.mounting import OPTICAL_FROM_BODY, mounting_of
-from cocalib.view.number_format import plain, with_sigma
+from cocalib.view.figures import OPTICAL_FROM_BODY, mounting_of, pose_figures
 from cocalib.view.reprojections import ellipses_of, reprojections
-from cocalib.view.wording import sentence
+from cocalib.view.wording import plain, sentence, with_sigma
 
 FACTS = RecordingFacts("drive", 1_700_000_000_123_456_789 + 100_000_000 * np.arange(50), width_px=640, height_px=480)
 TIMES = [TimeNs(int(time)) for time in FACTS.image_times]
