@@ -63,7 +63,7 @@ export function zoomEye(factor, x = canvas.clientWidth / 2, y = canvas.clientHei
 }
 
 /** Metres to CSS px. @param {number} x @param {number} y @returns {[number, number]} */
-const toCanvas = (x, y) => [canvas.clientWidth / 2 - (y - eye.y) * eye.scale, canvas.clientHeight / 2 - (x - eye.x) * eye.scale];
+export const toCanvas = (x, y) => [canvas.clientWidth / 2 - (y - eye.y) * eye.scale, canvas.clientHeight / 2 - (x - eye.x) * eye.scale];
 
 /** @param {number} x @param {number} y CSS px @returns {[number, number]} */
 const toRadar = (x, y) => [eye.x - (y - canvas.clientHeight / 2) / eye.scale, eye.y - (x - canvas.clientWidth / 2) / eye.scale];

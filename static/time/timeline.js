@@ -100,13 +100,13 @@ function extend() {
 const room = () => Math.max(1, canvas.clientWidth - lanes.left - lanes.right);
 
 /** @param {number} seconds @returns {number} CSS px */
-const toX = (seconds) => lanes.left + ((toFolded(folding, seconds) - span.from) / (span.to - span.from)) * room();
+export const toX = (seconds) => lanes.left + ((toFolded(folding, seconds) - span.from) / (span.to - span.from)) * room();
 
 /** @param {number} x CSS px @returns {number} drawn s */
 const toDrawn = (x) => span.from + ((x - lanes.left) / room()) * (span.to - span.from);
 
 /** @param {number} x CSS px @returns {number} s */
-const toSeconds = (x) => unfolded(folding, toDrawn(x));
+export const toSeconds = (x) => unfolded(folding, toDrawn(x));
 
 /** @param {PointerEvent} event */
 function scrub(event) {

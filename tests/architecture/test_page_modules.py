@@ -17,7 +17,7 @@ _LISTED = re.compile(r'^export\s+\{(?P<names>[^}]*)\}(?:\s+from\s+"(?P<path>[^"]
 _EITHER = re.compile(r"^(?:import|export)\b", re.MULTILINE)
 _COMMENT = re.compile(r"/\*.*?\*/|(?<![:\"'`\w\\/])//[^\n]*", re.DOTALL)
 _IN_COMMENT = re.compile(r'import\("(?P<path>\.[^"]+)"\)')
-_FROM_TEST = re.compile(r'const \{ (?P<names>[\w, ]+) \} = await import\(["\']/(?P<path>[\w/]+\.js)["\']\)')
+_FROM_TEST = re.compile(r'const \{ (?P<names>[\w, ]+) \} = await import\(["\'](?:\./|/)(?P<path>[\w/]+\.js)["\']\)')
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +98,7 @@ def faults(texts: Mapping[str, str], *, entries: Sequence[str], used_by_tests: s
     return [
         *(fault for path, module in modules.items() for fault in _faults_of_imports(path, module, modules)),
         *(fault for path in modules for fault in _faults_of_comments(path, texts)),
-        *_exported_in_vain(modules, used_by_tests),
+        *_faults_of_exports(modules, used_by_tests),
         *(f"{path}: no page loads it" for path in modules if path not in _reached(graph, entries)),
         *(f"circle: {' -> '.join(circle)}" for circle in circles(graph)),
     ]
@@ -123,12 +123,15 @@ def _faults_of_comments(path: str, texts: Mapping[str, str]) -> Iterator[str]:
             yield f"{path}: a comment names {target}, which does not exist"
 
 
-def _exported_in_vain(modules: Mapping[str, Module], used_by_tests: str) -> Iterator[str]:
+def _faults_of_exports(modules: Mapping[str, Module], used_by_tests: str) -> Iterator[str]:
     wanted = {
         (target, name) for module in modules.values() for target, names in module.imported.items() for name in names
     }
     for used in _FROM_TEST.finditer(used_by_tests):
-        wanted |= {(used["path"], name) for name, _ in _names(used["names"])}
+        names = {name for name, _ in _names(used["names"])}
+        wanted |= {(used["path"], name) for name in names}
+        missing = names - (modules[used["path"]].exported if used["path"] in modules else frozenset())
+        yield from (f"tests import {name} of {used['path']}, which does not export it" for name in sorted(missing))
     for path, module in modules.items():
         for name in sorted(module.exported):
             if (path, name) not in wanted:
@@ -198,6 +201,13 @@ export async function start(word) {
 def test_modules_that_fit_together_have_no_faults() -> None:
     used = 'await page.evaluate("const { again } = await import("/a/two.js")")'
     assert faults(SOUND, entries=("main.js",), used_by_tests=used) == []
+
+
+def test_what_a_browser_test_imports_must_be_exported() -> None:
+    for names, path in (("again, gone", "a/two.js"), ("gone", "b/two.js"), ("gone", "./a/two.js")):
+        used = f"const {{ {names} }} = await import('{'' if path.startswith('.') else '/'}{path}')"
+        fault = f"tests import gone of {path.removeprefix('./')}, which does not export it"
+        assert fault in faults(SOUND, entries=("main.js",), used_by_tests=used)
 
 
 @pytest.mark.parametrize(

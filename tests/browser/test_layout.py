@@ -70,7 +70,7 @@ EXTREME_NAMES = {
 def give_extreme_names(page: Driver) -> None:
     """Let the recording and its topics have names as long as they come."""
     page.page.evaluate(
-        "async ({ name, topics }) => { const { emit, state } = await import('./state.js'); state.recording.name = name;"
+        "async ({ name, topics }) => { const { emit, state } = await import('/shell/state.js'); state.recording.name = name;"
         "topics.forEach((topic, place) => (state.recording.sensors[place].topic = topic)); emit('recording'); }",
         EXTREME_NAMES,
     )

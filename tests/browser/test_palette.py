@@ -75,7 +75,10 @@ def test_the_palette_goes_to_placements_pairs_frames_times_and_options(page: Dri
 
 def test_the_help_and_the_keys_come_from_the_same_table(page: Driver) -> None:
     table = page.page.evaluate(
-        "async () => (await import('./actions.js')).ACTIONS.map(({ id, group, words, keys }) => ({ id, group, words, keys }))"
+        """async () => {
+            const { ACTIONS } = await import("/shell/actions.js");
+            return ACTIONS.map(({ id, group, words, keys }) => ({ id, group, words, keys }));
+        }"""
     )
     ids, keys = [row["id"] for row in table], [key for row in table for key in row.get("keys") or []]
     assert len(set(ids)) == len(ids)

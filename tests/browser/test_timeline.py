@@ -46,7 +46,11 @@ def islands_page(open_page: Callable[..., Driver], tmp_path: Path) -> Iterator[D
         for start_s, end_s in ALL_S
     ]
     page.page.evaluate(
-        "async (rows) => { const { emit, state } = await import('./state.js'); state.placements = rows; emit('placements'); }",
+        """async (rows) => {
+            const { emit, state } = await import("/shell/state.js");
+            state.placements = rows;
+            emit("placements");
+        }""",
         rows,
     )
     yield page
@@ -57,7 +61,7 @@ def islands_page(open_page: Callable[..., Driver], tmp_path: Path) -> Iterator[D
 def test_placements_in_a_recording_with_long_gaps_are_wide_enough_to_be_hit(islands_page: Driver) -> None:
     page = islands_page
     placed = page.page.evaluate(
-        "async () => { const { toX, toSeconds } = await import('./timeline.js');"
+        "async () => { const { toX, toSeconds } = await import('/time/timeline.js');"
         "return __cocalib.state.placements.map(({ start_s, end_s }) => "
         "[toX(start_s), toX(end_s), toSeconds(toX((start_s + end_s) / 2)) - (start_s + end_s) / 2]); }"
     )
@@ -78,7 +82,7 @@ def test_placements_in_a_recording_with_long_gaps_are_wide_enough_to_be_hit(isla
     page.until("!document.getElementById('tip').hidden")
     assert page.text("#tip").startswith("No frames for 4 min")
     known = page.page.evaluate(
-        "async () => { const { changes } = await import('./lanes.js'); const end = performance.now() + 30000;"
+        "async () => { const { changes } = await import('/time/lanes.js'); const end = performance.now() + 30000;"
         "while (!changes.seconds.length && performance.now() < end) await new Promise((done) => setTimeout(done, 50));"
         "return changes; }"
     )
@@ -97,7 +101,7 @@ def test_the_folded_axis_is_monotone_and_has_an_exact_way_back(islands_page: Dri
         cases.append({"times": times_s.tolist(), "asked": np.unique(asked_s).tolist()})
     cases.append({"times": [0.0], "asked": [-1.0, 0.0, 2.0]})
     answers = islands_page.page.evaluate(
-        "async (text) => { const { foldingOf, gapsOf, toFolded, toSeconds } = await import('./folding.js');"
+        "async (text) => { const { foldingOf, gapsOf, toFolded, toSeconds } = await import('/time/ruler.js');"
         "return JSON.parse(text).map(({ times, asked }) => { const folding = foldingOf(times);"
         "const drawn = asked.map((seconds) => toFolded(folding, seconds));"
         "return { drawn, back: drawn.map((at) => toSeconds(folding, at)), gaps: gapsOf(folding) }; }); }",
