@@ -2,7 +2,7 @@
 
 import signal
 
-from cocalib.batch.engines.worker_processes import WorkerProcesses
+from cocalib.batch.worker_processes import WorkerProcesses
 from cocalib.platform.process import stop_on_signals
 from tests.batch_calls import endless
 

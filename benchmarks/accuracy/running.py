@@ -6,9 +6,8 @@ from collections.abc import Sequence
 
 from benchmarks.accuracy.keeping import Keeper
 from benchmarks.accuracy.rows import Figures, Kept, Row
-from cocalib.batch.engines.engine import Engine
-from cocalib.batch.engines.in_process import InProcess
-from cocalib.batch.engines.worker_processes import WorkerProcesses
+from cocalib.batch.engine import Engine, InProcess
+from cocalib.batch.worker_processes import WorkerProcesses
 
 __all__ = ["kept_figures", "run"]
 

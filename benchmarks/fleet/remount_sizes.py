@@ -24,7 +24,7 @@ from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.pose_difference import camera_position_jacobian
 from calib_core.synthetic import RadarName
 from cocalib.batch.driving import drive
-from cocalib.batch.engines.in_process import InProcess
+from cocalib.batch.engine import InProcess
 from cocalib.batch.job import jobs_of
 from cocalib.batch.manifest_files.reading import read_manifest
 from cocalib.batch.results_folder import ResultsFolder

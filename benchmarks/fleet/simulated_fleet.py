@@ -16,9 +16,8 @@ from benchmarks.fleet.simulated_session import Mounting
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.synthetic import simulate, write_recording
 from calib_core.synthetic.rig import nominal_rotation
-from cocalib.batch.engines.engine import Engine
-from cocalib.batch.engines.in_process import InProcess
-from cocalib.batch.engines.worker_processes import WorkerProcesses
+from cocalib.batch.engine import Engine, InProcess
+from cocalib.batch.worker_processes import WorkerProcesses
 
 __all__ = ["RECORDING", "main", "write_fleet"]
 

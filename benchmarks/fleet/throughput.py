@@ -23,13 +23,13 @@ import psutil
 from benchmarks.fleet.plan import plan_fleet
 from benchmarks.fleet.simulated_fleet import write_fleet
 from cocalib.batch.driving import drive
-from cocalib.batch.engines.in_process import InProcess
-from cocalib.batch.engines.worker_processes import WorkerProcesses
+from cocalib.batch.engine import InProcess
 from cocalib.batch.job import Job, jobs_of
 from cocalib.batch.manifest_files.reading import read_manifest
 from cocalib.batch.outcome import Outcome
 from cocalib.batch.results_folder import OUTCOME_FILE, ResultsFolder
 from cocalib.batch.running import run_job
+from cocalib.batch.worker_processes import WorkerProcesses
 
 __all__ = ["killing", "main"]
 

@@ -14,7 +14,7 @@ from benchmarks.fleet.simulated_fleet import write_fleet
 from benchmarks.fleet.simulated_session import RECORDING
 from benchmarks.fleet.truth import read_truth
 from cocalib.batch.driving import drive
-from cocalib.batch.engines.in_process import InProcess
+from cocalib.batch.engine import InProcess
 from cocalib.batch.job import jobs_of
 from cocalib.batch.manifest_files.reading import read_manifest
 from cocalib.batch.results_folder import ResultsFolder

@@ -9,14 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from calib_core.errors import InputError, OptionError
-from cocalib.batch.engines.dask_scheduler import DaskScheduler
-from cocalib.batch.engines.engine import Engine
-from cocalib.batch.engines.in_process import InProcess
-from cocalib.batch.engines.one_job import failed_outcome, run_once
-from cocalib.batch.engines.worker_processes import WorkerProcesses
+from cocalib.batch.dask_scheduler import DaskScheduler
+from cocalib.batch.engine import Engine, InProcess
 from cocalib.batch.job import Job
+from cocalib.batch.one_job import failed_outcome, run_once
 from cocalib.batch.outcome import Outcome
 from cocalib.batch.results_folder import ResultsFolder
+from cocalib.batch.worker_processes import WorkerProcesses
 
 _SMALL = 8
 """Fewer jobs than this are not worth the seconds that workers take to start."""

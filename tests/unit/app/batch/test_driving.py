@@ -8,12 +8,11 @@ from typing import Any, TypeVar
 import pytest
 
 from calib_core.errors import InputError, OptionError
+from cocalib.batch.dask_scheduler import DaskScheduler
 from cocalib.batch.driving import BatchProgress, chosen_engine, drive
-from cocalib.batch.engines.dask_scheduler import DaskScheduler
-from cocalib.batch.engines.engine import workers_died
-from cocalib.batch.engines.in_process import InProcess
-from cocalib.batch.engines.worker_processes import WorkerProcesses
+from cocalib.batch.engine import InProcess, workers_died
 from cocalib.batch.results_folder import ResultsFolder
+from cocalib.batch.worker_processes import WorkerProcesses
 from tests.batch_calls import quick_jobs
 
 _Found = TypeVar("_Found")

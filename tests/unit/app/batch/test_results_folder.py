@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 from cocalib.batch.outcome import OUTCOME_SCHEMA, Outcome, outcome_text
-from cocalib.batch.results_folder import LOG_FILE, OUTCOME_FILE, ResultsFolder, listed_files
-from cocalib.batch.writers import Writer
+from cocalib.batch.results_folder import LOG_FILE, OUTCOME_FILE, ResultsFolder, Writer, listed_files
 
 DIGEST = "0123456789abcdef0123456789abcdef"
 

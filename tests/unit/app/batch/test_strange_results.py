@@ -9,7 +9,7 @@ import pytest
 from calib_core.errors import CalibrationError
 from cocalib.batch import input_digests
 from cocalib.batch.driving import drive
-from cocalib.batch.engines.in_process import InProcess
+from cocalib.batch.engine import InProcess
 from cocalib.batch.job import jobs_of
 from cocalib.batch.manifest import ManifestRow
 from cocalib.batch.plan import Plan, read_plans, write_plan

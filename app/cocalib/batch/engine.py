@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from calib_core.errors import InputError
-from cocalib.batch.writers import Writer, is_abandoned
+from cocalib.batch.results_folder import Writer, is_abandoned
 
 _Found = TypeVar("_Found")
 _OWN_FOLDER = "cocalib-batch"
@@ -43,6 +43,21 @@ class Engine(Protocol):
             InputError: the engine cannot be used.
         """
         ...
+
+
+class InProcess:
+    """Runs calls in this process, in order."""
+
+    def run_all(
+        self,
+        function: Callable[..., _Found],
+        arguments: Sequence[tuple[Any, ...]],
+        if_died: Callable[[int], _Found] = workers_died,
+    ) -> Generator[tuple[int, _Found], None, None]:
+        """Call a function with each of the arguments, in order."""
+        with own_temporary_folder():
+            for number, given in enumerate(arguments):
+                yield number, function(*given)
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from multiprocessing.connection import Connection, wait
 from typing import Any, TypeVar
 
 from calib_core.errors import InputError
-from cocalib.batch.engines.engine import own_temporary_folder, workers_died
+from cocalib.batch.engine import own_temporary_folder, workers_died
 
 _Found = TypeVar("_Found")
 _PROCESSES = multiprocessing.get_context("spawn")  # a forked child would share locks of our threads

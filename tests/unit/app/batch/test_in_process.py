@@ -5,11 +5,11 @@ from pathlib import Path
 import pytest
 
 from calib_core.errors import InputError
+from cocalib.batch import one_job
 from cocalib.batch.driving import drive
-from cocalib.batch.engines import one_job
-from cocalib.batch.engines.in_process import InProcess
-from cocalib.batch.engines.one_job import failed_outcome, run_once
+from cocalib.batch.engine import InProcess
 from cocalib.batch.job import Job
+from cocalib.batch.one_job import failed_outcome, run_once
 from cocalib.batch.outcome import Outcome
 from cocalib.batch.results_folder import ResultsFolder
 from tests.batch_calls import quick_jobs, squared, written

@@ -1,19 +1,20 @@
-"""A scheduler and workers that others started, in processes of their own on loopback."""
+"""A scheduler and workers that the user started, in processes of their own on loopback; which are used, and what is told."""
 
 import socket
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
 import pytest
 
 from calib_core.errors import InputError
+from cocalib.batch import dask_scheduler
+from cocalib.batch.dask_scheduler import DaskScheduler, checked_address, dask_trouble, version_trouble
 from cocalib.batch.driving import drive
-from cocalib.batch.engines import dask_connection, worker_checks
-from cocalib.batch.engines.dask_scheduler import DaskScheduler
-from cocalib.batch.engines.in_process import InProcess
+from cocalib.batch.engine import InProcess
 from cocalib.batch.results_folder import ResultsFolder
 from cocalib.platform.resources import version
 from tests.batch_calls import quick_jobs, squared
@@ -30,8 +31,8 @@ def address() -> Iterator[str]:
 
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(dask_connection, "_PATIENCE_S", 1)
-    monkeypatch.setattr(worker_checks, "_RESTART_S", 1)
+    monkeypatch.setattr(dask_scheduler, "_PATIENCE_S", 1)
+    monkeypatch.setattr(dask_scheduler, "_RESTART_S", 1)
 
 
 def test_workers_of_a_scheduler_that_are_killed_change_no_outcome(address: str, tmp_path: Path) -> None:
@@ -64,7 +65,7 @@ def test_a_worker_of_another_version_is_told_before_any_job_runs(address: str, t
     other = tmp_path / "other" / "cocalib-9.9.dist-info"
     other.mkdir(parents=True)
     (other / "METADATA").write_text("Metadata-Version: 2.1\nName: cocalib\nVersion: 9.9\n")
-    root = str(Path(__file__).resolve().parents[5])
+    root = str(Path(__file__).resolve().parents[4])
     with (
         worker_process(address, environment={"PYTHONPATH": f"{tmp_path / 'other'}:{root}"}),
         pytest.raises(InputError, match=rf"the worker at tcp://\S+ runs cocalib 9\.9 and this is cocalib {version()}"),
@@ -108,3 +109,73 @@ def test_dask_that_is_not_installed_is_told(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(InputError, match=r"Dask is not installed; install cocalib\[fleet\], or leave out --scheduler"):
         list(DaskScheduler("tcp://127.0.0.1:9").run_all(squared, [(1,)]))
+
+
+@pytest.mark.parametrize(
+    "address",
+    ["tcp://127.0.0.1:8786", "tcp://localhost:1", "tcp://[::1]:8786", "tls://10.0.0.7:8786", "tls://head.example:8786"],
+)
+def test_this_machine_and_tls_are_accepted(address: str) -> None:
+    assert checked_address(address) == address
+
+
+@pytest.mark.parametrize(
+    "address", ["tcp://10.0.0.7:8786", "tcp://head.example:8786", "tcp://127.0.0.1.example:8786", "tcp://[fe80::1]:1"]
+)
+def test_another_machine_without_tls_is_refused_with_the_reason(address: str) -> None:
+    with pytest.raises(InputError, match=r"without TLS is refused.*run code.*tls://"):
+        checked_address(address)
+
+
+@pytest.mark.parametrize(
+    "address",
+    ["", "8786", "localhost:8786", "http://127.0.0.1:8786", "tcp://127.0.0.1", "tcp://:8786", "tcp://127.0.0.1:port",
+     "tcp://127.0.0.1:99999", "tcp://[::1:8786", "inproc://1/2", "tcp://127.0.0.1:8786/x", "tcp://u@127.0.0.1:8786"],
+)  # fmt: skip
+def test_what_is_no_address_is_refused_with_an_example(address: str) -> None:
+    with pytest.raises(InputError, match=r"not an address of a Dask scheduler; write tcp://127\.0\.0\.1:8786"):
+        checked_address(address)
+
+
+def _part(version: str) -> dict[str, Any]:
+    return {"packages": {"distributed": version}}
+
+
+def test_equal_versions_are_no_trouble() -> None:
+    part = _part("2026.8.0")
+    assert dask_trouble({"client": part, "scheduler": part, "workers": {"tcp://127.0.0.1:1": part}}) == ""
+    assert version_trouble("0.1.0", {"tcp://127.0.0.1:1": "0.1.0"}) == ""
+
+
+def test_a_scheduler_of_another_dask_is_named() -> None:
+    here, there = _part("2026.8.0"), _part("2026.1.0")
+    found = dask_trouble({"client": here, "scheduler": there, "workers": {"tcp://127.0.0.1:1": here}})
+    assert found.startswith("the scheduler runs Dask 2026.1.0 and this process 2026.8.0; install")
+
+
+def test_a_worker_of_another_dask_is_named() -> None:
+    here, there = _part("2026.8.0"), _part("2026.1.0")
+    found = dask_trouble(
+        {"client": here, "scheduler": here, "workers": {"tcp://127.0.0.1:1": here, "tcp://127.0.0.1:2": there}}
+    )
+    assert found.startswith("the worker at tcp://127.0.0.1:2 runs Dask 2026.1.0 and this process 2026.8.0")
+
+
+def test_a_worker_without_cocalib_is_named() -> None:
+    found = version_trouble(
+        "0.1.0", {"tcp://127.0.0.1:1": "0.1.0", "tcp://127.0.0.1:2": ModuleNotFoundError("No module named 'app'")}
+    )
+    assert found == (
+        "the worker at tcp://127.0.0.1:2 has no cocalib (ModuleNotFoundError: No module named 'app'); "
+        "install cocalib[fleet] 0.1.0 where it runs"
+    )
+
+
+def test_a_worker_that_went_away_is_no_trouble() -> None:
+    gone = ConnectionRefusedError("closed")
+    assert version_trouble("0.1.0", {"tcp://127.0.0.1:1": "0.1.0", "tcp://127.0.0.1:2": gone}) == ""
+
+
+def test_a_worker_of_another_cocalib_is_named() -> None:
+    found = version_trouble("0.1.0", {"tcp://127.0.0.1:2": "9.9"})
+    assert found.startswith("the worker at tcp://127.0.0.1:2 runs cocalib 9.9 and this is cocalib 0.1.0")

@@ -15,10 +15,10 @@ import pytest
 from calib_core.errors import InputError
 from cocalib.batch import driving
 from cocalib.batch.driving import drive
-from cocalib.batch.engines.in_process import InProcess
-from cocalib.batch.engines.worker_processes import WorkerProcesses
+from cocalib.batch.engine import InProcess
 from cocalib.batch.outcome import Outcome
 from cocalib.batch.results_folder import ResultsFolder
+from cocalib.batch.worker_processes import WorkerProcesses
 from tests.batch_calls import attempts, dying, dying_job, failing, quick_jobs, squared, temporary_file, written
 
 pytestmark = pytest.mark.slow
@@ -124,8 +124,8 @@ def _killed_driver(temporary: str) -> None:
 
 
 def test_workers_that_never_start_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cocalib.batch.engines.worker_processes._MOST_FAILED_STARTS", 2)
-    monkeypatch.setattr("cocalib.batch.engines.worker_processes._work", failing)
+    monkeypatch.setattr("cocalib.batch.worker_processes._MOST_FAILED_STARTS", 2)
+    monkeypatch.setattr("cocalib.batch.worker_processes._work", failing)
     with pytest.raises(InputError, match="end as soon as they start; use --workers 1"):
         list(WorkerProcesses(1).run_all(squared, [(3,)]))
 
@@ -137,5 +137,5 @@ def test_what_a_function_raises_is_raised() -> None:
 
 
 def test_nothing_starts_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cocalib.batch.engines.worker_processes._PROCESSES", None)
+    monkeypatch.setattr("cocalib.batch.worker_processes._PROCESSES", None)
     assert list(WorkerProcesses(2).run_all(squared, [])) == []

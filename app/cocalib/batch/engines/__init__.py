@@ -1,1 +1,0 @@
-"""What runs jobs: this process, worker processes, or Dask."""
