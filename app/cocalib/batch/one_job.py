@@ -4,7 +4,7 @@ import socket
 from datetime import UTC, datetime
 from pathlib import Path
 
-from calib_core.errors import InputError
+from calib_core.errors import CalibrationError, InputError
 from cocalib.batch.job import Job
 from cocalib.batch.outcome import OUTCOME_SCHEMA, Outcome, OutcomeRun, outcome_text
 from cocalib.batch.results_folder import OUTCOME_FILE, ResultsFolder
@@ -66,9 +66,9 @@ def failed_outcome(job: Job, results: Path, *, reason: str, hint: str = "") -> O
     try:
         with ResultsFolder(results).writing(job.digest) as unfinished:
             (unfinished / OUTCOME_FILE).write_text(outcome_text(outcome), encoding="utf-8")
-    except OSError as error:
+    except (OSError, CalibrationError) as error:
         raise InputError(
-            f"{results}: the result of {row.name} cannot be written ({error.strerror or error}); "
+            f"{results}: the result of {row.name} cannot be written ({getattr(error, 'strerror', None) or error}); "
             "make room or choose another folder, and start the batch again: what is done is kept"
         ) from error
     return outcome

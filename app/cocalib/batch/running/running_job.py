@@ -8,6 +8,7 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
+from calib_core.errors import CalibrationError
 from cocalib.batch.inputs import all_reached, inputs_of, state_of
 from cocalib.batch.job import Job
 from cocalib.batch.outcome import Outcome, OutcomeRun, outcome_text
@@ -55,7 +56,7 @@ def _kept(outcome: Outcome, files: Mapping[str, bytes], job: Job, results: Path)
                 path.write_bytes(data)
             outcome = replace(outcome, files=listed_files(folder))
             (folder / OUTCOME_FILE).write_text(outcome_text(outcome), encoding="utf-8")
-    except OSError as error:
+    except (OSError, CalibrationError) as error:
         return replace(failed(job, _unwritten(results, error)), run=outcome.run)
     return outcome
 
@@ -67,8 +68,8 @@ def _changed(job: Job) -> Failure:
     )
 
 
-def _unwritten(results: Path, error: OSError) -> Failure:
+def _unwritten(results: Path, error: OSError | CalibrationError) -> Failure:
     return Failure(
-        f"{results}: the result cannot be written: {error.strerror or error}",
+        f"{results}: the result cannot be written: {getattr(error, 'strerror', None) or error}",
         "make room, or name another folder with --out, and run the batch again: what is done is kept",
     )
