@@ -24,7 +24,7 @@ from calib_core.input_files import file_text, name_text, read_input
 from calib_core.interchange.syntax.strict_json import json_value
 from calib_core.measurements import TimeNs
 from calib_core.recordings.box_topics import frames_of_stamps
-from calib_core.recordings.plain_files.name_times import times_in_names
+from calib_core.recordings.plain_files.file_stamps import times_in_names
 
 
 def read_boxes(path: str | Path, *, image_times: TimesNs, image_size_px: tuple[int, int] | None) -> Boxes:

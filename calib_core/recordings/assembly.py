@@ -15,27 +15,40 @@ from calib_core.recordings.assumptions import Assumption, about_assumptions
 from calib_core.recordings.camera.image_stream import ImageStream, about_video, frames_of_one_size, image_stream
 from calib_core.recordings.camera.images import ImageLayout
 from calib_core.recordings.camera.recorded_intrinsics import published_camera, recorded_camera
-from calib_core.recordings.checks import about_images, about_lost, about_radar, check_overlap, without_certain_zone
-from calib_core.recordings.column_map import parse_column_map
+from calib_core.recordings.checks import (
+    about_claims,
+    about_images,
+    about_lost,
+    about_radar,
+    check_overlap,
+    without_certain_zone,
+)
 from calib_core.recordings.containers.sources import Source
+from calib_core.recordings.field_words import parse_column_map
 from calib_core.recordings.messages.decoding import Message
 from calib_core.recordings.plain_files.folder_cameras import FolderCamera
 from calib_core.recordings.plain_files.source import PlainSource
 from calib_core.recordings.radar.axes import parse_radar_axes
-from calib_core.recordings.radar.checks import about_claims
 from calib_core.recordings.radar.column_mapping import StatedReading
 from calib_core.recordings.radar.layouts import layouts_of_parts
+from calib_core.recordings.radar.merging import MergedStream
 from calib_core.recordings.radar.message_layouts.single_returns import PointLayout
 from calib_core.recordings.radar.scan_stream import RadarStream
-from calib_core.recordings.radar.several_topics.merged_stream import MergedStream
-from calib_core.recordings.radar.several_topics.sensors import RadarSensor, other_azimuths
-from calib_core.recordings.radar_choice import RadarChoice, choose_radar
-from calib_core.recordings.selection import Inventory, Need, RecordingOptions, Selection, select
-from calib_core.recordings.stamping import StampedTopic, read_stamps
+from calib_core.recordings.radar.sensors import RadarSensor, other_azimuths
+from calib_core.recordings.selection import (
+    Inventory,
+    Need,
+    RadarChoice,
+    RecordingOptions,
+    Selection,
+    Usage,
+    choose_radar,
+    select,
+    usage_of,
+)
 from calib_core.recordings.time.clock_choice import ClockChoice, Stamps, choose_clock, choose_clocks
 from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis, about_clocks, diagnose
-from calib_core.recordings.topics import BOX_LAYOUT, Rhythm, Topic, TopicSummary, join_topics
-from calib_core.recordings.usages import Usage, usage_of
+from calib_core.recordings.topics import BOX_LAYOUT, Rhythm, StampedTopic, Topic, TopicSummary, join_topics, read_stamps
 from calib_core.results import DataWarning
 
 

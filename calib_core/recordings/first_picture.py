@@ -13,9 +13,8 @@ from calib_core.recordings.camera.recorded_intrinsics import is_camera_info
 from calib_core.recordings.containers.opening import open_beginnings
 from calib_core.recordings.containers.sources import Channel, Source
 from calib_core.recordings.messages.definitions import definition_of
-from calib_core.recordings.selection import Inventory, RecordingOptions, select_image
+from calib_core.recordings.selection import Inventory, RecordingOptions, Usage, select_image, usage_of
 from calib_core.recordings.topics import Topic, join_topics
-from calib_core.recordings.usages import Usage, usage_of
 
 
 def first_picture(paths: Sequence[Path], options: RecordingOptions | None = None) -> EncodedImage | None:

@@ -21,22 +21,21 @@ from calib_core.recordings.assumptions import Assumption, StatedAssumption
 from calib_core.recordings.box_topics import boxes_in_topic
 from calib_core.recordings.camera.image_stream import ImageStream
 from calib_core.recordings.camera.images import EncodedImage
-from calib_core.recordings.column_map import parse_column_map
 from calib_core.recordings.containers.opening import open_sources
 from calib_core.recordings.containers.sources import Source
+from calib_core.recordings.field_words import parse_column_map
 from calib_core.recordings.plain_files.opening import files_behind, open_plain_sources
-from calib_core.recordings.plain_files.reading_options import PlainOptions
+from calib_core.recordings.plain_files.source import PlainOptions
 from calib_core.recordings.plain_files.ti_uart import open_uart_streams
 from calib_core.recordings.plain_files.video import VIDEO_SUFFIXES
 from calib_core.recordings.radar.axes import parse_radar_axes
 from calib_core.recordings.radar.column_plan import ColumnReading
 from calib_core.recordings.radar.column_plans import column_readings
-from calib_core.recordings.radar.several_topics.merged_stream import MergedStream
-from calib_core.recordings.radar.several_topics.sensors import RadarSensor, figures_of
+from calib_core.recordings.radar.merging import MergedStream
+from calib_core.recordings.radar.sensors import RadarSensor, figures_of
 from calib_core.recordings.selection import Need, RecordingOptions
-from calib_core.recordings.stamping import read_stamps
 from calib_core.recordings.time.written_times import parse_zone
-from calib_core.recordings.topics import TopicSummary, join_topics
+from calib_core.recordings.topics import TopicSummary, join_topics, read_stamps
 from calib_core.results import DataWarning, InputFile
 
 _HASH_BYTES = 1 << 22

@@ -1,16 +1,36 @@
-"""Choose the topics to use, by name or automatically; errors list the available topics."""
+"""What each topic can be used for, and which ones are used: by name or by figures; errors list the available topics."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+import contextlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Literal
+
+import numpy as np
 
 from calib_core.errors import MessageError, RecordingError
 from calib_core.options import option
+from calib_core.recordings.box_topics import BoxLayout, box_layout
+from calib_core.recordings.camera.images import ImageLayout, is_picture
+from calib_core.recordings.camera.recorded_intrinsics import is_camera_info
+from calib_core.recordings.messages.definitions import PRIMITIVES, Definition
+from calib_core.recordings.radar.column_mapping import StatedReading
+from calib_core.recordings.radar.layouts import RadarLayout, recognise
+from calib_core.recordings.radar.message_layouts.list_messages import struct_lists
+from calib_core.recordings.radar.message_layouts.samples import leaf_names
 from calib_core.recordings.radar.message_layouts.single_returns import PointLayout
-from calib_core.recordings.time.clock_choice import Clock
+from calib_core.recordings.radar.scan_stream import RadarStream
+from calib_core.recordings.radar.sensors import Examined, Figures, RadarSensor, sensors_of
+from calib_core.recordings.time.clock_choice import HALF_DISTINCT, RETURNS_DISTINCT, Clock
 from calib_core.recordings.topics import Topic, TopicKind
-from calib_core.recordings.usages import Usage
+from calib_core.results import DataWarning
 
+_RAW = (
+    "raw sensor packets, which only the sensor's driver can decode; play the recording to the driver and record "
+    "what it publishes"
+)
+_NOTHING = StatedReading()
+_ENOUGH_BYTES = 16
+_MOST_NAMES = 8
 Need = Literal["radar", "image"]
 _WORDS = {"radar": "radar", "image": "camera image", "camera-info": "camera info"}
 _FLAGS = {"radar": "--radar-topic", "image": "--image-topic", "camera-info": "--camera-info-topic"}
@@ -19,6 +39,140 @@ _OBJECT_WORDS = ("object", "track")
 _MOST_RADARS = 12  # that are compared
 _ADDED_BY_EXPORT = "/cocalib/"
 _NOT_PICTURES = ("depth", "disparity", "mask", "infra", "debug")
+_PLENTY = 0.25  # of the most static returns ahead: with fewer, a radar looks elsewhere
+_COMPARABLE = 0.5  # with more than this of them, another radar could be meant
+_NOTHING_STATIC = 1.0  # returns a scan: the recording was made on the move
+
+
+def _words(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
+_ROS_PACKAGES = _words(
+    "actionlib_msgs builtin_interfaces control_msgs diagnostic_msgs geometry_msgs map_msgs nav_msgs rcl_interfaces "
+    "rosgraph_msgs sensor_msgs shape_msgs std_msgs stereo_msgs tf tf2_msgs trajectory_msgs unique_identifier_msgs "
+    "vision_msgs visualization_msgs"
+)
+"""Packages of ROS itself, whose lists of structs are no radar returns and need no remark."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Usage:
+    """What a topic can be used for.
+
+    Attributes:
+        kind: see TopicSummary.
+        problem: see TopicSummary.
+        radar: its layout, if it is a radar topic.
+        image: its layout, if it is an image topic.
+        boxes: its layout, if it has boxes around objects.
+    """
+
+    kind: TopicKind
+    problem: str | None = None
+    radar: RadarLayout | None = None
+    image: ImageLayout | None = None
+    boxes: BoxLayout | None = None
+
+    @property
+    def distinct_times(self) -> float:
+        """The least share of different times that is plausible among its messages."""
+        return RETURNS_DISTINCT if isinstance(self.radar, PointLayout) else HALF_DISTINCT
+
+
+def usage_of(topic: Topic, stated: StatedReading = _NOTHING) -> Usage:
+    """Determine what a topic can be used for, from its definition and its first readable message.
+
+    Args:
+        topic: the topic.
+        stated: what the user states about the radar's messages.
+    """
+    try:
+        definition = topic.definition()
+    except MessageError as error:
+        return Usage("other", problem=str(error))
+    if is_camera_info(definition):
+        return Usage("camera-info")
+    boxes = box_layout(definition)
+    if boxes is not None:
+        return Usage("other", boxes=boxes)
+    pictures = is_picture(definition)
+    usage = Usage("image" if pictures else "other", problem="no messages")
+    for row in sorted({0, len(topic) // 2, len(topic) - 1}) if len(topic) else ():
+        try:
+            payload = topic.payload(row)
+            return (
+                _image_usage(topic, definition, payload)
+                if pictures
+                else _radar_usage(topic, definition, payload, stated)
+            )
+        except MessageError as error:
+            usage = usage if usage.problem != "no messages" else replace(usage, problem=str(error))
+        except RecordingError as error:
+            usage = replace(usage, problem=f"its messages cannot be read: {error}")
+    if usage.problem != "no messages" and "radar" in topic.name.lower() and not pictures:
+        return replace(usage, kind="radar")
+    return usage
+
+
+def _image_usage(topic: Topic, definition: Definition, payload: bytes) -> Usage:
+    layout = ImageLayout(definition, topic.name)
+    layout.check(payload)
+    return Usage("image", image=layout)
+
+
+def _radar_usage(topic: Topic, definition: Definition, payload: bytes, stated: StatedReading) -> Usage:
+    def more(count: int) -> list[bytes]:
+        rows = np.unique(np.linspace(0, len(topic) - 1, min(count, len(topic))).astype(np.int64))
+        rows = rows[topic.part[rows] == topic.part[0]]
+        return list(_readable(topic, rows.tolist()))
+
+    try:
+        radar = recognise(definition, payload, more, stated)
+    except MessageError as error:
+        if not stated.column_map:
+            raise
+        if recognise(definition, payload, more) is None:
+            return _no_radar(definition)
+        return Usage("radar", problem=str(error))
+    return _no_radar(definition) if radar is None else Usage("radar", radar=radar)
+
+
+def _readable(topic: Topic, rows: Sequence[int]) -> Iterator[bytes]:
+    """Read messages; unreadable ones are left out: they are reported when they are used."""
+    for row in rows:
+        with contextlib.suppress(RecordingError):
+            yield topic.payload(row)
+
+
+def _no_radar(definition: Definition) -> Usage:
+    """Say why a message that might be a radar's is not read."""
+    if _holds_packets(definition):
+        return Usage("other", problem=_RAW)
+    if definition.type.partition("/")[0] in _ROS_PACKAGES:
+        return Usage("other")
+    for place in struct_lists(definition):
+        names, _ = leaf_names(definition, place.element)
+        if len(names) > 2 and place.element.partition("/")[0] not in _ROS_PACKAGES:
+            shown = ", ".join(names[:_MOST_NAMES]) + (", …" if len(names) > _MOST_NAMES else "")
+            return Usage("other", problem=(
+                f"not read as a radar: its list '{place.name}' has structs with the fields {shown}, and no position and speed or "
+                "amplitude is recognised among them; if it is one, say which is which, such as --map x=FIELD:m --map y=FIELD:m"
+            ))  # fmt: skip
+    return Usage("other")
+
+
+def _holds_packets(definition: Definition) -> bool:
+    """Return whether a message holds a list of structs that are little more than bytes: what a driver receives."""
+    for place in struct_lists(definition):
+        fields = definition.types[place.element]
+        blobs = [field for field in fields if field.count is not None and PRIMITIVES.get(field.type, "")[1:] == "1"]
+        numbers = [
+            name for name in leaf_names(definition, place.element)[0] if not name.startswith(("stamp.", "header."))
+        ]
+        if any((blob.count or _ENOUGH_BYTES) >= _ENOUGH_BYTES for blob in blobs) and len(numbers) <= len(blobs) + 3:
+            return True
+    return False
 
 
 @dataclass(frozen=True, slots=True)
@@ -257,3 +411,144 @@ def _nearest_info(image: Topic | None, inventory: Inventory) -> Topic | None:
             return infos[name]
     alone = len(infos) == 1 and len(inventory.of_kind("image")) == 1
     return next(iter(infos.values())) if alone else None
+
+
+@dataclass(frozen=True, slots=True)
+class RadarChoice:
+    """The radar in use, and the others.
+
+    Attributes:
+        sensors: all that were compared, the chosen one first; empty if there is one topic only.
+        reason: which one is used and why, with figures, as a sentence without its final period; "" if there is no other.
+        warnings: about a choice that is not clear, and about topics that do not belong together.
+    """
+
+    sensors: tuple[RadarSensor, ...] = ()
+    reason: str = ""
+    warnings: tuple[DataWarning, ...] = ()
+
+
+def choose_radar(
+    streams: Sequence[RadarStream], frames: Sequence[str], inventory: Inventory, selection: Selection
+) -> RadarChoice:
+    """Group the radar topics into sensors and choose one.
+
+    Args:
+        streams: of the selection's radar topics, the preferred one first.
+        frames: their frame_ids.
+        inventory: all topics.
+        selection: what the user asked for.
+
+    Raises:
+        RecordingError: there is no radar of the name the user gave.
+    """
+    if not streams:
+        return RadarChoice()
+    examined = [
+        Examined.of(stream, frame, returns=_has_returns(stream, inventory))
+        for stream, frame in zip(streams, frames, strict=True)
+    ]
+    if selection.radar_named:
+        (sensor,) = sensors_of(examined, together=True)
+        return RadarChoice((sensor,), f"{_described(sensor)}, as requested", tuple(_about_frames(examined)))
+    sensors = sensors_of(examined)
+    if selection.sensor is not None:
+        wanted = [sensor for sensor in sensors if sensor.name == selection.sensor]
+        if not wanted:
+            raise unknown_radar(inventory, selection.sensor, [sensor.name for sensor in sensors])
+        others = tuple(sensor for sensor in sensors if sensor is not wanted[0])
+        return RadarChoice((wanted[0], *others), f"{_described(wanted[0])}, as requested")
+    return _chosen_radar(sensors, {one.name: one for one in examined}, inventory)
+
+
+def _has_returns(stream: RadarStream, inventory: Inventory) -> bool:
+    layout = inventory.usages[stream.topic.name].radar
+    return not holds_objects(stream.topic) and layout is not None and not layout.lidar_like
+
+
+def _chosen_radar(sensors: Sequence[RadarSensor], examined: dict[str, Examined], inventory: Inventory) -> RadarChoice:
+    """Choose by figures first, then by names."""
+    plain = [_ahead(sensor, sensors) for sensor in sensors if examined[sensor.topics[0]].returns]
+    most = max(plain, default=0.0)
+
+    def rank(sensor: RadarSensor) -> tuple[float, ...]:
+        first = examined[sensor.topics[0]]
+        share = _ahead(sensor, sensors) / most if most > 0 else 1.0
+        figures = (first.returns, share >= _PLENTY, sensor.figures.doppler, share >= _COMPARABLE)
+        return (*figures, *radar_rank(first.stream.topic, inventory))
+
+    ordered = tuple(sorted(sensors, key=rank, reverse=True))
+    best, others = ordered[0], ordered[1:]
+    if not others:
+        return RadarChoice(ordered, _described(best) if len(best.topics) > 1 or best.copies else "")
+    listed = "; ".join(_described(sensor) for sensor in others)
+    reason = f"{_described(best)}; {_why(best, others, examined)}; not used: {listed}"
+    comparable = [
+        sensor
+        for sensor in others
+        if examined[sensor.topics[0]].returns
+        and _ahead(sensor, sensors) >= _COMPARABLE * _ahead(best, sensors)
+        and sensor.figures.doppler == best.figures.doppler
+    ]
+    return RadarChoice(ordered, reason, (_unclear(best, comparable),) if comparable else ())
+
+
+def _ahead(sensor: RadarSensor, sensors: Sequence[RadarSensor]) -> float:
+    """Return the static returns a scan ahead of a radar; all its returns if hardly any is static."""
+    still = max(other.figures.ahead_per_scan for other in sensors) >= _NOTHING_STATIC
+    return sensor.figures.ahead_per_scan if still else sensor.figures.returns_per_scan
+
+
+def _why(best: RadarSensor, others: Sequence[RadarSensor], examined: dict[str, Examined]) -> str:
+    rivals = [sensor for sensor in others if examined[sensor.topics[0]].returns]
+    if not rivals:
+        return "used because the others are tracked objects or lidars"
+    mine, *theirs = (_ahead(sensor, (best, *others)) for sensor in (best, *rivals))
+    if best.figures.doppler and not any(sensor.figures.doppler for sensor in rivals):
+        return "used because it has Doppler"
+    if mine >= max(theirs):
+        return f"used because it has the most static returns ahead ({mine:.1f} a scan against {max(theirs):.1f})"
+    return "used because of its name and message type; its figures are comparable"
+
+
+def _unclear(best: RadarSensor, comparable: Sequence[RadarSensor]) -> DataWarning:
+    listed = "; ".join(_described(sensor) for sensor in comparable)
+    return DataWarning(
+        "several-radars",
+        f"there are {len(comparable) + 1} radars with comparable returns: {_described(best)} (used); {listed}",
+        f"if another one is to be calibrated, choose it: --radar-topic {comparable[0].name}",
+    )
+
+
+def _about_frames(examined: Sequence[Examined]) -> list[DataWarning]:
+    """Warn about topics that the user joined although their frames say that they are different sensors."""
+    if len({one.frame for one in examined}) < 2:
+        return []
+    listed = ", ".join(f"{one.name} has frame '{one.frame}' ({figures_text(one.figures)})" for one in examined)
+    return [
+        DataWarning(
+            "radar-frames-differ",
+            f"the radar topics that are read as one have different frames: {listed}",
+            "positions are not moved from one frame to the other: name only topics of one radar with --radar-topic",
+        )
+    ]
+
+
+def _described(sensor: RadarSensor) -> str:
+    """Describe a radar by its topics, frame and figures."""
+    own = [name for place, name in enumerate(sensor.topics) if sensor.repeats[place] == place]
+    second = [name for place, name in enumerate(sensor.topics) if sensor.repeats[place] != place]
+    what = " + ".join(own)
+    if second:
+        what += f" with other azimuths in {' + '.join(second)}"
+    if sensor.copies:
+        what += f" (the same returns as {', '.join(sensor.copies)})"
+    return f"{what}, frame '{sensor.frame}': {figures_text(sensor.figures)}"
+
+
+def figures_text(figures: Figures) -> str:
+    """Describe a radar's figures."""
+    rate = "" if figures.rate_hz is None else f" at {figures.rate_hz:.1f} Hz"
+    static = "no Doppler" if figures.static_share is None else f"Doppler, {100.0 * figures.static_share:.0f} % static"
+    reach = f"{figures.nearest_m:.1f} to {figures.farthest_m:.1f} m"
+    return f"{figures.returns_per_scan:.0f} returns a scan{rate}, {reach}, {static}"

@@ -18,7 +18,7 @@ from calib_core.recordings.containers.writing import (
     RecordedMessage,
     VendorScanMessage,
 )
-from calib_core.recordings.radar.several_topics.merging import Spread, aligned, merged, moments_of
+from calib_core.recordings.radar.merging import Spread, aligned, merged, moments_of
 from calib_core.synthetic.options import RadarDefects
 from calib_core.synthetic.radar_profiles import Antenna
 from calib_core.synthetic.radar_returns import second_azimuths

@@ -8,7 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from calib_core.deployment.recorded_frames import read_frames
+from calib_core.deployment.placing import read_frames
 from calib_core.errors import CalibrationError
 from calib_core.interchange import (
     FORMATS,
@@ -25,8 +25,8 @@ from calib_core.interchange.hypotheses.reading import as_imported, read_unstated
 from calib_core.interchange.own.board_views_json import read_board_views
 from calib_core.measurements import TimeNs
 from calib_core.recordings import Recording, describe, first_picture, inspect_recording
-from calib_core.recordings.column_map import parse_column_map
 from calib_core.recordings.containers.copying import Losses, copied_file
+from calib_core.recordings.field_words import parse_column_map
 from calib_core.recordings.messages.decoding import decode
 from calib_core.recordings.messages.definitions import parse_definition
 from calib_core.recordings.radar.axes import parse_radar_axes

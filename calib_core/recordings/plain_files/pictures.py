@@ -10,9 +10,13 @@ from calib_core.measurements import TimeNs
 from calib_core.recordings.camera.jpeg import JPEG_MAGIC, PNG_MAGIC, picture_fault, picture_size_px
 from calib_core.recordings.plain_files.file_stamps import stamp_files
 from calib_core.recordings.plain_files.folder_cameras import FolderCamera, camera_beside
-from calib_core.recordings.plain_files.messages import picture_channel, picture_message
-from calib_core.recordings.plain_files.reading_options import PlainOptions
-from calib_core.recordings.plain_files.source import PlainSource, topic_of
+from calib_core.recordings.plain_files.source import (
+    PlainOptions,
+    PlainSource,
+    picture_channel,
+    picture_message,
+    topic_of,
+)
 from calib_core.results import DataWarning
 
 PICTURE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".ppm", ".pgm", ".tif", ".tiff", ".webp")

@@ -8,9 +8,7 @@ import numpy as np
 from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import TimeNs
 from calib_core.recordings.plain_files.file_stamps import StampedFiles, stamp_files
-from calib_core.recordings.plain_files.messages import cloud_channel, cloud_message
-from calib_core.recordings.plain_files.reading_options import PlainOptions
-from calib_core.recordings.plain_files.source import PlainSource, topic_of
+from calib_core.recordings.plain_files.source import PlainOptions, PlainSource, cloud_channel, cloud_message, topic_of
 
 _FRAME = "radar"
 _MAX_BYTES = 1 << 28

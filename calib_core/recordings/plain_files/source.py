@@ -1,5 +1,6 @@
-"""A source outside ROS containers: a list of times, with messages built on demand."""
+"""A source outside ROS containers: a list of times, with ROS 1 messages built on demand, and the options for reading it."""
 
+import struct
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,11 +12,12 @@ from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.recordings.assumptions import Assumption
 from calib_core.recordings.containers.sources import Channel, Heads, MessageIndex
+from calib_core.recordings.field_words import MappedColumn
 from calib_core.recordings.plain_files.folder_cameras import FolderCamera
-from calib_core.recordings.plain_files.messages import header_bytes
 from calib_core.results import DataWarning
 
 _HEADER_BYTES = 16
+_CODES = {"i1": 1, "u1": 2, "i2": 3, "u2": 4, "i4": 5, "u4": 6, "f4": 7, "f8": 8}
 
 
 def _no_faults() -> dict[Path, str]:
@@ -131,3 +133,71 @@ def topic_of(path: Path, word: str) -> str:
     path = path.parent if path.name == "data" and path.parent.name else path
     name = "".join(letter if letter.isalnum() else "_" for letter in path.stem).strip("_")
     return f"/{name or word}/{word}"
+
+
+@dataclass(frozen=True, slots=True)
+class PlainOptions:
+    """Options of plain files.
+
+    Attributes:
+        video_start: the time of a video's first frame.
+        mapped: --map, parsed.
+        axes_given: whether the user gave the directions of --radar-axes.
+        angle_unit: the angle unit of --radar-axes, "deg" or "rad"; "" if not given.
+        zone_s: offset from UTC of dates without a zone [s]; None if not given.
+        taken: files that are read as something else already.
+    """
+
+    video_start: str | None = None
+    mapped: tuple[MappedColumn, ...] = ()
+    axes_given: bool = False
+    angle_unit: str = ""
+    zone_s: int | None = None
+    taken: frozenset[Path] = frozenset()
+
+
+def picture_channel(topic: str) -> Channel:
+    """Return the channel of a picture topic."""
+    return Channel(0, topic, "sensor_msgs/CompressedImage", "ros1", "", "")
+
+
+def cloud_channel(topic: str) -> Channel:
+    """Return the channel of a point-cloud topic."""
+    return Channel(0, topic, "sensor_msgs/PointCloud2", "ros1", "", "")
+
+
+def header_bytes(time: TimeNs, frame: str) -> bytes:
+    """Return a serialised header."""
+    sec, nanosec = divmod(int(time), NS_PER_S)
+    return struct.pack("<III", 0, sec, nanosec) + _string(frame)
+
+
+def picture_message(time: TimeNs, frame: str, data: bytes) -> bytes:
+    """Return a CompressedImage; its format is recognized from the first bytes of the data."""
+    return header_bytes(time, frame) + _string("") + struct.pack("<I", len(data)) + data
+
+
+def cloud_message(time: TimeNs, frame: str, points: np.ndarray) -> bytes:
+    """Return a PointCloud2.
+
+    Args:
+        time: its stamp.
+        frame: its frame_id.
+        points: (n,) structured, little endian; fields of types that PointCloud2 does not support are not described.
+    """
+    described = [
+        _string(name) + struct.pack("<IBI", place[1], _CODES[place[0].str[1:]], 1)
+        for name, place in (points.dtype.fields or {}).items()
+        if place[0].str[1:] in _CODES
+    ]
+    data, step = points.tobytes(), points.dtype.itemsize
+    parts = [
+        header_bytes(time, frame), struct.pack("<III", 1, len(points), len(described)), *described,
+        struct.pack("<BIII", 0, step, step * len(points), len(data)), data, b"\1",
+    ]  # fmt: skip
+    return b"".join(parts)
+
+
+def _string(text: str) -> bytes:
+    raw = text.encode()
+    return struct.pack("<I", len(raw)) + raw

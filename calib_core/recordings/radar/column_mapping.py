@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from calib_core.errors import MessageError, OptionError
 from calib_core.recordings.assumptions import Assumption
-from calib_core.recordings.column_map import UNITS, MappedColumn
+from calib_core.recordings.field_words import MAPPED_UNITS, MappedColumn
 from calib_core.recordings.radar.axes import RadarAxes
 from calib_core.recordings.radar.column_plan import ColumnAssumption, ColumnPlan, ColumnReading
 
@@ -156,7 +156,7 @@ def _position(start: ColumnPlan, given: Mapping[str, MappedColumn], assumed: lis
             scales.append(before[1])
         elif quantity != names[2]:
             raise OptionError(
-                f"--map: {quantity} is not known; add --map {quantity}=COLUMN:{next(iter(UNITS[quantity]))}"
+                f"--map: {quantity} is not known; add --map {quantity}=COLUMN:{next(iter(MAPPED_UNITS[quantity]))}"
             )
         else:
             break
@@ -190,7 +190,7 @@ def _scales(plan: ColumnPlan) -> tuple[float, float, float]:
 
 
 def _about_unit(one: MappedColumn) -> ColumnAssumption:
-    unit = next(iter(UNITS[one.quantity]))
+    unit = next(iter(MAPPED_UNITS[one.quantity]))
     return ColumnAssumption(
         Assumption(
             _KEYS[one.quantity],

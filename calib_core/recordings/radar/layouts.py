@@ -9,13 +9,16 @@ import numpy as np
 from calib_core.errors import MessageError
 from calib_core.recordings.messages.definitions import Definition
 from calib_core.recordings.radar.column_mapping import StatedReading
-from calib_core.recordings.radar.message_layouts.array_messages import ArrayLayout
-from calib_core.recordings.radar.message_layouts.channel_clouds import ChannelCloudLayout, is_channel_cloud
-from calib_core.recordings.radar.message_layouts.list_messages import ListLayout
-from calib_core.recordings.radar.message_layouts.point_clouds import CloudLayout, cloud_columns, is_cloud
+from calib_core.recordings.radar.message_layouts.list_messages import ArrayLayout, ListLayout, struct_lists
+from calib_core.recordings.radar.message_layouts.point_clouds import (
+    ChannelCloudLayout,
+    CloudLayout,
+    cloud_columns,
+    is_channel_cloud,
+    is_cloud,
+)
 from calib_core.recordings.radar.message_layouts.samples import Samples, leaf_names
 from calib_core.recordings.radar.message_layouts.single_returns import PointLayout
-from calib_core.recordings.radar.message_layouts.struct_lists import struct_lists
 
 _NOTHING = StatedReading()
 

@@ -6,7 +6,8 @@ python -m calib_core.recordings.radar.registry_table docs/radar-formats.md
 import sys
 from pathlib import Path
 
-from calib_core.recordings.plain_files.tables.csv_files import CSV_EXAMPLE, csv_columns
+from calib_core.recordings.plain_files.tables.columns import TABLE_EXAMPLE
+from calib_core.recordings.plain_files.tables.text_tables import csv_columns
 from calib_core.recordings.radar.column_plans import plan_for
 from calib_core.recordings.radar.registry import DECODERS, Decoder, MessageKind
 from calib_core.recordings.time.written_times import DATE_SPELLINGS
@@ -221,7 +222,7 @@ def radar_formats() -> str:
     for kind, title in _KINDS.items():
         parts += [f"## {title}", "", *_table([decoder for decoder in DECODERS if decoder.kind == kind]), ""]
     dates = "\n".join(f"* `{spelling}`" for spelling in DATE_SPELLINGS)
-    files = _FILES.format(example=CSV_EXAMPLE, columns="\n".join(csv_columns()), dates=dates)
+    files = _FILES.format(example=TABLE_EXAMPLE, columns="\n".join(csv_columns()), dates=dates)
     parts += [files.rstrip("\n"), "", "## Notes", ""]
     parts += [
         f"* **{d.name}**: {'; '.join(filter(None, (d.note, d.assumed)))}." for d in DECODERS if d.note or d.assumed

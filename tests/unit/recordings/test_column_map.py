@@ -5,7 +5,7 @@ import math
 import pytest
 
 from calib_core.errors import OptionError
-from calib_core.recordings.column_map import MappedColumn, parse_column_map
+from calib_core.recordings.field_words import MappedColumn, parse_column_map
 
 
 def test_a_map_names_quantity_column_and_unit():

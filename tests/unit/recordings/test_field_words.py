@@ -5,14 +5,21 @@ import re
 
 import pytest
 
-from calib_core.recordings.column_map import parse_column_map
-from calib_core.recordings.field_words.names import SPELT, quantity_of, spelt
-from calib_core.recordings.field_words.spellings import AMBIGUOUS, SPELLINGS, Spelling
-from calib_core.recordings.field_words.units import UNITS_BY_SPELLING, Unit, unit_of_word
-from calib_core.recordings.field_words.words import SUBJECTS
-from calib_core.recordings.plain_files.tables.column_names import read_column_name
-from calib_core.recordings.radar.self_describing.comment_units import unit_in
-from calib_core.recordings.radar.self_describing.names import meaning_of
+from calib_core.recordings.field_words import (
+    AMBIGUOUS,
+    SPELLINGS,
+    SPELT,
+    SUBJECTS,
+    UNITS_BY_SPELLING,
+    Spelling,
+    Unit,
+    parse_column_map,
+    quantity_of,
+    spelt,
+    unit_of_word,
+)
+from calib_core.recordings.plain_files.tables.columns import read_column_name
+from calib_core.recordings.radar.described_columns import meaning_of, unit_in
 
 LEVELS = ("snr", "intensity", "rcs", "power", "amplitude")
 MEASURED = {"length": "range", "angle": "azimuth", "speed": "doppler", "level": "snr", "time": "time"}

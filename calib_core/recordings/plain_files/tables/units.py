@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.recordings.assumptions import Assumption
-from calib_core.recordings.column_map import MappedColumn
-from calib_core.recordings.plain_files.reading_options import PlainOptions
+from calib_core.recordings.field_words import MappedColumn
+from calib_core.recordings.plain_files.source import PlainOptions
 from calib_core.recordings.plain_files.tables.columns import TableColumn, TableColumns, units_of
 
 _SAMPLED_ROWS = 20_000

@@ -20,8 +20,7 @@ from rosbags.rosbag2 import Reader as Reader2
 
 from calib_core.errors import RecordingError
 from calib_core.recordings.containers.opening import open_sources
-from calib_core.recordings.stamping import read_stamps
-from calib_core.recordings.topics import join_topics
+from calib_core.recordings.topics import join_topics, read_stamps
 from tests.unit.recordings.conftest import START_NS, Ros, some_points, write_rows
 from tests.unit.recordings.containers.mcap_writing import mcap
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S
 from calib_core.recordings import RecordingOptions, open_recording
-from calib_core.recordings.plain_files.name_times import times_in_names
+from calib_core.recordings.plain_files.file_stamps import times_in_names
 from calib_core.recordings.time.written_times import DATE_SPELLINGS, moments_in, read_time
 
 MOMENT = datetime(2024, 5, 17, 9, 42, 31, 208764, UTC)

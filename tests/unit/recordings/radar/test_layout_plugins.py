@@ -10,7 +10,7 @@ import pytest
 
 from calib_core.radar import cartesian_from_polar
 from calib_core.recordings import open_recording
-from calib_core.recordings.radar.plugins import GROUP, all_decoders
+from calib_core.recordings.radar.column_plans import GROUP, all_decoders
 from calib_core.recordings.radar.registry import DECODERS, Decoder
 from tests.fake_distribution import install
 from tests.unit.recordings.radar.radar_samples import START_NS

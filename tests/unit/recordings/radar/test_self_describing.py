@@ -13,7 +13,7 @@ from calib_core.errors import MessageError
 from calib_core.measurements import TimeNs
 from calib_core.recordings import describe
 from calib_core.recordings.messages.definitions import parse_definition
-from calib_core.recordings.plain_files.messages import header_bytes
+from calib_core.recordings.plain_files.source import header_bytes
 from calib_core.recordings.radar.layouts import recognise
 from tests.unit.recordings.radar.test_registry import damaged
 from tests.unit.recordings.radar.vendor_layouts import LAYOUTS, POLAR, RETURNS, SCANS, START_NS, Truth, fields, listed

@@ -12,8 +12,7 @@ from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.radar import cartesian_from_polar
 from calib_core.recordings.assembly import assemble
 from calib_core.recordings.containers.sources import Channel
-from calib_core.recordings.plain_files.messages import header_bytes
-from calib_core.recordings.plain_files.source import PlainSource
+from calib_core.recordings.plain_files.source import PlainSource, header_bytes
 from calib_core.recordings.recording import Recording
 from calib_core.recordings.selection import RecordingOptions
 
@@ -243,7 +242,7 @@ def two_lists(first: str, second: str) -> Layout:
 def cloud(text: str, *assumed: str, **more: Any) -> Layout:
     """Return a PointCloud2 with unusual field names."""
     from calib_core.recordings.messages.known_definitions import KNOWN_DEFINITIONS
-    from calib_core.recordings.plain_files.messages import cloud_message
+    from calib_core.recordings.plain_files.source import cloud_message
 
     rows = fields(text)
 

@@ -13,7 +13,7 @@ from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 from calib_core.radar import cartesian_from_polar
 from calib_core.recordings import Recording, RecordingOptions, describe, open_recording, recording_summary
 from calib_core.recordings.containers.writing import CloudMessage, RecordedMessage, write_ros1_bag
-from calib_core.recordings.radar.several_topics.sensors import sensor_name
+from calib_core.recordings.radar.sensors import sensor_name
 from calib_core.synthetic import simulate
 from calib_core.synthetic.messages import SIDE_FRAME, SIDE_TOPIC, radar_messages
 from calib_core.synthetic.presets import PRESETS, PresetName

@@ -7,7 +7,7 @@ import pytest
 
 from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs
 from calib_core.radar import cartesian_from_polar
-from calib_core.recordings.radar.several_topics.merging import Spread, merged, moments_of, spread_of
+from calib_core.recordings.radar.merging import Spread, merged, moments_of, spread_of
 
 SPREAD = Spread(np.array([0.1, 0.02, 0.05]), 0.1)
 COARSE = Spread(np.array([0.1, 0.04, 0.05]), 0.1)

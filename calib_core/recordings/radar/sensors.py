@@ -13,9 +13,8 @@ import numpy as np
 
 from calib_core.measurements import RadarScans
 from calib_core.radar import direction_cosines, polar_from_cartesian
+from calib_core.recordings.radar.merging import Spread, aligned, matches, measured_spread, moments_of
 from calib_core.recordings.radar.scan_stream import RadarStream
-from calib_core.recordings.radar.several_topics.merged_stream import measured_spread
-from calib_core.recordings.radar.several_topics.merging import Spread, aligned, matches, moments_of
 from calib_core.recordings.topics import Rhythm
 
 Relation = Literal["same", "alternatives", "ranges", "apart"]

@@ -1,1 +1,0 @@
-"""Several topics of one radar, read as one."""
