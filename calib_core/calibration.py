@@ -29,8 +29,7 @@ from calib_core.estimation.measurement_model import PairMeasurements, pair_measu
 from calib_core.estimation.pair_results import excluded_pair_results, fit_metrics, used_pair_results
 from calib_core.estimation.posterior.beyond_the_fit import look_beyond
 from calib_core.measurements import MIN_PAIRS, Pair, RadarScans, ReflectorClick, Unpaired, Unsolvable
-from calib_core.option_checks import checked_options
-from calib_core.options import CalibrationOptions, Method
+from calib_core.options import CalibrationOptions, Method, checked_options
 from calib_core.pair_checks import checked_pairs
 from calib_core.plausibility import implausible_input
 from calib_core.radar import cartesian_from_polar

@@ -1,4 +1,4 @@
-"""Rigid transforms, named target_from_source, and their algebra."""
+"""Rigid transforms, named target_from_source, their algebra, and how far two poses of the same sensors are apart."""
 
 import math
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from typing import overload
 
 import numpy as np
 
-from calib_core.arrays import Matrix33, Matrix66, Points3, Vector3, frozen_array
+from calib_core.arrays import Matrix33, Matrix66, Points3, Values, Vector3, frozen_array
 
 OPTICAL_FROM_LINK = frozen_array(np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]), (3, 3))
 """Rotation from body axes (x forward, y left, z up) to a camera's optical axes (x right, y down, z forward)."""
@@ -240,3 +240,70 @@ def larger_eigenvalues(matrices: np.ndarray) -> np.ndarray:
     """Return the larger eigenvalue (n,) of symmetric matrices (n, 2, 2); NaN stays NaN."""
     first, second = matrices[:, 0, 0], matrices[:, 1, 1]
     return np.asarray(0.5 * (first + second) + np.hypot(0.5 * (first - second), matrices[:, 0, 1]))
+
+
+_ZERO_LENGTH = 1e-9
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseDifference:
+    """How far one camera_from_radar is from another.
+
+    Attributes:
+        error: (6,) (dt, dtheta) [m, rad] that leads from the first to the second.
+        rotation_deg: angle between the two rotations.
+        rotation_sigma_deg: its standard deviation about its own axis; NaN if unknown.
+        position_cm: distance between the two camera positions in the radar frame.
+        position_sigma_cm: its standard deviation along its own direction; NaN if unknown.
+        squared: squared Mahalanobis distance of the error; NaN if the covariance is unknown or singular.
+    """
+
+    error: Values
+    rotation_deg: float
+    rotation_sigma_deg: float
+    position_cm: float
+    position_sigma_cm: float
+    squared: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "error", frozen_array(self.error, (6,)))
+
+
+def pose_difference(first: RigidTransform, second: RigidTransform, covariance: Matrix66) -> PoseDifference:
+    """Return how far the second camera_from_radar is from the first.
+
+    Args:
+        first: a camera_from_radar.
+        second: another one of the same two sensors.
+        covariance: (6, 6) of the error between them [m, rad]; NaN where unknown.
+    """
+    error = second.error_from(first)
+    moved_m = second.inverse().translation_m - first.inverse().translation_m
+    jacobian = camera_position_jacobian(first)
+    return PoseDifference(
+        error=error,
+        rotation_deg=float(np.degrees(np.linalg.norm(error[3:]))),
+        rotation_sigma_deg=float(np.degrees(_sigma_along(error[3:], covariance[3:, 3:]))),
+        position_cm=float(np.linalg.norm(moved_m)) * 100.0,
+        position_sigma_cm=_sigma_along(moved_m, jacobian @ covariance @ jacobian.T) * 100.0,
+        squared=squared_distance(error, covariance),
+    )
+
+
+def camera_position_jacobian(camera_from_radar: RigidTransform) -> np.ndarray:
+    """Return d c / d (dt, dtheta), (3, 6): how the camera centre c = -R^T t in the radar frame follows an error of the pose."""
+    turned = -camera_from_radar.rotation.T
+    return np.hstack([turned, turned @ skew(camera_from_radar.translation_m)])
+
+
+def squared_distance(error: Values, covariance: Matrix66) -> float:
+    """Return the squared Mahalanobis distance of an error (6,); NaN if its covariance is unknown or singular."""
+    if not np.isfinite(covariance).all() or np.linalg.matrix_rank(covariance, hermitian=True) < 6:
+        return float("nan")
+    return float(error @ np.linalg.solve(covariance, error))
+
+
+def _sigma_along(direction: np.ndarray, covariance: np.ndarray) -> float:
+    length = float(np.linalg.norm(direction))
+    variance = np.trace(covariance) / 3 if length < _ZERO_LENGTH else direction @ covariance @ direction / length**2
+    return float(np.sqrt(variance)) if variance >= 0 else float("nan")

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from calib_core.detections import Box, Boxes, FrameBoxes
 from calib_core.interchange import read_clicks
-from calib_core.measurements import TimeNs
+from calib_core.measurements import Box, Boxes, FrameBoxes, TimeNs
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording, open_recording
 from calib_core.recordings.containers.writing import write_ros2

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.camera import Camera
-from calib_core.detections import Box, Boxes, FrameBoxes, LabelledScan, ReturnLabels
 from calib_core.geometry import RigidTransform, rotation_exp
-from calib_core.measurements import RadarScan, RadarScans, TimeNs
+from calib_core.measurements import Box, Boxes, FrameBoxes, LabelledScan, RadarScan, RadarScans, ReturnLabels, TimeNs
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 
 START_NS = 1_700_000_000_000_000_000

@@ -7,9 +7,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from calib_core.detections import Box
 from calib_core.interchange import read_calibration
-from calib_core.measurements import RadarScans, TimeNs
+from calib_core.measurements import Box, RadarScans, TimeNs
 from cocalib.view import Reference
 from tests.picture_recording import PictureRecording
 from tests.street import CAMERA, TRUE_POSE, Street, street

@@ -14,8 +14,18 @@ from typing import Any, TypeAlias
 import msgspec
 
 from calib_core.errors import OptionError
-from calib_core.option_checks import RANGES, UNITS, OptionKind, checked_options, kind_of, option_fields, unit_of_name
-from calib_core.options import RETIRED_METHODS, CalibrationOptions, CameraPositionPrior
+from calib_core.options import (
+    RANGES,
+    RETIRED_METHODS,
+    UNITS,
+    CalibrationOptions,
+    CameraPositionPrior,
+    OptionKind,
+    checked_options,
+    kind_of,
+    option_fields,
+    unit_of_name,
+)
 
 OptionValue: TypeAlias = bool | int | float | str | CameraPositionPrior | None
 

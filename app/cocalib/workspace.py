@@ -13,11 +13,10 @@ from calib_core.arrays import TimesNs
 from calib_core.association.placements import Placement
 from calib_core.boxes import read_boxes
 from calib_core.camera import Camera
-from calib_core.detections import Boxes
 from calib_core.errors import InputError
 from calib_core.input_files import name_text
 from calib_core.interchange import CameraFile, camera_info_text, read_clicks, write_clicks
-from calib_core.measurements import NS_PER_S, ReflectorClick, TimeNs
+from calib_core.measurements import NS_PER_S, Boxes, ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording, assumption_hint
 from calib_core.results import Calibration, DataWarning

@@ -20,8 +20,7 @@ from benchmarks.fleet.simulated_fleet import write_fleet
 from benchmarks.fleet.simulated_session import RECORDING
 from calib_core.arrays import Vector3
 from calib_core.fleet import SessionPose, Transition, transition
-from calib_core.geometry import RigidTransform, rotation_exp
-from calib_core.pose_difference import camera_position_jacobian
+from calib_core.geometry import RigidTransform, camera_position_jacobian, rotation_exp
 from calib_core.synthetic import RadarName
 from cocalib.batch.driving import drive
 from cocalib.batch.engine import InProcess

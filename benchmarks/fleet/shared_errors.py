@@ -16,9 +16,8 @@ import numpy as np
 from benchmarks.fleet.plan import TAPE_SIGMA_M
 from benchmarks.fleet.simulated_session import RECORDING
 from calib_core.calibration import calibrate_pairs
-from calib_core.geometry import RigidTransform
+from calib_core.geometry import RigidTransform, camera_position_jacobian
 from calib_core.options import CalibrationOptions, CameraPositionPrior, LensOptions, ReflectorOptions
-from calib_core.pose_difference import camera_position_jacobian
 from calib_core.results import Calibration
 from calib_core.synthetic import (
     PairsLayout,

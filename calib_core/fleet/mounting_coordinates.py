@@ -11,8 +11,7 @@ They do not depend on the camera's axes, and turn with the radar's.
 import numpy as np
 
 from calib_core.arrays import Matrix66, Values
-from calib_core.geometry import RigidTransform, rotation_exp, rotation_log, skew
-from calib_core.pose_difference import camera_position_jacobian
+from calib_core.geometry import RigidTransform, camera_position_jacobian, rotation_exp, rotation_log, skew
 
 _SMALL_RAD = 1e-4
 

@@ -8,7 +8,7 @@ import numpy as np
 from calib_core.arrays import Matrix66, Values, frozen_array
 from calib_core.fleet.session_pose import SessionPose
 from calib_core.fleet.tails import FALSE_RATE, quantile
-from calib_core.pose_difference import PoseDifference, camera_position_jacobian, pose_difference
+from calib_core.geometry import PoseDifference, camera_position_jacobian, pose_difference
 
 Outcome: TypeAlias = Literal["remounted", "unchanged", "cannot-tell"]
 _95 = 0.95

@@ -12,10 +12,9 @@ import numpy as np
 
 from calib_core.arrays import TimesNs
 from calib_core.camera import Camera
-from calib_core.detections import Boxes
 from calib_core.errors import InputError, RecordingError
 from calib_core.input_files import name_text, special_kind
-from calib_core.measurements import RadarScans, TimeNs
+from calib_core.measurements import Boxes, RadarScans, TimeNs
 from calib_core.recordings.assembly import Assembly, assemble
 from calib_core.recordings.assumptions import Assumption, StatedAssumption
 from calib_core.recordings.box_topics import boxes_in_topic

@@ -3,8 +3,7 @@
 import numpy as np
 
 from calib_core.arrays import Points3, Vector3
-from calib_core.detections import Box, Boxes, FrameBoxes, LabelledScan, ReturnLabels
-from calib_core.measurements import TimeNs
+from calib_core.measurements import Box, Boxes, FrameBoxes, LabelledScan, ReturnLabels, TimeNs
 from calib_core.synthetic.recording import SimulatedRecording
 from calib_core.synthetic.rendering.solids import Solid, block
 from calib_core.synthetic.scans import labelled_scans

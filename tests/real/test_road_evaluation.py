@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from calib_core.boxes import boxes_text
-from calib_core.detections import Box, Boxes, FrameBoxes
 from calib_core.geometry import RigidTransform
-from calib_core.measurements import TimeNs
+from calib_core.measurements import Box, Boxes, FrameBoxes, TimeNs
 from calib_core.recordings import open_recording
 from cocalib.cli import run
 

@@ -4,9 +4,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from calib_core.boxes import MOVING, changed_boxes, read_boxes, read_labels
-from calib_core.detections import Boxes, ReturnLabels
 from calib_core.errors import InputError, MessageError
 from calib_core.input_files import file_text, read_input
+from calib_core.measurements import Boxes, ReturnLabels
 from calib_core.recordings import Recording
 
 _MAX_LABELS_BYTES = 256 * 1024 * 1024

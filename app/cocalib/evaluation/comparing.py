@@ -5,11 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.detections import Boxes, ReturnLabels
 from calib_core.errors import InputError
 from calib_core.evaluation import Evaluation, PairedDifference, acc_difference, residual_difference
 from calib_core.evaluation.paired_difference import Winner
-from calib_core.measurements import ReflectorClick
+from calib_core.measurements import Boxes, ReflectorClick, ReturnLabels
 from calib_core.results import Calibration, DataWarning
 from cocalib.evaluation.evaluating import EvidenceOptions, RadarRecording, evidence_in, judged
 

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from calib_core.arrays import Flags, Points2
-from calib_core.detections import Box
+from calib_core.measurements import Box
 from cocalib.colours import residual_colours
 from cocalib.recorded_view import box_words
 

@@ -7,9 +7,8 @@ import numpy as np
 import rerun as rr
 
 from calib_core.arrays import Indices, TimesNs
-from calib_core.detections import Box
 from calib_core.errors import InputError, MessageError
-from calib_core.measurements import TimeNs
+from calib_core.measurements import Box, TimeNs
 from calib_core.results import PairResult
 from cocalib.colours import residual_colours
 from cocalib.recorded_view import FrameBlock, RecordedView, SeenReturns, box_words, frame_blocks, seen_in

@@ -6,6 +6,7 @@ import numpy as np
 
 from calib_core.arrays import Matrix66
 from calib_core.camera import Camera
+from calib_core.geometry import pose_difference, squared_distance
 from calib_core.interchange.check.pixel_differences import (
     DISTANCES_M,
     LOST_TEXT,
@@ -17,7 +18,6 @@ from calib_core.interchange.check.pixel_differences import (
     shown,
 )
 from calib_core.interchange.imported import ImportedCalibration
-from calib_core.pose_difference import pose_difference, squared_distance
 
 CHI2_95 = 12.591587243743977
 """The 95 % quantile of chi2 with 6 degrees of freedom."""

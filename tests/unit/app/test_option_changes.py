@@ -7,8 +7,15 @@ import msgspec
 import pytest
 
 from calib_core.errors import OptionError
-from calib_core.option_checks import RANGES, checked_options
-from calib_core.options import CalibrationOptions, CameraPositionPrior, GatingOptions, PaperOptions, SolvingOptions
+from calib_core.options import (
+    RANGES,
+    CalibrationOptions,
+    CameraPositionPrior,
+    GatingOptions,
+    PaperOptions,
+    SolvingOptions,
+    checked_options,
+)
 from calib_core.recordings import RecordingOptions
 from calib_core.synthetic import RigOptions, SimulationOptions
 from cocalib import option_changes

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from calib_core.boxes import read_boxes
-from calib_core.detections import Box, Boxes
 from calib_core.errors import InputError
+from calib_core.measurements import Box, Boxes
 
 START_NS = 1_700_000_000_000_000_000
 TIMES = START_NS + 100_000_000 * np.arange(10)

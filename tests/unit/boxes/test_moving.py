@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from calib_core.boxes import changed_boxes
-from calib_core.detections import Box
 from calib_core.errors import InputError, MessageError
+from calib_core.measurements import Box
 
 HEIGHT, WIDTH = 120, 160
 START_NS = 1_700_000_000_000_000_000

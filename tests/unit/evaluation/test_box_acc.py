@@ -6,12 +6,21 @@ import numpy as np
 import pytest
 
 from calib_core.camera import Camera
-from calib_core.detections import Box, Boxes, FrameBoxes, LabelledScan, ReturnLabels
 from calib_core.errors import InputError
 from calib_core.evaluation import box_figures, counted_returns, moving_targets, renamed_classes
 from calib_core.evaluation.box_acc import grouped_error
 from calib_core.geometry import RigidTransform
-from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs
+from calib_core.measurements import (
+    NS_PER_S,
+    Box,
+    Boxes,
+    FrameBoxes,
+    LabelledScan,
+    RadarScan,
+    RadarScans,
+    ReturnLabels,
+    TimeNs,
+)
 from tests.independent_acc import acc as independent_acc
 from tests.street import CAMERA, OPTICAL_FROM_RADAR, TRUE_POSE, Street, street, turned
 

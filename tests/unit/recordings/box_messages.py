@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from calib_core.detections import Box
+from calib_core.measurements import Box
 from tests.unit.recordings.conftest import START_NS, Ros, Row, plain_rows
 
 __all__ = ["EXPECTED", "FIRST_FRAME_NS", "KINDS", "recorded"]

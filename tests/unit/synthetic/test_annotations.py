@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calib_core.detections import Box
-from calib_core.measurements import NS_PER_S
+from calib_core.measurements import NS_PER_S, Box
 from calib_core.recordings import RecordingOptions, open_recording
 from calib_core.synthetic import (
     PRESETS,

@@ -13,9 +13,8 @@ from cocalib.cli.output import progress_bar, told_clicks_at_frames
 from cocalib.platform.files import read_text
 
 if TYPE_CHECKING:
-    from calib_core.detections import Boxes, ReturnLabels
     from calib_core.interchange import ImportedCalibration
-    from calib_core.measurements import ReflectorClick
+    from calib_core.measurements import Boxes, ReflectorClick, ReturnLabels
     from calib_core.recordings import Recording
     from cocalib.evaluation.evaluating import EvidenceOptions
 

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 from calib_core.errors import InputError
 from calib_core.input_files import name_text
-from calib_core.option_checks import checked_options
-from calib_core.options import CalibrationOptions
+from calib_core.options import CalibrationOptions, checked_options
 from cocalib.cli.flags import File, Switch
 from cocalib.cli.output import explain_unsolvable, write_whole
 from cocalib.cli.recording_flags import CameraPosition, MeasuredCamera, Options, Recordings, TopicFlags, Topics

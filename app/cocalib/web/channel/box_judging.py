@@ -8,9 +8,9 @@ from dataclasses import replace
 from functools import partial
 
 from calib_core.camera import Camera
-from calib_core.detections import Boxes
 from calib_core.errors import CalibrationError
 from calib_core.evaluation import BoxFigures
+from calib_core.measurements import Boxes
 from calib_core.recordings import Recording
 from calib_core.results import Calibration
 from cocalib.evaluation.evaluating import Evidence, evidence_in, judged

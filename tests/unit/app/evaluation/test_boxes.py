@@ -6,9 +6,8 @@ from pathlib import Path
 import pytest
 
 from calib_core.boxes import boxes_text, labels_text
-from calib_core.detections import Box, Boxes, FrameBoxes, LabelledScan, ReturnLabels
 from calib_core.errors import InputError
-from calib_core.measurements import TimeNs
+from calib_core.measurements import Box, Boxes, FrameBoxes, LabelledScan, ReturnLabels, TimeNs
 from calib_core.recordings import Recording, inspect_recording
 from cocalib.evaluation.boxes import find_boxes, find_labels
 from tests.unit.recordings.box_messages import FIRST_FRAME_NS, recorded

@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calib_core.detections import Box
 from calib_core.errors import InputError
-from calib_core.measurements import NS_PER_S, TimeNs
+from calib_core.measurements import NS_PER_S, Box, TimeNs
 from cocalib.overlay_video import OverlayOptions, encoding, write_overlay
 from cocalib.overlay_video.footer import time_text
 from cocalib.overlay_video.marks import draw_boxes, draw_clicks, draw_returns
