@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib_core import unsolved
 from calib_core.advice.angle_map import learn_angle_map
 from calib_core.advice.next_placement import next_placement
 from calib_core.arrays import Values
+from calib_core.association.array_pairs import checked_pairs
 from calib_core.association.clustering import candidate_at
 from calib_core.association.pairing import pair_clicks
 from calib_core.association.placement_groups import PlacementGroup, click_results, placement_groups
@@ -19,6 +19,7 @@ from calib_core.diagnostics.elevation import flat_radar
 from calib_core.diagnostics.picture import picture_sigma_px
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.errors import InputError
+from calib_core.estimation import unsolved
 from calib_core.estimation.best_fit import BestFit, best_fit, quick_fit
 from calib_core.estimation.covariance import PoseCovariance, pose_covariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
@@ -27,11 +28,10 @@ from calib_core.estimation.leave_one_out import LeaveOneOut, leave_one_out
 from calib_core.estimation.lens_prior import useless_covariance
 from calib_core.estimation.measurement_model import PairMeasurements, pair_measurements
 from calib_core.estimation.pair_results import excluded_pair_results, fit_metrics, used_pair_results
+from calib_core.estimation.plausibility import implausible_input
 from calib_core.estimation.posterior.beyond_the_fit import look_beyond
 from calib_core.measurements import MIN_PAIRS, Pair, RadarScans, ReflectorClick, Unpaired, Unsolvable
 from calib_core.options import CalibrationOptions, Method, checked_options
-from calib_core.pair_checks import checked_pairs
-from calib_core.plausibility import implausible_input
 from calib_core.radar import cartesian_from_polar
 from calib_core.results import Calibration
 

@@ -15,7 +15,7 @@ from calib_core.diagnostics.posterior import agreeing_outliers, pivotal_pair, po
 from calib_core.diagnostics.refined_lens import lens_or_scale, refined_too_far
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.diagnostics.systematic import angle_scale, clicks_off_centre
-from calib_core.plausibility import PIXELS_SUSPECTED, implausible_input
+from calib_core.estimation.plausibility import PIXELS_SUSPECTED, implausible_input
 from calib_core.radar import cartesian_from_polar, direction_cosines
 from calib_core.radar_axes import without_mounting
 from calib_core.results import DataWarning

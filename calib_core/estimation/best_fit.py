@@ -9,10 +9,10 @@ from calib_core.estimation.gnc import GncSolution, associate, solve_gnc
 from calib_core.estimation.initialization import initial_poses
 from calib_core.estimation.measurement_model import PairMeasurements
 from calib_core.estimation.mirror_test import MIRRORED_GAIN, mirror_gain
+from calib_core.estimation.unsolved import degenerate, mirrored, no_pose
 from calib_core.measurements import MIN_PAIRS, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
-from calib_core.unsolved import degenerate, mirrored, no_pose
 
 _STARTS_MEASURED = 3
 _STARTS_FREE = 6

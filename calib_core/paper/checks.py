@@ -12,10 +12,10 @@ import numpy as np
 from calib_core.arrays import Flags, Points2, Points3
 from calib_core.camera import Camera
 from calib_core.estimation.linearization import Linearization, linearize
+from calib_core.estimation.plausibility import implausible_input
 from calib_core.geometry import RigidTransform, skew
 from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
-from calib_core.plausibility import implausible_input
 from calib_core.radar import polar_from_cartesian
 from calib_core.results import DataWarning
 

@@ -14,11 +14,11 @@ from calib_core.arrays import Flags
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.estimation.linearization import linearize
+from calib_core.estimation.plausibility import implausible_input
 from calib_core.geometry import RigidTransform, mounting_rotation
 from calib_core.measurements import Pair, Unpaired
 from calib_core.metrics import metrics_of
 from calib_core.options import CalibrationOptions
-from calib_core.plausibility import implausible_input
 from calib_core.radar import polar_from_cartesian
 from calib_core.results import Calibration, DataWarning, PairResult
 

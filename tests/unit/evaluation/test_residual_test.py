@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from calib_core.calibration import calibrate_pairs
+from calib_core.evaluation.residual_test import residual_test
 from calib_core.measurements import Pair
-from calib_core.residual_test import residual_test
 from calib_core.results import Calibration
 from calib_core.synthetic import simulate_pairs
 
