@@ -5,17 +5,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib_core.advice.angle_map import learn_angle_map
-from calib_core.advice.next_placement import next_placement
 from calib_core.arrays import Values
 from calib_core.association.array_pairs import checked_pairs
 from calib_core.association.clustering import candidate_at
 from calib_core.association.pairing import pair_clicks
 from calib_core.association.placement_groups import PlacementGroup, click_results, placement_groups
 from calib_core.camera import Camera
+from calib_core.diagnostics.angle_map import learn_angle_map
 from calib_core.diagnostics.checks import warnings_of
 from calib_core.diagnostics.clocks import CLOCK_CODES, clocks
 from calib_core.diagnostics.elevation import flat_radar
+from calib_core.diagnostics.next_placement import next_placement
 from calib_core.diagnostics.picture import picture_sigma_px
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.errors import InputError

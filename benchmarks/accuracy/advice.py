@@ -11,8 +11,8 @@ from benchmarks.accuracy.cases import Case, bound_of, draw, options_of
 from benchmarks.accuracy.figures import Measured, at_least, column, fewest, summed_up
 from benchmarks.accuracy.methods import solve_ours
 from benchmarks.accuracy.rows import Figures, Kept, Part, Row, Section
-from calib_core.advice.next_placement import PlacementLimits, next_placement
 from calib_core.calibration import calibrate_pairs
+from calib_core.diagnostics.next_placement import PlacementLimits, next_placement
 from calib_core.measurements import Candidate, Pair
 from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, polar_from_cartesian
 from calib_core.results import Calibration

@@ -1,1 +1,1 @@
-"""Checks of a solved fit: each returns no warnings if all is well, otherwise what is wrong and what to do."""
+"""What an answer is worth: checks of a solved fit, each of which returns no warnings if all is well, and the next placement."""

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from calib_core.advice.coverage import ENOUGH_PLACEMENTS, Coverage, Place
+from calib_core.diagnostics.next_placement import ENOUGH_PLACEMENTS, Coverage, Place
 from calib_core.results import NextPlacement
 from calib_core.verdict import placement_words
 

@@ -11,8 +11,8 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
-from calib_core.advice.coverage import placement_coverage
 from calib_core.camera import Camera
+from calib_core.diagnostics.next_placement import placement_coverage
 from calib_core.errors import CalibrationError
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.recordings import FollowedRecording, Growth

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from calib_core.advice.coverage import Coverage, Place
+from calib_core.diagnostics.next_placement import Coverage, Place
 from calib_core.results import NextPlacement
 from cocalib.view import Pace, advice_words, pace_words
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calib_core.advice.angle_map import learn_angle_map
 from calib_core.arrays import Points3
 from calib_core.calibration import calibrate_pairs
+from calib_core.diagnostics.angle_map import learn_angle_map
 from calib_core.options import CalibrationOptions
 from calib_core.radar import AngleMap, cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration
