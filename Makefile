@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 # Files in their order: the slow ones (accuracy, browser) first, so that no worker is left with one at the end.
 PARALLEL := -n logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 FAST := tests/golden tests/paper tests/properties $(wildcard tests/unit/test_*.py) \
-  $(addprefix tests/unit/,association diagnostics estimation interchange)
+  $(addprefix tests/unit/,association diagnostics estimation interchange results)
 
 .PHONY: help env dev demo test fuzz test-fast test-lowest test-newest check lock bench bench-accuracy paper sample picture clean
 

@@ -43,7 +43,6 @@ if TYPE_CHECKING:
     )
     from calib_core.lens_models.lens_model import LensModel
     from calib_core.measurements import Candidate, Pair, RadarScan, RadarScans, ReflectorClick, Unpaired, Unsolvable
-    from calib_core.metrics import acc, aed, cdsd
     from calib_core.options import (
         CalibrationOptions,
         CameraPositionPrior,
@@ -59,8 +58,9 @@ if TYPE_CHECKING:
     from calib_core.radar import AngleMap, RadarErrors
     from calib_core.recordings import Recording, RecordingOptions, open_recording
     from calib_core.results import Calibration, DataWarning, Metrics, NextPlacement, PairResult
-    from calib_core.systematic_errors import SystematicErrorResult
-    from calib_core.verdict import Verdict, verdict_on
+    from calib_core.results.metrics import acc, aed, cdsd
+    from calib_core.results.shared_errors import SystematicErrorResult
+    from calib_core.results.verdict import Verdict, verdict_on
 
 __all__ = [
     "AgreementLimits",
@@ -152,7 +152,6 @@ _MODULES = {
     ),
     "lens_models.lens_model": ("LensModel",),
     "measurements": ("Candidate", "Pair", "RadarScan", "RadarScans", "ReflectorClick", "Unpaired", "Unsolvable"),
-    "metrics": ("acc", "aed", "cdsd"),
     "options": (
         *("CalibrationOptions", "CameraPositionPrior", "GatingOptions", "LensOptions", "LocatingOptions"),
         *("NoiseOptions", "PaperOptions", "RadarOptions", "ReflectorOptions", "SolvingOptions"),
@@ -160,8 +159,9 @@ _MODULES = {
     "radar": ("AngleMap", "RadarErrors"),
     "recordings": ("Recording", "RecordingOptions", "open_recording"),
     "results": ("Calibration", "DataWarning", "Metrics", "NextPlacement", "PairResult"),
-    "systematic_errors": ("SystematicErrorResult",),
-    "verdict": ("Verdict", "verdict_on"),
+    "results.metrics": ("acc", "aed", "cdsd"),
+    "results.shared_errors": ("SystematicErrorResult",),
+    "results.verdict": ("Verdict", "verdict_on"),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 

@@ -9,7 +9,7 @@ from calib_core.arrays import Values
 from calib_core.association.array_pairs import checked_pairs
 from calib_core.association.clustering import candidate_at
 from calib_core.association.pairing import pair_clicks
-from calib_core.association.placement_groups import PlacementGroup, click_results, placement_groups
+from calib_core.association.placement_groups import PlacementGroup, placement_groups
 from calib_core.camera import Camera
 from calib_core.diagnostics.angle_map import learn_angle_map
 from calib_core.diagnostics.checks import warnings_of
@@ -27,7 +27,7 @@ from calib_core.estimation.influential_pairs import average_over_influential_pai
 from calib_core.estimation.leave_one_out import LeaveOneOut, leave_one_out
 from calib_core.estimation.lens_prior import useless_covariance
 from calib_core.estimation.measurement_model import PairMeasurements, pair_measurements
-from calib_core.estimation.pair_results import excluded_pair_results, fit_metrics, used_pair_results
+from calib_core.estimation.pair_results import click_results, excluded_pair_results, fit_metrics, used_pair_results
 from calib_core.estimation.plausibility import implausible_input
 from calib_core.estimation.posterior.beyond_the_fit import look_beyond
 from calib_core.measurements import MIN_PAIRS, Pair, RadarScans, ReflectorClick, Unpaired, Unsolvable

@@ -3,12 +3,11 @@
 `checked_options` checks the type and range of each, for whoever sets them: a script, the page or the command line.
 """
 
-import dataclasses
 import math
 import numbers
 import typing
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import Field, dataclass, field, fields, is_dataclass, replace
 from functools import cache
 from typing import Any, Literal, TypeAlias
 
@@ -297,7 +296,7 @@ class OptionField:
 
     path: str
     owner: type
-    field: dataclasses.Field[Any]
+    field: Field[Any]
     type: Any
 
 
@@ -382,15 +381,15 @@ def option_fields() -> Mapping[str, OptionField]:
     """Return every option that can be set on its own, by path; a camera position is set as a whole."""
     leaves: dict[str, OptionField] = {}
     top = typing.get_type_hints(CalibrationOptions)
-    for field in dataclasses.fields(CalibrationOptions):
-        group = top[field.name]
-        if not dataclasses.is_dataclass(group):
-            leaves[field.name] = OptionField(field.name, CalibrationOptions, field, group)
+    for top_field in fields(CalibrationOptions):
+        group = top[top_field.name]
+        if not is_dataclass(group):
+            leaves[top_field.name] = OptionField(top_field.name, CalibrationOptions, top_field, group)
             continue
         hints = typing.get_type_hints(group)
-        for option in dataclasses.fields(group):
-            path = f"{field.name}.{option.name}"
-            leaves[path] = OptionField(path, typing.cast(type, group), option, hints[option.name])
+        for one in fields(group):
+            path = f"{top_field.name}.{one.name}"
+            leaves[path] = OptionField(path, typing.cast(type, group), one, hints[one.name])
     return leaves
 
 
@@ -400,7 +399,7 @@ def _ranges() -> Iterator[tuple[str, tuple[float, float]]]:
         if kind_of(leaf) in ("number", "integer"):
             yield leaf.path, (leaf.field.metadata["low"], leaf.field.metadata["high"])
         elif kind_of(leaf) == "camera-position":
-            for part in dataclasses.fields(CameraPositionPrior):
+            for part in fields(CameraPositionPrior):
                 yield f"{leaf.path}.{part.name}", (part.metadata["low"], part.metadata["high"])
 
 

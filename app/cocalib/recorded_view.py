@@ -7,10 +7,9 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from calib_core.arrays import Flags, Indices, Points2, TimesNs, Values, frozen_array
-from calib_core.detections import Box, Boxes
 from calib_core.errors import InputError
 from calib_core.evaluation.figures import Evaluation
-from calib_core.measurements import NS_PER_S, RadarScans, ReflectorClick, TimeNs
+from calib_core.measurements import NS_PER_S, Box, Boxes, RadarScans, ReflectorClick, TimeNs
 from calib_core.recordings import Recording
 from calib_core.results import Calibration, PairResult
 from cocalib.colours import ramp_colours

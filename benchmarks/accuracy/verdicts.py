@@ -19,11 +19,10 @@ from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.radar import cartesian_from_polar
 from calib_core.results import Calibration
-from calib_core.stated_error import stated_error
+from calib_core.results.verdict import VerdictLevel, stated_error, verdict_on
 from calib_core.synthetic import FIELD, PairsLayout, SimulatedPairs, simulate_pairs, simulate_scans
 from calib_core.synthetic.presets import PRESETS, PresetName
 from calib_core.synthetic.simulated_pairs import NoiseName, draw_systematic_errors
-from calib_core.verdict import VerdictLevel, verdict_on
 
 __all__ = ["ROWS", "Verdicts", "measure_recording", "measure_verdict", "section", "share_inside"]
 

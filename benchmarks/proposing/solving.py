@@ -13,7 +13,7 @@ from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
 from calib_core.proposing import Proposal
 from calib_core.results import Calibration
-from calib_core.verdict import verdict_on
+from calib_core.results.verdict import verdict_on
 
 __all__ = ["accepted_clicks", "pose_figures"]
 

@@ -16,7 +16,6 @@ from calib_core.association.clustering import CLUSTER_SCALE
 from calib_core.measurements import NS_PER_S, Candidate, Pair
 from calib_core.options import CalibrationOptions
 from calib_core.radar import covariance_from_sigma_polar, direction_cosines, polar_from_cartesian
-from calib_core.results import Calibration, PairResult
 
 SHARED_SIGMA_PX = 1.0
 """Standard deviation per axis of what all clicks of one placement have in common: the lens, the reflector's look [px]."""
@@ -57,49 +56,9 @@ def placement_groups(pairs: Sequence[Pair], options: CalibrationOptions) -> tupl
     members = linked_clicks(pairs, options)
     if len(members) == len(pairs):
         return tuple(PlacementGroup(pair, (pair,), np.zeros(1, dtype=np.bool_)) for pair in pairs)
-    sigma_px = _click_sigmas(pairs, options)
+    sigma_px = click_sigmas(pairs, options)
     noise = _excess_noise([(_pixels(pairs, rows), sigma_px[rows]) for rows in members if len(rows) > 1])
     return tuple(_group([pairs[i] for i in rows], sigma_px[rows], noise) for rows in members)
-
-
-def click_results(
-    calibration: Calibration, groups: Sequence[PlacementGroup], shown: Sequence[Pair]
-) -> tuple[PairResult, ...]:
-    """Return one result per click: its own pixel and residual, with the return and the weight of its placement.
-
-    Args:
-        calibration: with one result per placement, and those of the excluded clicks.
-        groups: the placements.
-        shown: the pairs of all clicks, in the order wanted.
-    """
-    results = {result.id: result for result in calibration.pairs}
-    for group in groups:
-        if len(group.clicks) > 1:
-            of_pair = results[group.pair.id]
-            for click, off in zip(group.clicks, group.off, strict=True):
-                results[click.id] = _click_result(calibration, of_pair, group.pair, click, off=bool(off))
-    return tuple(results[pair.id] for pair in shown)
-
-
-def _click_result(calibration: Calibration, result: PairResult, pair: Pair, click: Pair, *, off: bool) -> PairResult:
-    steps = _steps(click.candidates) - _steps(pair.candidates)[result.candidate]
-    chosen = int((steps**2).sum(axis=1).argmin())
-    point = click.candidates[chosen].position_radar_m
-    own_px, pair_px = _click_sigmas((click, pair), calibration.options).tolist()
-    more_px2 = max(own_px**2 - pair_px**2, 0.0) * calibration.noise_scale[0] ** 2
-    return replace(
-        result,
-        id=click.id,
-        pixel_px=click.pixel_px,
-        projected_px=calibration.reproject(point[None])[0],
-        point_radar_m=point,
-        inlier=result.inlier and not off,
-        outlier_probability=1.0 if off else result.outlier_probability,
-        candidate=chosen,
-        expected_covariance_px2=result.expected_covariance_px2 + more_px2 * np.eye(2),
-        image_time=click.image_time,
-        measured=click,
-    )
 
 
 def linked_clicks(pairs: Sequence[Pair], options: CalibrationOptions) -> tuple[Indices, ...]:
@@ -123,13 +82,14 @@ def _pixels(pairs: Sequence[Pair], rows: Indices | None = None) -> Points2:
     return np.array([pair.pixel_px for pair in chosen]).reshape(-1, 2)
 
 
-def _click_sigmas(pairs: Sequence[Pair], options: CalibrationOptions) -> Values:
+def click_sigmas(pairs: Sequence[Pair], options: CalibrationOptions) -> Values:
+    """Return the standard deviation (n,) [px] of each click: its own, or the options'."""
     return np.array([options.noise.sigma_px if pair.sigma_px is None else pair.sigma_px for pair in pairs])
 
 
 def _near_pixels(pairs: Sequence[Pair], options: CalibrationOptions) -> tuple[Indices, Indices]:
     """Return the indices of all two clicks whose pixels are within reach; a sweep over the columns finds them."""
-    pixels, reach_px = _pixels(pairs), _REACH * _click_sigmas(pairs, options)
+    pixels, reach_px = _pixels(pairs), _REACH * click_sigmas(pairs, options)
     order = np.argsort(pixels[:, 0], kind="stable")
     pixels, reach_px = pixels[order], reach_px[order]
     found = [np.zeros((0, 2), dtype=np.int64)]
@@ -165,7 +125,7 @@ def _same_placement(pairs: Sequence[Pair], first: Indices, second: Indices, wind
 def _two_reflectors(pairs: Sequence[Pair], first: Indices, second: Indices, options: CalibrationOptions) -> Flags:
     """Return which clicks (k,) are two marks of one frame: whoever sets two marks there sees two reflectors."""
     apart_px = np.linalg.norm(_pixels(pairs)[first] - _pixels(pairs)[second], axis=1)
-    sigma_px = _click_sigmas(pairs, options)
+    sigma_px = click_sigmas(pairs, options)
     in_one_frame = _seconds_apart(pairs, first, second) == 0.0
     return np.asarray(in_one_frame & (apart_px > _ONE_MARK * np.maximum(sigma_px[first], sigma_px[second])))
 
@@ -180,12 +140,13 @@ def _seconds_apart(pairs: Sequence[Pair], first: Indices, second: Indices) -> Va
 
 def _share_return(one: Pair, other: Pair) -> bool:
     """Return whether the best candidate of either pair is a candidate of the other."""
-    a, b = (_steps(pair.candidates) for pair in (one, other))
+    a, b = (steps_of_sigma(pair.candidates) for pair in (one, other))
     nearest = [((places - best) ** 2).sum(axis=1).min() for places, best in ((a, b[0]), (b, a[0]))]
     return bool(min(nearest) <= _SAME_RETURN**2)
 
 
-def _steps(candidates: Sequence[Candidate]) -> Points3:
+def steps_of_sigma(candidates: Sequence[Candidate]) -> Points3:
+    """Return the radar positions of candidates (n, 3) in steps of the scale of a cluster: range and direction cosines."""
     return direction_cosines(np.array([one.position_radar_m for one in candidates])) / CLUSTER_SCALE
 
 
@@ -238,8 +199,8 @@ def _pooled_candidates(clicks: Sequence[Pair]) -> tuple[Candidate, ...]:
         return clicks[0].candidates
     kept: list[list[Candidate]] = []
     for click in _numbered_apart(clicks):
-        known = _steps([group[0] for group in kept]) if kept else np.zeros((0, 3))
-        for one, place in zip(click.candidates, _steps(click.candidates), strict=True):
+        known = steps_of_sigma([group[0] for group in kept]) if kept else np.zeros((0, 3))
+        for one, place in zip(click.candidates, steps_of_sigma(click.candidates), strict=True):
             apart = ((known - place) ** 2).sum(axis=1)
             if len(apart) and apart.min() <= _SAME_RETURN**2:
                 kept[int(apart.argmin())].append(one)

@@ -12,9 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib_core.arrays import TimesNs
-from calib_core.detections import Box, Boxes, FrameBoxes
 from calib_core.errors import InputError, MessageError
-from calib_core.measurements import TimeNs
+from calib_core.measurements import Box, Boxes, FrameBoxes, TimeNs
 
 MOVING = "moving"
 """The label of every box, and the word for --boxes."""

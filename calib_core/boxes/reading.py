@@ -18,11 +18,10 @@ import numpy as np
 from calib_core.arrays import Indices, TimesNs
 from calib_core.boxes.formats.box_format import BoxFile, FileBoxes, FileFrame
 from calib_core.boxes.formats.registry import BOX_FORMATS
-from calib_core.detections import Box, Boxes, FrameBoxes
 from calib_core.errors import InputError
 from calib_core.input_files import file_text, name_text, read_input
 from calib_core.interchange.syntax.strict_json import json_value
-from calib_core.measurements import TimeNs
+from calib_core.measurements import Box, Boxes, FrameBoxes, TimeNs
 from calib_core.recordings.box_topics import frames_of_stamps
 from calib_core.recordings.plain_files.file_stamps import times_in_names
 

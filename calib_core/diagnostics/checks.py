@@ -17,8 +17,8 @@ from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.diagnostics.systematic import angle_scale, clicks_off_centre
 from calib_core.estimation.plausibility import PIXELS_SUSPECTED, implausible_input
 from calib_core.radar import cartesian_from_polar, direction_cosines
-from calib_core.radar_axes import without_mounting
 from calib_core.results import DataWarning
+from calib_core.results.radar_axes import without_mounting
 
 _NARROW_CONDITION = 5e5
 _WEAK_ROTATION_RAD = np.deg2rad(2.5)

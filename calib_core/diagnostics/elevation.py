@@ -6,8 +6,8 @@ from calib_core.diagnostics.picture import picture_sigma_px
 from calib_core.estimation.covariance import PoseCovariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.options import RadarOptions
-from calib_core.radar_axes import sigma_in_radar_axes, without_mounting
 from calib_core.results import DataWarning
+from calib_core.results.radar_axes import sigma_in_radar_axes, without_mounting
 
 
 def flat_radar(refined: ErrorsInVariablesFit, uncertainty: PoseCovariance, radar: RadarOptions) -> list[DataWarning]:

@@ -1,6 +1,7 @@
 """Next placement: where a further pair would reduce the pose's uncertainty most, and when to stop.
 
-Before any pose it is the radar alone that tells where placements are missing: `coverage` divides its field into bearings and ranges.
+Before any pose it is the radar alone that tells where placements are missing: its field is divided into bearings and
+ranges.
 """
 
 from collections import Counter

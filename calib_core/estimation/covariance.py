@@ -13,8 +13,8 @@ from calib_core.estimation.lens_prior import LensPrior, shared_out
 from calib_core.estimation.prior_rows import prior_rows
 from calib_core.estimation.systematic_errors import SystematicErrors
 from calib_core.options import RadarOptions
-from calib_core.radar_axes import mounting_moves
-from calib_core.systematic_errors import SystematicErrorResult
+from calib_core.results.radar_axes import mounting_moves
+from calib_core.results.shared_errors import SystematicErrorResult
 
 _LEAST_SHARE = 0.25  # of the plain information that must remain after the correction for uncertain weights
 _CHI2_95_6 = 12.591587243743977

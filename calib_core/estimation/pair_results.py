@@ -1,10 +1,11 @@
-"""Pair results: the residual and influence of each pair under a fit, and the metrics over the inliers."""
+"""Pair results: the residual and influence of each pair and click under a fit, and the metrics over the inliers."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from calib_core.association.placement_groups import PlacementGroup, click_sigmas, steps_of_sigma
 from calib_core.camera import Camera
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.gnc import associate
@@ -12,10 +13,10 @@ from calib_core.estimation.leave_one_out import LeaveOneOut
 from calib_core.estimation.linearization import Linearization
 from calib_core.estimation.measurement_model import PairMeasurements, pair_measurements
 from calib_core.measurements import Pair
-from calib_core.metrics import distances, metrics_of
 from calib_core.options import CalibrationOptions
 from calib_core.radar import cartesian_from_polar
-from calib_core.results import Metrics, PairResult
+from calib_core.results import Calibration, Metrics, PairResult
+from calib_core.results.metrics import distances, metrics_of
 
 
 def fit_metrics(measurements: PairMeasurements, refined: ErrorsInVariablesFit, left_out: LeaveOneOut) -> Metrics:
@@ -103,3 +104,43 @@ def excluded_pair_results(
             measured=pair,
         )
     return results
+
+
+def click_results(
+    calibration: Calibration, groups: Sequence[PlacementGroup], shown: Sequence[Pair]
+) -> tuple[PairResult, ...]:
+    """Return one result per click: its own pixel and residual, with the return and the weight of its placement.
+
+    Args:
+        calibration: with one result per placement, and those of the excluded clicks.
+        groups: the placements.
+        shown: the pairs of all clicks, in the order wanted.
+    """
+    results = {result.id: result for result in calibration.pairs}
+    for group in groups:
+        if len(group.clicks) > 1:
+            of_pair = results[group.pair.id]
+            for click, off in zip(group.clicks, group.off, strict=True):
+                results[click.id] = _click_result(calibration, of_pair, group.pair, click, off=bool(off))
+    return tuple(results[pair.id] for pair in shown)
+
+
+def _click_result(calibration: Calibration, result: PairResult, pair: Pair, click: Pair, *, off: bool) -> PairResult:
+    steps = steps_of_sigma(click.candidates) - steps_of_sigma(pair.candidates)[result.candidate]
+    chosen = int((steps**2).sum(axis=1).argmin())
+    point = click.candidates[chosen].position_radar_m
+    own_px, pair_px = click_sigmas((click, pair), calibration.options).tolist()
+    more_px2 = max(own_px**2 - pair_px**2, 0.0) * calibration.noise_scale[0] ** 2
+    return replace(
+        result,
+        id=click.id,
+        pixel_px=click.pixel_px,
+        projected_px=calibration.reproject(point[None])[0],
+        point_radar_m=point,
+        inlier=result.inlier and not off,
+        outlier_probability=1.0 if off else result.outlier_probability,
+        candidate=chosen,
+        expected_covariance_px2=result.expected_covariance_px2 + more_px2 * np.eye(2),
+        image_time=click.image_time,
+        measured=click,
+    )

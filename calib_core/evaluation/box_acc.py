@@ -7,7 +7,6 @@ import numpy as np
 
 from calib_core.arrays import Flags, Indices, Points2, Points3, TimesNs, Values, Vector3
 from calib_core.camera import Camera
-from calib_core.detections import Boxes, ReturnLabels
 from calib_core.evaluation.counted_returns import CountedReturns, counted_returns
 from calib_core.evaluation.figures import (
     Axis,
@@ -22,7 +21,7 @@ from calib_core.evaluation.figures import (
 from calib_core.evaluation.moving_returns import TargetOptions
 from calib_core.evaluation.target_tracking import TargetTrack, moving_targets
 from calib_core.geometry import RigidTransform, rotation_exp
-from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
+from calib_core.measurements import NS_PER_S, Boxes, RadarScans, ReturnLabels, TimeNs
 from calib_core.radar import RadarErrors
 
 ANGLES_DEG = (-1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0)

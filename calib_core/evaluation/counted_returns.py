@@ -7,12 +7,11 @@ import numpy as np
 
 from calib_core.arrays import Indices, Points3, TimesNs, frozen_array
 from calib_core.camera import Camera
-from calib_core.detections import Boxes, ReturnLabels
 from calib_core.errors import InputError
 from calib_core.evaluation.matching import Bearings, box_table, match_by_bearing, match_by_name
 from calib_core.evaluation.sightings import labelled_sightings, tracked_sightings
 from calib_core.evaluation.target_tracking import TargetTrack
-from calib_core.measurements import NS_PER_S, RadarScans
+from calib_core.measurements import NS_PER_S, Boxes, RadarScans, ReturnLabels
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -15,8 +15,8 @@ import numpy as np
 
 from calib_core.arrays import Flags, Indices, TimesNs, Values, frozen_array
 from calib_core.camera import Camera
-from calib_core.detections import Box, Boxes
 from calib_core.evaluation.sightings import Sightings
+from calib_core.measurements import Box, Boxes
 
 _LONGEST_STEP = 0.8  # widths or heights from where a box is expected, for a box of the same object
 _LONGEST_GAP = 3  # frames that an object may be missed in

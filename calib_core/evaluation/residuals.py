@@ -14,12 +14,12 @@ from calib_core.association.placement_groups import linked_clicks
 from calib_core.calibration import preview_pairs
 from calib_core.camera import Camera
 from calib_core.evaluation.figures import HeldOut, ResidualFigures, spreads
+from calib_core.evaluation.residual_test import residual_test
 from calib_core.measurements import MIN_PAIRS, Pair, Unpaired
-from calib_core.metrics import aed, metrics_of
 from calib_core.options import CalibrationOptions
 from calib_core.radar import polar_from_cartesian
-from calib_core.residual_test import residual_test
 from calib_core.results import Calibration
+from calib_core.results.metrics import aed, metrics_of
 
 _FOLDS = 5
 _CHOSEN = "the return of each click was chosen by a person, or is the only one"

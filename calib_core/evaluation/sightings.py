@@ -6,10 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.arrays import Flags, Indices, Points3, TimesNs, Values, frozen_array
-from calib_core.detections import ReturnLabels
 from calib_core.errors import InputError
 from calib_core.evaluation.target_tracking import TargetTrack
-from calib_core.measurements import NS_PER_S, RadarScans
+from calib_core.measurements import NS_PER_S, RadarScans, ReturnLabels
 
 
 @dataclass(frozen=True, slots=True, eq=False)

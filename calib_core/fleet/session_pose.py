@@ -12,8 +12,8 @@ from calib_core.geometry import RigidTransform
 from calib_core.measurements import TimeNs
 from calib_core.options import CameraPositionPrior
 from calib_core.results import Calibration
-from calib_core.stated_error import degrees_of_freedom
-from calib_core.systematic_errors import SystematicErrorResult
+from calib_core.results.shared_errors import SystematicErrorResult
+from calib_core.results.verdict import degrees_of_freedom
 
 CHI2_95 = 12.591587243743977
 """The 95 % quantile of chi2 with 6 degrees of freedom: the quantile of a covariance whose noise level is known."""

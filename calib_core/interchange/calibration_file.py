@@ -8,7 +8,7 @@ from calib_core.errors import InputError
 from calib_core.interchange.evidence import Evidence
 from calib_core.interchange.vehicle_note import VehicleNote
 from calib_core.results import Calibration, CheckPoint, InputFile, PairResult, UnconfirmedClicks
-from calib_core.verdict import Verdict
+from calib_core.results.verdict import Verdict
 
 EQUATION = "p_camera = R p_radar + t"
 _OPTICAL_ENDINGS = ("_optical_frame", "_optical_link", "_optical")

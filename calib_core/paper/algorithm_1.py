@@ -23,11 +23,11 @@ from calib_core.measurements import (
     Unpaired,
     Unsolvable,
 )
-from calib_core.metrics import aed, distances, metrics_of
 from calib_core.options import CalibrationOptions, PaperOptions
 from calib_core.paper.checks import unused_choices, warnings_as_printed
 from calib_core.paper.pnp import PnPSolver, refine_lm, solve_pnp_ransac, spans_a_plane
 from calib_core.results import Calibration, PairResult
+from calib_core.results.metrics import aed, distances, metrics_of
 
 _ROUNDING = 1e-9  # the z-scores of two returns are exactly 1, up to rounding
 

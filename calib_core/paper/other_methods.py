@@ -17,10 +17,10 @@ from calib_core.estimation.linearization import linearize
 from calib_core.estimation.plausibility import implausible_input
 from calib_core.geometry import RigidTransform, mounting_rotation
 from calib_core.measurements import Pair, Unpaired
-from calib_core.metrics import metrics_of
 from calib_core.options import CalibrationOptions
 from calib_core.radar import polar_from_cartesian
 from calib_core.results import Calibration, DataWarning, PairResult
+from calib_core.results.metrics import metrics_of
 
 _EXPLAINED = 11.83  # chi2 of 2 degrees of freedom that noise exceeds in 0.27 % of the pairs
 

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from calib_core.arrays import Indices, TimesNs
-from calib_core.detections import Box, Boxes, FrameBoxes
 from calib_core.errors import InputError, MessageError, RecordingError
-from calib_core.measurements import NS_PER_S, TimeNs, time_from_parts
+from calib_core.measurements import NS_PER_S, Box, Boxes, FrameBoxes, TimeNs, time_from_parts
 from calib_core.recordings.messages.decoding import Message, decode
 from calib_core.recordings.messages.definitions import PRIMITIVES, Definition, Field
 from calib_core.recordings.topics import Topic

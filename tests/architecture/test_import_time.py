@@ -41,7 +41,7 @@ def test_a_verdict_needs_no_optimizer_of_scipy() -> None:
     """`scipy.optimize` is a third of a second of every `cocalib solve`, and of the first answer on the page."""
     code = (
         "import sys\nfrom dataclasses import replace\nimport numpy as np\n"
-        "from calib_core.calibration import calibrate_pairs\nfrom calib_core.stated_error import stated_error\n"
+        "from calib_core.calibration import calibrate_pairs\nfrom calib_core.results.verdict import stated_error\n"
         "from calib_core.synthetic import simulate_pairs\n"
         "drawn = simulate_pairs(8, rng=np.random.default_rng(1))\n"
         "answer = calibrate_pairs(drawn.pairs, drawn.camera).unwrap()\n"

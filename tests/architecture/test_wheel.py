@@ -100,7 +100,7 @@ def test_a_foreign_package_called_app_is_left_alone(wheel: Path, tmp_path: Path)
     subprocess.run([*pip, "install", "--quiet", "--no-index", "--no-deps", wheel], check=True)
     code = "import app, cocalib as cc; print(app.WHOSE, cc.aed.__module__, cc.__file__)"
     said = subprocess.run([python, "-c", code], cwd=tmp_path, check=True, capture_output=True, text=True).stdout
-    assert said.startswith("another program calib_core.metrics ")
+    assert said.startswith("another program calib_core.results.metrics ")
     assert str(site) in said
     assert subprocess.run([tmp_path / "bin" / "cocalib", "--version"], capture_output=True).returncode == 0
     subprocess.run([*pip, "uninstall", "--quiet", "--yes", "cocalib"], check=True)

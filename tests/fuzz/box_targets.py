@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from calib_core.boxes import boxes_text, labels_text, read_boxes, read_labels
-from calib_core.detections import Box, Boxes, FrameBoxes, LabelledScan, ReturnLabels
-from calib_core.measurements import TimeNs
+from calib_core.measurements import Box, Boxes, FrameBoxes, LabelledScan, ReturnLabels, TimeNs
 from calib_core.recordings.box_topics import box_layout, frames_in_message
 from calib_core.recordings.messages.decoding import decode
 from calib_core.recordings.messages.definitions import parse_definition

@@ -18,7 +18,6 @@ from calib_core.measurements import (
     Unpaired,
     Unsolvable,
 )
-from calib_core.metrics import aed, cdsd, distances
 from calib_core.options import CalibrationOptions, LocatingOptions, PaperOptions
 from calib_core.paper.algorithm_1 import (
     ScoredPose,
@@ -38,6 +37,7 @@ from calib_core.paper.algorithm_1 import (
 )
 from calib_core.paper.pnp import project_points, refine_lm, solve_pnp_ransac
 from calib_core.results import Calibration
+from calib_core.results.metrics import aed, cdsd, distances
 from calib_core.synthetic import FIELD, SimulatedPairs, simulate_pairs
 from calib_core.synthetic.simulated_pairs import study_camera
 

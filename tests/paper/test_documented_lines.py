@@ -4,9 +4,9 @@ import re
 from pathlib import Path
 
 import calib_core.geometry
-import calib_core.metrics
 import calib_core.paper.algorithm_1
 import calib_core.radar
+import calib_core.results.metrics
 from calib_core.results import Calibration
 
 _ROW = re.compile(r"\| `(\w+)` \| `(test_\w+)` \|$", re.MULTILINE)
@@ -15,7 +15,13 @@ _ROW = re.compile(r"\| `(\w+)` \| `(test_\w+)` \|$", re.MULTILINE)
 def test_every_function_and_test_in_the_table_exists(project_root: Path) -> None:
     rows = _ROW.findall((project_root / "docs" / "paper.md").read_text(encoding="utf-8"))
     tests = "".join(path.read_text(encoding="utf-8") for path in (project_root / "tests" / "paper").glob("test_*.py"))
-    homes = (calib_core.paper.algorithm_1, calib_core.metrics, calib_core.geometry, calib_core.radar, Calibration)
+    homes = (
+        calib_core.paper.algorithm_1,
+        calib_core.results.metrics,
+        calib_core.geometry,
+        calib_core.radar,
+        Calibration,
+    )
     assert len(rows) == 10 + 6
     assert [function for function, _ in rows if not any(hasattr(home, function) for home in homes)] == []
     assert [test for _, test in rows if f"def {test}(" not in tests] == []

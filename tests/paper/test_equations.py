@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, euler_from_rotation, rotation_exp, rotation_from_euler
-from calib_core.metrics import acc, aed, cdsd, distances, inside_boxes
 from calib_core.radar import cartesian_from_polar
+from calib_core.results.metrics import acc, aed, cdsd, distances, inside_boxes
 
 # Printed by the authors with their result: camera matrix, distortion, rotation vector, translation.
 PUBLISHED_CAMERA = Camera(

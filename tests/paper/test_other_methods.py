@@ -11,12 +11,12 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.geometry import mounting_rotation
 from calib_core.measurements import Candidate, Pair
-from calib_core.metrics import aed, cdsd
 from calib_core.options import CalibrationOptions, CameraPositionPrior, MountingOptions, SolvingOptions
 from calib_core.paper.other_methods import calibrate_by_mounting, swapped
 from calib_core.results import Calibration
+from calib_core.results.metrics import aed, cdsd
+from calib_core.results.verdict import verdict_on
 from calib_core.synthetic import random_rig, simulate_pairs, typical_camera
-from calib_core.verdict import verdict_on
 
 CAMERA = Camera("pinhole", 1280, 720, np.array([[800.0, 0.0, 640.0], [0.0, 800.0, 360.0], [0.0, 0.0, 1.0]]))
 TAPE = SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.1)))

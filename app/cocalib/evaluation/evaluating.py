@@ -9,7 +9,6 @@ import numpy as np
 from calib_core.arrays import TimesNs
 from calib_core.association.pairing import RadarSource, pair_clicks, scans_around
 from calib_core.camera import Camera
-from calib_core.detections import Boxes, ReturnLabels
 from calib_core.errors import InputError
 from calib_core.evaluation import (
     AssociatedPairs,
@@ -23,7 +22,7 @@ from calib_core.evaluation import (
     residual_figures,
 )
 from calib_core.evaluation.counted_returns import longest_gap_s
-from calib_core.measurements import NS_PER_S, RadarScans, ReflectorClick, TimeNs, Unpaired
+from calib_core.measurements import NS_PER_S, Boxes, RadarScans, ReflectorClick, ReturnLabels, TimeNs, Unpaired
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, DataWarning
 

@@ -9,8 +9,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from calib_core.detections import Box, Boxes, FrameBoxes
-from calib_core.measurements import TimeNs
+from calib_core.measurements import Box, Boxes, FrameBoxes, TimeNs
 from cocalib.session.box_tracks import BoxEdges, BoxKeyframe, BoxTrack
 from cocalib.session.events import BoxesLoaded
 from cocalib.session.state import RecordingFacts, Session

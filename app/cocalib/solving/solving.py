@@ -27,8 +27,7 @@ from calib_core.interchange import (
 )
 from calib_core.interchange import calibration_text as interchange_text
 from calib_core.measurements import Candidate, Pair, ReflectorClick, Unsolvable
-from calib_core.option_checks import checked_options
-from calib_core.options import CalibrationOptions
+from calib_core.options import CalibrationOptions, checked_options
 from calib_core.recordings import Recording, about_assumptions
 from calib_core.results import Calibration, InputFile, PairResult, UnconfirmedClicks
 from cocalib.platform.resources import version

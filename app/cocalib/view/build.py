@@ -4,10 +4,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from calib_core.association.placements import Placement
-from calib_core.diagnostics.consequence import by_consequence
 from calib_core.measurements import MIN_PAIRS, Stamp, Unpaired, Unsolvable
 from calib_core.results import Calibration, DataWarning
-from calib_core.verdict import Verdict, verdict_on
+from calib_core.results.verdict import Verdict, by_consequence, verdict_on
 from cocalib.session import History, RecordingFacts, Session
 from cocalib.session.boxes_in_frames import CarriedTrack, carried_tracks
 from cocalib.view.box_rows import box_rows, known_labels

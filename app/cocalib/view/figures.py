@@ -6,8 +6,8 @@ import numpy as np
 
 from calib_core.arrays import Matrix33, Vector3, frozen_array
 from calib_core.geometry import skew
-from calib_core.radar_axes import sigma_in_radar_axes
 from calib_core.results import Calibration
+from calib_core.results.radar_axes import sigma_in_radar_axes
 from cocalib.view.model import Figure
 from cocalib.view.reprojections import reprojections
 from cocalib.view.wording import plain, sentence, with_sigma

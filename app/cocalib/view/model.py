@@ -9,7 +9,7 @@ from calib_core.evaluation.figures import Axis
 from calib_core.measurements import Mark, Stamp
 from calib_core.options import CalibrationOptions, Method
 from calib_core.results import DataWarning
-from calib_core.verdict import VerdictLevel
+from calib_core.results.verdict import VerdictLevel
 
 Level: TypeAlias = Literal["plain", "good", "warning"]
 

@@ -6,10 +6,9 @@ from typing import Literal
 import numpy as np
 
 from calib_core.association.placements import Placement
-from calib_core.diagnostics.consequence import by_consequence
 from calib_core.measurements import Unsolvable
 from calib_core.results import Calibration, NextPlacement
-from calib_core.verdict import ALL_CLICKED, DONE, Verdict, placement_words, verdict_on
+from calib_core.results.verdict import ALL_CLICKED, DONE, Verdict, by_consequence, placement_words, verdict_on
 from cocalib.session import RecordingFacts, Session
 from cocalib.view.model import Advice, VerdictRow
 from cocalib.view.wording import sentence

@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 from typing import Any
 from xml.etree.ElementTree import Element
 
-from calib_core.detections import Box
 from calib_core.errors import InputError
-from calib_core.measurements import TimeNs
+from calib_core.measurements import Box, TimeNs
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,8 +14,8 @@ from calib_core.boxes.formats.box_format import (
     score_of,
     whole_number,
 )
-from calib_core.detections import Box
 from calib_core.errors import InputError
+from calib_core.measurements import Box
 
 _TRACK_KEYS = ("track_id", "instance_id", "tracking_id")
 

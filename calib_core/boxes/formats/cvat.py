@@ -16,8 +16,8 @@ from calib_core.boxes.formats.box_format import (
     rotated_box,
     whole_number,
 )
-from calib_core.detections import Box
 from calib_core.errors import InputError
+from calib_core.measurements import Box
 
 _EDGES = ("xtl", "ytl", "xbr", "ybr")
 _OTHER_SHAPES = ("polygon", "polyline", "points", "cuboid", "mask", "ellipse", "skeleton")

@@ -15,8 +15,8 @@ from calib_core.boxes.formats.box_format import (
     score_of,
     whole_number,
 )
-from calib_core.detections import Box
 from calib_core.errors import InputError
+from calib_core.measurements import Box
 
 _OBJECT_COLUMNS = (15, 16)  # the last, of results, is the score
 _TRACK_COLUMNS = (17, 18)

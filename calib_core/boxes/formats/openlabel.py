@@ -13,9 +13,8 @@ from calib_core.boxes.formats.box_format import (
     rotated_box,
     whole_number,
 )
-from calib_core.detections import Box
 from calib_core.errors import InputError, RecordingError
-from calib_core.measurements import TimeNs
+from calib_core.measurements import Box, TimeNs
 from calib_core.recordings.time.written_times import read_time
 
 

@@ -6,7 +6,6 @@ from typing import Any
 import msgspec
 
 from calib_core.boxes.formats.box_format import BoxFile, BoxFormat, FileBoxes, FileFrame
-from calib_core.detections import Box, Boxes, FrameBoxes, LabelledScan, ReturnLabels
 from calib_core.errors import InputError
 from calib_core.interchange.own.detection_documents import (
     BOXES_SCHEMA,
@@ -20,7 +19,16 @@ from calib_core.interchange.own.detection_documents import (
 from calib_core.interchange.own.documents import TimeDocument
 from calib_core.interchange.syntax.json_text import json_text
 from calib_core.interchange.syntax.strict_json import checked, parse_document
-from calib_core.measurements import TimeNs, time_from_parts, time_parts
+from calib_core.measurements import (
+    Box,
+    Boxes,
+    FrameBoxes,
+    LabelledScan,
+    ReturnLabels,
+    TimeNs,
+    time_from_parts,
+    time_parts,
+)
 
 
 def _recognizes(file: BoxFile) -> bool:

@@ -13,9 +13,9 @@ from calib_core.boxes.formats.box_format import (
     finite_number,
     score_of,
 )
-from calib_core.detections import Box
 from calib_core.errors import InputError
 from calib_core.interchange.syntax.yaml_text import load_yaml_documents
+from calib_core.measurements import Box
 
 _LISTS = frozenset({"classes.txt", "labels.txt", "predefined_classes.txt", "train.txt", "val.txt", "test.txt"})
 _NAMES = ("classes.txt", "predefined_classes.txt", "labels.txt")

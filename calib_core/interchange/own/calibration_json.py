@@ -47,7 +47,7 @@ from calib_core.interchange.vehicle_note import VehicleNote
 from calib_core.measurements import ReflectorClick, Unpaired
 from calib_core.radar import RadarErrors
 from calib_core.results import Calibration, CheckPoint, DataWarning, Metrics
-from calib_core.verdict import Verdict, verdict_on
+from calib_core.results.verdict import Verdict, verdict_on
 
 _ABOUT_PRIOR = ("fleet-prior-untested", "fleet-prior-decides", "far-from-its-kind")
 COVARIANCE_CONVENTION = (

@@ -15,7 +15,7 @@ from calib_core.interchange.evidence import Evidence
 from calib_core.interchange.vehicle_note import MOST_CHARACTERS
 from calib_core.measurements import Mark
 from calib_core.options import RETIRED_METHODS, CalibrationOptions
-from calib_core.verdict import VerdictLevel
+from calib_core.results.verdict import VerdictLevel
 
 CLICKS_SCHEMA: Final = "cocalib/clicks-1"
 PAIRS_SCHEMA: Final = "cocalib/pairs-1"

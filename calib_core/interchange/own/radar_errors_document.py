@@ -3,7 +3,7 @@
 from calib_core.interchange.own.documents import RadarErrorsDocument, SystematicErrorDocument
 from calib_core.interchange.own.numbers import finite_or_none
 from calib_core.radar import RadarErrors
-from calib_core.systematic_errors import SystematicErrorResult
+from calib_core.results.shared_errors import SystematicErrorResult
 
 
 def radar_errors_document(errors: RadarErrors) -> RadarErrorsDocument:

@@ -8,9 +8,8 @@ from hypothesis import strategies as st
 
 from calib_core.boxes import boxes_text, labels_text, read_labels
 from calib_core.boxes.formats.own import own_boxes
-from calib_core.detections import Box, Boxes, FrameBoxes, LabelledScan, ReturnLabels
 from calib_core.errors import InputError
-from calib_core.measurements import TimeNs
+from calib_core.measurements import Box, Boxes, FrameBoxes, LabelledScan, ReturnLabels, TimeNs
 
 TIMES = st.integers(0, 4_000_000_000_000_000_000).map(TimeNs)
 EDGES = st.floats(-1e6, 1e6)

@@ -3,10 +3,9 @@
 import numpy as np
 
 from calib_core.camera import Camera
-from calib_core.detections import Box, Boxes, FrameBoxes
 from calib_core.evaluation.matching import box_table, match_by_bearing
 from calib_core.evaluation.sightings import Sightings
-from calib_core.measurements import NS_PER_S, TimeNs
+from calib_core.measurements import NS_PER_S, Box, Boxes, FrameBoxes, TimeNs
 
 CAMERA = Camera("pinhole", 1000, 600, np.array([[800.0, 0.0, 499.5], [0.0, 800.0, 299.5], [0.0, 0.0, 1.0]]))
 FRAMES = 40

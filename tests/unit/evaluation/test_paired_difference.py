@@ -7,7 +7,7 @@ import pytest
 
 from calib_core.evaluation import acc_difference, box_figures, moving_targets, residual_difference
 from calib_core.evaluation.figures import ResidualFigures
-from calib_core.metrics import metrics_of
+from calib_core.results.metrics import metrics_of
 from tests.street import CAMERA, TRUE_POSE, street, turned
 
 

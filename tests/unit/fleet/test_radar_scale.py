@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.fleet.simulated_poses import NOMINAL
 from calib_core.fleet import SessionPose, radar_scales
-from calib_core.systematic_errors import SystematicErrorResult
+from calib_core.results.shared_errors import SystematicErrorResult
 
 PRIOR = 0.02
 

@@ -25,8 +25,8 @@ from calib_core.measurements import time_from_parts
 from calib_core.options import CalibrationOptions
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration
+from calib_core.results.verdict import verdict_on
 from calib_core.synthetic import NoiseProfile, simulate_pairs
-from calib_core.verdict import verdict_on
 
 
 @pytest.fixture

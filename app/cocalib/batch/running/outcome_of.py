@@ -5,7 +5,7 @@ from msgspec.structs import replace
 
 from calib_core.arrays import Matrix66
 from calib_core.measurements import Unsolvable
-from calib_core.verdict import verdict_on
+from calib_core.results.verdict import verdict_on
 from cocalib.batch.job import Job
 from cocalib.batch.outcome import OUTCOME_SCHEMA, Outcome, Status
 from cocalib.batch.running.attempting import Failure

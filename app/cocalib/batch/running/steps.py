@@ -6,7 +6,7 @@ from typing import TypeVar
 
 from calib_core.measurements import Unsolvable
 from calib_core.recordings import Recording, open_recording
-from calib_core.verdict import verdict_on
+from calib_core.results.verdict import verdict_on
 from cocalib.batch.manifest import ManifestRow
 from cocalib.batch.outcome import StepState
 from cocalib.batch.running.attempting import Failure, attempted

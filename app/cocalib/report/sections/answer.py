@@ -4,7 +4,7 @@ import numpy as np
 
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 from calib_core.results import Calibration
-from calib_core.verdict import Verdict, verdict_on
+from calib_core.results.verdict import Verdict, verdict_on
 from cocalib.report.markup import Child, Markup, tag
 from cocalib.report.plots import drawing, rounded_step, text
 from cocalib.report.subject import ReportSubject
@@ -170,7 +170,7 @@ _ANGLES = ("roll", "pitch", "yaw")
 
 def _sigmas(mounting: Mounting, calibration: Calibration) -> dict[str, float]:
     """Return standard deviations by key, in centimetres and degrees; of a radar without elevation those that pairs determine."""
-    from calib_core.radar_axes import sigma_in_radar_axes
+    from calib_core.results.radar_axes import sigma_in_radar_axes
 
     places, angles = mounting.position_sigma_m.tolist(), mounting.roll_pitch_yaw_sigma_rad.tolist()
     if not calibration.sees_elevation:

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 
-from calib_core.diagnostics.consequence import by_consequence, consequence_of
 from calib_core.results import DataWarning
+from calib_core.results.verdict import by_consequence, consequence_of
 from cocalib.report.markup import Markup, tag
 from cocalib.report.subject import ReportSubject
 from cocalib.view.wording import sentence

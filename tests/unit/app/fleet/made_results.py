@@ -13,8 +13,8 @@ import numpy as np
 from calib_core.calibration import calibrate_pairs
 from calib_core.interchange import calibration_text
 from calib_core.results import Calibration
+from calib_core.results.verdict import verdict_on
 from calib_core.synthetic.simulated_pairs import simulate_pairs
-from calib_core.verdict import verdict_on
 from cocalib.batch.outcome import OUTCOME_SCHEMA, Outcome, OutcomeFile, OutcomeRun, outcome_text
 from cocalib.batch.results_folder import OUTCOME_FILE, ResultsFolder
 

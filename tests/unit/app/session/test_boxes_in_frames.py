@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from calib_core.boxes import boxes_text
-from calib_core.detections import Box, Boxes, FrameBoxes
 from calib_core.errors import InputError
-from calib_core.measurements import TimeNs
+from calib_core.measurements import Box, Boxes, FrameBoxes, TimeNs
 from cocalib.session import BoxEdges, BoxKeyframe, BoxTrack, RecordingFacts, Session, apply
 from cocalib.session.boxes_in_frames import (
     MOST_FRAMES,

@@ -6,8 +6,8 @@ import pytest
 from calib_core.calibration import calibrate_pairs
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
+from calib_core.results.verdict import verdict_on
 from calib_core.synthetic import simulate_pairs
-from calib_core.verdict import verdict_on
 from cocalib.view.model import Advice
 from cocalib.view.verdict_row import advice_for
 

@@ -8,7 +8,7 @@ import pytest
 from calib_core.association.placements import Placement
 from calib_core.measurements import ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions, NoiseOptions
-from calib_core.verdict import DONE, Verdict
+from calib_core.results.verdict import DONE, Verdict
 from cocalib.session import ClickPlaced, History, PlacementDismissed, RecordingFacts, Session, advance
 from cocalib.view.click_rows import disagreement
 from cocalib.view.verdict_row import placements_left, verdict_row

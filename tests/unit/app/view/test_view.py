@@ -13,8 +13,8 @@ from calib_core.measurements import Stamp, TimeNs, Unpaired, Unsolvable
 from calib_core.options import CalibrationOptions, NoiseOptions
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration, DataWarning, Metrics, PairResult
+from calib_core.results.verdict import verdict_on
 from calib_core.synthetic import NoiseProfile, simulate_pairs
-from calib_core.verdict import verdict_on
 from cocalib.session import ClickExcluded, ClickMoved, ClickPlaced, History, RecordingFacts, Solved, Undo, advance
 from cocalib.view import View, summary_lines, view
 from cocalib.view.figures import OPTICAL_FROM_BODY, mounting_of, pose_figures

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from calib_core.metrics import acc, aed, cdsd, distances, inside_boxes, metrics_of, rms
+from calib_core.results.metrics import acc, aed, cdsd, distances, inside_boxes, metrics_of, rms
 
 LENGTHS = np.array([1.0, 2.0, 6.0])
 

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from calib_core.arrays import Flags, Points2, Values
-from calib_core.results import Metrics
+from calib_core.results.calibration import Metrics
 
 ZeroFrames = Literal["keep", "drop"]
 

@@ -9,13 +9,11 @@ import pytest
 
 from benchmarks.accuracy.cases import tape_measured
 from calib_core.calibration import calibrate_pairs
-from calib_core.diagnostics.consequence import by_consequence, consequence_of
 from calib_core.measurements import Unpaired, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, DataWarning, NextPlacement
-from calib_core.stated_error import stated_error
+from calib_core.results.verdict import ALL_CLICKED, DONE, by_consequence, consequence_of, stated_error, verdict_on
 from calib_core.synthetic import simulate_pairs
-from calib_core.verdict import ALL_CLICKED, DONE, verdict_on
 
 FEW = Unsolvable("too-few-pairs", "2 of at least 4 required pairs", "click the reflector at more placements")
 
