@@ -3,10 +3,7 @@
 Nothing here deals with files, threads or screens.
 """
 
-from cocalib.session.applying import apply
-from cocalib.session.box_tracks import BoxEdges, BoxKeyframe, BoxTrack
-from cocalib.session.chosen_intrinsics import ChosenIntrinsics
-from cocalib.session.event_checks import EventError
+from cocalib.session.applying import EventError, apply
 from cocalib.session.events import (
     AssumptionsConfirmed,
     AxesStated,
@@ -37,7 +34,17 @@ from cocalib.session.events import (
     WarningsAcknowledged,
 )
 from cocalib.session.history import History, advance, settled
-from cocalib.session.state import AssumedReading, DismissedPlacement, Outcome, RecordingFacts, Session
+from cocalib.session.state import (
+    AssumedReading,
+    BoxEdges,
+    BoxKeyframe,
+    BoxTrack,
+    ChosenIntrinsics,
+    DismissedPlacement,
+    Outcome,
+    RecordingFacts,
+    Session,
+)
 
 __all__ = [
     "AssumedReading",

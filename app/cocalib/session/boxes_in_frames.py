@@ -10,9 +10,8 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from calib_core.measurements import Box, Boxes, FrameBoxes, TimeNs
-from cocalib.session.box_tracks import BoxEdges, BoxKeyframe, BoxTrack
 from cocalib.session.events import BoxesLoaded
-from cocalib.session.state import RecordingFacts, Session
+from cocalib.session.state import BoxEdges, BoxKeyframe, BoxTrack, RecordingFacts, Session
 
 MOST_FRAMES = 900
 """A box is followed through so many frames at most after it was drawn: half a minute at 30 Hz."""

@@ -12,9 +12,7 @@ from calib_core.interchange.own.documents import ClickDocument
 from calib_core.measurements import ChosenReturn, Mark, ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions
 from calib_core.results import PairResult
-from cocalib.session.box_tracks import BoxEdges, BoxLabel, BoxTrack
-from cocalib.session.chosen_intrinsics import ChosenIntrinsics
-from cocalib.session.state import Outcome
+from cocalib.session.state import BoxEdges, BoxLabel, BoxTrack, ChosenIntrinsics, Outcome
 
 Id: TypeAlias = Annotated[str, Meta(min_length=1, max_length=100)]
 

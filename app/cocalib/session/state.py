@@ -1,16 +1,107 @@
-"""The session as a value, and what it must know about the recording."""
+"""The session as a value: its intrinsics, its boxes, what it must know about the recording."""
 
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import Annotated, TypeAlias
 
+import msgspec
 import numpy as np
+from msgspec import Meta
 
 from calib_core.arrays import Indices, TimesNs, frozen_array
+from calib_core.camera import Camera, CameraCovariance
 from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, PairResult
-from cocalib.session.box_tracks import BoxTrack
-from cocalib.session.chosen_intrinsics import ChosenIntrinsics
+
+_Row: TypeAlias = Annotated[tuple[float, ...], Meta(max_length=40)]
+_Row3: TypeAlias = tuple[float, float, float]
+_Name: TypeAlias = Annotated[str, Meta(max_length=100)]
+_Pixels: TypeAlias = Annotated[int, Meta(ge=1, le=1_000_000)]
+
+
+class ChosenIntrinsics(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """A camera, and where it comes from.
+
+    Attributes:
+        about: where it comes from, such as "the board in this recording, 24 views".
+        model: name of its lens model.
+        size_px: width and height of its pictures.
+        matrix_px: K, row by row [px].
+        distortion: coefficients in the lens model's order.
+        order: names of the parameters that `covariance` is about; none if nobody said how well they are known.
+        covariance: of these, row by row.
+    """
+
+    about: Annotated[str, Meta(max_length=500)]
+    model: _Name
+    size_px: tuple[_Pixels, _Pixels]
+    matrix_px: tuple[_Row3, _Row3, _Row3]
+    distortion: _Row = ()
+    order: Annotated[tuple[_Name, ...], Meta(max_length=40)] = ()
+    covariance: Annotated[tuple[_Row, ...], Meta(max_length=40)] = ()
+
+    @classmethod
+    def of(cls, camera: Camera, about: str) -> "ChosenIntrinsics":
+        """Take a camera's numbers."""
+        known = camera.covariance
+        first, second, third = ((row[0], row[1], row[2]) for row in camera.matrix_px.tolist())
+        return cls(
+            about,
+            camera.model,
+            (camera.width_px, camera.height_px),
+            (first, second, third),
+            tuple(camera.distortion.tolist()),
+            () if known is None else known.order,
+            () if known is None else tuple(map(tuple, known.matrix.tolist())),
+        )
+
+    @property
+    def camera(self) -> Camera:
+        """The camera.
+
+        Raises:
+            ValueError: the numbers are not a camera's.
+        """
+        known = CameraCovariance(self.order, np.array(self.covariance)) if self.order else None
+        return Camera(self.model, *self.size_px, np.array(self.matrix_px), np.array(self.distortion), known)
+
+
+BoxEdges: TypeAlias = tuple[float, float, float, float]
+"""Left, top, right and bottom edge of a box [px]; pixel (0, 0) is the centre of the top-left pixel."""
+
+
+TrackId: TypeAlias = Annotated[str, Meta(min_length=1, max_length=100)]
+BoxLabel: TypeAlias = Annotated[str, Meta(max_length=100)]
+
+
+class BoxKeyframe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename={"edges_px": "box_px"}):
+    """A frame in which a person said where an object is.
+
+    Attributes:
+        image_time: stamp of the frame.
+        edges_px: of its box; None: the object is hidden from this frame on.
+    """
+
+    image_time: TimeNs
+    edges_px: BoxEdges | None
+
+
+class BoxTrack(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename={"is_carried": "carried"}):
+    """The boxes of one object.
+
+    Attributes:
+        id: unique in the session, such as "b3"; it becomes Box.track.
+        label: the object's class, such as "person"; "" if a file states none.
+        keyframes: sorted by time, at least one, each stamp once.
+        is_carried: the box is followed through the frames after each keyframe; boxes from a file are only in the frames
+            for which the file states them.
+    """
+
+    id: TrackId
+    label: BoxLabel
+    keyframes: tuple[BoxKeyframe, ...]
+    is_carried: bool = True
+
 
 Outcome: TypeAlias = Calibration | Unsolvable
 
