@@ -7,16 +7,18 @@ following links; every line carries a checksum, and both files are compared befo
 
 from cocalib.platform.resources import user_session_folder
 from cocalib.session.file.contents import Repair, inspect_session, repair_session
-from cocalib.session.file.errors import SessionFileError
 from cocalib.session.file.finding import (
     FoundFolder,
+    SessionSummary,
     find_session_folder,
     has_session_of,
     holds_session_files,
+    recording_session_folder,
     remembered_map,
+    session_summaries,
+    unused_session_folder,
 )
-from cocalib.session.file.folders import recording_session_folder, unused_session_folder
-from cocalib.session.file.listing import SessionSummary, session_summaries
+from cocalib.session.file.guarded_folder import SessionFileError
 from cocalib.session.file.session_file import Closed, Restored, SessionFile, open_session_file, set_aside
 
 __all__ = [

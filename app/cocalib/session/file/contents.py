@@ -8,8 +8,7 @@ from calib_core.errors import CalibrationError
 from calib_core.measurements import ReflectorClick
 from cocalib.platform.resources import version
 from cocalib.session import AxesStated, History, RecordingFacts, Step, advance
-from cocalib.session.file.errors import SessionFileError
-from cocalib.session.file.guarded_folder import GuardedFolder
+from cocalib.session.file.guarded_folder import FolderLock, GuardedFolder, SessionFileError
 from cocalib.session.file.identity import RecordingForm, facts_of, require_same_recording
 from cocalib.session.file.journal import (
     COPY,
@@ -22,7 +21,6 @@ from cocalib.session.file.journal import (
     new_lines,
     read_journal,
 )
-from cocalib.session.file.lock import FolderLock
 from cocalib.session.file.snapshot import SNAPSHOT, FoundSnapshot, read_snapshot
 
 

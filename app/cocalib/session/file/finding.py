@@ -1,22 +1,25 @@
-"""Find the session of a recording that was renamed or moved: by its content, next to it and in the user's folder."""
+"""Where sessions are: the folder of a recording, also after it was renamed or moved, and the list of all of them."""
 
+import os
+import re
+import tempfile
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
 from calib_core.results import DataWarning
-from cocalib.platform.resources import state_folder
+from cocalib.platform.resources import SESSION_SUFFIX, state_folder, user_session_folder
 from cocalib.session import ColumnsMapped, RecordingFacts
-from cocalib.session.file.errors import SessionFileError
-from cocalib.session.file.folders import is_writable, recording_session_folder, session_folders_in
-from cocalib.session.file.guarded_folder import GuardedFolder
+from cocalib.session.file.contents import inspect_session
+from cocalib.session.file.guarded_folder import GuardedFolder, SessionFileError, lock_holder
 from cocalib.session.file.identity import RecordingForm, has_dates, is_same_recording
 from cocalib.session.file.journal import COPY, JOURNAL, read_journal
 from cocalib.session.file.snapshot import SNAPSHOT, read_snapshot
 
 _HEAD_BYTES = 1 << 16
 _FILES = (JOURNAL, COPY, SNAPSHOT)
+_SET_ASIDE = re.compile(re.escape(SESSION_SUFFIX) + r"\.[0-9]+$")
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,3 +166,112 @@ def _recording(folder: GuardedFolder) -> RecordingForm | None:
 def holds_session_files(folder: Path) -> bool:
     """Return whether a folder has a file of a session, be it sound or not."""
     return any((folder / name).exists() or (folder / name).is_symlink() for name in _FILES)
+
+
+def recording_session_folder(paths: Sequence[Path]) -> Path:
+    """Return the session folder of a recording: an existing one, else next to the recording, else in the state folder.
+
+    Args:
+        paths: the files or folders of the recording, at least one; the first names the session.
+    """
+    first = paths[0].resolve()
+    adjacent = first.with_name(first.name + SESSION_SUFFIX)
+    in_state_folder = user_session_folder(first.name, key=str(first))
+    for folder in (adjacent, in_state_folder):
+        if folder.is_dir() and is_writable(folder):
+            return folder
+    return adjacent if is_writable(adjacent.parent) else in_state_folder
+
+
+def unused_session_folder(folder: Path) -> Path:
+    """Return a name that no session has yet: the given one, or that with a number, such as NAME-2.cocalib-session."""
+    number, free = 1, folder
+    while os.path.lexists(free):
+        number += 1
+        free = folder.with_name(f"{folder.name.removesuffix(SESSION_SUFFIX)}-{number}{SESSION_SUFFIX}")
+    return free
+
+
+def session_folders_in(folder: Path, *, set_aside: bool = False) -> tuple[Path, ...]:
+    """Return the session folders directly in a folder, by name; none if it cannot be read.
+
+    Args:
+        folder: where to look.
+        set_aside: also those that --fresh has renamed.
+    """
+    try:
+        names = sorted(path.name for path in folder.iterdir())
+    except OSError:
+        return ()
+    return tuple(
+        folder / name
+        for name in names
+        if name.endswith(SESSION_SUFFIX) or (set_aside and _SET_ASIDE.search(name) is not None)
+    )
+
+
+def is_writable(folder: Path) -> bool:
+    """Try to write: permission bits do not cover read-only media, quotas and network folders."""
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False
+
+
+@dataclass(frozen=True, slots=True)
+class SessionSummary:
+    """One session.
+
+    Attributes:
+        folder: its path.
+        recording: name of its recording; "" if unknown.
+        clicks: how many it has, or how many are proven.
+        steps: how many steps its journal holds.
+        changed_at_s: when it was last changed, in seconds since the epoch; None if unknown.
+        state: "sound", "damaged", "open" (in another process), or "unreadable".
+        about: what is wrong, or which process has it open.
+    """
+
+    folder: Path
+    recording: str
+    clicks: int
+    steps: int
+    changed_at_s: float | None
+    state: str
+    about: str
+
+
+def session_summaries(places: Sequence[Path]) -> tuple[SessionSummary, ...]:
+    """Return the sessions in some places and in the user's folder.
+
+    Args:
+        places: session folders, recordings, or folders that hold either; folders in them are not searched.
+    """
+    folders = [folder for place in (*places, state_folder() / "sessions") for folder in _folders(place)]
+    return tuple(_summary(folder) for folder in dict.fromkeys(folder.absolute() for folder in folders))
+
+
+def _folders(place: Path) -> tuple[Path, ...]:
+    if holds_session_files(place):
+        return (place,)
+    inside = session_folders_in(place, set_aside=True)
+    named = recording_session_folder([place]) if place.exists() else place
+    return (*inside, named) if named.is_dir() and named not in inside else inside
+
+
+def _summary(path: Path) -> SessionSummary:
+    changed, holder = None, ""
+    try:
+        folder = GuardedFolder(path)
+        try:
+            changed = max(filter(None, map(folder.changed_at_s, (JOURNAL, COPY, SNAPSHOT))), default=None)
+            holder = lock_holder(folder)
+        finally:
+            folder.close()
+        found = inspect_session(path)
+    except (SessionFileError, OSError) as error:
+        return SessionSummary(path, "", 0, 0, changed, "unreadable", str(error))
+    state = "open" if holder else "damaged" if found.faults else "sound"
+    about = "; ".join(filter(None, (holder, *found.faults)))
+    return SessionSummary(path, found.recording, len(found.clicks), found.steps, changed, state, about)

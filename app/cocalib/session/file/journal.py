@@ -17,8 +17,7 @@ from calib_core.errors import CalibrationError
 from calib_core.measurements import time_from_json, time_to_json
 from cocalib.option_changes import kept_options
 from cocalib.session import JournalStep, OptionsChanged, Step
-from cocalib.session.file.errors import SessionFileError
-from cocalib.session.file.guarded_folder import GuardedFolder
+from cocalib.session.file.guarded_folder import GuardedFolder, SessionFileError
 from cocalib.session.file.identity import RecordingForm
 
 JOURNAL, COPY = "journal.jsonl", "journal-copy.jsonl"

@@ -10,11 +10,9 @@ from calib_core.results import DataWarning
 from cocalib.platform.resources import user_session_folder, version
 from cocalib.session import AxesStated, History, RecordingFacts, Step
 from cocalib.session.file.contents import Contents, read_contents, rewrite
-from cocalib.session.file.errors import SessionFileError
-from cocalib.session.file.guarded_folder import GuardedFolder
+from cocalib.session.file.guarded_folder import FolderLock, GuardedFolder, SessionFileError
 from cocalib.session.file.identity import recording_form
 from cocalib.session.file.journal import COPY, JOURNAL, Journal, bytes_of, new_lines
-from cocalib.session.file.lock import FolderLock
 from cocalib.session.file.snapshot import SNAPSHOT
 
 

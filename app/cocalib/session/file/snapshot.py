@@ -29,7 +29,7 @@ from cocalib.session import (
     Step,
     WarningsAcknowledged,
 )
-from cocalib.session.file.errors import SessionFileError
+from cocalib.session.file.guarded_folder import SessionFileError
 from cocalib.session.file.identity import RecordingForm
 from cocalib.session.file.journal import SCHEMA, SCHEMA_1, sealed, taken_apart
 

@@ -150,7 +150,7 @@ def test_a_session_that_cannot_be_written_is_named_with_the_way_to_its_clicks(
     home: Path, state_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = clicked(home / "drive.bag.cocalib-session")
-    monkeypatch.setattr("cocalib.session.file.folders.is_writable", lambda place: state_folder in (place, place.parent))
+    monkeypatch.setattr("cocalib.session.file.finding.is_writable", lambda place: state_folder in (place, place.parent))
     monkeypatch.setattr("cocalib.session.file.finding.is_writable", lambda place: False)
     found = find_session_folder([home / "drive.bag"], FACTS)
     assert found.path.parent == state_folder
@@ -166,7 +166,7 @@ def test_another_users_session_next_to_the_recording_is_named(
 ) -> None:
     folder = clicked(home / "drive.bag.cocalib-session")
     os.chown(folder, 12345, -1)
-    monkeypatch.setattr("cocalib.session.file.folders.is_writable", lambda place: state_folder in (place, place.parent))
+    monkeypatch.setattr("cocalib.session.file.finding.is_writable", lambda place: state_folder in (place, place.parent))
     found = find_session_folder([home / "drive.bag"], FACTS)
     assert found.path.parent == state_folder
     (warning,) = found.warnings
