@@ -312,7 +312,7 @@ class Calibration:
             advice = f"({x_m:.1f}, {y_m:.1f}, {z_m:.1f}) m would reduce the pose uncertainty by {percent:.0f} %"
         return "\n".join(
             (
-                f"camera_from_radar, method {self.options.method}: {agreeing} of {len(used)} pairs agree",
+                f"camera_from_radar, method {self.options.method}: {agreeing} of {len(used)} clicks agree",
                 "  translation     " + " ".join(f"{value:.4f}" for value in place) + " m",
                 "  quaternion wxyz " + " ".join(f"{value:.6f}" for value in quaternion),
                 *(f"  {line}" for line in self._uncertainty_lines()),

@@ -238,10 +238,10 @@ def _judged(calibration: Calibration, error: StatedError, warning: DataWarning |
         action = _click_the_rest(left) if left and warning.code in _MORE_PAIRS_HELP else hint
         if warning.code not in _ABOUT_FIGURES:
             return Verdict("weak", warning.message, action)
-        few = f", from only {count} pairs" if warning.code == "few-pairs" else ""
+        few = f", from only {count} clicks" if warning.code == "few-pairs" else ""
         return Verdict("weak", f"uncertain to {error.text}{few}", action)
     if count < SURE_PAIRS:
-        return Verdict("weak", f"uncertain to {error.text}, from only {count} pairs", _most_helpful(calibration, left))
+        return Verdict("weak", f"uncertain to {error.text}, from only {count} clicks", _most_helpful(calibration, left))
     if error.rotation_deg > USABLE_DEG or error.position_cm > USABLE_CM:
         return Verdict("weak", f"uncertain to {error.text}", _most_helpful(calibration, left))
     steady = not calibration.metrics.held_out_aed_px > HELD_OUT_RATIO * calibration.metrics.aed_px

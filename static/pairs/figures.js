@@ -14,7 +14,7 @@ const EMPTY = [
   ["held_out_aed", "new placement (held-out AED)"],
   ["cdsd", "spread (CDSD)"],
   ["rms", "root mean square (RMS)"],
-  ["inliers", "pairs that agree"],
+  ["inliers", "clicks that agree"],
 ];
 const poseTable = make("table", "", []);
 const poseHead = make("div", "pose-head", "");

@@ -35,7 +35,7 @@ const offset = (click) => (click.projected_px ? [click.projected_px[0] - click.u
 /** The plot in words. @param {import("../messages.js").ClickRow[]} shown */
 function describe(shown) {
   const mean = [0, 1].map((axis) => shown.reduce((sum, click) => sum + offset(click)[axis], 0) / Math.max(shown.length, 1));
-  return `Reprojection minus click: ${shown.length} pairs, on average ${mean[0].toFixed(1)} px right and ${mean[1].toFixed(1)} px down`;
+  return `Reprojection minus click: ${shown.length} clicks, on average ${mean[0].toFixed(1)} px right and ${mean[1].toFixed(1)} px down`;
 }
 
 /** Position of a click in the plot; clicks out of range are drawn on its edge. @param {import("../messages.js").ClickRow} click @param {number} most @returns {[number, number]} */

@@ -49,7 +49,7 @@ export class Plot {
     this.content = content;
     this.highlight = highlight;
     const count = content.marks.reduce((sum, mark) => sum + mark.ids.length, 0);
-    this.canvas.setAttribute("aria-label", `${this.title}: ${count} pairs. Arrow keys move from mark to mark, Enter goes to its frame.`);
+    this.canvas.setAttribute("aria-label", `${this.title}: ${count} clicks. Arrow keys move from mark to mark, Enter goes to its frame.`);
     if (this.at >= content.marks.length) this.at = -1;
     this.draw();
   }

@@ -213,7 +213,7 @@ function drawPlots() {
   plots.get("influence")?.show(influences(drawn), highlight);
 }
 
-const EMPTY = "no pairs to show";
+const EMPTY = "no clicks to show";
 
 /** How many residuals of each length, and how many the noise model expects. @param {Row[]} drawn @returns {Content} */
 function histogram(drawn) {
@@ -232,7 +232,7 @@ function histogram(drawn) {
   const curve = expected.map((share, index) => /** @type {[number, number]} */ ([edges[index] + width / 2, share * agreeing]));
   const high = Math.max(1, ...bins.map((bin) => bin.y), ...curve.map(([, y]) => y)) * 1.08;
   const axis = { label: curve.length ? "residual [px]; line: expected" : "residual [px]", low: 0, high: last + width };
-  return { marks: review?.histogram ? bins : [], x: axis, y: { label: "pairs", low: 0, high }, bar: width, curve, limit: null, empty: EMPTY };
+  return { marks: review?.histogram ? bins : [], x: axis, y: { label: "clicks", low: 0, high }, bar: width, curve, limit: null, empty: EMPTY };
 }
 
 /** @param {Row[]} drawn @param {string} label @param {(row: Row) => number|null} at @returns {Content} */
@@ -337,4 +337,4 @@ function told(row) {
 const digits = (value) => (Math.abs(value) < 0.995 ? String(Number(value.toFixed(2))) : String(Number(value.toPrecision(3))));
 
 /** @param {number} number */
-const count = (number) => `${number} pair${number === 1 ? "" : "s"}`;
+const count = (number) => `${number} click${number === 1 ? "" : "s"}`;

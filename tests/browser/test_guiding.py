@@ -18,7 +18,7 @@ def test_a_wrong_click_is_named_and_found_by_j(page: Driver, truth: Any) -> None
     page.click(u + (200 if u < 480 else -200), v)
     page.press("n")
     page.until("__cocalib.state.view.clicks.filter((click) => click.state === 'outlier').length === 1")
-    assert "9 of 10 pairs agree" in page.text("#status-text")
+    assert "9 of 10 clicks agree" in page.text("#status-text")
     assert "Press J to see the outlier" in page.text("#status-text")
     page.press("j")
     page.until(f"__cocalib.state.shown.index === {page.frame_at(wrong['best_image_time'])}")

@@ -34,7 +34,7 @@ def test_the_verdict_is_in_sight_from_nothing_to_done(page: Driver, truth: Any) 
     verdict = page.view["verdict"]
     assert (verdict["level"], verdict["action"]) == ("weak", "Click the 15 placements that are left.")
     assert page.text("#verdict .line") == verdict["line"]
-    assert page.text("#status-text").startswith("Weak: all 5 pairs agree")
+    assert page.text("#status-text").startswith("Weak: all 5 clicks agree")
     assert "Click the 15 placements that are left. Press N" in page.text("#guide")
     assert in_sight(page)
     assert page.page.get_attribute("#verdict", "data-level") == "weak"

@@ -47,7 +47,7 @@ def test_a_calibration_is_shown_checked_and_compared(
         assert float(figures["rotation_apart"]["value"].split()[0]) < 1.0
         assert "Difference from factory.txt" in page.text("#page-pose")
         assert "at 20 m" in page.text("#page-pose .apart")
-        assert "pairs agree" in page.text("#status-text")
+        assert "clicks agree" in page.text("#status-text")
     finally:
         running.close()
         workspace.close()

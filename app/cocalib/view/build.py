@@ -155,7 +155,7 @@ def _agreement(calibration: Calibration, word: str) -> str:
     agreeing = sum(pair.inlier for pair in used)
     agreed = f"all {len(used)}" if agreeing == len(used) else f"{agreeing} of {len(used)}"
     firm = "" if calibration.sees_elevation else f"; {firm_text(calibration)}"
-    return f"{word} {agreed} pairs agree{firm}"
+    return f"{word} {agreed} clicks agree{firm}"
 
 
 def _warnings(calibration: Calibration) -> tuple[DataWarning, ...]:

@@ -44,10 +44,10 @@ def metric_figures(calibration: Calibration) -> tuple[Figure, ...]:
         ),
         Figure(
             "inliers",
-            "pairs that agree",
+            "clicks that agree",
             f"{agreeing} of {used}",
             "",
-            "Pairs that agree on the pose, out of all that you have not excluded.",
+            "Clicks that agree on the pose, out of all that you have not excluded.",
             "good" if agreeing == used else "plain",
         ),
     )

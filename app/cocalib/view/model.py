@@ -309,7 +309,7 @@ class View:
     Attributes:
         revision: of the session; grows with every change.
         stage: how far the session has come.
-        status: the same in a few words: "4 more placements needed", "Solving…", "Usable: 18 of 20 pairs agree".
+        status: the same in a few words: "4 more placements needed", "Solving…", "Usable: 18 of 20 clicks agree".
         hint: the next thing to do; "" when there is none.
         solving: this revision is being solved; what is shown belongs to an older one, unless it is being checked.
         checking: what is shown is a preview of this revision's answer; warnings and advice are still the previous ones.

@@ -122,7 +122,7 @@ def _words(calibration: Calibration) -> str:
     if len(sigmas):
         inside = int((sigmas**2 <= _CHI2_95_2D).sum())
         said = [
-            f"{inside} of {len(sigmas)} agreeing pairs are inside their 95 % ellipse ({plain(0.95 * len(sigmas))} expected)."
+            f"{inside} of {len(sigmas)} agreeing clicks are inside their 95 % ellipse ({plain(0.95 * len(sigmas))} expected)."
         ]
     influences = [(pair.influence, pair.id) for pair in calibration.pairs if np.isfinite(pair.influence)]
     if influences:

@@ -45,7 +45,7 @@ def test_a_calibration_prints_as_nine_lines(simulated: SimulatedPairs, method: s
     assert len(lines) == 9
     assert max(map(len, lines)) < 120
     for word in (
-        "pairs agree",
+        "clicks agree",
         "translation",
         "quaternion wxyz",
         "one sigma",

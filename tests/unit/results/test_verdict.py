@@ -108,7 +108,7 @@ def test_few_pairs_are_weak_before_they_are_checked() -> None:
     calibration = replace(solved(6), warnings=())
     verdict = verdict_on(calibration)
     assert verdict.level == "weak"
-    assert verdict.reason.endswith(", from only 6 pairs")
+    assert verdict.reason.endswith(", from only 6 clicks")
 
 
 def test_the_papers_method_is_never_good_and_blames_no_mark() -> None:

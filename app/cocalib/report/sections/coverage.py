@@ -59,10 +59,10 @@ def _counts(pixels_px: np.ndarray, size_px: tuple[int, int]) -> np.ndarray:
 def _picture_words(counts: np.ndarray) -> str:
     empty = [f"{_ROWS[row]} {_COLUMNS[column]}" for row, column in zip(*np.nonzero(counts == 0), strict=True)]
     total = int(counts.sum())
-    pairs = f"{total} {'pair' if total == 1 else 'pairs'}"
+    clicks = f"{total} {'click' if total == 1 else 'clicks'}"
     if not empty:
-        return f"The {pairs} reach all nine parts of the picture."
-    return f"The {pairs} reach {9 - len(empty)} of nine parts of the picture; none is in: {', '.join(empty)}."
+        return f"The {clicks} reach all nine parts of the picture."
+    return f"The {clicks} reach {9 - len(empty)} of nine parts of the picture; none is in: {', '.join(empty)}."
 
 
 def _from_above(rows: ResidualRows) -> Markup:

@@ -31,9 +31,9 @@ def pair_table(rows: ResidualRows) -> Markup | None:
         return None
     shown = _shown(rows)
     note = (
-        f"{len(shown)} of {len(rows)} pairs: those with the largest residuals; all are in the calibration's file."
+        f"{len(shown)} of {len(rows)} clicks: those with the largest residuals; all are in the calibration's file."
         if len(shown) < len(rows)
-        else f"All {len(rows)} pairs."
+        else f"All {len(rows)} clicks."
     )
     body = (_row(rows, index) for index in shown)
     return tag(

@@ -206,7 +206,7 @@ def test_many_pairs_are_cut_to_those_with_the_largest_residuals(project_root: Pa
     one = calibration.pairs[0]
     many = tuple(replace(one, id=f"n{k}", projected_px=np.add(one.pixel_px, (k, 0.0))) for k in range(100))
     words = _words(subject_for(project_root, replace(calibration, pairs=many)))
-    assert "30 of 100 pairs: those with the largest residuals" in words
+    assert "30 of 100 clicks: those with the largest residuals" in words
     assert "n99" in words
     assert "n70" in words
     assert "n69 " not in words

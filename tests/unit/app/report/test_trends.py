@@ -82,4 +82,4 @@ def test_chance_alone_is_seldom_called_a_trend() -> None:
 
 @pytest.mark.parametrize("sentence", [range_sentence, azimuth_sentence, _place, time_sentence, shift_sentence])
 def test_few_pairs_show_no_trend_and_the_sentence_says_so(sentence: Callable[[ResidualRows], str]) -> None:
-    assert sentence(planted_rows(n=5)) == "5 pairs are too few to show a trend; 8 or more are needed."
+    assert sentence(planted_rows(n=5)) == "5 clicks are too few to show a trend; 8 or more are needed."

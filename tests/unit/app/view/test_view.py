@@ -91,12 +91,12 @@ def test_before_the_first_click_the_hint_says_what_to_do() -> None:
 
 def test_a_solved_session_says_how_many_pairs_agree() -> None:
     four_agree = (*FIVE[:4], pair("c5", inlier=False))
-    assert shown(5, calibration(*FIVE)).status == "Weak: all 5 pairs agree"
-    assert shown(5, calibration(*four_agree)).status == "Weak: 4 of 5 pairs agree"
+    assert shown(5, calibration(*FIVE)).status == "Weak: all 5 clicks agree"
+    assert shown(5, calibration(*four_agree)).status == "Weak: 4 of 5 clicks agree"
 
 
 def test_an_excluded_pair_is_not_among_those_that_could_agree() -> None:
-    assert shown(5, calibration(*FIVE[:4], pair("c5", excluded=True))).status == "Weak: all 4 pairs agree"
+    assert shown(5, calibration(*FIVE[:4], pair("c5", excluded=True))).status == "Weak: all 4 clicks agree"
 
 
 def test_an_unsolvable_session_shows_reason_and_hint() -> None:
@@ -146,10 +146,10 @@ def test_a_preview_is_shown_as_being_checked() -> None:
     preview = calibration(*pairs, checking=True)
     drawn = shown(5, preview)
     assert (drawn.checking, drawn.solving) == (True, True)
-    assert drawn.status == "Checking… 4 of 5 pairs agree"
+    assert drawn.status == "Checking… 4 of 5 clicks agree"
     checked = shown(5, replace(preview, checking=False))
     assert (checked.checking, checked.solving) == (False, False)
-    assert checked.status == "Weak: 4 of 5 pairs agree"
+    assert checked.status == "Weak: 4 of 5 clicks agree"
 
 
 def test_the_view_says_what_can_be_undone_and_redone() -> None:

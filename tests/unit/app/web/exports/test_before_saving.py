@@ -31,7 +31,7 @@ def test_each_format_stands_once_under_the_heading_of_where_it_is_used():
 def test_the_evidence_is_said_with_the_verdict(file):
     said = panel.export_preview(file, "tf2", "", "drive").evidence
     inliers = sum(pair.inlier for pair in file.calibration.pairs)
-    assert said.startswith(f"Rests on clicks ({inliers} pairs).")
+    assert said.startswith(f"Rests on clicks ({inliers} clicks).")
     assumed = panel.export_preview(replace(file, evidence="imported_assumed"), "tf2", "", "drive").evidence
     assert "nothing proves it" in assumed
     proven = panel.export_preview(replace(file, evidence="imported_proven"), "tf2", "", "drive").evidence
