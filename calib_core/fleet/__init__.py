@@ -3,17 +3,14 @@
 from calib_core.fleet.mounting_scatter import LeftOut, MountingScatter, mounting_scatter
 from calib_core.fleet.mountings import Mounting, mounting_of, mountings_of, transitions_of
 from calib_core.fleet.off_kind import OffKind, off_kind, off_kinds
-from calib_core.fleet.radar_scale import KnownScale, RadarScale, radar_scales
 from calib_core.fleet.session_pose import SessionPose, session_pose
 from calib_core.fleet.transitions import RelevantChange, Transition, transition
 
 __all__ = [
-    "KnownScale",
     "LeftOut",
     "Mounting",
     "MountingScatter",
     "OffKind",
-    "RadarScale",
     "RelevantChange",
     "SessionPose",
     "Transition",
@@ -22,7 +19,6 @@ __all__ = [
     "mountings_of",
     "off_kind",
     "off_kinds",
-    "radar_scales",
     "session_pose",
     "transition",
     "transitions_of",

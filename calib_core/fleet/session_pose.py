@@ -12,13 +12,11 @@ from calib_core.geometry import RigidTransform
 from calib_core.measurements import TimeNs
 from calib_core.options import CameraPositionPrior
 from calib_core.results import Calibration
-from calib_core.results.shared_errors import SystematicErrorResult
 from calib_core.results.verdict import degrees_of_freedom
 
 CHI2_95 = 12.591587243743977
 """The 95 % quantile of chi2 with 6 degrees of freedom: the quantile of a covariance whose noise level is known."""
 
-_SCALES = ("azimuth_scale", "elevation_scale")
 _ROUNDING, _EXCESS = 1e-12, 1e-6
 
 
@@ -40,7 +38,6 @@ class SessionPose:
         camera_serial: of the camera; None if unknown.
         camera: its intrinsics, for figures in the picture; None if unknown.
         reference_radar_m: (3,) the position in the radar frame where these are stated; None if unknown.
-        angle_scales: what is known of the radar's azimuth and elevation scale.
         measured: the camera position in the radar frame that was measured with a tape, and its standard deviation; None without.
 
     Raises:
@@ -58,7 +55,6 @@ class SessionPose:
     camera_serial: str | None = None
     camera: Camera | None = None
     reference_radar_m: Vector3 | None = None
-    angle_scales: tuple[SystematicErrorResult, ...] = ()
     measured: CameraPositionPrior | None = None
     of_tape: Matrix66 = field(default_factory=lambda: np.zeros((6, 6)))
 
@@ -143,7 +139,6 @@ def session_pose(
         camera_serial=camera_serial,
         camera=calibration.camera,
         reference_radar_m=np.median(places_m, axis=0) if places_m else None,
-        angle_scales=tuple(one for one in calibration.systematic_errors if one.name in _SCALES and one.estimated),
         measured=calibration.options.solving.camera_position,
         of_tape=parts.camera_position,
     )

@@ -21,12 +21,11 @@ def calibration() -> Calibration:
     return outcome
 
 
-def test_pose_uncertainty_and_scales_are_the_calibrations(calibration: Calibration) -> None:
+def test_pose_and_uncertainty_are_the_calibrations(calibration: Calibration) -> None:
     pose = session_pose(calibration, vehicle="van", session="spring", radar_serial="R1")
     np.testing.assert_array_equal(pose.covariance, calibration.covariance)
     assert pose.quantile == calibration.covariance_quantile
     assert pose.freedom < 1e4  # the noise level was estimated
-    assert {one.name for one in pose.angle_scales} == {"azimuth_scale", "elevation_scale"}
     assert pose.camera is calibration.camera
     assert pose.reference_radar_m is not None
     assert pose.sensors == ("R1", None)
