@@ -1,10 +1,16 @@
 """A fleet: what was remounted, how the mountings of a vehicle type scatter, and which vehicle is off its kind."""
 
-from calib_core.fleet.mounting_scatter import LeftOut, MountingScatter, mounting_scatter
-from calib_core.fleet.mountings import Mounting, mounting_of, mountings_of, transitions_of
-from calib_core.fleet.off_kind import OffKind, off_kind, off_kinds
+from calib_core.fleet.mounting_scatter import LeftOut, MountingScatter, OffKind, mounting_scatter, off_kind, off_kinds
+from calib_core.fleet.mountings import (
+    Mounting,
+    RelevantChange,
+    Transition,
+    mounting_of,
+    mountings_of,
+    transition,
+    transitions_of,
+)
 from calib_core.fleet.session_pose import SessionPose, session_pose
-from calib_core.fleet.transitions import RelevantChange, Transition, transition
 
 __all__ = [
     "LeftOut",

@@ -1,4 +1,7 @@
-"""How far one mounting is from the others of its kind: one test over six degrees of freedom."""
+"""How far one mounting is from the others of its kind: one test over six degrees of freedom, and its quantiles.
+
+An estimate may be farther out if its covariance was itself estimated: the quantiles are those of Hotelling's T2.
+"""
 
 from dataclasses import dataclass
 
@@ -6,12 +9,15 @@ import numpy as np
 
 from calib_core.arrays import Matrix66, Values, frozen_array
 from calib_core.fleet.random_effects import RandomEffects
-from calib_core.fleet.tails import DIMENSIONS, FALSE_RATE, quantile, tail
+
+DIMENSIONS = 6
+FALSE_RATE = 1e-4
+"""How often a sound calibration is named by one test: the point beyond which a change or a vehicle is."""
 
 _WHOLE = 5.0
 _MOST_OF_FREEDOM = 0.8
 _AXES = ("camera forward", "camera left", "camera up", "roll", "pitch", "yaw")
-_MOST_KNOWN = 1e7
+_MOST_FREEDOM = 1e7
 _NAMED, _MOST_NAMED = 3.0, 3
 _TO_SHOWN = np.array([100.0] * 3 + [180.0 / np.pi] * 3)
 
@@ -77,7 +83,33 @@ def deviation(effects: RandomEffects, vector: Values, covariance: Matrix66, *, f
     total = predicted + covariance
     squared = float(away @ np.linalg.solve(total, away))
     share = float(np.trace(np.linalg.solve(total, predicted))) / DIMENSIONS
-    nu = 1.0 / (share**2 / min(effects.freedom, _MOST_KNOWN) + (1.0 - share) ** 2 / freedom)
+    nu = 1.0 / (share**2 / min(effects.freedom, _MOST_FREEDOM) + (1.0 - share) ** 2 / freedom)
     whole = min(_WHOLE * share, _MOST_OF_FREEDOM * nu)
     limit = quantile(1.0 - FALSE_RATE, nu, whole=whole)
     return Deviation(away, total, squared, limit, tail(squared, nu, whole=whole))
+
+
+def quantile(probability: float, freedom: float, *, whole: float = 0.0) -> float:
+    """Return what a squared distance is below with a probability: nu p / (nu - k) F(p, nu - k), p = 6.
+
+    Args:
+        probability: 0 to 1.
+        freedom: nu, degrees of freedom of the covariance, more than k.
+        whole: k, how much of the covariance's shape had to be estimated: 0 if only its level (then it is 6 F(6, nu)), 5 if all of
+            it (then it is Hotelling's T2).
+    """
+    from scipy.special import fdtri
+
+    nu = min(freedom, _MOST_FREEDOM)
+    return float(nu * DIMENSIONS / (nu - whole) * fdtri(DIMENSIONS, nu - whole, probability))
+
+
+def tail(squared: float, freedom: float, *, whole: float = 0.0) -> float:
+    """Return the probability that a squared distance is exceeded; the arguments are those of `quantile`."""
+    from scipy.special import fdtr, fdtrc
+
+    nu = min(freedom, _MOST_FREEDOM)
+    value = squared * (nu - whole) / (nu * DIMENSIONS)
+    return (
+        float(fdtrc(DIMENSIONS, nu - whole, value)) if value > 1.0 else 1.0 - float(fdtr(DIMENSIONS, nu - whole, value))
+    )

@@ -1,4 +1,4 @@
-"""How the mountings of a vehicle type scatter, estimated from their calibrations; those that are off are left out."""
+"""How the mountings of a vehicle type scatter, estimated from their calibrations, and which of them is off its kind."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -6,12 +6,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib_core.arrays import Matrix66
-from calib_core.fleet.common_mounting import common_mounting, robust_distances
-from calib_core.fleet.deviation import Deviation, deviation
-from calib_core.fleet.mounting_coordinates import coordinate_jacobian, coordinates, pose_from_coordinates
+from calib_core.fleet.deviation import FALSE_RATE, Deviation, deviation
+from calib_core.fleet.mounting_coordinates import (
+    common_mounting,
+    coordinate_jacobian,
+    coordinates,
+    pose_from_coordinates,
+    robust_distances,
+)
 from calib_core.fleet.mountings import Mounting
 from calib_core.fleet.random_effects import RandomEffects, random_effects
-from calib_core.fleet.tails import FALSE_RATE
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import Unsolvable
 
@@ -21,7 +25,7 @@ MIN_MOUNTINGS = 5
 _FEWEST_FITTED = 4
 _CANDIDATE = 22.457744484825323  # the 99.9 % quantile of chi2 with 6 degrees of freedom
 _FEW = 12  # up to so many, a vehicle may hide itself by widening the scatter: each is tested against the others
-_USUAL = 12.591587243743977
+_USUAL = 12.591587243743977  # the 95 % quantile
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,6 +124,27 @@ class MountingScatter:
         return MountingScatter(self.vehicle_type, self.common, effects, rest, others, shared)
 
 
+@dataclass(frozen=True, slots=True)
+class OffKind:
+    """A mounting tested against the others of its type.
+
+    Attributes:
+        mounting: what was tested.
+        deviation: from what the others predict.
+        others: how many mountings these are.
+        is_off: whether it is beyond the 1-in-10,000 point.
+        words: the outcome with figures, without a full stop.
+        hint: what to do; "" if it is not off.
+    """
+
+    mounting: Mounting
+    deviation: Deviation
+    others: int
+    is_off: bool
+    words: str
+    hint: str
+
+
 def mounting_scatter(mountings: Sequence[Mounting], *, vehicle_type: str) -> MountingScatter | Unsolvable:
     """Estimate how the mountings of one vehicle type scatter.
 
@@ -148,6 +173,52 @@ def mounting_scatter(mountings: Sequence[Mounting], *, vehicle_type: str) -> Mou
         reason = f"off its kind: {away.text}, beyond the 1-in-10,000 point of the other mountings"
         left_out.append(LeftOut(mountings[k], away, reason))
     return MountingScatter(vehicle_type, common, effects, counted, tuple(left_out), shared)
+
+
+def off_kind(mounting: Mounting, scatter: MountingScatter) -> OffKind | Unsolvable:
+    """Test one mounting against the other vehicles of its type: none of its own vehicle's mountings counts among them.
+
+    Args:
+        mounting: the mounting.
+        scatter: of the type, with or without this vehicle.
+    """
+    others = scatter.without(mounting.vehicle)
+    return others if isinstance(others, Unsolvable) else _judged(mounting, others)
+
+
+def off_kinds(scatter: MountingScatter) -> tuple[OffKind, ...]:
+    """Test every mounting of a fleet, counted or left out, each against the other vehicles; in order of vehicle and session.
+
+    In a fleet of more than 12 mountings, one that is within the 95 % point of all of them, its own included, is not tested again
+    without it: its own part in the estimate is too small to hide it.
+    In a very small fleet, a vehicle without which fewer than 4 mountings are left is not tested; `off_kind` says so of it.
+
+    Args:
+        scatter: of the type.
+    """
+    rows = [*scatter.mountings, *(one.mounting for one in scatter.left_out)]
+    found = []
+    for mounting in sorted(rows, key=lambda one: (one.vehicle, one.sessions)):
+        sound = len(scatter.mountings) > _FEW and scatter.deviation_of(mounting).squared <= _USUAL
+        outcome = _judged(mounting, scatter) if sound else off_kind(mounting, scatter)
+        if isinstance(outcome, OffKind):
+            found.append(outcome)
+    return tuple(found)
+
+
+def _judged(mounting: Mounting, others: MountingScatter) -> OffKind:
+    away, count = others.deviation_of(mounting), len(others.mountings)
+    figures = f"squared distance {away.squared:.3g}, 1-in-10,000 point {away.limit:.3g}, {count} other mountings"
+    if not away.is_beyond:
+        return OffKind(mounting, away, count, False, f"{mounting.vehicle} is of its kind ({figures})", "")
+    return OffKind(
+        mounting,
+        away,
+        count,
+        True,
+        f"{mounting.vehicle} is off its kind: {away.text} ({figures})",
+        "check that radar, camera and intrinsics are this vehicle's and that the type is right",
+    )
 
 
 def _shared_tape(mountings: Sequence[Mounting]) -> SharedTape | None:

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.special import chdtri
 
-from calib_core.fleet.deviation import deviation
+from calib_core.fleet.deviation import FALSE_RATE, deviation, quantile, tail
 from calib_core.fleet.random_effects import RandomEffects, random_effects
 from calib_core.fleet.session_pose import CHI2_95
-from calib_core.fleet.tails import FALSE_RATE, quantile, tail
 
 EQUAL = np.full(6, 0.005)
 EXACT = 1e-7 * np.eye(6)
@@ -55,3 +55,12 @@ def test_quantiles_are_chi2_f_and_hotellings() -> None:
 def test_the_tail_is_the_inverse_of_the_quantile(whole: float) -> None:
     for probability in (0.1, 0.5, 0.95, 1.0 - FALSE_RATE):
         assert tail(quantile(probability, 15.0, whole=whole), 15.0, whole=whole) == pytest.approx(1.0 - probability)
+
+
+def test_a_quantile_is_exceeded_as_often_as_it_says() -> None:
+    for freedom, whole in ((8.0, 0.0), (30.0, 5.0), (1e6, 2.0)):
+        assert tail(quantile(0.95, freedom, whole=whole), freedom, whole=whole) == pytest.approx(0.05, rel=1e-6)
+
+
+def test_the_quantile_of_a_known_covariance_is_that_of_chi2() -> None:
+    assert quantile(0.95, float("inf")) == pytest.approx(chdtri(6, 0.05), rel=1e-4)

@@ -5,10 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.fleet.simulated_poses import NOMINAL
-from calib_core.fleet import SessionPose, mounting_of, mountings_of
+from benchmarks.fleet.simulated_poses import NOMINAL, Accuracy, Spread, simulated_fleet
+from calib_core.camera import Camera
+from calib_core.errors import InputError
+from calib_core.fleet import RelevantChange, SessionPose, mounting_of, mountings_of, transition, transitions_of
+from calib_core.fleet.session_pose import CHI2_95
 from calib_core.geometry import RigidTransform
-from calib_core.measurements import TimeNs
+from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.options import CameraPositionPrior
 
 COVARIANCE = np.diag(np.repeat([1e-4, 4e-6], 3))
@@ -90,3 +93,140 @@ def test_the_covariance_of_the_mean_is_that_of_simulated_sessions() -> None:
     stated = mounting_of([session(k, share=share) for k in range(3)]).covariance
     ratio = np.einsum("ni,ij,nj->n", errors, np.linalg.inv(stated), errors).mean() / 6.0
     assert ratio == pytest.approx(1.0, abs=0.08)
+
+
+CAMERA = Camera("pinhole", 1280, 720, np.array([[900.0, 0.0, 640.0], [0.0, 900.0, 360.0], [0.0, 0.0, 1.0]]))
+WIDE_TAILS = 6.0 * 8.94  # the 95 % quantile of 6 F(6, 3)
+
+
+def measured(
+    name: str = "spring",
+    *,
+    pose: RigidTransform = NOMINAL,
+    cm: float = 1.0,
+    deg: float = 0.1,
+    quantile: float = CHI2_95,
+) -> SessionPose:
+    covariance = np.diag(np.repeat([(cm / 100.0) ** 2, np.deg2rad(deg) ** 2], 3))
+    return SessionPose(
+        "van",
+        name,
+        pose,
+        covariance,
+        quantile=quantile,
+        camera=CAMERA,
+        reference_radar_m=np.array([10.0, 0.0, 0.0]),
+        radar_serial="R1",
+        camera_serial="C1",
+    )
+
+
+def turned(deg: float) -> RigidTransform:
+    return NOMINAL.perturbed(np.array([0.0, 0.0, 0.0, 0.0, np.deg2rad(deg), 0.0]))
+
+
+def test_the_same_pose_with_narrow_error_bars_is_unchanged() -> None:
+    step = transition(measured(), measured("autumn", pose=turned(0.05)))
+    assert step.is_unchanged
+    assert not step.is_remount
+    assert step.words.startswith("unchanged: 0.05 ± 0.14 deg")
+    assert "95 % error bars of 0.28 deg and 2.8 cm" in step.words
+
+
+def test_a_change_beyond_both_error_bars_is_a_remount_with_its_figures() -> None:
+    step = transition(measured(), measured("autumn", pose=turned(2.0)))
+    assert step.is_remount
+    assert step.rotation_deg == pytest.approx(2.0)
+    assert step.rotation_sigma_deg == pytest.approx(0.1 * np.sqrt(2.0))
+    assert step.words.startswith("this radar was remounted: 2.00 ± 0.14 deg")
+    assert step.words.endswith("px between spring and autumn, beyond both error bars")
+
+
+def test_the_change_in_the_picture_is_that_of_the_reference_position() -> None:
+    step = transition(measured(), measured("autumn", pose=turned(2.0)))
+    reference = np.array([[10.0, 0.0, 0.0]])
+    one, other = (CAMERA.project(pose @ reference)[0] for pose in (NOMINAL, turned(2.0)))
+    assert step.picture_px == pytest.approx(np.linalg.norm(other - one))
+    draws = np.random.default_rng(1).multivariate_normal(np.zeros(6), step.covariance, 4000)
+    along = (other - one) / step.picture_px
+    moved = [float(along @ (CAMERA.project(NOMINAL.perturbed(draw) @ reference)[0] - one)) for draw in draws]
+    assert step.picture_sigma_px == pytest.approx(np.std(moved), rel=0.05)
+
+
+def test_without_a_camera_there_are_no_pixels() -> None:
+    step = transition(replace(measured(), camera=None), replace(measured("autumn"), camera=None))
+    assert np.isnan(step.picture_px)
+    assert "px" not in step.words
+
+
+def test_wide_error_bars_cannot_tell_and_say_what_they_would_hide() -> None:
+    step = transition(measured(deg=1.0), measured("autumn", deg=1.0))
+    assert step.outcome == "cannot-tell"
+    assert "would hide a change of 0.5 deg or 5 cm" in step.words
+    assert transition(measured(deg=1.0), measured("autumn", deg=1.0), relevant=RelevantChange(deg=4.0)).is_unchanged
+
+
+def test_a_change_between_the_95_percent_and_the_1_in_10000_point_is_neither() -> None:
+    step = transition(measured(), measured("autumn", pose=turned(0.64)))
+    assert CHI2_95 < step.squared < step.limit
+    assert step.outcome == "cannot-tell"
+    assert "perhaps remounted, measure again" in step.words
+
+
+def test_the_wide_tails_of_few_pairs_are_no_remount() -> None:
+    moved = turned(1.0)
+    assert transition(measured(), measured("autumn", pose=moved)).is_remount
+    assert not transition(measured(), measured("autumn", pose=moved, quantile=WIDE_TAILS)).is_remount
+    assert not transition(measured(quantile=WIDE_TAILS), measured("autumn", pose=moved)).is_remount
+
+
+def test_another_serial_is_said_and_begins_another_mounting() -> None:
+    step = transition(measured(), replace(measured("autumn", pose=turned(2.0)), radar_serial="R2"))
+    assert step.other_sensors
+    assert step.words.startswith("the sensors were replaced and sit elsewhere")
+    assert "radar R2 instead of R1" in step.words
+    assert not transition(measured(), replace(measured("autumn"), radar_serial=None)).other_sensors
+
+
+def test_transitions_follow_the_time_whatever_the_order() -> None:
+    rows = [replace(measured(f"s{k}"), time_ns=TimeNs((9 - k) * NS_PER_S)) for k in range(3)]
+    names = [(one.before.session, one.after.session) for one in transitions_of(rows)]
+    assert names == [("s2", "s1"), ("s1", "s0")]
+
+
+def test_of_250_unchanged_transitions_none_is_named_and_every_remount_is() -> None:
+    rng = np.random.default_rng(11)
+    named, remounted, unchanged = 0, 0, 0
+    for accuracy in (Accuracy(0.02, 0.15), Accuracy(0.07, 0.6)):
+        fleet = simulated_fleet(Spread(0.005, 0.3), accuracy, rng, vehicles=65)
+        steps = transitions_of(fleet.sessions)
+        found = [one.before.vehicle for one in steps if one.is_remount]
+        assert sorted(found) == sorted(fleet.remounted)
+        named, remounted = named + len(found), remounted + len(fleet.remounted)
+        unchanged += len(steps) - len(fleet.remounted)
+    assert named == remounted
+    assert unchanged > 250
+
+
+def test_the_false_rate_of_a_remount_is_one_in_10000() -> None:
+    rng = np.random.default_rng(5)
+    before = measured()
+    root = np.linalg.cholesky(2.0 * before.covariance)
+    errors = (root @ rng.standard_normal((6, 200_000))).T
+    squared = np.einsum("ni,ni->n", errors, np.linalg.solve(2.0 * before.covariance, errors.T).T)
+    limit = transition(before, measured("autumn")).limit
+    assert 8 <= int((squared > limit).sum()) <= 34  # 20 expected
+
+
+@pytest.mark.parametrize("number", [np.nan, 0.0])
+def test_a_covariance_that_cannot_weigh_anything_is_refused_with_what_to_do(number: float) -> None:
+    covariance = np.diag([number, 1e-4, 1e-4, 1e-4, 1e-4, 1e-4])
+    with pytest.raises(InputError, match=r"vehicle 'van', session 's': .*; (solve|export) "):
+        SessionPose("van", "s", NOMINAL, covariance)
+
+
+def test_stated_parts_beyond_the_covariance_are_refused() -> None:
+    with pytest.raises(InputError, match="rest on stated sigmas exceed it; solve the session again"):
+        SessionPose("van", "s", NOMINAL, np.eye(6), 2.0 * np.eye(6))
+    with pytest.raises(InputError, match="rest on stated sigmas exceed it"):
+        SessionPose("van", "s", NOMINAL, np.eye(6), 0.6 * np.eye(6), of_tape=0.6 * np.eye(6))

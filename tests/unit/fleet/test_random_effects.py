@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from calib_core.fleet.deviation import quantile
 from calib_core.fleet.random_effects import PRIOR_VECTORS, RandomEffects, random_effects
-from calib_core.fleet.tails import quantile
 
 EQUAL = np.full(6, 0.005)
 UNEQUAL = np.array([0.01, 0.003, 0.001, 0.001, 0.01, 0.003])
