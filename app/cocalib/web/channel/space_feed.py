@@ -21,8 +21,7 @@ from cocalib.web.messages import CursorMoved, SpaceLook
 from cocalib.web.view3d.extent import UNKNOWN, Extent, extent_of
 from cocalib.web.view3d.returns import Returns
 from cocalib.web.view3d.scene import TabScene
-from cocalib.web.view3d.sight import Sight
-from cocalib.web.view3d.space_look import space_look
+from cocalib.web.view3d.sight import Sight, space_look
 
 _PLAYING_EVERY_S, _LOOKING_EVERY_S = 1.0, 0.34
 """Minimum time between two drawings while playing, with and without pictures: the 3D view shares the page's main thread, and the

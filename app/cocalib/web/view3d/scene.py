@@ -1,4 +1,4 @@
-"""The 3D view of one tab, in viser: radar axes, the scan of the frame, chosen returns, and the camera with its live picture."""
+"""The 3D view of one tab, in viser: radar axes, chosen returns, placements, the camera with its picture."""
 
 import threading
 from typing import TYPE_CHECKING, Any
@@ -10,24 +10,33 @@ from calib_core.results import Calibration, PairResult
 from cocalib.colours import residual_colours
 from cocalib.web.messages import Viewpoint
 from cocalib.web.view3d.extent import UNKNOWN, Extent, fitted_stand, ring_ranges_m
-from cocalib.web.view3d.nodes import add_cloud, add_lines, fill_cloud, fill_lines
 from cocalib.web.view3d.returns import SizedClouds, size_classes
 from cocalib.web.view3d.shapes import (
     DARK,
     LIGHT,
+    add_cloud,
+    add_lines,
     ellipsoids,
+    fill_cloud,
+    fill_lines,
     next_place,
     nominal_camera_from_radar,
     range_rings,
     rays_to,
     vertical_field_of_view_rad,
 )
-from cocalib.web.view3d.sight import Sight, true_positions
-from cocalib.web.view3d.space_look import ground_m
-from cocalib.web.view3d.surveyed import SurveyNodes
+from cocalib.web.view3d.sight import Sight, ground_m, true_positions
 
 if TYPE_CHECKING:
     import viser
+from typing import TYPE_CHECKING
+
+from cocalib.web.messages import PlacementState
+from cocalib.web.view3d.returns import map_colours
+
+if TYPE_CHECKING:
+    import viser
+
 
 STAND_AT, LOOK_AT = (-5.0, 0.0, 3.6), (6.0, 0.0, -0.4)
 """Initial position and target of the 3D view's camera, until the extent of the data is known."""
@@ -35,7 +44,7 @@ STAND_AT, LOOK_AT = (-5.0, 0.0, 3.6), (6.0, 0.0, -0.4)
 FIELD_OF_VIEW_RAD = 0.75
 
 _MOST_ELLIPSOIDS = 200
-_LARGE_PX = 30.0  # as in static/colours.js: a colour means the same after every click
+_LARGE_PX = 30.0  # as in static/shell/colours.js: a colour means the same after every click
 """More would be a cloud in which none can be told from the others, and 2 kB each for every answer."""
 _USUAL_RANGE_M, _USUAL_SIZE_M = 12.0, 0.12
 """The size of a return of middle strength in data that reach so far [m]; farther data have larger returns, by the square root."""
@@ -242,3 +251,48 @@ def _shells(calibration: Calibration, pairs: tuple[PairResult, ...]) -> np.ndarr
 def _place(node: Any, target_from_node: RigidTransform) -> None:
     node.wxyz = quaternion_wxyz_from_matrix(target_from_node.rotation)
     node.position = target_from_node.translation_m
+
+
+_RING_SHARE = 0.025
+"""Radius of a placement's ring, as a share of the extent."""
+
+
+class SurveyNodes:
+    """The nodes of viser that show what is known of the whole recording; filled again only when that changes."""
+
+    def __init__(self, scene: "viser.SceneApi") -> None:
+        self._map = add_cloud(scene, "/map", 0.1)
+        self._rings = {
+            state: add_lines(scene, f"/placements_{state}", width_px, DARK.next)
+            for state, width_px in (("open", 2.0), ("clicked", 1.0))
+        }
+        self._mapped: object = None
+        self._placed: object = None
+
+    def show(self, sight: Sight) -> None:
+        """Draw the map and the placements of a Sight."""
+        self._show_map(sight)
+        states, palette = sight.placement_states(), LIGHT if sight.light else DARK
+        placed = (tuple(map(id, sight.placements)), states, sight.extent, sight.light, id(sight.calibration))
+        if placed == self._placed:
+            return
+        self._placed = placed
+        positions = np.array([placement.position_radar_m for placement in sight.placements]).reshape(-1, 3)
+        places = sight.errors.corrected(positions)
+        colours: dict[PlacementState, tuple[int, int, int]] = {"open": palette.next, "clicked": palette.rings}
+        for state, rings in self._rings.items():
+            chosen = np.array([one == state for one in states], dtype=bool)
+            rings.colors = np.array(colours[state], dtype=np.uint8)  # type: ignore[index]
+            fill_lines(rings, next_place(places[chosen], radius_m=max(0.15, _RING_SHARE * sight.extent.range_m)))
+
+    def _show_map(self, sight: Sight) -> None:
+        shown = (sight.map, sight.colour, sight.light)
+        if shown == self._mapped:
+            return
+        self._mapped = shown
+        if sight.map is None:
+            self._map.visible = False
+            return
+        points = np.stack([sight.map.x_m, sight.map.y_m, sight.map.z_m], axis=1)
+        self._map.point_size = sight.map.cell_m / 2.0
+        fill_cloud(self._map, points, map_colours(sight.map, sight.colour, light=sight.light))

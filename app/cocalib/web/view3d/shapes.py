@@ -1,7 +1,8 @@
-"""Shapes of the 3D view as arrays: rings, rays, ellipsoids, colours. All in the radar frame, all pure."""
+"""Shapes of the 3D view in the radar frame, as arrays: rings, rays, ellipsoids; and the nodes of viser that they fill."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from calib_core.options import NoiseOptions
 from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar
 from calib_core.results import Calibration, PairResult
 from cocalib.colours import Colour
+
+if TYPE_CHECKING:
+    import viser
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,3 +135,35 @@ def nominal_camera_from_radar() -> RigidTransform:
 def vertical_field_of_view_rad(camera: Camera) -> float:
     """Return the angle that the picture's height spans, ignoring lens distortion."""
     return 2.0 * float(np.arctan2(camera.height_px / 2.0, camera.matrix_px[1, 1]))
+
+
+_NOWHERE = np.zeros((1, 3))
+_NO_LINE = np.zeros((1, 2, 3))
+
+
+def add_cloud(scene: "viser.SceneApi", name: str, size_m: float) -> Any:
+    """Add a hidden point cloud."""
+    return scene.add_point_cloud(
+        name, _NOWHERE, (255, 255, 255), point_size=size_m, point_shape="circle", precision="float32", visible=False
+    )
+
+
+def add_lines(scene: "viser.SceneApi", name: str, thickness_px: float, colour: tuple[int, int, int]) -> Any:
+    """Add hidden line segments of one colour: viser treats per-point colours as linear light, but takes one colour as it is."""
+    return scene.add_line_segments(
+        name, _NO_LINE, colour, thickness=thickness_px, thickness_units="screen", visible=False
+    )
+
+
+def fill_cloud(node: Any, points: Points3, colours: np.ndarray) -> None:
+    """Assign points (n, 3) and colours (n, 3)."""
+    node.visible = len(points) > 0
+    if len(points):
+        node.points, node.colors = points, colours
+
+
+def fill_lines(node: Any, segments: np.ndarray) -> None:
+    """Assign segments (n, 2, 3)."""
+    node.visible = len(segments) > 0
+    if len(segments):
+        node.points = segments

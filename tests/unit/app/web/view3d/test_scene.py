@@ -33,8 +33,7 @@ from cocalib.web.view3d.shapes import (
     rays_to,
     vertical_field_of_view_rad,
 )
-from cocalib.web.view3d.sight import Sight
-from cocalib.web.view3d.space_look import space_look
+from cocalib.web.view3d.sight import Sight, space_look
 
 CAMERA = Camera("pinhole", 640, 480, np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]]))
 FACTS = RecordingFacts("made", np.arange(4, dtype=np.int64) * 1000, 640, 480)
