@@ -9,10 +9,9 @@ import pytest
 
 from calib_core.errors import InputError
 from calib_core.measurements import NS_PER_S, Box, TimeNs
-from cocalib.overlay_video import OverlayOptions, encoding, write_overlay
-from cocalib.overlay_video.footer import time_text
+from cocalib.overlay_video import OverlayOptions, write_overlay, writing
 from cocalib.overlay_video.marks import draw_boxes, draw_clicks, draw_returns
-from cocalib.overlay_video.panels import Panels
+from cocalib.overlay_video.panels import Panels, time_text
 from cocalib.recorded_view import RecordedView, frame_blocks
 from tests.recorded_view import boxes_around, nearest_rows, opened_view
 
@@ -122,9 +121,9 @@ def test_without_h264_the_next_codec_is_used_and_without_any_that_is_said(
 ) -> None:
     pytest.importorskip("av", reason="the extra 'video' is not installed")
     for name, label in (("mpeg4", "MPEG-4"), ("mjpeg", "Motion JPEG")):
-        monkeypatch.setattr(encoding, "_can_write", name.__eq__)
+        monkeypatch.setattr(writing, "_can_write", name.__eq__)
         assert write_overlay(view, tmp_path / f"{name}.mkv", OverlayOptions(("c.json",))).codec == label
-    monkeypatch.setattr(encoding, "_can_write", lambda _name: False)
+    monkeypatch.setattr(writing, "_can_write", lambda _name: False)
     with pytest.raises(InputError, match="none of the codecs"):
         write_overlay(view, tmp_path / "out.mp4", OverlayOptions(("c.json",)))
 
