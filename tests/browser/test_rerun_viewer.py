@@ -11,7 +11,7 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from cocalib.rerun import write_view
-from cocalib.rerun.web_viewer import serve_view
+from cocalib.rerun.viewer import serve_view
 from tests.recorded_view import nearest_rows, opened_view
 
 pytest.importorskip("rerun", reason="there is no wheel of rerun-sdk for this machine")

@@ -1,10 +1,11 @@
-"""What changes with time: the radar cloud, the pictures with the returns in them, boxes, clicks at their frames, figures."""
+"""What changes with time (radar cloud, pictures with returns, boxes, clicks, figures), and how the viewer lays it out."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import rerun as rr
+import rerun.blueprint as rrb
 
 from calib_core.arrays import Indices, TimesNs
 from calib_core.errors import InputError, MessageError
@@ -12,25 +13,31 @@ from calib_core.measurements import Box, TimeNs
 from calib_core.results import PairResult
 from cocalib.colours import residual_colours
 from cocalib.recorded_view import FrameBlock, RecordedView, SeenReturns, box_words, frame_blocks, seen_in
-from cocalib.rerun.entities import (
+from cocalib.rerun.unmoving import (
     ACC,
     AED,
     AGAINST_RETURNS,
     BOXES,
     CLICKED_NOW,
+    HALF_PIXEL_PX,
+    LARGE_PX,
+    METRICS,
     PICTURE,
+    RADAR,
     RESIDUALS,
     RETURNS,
     RETURNS_SEEN,
     SEEN_RETURNS,
+    SUMMARY,
     TIMELINE,
+    ellipse_strips,
 )
-from cocalib.rerun.unmoving import HALF_PIXEL_PX, LARGE_PX, ellipse_strips
 
 _AGAINST = (230, 120, 230)
 _CHUNK_BYTES = 4 << 20
 _PATIENCE_S = 60.0
 _HUES = ((255, 210, 80), (110, 220, 130), (90, 190, 255), (255, 140, 120), (200, 160, 255), (240, 240, 240))
+_BACKGROUND = (13, 16, 20)
 
 
 @dataclass(slots=True)
@@ -231,3 +238,40 @@ def flush(stream: rr.RecordingStream) -> None:
 
 def _times(times_ns: TimesNs) -> rr.TimeColumn:
     return rr.TimeColumn(TIMELINE, timestamp=times_ns.astype("datetime64[ns]"))
+
+
+def layout(view: RecordedView) -> rrb.Blueprint:
+    """Return the blueprint for what there is to show."""
+    series = [_series("Returns in the picture", RETURNS_SEEN)]
+    if view.pairs:
+        series.insert(0, _series("Residuals [px]", RESIDUALS, AED))
+    if view.acc_by_frame():
+        series.insert(0, _series("Acc [%]", ACC))
+    picture = rrb.Spatial2DView(origin=PICTURE, name="Picture")
+    far_m = view.colours.high if view.colours.quantity == "range" else 30.0
+    eye = rrb.EyeControls3D(
+        position=(-0.35 * far_m, 0.0, 0.35 * far_m), look_target=(0.3 * far_m, 0.0, 0.0), eye_up=(0, 0, 1)
+    )
+    space = rrb.Spatial3DView(origin=RADAR, name="Radar frame", background=_BACKGROUND, eye_controls=eye)
+    summary = rrb.TextDocumentView(origin=SUMMARY, name="Summary")
+    left = rrb.Vertical(picture, *series, row_shares=[3.0, *([1.0] * len(series))])
+    right = rrb.Vertical(space, summary, row_shares=[3.0, 1.6])
+    return rrb.Blueprint(
+        rrb.Horizontal(left, right, column_shares=[1.2, 1.0]),
+        rrb.TimePanel(timeline=TIMELINE, state="collapsed"),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        auto_views=False,
+    )
+
+
+def _series(name: str, *contents: str) -> rrb.TimeSeriesView:
+    """Return a plot over the whole recording."""
+    always = rr.TimeRange(start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite())
+    return rrb.TimeSeriesView(
+        origin=METRICS,
+        contents=list(contents),
+        name=name,
+        axis_x=rrb.TimeAxis(view_range=always),
+        plot_legend=rrb.Corner2D.LeftTop,
+    )

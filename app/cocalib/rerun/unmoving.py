@@ -1,6 +1,6 @@
-"""What holds for the whole recording: transforms, the frustum, reflectors, all clicks, uncertainty, the summary."""
+"""What holds for the whole recording: entity paths, transforms, the frustum, reflectors, all clicks, uncertainty, the summary."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import rerun as rr
@@ -12,21 +12,28 @@ from calib_core.radar import covariance_from_sigma_polar
 from calib_core.results import Calibration, PairResult
 from cocalib.colours import residual_colours
 from cocalib.recorded_view import RecordedView
-from cocalib.rerun.entities import (
-    AGAINST_CAMERA,
-    AGAINST_RETURNS,
-    CAMERA,
-    CAMERA_POSITION,
-    PAIRS,
-    PICTURE,
-    RADAR,
-    REFLECTORS,
-    RETURNS,
-    SEEN_RETURNS,
-    SUMMARY,
-)
-from cocalib.rerun.summary import summary_text
 
+TIMELINE = "recorded"
+"""The stamps of the recording, as the solver uses them."""
+RADAR = "radar"
+"""The root: the radar's frame, x forward, y left, z up."""
+RETURNS = f"{RADAR}/returns"
+REFLECTORS = f"{RADAR}/reflectors"
+CAMERA = f"{RADAR}/camera"
+CAMERA_POSITION = f"{RADAR}/camera_position_95"
+AGAINST_CAMERA = f"{RADAR}/against"
+PICTURE = f"{CAMERA}/picture"
+SEEN_RETURNS = f"{PICTURE}/returns"
+AGAINST_RETURNS = f"{PICTURE}/returns_against"
+BOXES = f"{PICTURE}/boxes"
+PAIRS = f"{PICTURE}/all_clicks"
+CLICKED_NOW = f"{PICTURE}/clicked_now"
+METRICS = "metrics"
+RESIDUALS = f"{METRICS}/residual_px"
+AED = f"{METRICS}/aed_px"
+ACC = f"{METRICS}/acc_percent"
+RETURNS_SEEN = f"{METRICS}/returns_in_picture"
+SUMMARY = "summary"
 HALF_PIXEL_PX = 0.5
 """Rerun's (0, 0) is the corner of the top-left pixel, ours its centre."""
 LARGE_PX = 30.0
@@ -155,3 +162,49 @@ def _ellipsoids(
         labels=list(labels),
         show_labels=False,
     )
+
+
+def summary_text(view: RecordedView) -> str:
+    """Return the summary as plain text: as Markdown, a name in a recording could make the viewer fetch a picture."""
+    return "\n".join(_lines(view)) + "\n"
+
+
+def _lines(view: RecordedView) -> Iterator[str]:
+    recording = view.recording
+    yield f"recording: {recording.name}"
+    yield f"radar: {recording.radar_topic}, camera: {recording.image_topic}"
+    yield ""
+    yield str(view.calibration)
+    yield ""
+    yield from _figures(view)
+    what = "range" if view.colours.quantity == "range" else "radial speed"
+    low, high = view.colours.ends
+    yield f"returns: coloured by {what}, {low} to {high}"
+    if view.against is not None:
+        yield "pink: the other calibration"
+    if view.pairs:
+        yield "clicks: blue for residuals near 0 px, red from 30 px; outlines contain 95 % of the clicks of good pairs"
+    if view.calibration.camera.is_distorted:
+        yield (
+            "lens: returns are projected through the calibration's own lens; the frustum in 3D is of the camera matrix alone, "
+            "because Rerun has no lens distortion"
+        )
+    for warning in view.calibration.warnings:
+        yield f"warning {warning.code}: {warning.message}"
+
+
+def _figures(view: RecordedView) -> Iterator[str]:
+    evaluation = view.evaluation
+    if evaluation is None:
+        return
+    if evaluation.residuals is not None:
+        figures = evaluation.residuals
+        metrics = figures.metrics
+        yield (
+            f"on this recording: AED {metrics.aed_px:.2f} px, CDSD {metrics.cdsd_px:.2f} px, median {figures.median_px:.2f} px, "
+            f"{metrics.n} clicks"
+        )
+    boxes = evaluation.boxes
+    if boxes is not None and boxes.acc is not None:
+        frames = sum(frame.returns > 0 for frame in boxes.frames)
+        yield f"Acc {100 * boxes.acc:.1f} % over {frames} frames ({boxes.source}); it is nearly blind to roll"

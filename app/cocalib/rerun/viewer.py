@@ -1,4 +1,4 @@
-"""Show a file in Rerun's web viewer, served by us on this machine only.
+"""Show a file in Rerun's own window, or in its web viewer, served by us on this machine only.
 
 Rerun's own server of the web viewer cannot forbid the page anything, and the page asks the internet for the newest version,
 examples and a font, and sends usage data. Its three files are therefore taken once from that server, on this machine, and
@@ -11,6 +11,7 @@ import secrets
 import shutil
 import socket
 import subprocess
+import sys
 import time
 import urllib.error
 import urllib.request
@@ -40,6 +41,8 @@ _ASSETS = {
     "re_viewer_bg.wasm": "application/wasm",
 }
 _PATIENCE_S = 30.0
+_TO_ONE_MACHINE = ("--bind", "127.0.0.1", "--port", "auto")
+"""The viewer also listens for programs that log to it: on all interfaces unless it is told otherwise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,3 +183,30 @@ class _Handler(BaseHTTPRequestHandler):
 
     def log_message(self, format: str, *args: object) -> None:
         """Print nothing."""
+
+
+def require_display(environment: Mapping[str, str], platform: str = sys.platform) -> None:
+    """Refuse to go on where no window can be opened.
+
+    Raises:
+        InputError: there is no display.
+    """
+    if platform.startswith("linux") and not (environment.get("DISPLAY") or environment.get("WAYLAND_DISPLAY")):
+        raise InputError(
+            "no window can be opened here: there is no display (DISPLAY and WAYLAND_DISPLAY are not set, as over ssh). Use "
+            "--web for a viewer in the browser, or write a file with cocalib record-rrd ... --out FILE.rrd and open it on a "
+            "computer with a screen"
+        )
+
+
+def open_window(path: Path) -> int:
+    """Show a file in Rerun's window until it is closed; return its exit code.
+
+    Raises:
+        InputError: the viewer is missing or cannot be started.
+    """
+    command = [str(viewer_program()), *_TO_ONE_MACHINE, str(path)]
+    try:
+        return subprocess.run(command, env=offline_environment(os.environ), check=False).returncode
+    except OSError as error:
+        raise InputError(f"{command[0]}: cannot be started: {(error.strerror or str(error)).lower()}") from error

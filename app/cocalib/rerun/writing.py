@@ -66,7 +66,7 @@ def _stream_to(part: Path, view: RecordedView) -> "Iterator[rr.RecordingStream]"
     """Yield a stream that writes to a file; it is closed in any case."""
     import rerun as rr
 
-    from cocalib.rerun.layout import layout
+    from cocalib.rerun.moving import layout
 
     stream = rr.RecordingStream(_APPLICATION, send_properties=False)
     try:

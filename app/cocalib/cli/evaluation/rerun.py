@@ -43,7 +43,7 @@ class Rerun:
 
 
 def _serve(path: Path, port: int) -> int:
-    from cocalib.rerun.web_viewer import serve_view
+    from cocalib.rerun.viewer import serve_view
 
     with serve_view(path, port) as served:
         print(f"open {served.url}", flush=True)

@@ -16,7 +16,7 @@ import pytest
 from calib_core.errors import InputError
 from cocalib.rerun import require_display
 from cocalib.rerun.sdk import offline_environment
-from cocalib.rerun.web_viewer import POLICY, serve_view
+from cocalib.rerun.viewer import POLICY, serve_view
 
 BLOCKED = """
 import sys

@@ -13,7 +13,7 @@ import pytest
 from calib_core.errors import InputError
 from cocalib.recorded_view import RecordedView
 from cocalib.rerun import write_view
-from cocalib.rerun.summary import summary_text
+from cocalib.rerun.unmoving import summary_text
 from cocalib.rerun.writing import _require_complete
 from tests.recorded_view import boxes_around, nearest_rows, opened_view
 
