@@ -1,22 +1,24 @@
-"""Calibrating a lens in the background: started, watched and cancelled from other threads, one calibration at a time."""
+"""Look for the board and calibrate the lens: at once, or in the background, watched and cancelled from other threads."""
 
 import logging
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 from typing import Literal, TypeAlias
 
 from calib_core.errors import CalibrationError, InputError
 from calib_core.intrinsics import (
     Board,
+    BoardCorners,
     BoardPictures,
     BoardSearch,
     CalibratedLens,
     IntrinsicsOptions,
     SearchProgress,
+    calibrate_lens,
+    search_boards,
 )
 from calib_core.measurements import Unsolvable
-from cocalib.intrinsics.calibrating import calibrate_from
 from cocalib.platform.error_boundary import error_boundary
 
 LensStage: TypeAlias = Literal["idle", "searching", "calibrating", "cancelled", "failed", "done"]
@@ -162,3 +164,33 @@ class LensJob:
         with self._lock:
             self._snapshot = replace(self._snapshot, **changes)  # type: ignore[arg-type]
         self._changed()
+
+
+def calibrate_from(
+    pictures: BoardPictures,
+    board: Board,
+    options: IntrinsicsOptions | None = None,
+    *,
+    known: tuple[BoardCorners, ...] = (),
+    searched: Collection[int] = (),
+    progress: Callable[[SearchProgress | str], None] | None = None,
+    stopped: Callable[[], bool] = lambda: False,
+) -> tuple[BoardSearch, CalibratedLens] | Unsolvable:
+    """Find the board in pictures, and calibrate the lens that took them.
+
+    Args:
+        pictures: where to look.
+        board: what to look for.
+        options: of the calibration.
+        known: views of an earlier search.
+        searched: numbers of the pictures that it looked at.
+        progress: called while the board is looked for, and then with what is done next, in words.
+        stopped: asked often; once it is true there is no calibration.
+    """
+    search = search_boards(pictures, board, known=known, searched=searched, progress=progress, stopped=stopped)
+    if isinstance(search, Unsolvable):
+        return search
+    if stopped():
+        return Unsolvable("stopped", "the calibration was stopped", "start it again")
+    lens = calibrate_lens(search, options, progress=progress, stopped=stopped)
+    return lens if isinstance(lens, Unsolvable) else (search, lens)

@@ -200,7 +200,7 @@ def _file_name(name: str) -> str:
 def _about_series(pictures: "OpenPictures") -> "Iterator[DataWarning]":
     """Warn if the files given are perhaps of several cameras."""
     from calib_core.results import DataWarning
-    from cocalib.intrinsics.picture_files import FilePictures, series_of
+    from cocalib.intrinsics.picture_sources import FilePictures, series_of
 
     series = series_of(pictures.paths) if isinstance(pictures, FilePictures) else {}
     if len(series) > 1:

@@ -8,7 +8,7 @@ import pytest
 
 from calib_core.errors import InputError
 from cocalib.intrinsics import open_pictures
-from cocalib.intrinsics.picture_files import pictures_in
+from cocalib.intrinsics.picture_sources import pictures_in
 
 
 def grey(value: int) -> np.ndarray:
