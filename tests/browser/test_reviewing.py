@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from calib_core.recordings import Recording
-from cocalib.opening.reference import reference_from
+from cocalib.opening.opened import reference_from
 from cocalib.web.port.link import ServerOptions
 from cocalib.web.port.server import start
 from cocalib.workspace import open_workspace

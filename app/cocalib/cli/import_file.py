@@ -105,7 +105,7 @@ def _sized_camera(found: "ImportedCalibration", path: Path, image_size_px: tuple
         InputError: the matrix is not a camera's.
     """
     from calib_core.recordings import size_of_pictures_beside
-    from cocalib.opening.reference import camera_of
+    from cocalib.opening.opened import camera_of
 
     if found.matrix_px is None:
         if image_size_px is not None:

@@ -6,7 +6,7 @@ import pytest
 
 from calib_core.measurements import TimeNs
 from cocalib.opening.choice import Choice
-from cocalib.opening.sessions import fitting_clicks, session_folder, session_offer
+from cocalib.opening.opened import fitting_clicks, session_folder, session_offer
 from cocalib.session import ClickPlaced, RecordingFacts
 from cocalib.session.file import SessionFileError, has_session_of, open_session_file
 from cocalib.workspace import open_workspace, recording_facts

@@ -27,7 +27,7 @@ from calib_core.measurements import (
     Unsolvable,
 )
 from calib_core.radar import RadarErrors
-from cocalib.opening.reference import camera_in, reference_from
+from cocalib.opening.opened import camera_in, reference_from
 from cocalib.session import History, RecordingFacts, Session
 from cocalib.solving.solving import check_clicks
 from cocalib.view import Reference, shown_calibration, view

@@ -13,7 +13,7 @@ from calib_core.geometry import RigidTransform
 from calib_core.recordings import Recording, open_recording
 from cocalib.hypothesis_sheet import OpenMeaning
 from cocalib.opening.choice import MeaningPick
-from cocalib.opening.reference import about_calibration, meaning_of, reference_from
+from cocalib.opening.opened import about_calibration, meaning_of, reference_from
 from cocalib.view import Reference
 from cocalib.web.channel.open_meaning import drawn_meaning, meaning_rows
 
