@@ -1,11 +1,9 @@
 """The report: one self-contained HTML file that says how good a calibration is, where, and how one knows."""
 
-from cocalib.report.current_report import current_report
-from cocalib.report.making import against_of, known_calibration, subject_of
+from cocalib.report.making import against_of, current_report, known_calibration, subject_of, watched
 from cocalib.report.page import report_html
 from cocalib.report.printing import PrintingError, print_pdf
 from cocalib.report.subject import Against, Judged, Picture, ReportSubject, Watched
-from cocalib.report.watching import watched
 
 __all__ = [
     "Against",

@@ -3,8 +3,7 @@
 import base64
 
 from calib_core.results import Calibration
-from cocalib.report.html_file import html_file
-from cocalib.report.markup import Child, Markup, tag
+from cocalib.report.markup import Child, Markup, html_file, tag
 from cocalib.report.residual_rows import rows_at_clicks, rows_of_pairs
 from cocalib.report.sections.acc import acc
 from cocalib.report.sections.answer import answer

@@ -171,7 +171,7 @@ class Intrinsics:
         """Write the report and the rectified pictures, if they are asked for."""
         told = sys.stderr if self.json else sys.stdout
         if self.report is not None:
-            from cocalib.report.lens import lens_report_html
+            from cocalib.report.lens_page import lens_report_html
 
             write_whole(self.report, lens_report_html(lens, search.source, coverage, searched=found.searched))
             print(f"report written to {self.report}", file=told)

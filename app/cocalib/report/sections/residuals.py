@@ -6,9 +6,15 @@ from calib_core.arrays import Values
 from calib_core.results import Calibration
 from cocalib.report.markup import Child, Markup, tag
 from cocalib.report.plots import Axes, MarkKind, captioned, drawing, mark, rounded_step, text
-from cocalib.report.residual_rows import ResidualRows
+from cocalib.report.residual_rows import (
+    ResidualRows,
+    azimuth_sentence,
+    place_sentence,
+    range_sentence,
+    shift_sentence,
+    time_sentence,
+)
 from cocalib.report.sections.uncertainty import picture_layer
-from cocalib.report.trends import azimuth_sentence, place_sentence, range_sentence, shift_sentence, time_sentence
 from cocalib.view.wording import plain
 
 _WIDTH = 320.0

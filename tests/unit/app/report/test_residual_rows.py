@@ -5,8 +5,15 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from cocalib.report.residual_rows import ResidualRows
-from cocalib.report.trends import azimuth_sentence, place_sentence, range_sentence, shift_sentence, time_sentence, trend
+from cocalib.report.residual_rows import (
+    ResidualRows,
+    azimuth_sentence,
+    place_sentence,
+    range_sentence,
+    shift_sentence,
+    time_sentence,
+    trend,
+)
 from tests.unit.app.report.planted import SIZE_PX, planted_rows
 
 

@@ -1,0 +1,345 @@
+"""The report on a lens, from the figures to be judged to everything that was measured."""
+
+import math
+
+import numpy as np
+
+from calib_core.camera import Camera
+from calib_core.interchange.own.board_views_json import PictureSource
+from calib_core.intrinsics import (
+    MODEL_ERRORS_UNSEEN,
+    CalibratedLens,
+    ResidualField,
+    projection_uncertainty,
+    residual_field,
+    split_difference,
+)
+from calib_core.intrinsics.coverage import Coverage
+from calib_core.measurements import Unsolvable
+from cocalib.intrinsics.field_of_view import field_of_view_text
+from cocalib.report.markup import Child, Markup, html_file, scrolled, tag
+from cocalib.report.plots import Axes, captioned, drawing, mark, text
+from cocalib.view.number_format import plain, with_sigma
+from cocalib.view.wording import sentence
+
+_MOST_ROWS = 400
+_WIDTH = 320.0
+_MOST_POINTS = 1500
+_LONGEST = 22.0
+
+
+def lens_report_html(lens: CalibratedLens, source: PictureSource, coverage: Coverage, *, searched: int) -> str:
+    """Return the report as HTML that is well-formed XML, too; the same lens gives the same bytes.
+
+    Args:
+        lens: with its views.
+        source: of the pictures.
+        coverage: of the used views.
+        searched: how many pictures were looked at.
+    """
+    body = tag(
+        "body",
+        tag("header", tag("h1", "Camera lens report"), tag("p", tag("b", source.name), f", {_board_text(lens)}")),
+        tag(
+            "main",
+            _answer(lens, searched),
+            warning_list(lens),
+            uncertainty_over_the_picture(lens),
+            residuals_over_the_picture(lens),
+            coverage_of_views(lens, coverage),
+            errors_of_views(lens),
+            view_table(lens),
+            left_out_table(lens),
+        ),
+        tag("footer", _foot()),
+    )
+    return html_file(f"Camera lens report: {source.name}", body)
+
+
+def _answer(lens: CalibratedLens, searched: int) -> Markup:
+    camera = lens.camera
+    said = (
+        f"{camera.model}, {camera.width_px} x {camera.height_px} px, field of view {field_of_view_text(camera)}. "
+        f"RMS {lens.rms_px:.3f} px in {len(lens.views)} used views, {lens.held_out_rms_px:.3f} px in views left out in turn; "
+        f"{searched} pictures searched, {len(lens.left_out)} left out."
+    )
+    return tag(
+        "section",
+        tag("h2", "The lens"),
+        tag("p", said),
+        tag("div", parameter_table(lens), model_table(lens), class_="two"),
+        id="lens",
+    )
+
+
+def _board_text(lens: CalibratedLens) -> str:
+    return f"{lens.board.text}, {1e3 * lens.board.square_m:g} mm"
+
+
+def _foot() -> str:
+    return (
+        "Pixel (0, 0) is the centre of the top-left pixel. Sigma is one standard deviation. Held out: with the lens calibrated "
+        "without that view. The same pictures give the same file, byte for byte."
+    )
+
+
+def warning_list(lens: CalibratedLens) -> Markup:
+    """Return the warnings with what to do."""
+    items = [
+        tag("li", tag("code", one.code), " ", sentence(one.message), " ", tag("b", sentence(one.hint)))
+        for one in lens.warnings
+    ]
+    body = tag("ul", *items, class_="cautions") if items else tag("p", "No warnings.", class_="note")
+    return tag("section", tag("h2", "Cautions"), body, id="cautions")
+
+
+def parameter_table(lens: CalibratedLens) -> Markup:
+    """Return the parameters with their standard deviations."""
+    camera = lens.camera
+    known = camera.covariance
+    rows = [
+        _row(
+            name.removesuffix("_px") + (" [px]" if name.endswith("_px") else ""),
+            plain(value, 6) if known is None else with_sigma(value, known.sigma(name)),
+        )
+        for name, value in zip(camera.parameter_names, camera.parameters.tolist(), strict=True)
+    ]
+    return tag("div", tag("h3", f"Parameters ({camera.model})"), _table("Parameters", ("", "value ± sigma"), rows))
+
+
+def model_table(lens: CalibratedLens) -> Markup:
+    """Return the models that were tried."""
+    rows = [
+        _row(
+            one.model,
+            _pixels(one.rms_px),
+            _pixels(one.held_out_rms_px),
+            one.fault or f"{one.worse_by:.4f} ± {one.standard_error:.4f}",
+        )
+        for one in lens.trials
+    ]
+    heads = ("model", "RMS [px]", "held out [px]", "worse by [px²]")
+    return tag(
+        "div", tag("h3", "Models"), _table("Models", heads, rows), tag("p", sentence(lens.choice), class_="note")
+    )
+
+
+def view_table(lens: CalibratedLens) -> Markup:
+    """Return every used view with its errors."""
+    rows = [
+        _row(
+            view.corners.name,
+            f"{int(view.used.sum())} of {len(view.used)}",
+            _pixels(view.rms_px),
+            _pixels(view.held_out_rms_px),
+            _pixels(view.corners.blur_px),
+        )
+        for view in lens.views[:_MOST_ROWS]
+    ]
+    heads = ("view", "corners used", "RMS [px]", "held out [px]", "blur [px]")
+    return tag("section", tag("h2", "Every view"), _table("Views", heads, rows), id="every-view")
+
+
+def left_out_table(lens: CalibratedLens) -> Markup:
+    """Return the pictures that were not used, with the reasons."""
+    rows = [tag("li", tag("b", one.name), f": {one.reason}") for one in lens.left_out[:_MOST_ROWS]]
+    if len(lens.left_out) > _MOST_ROWS:
+        rows.append(tag("li", f"{len(lens.left_out) - _MOST_ROWS} more."))
+    body = tag("ul", *rows) if rows else tag("p", "None: every picture with a board was used.", class_="note")
+    return tag("section", tag("h2", "Left out"), body, id="left-out")
+
+
+def _row(head: str, *cells: str) -> Markup:
+    return tag("tr", tag("th", head, scope="row"), *(tag("td", cell) for cell in cells))
+
+
+def _table(name: str, heads: tuple[str, ...], rows: list[Markup]) -> Markup:
+    titles: list[Child] = [tag("th", head, scope="col") for head in heads]
+    return scrolled(name, tag("thead", tag("tr", *titles)), tag("tbody", *rows), class_="figures")
+
+
+def _pixels(value: float) -> str:
+    return f"{value:.3f}" if math.isfinite(value) else "–"
+
+
+def residuals_over_the_picture(lens: CalibratedLens) -> Markup:
+    """Return the mean residuals as arrows over the picture, and all residuals as a scatter."""
+    found = residual_field(lens)
+    return tag(
+        "section",
+        tag("h2", "Residuals"),
+        tag("div", _arrows(found, lens.camera), _scatter(found), class_="two"),
+        id="residuals",
+    )
+
+
+def _arrows(found: ResidualField, camera: Camera) -> Markup:
+    means = found.means_px.reshape(-1, 2)
+    x_px, y_px = (axis.ravel() for axis in np.meshgrid(found.x_px, found.y_px))
+    there = np.isfinite(means).all(axis=1)
+    longest = float(np.hypot(*means[there].T).max()) if there.any() else 0.0
+    gain = _LONGEST / max(longest, 1e-9)
+    shapes: list[Child] = [_picture_frame(camera)]
+    for x, y, (du, dv) in zip(x_px[there], y_px[there], means[there].tolist(), strict=True):
+        at_u, at_v = _places(camera, x, y)
+        shapes.append(tag("line", x1=at_u, y1=at_v, x2=at_u + gain * du, y2=at_v + gain * dv, class_="vector"))
+        shapes.append(tag("circle", cx=at_u, cy=at_v, r=1.6, class_="used"))
+    said = f"Mean residual of each part of the picture; the longest line is {plain(longest, 2)} px. {found.sentence}"
+    return captioned("Mean residuals", _over_picture(said, camera, *shapes), said)
+
+
+def _scatter(found: ResidualField) -> Markup:
+    residuals = found.residuals_px
+    reach = max(float(np.abs(residuals).max()), 1e-3)
+    axes = Axes(-reach, reach, -reach, reach, left=90.0, top=8.0, width=138.0, height=138.0)
+    step = -(-len(residuals) // _MOST_POINTS)
+    points = [tag("circle", cx=axes.x(u), cy=axes.y(-v), r=0.9, class_="radar") for u, v in residuals[::step].tolist()]
+    rms = float(np.sqrt(np.square(residuals).sum(axis=1).mean()))
+    said = f"{len(residuals)} corners, projected minus found; root mean square distance {rms:.3f} px."
+    return captioned("All residuals", drawing(said, axes.drawn("right [px]", "down, negative [px]"), *points), said)
+
+
+def uncertainty_over_the_picture(lens: CalibratedLens) -> Markup:
+    """Return how far the projection of far points is known, and two halves of the views calibrated separately."""
+    grid = projection_uncertainty(lens, columns=16, rows=10)
+    sigmas = grid.sigma_px
+    finite = sigmas[np.isfinite(sigmas)]
+    span = f"{plain(float(finite.min()), 2)} to {plain(float(finite.max()), 2)} px" if len(finite) else "not known"
+    said = f"Standard deviation of a far point's pixel: {span}; the darker, the less is known. {MODEL_ERRORS_UNSEEN}"
+    drawn = _over_picture(said, lens.camera, *_cells(sigmas, lens.camera), _picture_frame(lens.camera))
+    shown: list[Child] = [captioned("Projection uncertainty", drawn, said)]
+    halves = split_difference(lens)
+    if isinstance(halves, Unsolvable):
+        shown.append(tag("p", f"Not cross-checked: {halves.reason}.", class_="note"))
+    else:
+        cells = _cells(halves.apart_px, lens.camera)
+        drawn = _over_picture(halves.sentence, lens.camera, *cells, _picture_frame(lens.camera))
+        words = f"Distance between the projections of both lenses. {halves.sentence}"
+        shown.append(captioned("Halves calibrated separately", drawn, words))
+    return tag("section", tag("h2", "How well the lens is known"), tag("div", *shown, class_="two"), id="uncertainty")
+
+
+def covered(lens: CalibratedLens, coverage: Coverage) -> Markup:
+    """Return how many corners lie in each part of the picture."""
+    camera = lens.camera
+    rows, columns = coverage.counts.shape
+    most = max(int(coverage.counts.max()), 1)
+    height = _height(camera)
+    shapes: list[Child] = [_picture_frame(camera)]
+    for row in range(rows):
+        for column in range(columns):
+            count = int(coverage.counts[row, column])
+            left, top = _WIDTH * column / columns, height * row / rows
+            shade = _share_text(0.75 * (count / most) ** 0.5)
+            shapes.append(_cell(left, top, _WIDTH / columns, height / rows, shade))
+            shapes.append(
+                text(left + _WIDTH / columns / 2, top + height / rows / 2 + 3, str(count), class_="middle label")
+            )
+    said = f"Corners in each part of the picture; {100.0 * coverage.share:.0f} % of it is covered."
+    return captioned("In the picture", _over_picture(said, camera, *shapes), said)
+
+
+def _share_text(value: float) -> str:
+    """Write a share with three decimals."""
+    return f"{value:.3f}"
+
+
+def _cells(values: np.ndarray, camera: Camera) -> list[Child]:
+    """Return a shaded cell for each value, on a logarithmic scale, with the value in some of them."""
+    rows, columns = values.shape
+    width, height = _WIDTH / columns, _height(camera) / rows
+    finite = values[np.isfinite(values) & (values > 0)]
+    low, high = (float(np.log(finite.min())), float(np.log(finite.max()))) if len(finite) else (0.0, 1.0)
+    shapes: list[Child] = []
+    labels: list[Child] = []
+    for row, column in np.ndindex(rows, columns):
+        value = float(values[row, column])
+        if not np.isfinite(value) or value <= 0:
+            continue
+        share = (np.log(value) - low) / max(high - low, 1e-9)
+        shapes.append(_cell(column * width, row * height, width, height, _share_text(0.05 + 0.7 * share)))
+        if row % 3 == 0 and column % 5 == 0:
+            at = (column + 0.5) * width, (row + 0.5) * height + 3
+            labels.append(text(*at, plain(value, 2), class_="middle label"))
+    return [*shapes, *labels]
+
+
+def _cell(left: float, top: float, width: float, height: float, shade: str) -> Markup:
+    return tag("rect", x=left, y=top, width=width, height=height, class_="shaded", fill_opacity=shade)
+
+
+def _picture_frame(camera: Camera) -> Markup:
+    return tag("rect", x=0.0, y=0.0, width=_WIDTH, height=_height(camera), class_="frame")
+
+
+def _height(camera: Camera) -> float:
+    return _WIDTH * camera.height_px / camera.width_px
+
+
+def _places(camera: Camera, u_px: float, v_px: float) -> tuple[float, float]:
+    scale = _WIDTH / camera.width_px
+    return (u_px + 0.5) * scale, (v_px + 0.5) * scale
+
+
+def _over_picture(alternative: str, camera: Camera, *shapes: Child) -> Markup:
+    return drawing(alternative, *shapes, width=_WIDTH, height=_height(camera))
+
+
+def coverage_of_views(lens: CalibratedLens, coverage: Coverage) -> Markup:
+    """Return where the corners are, how the board was turned and how far it was, and what to film next."""
+    missing: list[Child] = [tag("li", sentence(one)) for one in coverage.missing]
+    return tag(
+        "section",
+        tag("h2", "Coverage"),
+        tag("div", covered(lens, coverage), _tilts(lens), _distances(lens), class_="three"),
+        tag("ul", *missing) if missing else None,
+        id="coverage",
+    )
+
+
+def _tilts(lens: CalibratedLens) -> Markup:
+    normals = np.array([view.camera_from_board.rotation[:, 2] for view in lens.views])
+    normals = normals * np.where(normals[:, 2:] < 0, -1.0, 1.0)
+    sideways = np.degrees(np.arctan2(normals[:, 0], normals[:, 2]))
+    upwards = np.degrees(np.arctan2(-normals[:, 1], normals[:, 2]))
+    axes = Axes(-70.0, 70.0, -70.0, 70.0, left=90.0, width=138.0)
+    inside = np.clip(np.stack([sideways, upwards], axis=1), -70.0, 70.0)
+    marks = [mark("used", axes.x(x), axes.y(y)) for x, y in inside.tolist()]
+    said = (
+        f"Tilt of the board, one mark a view: {plain(float(sideways.min()), 2)} to {plain(float(sideways.max()), 2)} deg "
+        f"sideways, {plain(float(upwards.min()), 2)} to {plain(float(upwards.max()), 2)} deg up or down."
+    )
+    return captioned("Tilts", drawing(said, axes.drawn("sideways [deg]", "up [deg]"), *marks), said)
+
+
+def _distances(lens: CalibratedLens) -> Markup:
+    middle = lens.board_shape_m.mean(axis=0)
+    poses = [view.camera_from_board for view in lens.views]
+    distances = np.array([np.linalg.norm(pose.rotation @ middle + pose.translation_m) for pose in poses])
+    rms = np.array([view.rms_px for view in lens.views])
+    axes = Axes(0.0, 1.1 * float(distances.max()), 0.0, 1.15 * max(float(rms.max()), 1e-3))
+    marks = [mark("used", axes.x(x), axes.y(y)) for x, y in zip(distances.tolist(), rms.tolist(), strict=True)]
+    said = (
+        f"Distances of the board from {plain(float(distances.min()), 2)} to {plain(float(distances.max()), 2)} m, "
+        "by the stated size of its squares."
+    )
+    return captioned("Distances", drawing(said, axes.drawn("distance [m]", "RMS [px]"), *marks), said)
+
+
+def errors_of_views(lens: CalibratedLens) -> Markup:
+    """Return the root mean square error of each view: bars where it was used, circles where it was left out."""
+    used = np.array([view.rms_px for view in lens.views])
+    held_out = np.array([view.held_out_rms_px for view in lens.views])
+    highest = max(float(np.nanmax(np.concatenate([used, held_out]))), 1e-3)
+    axes = Axes(0.0, float(len(used)), 0.0, 1.1 * highest, width=600.0)
+    step = axes.width / len(used)
+    floor = axes.y(0.0)
+    shapes: list[Child] = []
+    for place, (value, other) in enumerate(zip(used.tolist(), held_out.tolist(), strict=True)):
+        left, top = axes.left + step * (place + 0.15), axes.y(value)
+        shapes.append(tag("rect", x=left, y=top, width=0.7 * step, height=floor - top, class_="bar"))
+        if np.isfinite(other):
+            shapes.append(mark("used", left + 0.35 * step, axes.y(other)))
+    said = "Bars: RMS of the used views; dots: RMS with the lens calibrated without that view."
+    drawn = drawing(said, axes.drawn("view", "RMS [px]"), *shapes, width=644.0)
+    return tag("section", tag("h2", "Views"), captioned("Errors of the views", drawn, said), id="views")
