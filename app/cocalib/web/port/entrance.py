@@ -1,6 +1,8 @@
 """What happens to each request before it reaches a page's channel or the 3D view: who is it, what is it, what is the answer."""
 
+import asyncio
 import logging
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from urllib.parse import parse_qs
@@ -9,8 +11,7 @@ import msgspec
 
 from cocalib.platform.error_boundary import error_boundary
 from cocalib.web.port import guard
-from cocalib.web.port.admissions import Admissions
-from cocalib.web.port.backoff import Backoff
+from cocalib.web.port.guard import Admissions
 from cocalib.web.port.resumption import Resumption
 from cocalib.web.port.routes import Reply, Routes, json_reply, landing, refusal
 
@@ -19,6 +20,11 @@ MAX_SOCKETS = 64
 _METHODS = ("GET", "HEAD")
 _CHALLENGE, _RESUME, _TICKET = "/api/challenge", "/api/resume", "/api/ticket"
 _log = logging.getLogger(__name__)
+_FREE_TRIES = 5
+_FIRST_DELAY_S = 0.25
+_LONGEST_DELAY_S = 8.0
+_FORGOTTEN_AFTER_S = 300.0
+_MOST_WAITING = 8
 
 
 class Entrance:
@@ -118,3 +124,44 @@ class Entrance:
             return refusal(401, "Open the link shown in the terminal.")
         cookie = self._admissions.set_cookie(self._admissions.admit())
         return json_reply(b"{}", more=(("Set-Cookie", cookie),))
+
+
+class Backoff:
+    """Lets tokens be tried one after another, ever more slowly while they are wrong. Runs on one event loop."""
+
+    def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
+        self._now = now
+        self._wrong = 0
+        self._last_wrong = now()
+        self._waiting = 0
+        self._turn: asyncio.Lock | None = None
+
+    @property
+    def delay_s(self) -> float:
+        """How long the next try has to wait [s]."""
+        if self._now() - self._last_wrong > _FORGOTTEN_AFTER_S:
+            self._wrong = 0
+        late = self._wrong - _FREE_TRIES
+        return 0.0 if late < 0 else min(_LONGEST_DELAY_S, _FIRST_DELAY_S * 2.0 ** min(late, 10))
+
+    async def turn(self) -> bool:
+        """Wait for the turn of a try; return False if too many are waiting already."""
+        if self._waiting >= _MOST_WAITING:
+            return False
+        self._turn = self._turn or asyncio.Lock()
+        self._waiting += 1
+        try:
+            async with self._turn:
+                await asyncio.sleep(self.delay_s)
+        finally:
+            self._waiting -= 1
+        return True
+
+    def wrong(self) -> None:
+        """Note a wrong token."""
+        self._wrong += 1
+        self._last_wrong = self._now()
+
+    def right(self) -> None:
+        """Note a right token: the delay ends."""
+        self._wrong = 0

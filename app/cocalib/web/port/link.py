@@ -1,11 +1,21 @@
-"""The link that opens the page: bound and printed before the server's own modules are imported.
+"""The link that opens the page, on a port or a Unix socket: bound and handed over before the server's own modules are imported.
 
 A browser takes about as long to start as the rest of the program. Whoever uses the link before the server accepts connections
 waits in the queue of the listening socket: nothing is answered before the guard can answer it.
 """
 
+import contextlib
+import getpass
+import html
+import os
+import secrets
+import shlex
 import socket
+import stat
 import sys
+import tempfile
+import threading
+import webbrowser
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,13 +23,14 @@ from typing import TextIO
 from urllib.parse import quote
 
 from cocalib.platform.loopback import is_loopback
-from cocalib.web.port.address import listening_at
-from cocalib.web.port.admissions import Admissions
-from cocalib.web.port.guard import Guard, is_address
-from cocalib.web.port.hand_over import HandOver
-from cocalib.web.port.unix_socket import forwarding_command, listening_socket, remove_socket
+from cocalib.platform.resources import state_folder
+from cocalib.web.port.address import AddressError, listening_at
+from cocalib.web.port.guard import Admissions, Guard, is_address
 
 _FORWARDED_PORT = 8080
+_SNAPS = ("firefox", "chromium", "brave", "opera")
+_LONGEST_BYTES = 103
+"""macOS allows 103 bytes, Linux 107."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,3 +146,135 @@ def _bound(options: ServerOptions) -> socket.socket | None:
 
 def _port_of(listening: socket.socket | None) -> int:
     return 0 if listening is None else int(listening.getsockname()[1])
+
+
+class HandOver:
+    """A file that leads a browser to the link; it is deleted once the link was used, or when the server stops."""
+
+    def __init__(self, url: str, opener: Callable[[str], object] | None = None) -> None:
+        """Write the file and open it; if it cannot be written, nothing is opened: the printed link remains.
+
+        Args:
+            url: the link.
+            opener: opens an address in the browser; None for the user's own.
+        """
+        self.path = _written(url)
+        if self.path is not None:
+            threading.Thread(target=opener or webbrowser.open, args=(self.path.as_uri(),), daemon=True).start()
+
+    def discard(self) -> None:
+        """Delete the file. Safe to call twice."""
+        if self.path is None:
+            return
+        try:
+            self.path.unlink(missing_ok=True)
+            self.path.parent.rmdir()
+        except OSError:
+            return  # another server's file is in the folder
+
+
+def _written(url: str) -> Path | None:
+    link = html.escape(url, quote=True)
+    page = (
+        '<!doctype html><meta charset="utf-8"><meta name="referrer" content="no-referrer"><title>cocalib</title>'
+        f'<meta http-equiv="refresh" content="0; url={link}"><p><a href="{link}">Open the page</a>\n'
+    )
+    try:
+        folder = _folder()
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        status = folder.lstat()
+        if os.name != "nt" and (status.st_uid != os.getuid() or status.st_mode & 0o077):
+            folder = Path(tempfile.mkdtemp(prefix="cocalib-"))
+        path = folder / f"open-{secrets.token_hex(8)}.html"
+        with os.fdopen(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600), "w", encoding="utf-8") as file:
+            file.write(page)
+    except OSError:
+        return None
+    return path
+
+
+def _folder() -> Path:
+    """Return a folder of this user that the browser can read: one from a snap reads no hidden folders."""
+    if sys.platform == "linux" and any(Path("/snap/bin", name).exists() for name in _SNAPS):
+        return Path.home() / "cocalib-link"
+    runtime = Path(os.environ.get("XDG_RUNTIME_DIR") or "")
+    return runtime / "cocalib" if runtime.is_absolute() and runtime.is_dir() else state_folder() / "link"
+
+
+def listening_socket(path: Path) -> socket.socket:
+    """Bind a socket that only this user can reach; one that a killed server left behind is replaced.
+
+    Args:
+        path: where to create it; its folder is created if it is missing.
+
+    Raises:
+        AddressError: the system has no Unix sockets, the path is too long or taken, or others can enter its folder.
+    """
+    path = path.absolute()
+    if not hasattr(socket, "AF_UNIX"):
+        raise AddressError("--socket: this system has no Unix sockets; leave the option out")
+    if len(os.fsencode(path)) > _LONGEST_BYTES:
+        raise AddressError(f"--socket {path}: longer than {_LONGEST_BYTES} bytes, the maximum; choose a shorter path")
+    if ":" in str(path):
+        raise AddressError(f"--socket {path}: ssh cannot forward a path with a colon; choose another one")
+    bound = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    try:
+        _require_private(path.parent)
+        _require_free(path)
+        bound.bind(str(path))
+        path.chmod(0o600)
+        bound.listen()
+    except OSError as error:
+        bound.close()
+        raise AddressError(
+            f"--socket {path}: cannot be created ({(error.strerror or str(error)).lower()}); choose another path"
+        ) from None
+    except AddressError:
+        bound.close()
+        raise
+    return bound
+
+
+def remove_socket(path: Path) -> None:
+    """Remove the socket's file, if it is one."""
+    with contextlib.suppress(OSError):
+        if stat.S_ISSOCK(path.lstat().st_mode):
+            path.unlink()
+
+
+def forwarding_command(path: Path, port: int) -> str:
+    """Return the command that forwards a port of another machine to the socket."""
+    to = shlex.quote(f"{port}:{path.absolute()}")
+    return f"ssh -N -L {to} {shlex.quote(f'{getpass.getuser()}@{socket.gethostname()}')}"
+
+
+def _require_private(folder: Path) -> None:
+    """Create the folder if it is missing; refuse one that others can enter."""
+    folder.mkdir(mode=0o700, exist_ok=True)
+    status = folder.stat()
+    if status.st_uid != os.getuid() or status.st_mode & 0o077:
+        raise AddressError(
+            f"--socket: others can enter {folder}; choose a path in a folder of your own that nobody else can enter, "
+            f"such as {_suggestion()}"
+        )
+
+
+def _suggestion() -> str:
+    runtime = os.environ.get("XDG_RUNTIME_DIR")
+    return f"{runtime}/cocalib.sock" if runtime else "~/.cocalib/socket"
+
+
+def _require_free(path: Path) -> None:
+    try:
+        mode = path.lstat().st_mode
+    except FileNotFoundError:
+        return
+    if not stat.S_ISSOCK(mode):
+        raise AddressError(f"--socket {path}: exists and is not a socket; choose another path")
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as trial:
+        try:
+            trial.connect(str(path))
+        except ConnectionRefusedError:
+            path.unlink()
+            return
+    raise AddressError(f"--socket {path}: another server is using it; stop that one, or choose another path")

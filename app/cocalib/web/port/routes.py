@@ -3,8 +3,9 @@
 import asyncio
 import gzip
 import http
+import posixpath
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
@@ -31,7 +32,6 @@ from cocalib.web.channel.radar_survey import Survey
 from cocalib.web.exports.check_point import picture_of
 from cocalib.web.exports.format_list import format_rows
 from cocalib.web.exports.query import FieldError
-from cocalib.web.port.preloading import with_preloaded_modules
 from cocalib.web.port.viser_hook import client_page
 from cocalib.workspace import Workspace
 
@@ -67,6 +67,8 @@ _LANDING = (
 _PAGE = "index.html"
 _INDEX = re.compile(r"[0-9]{1,9}")
 _VISER_PAGE = re.compile(r"/viser/[0-9a-z]{1,40}/")
+_IMPORT = re.compile(r"""^(?:import|export)\b[^'"();]*?["'](\.\.?/[a-z0-9_./]+\.js)["']""", re.MULTILINE)
+_SCRIPT = re.compile(r'<script type="module" src="([a-z0-9_/]+\.js)">')
 
 
 class Surveyor(Protocol):
@@ -331,3 +333,31 @@ def _why_none(session: Session) -> str:
     if session.is_solved and isinstance(session.outcome, Unsolvable):
         return f"{sentence(session.outcome.reason)} {sentence(session.outcome.hint)}"
     return "There is no calibration yet. Click the reflector in at least four placements."
+
+
+def with_preloaded_modules(page: str, folder: Path) -> str:
+    """Return the page with a `modulepreload` link for each module that its scripts import, directly or not.
+
+    Args:
+        page: HTML with a head.
+        folder: where the modules are.
+    """
+    names: dict[str, None] = {}
+    for script in _SCRIPT.findall(page):
+        _collect(script, folder, names)
+    links = "".join(f'<link rel="modulepreload" href="{name}">' for name in names)
+    return page.replace("</head>", f"{links}</head>", 1)
+
+
+def _collect(name: str, folder: Path, names: dict[str, None]) -> None:
+    """Add a module and all that it imports, each once."""
+    if name in names:
+        return
+    names[name] = None
+    for imported in _imports(folder / name):
+        _collect(posixpath.normpath(posixpath.join(posixpath.dirname(name), imported)), folder, names)
+
+
+def _imports(module: Path) -> Iterator[str]:
+    """Yield the paths that a module names, as it writes them."""
+    yield from _IMPORT.findall(module.read_text(encoding="utf-8"))

@@ -1,4 +1,4 @@
-"""Our changes to websockets: who answers its requests, and which of its log messages are shown.
+"""Our changes to websockets: the head of a request is checked first, who answers it, and which log messages are shown.
 
 viser starts its server with `websockets.asyncio.server.serve`, looked up when it is called. Inside `wrapped_serve`, that name
 refers to our function. tests/unit/app/web/port/test_websockets_hook.py fails with a clear message if websockets changes this.
@@ -8,30 +8,101 @@ import asyncio
 import contextlib
 import errno
 import logging
+import re
 import socket
 import threading
 import time
 from collections import deque
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Literal
 
 import websockets.asyncio.server as websocket_server
 from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
 from cocalib.platform.error_boundary import report_of
-from cocalib.web.port.request_head import Head, read_head
 
+Fault = Literal[400, 414, 431, 505]
+MAX_HEAD_BYTES = 64 * 1024
+_MAX_LINE_BYTES = 8 * 1024
+_MAX_HEADERS = 100
+_TOKEN = re.compile(rb"[-!#$%&'*+.^_`|~0-9A-Za-z]{1,64}")
+_TARGET = re.compile(rb"[\x21-\x7e]+")
+_VALUE = re.compile(rb"[\x09\x20-\x7e\x80-\xff]*")
+_OF_A_BODY = (b"content-length", b"transfer-encoding", b"expect")
 ProcessRequest = Callable[[ServerConnection, Request], Awaitable[Response | None]]
 SocketHandler = Callable[[ServerConnection], Awaitable[None]]
-
 _LOGGER = "cocalib.port"
 _MOST_BEGINNING = 128
 _NO_RESOURCES = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
 _COMPLAIN_EVERY_S = 60.0
 _log = logging.getLogger(_LOGGER)
 _one_at_a_time = threading.Lock()
+
+
+@dataclass(frozen=True, slots=True)
+class Head:
+    """A request's head.
+
+    Attributes:
+        method: such as GET.
+        data: what websockets is given instead of the bytes received: a GET without a body.
+        upgrades: it asks for a WebSocket; whatever follows any other head is of no interest.
+        fault: the status to answer with at once; None if the head is sound.
+    """
+
+    method: str
+    data: bytes
+    upgrades: bool = False
+    fault: Fault | None = None
+
+
+def read_head(received: bytes) -> Head | None:
+    """Read the head of a request.
+
+    Args:
+        received: all bytes of the connection so far.
+
+    Returns:
+        None while it is incomplete.
+    """
+    if received and not _TOKEN.match(received):
+        return _faulty(400)  # such as the beginning of TLS
+    end = received.find(b"\r\n\r\n", 0, MAX_HEAD_BYTES)
+    if end < 0:
+        return _faulty(431) if len(received) >= MAX_HEAD_BYTES else None
+    first, *headers = received[:end].split(b"\r\n")
+    parts = first.split(b" ")
+    if len(first) > _MAX_LINE_BYTES:
+        return _faulty(414)
+    if len(parts) != 3 or not _TOKEN.fullmatch(parts[0]) or not _TARGET.fullmatch(parts[1]):
+        return _faulty(400)
+    if parts[2] != b"HTTP/1.1":
+        return _faulty(505 if parts[2].startswith(b"HTTP/") else 400)
+    return _with_headers(parts[0], parts[1], headers, received[end + 4 :])
+
+
+def _with_headers(method: bytes, target: bytes, headers: list[bytes], rest: bytes) -> Head:
+    if len(headers) > _MAX_HEADERS or any(len(line) > _MAX_LINE_BYTES for line in headers):
+        return _faulty(431)
+    kept = []
+    for line in headers:
+        name, colon, value = line.partition(b":")
+        if not colon or not _TOKEN.fullmatch(name) or not _VALUE.fullmatch(value):
+            return _faulty(400)
+        if name.lower() not in _OF_A_BODY:
+            kept.append(line)
+        elif method == b"GET" and value.strip() != b"0":
+            return _faulty(400)  # a GET with a body
+    head = b"\r\n".join((b"GET " + target + b" HTTP/1.1", *kept))
+    upgrades = method == b"GET" and any(line.lower().startswith(b"upgrade:") for line in kept)
+    return Head(method.decode("ascii"), head + b"\r\n\r\n" + (rest if upgrades else b""), upgrades)
+
+
+def _faulty(fault: Fault) -> Head:
+    return Head("GET", b"GET / HTTP/1.1\r\n\r\n", fault=fault)
 
 
 class _NoHandshakeNoise(logging.Filter):

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from cocalib.web.port import backoff as module
-from cocalib.web.port.backoff import Backoff
+from cocalib.web.port import entrance as module
+from cocalib.web.port.entrance import Backoff
 from cocalib.web.port.link import ServerOptions
 from cocalib.web.port.server import RunningServer, start
 from cocalib.workspace import open_workspace

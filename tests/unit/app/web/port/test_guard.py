@@ -2,8 +2,7 @@
 
 import pytest
 
-from cocalib.web.port.admissions import MAX_IDLE_S, Admissions
-from cocalib.web.port.guard import Admitted, Allowed, Guard, Refused, Request
+from cocalib.web.port.guard import MAX_IDLE_S, Admissions, Admitted, Allowed, Guard, Refused, Request
 
 
 def request(path: str = "/", **headers: str | list[str]) -> Request:

@@ -6,9 +6,8 @@ from pathlib import Path
 import pytest
 
 from cocalib.web.messages import Opening
-from cocalib.web.port import hand_over as module
-from cocalib.web.port.hand_over import HandOver
-from cocalib.web.port.link import ServerOptions
+from cocalib.web.port import link as module
+from cocalib.web.port.link import HandOver, ServerOptions
 from cocalib.web.port.serving import Service
 from tests.port_client import come_in
 

@@ -11,8 +11,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from cocalib.web.port.link import ServerOptions
-from cocalib.web.port.request_head import read_head
 from cocalib.web.port.server import RunningServer, start
+from cocalib.web.port.websockets_hook import read_head
 from cocalib.workspace import open_workspace
 from tests.picture_recording import PictureRecording, grey_pictures
 from tests.port_client import come_in

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from cocalib.platform.resources import static_folder
-from cocalib.web.port.preloading import with_preloaded_modules
+from cocalib.web.port.routes import with_preloaded_modules
 
 PAGE = '<head><script type="module" src="a.js"></script></head><body></body>'
 

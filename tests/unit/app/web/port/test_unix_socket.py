@@ -10,9 +10,8 @@ import pytest
 
 from cocalib.cli import run
 from cocalib.web.port.address import AddressError
-from cocalib.web.port.link import ServerOptions
+from cocalib.web.port.link import ServerOptions, forwarding_command, listening_socket, remove_socket
 from cocalib.web.port.server import start
-from cocalib.web.port.unix_socket import forwarding_command, listening_socket, remove_socket
 from cocalib.workspace import open_workspace
 from tests.picture_recording import PictureRecording, grey_pictures
 
