@@ -15,7 +15,7 @@ from calib_core.measurements import ReflectorClick, TimeNs
 from calib_core.synthetic import FIELD, SimulatedPairs, simulate_pairs
 from cocalib.session import History, RecordingFacts, Session
 from cocalib.view import View, view
-from cocalib.web.channel.view_feed import ViewFeed
+from cocalib.web.channel.outbox import ViewFeed
 from cocalib.web.messages import encode
 
 __all__ = ["measure_channel"]

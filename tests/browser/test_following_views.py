@@ -11,7 +11,7 @@ from calib_core.measurements import Stamp
 from cocalib.session import History, RecordingFacts
 from cocalib.view import ClickRow, View, view
 from cocalib.view.model import Ellipse
-from cocalib.web.channel.view_feed import ViewFeed
+from cocalib.web.channel.outbox import ViewFeed
 from cocalib.web.messages import encode
 from cocalib.workspace import Workspace
 from tests.browser.driving import Driver

@@ -12,8 +12,7 @@ from playwright.sync_api import Browser
 
 from calib_core.recordings import Recording, first_picture
 from cocalib.web.messages import Opening
-from cocalib.web.port.hand_over import HandOver
-from cocalib.web.port.link import ServerOptions
+from cocalib.web.port.link import HandOver, ServerOptions
 from cocalib.web.port.server import RunningServer
 from cocalib.web.port.serving import Service
 from cocalib.workspace import Workspace

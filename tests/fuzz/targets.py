@@ -37,7 +37,7 @@ from cocalib.session.file import SessionFileError, open_session_file
 from cocalib.view import view
 from cocalib.web.messages.incoming import CursorMoved, FrameWanted, Hello, ImportWanted, ViewpointWanted, parse
 from cocalib.web.port import guard
-from cocalib.web.port.admissions import Admissions
+from cocalib.web.port.guard import Admissions
 from tests.fuzz.box_targets import FILE_SEEDS, FILE_TOKENS, MESSAGE_SEEDS, box_file_reader, box_message_reader
 from tests.fuzz.fuzzing import Target
 from tests.fuzz.tree_target import SEEDS, tree_reader

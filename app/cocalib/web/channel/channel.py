@@ -1,25 +1,30 @@
 """One page's channel: reads its messages and answers them in order, without waiting for other pages."""
 
 import asyncio
+from concurrent.futures import Executor
 from functools import partial
 from typing import Protocol
 
-from calib_core.errors import CalibrationError
-from calib_core.measurements import RadarScan, RadarScans, TimeNs
+import numpy as np
+
+from calib_core.arrays import TimesNs
+from calib_core.association.pairing import RadarSource
+from calib_core.errors import CalibrationError, InputError
+from calib_core.measurements import Candidate, RadarScan, RadarScans, ReflectorClick, TimeNs
+from calib_core.results import Calibration
+from calib_core.vision import Apex, NoApex, find_apex
 from cocalib.platform.error_boundary import error_boundary
-from cocalib.session import Step
-from cocalib.view import sentence
+from cocalib.session import Session, Step
+from cocalib.solving.solving import window_candidates
+from cocalib.view import PairCandidates, click_candidates, pair_of_click, sentence
 from cocalib.view.box_rows import boxes_in_frame
-from cocalib.web.channel.click_candidates import candidates_of
 from cocalib.web.channel.desk import answer_of
 from cocalib.web.channel.hub import Hub
-from cocalib.web.channel.newest import NewestWins
-from cocalib.web.channel.outbox import Outbox
+from cocalib.web.channel.outbox import NewestWins, Outbox, Shown
 from cocalib.web.channel.radar_survey import placements_at
 from cocalib.web.channel.review import ReviewDesk
-from cocalib.web.channel.snapping import snapped
 from cocalib.web.channel.space_feed import SpaceFeed
-from cocalib.web.channel.view_feed import Shown
+from cocalib.web.frames import Frame, FrameStore
 from cocalib.web.messages import (
     BoxesWanted,
     Command,
@@ -304,3 +309,68 @@ class Channel:
             return await asyncio.get_running_loop().run_in_executor(self._hub.executor, look)
         except CalibrationError:
             return RadarScans()
+
+
+def candidates_of(session: Session, selected: str | None, recording: RadarSource) -> PairCandidates:
+    """List the returns that may belong to the selected click; none if there is no such click, or it has no pair.
+
+    Args:
+        session: with the latest outcome.
+        selected: id of the click; None if none is selected.
+        recording: where further returns of its window come from, if no candidate of its pair fits.
+    """
+    click = next((click for click in session.clicks if click.id == selected), None)
+    pair = None if click is None else pair_of_click(session, click.id)
+    if click is None or pair is None:
+        return PairCandidates(selected or "", session.revision, ())
+    return click_candidates(session, pair, _further(session, click, recording))
+
+
+def _further(session: Session, click: ReflectorClick, recording: RadarSource) -> tuple[Candidate, ...]:
+    """Return more returns of the window for a click that does not agree with the others."""
+    if not isinstance(session.outcome, Calibration):
+        return ()
+    result = next(one for one in session.outcome.pairs if one.id == click.id)
+    if result.inlier or not result.outlier_probability > 0.0:
+        return ()
+    try:
+        return window_candidates(recording, click, session.options)
+    except CalibrationError:
+        return ()
+
+
+async def snapped(wanted: SnapWanted, moments: TimesNs, frames: FrameStore, executor: Executor) -> Snapped:
+    """Search for the apex near a pixel.
+
+    Args:
+        wanted: by a page.
+        moments: (m,) stamps of the frames [ns], ascending.
+        frames: of the recording.
+        executor: where to decode and search.
+
+    Raises:
+        InputError: no frame has this stamp, or the frame cannot be shown.
+        MessageError: the frame cannot be read.
+    """
+    if not len(frames):
+        raise InputError("this recording has no pictures to snap in; open one with a camera topic")
+    index = int(np.searchsorted(moments, wanted.image_time))
+    if index == len(moments) or int(moments[index]) != wanted.image_time:
+        raise InputError(f"no frame has the stamp {wanted.image_time}; the picture may belong to another recording")
+    frame = await frames.get(index)
+    answer = await asyncio.get_running_loop().run_in_executor(executor, _search, frame, wanted.pixel_px)
+    if isinstance(answer, NoApex):
+        return Snapped(None, None, f"No corner found: {answer.reason}.", wanted.id)
+    column, row = (float(value) for value in answer.pixel_px)
+    words = f"Snapped to the reflector's apex, with a standard deviation of {answer.sigma_px:.2f} px."
+    return Snapped((column, row), answer.sigma_px, words, wanted.id)
+
+
+def _search(frame: Frame, pixel_px: tuple[float, float]) -> Apex | NoApex:
+    import cv2
+
+    flags = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION
+    grey = cv2.imdecode(np.frombuffer(frame.data, dtype=np.uint8), flags)
+    if grey is None:
+        raise InputError(f"frame {frame.index + 1} cannot be decoded; snap in another frame of this placement")
+    return find_apex(np.asarray(grey), np.array(pixel_px))

@@ -16,16 +16,14 @@ from calib_core.results import DataWarning
 from cocalib.platform.error_boundary import error_boundary
 from cocalib.platform.resources import version
 from cocalib.view import AccPanel, View, warning_in_sentences
-from cocalib.web.channel.box_following import BoxFollowing
-from cocalib.web.channel.box_judging import BoxJudging
+from cocalib.web.channel.boxes import BoxFollowing, BoxJudging
 from cocalib.web.channel.desk import ClosedDesk, Desk
 from cocalib.web.channel.lens import LensDesk
 from cocalib.web.channel.live_edge import LiveEdge
-from cocalib.web.channel.outbox import Outbox
+from cocalib.web.channel.outbox import Outbox, ViewFeed
 from cocalib.web.channel.picture_changes import PictureChanges, changes_of
 from cocalib.web.channel.proposing import ProposingDesk
 from cocalib.web.channel.radar_survey import Survey, survey_of
-from cocalib.web.channel.view_feed import ViewFeed
 from cocalib.web.frames import FrameStore
 from cocalib.web.messages import (
     Outgoing,

@@ -1,15 +1,23 @@
-"""Messages waiting for one page: a newer one of a kind replaces the older one, so they do not pile up for a slow page."""
+"""What waits for one page, of which only the newest matters: messages by their kind, work, and the View as text."""
 
 import asyncio
+import logging
 from collections import OrderedDict
 from collections.abc import Awaitable, Callable, Hashable
-from typing import TypeAlias
+from dataclasses import dataclass
+from typing import Generic, TypeAlias, TypeVar
+
+from cocalib.platform.error_boundary import error_boundary
+from cocalib.view import View
+from cocalib.web.messages import ViewChange, change_between, encode
 
 Message: TypeAlias = str | bytes | Callable[[], str]
 """What is sent, or a function that writes it when it is sent."""
 
 _MOST = 2000
 """A page that leaves more messages than this unread is considered gone."""
+Item = TypeVar("Item")
+_log = logging.getLogger(__name__)
 
 
 class Outbox:
@@ -45,3 +53,90 @@ class Outbox:
                 _, message = self._waiting.popitem(last=False)
                 await send(message() if callable(message) else message)
             self._something.clear()
+
+
+class NewestWins(Generic[Item]):
+    """Processes one item at a time; of those that arrive meanwhile, only the newest is kept. Runs on one event loop."""
+
+    def __init__(self, work: Callable[[Item], Awaitable[None]], tell: Callable[[str], None] = _log.error) -> None:
+        """Set up the work.
+
+        Args:
+            work: processes one item.
+            tell: takes the line about an internal error in it.
+        """
+        self._work = work
+        self._tell = tell
+        self._next: list[Item] = []
+        self._task: asyncio.Task[None] | None = None
+
+    def give(self, item: Item) -> None:
+        """Process this as soon as the current item is done."""
+        self._next = [item]
+        if self._task is None or self._task.done():  # done, but its callback has not run yet: it takes no more items
+            self._task = asyncio.get_running_loop().create_task(self._run())
+            self._task.add_done_callback(self._ended)
+
+    def close(self) -> None:
+        """Drop the waiting item and cancel the current one."""
+        self._next = []
+        if self._task is not None:
+            self._task.cancel()
+
+    async def _run(self) -> None:
+        while self._next:
+            with error_boundary("a picture or drawing for a page", self._tell):
+                await self._work(self._next.pop())
+
+    def _ended(self, task: "asyncio.Task[None]") -> None:
+        if self._task is task:
+            self._task = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shown:
+    """The View that a page has.
+
+    Attributes:
+        view: as of the last message.
+        changes: how many changes were sent since the last whole View.
+    """
+
+    view: View
+    changes: int = 0
+
+
+class ViewFeed:
+    """Writes messages from the View that a page has to the newest one. Runs on one event loop.
+
+    A page is told where it stands when it can take the next message, so a slow page gets one change instead of many.
+    """
+
+    def __init__(self, view: View) -> None:
+        self._newest = view
+        self._before: View | None = None
+        self._change: ViewChange | None = None
+
+    @property
+    def newest(self) -> View:
+        """The newest View."""
+        return self._newest
+
+    def take(self, view: View) -> None:
+        """Make this the newest View."""
+        self._newest = view
+        self._before = self._change = None
+
+    def message(self, shown: Shown | None) -> tuple[str, Shown]:
+        """Return the text to send to a page, and what the page has afterwards.
+
+        Args:
+            shown: what it has now; None if it has nothing, or does not know.
+        """
+        if shown is None:
+            return encode(self._newest), Shown(self._newest)
+        if self._change is None or shown.view is not self._before:  # pages usually have the same View
+            self._before, self._change = shown.view, change_between(shown.view, self._newest, number=0)
+        number = shown.changes + 1
+        change = ViewChange(number, self._change.fields, self._change.clicks)
+        return encode(change), Shown(self._newest, number)

@@ -1,25 +1,96 @@
-"""What the radar alone says about the whole recording: where the reflector stood still, and how many returns there were."""
+"""What the radar alone says about the whole recording: placements of the reflector, in words too, and returns from above."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import TimesNs
+from calib_core.arrays import Indices, TimesNs, Values
 from calib_core.association.gating import static_returns
 from calib_core.association.placements import MOST_STATIC_RETURNS, Placement, find_placements, in_stretches
-from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
+from calib_core.measurements import MIN_PAIRS, NS_PER_S, RadarScans, TimeNs
 from calib_core.options import GatingOptions
 from calib_core.radar import polar_from_cartesian
-from cocalib.web.channel.placement_words import SHORTEST_S, placement_figures, placement_note, placement_summary
-from cocalib.web.channel.radar_map import RadarMapSum
+from cocalib.view import Figure
+from cocalib.view.number_format import plain
 from cocalib.web.messages import PlacementRow, Placements, RadarMap
 
+_CELLS_ACROSS = 600
+_SMALLEST_CELL_M = 0.2
+_MOST_CELLS = 6000
+_LEAST_SCANS = 3
+"""A cell with returns in fewer scans is left out: it is noise."""
+_LOW_QUANTILE, _HIGH_QUANTILE = 0.05, 0.995
+_DB_STEPS = np.arange(-100.0, 160.0, 0.5)
 _MOST_SLICES = 8000
 _AT_RANGE_M = 1.0
 _OWN_RETURNS_M, _OWN_SHARE = 0.5, 0.1
 """Returns this far from a placement belong to it [m], and this share of its range more: angles scatter."""
 _STRONG = 0.9
+SHORTEST_S = 2.0
+"""A placement lasts at least this long [s]."""
+_SHORT_S = 3.0
+"""A click averages the returns of this time [s]; a shorter placement has fewer."""
+_LITTLE_DB = 6.0
+"""A reflector that stands out less may be taken for clutter."""
+
+
+class RadarMapSum:
+    """Counts static returns by square cells, a bounded number of scans at a time; memory does not grow with the recording."""
+
+    def __init__(self, options: GatingOptions) -> None:
+        self._cell_m = max(_SMALLEST_CELL_M, 2.0 * options.max_range_m / _CELLS_ACROSS)
+        self._scans = 0
+        self._shown = np.zeros(_CELLS_ACROSS**2, dtype=np.int64)
+        self._returns = np.zeros(_CELLS_ACROSS**2)
+        self._sum_z_m = np.zeros(_CELLS_ACROSS**2)
+        self._measured = np.zeros(_CELLS_ACROSS**2)
+        self._sum_db = np.zeros(_CELLS_ACROSS**2)
+        self._histogram = np.zeros(len(_DB_STEPS) - 1, dtype=np.int64)
+
+    def add(self, static: RadarScans) -> None:
+        """Count the static returns of some scans; scans without any count too."""
+        self._scans += len(static)
+        places = np.floor(static.points_radar_m[:, :2] / self._cell_m) + _CELLS_ACROSS // 2
+        inside = ((places >= 0) & (places < _CELLS_ACROSS)).all(axis=1)
+        cell: Indices = (places[inside, 0] * _CELLS_ACROSS + places[inside, 1]).astype(np.int64)
+        scan_and_cell = np.unique(static.scan_of_return()[inside] * _CELLS_ACROSS**2 + cell)
+        self._shown += np.bincount(scan_and_cell % _CELLS_ACROSS**2, minlength=_CELLS_ACROSS**2)
+        snr_db = static.snr_db[inside]
+        known = np.isfinite(snr_db)
+        self._returns += np.bincount(cell, minlength=_CELLS_ACROSS**2)
+        self._sum_z_m += np.bincount(cell, weights=static.points_radar_m[inside, 2], minlength=_CELLS_ACROSS**2)
+        self._measured += np.bincount(cell[known], minlength=_CELLS_ACROSS**2)
+        self._sum_db += np.bincount(cell[known], weights=snr_db[known], minlength=_CELLS_ACROSS**2)
+        self._histogram += np.histogram(snr_db[known], _DB_STEPS)[0]
+
+    def total(self) -> RadarMap:
+        """Return the cells that were seen most often."""
+        seen = np.flatnonzero(self._shown >= _LEAST_SCANS)
+        kept = np.sort(seen[np.argsort(-self._shown[seen], kind="stable")][:_MOST_CELLS])
+        low_db, high_db = (self._quantile_db(share) for share in (_LOW_QUANTILE, _HIGH_QUANTILE))
+        has_db = low_db < high_db  # equal amplitudes say nothing
+        middle = (np.stack(np.divmod(kept, _CELLS_ACROSS)) - _CELLS_ACROSS // 2 + 0.5) * self._cell_m
+        mean_db = self._sum_db[kept] / np.maximum(self._measured[kept], 1.0)
+        return RadarMap(
+            cell_m=self._cell_m,
+            x_m=_numbers(middle[0], 3),
+            y_m=_numbers(middle[1], 3),
+            z_m=_numbers(self._sum_z_m[kept] / self._returns[kept], 3),
+            share=_numbers(self._shown[kept] / max(self._scans, 1), 4),
+            snr_db=_numbers(mean_db, 1) if has_db else (),
+            low_db=low_db if has_db else None,
+            high_db=high_db if has_db else None,
+        )
+
+    def _quantile_db(self, share: float) -> float:
+        """Return the amplitude that this share of the returns is below; the lowest one without any."""
+        summed = np.cumsum(self._histogram)
+        return float(_DB_STEPS[int(np.searchsorted(summed, share * summed[-1]))])
+
+
+def _numbers(values: Values, decimals: int) -> tuple[float, ...]:
+    return tuple(np.round(values, decimals).tolist())
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,3 +301,86 @@ def placements_at(survey: Survey | None, time: int) -> Sequence[Placement]:
     if survey is None:
         return ()
     return [placement for placement in survey.placements if placement.start <= time <= placement.end]
+
+
+def placement_note(lasted_s: float, stands_out_db: float | None) -> str:
+    """Return what is unusual about a placement; "" if nothing is.
+
+    Args:
+        lasted_s: how long it stood still [s].
+        stands_out_db: above the strongest other static returns; None if unknown.
+    """
+    notes = [f"lasted only {lasted_s:.1f} s"] if lasted_s < _SHORT_S else []
+    if stands_out_db is not None and stands_out_db < _LITTLE_DB:
+        notes.append(
+            f"only {stands_out_db:.0f} dB above other returns"
+            if stands_out_db >= 0
+            else f"{-stands_out_db:.0f} dB weaker than other returns"
+        )
+    return ", ".join(notes)
+
+
+def placement_summary(rows: Sequence[PlacementRow], length_s: float) -> str:
+    """Return one line about all placements: how many, where, the strongest, and those to look at.
+
+    Args:
+        rows: the placements.
+        length_s: of the recording [s].
+    """
+    if length_s < SHORTEST_S:
+        return f"The recording is {length_s:.1f} s long, too short for a placement of {SHORTEST_S:.0f} s or longer"
+    if not rows:
+        return (
+            f"No placement found: nothing appeared, stood still for {SHORTEST_S:.0f} s or longer, and went away again"
+        )
+    ranges = [row.range_m for row in rows]
+    words = [
+        f"{len(rows)} placement{'s' if len(rows) > 1 else ''} found, {min(ranges):.1f} to {max(ranges):.1f} m, "
+        f"azimuth {_azimuths(rows)}"
+    ]
+    if len(rows) < MIN_PAIRS:
+        words.append(f"a calibration needs at least {MIN_PAIRS}")
+    known = [(row.snr_db, number) for number, row in enumerate(rows, start=1) if row.snr_db is not None]
+    if known:
+        words.append(f"strongest: placement {max(known)[1]}, {max(known)[0]:.0f} dB")
+    odd = [f"placement {number} {row.note}" for number, row in enumerate(rows, start=1) if row.note]
+    words += odd[:2]
+    if len(odd) > 2:
+        words.append(f"{len(odd) - 2} more to look at")
+    return "; ".join(words)
+
+
+def placement_figures(rows: Sequence[PlacementRow], returns_per_scan: float, scans_per_s: float) -> tuple[Figure, ...]:
+    """Return the figures about a recording without pictures.
+
+    Args:
+        rows: the placements.
+        returns_per_scan: mean number of returns.
+        scans_per_s: scans per second; NaN if there are too few.
+    """
+    count = Figure(
+        "placements", "placements", str(len(rows)), "", "Places where something appeared, stood still, and went away again.",
+        "good" if len(rows) >= MIN_PAIRS else "warning",
+    )  # fmt: skip
+    ranges, known = [row.range_m for row in rows], [row.snr_db for row in rows if row.snr_db is not None]
+    span = f"{min(ranges):.1f}–{max(ranges):.1f}" if rows else "–"
+    strength = f"{min(known):.0f}–{max(known):.0f}" if known else "–"
+    return (
+        count,
+        Figure("range", "range", span, "m", "Distance of the nearest and of the farthest placement from the radar."),
+        Figure(
+            "amplitude", "amplitude", strength, "dB", "Mean amplitude of the weakest and of the strongest placement."
+        ),
+        Figure("returns", "returns a scan", plain(returns_per_scan), "", "Mean number of returns of a radar scan."),
+        Figure("rate", "scans", plain(scans_per_s), "Hz", "Radar scans per second."),
+    )
+
+
+def _azimuths(rows: Sequence[PlacementRow]) -> str:
+    azimuths = [row.azimuth_deg for row in rows]
+    return f"{_side(min(azimuths))} to {_side(max(azimuths))}"
+
+
+def _side(azimuth_deg: float) -> str:
+    rounded = round(azimuth_deg)
+    return "0°" if rounded == 0 else f"{abs(rounded)}° {'left' if rounded > 0 else 'right'}"

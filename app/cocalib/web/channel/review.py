@@ -30,8 +30,7 @@ from cocalib.view.review import (
     review_of,
     solution_of,
 )
-from cocalib.web.channel.newest import NewestWins
-from cocalib.web.channel.outbox import Outbox
+from cocalib.web.channel.outbox import NewestWins, Outbox
 from cocalib.web.messages import Outgoing, Uncertainty, encode
 from cocalib.web.messages.review_messages import (
     CompareWanted,

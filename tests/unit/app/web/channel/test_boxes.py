@@ -5,7 +5,7 @@ import pytest
 
 from calib_core.errors import InputError
 from cocalib.session.boxes_in_frames import Start, Stretch
-from cocalib.web.channel.box_following import BoxFollower
+from cocalib.web.channel.boxes import BoxFollower
 from tests.unit.vision.test_box_tracking import edges, picture
 
 WAY = [(60 + 3.0 * step, 100.0) for step in range(60)]

@@ -5,9 +5,13 @@ import pytest
 
 from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs
 from calib_core.options import GatingOptions
-from cocalib.web.channel.placement_words import placement_figures, placement_note, placement_summary
-from cocalib.web.channel.radar_map import RadarMapSum
-from cocalib.web.channel.radar_survey import survey_of
+from cocalib.web.channel.radar_survey import (
+    RadarMapSum,
+    placement_figures,
+    placement_note,
+    placement_summary,
+    survey_of,
+)
 from cocalib.web.channel.space_feed import surveyed_extent
 from cocalib.web.messages import PlacementRow
 from cocalib.web.radar_sight import RadarSight, look_of, shown_rows

@@ -11,7 +11,7 @@ import pytest
 from calib_core.errors import InputError
 from calib_core.measurements import TimeNs
 from calib_core.recordings.camera.images import EncodedImage
-from cocalib.web.channel.snapping import snapped
+from cocalib.web.channel.channel import snapped
 from cocalib.web.frames import FrameStore
 from cocalib.web.messages import Snapped, SnapWanted, encode, parse
 from tests.unit.vision.trihedral import draw_look, picture
