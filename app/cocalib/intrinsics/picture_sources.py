@@ -61,7 +61,7 @@ class FilePictures:
             data = np.frombuffer(path.read_bytes(), dtype=np.uint8)
             found = cv2.imdecode(data, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION) if len(data) else None
         except OSError as error:
-            raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from error
+            raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
         except cv2.error as error:
             raise InputError(f"{path}: cannot be decoded; it is damaged or too large") from error
         if found is None:

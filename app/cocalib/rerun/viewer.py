@@ -209,4 +209,4 @@ def open_window(path: Path) -> int:
     try:
         return subprocess.run(command, env=offline_environment(os.environ), check=False).returncode
     except OSError as error:
-        raise InputError(f"{command[0]}: cannot be started: {(error.strerror or str(error)).lower()}") from error
+        raise InputError(f"{command[0]}: cannot be started: {error.strerror or error}") from error

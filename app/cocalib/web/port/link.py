@@ -227,7 +227,7 @@ def listening_socket(path: Path) -> socket.socket:
     except OSError as error:
         bound.close()
         raise AddressError(
-            f"--socket {path}: cannot be created ({(error.strerror or str(error)).lower()}); choose another path"
+            f"--socket {path}: cannot be created ({error.strerror or error}); choose another path"
         ) from None
     except AddressError:
         bound.close()
