@@ -19,8 +19,7 @@ from calib_core.measurements import Unsolvable
 from cocalib.intrinsics.field_of_view import field_of_view_text
 from cocalib.report.markup import Child, Markup, html_file, scrolled, tag
 from cocalib.report.plots import Axes, captioned, drawing, mark, text
-from cocalib.view.number_format import plain, with_sigma
-from cocalib.view.wording import sentence
+from cocalib.view.wording import plain, sentence, with_sigma
 
 _MOST_ROWS = 400
 _WIDTH = 320.0

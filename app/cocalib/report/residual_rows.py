@@ -12,7 +12,7 @@ from calib_core.measurements import ReflectorClick
 from calib_core.radar import polar_from_cartesian
 from calib_core.results import Calibration, PairResult
 from cocalib.report.plots import MarkKind
-from cocalib.view.number_format import plain
+from cocalib.view.wording import plain
 
 _NS_PER_S = 1e9
 _FEWEST = 8

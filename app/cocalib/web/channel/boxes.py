@@ -13,9 +13,9 @@ from typing import TypeAlias
 import numpy as np
 
 from calib_core.camera import Camera
-from calib_core.detections import Boxes
 from calib_core.errors import CalibrationError, InputError
 from calib_core.evaluation import BoxFigures
+from calib_core.detections import Boxes
 from calib_core.recordings import Recording
 from calib_core.results import Calibration
 from calib_core.vision import LostBox, TrackedBox, follow_box
@@ -23,9 +23,8 @@ from cocalib.evaluation.evaluating import Evidence, evidence_in, judged
 from cocalib.platform.error_boundary import error_boundary
 from cocalib.session.boxes_in_frames import Followed, PlacedBox, Start, Stretch, stretches_of
 from cocalib.view import sentence
-from cocalib.view.acc import acc_panel, no_acc
-from cocalib.view.box_panel import AccPanel
-from cocalib.view.box_rows import BoxedReturn, returns_in_frame
+from cocalib.view.box_rows import BoxedReturn, acc_panel, no_acc, returns_in_frame
+from cocalib.view.model import AccPanel
 from cocalib.web.messages import Progress
 from cocalib.workspace import Judged, Workspace
 

@@ -26,7 +26,7 @@ from cocalib.intrinsics import LensJob, LensSnapshot, RecordedPictures, field_of
 from cocalib.platform.error_boundary import error_boundary
 from cocalib.session import ChosenIntrinsics, IntrinsicsChosen
 from cocalib.view import sentence, warning_in_sentences
-from cocalib.view.number_format import plain, with_sigma
+from cocalib.view.wording import plain, with_sigma
 from cocalib.web.channel.outbox import Outbox
 from cocalib.web.messages import (
     LensCalibrate,

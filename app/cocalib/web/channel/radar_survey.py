@@ -12,7 +12,7 @@ from calib_core.measurements import MIN_PAIRS, NS_PER_S, RadarScans, TimeNs
 from calib_core.options import GatingOptions
 from calib_core.radar import polar_from_cartesian
 from cocalib.view import Figure
-from cocalib.view.number_format import plain
+from cocalib.view.wording import plain
 from cocalib.web.messages import PlacementRow, Placements, RadarMap
 
 _CELLS_ACROSS = 600

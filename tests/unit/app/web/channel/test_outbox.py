@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from calib_core.measurements import Stamp, TimeNs
 from cocalib.session import ClickPlaced, History, RecordingFacts, advance
 from cocalib.view import ClickRow, View, view
-from cocalib.view.figure import Figure
-from cocalib.view.model import Ellipse
+from cocalib.view.model import Ellipse, Figure
 from cocalib.web.channel.outbox import NewestWins, Shown, ViewFeed
 from cocalib.web.messages import encode
 from tests.page_view import applied
