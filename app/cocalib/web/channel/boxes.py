@@ -15,7 +15,7 @@ import numpy as np
 from calib_core.camera import Camera
 from calib_core.errors import CalibrationError, InputError
 from calib_core.evaluation import BoxFigures
-from calib_core.detections import Boxes
+from calib_core.measurements import Boxes
 from calib_core.recordings import Recording
 from calib_core.results import Calibration
 from calib_core.vision import LostBox, TrackedBox, follow_box
