@@ -322,8 +322,8 @@ def _expected_halves(rows: ResidualRows, middle: float) -> str:
 def _too_few(rows: ResidualRows) -> str:
     n = int(rows.judged.sum())
     if n >= _FEWEST:
-        return f"The {n} pairs do not differ enough here to show a trend."
-    return f"{n} {'pair is' if n == 1 else 'pairs are'} too few to show a trend; {_FEWEST} or more are needed."
+        return f"The {n} clicks do not differ enough here to show a trend."
+    return f"{n} {'click is' if n == 1 else 'clicks are'} too few to show a trend; {_FEWEST} or more are needed."
 
 
 def _ranks(values: Values) -> Values:
