@@ -14,8 +14,7 @@ from cocalib.fleet.kinds import Kind, kinds_of
 from cocalib.fleet.records import FleetRecord, SessionRecord, UnreadResult, VehicleRecord
 from cocalib.fleet.standing import VehicleStanding, recorded_text, standings_of
 from cocalib.platform.resources import version
-from cocalib.report.html_file import html_file
-from cocalib.report.markup import Child, Markup, joined, scrolled, tag
+from cocalib.report.markup import Child, Markup, html_file, joined, scrolled, tag
 from cocalib.report.plots import Axes, drawing, mark, polyline
 from cocalib.report.sections.answer import LEVEL_SIGNS
 from cocalib.view.wording import plain, sentence, with_sigma
