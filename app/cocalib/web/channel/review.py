@@ -32,7 +32,7 @@ from cocalib.view.review import (
 )
 from cocalib.web.channel.outbox import NewestWins, Outbox
 from cocalib.web.messages import Outgoing, Uncertainty, encode
-from cocalib.web.messages.review_messages import (
+from cocalib.web.messages.incoming import (
     CompareWanted,
     PairReviewWanted,
     ReviewRequest,

@@ -4,7 +4,6 @@ A page's message is a JSON object with a "type" and, if it wants an answer, a "r
 writes the types as TypeScript; `static/messages.d.ts` holds its output, and a test compares the two.
 """
 
-from cocalib.web.messages.box_messages import FrameBoxes
 from cocalib.web.messages.incoming import (
     MAX_TEXT_BYTES,
     BoxesWanted,
@@ -15,7 +14,9 @@ from cocalib.web.messages.incoming import (
     Hello,
     ImportWanted,
     Incoming,
+    ProposingSwitch,
     ReturnColour,
+    ReviewRequest,
     SnapWanted,
     Viewpoint,
     ViewpointWanted,
@@ -58,8 +59,10 @@ from cocalib.web.messages.opening_messages import (
     TopicRow,
 )
 from cocalib.web.messages.outgoing import (
+    ClickChange,
     Done,
     FollowNote,
+    FrameBoxes,
     FrameHeader,
     FramesAdded,
     Opening,
@@ -69,25 +72,29 @@ from cocalib.web.messages.outgoing import (
     OverlayReturn,
     Problem,
     Progress,
+    ProposalNews,
+    ProposalPlace,
+    ProposalRow,
     RecordingNote,
+    RowValues,
     SensorNote,
     SessionNote,
     Snapped,
     StampColumns,
+    Uncertainty,
+    UnproposedRow,
+    ViewChange,
+    change_between,
     encode,
     encode_frame,
 )
-from cocalib.web.messages.proposal_messages import (
-    ProposalNews,
-    ProposalPlace,
-    ProposalRow,
-    ProposingSwitch,
-    UnproposedRow,
-)
-from cocalib.web.messages.radar_messages import PlacementRow, Placements, RadarLook, RadarMap, RadarReturn
-from cocalib.web.messages.review_messages import ReviewRequest, Uncertainty
 from cocalib.web.messages.space_messages import (
+    PlacementRow,
+    Placements,
     PlacementState,
+    RadarLook,
+    RadarMap,
+    RadarReturn,
     SpaceLabel,
     SpaceLegend,
     SpaceLook,
@@ -95,7 +102,6 @@ from cocalib.web.messages.space_messages import (
     SpaceReflector,
     SpaceReturn,
 )
-from cocalib.web.messages.view_changes import ClickChange, RowValues, ViewChange, change_between
 
 __all__ = [
     "MAX_CAMERA_FILE_BYTES",

@@ -15,8 +15,6 @@ from cocalib.session import AxesStated, ClickPlaced, ColumnsMapped, JournalStep,
 from cocalib.session.events import Id
 from cocalib.web.messages.lens_messages import LensRequest
 from cocalib.web.messages.opening_messages import ChoicesWanted, FolderWanted, OpeningCommand, OpenWith, RecentForgotten
-from cocalib.web.messages.proposal_messages import ProposingSwitch
-from cocalib.web.messages.review_messages import ReviewRequest
 
 MAX_TEXT_BYTES = 4 * 1024 * 1024
 """A longer message is refused without parsing; 10,000 clicks take about one megabyte."""
@@ -129,6 +127,42 @@ class BoxesWanted(_Request, frozen=True, tag="load_boxes", rename={"content": "c
 
 class FollowingStopped(_Request, frozen=True, tag="stop_following"):
     """A page wants boxes to be followed no farther than they have been."""
+
+
+class ProposingSwitch(_Request, frozen=True, tag="propose"):
+    """Proposals are wanted, or not wanted any more."""
+
+    on: bool
+
+
+SolutionKind: TypeAlias = Literal["now", "default", "paper", "toggled", "before", "reference", "file"]
+
+
+class ReviewWanted(_Request, frozen=True, tag="review"):
+    """The review of all pairs is requested."""
+
+
+class PairReviewWanted(_Request, frozen=True, tag="review_pair"):
+    """The review of one pair is requested."""
+
+    id: Annotated[str, Meta(max_length=100)]
+
+
+class CompareWanted(_Request, frozen=True, tag="compare"):
+    """Two solutions are to be compared; the content of a file is sent once, and kept for later requests of the page."""
+
+    a: SolutionKind
+    b: SolutionKind
+    pair: Annotated[str, Meta(max_length=100)] | None = None
+    file_name: Annotated[str, Meta(max_length=300)] = ""
+    file_base64: str = ""
+
+
+class UncertaintyWanted(_Request, frozen=True, tag="uncertainty"):
+    """The contours of the uncertainty in the picture are requested."""
+
+
+ReviewRequest: TypeAlias = ReviewWanted | PairReviewWanted | CompareWanted | UncertaintyWanted
 
 
 Command: TypeAlias = (

@@ -1,9 +1,10 @@
 """What is sent to a page: values in, text out."""
 
 import struct
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Literal, TypeAlias
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from operator import attrgetter
+from typing import Any, Literal, TypeAlias
 
 import msgspec
 
@@ -11,16 +12,167 @@ from calib_core.arrays import TimesNs
 from calib_core.measurements import NS_PER_S, Stamp
 from calib_core.results import DataWarning
 from cocalib.option_changes import OptionGroup, option_groups
-from cocalib.view import FollowState, PairCandidates, View
+from cocalib.view import ClickRow, FollowState, PairCandidates, View
+from cocalib.view.box_rows import BoxedReturn, BoxInFrame
+from cocalib.view.contours import ContourMap
 from cocalib.view.review import Compared, PairReview, Review
-from cocalib.web.messages.box_messages import FrameBoxes
 from cocalib.web.messages.lens_messages import LensResult, LensState
 from cocalib.web.messages.opening_messages import FolderListing, OpeningChoices
-from cocalib.web.messages.proposal_messages import ProposalNews
-from cocalib.web.messages.radar_messages import Placements, RadarLook, RadarMap
-from cocalib.web.messages.review_messages import Uncertainty
-from cocalib.web.messages.space_messages import SpaceLook
-from cocalib.web.messages.view_changes import ViewChange
+from cocalib.web.messages.space_messages import Placements, RadarLook, RadarMap, SpaceLook
+
+_VIEW_FIELDS = tuple(field.name for field in fields(View) if field.name != "clicks")
+_ROW_FIELDS = tuple(field.name for field in fields(ClickRow))
+_row_values = attrgetter(*_ROW_FIELDS)
+
+
+@dataclass(frozen=True, slots=True)
+class RowValues:
+    """New values of some fields in some rows.
+
+    Attributes:
+        rows: places in the new list, ascending; None for all of them.
+        fields: for each field, one value per row.
+    """
+
+    rows: tuple[int, ...] | None
+    fields: dict[str, tuple[Any, ...]]
+
+
+@dataclass(frozen=True, slots=True)
+class ClickChange:
+    """How the list of clicks changes: rows are removed, then added, then given values.
+
+    Attributes:
+        removed: places in the old list, ascending.
+        added: places in the new list, ascending; `values` has every field of these rows.
+        values: what differs; fields that differ in the same rows stand together.
+    """
+
+    removed: tuple[int, ...]
+    added: tuple[int, ...]
+    values: tuple[RowValues, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ViewChange:
+    """What a page changes in the View it has.
+
+    Attributes:
+        number: 1 for the first change after a whole View, and so on; a page that misses one asks for a whole View.
+        fields: the new values of the View's fields that differ, except `clicks`.
+        clicks: the rows that differ; None if none does.
+    """
+
+    number: int
+    fields: dict[str, Any]
+    clicks: ClickChange | None
+
+
+ProposalStage: TypeAlias = Literal["off", "looking", "comparing", "ready", "failed"]
+
+
+@dataclass(frozen=True, slots=True)
+class ProposalPlace:
+    """A place in the picture where the reflector may stand.
+
+    Attributes:
+        u_px: column.
+        v_px: row.
+        sigma_px: standard deviation of that pixel per axis, if it is the reflector.
+    """
+
+    u_px: float
+    v_px: float
+    sigma_px: float
+
+
+@dataclass(frozen=True, slots=True)
+class ProposalRow:
+    """Where the reflector probably stands in the pictures of a placement.
+
+    Attributes:
+        placement: its number among the placements, from 0.
+        frame: in which it is shown.
+        image_time: stamp of that frame.
+        width_px: of the reflector there.
+        confidence: probability that the first place is the reflector, 0 to 1.
+        reason: why the confidence is low, as a clause; "" if it is not.
+        places: what the picture shows, the most probable first.
+    """
+
+    placement: int
+    frame: int
+    image_time: Stamp
+    width_px: float
+    confidence: float
+    reason: str
+    places: tuple[ProposalPlace, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class UnproposedRow:
+    """A placement without a proposal.
+
+    Attributes:
+        placement: its number among the placements, from 0.
+        reason: why there is none, as a clause.
+    """
+
+    placement: int
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class ProposalNews:
+    """The proposals as far as they can be made, and how far they are.
+
+    Attributes:
+        on: whether proposals are wanted.
+        stage: what is being done.
+        done: placements whose pictures were looked at, or compared with what was clicked.
+        count: of all.
+        problem: why there are none; "" if nothing is wrong.
+        hint: what to do about it.
+        rows: the most confident first; placements that have a click are left out.
+        unproposed: placements for which nothing can be proposed.
+    """
+
+    on: bool
+    stage: ProposalStage
+    done: int
+    count: int
+    problem: str
+    hint: str
+    rows: tuple[ProposalRow, ...] = ()
+    unproposed: tuple[UnproposedRow, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Uncertainty:
+    """Where points at several distances may appear in the picture.
+
+    Attributes:
+        revision: of the session that the answer belongs to.
+        maps: one per distance; empty without a calibration.
+    """
+
+    revision: int
+    maps: tuple[ContourMap, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class FrameBoxes:
+    """The boxes of the frame that a page shows.
+
+    Attributes:
+        index: of the frame.
+        boxes: around objects in it.
+        returns: of moving targets at its time.
+    """
+
+    index: int
+    boxes: tuple[BoxInFrame, ...]
+    returns: tuple[BoxedReturn, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -369,3 +521,62 @@ def encode_frame(header: FrameHeader, data: bytes) -> bytes:
     """Encode a picture: length of the header (32 bits, little-endian), the header as JSON, the picture's own bytes."""
     text = msgspec.json.encode(header)
     return b"".join((struct.pack("<I", len(text)), text, data))
+
+
+def change_between(before: View, after: View, *, number: int) -> ViewChange:
+    """Return what a page that shows `before` needs in order to show `after`.
+
+    Args:
+        before: the View that the page has.
+        after: the View that it is to have.
+        number: counts the changes since the last whole View.
+    """
+    different = {name: value for name in _VIEW_FIELDS if (value := getattr(after, name)) != getattr(before, name)}
+    return ViewChange(number, different, _click_change(before.clicks, after.clicks))
+
+
+def _click_change(before: Sequence[ClickRow], after: Sequence[ClickRow]) -> ClickChange | None:
+    removed, added = _membership([row.id for row in before], [row.id for row in after])
+    is_added = set(added)
+    places = [place for place in range(len(after)) if place not in is_added]
+    is_removed = set(removed)
+    kept = [row for place, row in enumerate(before) if place not in is_removed]
+    rows: dict[str, list[int]] = {name: list(added) for name in _ROW_FIELDS}
+    for place, old in zip(places, kept, strict=True):
+        if after[place] is not old:
+            for name in _differing(old, after[place]):
+                rows[name].append(place)
+    values = tuple(_values(rows, after))
+    return ClickChange(tuple(removed), tuple(added), values) if removed or added or values else None
+
+
+def _membership(before: Sequence[str], after: Sequence[str]) -> tuple[list[int], list[int]]:
+    """Return the places of the ids to remove and to add; the whole lists if those that stay are in another order."""
+    if before == after:
+        return [], []
+    old, new = set(before), set(after)
+    staying = [name for name in before if name in new] == [name for name in after if name in old]
+    if not staying or len(old) < len(before) or len(new) < len(after):
+        return list(range(len(before))), list(range(len(after)))
+    return (
+        [place for place, name in enumerate(before) if name not in new],
+        [place for place, name in enumerate(after) if name not in old],
+    )
+
+
+def _differing(old: ClickRow, new: ClickRow) -> Iterator[str]:
+    pairs = zip(_ROW_FIELDS, _row_values(old), _row_values(new), strict=True)
+    return (name for name, before, after in pairs if before != after)
+
+
+def _values(rows: dict[str, list[int]], after: Sequence[ClickRow]) -> Iterable[RowValues]:
+    """Yield the new values, fields that differ in the same rows together."""
+    together: dict[tuple[int, ...], list[str]] = {}
+    for name, places in rows.items():
+        if 2 * len(places) > len(after):
+            places = list(range(len(after)))  # shorter to write than most of the places
+        if places:
+            together.setdefault(tuple(sorted(places)), []).append(name)
+    for chosen, names in together.items():
+        columns = {name: tuple(getattr(after[place], name) for place in chosen) for name in names}
+        yield RowValues(None if len(chosen) == len(after) else chosen, columns)

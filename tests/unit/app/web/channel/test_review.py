@@ -16,7 +16,7 @@ from calib_core.synthetic import simulate_pairs
 from cocalib.session import History, Session
 from cocalib.web.channel.outbox import Outbox
 from cocalib.web.channel.review import ReviewDesk
-from cocalib.web.messages.review_messages import CompareWanted, ReviewRequest, ReviewWanted, UncertaintyWanted
+from cocalib.web.messages.incoming import CompareWanted, ReviewRequest, ReviewWanted, UncertaintyWanted
 
 
 @dataclass
