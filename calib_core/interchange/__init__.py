@@ -13,13 +13,12 @@ from calib_core.interchange.cameras.formats.ros import camera_info_text
 from calib_core.interchange.cameras.written import CAMERA_FORMATS, camera_content
 from calib_core.interchange.check.agreement import AgreementLimits, Criterion, Judgement
 from calib_core.interchange.check.comparison import Comparison, compare
-from calib_core.interchange.check.explanation import CheckResult
 from calib_core.interchange.check.pair_residuals import CheckPairs, read_check_pairs, read_check_pairs_file
 from calib_core.interchange.check.pixel_differences import PixelDifference
 from calib_core.interchange.check.report import CheckReport, Verdict, check
 from calib_core.interchange.check.report_json import CheckedFile, check_json, check_junit, exit_code
-from calib_core.interchange.contents import contents_text
-from calib_core.interchange.exporting import Export, NotExported, export, export_all
+from calib_core.interchange.check.slips import CheckResult
+from calib_core.interchange.exporting import Export, NotExported, contents_text, export, export_all, parent_pose
 from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.formats.registry import CAMERA_ONLY, FORMATS, format_named, written_formats
 from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose, imported
@@ -43,7 +42,6 @@ from calib_core.interchange.own.calibration_json import (
 from calib_core.interchange.own.clicks_json import read_clicks, write_clicks
 from calib_core.interchange.own.documents import CALIBRATION_SCHEMA, names_schema
 from calib_core.interchange.own.pairs_json import PairsFile, read_pairs, write_pairs
-from calib_core.interchange.parent_pose import parent_pose
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.trees.attaching import attached_export
 from calib_core.interchange.trees.frame_choice import WantedFrames

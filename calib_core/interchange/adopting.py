@@ -9,7 +9,6 @@ from calib_core.arrays import Matrix66
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames, Provenance, choose_check_point
-from calib_core.interchange.cameras.difference import largest_difference_px
 from calib_core.interchange.check.pair_residuals import CheckPairs
 from calib_core.interchange.check.report import CheckReport, check
 from calib_core.interchange.evidence import Evidence
@@ -229,3 +228,21 @@ def _imported_warning(found: ImportedCalibration, source: str) -> DataWarning:
         f"imported from {PurePath(source).name} ({found.format}): its pairs and input data are unknown",
         "check it with cocalib open RECORDING --calibration FILE: click the reflector",
     )
+
+
+_GRID = 9
+
+
+def largest_difference_px(a: Camera, b: Camera) -> float:
+    """Return the largest distance [px] between the pixels of one ray, over the picture of the first camera.
+
+    Infinite if the pictures have different sizes, or the second camera does not image a ray of the first.
+    """
+    if (a.width_px, a.height_px) != (b.width_px, b.height_px):
+        return float("inf")
+    columns, rows = np.linspace(0, a.width_px - 1, _GRID), np.linspace(0, a.height_px - 1, _GRID)
+    pixels_px = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
+    rays = a.rays(pixels_px)
+    seen = np.isfinite(rays).all(axis=1)
+    apart_px = np.linalg.norm(b.project(rays[seen]) - pixels_px[seen], axis=1)
+    return float(np.where(np.isfinite(apart_px), apart_px, np.inf).max(initial=0.0))

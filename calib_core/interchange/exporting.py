@@ -1,6 +1,12 @@
-"""Export a calibration to another format, or refuse with a clear error if the format cannot represent it."""
+"""Export a calibration to another format, or refuse with a clear error if the format cannot represent it; show a file as text."""
 
+import io
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
@@ -8,10 +14,12 @@ from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
 from calib_core.interchange.format import Format
 from calib_core.interchange.formats.registry import format_named, written_formats
+from calib_core.interchange.imported import WrittenPose
 from calib_core.interchange.origin import missing_map
 from calib_core.interchange.own.calibration_json import calibration_sha256
 from calib_core.interchange.rectification import maps_npz, rectified_camera, rectified_file
-from calib_core.interchange.syntax.zip_archives import pack
+from calib_core.interchange.syntax.mat_file import load_mat
+from calib_core.interchange.syntax.zip_archives import pack, unpack
 
 _MAPS_NAME = "rectification.npz"
 _SAME_MATRIX_NOTE = (
@@ -189,3 +197,74 @@ def _refuse_rectified(chosen: Format, *, rectified: bool) -> None:
         raise InputError(
             f"rectified applies only to formats that cannot store distortion ({asking}), not to {chosen.name}; omit it"
         )
+
+
+_MAT_TEXT_BYTES = 116
+
+
+def contents_text(written: Export) -> str:
+    """Return a text file unchanged, and a binary file as text, one member after the other."""
+    content = written.content
+    if isinstance(content, str):
+        return content
+    if content.startswith(b"PK"):
+        members = unpack(content, source=written.file_name)
+        return "\n".join(_member(name, data) for name, data in members.items())
+    if content.startswith(b"MATLAB"):
+        comment = content[:_MAT_TEXT_BYTES].decode("ascii", errors="replace").rstrip("\0 ")
+        return "\n".join([comment, "", *_variables(load_mat(content, source=written.file_name))]) + "\n"
+    return f"binary, {len(content):,} bytes\n"  # a format of an installed package, with an unknown layout
+
+
+def _member(name: str, data: bytes) -> str:
+    if name.endswith(".npz"):
+        inside = unpack(data, source=name)
+        return f"[{name}]\n" + "\n".join(_member(inner, array) for inner, array in inside.items())
+    if not name.endswith(".npy"):
+        return f"[{name}]\n{data.decode('utf-8', errors='replace')}"
+    array = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
+    return "\n".join(_variables({name.removesuffix(".npy"): array})) + "\n"
+
+
+def _variables(values: Mapping[str, Any], owner: str = "") -> Iterator[str]:
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            yield from _variables(value, f"{owner}{key}.")
+            continue
+        array = np.asarray(value)
+        if array.dtype.kind in "US":
+            lines = [line for text in array.ravel().tolist() for line in str(text).splitlines()]
+            yield from [f"{owner}{key} = {lines[0]!r}"] if len(lines) == 1 else [f"{owner}{key}", *_indented(lines)]
+            continue
+        yield f"{owner}{key}  {array.dtype}  {' x '.join(map(str, array.shape)) or 'scalar'}"
+        yield from (f"    {row}" for row in _rows(array))
+
+
+def _indented(lines: list[str]) -> list[str]:
+    return [f"    {line}" for line in lines]
+
+
+def _rows(array: np.ndarray) -> list[str]:
+    """Format an array row by row, each number with six significant digits."""
+    rows = np.atleast_2d(array)
+    return ["".join(f"{value:>13.6g}" for value in row.ravel().tolist()) for row in rows]
+
+
+_NAMES = "x y z qx qy qz qw"
+
+
+def parent_pose(numbers: Sequence[float]) -> RigidTransform:
+    """Return parent_from_radar from x, y, z [m] and the quaternion qx, qy, qz, qw.
+
+    Raises:
+        InputError: there are not seven numbers, one is not finite, or the quaternion's length is not 1.
+    """
+    if len(numbers) != 7 or not all(map(math.isfinite, numbers)):
+        raise InputError(
+            f"the pose of the radar in its parent takes seven finite numbers: {_NAMES} (metres, quaternion)"
+        )
+    try:
+        pose = WrittenPose("quaternion_xyzw", np.array(numbers[3:]), np.array(numbers[:3]), "camera_from_radar")
+        return pose.as_written()
+    except ValueError as error:
+        raise InputError(f"the pose of the radar in its parent: {error}; the order is {_NAMES}, qw last") from None

@@ -2,6 +2,8 @@
 
 from difflib import get_close_matches
 
+import msgspec
+
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange.cameras.camera_format import CameraFormat
@@ -11,8 +13,17 @@ from calib_core.interchange.cameras.formats.kitti import KITTI_CAMERAS_FILE
 from calib_core.interchange.cameras.formats.matlab import MATLAB_PARAMETERS
 from calib_core.interchange.cameras.formats.mrcal import MRCAL
 from calib_core.interchange.cameras.formats.opencv import OPENCV_JSON, OPENCV_XML, OPENCV_YAML
-from calib_core.interchange.cameras.formats.own_json import OWN_JSON
 from calib_core.interchange.cameras.formats.ros import ROS
+from calib_core.interchange.own.camera_document import camera_document
+from calib_core.interchange.syntax.json_text import json_text
+
+
+def _write(camera: Camera, _name: str) -> str:
+    return json_text(msgspec.to_builtins(camera_document(camera)))
+
+
+OWN_JSON = CameraFormat("json", "JSON, with the covariance of the intrinsics", ".json", _write)
+
 
 CAMERA_FORMATS: dict[str, CameraFormat] = {
     one.name: one

@@ -7,8 +7,8 @@ import numpy as np
 from calib_core.geometry import RigidTransform, rotation_angle_rad
 from calib_core.interchange.check.agreement import WITHOUT_COVARIANCE, AgreementLimits, Judgement
 from calib_core.interchange.check.comparison import Comparison
-from calib_core.interchange.check.explanation import CheckResult, explain, explained
 from calib_core.interchange.check.pixel_differences import shown
+from calib_core.interchange.check.slips import CheckResult, explain, explained
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 
 _COARSE_RAD = np.radians(10.0)

@@ -1,4 +1,4 @@
-"""Check a calibration against pairs: the radar positions must project near their pixels."""
+"""Check a calibration against pairs, its own or others': the radar positions must project near their pixels."""
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -11,8 +11,8 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.input_files import file_text, read_input
-from calib_core.interchange.check.explanation import CheckResult, explain, explained
 from calib_core.interchange.check.pixel_differences import LOST_TEXT, far_outside, lenses_of, shown
+from calib_core.interchange.check.slips import CheckResult, explain, explained, rounding_of
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.own.calibration_json import read_calibration
 from calib_core.interchange.own.documents import CALIBRATION_SCHEMA
@@ -20,7 +20,7 @@ from calib_core.interchange.own.pairs_json import read_pairs
 from calib_core.interchange.syntax.strict_json import json_object
 from calib_core.measurements import MIN_PAIRS
 from calib_core.radar import RadarErrors
-from calib_core.results import Calibration
+from calib_core.results import Calibration, PairResult
 
 _NEAR = 0.03
 _CLEARLY_BETTER = 0.2
@@ -148,3 +148,44 @@ def _by_pose(pose: WrittenPose, pairs: CheckPairs, camera: Camera | None) -> Che
     return CheckResult(
         "error", "pairs-missed", f"{mismatch}, and no known slip explains it", "the sensors moved, or the pose is wrong"
     )
+
+
+_CLOSE_PX = 0.05
+
+
+def by_own_pairs(imported: ImportedCalibration) -> list[CheckResult]:
+    """Recompute the pair results that a calibration-1 file states."""
+    file = imported.file
+    pairs = [pair for pair in file.calibration.pairs if np.isfinite(pair.projected_px).all()] if file else []
+    if file is None or not pairs:
+        return []
+    again = file.calibration.reproject(np.array([pair.point_radar_m for pair in pairs]))
+    apart = np.linalg.norm(again - [pair.projected_px for pair in pairs], axis=1)
+    tolerances = _tolerances_px(imported, pairs)
+    wrong = [pair.id for pair, px, most in zip(pairs, apart, tolerances, strict=True) if not px <= most]
+    if wrong:
+        named = ", ".join(wrong[:5]) + (", ..." if len(wrong) > 5 else "")
+        message = f"{len(wrong)} of {len(pairs)} pairs do not project where the file says ({named})"
+        hint = "pose, camera or pairs were changed after solving; solve again"
+        return [CheckResult("error", "pairs-disagree", message, hint)]
+    results = [CheckResult("good", "pairs", f"all {len(pairs)} pairs project where the file says")]
+    as_printed = not file.calibration.options.models_noise  # averages what disagrees, too
+    averaged = [pair.distance_px for pair in pairs if (not pair.excluded if as_printed else pair.inlier)]
+    aed_px = file.calibration.metrics.aed_px
+    if averaged and np.isfinite(aed_px) and abs(np.mean(averaged) - aed_px) > tolerances.max():
+        which = "pairs that are used" if as_printed else "inliers"
+        message = f"aed_px is {aed_px:.3f}, but the {which} average {np.mean(averaged):.3f} px"
+        results.append(CheckResult("error", "metrics-disagree", message, "solve again"))
+    return results
+
+
+def _tolerances_px(imported: ImportedCalibration, pairs: list[PairResult]) -> Values:
+    """Return how far (n,) each pair may project from where the file says: more if the numbers of the pose are rounded."""
+    pose, rounding = imported.camera_from_radar, rounding_of(imported.pose)
+    points_radar_m = np.array([pair.point_radar_m for pair in pairs])
+    camera = imported.camera
+    if camera is None or not rounding.is_harmless:
+        return np.full(len(pairs), _CLOSE_PX)
+    px_per_m = np.linalg.norm(camera.project_with_jacobian(pose @ points_radar_m)[1], axis=(1, 2))
+    moved_m = np.array([rounding.at(point, pose) for point in points_radar_m])
+    return np.asarray(_CLOSE_PX + np.where(np.isfinite(px_per_m), px_per_m * moved_m, 0.0))

@@ -9,8 +9,8 @@ import msgspec
 import numpy as np
 
 from calib_core.input_files import encodable
-from calib_core.interchange.check.explanation import CheckResult
 from calib_core.interchange.check.report import CheckReport
+from calib_core.interchange.check.slips import CheckResult
 from calib_core.interchange.syntax.json_text import json_text
 
 CHECK_SCHEMA = "cocalib/check-1"

@@ -3,9 +3,8 @@
 import numpy as np
 
 from calib_core.geometry import RigidTransform, rotation_angle_rad
-from calib_core.interchange.check.explanation import CheckResult, explain, explained
 from calib_core.interchange.check.pixel_differences import Lenses, lenses_of, shown
-from calib_core.interchange.check.rounding import rounding_of, within_rounding
+from calib_core.interchange.check.slips import CheckResult, explain, explained, rounding_of, within_rounding
 from calib_core.interchange.imported import ImportedCalibration
 from calib_core.interchange.own.calibration_json import calibration_sha256
 

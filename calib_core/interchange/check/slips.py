@@ -1,15 +1,23 @@
-"""The slips that turn a right calibration into a wrong file, each with the edit that undoes it."""
+"""What explains a mismatch: rounding, or a slip between a right calibration and a wrong file, with the edit that undoes it."""
 
 import dataclasses
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from decimal import Decimal
 from itertools import combinations
+from typing import Literal
 
 import numpy as np
 
-from calib_core.geometry import matrix_from_quaternion_wxyz, quaternion_wxyz_from_matrix
+from calib_core.arrays import Vector3
+from calib_core.geometry import (
+    RigidTransform,
+    matrix_from_quaternion_wxyz,
+    quaternion_wxyz_from_matrix,
+    rotation_angle_rad,
+)
 from calib_core.interchange.imported import Direction, Form, WrittenPose
-from calib_core.interchange.rotations import matrix_from_rpy, rpy_from_matrix
+from calib_core.interchange.rotations import LINK_FROM_OPTICAL, matrix_from_rpy, rpy_from_matrix
 
 _ROUNDED = 1.001
 
@@ -228,3 +236,155 @@ def undone_slips(pose: WrittenPose) -> Iterator[UndoneSlips]:
         for once in first.undo(pose):
             for undone in second.undo(once):
                 yield UndoneSlips((first, second), undone)
+
+
+@dataclass(frozen=True, slots=True)
+class CheckResult:
+    """One result of a check.
+
+    Attributes:
+        level: "good" (verified), "warning" (look at it) or "error" (the file is wrong).
+        code: one word for programs.
+        message: what was found, with figures.
+        hint: what to do about it; empty if nothing needs to be done.
+    """
+
+    level: Literal["good", "warning", "error"]
+    code: str
+    message: str
+    hint: str = ""
+
+
+def explain(
+    pose: WrittenPose, miss: Callable[[RigidTransform], float], limit: float, *, most: int = 2
+) -> UndoneSlips | None:
+    """Find the fewest slips that, undone, bring the miss within the limit; among equally few, the best.
+
+    Args:
+        pose: as written.
+        miss: how far a pose is from the right one, in any unit.
+        limit: in the same unit.
+        most: how many slips may have happened at once, 1 or 2.
+    """
+    best: tuple[int, float, UndoneSlips] | None = None
+    for undone in undone_slips(pose):
+        if len(undone.slips) > most or (best is not None and len(undone.slips) > best[0]):
+            break
+        try:
+            missed = miss(undone.pose.camera_from_radar())
+        except ValueError:
+            continue
+        rank = (len(undone.slips), missed)
+        if missed <= limit and (best is None or rank < best[:2]):
+            best = (*rank, undone)
+    return best[2] if best else None
+
+
+def explained(undone: UndoneSlips, mismatch: str) -> CheckResult:
+    """Return an error result that names the slips.
+
+    Args:
+        undone: the slips.
+        mismatch: what does not fit, with figures; it starts the message.
+    """
+    slips = undone.slips
+    return CheckResult(
+        "error",
+        "+".join(slip.code for slip in slips),
+        f"{mismatch}: " + ", and ".join(slip.message for slip in slips),
+        ", and ".join(slip.hint for slip in slips),
+    )
+
+
+_FULL_DIGITS = 15
+_FLOAT_32 = 1e-6
+_HARMLESS_RAD, _HARMLESS_M = 2e-4, 1e-3
+_LARGEST = 0.02  # metres and radians: numbers such as 1 and 0.5 are usually not rounded
+
+
+@dataclass(frozen=True, slots=True)
+class Rounding:
+    """What rounding can have done to a pose.
+
+    Attributes:
+        digits: of its numbers; 15 and more are all that a number has.
+        angle_rad: the largest rotation that rounding can have added.
+        distance_m: the largest shift of the translation as written.
+    """
+
+    digits: int
+    angle_rad: float
+    distance_m: float
+
+    @property
+    def is_harmless(self) -> bool:
+        """Whether it moves the pose by less than any calibration knows it: about 0.01 degrees and a millimetre."""
+        return self.angle_rad <= _HARMLESS_RAD and self.distance_m <= _HARMLESS_M
+
+    def at(self, point_radar_m: Vector3, camera_from_radar: RigidTransform) -> float:
+        """Return how far rounding can have moved a radar point (3,) in the camera frame [m]."""
+        arm_m = float(np.linalg.norm(point_radar_m) + np.linalg.norm(camera_from_radar.translation_m))
+        return self.distance_m + self.angle_rad * arm_m
+
+    @property
+    def text(self) -> str:
+        """What was done to the numbers."""
+        return f"the numbers are rounded to {self.digits} digits"
+
+
+def rounding_of(pose: WrittenPose) -> Rounding:
+    """Find out from the numbers of a pose how they were rounded; angles may have been written in degrees."""
+    digits, tolerance = _last_digits(pose.rotation)
+    if pose.form == "rpy":
+        in_degrees, tolerance_deg = _last_digits(np.degrees(pose.rotation))
+        if in_degrees < digits:
+            digits, tolerance = in_degrees, np.radians(tolerance_deg)
+    half_angles = 2.0 if pose.form.startswith("quaternion") else 1.0
+    angle_rad = float(tolerance.sum()) if pose.form == "rpy" else half_angles * float(np.linalg.norm(tolerance))
+    shift_digits, shift_m = _last_digits(pose.translation_m)
+    found = (digits, shift_digits)
+    return Rounding(
+        max(found) if max(found) < _FULL_DIGITS else min(found),
+        min(angle_rad, _LARGEST) + _FLOAT_32,
+        min(float(np.linalg.norm(shift_m)), _LARGEST) + _FLOAT_32,
+    )
+
+
+def within_rounding(pose: WrittenPose, camera_from_radar: RigidTransform, rounding: Rounding) -> bool:
+    """Return whether a pose, as written, is the given one up to rounding.
+
+    Raises:
+        ValueError: its rotation is not a rotation.
+    """
+    written, wanted = pose.as_written(), as_in_file(pose, camera_from_radar)
+    angle_rad = rotation_angle_rad(written.rotation @ wanted.rotation.T)
+    far_m = _FLOAT_32 * float(np.linalg.norm(wanted.translation_m))
+    distance_m = float(np.linalg.norm(written.translation_m - wanted.translation_m))
+    return angle_rad <= rounding.angle_rad and distance_m <= rounding.distance_m + far_m
+
+
+def as_in_file(pose: WrittenPose, camera_from_radar: RigidTransform) -> RigidTransform:
+    """Return the transform that the file would hold for another pose: in its direction, with its camera axes."""
+    meant = LINK_FROM_OPTICAL @ camera_from_radar if pose.axes == "link" else camera_from_radar
+    return meant if pose.direction == "camera_from_radar" else meant.inverse()
+
+
+def _last_digits(values: np.ndarray) -> tuple[int, np.ndarray]:
+    """Return the most significant digits of any value, and for each value half a unit of its last digit.
+
+    Trailing zeros are not visible in a number, so that the digit is that of the value with the most digits.
+    """
+    flat = np.abs(np.asarray(values, dtype=np.float64)).ravel()
+    parts = [_digits_and_decimals(value) for value in flat.tolist() if value]
+    digits = max((digits for digits, _ in parts), default=1)
+    decimals = max((decimals for _, decimals in parts), default=0)
+    if digits >= _FULL_DIGITS:
+        return digits, np.zeros(len(flat))
+    exponents = np.floor(np.log10(np.where(flat > 0, flat, 1.0)))
+    by_digits = np.where(flat > 0, 0.5 * 10.0 ** (exponents + 1 - digits), 0.0)
+    return digits, np.maximum(by_digits, 0.5 * 10.0**-decimals)
+
+
+def _digits_and_decimals(value: float) -> tuple[int, int]:
+    number = Decimal(repr(value)).normalize().as_tuple()
+    return len(number.digits), max(0, -int(number.exponent))

@@ -7,7 +7,7 @@ from calib_core.errors import InputError
 from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.formats.apollo import APOLLO
 from calib_core.interchange.formats.arrays.mat import MATLAB
-from calib_core.interchange.formats.arrays.npz import NUMPY
+from calib_core.interchange.formats.arrays.named_arrays import NUMPY
 from calib_core.interchange.formats.arrays.text_matrix import MATRIX
 from calib_core.interchange.formats.autoware import AUTOWARE
 from calib_core.interchange.formats.colmap import COLMAP

@@ -1,17 +1,133 @@
-"""Hypotheses about a pose, ranked: by how usual their meaning and mounting are, by pairs, and by another calibration."""
+"""Hypotheses about a pose, ranked: what its numbers can mean, how usual that and the mounting are, pairs, another calibration."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
+from typing import Literal, TypeAlias, TypeVar
 
 import numpy as np
 
 from calib_core.geometry import RigidTransform, rotation_angle_rad
 from calib_core.interchange.check.pair_residuals import CheckPairs
 from calib_core.interchange.check.pixel_differences import shown
-from calib_core.interchange.hypotheses.found_poses import FoundPose
-from calib_core.interchange.hypotheses.meanings import Meaning, meanings_of
-from calib_core.interchange.hypotheses.mounting import is_usual, mounting_weight, mounting_words
+from calib_core.interchange.hypotheses.found_poses import FoundPose, PoseReading
+from calib_core.interchange.imported import Direction
+from calib_core.interchange.rotations import LINK_FROM_OPTICAL, off_forward_rad
+
+CameraAxes: TypeAlias = Literal["optical", "body", "opengl"]
+RadarAxes: TypeAlias = Literal["flu", "frd", "rfu", "optical-like"]
+LengthUnit: TypeAlias = Literal["m", "mm", "cm"]
+
+Name = TypeVar("Name", bound=str)
+
+_DIRECTIONS: tuple[Direction, ...] = ("camera_from_radar", "radar_from_camera")
+_OPTICAL_FROM: dict[CameraAxes, np.ndarray] = {
+    "optical": np.eye(3),
+    "body": LINK_FROM_OPTICAL.rotation.T,
+    "opengl": np.diag([1.0, -1.0, -1.0]),
+}
+_AS_WRITTEN_FROM_RADAR: dict[RadarAxes, np.ndarray] = {
+    "flu": np.eye(3),
+    "frd": np.diag([1.0, -1.0, -1.0]),
+    "rfu": np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
+    "optical-like": LINK_FROM_OPTICAL.rotation.T,
+}
+_METRES: dict[LengthUnit, float] = {"m": 1.0, "mm": 1e-3, "cm": 1e-2}
+
+# How usual each is in files that state nothing; a name that mentions one makes it the usual one.
+_USUAL_CAMERA: dict[CameraAxes, float] = {"optical": 0.7, "body": 0.25, "opengl": 0.05}
+_USUAL_RADAR: dict[RadarAxes, float] = {"flu": 0.86, "frd": 0.06, "rfu": 0.06, "optical-like": 0.02}
+_USUAL_UNIT: dict[LengthUnit, float] = {"m": 0.9, "mm": 0.08, "cm": 0.02}
+_NAMED = 0.95
+
+_WORDS_OF_CAMERA: dict[CameraAxes, str] = {
+    "optical": "optical axes (z forward, y down)",
+    "body": "body axes (x forward, z up)",
+    "opengl": "OpenGL axes (z backward, y up)",
+}
+_WORDS_OF_RADAR: dict[RadarAxes, str] = {
+    "flu": "radar x forward, y left, z up",
+    "frd": "radar x forward, y right, z down",
+    "rfu": "radar x right, y forward, z up",
+    "optical-like": "radar x right, y down, z forward",
+}
+_WORDS_OF_UNIT: dict[LengthUnit, str] = {"m": "metres", "mm": "millimetres", "cm": "centimetres"}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Meaning:
+    """One meaning of the numbers of a pose.
+
+    Attributes:
+        direction: which transform they are.
+        camera_axes: the axes of the camera frame they refer to.
+        radar_axes: the same for the radar.
+        unit: of the translation.
+        reading: how the numbers are read.
+        weight: how usual this meaning is, before the pose is looked at.
+    """
+
+    direction: Direction
+    camera_axes: CameraAxes
+    radar_axes: RadarAxes
+    unit: LengthUnit
+    reading: PoseReading
+    weight: float
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """Every part of its key; any of them can be given to choose it."""
+        order = (self.reading.turned.key,) if self.reading.turned.key else ()
+        return (self.direction, self.camera_axes, self.radar_axes, *order, self.unit)
+
+    @property
+    def key(self) -> str:
+        """What chooses it on the command line: its parts without the radar axes that go without saying."""
+        return ",".join(part for part in self.parts if part != "flu")
+
+    @property
+    def words(self) -> str:
+        """The same for people."""
+        carries = (
+            "carries radar points into the camera"
+            if self.direction == "camera_from_radar"
+            else "carries camera points into the radar (the pose of the camera)"
+        )
+        parts = [carries, _WORDS_OF_CAMERA[self.camera_axes], _WORDS_OF_RADAR[self.radar_axes]]
+        if self.reading.turned.words:
+            parts.append(self.reading.turned.words)
+        return ", ".join([*parts, _WORDS_OF_UNIT[self.unit]])
+
+    def camera_from_radar(self) -> RigidTransform:
+        """Return the pose in our convention: p_camera = R p_radar + t, optical camera frame, radar x forward, y left, z up."""
+        written = RigidTransform(self.reading.turned.rotation, self.reading.translation * _METRES[self.unit])
+        carries_radar = written if self.direction == "camera_from_radar" else written.inverse()
+        optical, radar = _OPTICAL_FROM[self.camera_axes], _AS_WRITTEN_FROM_RADAR[self.radar_axes]
+        return RigidTransform(optical @ carries_radar.rotation @ radar, optical @ carries_radar.translation_m)
+
+
+def meanings_of(pose: FoundPose) -> Iterator[Meaning]:
+    """Yield every meaning of a pose's numbers."""
+    hints = pose.hints
+    cameras = _weights(_USUAL_CAMERA, hints.camera_axes)
+    radars = _weights(_USUAL_RADAR, hints.radar_axes)
+    units = _weights(_USUAL_UNIT, hints.unit)
+    towards: dict[Direction, float] = dict(
+        zip(_DIRECTIONS, (hints.carries_radar, 1 - hints.carries_radar), strict=True)
+    )
+    for reading, direction, camera, radar, unit in product(pose.readings, _DIRECTIONS, cameras, radars, units):
+        weight = towards[direction] * cameras[camera] * radars[radar] * units[unit] * reading.turned.weight
+        yield Meaning(direction, camera, radar, unit, reading, weight)
+
+
+def _weights(usual: dict[Name, float], named: str) -> dict[Name, float]:
+    """Return how usual each is; one that a name mentions is nearly certain."""
+    if named not in usual:
+        return usual
+    others = sum(weight for name, weight in usual.items() if name != named)
+    return {name: _NAMED if name == named else (1 - _NAMED) * weight / others for name, weight in usual.items()}
+
 
 _SAME_RAD, _SAME_M = 1e-4, 1e-4
 _CLEAR = 0.95
@@ -170,3 +286,71 @@ def _by_pairs(hypotheses: Sequence[Hypothesis], pairs: CheckPairs) -> np.ndarray
 def _by_distance(one: Hypothesis) -> float:
     angle, distance_m = one.apart
     return -3.0 * (math.log1p((angle / _ANGLE_RAD) ** 2) + math.log1p((distance_m / _APART_M) ** 2))
+
+
+_ALONG_RAD, _UPRIGHT_RAD = math.radians(20.0), math.radians(12.0)
+_USUAL_ALONG_RAD, _USUAL_UPRIGHT_RAD = math.radians(50.0), math.radians(35.0)
+_USUAL_M = (0.01, 4.0)
+_TYPICAL_M, _FACTOR = 0.4, 3.5
+_LOOKS_ANYWHERE, _ANY_ATTITUDE = 0.02, 0.001
+_SMALLEST_M = 1e-3
+
+
+def _tilts_rad(camera_from_radar: RigidTransform) -> tuple[float, float]:
+    """Return the angles between the viewing direction and the radar's x axis, and of the picture's lean to one side."""
+    rotation = camera_from_radar.rotation
+    lean = abs(math.atan2(rotation[0, 2], -rotation[1, 2]))  # of the radar's up axis in the picture
+    return off_forward_rad(camera_from_radar), lean
+
+
+def mounting_weight(camera_from_radar: RigidTransform) -> float:
+    """Return how usual a mounting is, as an unnormalised density over attitudes and over the logarithm of the distance.
+
+    Most pairs of sensors look the same way, within about 20 degrees, upright, decimetres apart; a few look elsewhere.
+    """
+    along, lean = _tilts_rad(camera_from_radar)
+    upright = math.exp(-0.5 * (lean / _UPRIGHT_RAD) ** 2)
+    facing = math.exp(-0.5 * (along / _ALONG_RAD) ** 2) * upright
+    distance_m = max(float(np.linalg.norm(camera_from_radar.translation_m)), _SMALLEST_M)
+    apart = math.exp(-0.5 * (math.log(distance_m / _TYPICAL_M) / math.log(_FACTOR)) ** 2)
+    return (facing + _LOOKS_ANYWHERE * upright + _ANY_ATTITUDE) * (apart + 1e-6)
+
+
+def is_usual(camera_from_radar: RigidTransform) -> bool:
+    """Return whether two sensors of one vehicle are often mounted like this."""
+    along, lean = _tilts_rad(camera_from_radar)
+    distance_m = float(np.linalg.norm(camera_from_radar.translation_m))
+    near = distance_m <= _USUAL_M[1] and (distance_m >= _USUAL_M[0] or distance_m == 0.0)
+    return along <= _USUAL_ALONG_RAD and lean <= _USUAL_UPRIGHT_RAD and near
+
+
+def mounting_words(camera_from_radar: RigidTransform) -> str:
+    """Return where the camera is, seen from the radar, and where it looks."""
+    along, lean = _tilts_rad(camera_from_radar)
+    forward, left, up = camera_from_radar.rotation[2].tolist()  # the viewing direction in the radar's axes
+    if along <= math.radians(10.0):
+        looks = "the camera looks where the radar looks"
+    elif forward < -0.8:
+        looks = "the camera looks backwards"
+    else:
+        sides = [(abs(left), "left" if left > 0 else "right"), (abs(up), "up" if up > 0 else "down")]
+        looks = f"the camera looks {math.degrees(along):.0f} deg to the {max(sides)[1]}".replace(
+            "to the up", "up"
+        ).replace("to the down", "down")
+    if lean > math.radians(135.0):
+        looks += ", upside down"
+    elif lean > math.radians(45.0):
+        looks += ", on its side"
+    elif lean > math.radians(10.0):
+        looks += f", leaning {math.degrees(lean):.0f} deg"
+    return f"{looks}, {_place_words(camera_from_radar.inverse().translation_m)}"
+
+
+def _place_words(camera_radar_m: np.ndarray) -> str:
+    names = (("forward", "back"), ("left", "right"), ("up", "down"))
+    parts = [
+        f"{abs(value):.2g} m {name if value > 0 else opposite}"
+        for value, (name, opposite) in zip(camera_radar_m.tolist(), names, strict=True)
+        if abs(value) >= 0.005
+    ]
+    return f"from the radar {', '.join(parts)}" if parts else "at the radar's place"

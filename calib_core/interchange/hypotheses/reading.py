@@ -10,7 +10,7 @@ from calib_core.errors import InputError
 from calib_core.interchange.cameras.camera_format import FoundCamera
 from calib_core.interchange.cameras.fields import find_cameras
 from calib_core.interchange.formats.arrays.mat import MATLAB
-from calib_core.interchange.formats.arrays.npz import NUMPY
+from calib_core.interchange.formats.arrays.named_arrays import NUMPY
 from calib_core.interchange.formats.arrays.text_matrix import MATRIX
 from calib_core.interchange.formats.opencv import OPENCV
 from calib_core.interchange.formats.registry import reader_of

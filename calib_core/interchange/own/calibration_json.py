@@ -1,52 +1,61 @@
-"""calibration-1, the file of a solved calibration: written, read, and as a format of the registry."""
+"""calibration-1, the file of a solved calibration: written, read, and as a format of the registry.
+
+Below are the parts that differ from their types: what is said of the vehicle, the radar's errors and angle map, the covariance's
+parts, the provenance.
+"""
 
 import dataclasses
 import hashlib
 from collections.abc import Iterable, Mapping
+from dataclasses import asdict
 from pathlib import PurePath
 from typing import Any
 
 import msgspec
 import numpy as np
+from msgspec import UNSET, UnsetType
 
+from calib_core.arrays import Matrix66
 from calib_core.camera import Camera
+from calib_core.covariance_parts import CovarianceParts
 from calib_core.diagnostics.confirmation import rests_on_fleet_prior
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.input_files import encodable
 from calib_core.interchange.calibration_file import (
     EQUATION,
+    AssumptionNote,
     CalibrationFile,
     FrameNames,
+    KeptResult,
     Provenance,
     choose_check_point,
 )
 from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose, imported
 from calib_core.interchange.own import documents
-from calib_core.interchange.own.angle_map_document import angle_map_document, angle_map_of
 from calib_core.interchange.own.camera_document import camera_document, camera_of
-from calib_core.interchange.own.clicks_json import refuse_repeated_ids
-from calib_core.interchange.own.covariance_parts_document import covariance_parts_document, covariance_parts_of
+from calib_core.interchange.own.clicks_json import refuse_repeated_ids, unconfirmed_document, unconfirmed_of
+from calib_core.interchange.own.documents import (
+    AngleMapDocument,
+    CovariancePartsDocument,
+    RadarErrorsDocument,
+    SystematicErrorDocument,
+    VehicleDocument,
+)
+from calib_core.interchange.own.documents import Matrix66 as StatedMatrix
 from calib_core.interchange.own.kept_results import kept_results, with_kept
 from calib_core.interchange.own.numbers import finite_or_none, nan_if_none, nested
 from calib_core.interchange.own.pair_document import SOLVED_FROM_KEYS, solved_pair_document, solved_pair_of
-from calib_core.interchange.own.provenance_document import provenance_document, provenance_of
-from calib_core.interchange.own.radar_errors_document import (
-    radar_errors_document,
-    radar_errors_of,
-    systematic_error_document,
-    systematic_error_of,
-)
 from calib_core.interchange.own.transform_document import are_inverse, transform_document, transform_of
-from calib_core.interchange.own.vehicle_document import vehicle_document, vehicle_of
 from calib_core.interchange.syntax.content import Content, decoded
 from calib_core.interchange.syntax.json_text import json_text
 from calib_core.interchange.syntax.strict_json import document_in, json_object
 from calib_core.interchange.vehicle_note import VehicleNote
 from calib_core.measurements import ReflectorClick, Unpaired
-from calib_core.radar import RadarErrors
-from calib_core.results import Calibration, CheckPoint, DataWarning, Metrics
+from calib_core.radar import AngleMap, RadarErrors
+from calib_core.results import Calibration, CheckPoint, DataWarning, InputFile, Metrics
+from calib_core.results.shared_errors import SystematicErrorResult
 from calib_core.results.verdict import Verdict, verdict_on
 
 _ABOUT_PRIOR = ("fleet-prior-untested", "fleet-prior-decides", "far-from-its-kind")
@@ -367,3 +376,189 @@ def _metrics(document: documents.MetricsDocument) -> Metrics:
         degrees_of_freedom=document.degrees_of_freedom,
         picture_sigma_px=nan_if_none(document.picture_sigma_px),
     )
+
+
+def vehicle_document(note: VehicleNote, kept: tuple[KeptResult, ...] = ()) -> VehicleDocument | None:
+    """Return the document; None if nothing is stated.
+
+    Args:
+        note: what is stated.
+        kept: results that go back to their places, which may be in this document alone.
+    """
+    has_more = any(result.place[0] == "vehicle" for result in kept)
+    return VehicleDocument(**asdict(note)) if has_more or note != VehicleNote() else None
+
+
+def vehicle_of(document: VehicleDocument | None, *, source: str) -> VehicleNote:
+    """Return what a document states.
+
+    Raises:
+        InputError: a text is empty, too long or not printable, or a name has a slash; the message names the file and the key.
+    """
+    if document is None:
+        return VehicleNote()
+    try:
+        return VehicleNote(
+            document.name, document.type, document.session, document.radar_serial, document.camera_serial
+        )
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from None
+
+
+def radar_errors_document(errors: RadarErrors) -> RadarErrorsDocument:
+    """Return the document of the radar's errors."""
+    return RadarErrorsDocument(
+        errors.azimuth_scale, errors.elevation_scale, errors.range_bias_m, errors.squared_height_m2
+    )
+
+
+def radar_errors_of(document: RadarErrorsDocument) -> RadarErrors:
+    """Return the radar's errors in a document."""
+    return RadarErrors(
+        document.azimuth_scale, document.elevation_scale, document.range_bias_m, document.squared_height_m2
+    )
+
+
+def systematic_error_document(error: SystematicErrorResult) -> SystematicErrorDocument:
+    """Return the document of one error; its text is left out, because its name says the same."""
+    return SystematicErrorDocument(
+        name=error.name,
+        value=error.value,
+        sigma=error.sigma,
+        prior_sigma=error.prior_sigma,
+        estimated=error.estimated,
+        position_share=finite_or_none(error.position_share) or 0.0,
+        rotation_share=finite_or_none(error.rotation_share) or 0.0,
+    )
+
+
+def systematic_error_of(document: SystematicErrorDocument) -> SystematicErrorResult:
+    """Return the error in a document."""
+    return SystematicErrorResult(
+        name=document.name,
+        value=document.value,
+        sigma=document.sigma,
+        prior_sigma=document.prior_sigma,
+        estimated=document.estimated,
+        position_share=document.position_share,
+        rotation_share=document.rotation_share,
+    )
+
+
+def angle_map_document(angle_map: AngleMap | None) -> AngleMapDocument | None:
+    """Return the document of an angle map."""
+    if angle_map is None:
+        return None
+    add, sigma = angle_map.correction_rad + 0.0, angle_map.sigma_rad
+    return AngleMapDocument(
+        azimuth_rad=angle_map.azimuth_rad.tolist(),
+        elevation_rad=angle_map.elevation_rad.tolist(),
+        add_azimuth_rad=add[:, :, 0].tolist(),
+        add_elevation_rad=add[:, :, 1].tolist(),
+        sigma_azimuth_rad=sigma[:, :, 0].tolist(),
+        sigma_elevation_rad=sigma[:, :, 1].tolist(),
+        aed_px=angle_map.raw_aed_px,
+        corrected_aed_px=angle_map.corrected_aed_px,
+    )
+
+
+def angle_map_of(document: AngleMapDocument | None, *, source: str) -> AngleMap | None:
+    """Return the angle map in a document.
+
+    Raises:
+        InputError: the tables do not fit the grid lines, or the grid lines do not ascend.
+    """
+    if document is None:
+        return None
+    try:
+        return AngleMap(
+            azimuth_rad=np.array(document.azimuth_rad),
+            elevation_rad=np.array(document.elevation_rad),
+            correction_rad=np.stack([document.add_azimuth_rad, document.add_elevation_rad], axis=-1),
+            sigma_rad=np.stack([document.sigma_azimuth_rad, document.sigma_elevation_rad], axis=-1),
+            raw_aed_px=np.nan if document.aed_px is None else document.aed_px,
+            corrected_aed_px=np.nan if document.corrected_aed_px is None else document.corrected_aed_px,
+        )
+    except ValueError as error:
+        raise InputError(f"{source}: radar_angle_map: {error}; correct it or remove radar_angle_map") from None
+
+
+def covariance_parts_document(parts: CovarianceParts | None) -> CovariancePartsDocument | None:
+    """Return the document of the parts; without a measured camera position that part is left out."""
+    if parts is None or not np.isfinite(parts.systematic).all():
+        return None
+    measured = nested(parts.camera_position + 0.0) if parts.camera_position.any() else None
+    return CovariancePartsDocument(nested(parts.systematic + 0.0), measured)
+
+
+def covariance_parts_of(
+    document: CovariancePartsDocument | None, *, source: str, place: str = "covariance_parts"
+) -> CovarianceParts | None:
+    """Return the parts in a document.
+
+    Raises:
+        InputError: a part is no covariance.
+    """
+    if document is None:
+        return None
+    measured = document.camera_position
+    return CovarianceParts(
+        _part(document.systematic, source=source, place=f"{place}.systematic"),
+        np.zeros((6, 6)) if measured is None else _part(measured, source=source, place=f"{place}.camera_position"),
+    )
+
+
+def _part(rows: StatedMatrix, *, source: str, place: str) -> Matrix66:
+    part = np.array(rows)
+    if not np.isfinite(part).all() or (np.diagonal(part) < 0.0).any():
+        raise InputError(
+            f"{source}: {place}: a variance on the diagonal is negative or no number; solve the session again"
+        )
+    return np.asarray(0.5 * (part + part.T))
+
+
+def provenance_document(provenance: Provenance) -> documents.ProvenanceDocument:
+    """Return the document of a provenance."""
+    return documents.ProvenanceDocument(
+        inputs=[documents.InputDocument(f.name, f.size_bytes, f.sha256) for f in provenance.inputs],
+        topics=documents.TopicsDocument(
+            provenance.radar_topic,
+            provenance.image_topic,
+            provenance.camera_info_topic,
+            radar_all=list(provenance.radar_topics) if len(provenance.radar_topics) > 1 else UNSET,
+            radar_choice=provenance.radar_choice or UNSET,
+        ),
+        clocks=documents.ClocksDocument(provenance.radar_clock, provenance.image_clock),
+        radar_axes=provenance.radar_axes,
+        video_start=provenance.video_start,
+        version=provenance.version,
+        column_map=list(provenance.column_map) or UNSET,
+        assumptions=[documents.AssumptionDocument(one.text, one.confirmed) for one in provenance.assumptions] or UNSET,
+        unconfirmed=unconfirmed_document(provenance.unconfirmed),
+    )
+
+
+def provenance_of(document: documents.ProvenanceDocument) -> Provenance:
+    """Return the provenance in a document."""
+    return Provenance(
+        inputs=tuple(InputFile(f.name, f.size_bytes, f.sha256) for f in document.inputs),
+        radar_topic=document.topics.radar,
+        radar_topics=_radar_topics(document.topics),
+        radar_choice=document.topics.radar_choice or "",
+        image_topic=document.topics.image,
+        camera_info_topic=document.topics.camera_info,
+        radar_clock=document.clocks.radar,
+        image_clock=document.clocks.image,
+        radar_axes=document.radar_axes,
+        video_start=document.video_start,
+        version=document.version,
+        column_map=tuple(document.column_map or ()),
+        assumptions=tuple(AssumptionNote(one.text, one.confirmed) for one in document.assumptions or ()),
+        unconfirmed=unconfirmed_of(document.unconfirmed),
+    )
+
+
+def _radar_topics(topics: documents.TopicsDocument) -> tuple[str, ...]:
+    if not isinstance(topics.radar_all, UnsetType):
+        return tuple(topics.radar_all)
+    return () if topics.radar is None else (topics.radar,)

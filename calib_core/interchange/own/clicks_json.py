@@ -1,18 +1,23 @@
-"""Write and read clicks-1, the file of a session's clicks."""
+"""Write and read clicks-1, the file of a session's clicks, with chosen returns and clicks that nobody confirmed."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import msgspec
-from msgspec import UNSET
+from msgspec import UNSET, UnsetType
 
 from calib_core.errors import InputError
-from calib_core.interchange.own.documents import CLICKS_SCHEMA, ClickDocument, ClicksDocument, TimeDocument
-from calib_core.interchange.own.return_document import chosen_of, return_document
-from calib_core.interchange.own.unconfirmed_document import unconfirmed_document, unconfirmed_of
+from calib_core.interchange.own.documents import (
+    CLICKS_SCHEMA,
+    ClickDocument,
+    ClicksDocument,
+    ReturnDocument,
+    TimeDocument,
+    UnconfirmedDocument,
+)
 from calib_core.interchange.syntax.json_text import json_text
 from calib_core.interchange.syntax.strict_json import parse_document
-from calib_core.measurements import ReflectorClick, time_from_parts, time_parts
+from calib_core.measurements import ChosenReturn, ReflectorClick, time_from_parts, time_parts
 from calib_core.results import UnconfirmedClicks
 
 
@@ -119,3 +124,37 @@ def refuse_repeated_ids(ids: Sequence[str], *, source: str, place: str) -> None:
             places = f"{place}[{first[name]}] and {place}[{index}]"
             raise InputError(f"{source}: {places}: both have the id {name!r}; give each its own")
         first[name] = index
+
+
+def unconfirmed_document(unconfirmed: UnconfirmedClicks | None) -> UnconfirmedDocument | UnsetType:
+    """Return the document; unset if everything was confirmed."""
+    return UNSET if unconfirmed is None else UnconfirmedDocument(list(unconfirmed.ids), unconfirmed.confidence)
+
+
+def unconfirmed_of(
+    document: UnconfirmedDocument | UnsetType, present: Sequence[str] | None = None
+) -> UnconfirmedClicks | None:
+    """Return what a document says; None if it says nothing.
+
+    Args:
+        document: of a file.
+        present: ids of the file's clicks: others were taken out of it since; None keeps all.
+    """
+    if isinstance(document, UnsetType):
+        return None
+    ids = tuple(name for name in document.clicks if present is None or name in present)
+    return UnconfirmedClicks(ids, document.confidence) if ids else None
+
+
+def return_document(chosen: ChosenReturn) -> ReturnDocument:
+    """Return the document of a chosen return."""
+    time = None if chosen.radar_time is None else TimeDocument(*time_parts(chosen.radar_time))
+    return ReturnDocument(chosen.position_m, time, chosen.topic)
+
+
+def chosen_of(document: ReturnDocument) -> ChosenReturn:
+    """Return the chosen return of a JSON object."""
+    time = document.radar_time
+    return ChosenReturn(
+        document.position_m, None if time is None else time_from_parts(time.sec, time.nanosec), document.topic
+    )

@@ -1,8 +1,10 @@
-"""Patch a frame tree's file in place so that its chain from radar to camera is a calibration; only the numbers change."""
+"""Patch a frame tree's file in place so that its chain from radar to camera is a calibration; only the numbers of the one free
+joint change.
+"""
 
 import codecs
 import difflib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,9 +16,15 @@ from calib_core.interchange.imported import Form
 from calib_core.interchange.origin import missing_map
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL, quaternion_xyzw_from_matrix, rpy_from_matrix
 from calib_core.interchange.syntax.yaml_text import number_text
-from calib_core.interchange.trees.frame_choice import ChosenFrames, WantedFrames, choose_frames
-from calib_core.interchange.trees.frame_tree import FrameTree
-from calib_core.interchange.trees.free_joint import free_joint
+from calib_core.interchange.trees.frame_choice import (
+    ChosenFrames,
+    WantedFrames,
+    choose_frames,
+    is_fixture,
+    is_of_camera,
+    is_of_radar,
+)
+from calib_core.interchange.trees.frame_tree import FrameTree, Step
 from calib_core.interchange.trees.joint import Joint, JointNumbers, Slot
 from calib_core.interchange.trees.posed_in_tree import axes_of_camera
 from calib_core.interchange.trees.reading import TreeFile, joined_tree
@@ -187,3 +195,79 @@ def _refuse_other_reading(
             f"{joint.place}: the patched text does not read back as the calibration (off by {off:.2g}), so nothing is changed; "
             "write each number of this joint once, on its own, and try again"
         )
+
+
+@dataclass(frozen=True, slots=True)
+class FreeJoint:
+    """The joint to solve for, and why this one."""
+
+    joint: Joint
+    why: str
+
+
+def free_joint(tree: FrameTree, chosen: ChosenFrames, sources: Collection[str], name: str | None) -> FreeJoint:
+    """Choose the joint to solve for.
+
+    Args:
+        tree: of the files and the recording.
+        chosen: the radar's and the camera's frame.
+        sources: the files that may be changed.
+        name: of the joint, or of its child frame, as the user says; None for the camera's mount.
+
+    Raises:
+        InputError: no joint between the two frames can be changed, or the named one is not between them.
+    """
+    path = tree.path(chosen.radar, chosen.camera)
+    between = [step for step in path if step.joint.place.source in sources]
+    if name is not None:
+        joint = _named(between, name, path)
+        return FreeJoint(joint, f"{_described(joint)}: named with --joint{_moving(tree, joint)}")
+    mounts = [step.joint for step in between if step.down and _is_mount_of_camera(tree, step.joint)]
+    if mounts:
+        return FreeJoint(mounts[-1], f"{_described(mounts[-1])}: the camera's mount{_moving(tree, mounts[-1])}")
+    on_camera_side = [step.joint for step in between if step.down and not _is_inside_camera(tree, step.joint)]
+    if on_camera_side:
+        joint = on_camera_side[-1]
+        return FreeJoint(joint, f"{_described(joint)}: the last one before the camera{_moving(tree, joint)}")
+    on_radar_side = [step.joint for step in between if not step.down and is_of_radar(tree, step.joint.child)]
+    if on_radar_side:
+        joint = on_radar_side[0]
+        return FreeJoint(
+            joint, f"{_described(joint)}: the radar's mount; the camera's is in no file{_moving(tree, joint)}"
+        )
+    raise InputError(
+        f"none of the joints between {chosen.radar} and {chosen.camera} is in the files to change; they are "
+        f"{_listed(path)}; give the file of one of them with --into, or name one with --joint"
+    )
+
+
+def _is_mount_of_camera(tree: FrameTree, joint: Joint) -> bool:
+    return is_of_camera(tree, joint.child) and not _is_inside_camera(tree, joint)
+
+
+def _is_inside_camera(tree: FrameTree, joint: Joint) -> bool:
+    """Return whether a joint connects two frames of one camera, such as its body and its optical axes."""
+    return is_of_camera(tree, joint.parent) and is_of_camera(tree, joint.child) and not is_fixture(joint.parent)
+
+
+def _named(between: Sequence[Step], name: str, path: Sequence[Step]) -> Joint:
+    found = [step.joint for step in between if name.lstrip("/") in (step.joint.name, step.joint.child)]
+    if len(found) != 1:
+        raise InputError(
+            f"--joint: no joint {name!r} that can be changed lies between the radar and the camera; those on the way are "
+            f"{_listed(path)}; name one of them by its name or its child frame"
+        )
+    return found[0]
+
+
+def _described(joint: Joint) -> str:
+    return f"joint {f'{joint.name}, ' if joint.name else ''}{joint}"
+
+
+def _listed(path: Sequence[Step]) -> str:
+    return "; ".join(_described(step.joint).removeprefix("joint ") for step in path)
+
+
+def _moving(tree: FrameTree, joint: Joint) -> str:
+    below = tree.below(joint.child)
+    return f"; with it moves {', '.join(below)}" if below else ""

@@ -1,5 +1,7 @@
 """The pose between the radar and the camera of a frame tree, chained over the joints between them."""
 
+import json
+import re
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,9 +15,8 @@ from calib_core.interchange.rotations import LINK_FROM_OPTICAL
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.trees.frame_choice import ChosenFrames, WantedFrames, choose_frames
 from calib_core.interchange.trees.frame_tree import FrameTree, Sensor
-from calib_core.interchange.trees.joint import Joint
+from calib_core.interchange.trees.joint import Joint, Place
 from calib_core.interchange.trees.reading import may_have_several_joints, tree_in
-from calib_core.interchange.trees.stated_joint import stated_joint
 from calib_core.interchange.trees.tree_part import joined
 
 _STANDARD = 1e-4
@@ -143,3 +144,21 @@ def _is_standard(joint: Joint) -> bool:
     if "optical" not in joint.child:
         return False
     return bool(np.abs(joint.transform.as_matrix() - LINK_FROM_OPTICAL.as_matrix()).max() <= _STANDARD)
+
+
+_STRING = r'"(?:[^"\\]|\\.)*"'
+_FIXED = re.compile(rf"; ({_STRING}) is fixed in ({_STRING}) at x y z qx qy qz qw \[([^\]]*)\]")
+
+
+def stated_joint(text: str, source: str) -> Joint | None:
+    """Return the camera's pose in the frame that a file poses, as its comment states it; None if it states none."""
+    match = _FIXED.search(text)
+    if match is None:
+        return None
+    try:
+        numbers = np.array(match[3].split(","), dtype=np.float64)
+        written = WrittenPose("quaternion_xyzw", numbers[3:], numbers[:3], "radar_from_camera")
+        place = Place(source, text.count("\n", 0, match.start()) + 1)
+        return Joint.posed(json.loads(match[2]), json.loads(match[1]), written, place)
+    except ValueError:
+        return None

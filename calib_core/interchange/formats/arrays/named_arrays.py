@@ -1,5 +1,6 @@
-"""Read a calibration from named arrays, as npz and mat files contain them."""
+"""Read a calibration from named arrays: NumPy's npz, and what it shares with mat files."""
 
+import io
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,10 +10,12 @@ from calib_core.arrays import Matrix66
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import FrameNames
+from calib_core.interchange.format import Reads
 from calib_core.interchange.formats.statement import STATEMENT_KEY, stated_lines, with_statement
 from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose
 from calib_core.interchange.own.calibration_json import COVARIANCE_CONVENTION
 from calib_core.interchange.rotations import upper_rows
+from calib_core.interchange.syntax.content import Content
 
 _ROUNDING = 1e-5
 
@@ -91,3 +94,25 @@ def _camera(arrays: Mapping[str, Any]) -> Camera | None:
     width_px, height_px = np.ravel(arrays["image_size_px"]).tolist()
     model: Any = str(arrays["camera_model"])
     return Camera(model, int(width_px), int(height_px), np.asarray(arrays["K"]), np.ravel(arrays["D"]))
+
+
+def _recognizes(content: Content) -> bool:
+    return content.syntax == "archive"
+
+
+def _read(content: Content, source: str) -> ImportedCalibration:
+    """Read an npz that contains camera_from_radar, or R and t.
+
+    Raises:
+        InputError: it contains neither, or Python objects.
+    """
+    arrays: dict[str, np.ndarray] = {}
+    for name, data in content.members.items():
+        try:
+            arrays[name.removesuffix(".npy")] = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
+        except (ValueError, EOFError) as error:
+            raise InputError(f"{source}: {name}: {error}; save plain arrays") from None
+    return from_arrays(arrays, "numpy", source=source)
+
+
+NUMPY = Reads(_recognizes, _read)
