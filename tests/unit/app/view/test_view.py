@@ -89,14 +89,19 @@ def test_before_the_first_click_the_hint_says_what_to_do() -> None:
     assert (seen.verdict.level, seen.verdict.action) == ("nothing", seen.hint)
 
 
-def test_a_solved_session_says_how_many_pairs_agree() -> None:
+def agreeing(seen: View) -> tuple[str, str]:
+    """Return the verdict's level, and how many clicks agree of how many."""
+    return seen.verdict.level, next(one.value for one in seen.metrics if one.key == "inliers")
+
+
+def test_a_solved_session_says_how_many_clicks_agree() -> None:
     four_agree = (*FIVE[:4], pair("c5", inlier=False))
-    assert shown(5, calibration(*FIVE)).status == "Weak: all 5 clicks agree"
-    assert shown(5, calibration(*four_agree)).status == "Weak: 4 of 5 clicks agree"
+    assert agreeing(shown(5, calibration(*FIVE))) == ("weak", "5 of 5")
+    assert agreeing(shown(5, calibration(*four_agree))) == ("weak", "4 of 5")
 
 
 def test_an_excluded_pair_is_not_among_those_that_could_agree() -> None:
-    assert shown(5, calibration(*FIVE[:4], pair("c5", excluded=True))).status == "Weak: all 4 clicks agree"
+    assert agreeing(shown(5, calibration(*FIVE[:4], pair("c5", excluded=True)))) == ("weak", "4 of 4")
 
 
 def test_an_unsolvable_session_shows_reason_and_hint() -> None:
@@ -146,10 +151,10 @@ def test_a_preview_is_shown_as_being_checked() -> None:
     preview = calibration(*pairs, checking=True)
     drawn = shown(5, preview)
     assert (drawn.checking, drawn.solving) == (True, True)
-    assert drawn.status == "Checking… 4 of 5 clicks agree"
+    assert agreeing(drawn)[1] == "4 of 5"
     checked = shown(5, replace(preview, checking=False))
     assert (checked.checking, checked.solving) == (False, False)
-    assert checked.status == "Weak: 4 of 5 clicks agree"
+    assert agreeing(checked) == ("weak", "4 of 5")
 
 
 def test_the_view_says_what_can_be_undone_and_redone() -> None:
