@@ -58,7 +58,7 @@ def dying(folder: str, name: str, times: int) -> str:
 
 def dying_job(job: Job, results: Path) -> Outcome:
     """Kill this worker whenever it runs the job of vehicle v001, as one that needs too much memory does."""
-    from cocalib.batch.one_job import run_once
+    from cocalib.batch.running_job import run_once
 
     (results / f"{job.row.vehicle}.{attempts(results, job.row.vehicle)}").touch()
     if job.row.vehicle == "v001":

@@ -25,10 +25,10 @@ from benchmarks.fleet.simulated_fleet import write_fleet
 from cocalib.batch.driving import drive
 from cocalib.batch.engine import InProcess
 from cocalib.batch.job import Job, jobs_of
-from cocalib.batch.manifest_files.reading import read_manifest
+from cocalib.batch.manifest import read_manifest
 from cocalib.batch.outcome import Outcome
 from cocalib.batch.results_folder import OUTCOME_FILE, ResultsFolder
-from cocalib.batch.running import run_job
+from cocalib.batch.running_job import run_job
 from cocalib.batch.worker_processes import WorkerProcesses
 
 __all__ = ["killing", "main"]

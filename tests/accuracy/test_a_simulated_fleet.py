@@ -16,7 +16,7 @@ from benchmarks.fleet.truth import read_truth
 from cocalib.batch.driving import drive
 from cocalib.batch.engine import InProcess
 from cocalib.batch.job import jobs_of
-from cocalib.batch.manifest_files.reading import read_manifest
+from cocalib.batch.manifest import read_manifest
 from cocalib.batch.results_folder import ResultsFolder
 from cocalib.fleet.reading import read_fleet
 

@@ -12,9 +12,9 @@ from calib_core.errors import InputError, OptionError
 from cocalib.batch.dask_scheduler import DaskScheduler
 from cocalib.batch.engine import Engine, InProcess
 from cocalib.batch.job import Job
-from cocalib.batch.one_job import failed_outcome, run_once
 from cocalib.batch.outcome import Outcome
 from cocalib.batch.results_folder import ResultsFolder
+from cocalib.batch.running_job import failed_outcome, run_once
 from cocalib.batch.worker_processes import WorkerProcesses
 
 _SMALL = 8

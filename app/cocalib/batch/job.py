@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cocalib.batch.input_digests import InputDigests
-from cocalib.batch.inputs import InputPath, inputs_of, state_of
+from cocalib.batch.inputs import InputDigests, InputPath, inputs_of, state_of
 from cocalib.batch.manifest import ManifestRow
 from cocalib.platform.resources import version
 

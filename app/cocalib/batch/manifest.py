@@ -1,10 +1,22 @@
 """The manifest: which sessions of which vehicles are to be calibrated, from what, and how."""
 
-from dataclasses import dataclass, field
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Annotated, Any
 
-from calib_core.options import CalibrationOptions
+import msgspec
+from msgspec import Meta, Struct
+
+from calib_core.errors import CalibrationError, InputError
+from calib_core.interchange import format_named
+from calib_core.interchange.syntax.strict_json import checked
+from calib_core.interchange.vehicle_note import MOST_CHARACTERS, require_label, require_name
+from calib_core.options import CalibrationOptions, CameraPositionPrior
 from calib_core.recordings import RecordingOptions
+from cocalib.option_changes import options_from_tree
+from cocalib.platform.files import read_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,3 +76,212 @@ class Manifest:
 
     source: Path
     rows: tuple[ManifestRow, ...]
+
+
+Name = Annotated[str, Meta(min_length=1, max_length=MOST_CHARACTERS)]
+
+
+class SharedDocument(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What sessions can have in common."""
+
+    vehicle_type: Name | None = None
+    radar_serial: Name | None = None
+    camera_serial: Name | None = None
+    auto: bool = False
+    camera: str | None = None
+    rescale_camera: bool = False
+    reflector_m: Annotated[float, Meta(ge=0.02, le=2.0)] = 0.24
+    camera_position_m: tuple[float, float, float] | None = None
+    camera_position_sigma_m: float | None = None
+    exports: tuple[str, ...] = ()
+    topics: RecordingOptions = msgspec.field(default_factory=RecordingOptions)
+    options: dict[str, object] = msgspec.field(default_factory=dict)
+
+
+class SessionDocument(SharedDocument, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """One session of one vehicle; paths are relative to the manifest."""
+
+    vehicle: Name
+    recording: str | tuple[str, ...]
+    session: Name | None = None
+    clicks: str | None = None
+    boxes: str | None = None
+
+
+class ManifestDocument(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A manifest: its sessions, each a SessionDocument, and what they share unless they say otherwise."""
+
+    session: tuple[dict[str, object], ...]
+    defaults: SharedDocument = msgspec.field(default_factory=SharedDocument)
+
+
+_MOST_BYTES = 64 * 1024 * 1024
+_TEXTS = ("vehicle", "session", "vehicle_type", "radar_serial", "camera_serial")
+_TAPE_SIGMA_M = 0.01
+
+
+def read_manifest(path: Path) -> Manifest:
+    """Read a TOML manifest. Paths in it are relative to its folder; whether they exist is not looked at.
+
+    Raises:
+        InputError: it cannot be read; a key is unknown or has a wrong value; two rows are of one session.
+    """
+    text = _text(path)
+    if path.suffix.lower() != ".toml":
+        raise InputError(f"{path}: a manifest is a .toml file; cocalib batch FILE.toml --init FOLDER writes one")
+    places, content = _toml(text, path)
+    document = checked(content, ManifestDocument, source=str(path))
+    if not document.session:
+        raise InputError(f"{path}: no session in it; add one, or let cocalib batch {path} --init FOLDER write the file")
+    defaults = content.get("defaults", {})
+    sessions = [
+        checked(_merged(defaults, one), SessionDocument, source=f"{path}: {place}")
+        for one, place in zip(content["session"], places, strict=True)
+    ]
+    rows = tuple(_row(one, place, path) for one, place in zip(sessions, places, strict=True))
+    _require_different(rows, path)
+    _require_own_recordings(rows, path)
+    return Manifest(path, rows)
+
+
+def _text(path: Path) -> str:
+    return read_text(
+        path,
+        is_what="a manifest",
+        max_bytes=_MOST_BYTES,
+        if_missing=f"cocalib batch {path} --init FOLDER writes one",
+        if_no_text="save it as UTF-8",
+    )
+
+
+def _toml(text: str, path: Path) -> tuple[list[str], dict[str, Any]]:
+    try:
+        content = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise InputError(f"{path}: not valid TOML: {error}") from None
+    sessions = content.setdefault("session", [])
+    if isinstance(sessions, dict):
+        raise InputError(f"{path}: [session] is one table; write [[session]], with two brackets, above each session")
+    for number, one in enumerate(sessions if isinstance(sessions, list) else [], start=1):
+        _require_quoted(one, f"{path}: session {number}")
+    _require_quoted(content.get("defaults"), f"{path}: defaults")
+    count = len(sessions) if isinstance(sessions, list) else 0
+    return [f"session {number}" for number in range(1, count + 1)], content
+
+
+def _require_quoted(table: object, where: str) -> None:
+    """Refuse numbers and dates where TOML wants text in quotes.
+
+    Raises:
+        InputError: names the first.
+    """
+    for key, value in table.items() if isinstance(table, dict) else ():
+        if key in _TEXTS and not isinstance(value, str):
+            raise InputError(f'{where}: {key}: {value} is no text; write it in quotes: {key} = "{value}"')
+
+
+def _merged(under: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a session says, and the defaults where it says nothing; tables are merged key by key."""
+    merged = dict(under)
+    for key, value in over.items():
+        below = merged.get(key)
+        merged[key] = _merged(below, value) if isinstance(below, Mapping) and isinstance(value, Mapping) else value
+    return merged
+
+
+def _row(document: SessionDocument, place: str, path: Path) -> ManifestRow:
+    where = f"{path}: {place} ({document.vehicle})"
+    recordings = (document.recording,) if isinstance(document.recording, str) else document.recording
+    if not recordings or not all(recordings):
+        raise InputError(f"{where}: recording: names no file; give one or more")
+    for name in document.exports:
+        try:
+            format_named(name)
+        except CalibrationError as error:
+            raise InputError(f"{where}: exports: {error}") from None
+    folder = path.parent
+    session = document.session or Path(recordings[0]).stem
+    for key, name in (("vehicle", document.vehicle), ("session", session)):
+        require_name(name, f"{where}: {key}")
+    for key in ("vehicle_type", "radar_serial", "camera_serial"):
+        if (text := getattr(document, key)) is not None:
+            require_label(text, f"{where}: {key}")
+    return ManifestRow(
+        document.vehicle,
+        session,
+        tuple(folder / name for name in recordings),
+        vehicle_type=document.vehicle_type,
+        radar_serial=document.radar_serial,
+        camera_serial=document.camera_serial,
+        clicks=_path(folder, document.clicks),
+        auto=document.auto,
+        camera=_path(folder, document.camera),
+        boxes=_path(folder, document.boxes),
+        topics=document.topics,
+        options=_options(document, where),
+        exports=document.exports,
+        rescale_camera=document.rescale_camera,
+        reflector_m=document.reflector_m,
+        place=place,
+    )
+
+
+def _path(folder: Path, name: str | None) -> Path | None:
+    return folder / name if name else None
+
+
+def _options(document: SessionDocument, where: str) -> CalibrationOptions:
+    """Return the options of a session with the position of its camera.
+
+    Raises:
+        InputError: an option is unknown or out of range, or there is a standard deviation of no position.
+    """
+    position = document.camera_position_m
+    if position is None and document.camera_position_sigma_m is not None:
+        raise InputError(f"{where}: camera_position_sigma_m: there is no camera_position_m; give it, too")
+    try:
+        options = options_from_tree(document.options)
+    except CalibrationError as error:
+        raise InputError(f"{where}: {error}") from None
+    if position is None:
+        return options
+    sigma_m = _TAPE_SIGMA_M if document.camera_position_sigma_m is None else document.camera_position_sigma_m
+    if not 0.0 < sigma_m < 10.0 or not all(abs(value) < 100.0 for value in position):
+        raise InputError(f"{where}: camera_position_m: give metres, and a standard deviation above 0")
+    solving = replace(options.solving, camera_position=CameraPositionPrior(position, sigma_m))
+    return replace(options, solving=solving)
+
+
+def _require_different(rows: Sequence[ManifestRow], path: Path) -> None:
+    """Refuse two rows of one session; names that differ only in capitals would share a folder on some systems."""
+    for first, second in _twice(rows):
+        raise InputError(
+            f"{path}: {first.place} and {second.place} are both session '{second.session}' of vehicle "
+            f"'{second.vehicle}'; give each its own session"
+        )
+
+
+def _require_own_recordings(rows: Sequence[ManifestRow], path: Path) -> None:
+    """Refuse a recording of two vehicles or sessions: one measurement would count as two that agree.
+
+    Raises:
+        InputError: names both rows.
+    """
+    known: dict[frozenset[Path], ManifestRow] = {}
+    for row in rows:
+        files = frozenset(one.resolve() for one in row.recording)
+        other = known.setdefault(files, row)
+        if other is not row:
+            raise InputError(
+                f"{path}: {other.place} ({other.name}) and {row.place} ({row.name}) have the same recording; name the one that "
+                "it is of, or try other options in a manifest with another --out"
+            )
+
+
+def _twice(rows: Sequence[ManifestRow]) -> Iterator[tuple[ManifestRow, ManifestRow]]:
+    known: dict[tuple[str, str], ManifestRow] = {}
+    for row in rows:
+        key = (row.vehicle.casefold(), row.session.casefold())
+        if key in known:
+            yield known[key], row
+        known[key] = row

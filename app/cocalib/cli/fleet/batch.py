@@ -38,13 +38,13 @@ class Batch:
             raise InputError("MANIFEST is missing; see cocalib batch --help")
         if self.init is not None:
             return self._write_first(self.manifest, self.init)
-        from cocalib.batch.manifest_files.reading import read_manifest
+        from cocalib.batch.manifest import read_manifest
 
         return self._calibrate(read_manifest(self.manifest))
 
     def _write_first(self, manifest: Path, folder: Path) -> int:
         """Write a first manifest, never over another file."""
-        from cocalib.batch.manifest_files.first_manifest import first_manifest
+        from cocalib.batch.first_manifest import first_manifest
 
         if manifest.suffix.lower() != ".toml":
             raise InputError(f"{manifest}: --init writes a .toml file; name it so")

@@ -5,13 +5,13 @@ from pathlib import Path
 import pytest
 
 from calib_core.errors import InputError
-from cocalib.batch import one_job
+from cocalib.batch import running_job
 from cocalib.batch.driving import drive
 from cocalib.batch.engine import InProcess
 from cocalib.batch.job import Job
-from cocalib.batch.one_job import failed_outcome, run_once
 from cocalib.batch.outcome import Outcome
 from cocalib.batch.results_folder import ResultsFolder
+from cocalib.batch.running_job import failed_outcome, run_once
 from tests.batch_calls import quick_jobs, squared, written
 
 
@@ -29,7 +29,7 @@ def test_functions_run_in_order() -> None:
 def test_what_another_driver_finished_is_not_run_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (job,) = quick_jobs(tmp_path, 1)
     first = run_once(job, tmp_path)
-    monkeypatch.setattr(one_job, "run_job", lambda *_: pytest.fail("it ran again"))
+    monkeypatch.setattr(running_job, "run_job", lambda *_: pytest.fail("it ran again"))
     assert run_once(job, tmp_path) == first
 
 
@@ -38,7 +38,7 @@ def test_a_bug_in_one_job_is_its_outcome(tmp_path: Path, monkeypatch: pytest.Mon
         raise RuntimeError(f"no such thing as {job.row.vehicle}")
 
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    monkeypatch.setattr(one_job, "run_job", broken)
+    monkeypatch.setattr(running_job, "run_job", broken)
     outcomes = drive(quick_jobs(tmp_path, 2), InProcess(), ResultsFolder(tmp_path))
     assert [outcome.status for outcome in outcomes] == ["failed", "failed"]
     assert "RuntimeError: no such thing as v001" in outcomes[1].reason

@@ -10,7 +10,7 @@ import pytest
 from cocalib.batch.inputs import InputPath
 from cocalib.batch.job import jobs_of
 from cocalib.batch.manifest import ManifestRow
-from cocalib.batch.running import run_job
+from cocalib.batch.running_job import run_job
 
 _OPENED = """
 import os, sys

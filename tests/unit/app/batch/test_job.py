@@ -10,9 +10,8 @@ import pytest
 
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 from calib_core.recordings import RecordingOptions
-from cocalib.batch import input_digests
-from cocalib.batch.input_digests import InputDigests
-from cocalib.batch.inputs import inputs_of, state_of
+from cocalib.batch import inputs
+from cocalib.batch.inputs import InputDigests, inputs_of, state_of
 from cocalib.batch.job import Job, jobs_of
 from cocalib.batch.manifest import ManifestRow
 
@@ -35,7 +34,7 @@ def row(tmp_path: Path) -> ManifestRow:
 @pytest.fixture(autouse=True)
 def settled(monkeypatch: pytest.MonkeyPatch) -> None:
     """Take every file as unchanged for long enough."""
-    monkeypatch.setattr(input_digests, "_SETTLED_NS", 0)
+    monkeypatch.setattr(inputs, "_SETTLED_NS", 0)
 
 
 def job_of(row: ManifestRow, results: Path) -> Job:
@@ -169,7 +168,7 @@ def test_content_of_the_same_size_with_a_new_time_is_read_again(row: ManifestRow
 def test_what_was_changed_just_now_is_not_kept(
     row: ManifestRow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(input_digests, "_SETTLED_NS", 10**15)
+    monkeypatch.setattr(inputs, "_SETTLED_NS", 10**15)
     job_of(row, tmp_path)
     reading = Reading()
     jobs_of([row], tmp_path, reading)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from calib_core.errors import CalibrationError
-from cocalib.batch import input_digests
+from cocalib.batch import inputs
 from cocalib.batch.driving import drive
 from cocalib.batch.engine import InProcess
 from cocalib.batch.job import jobs_of
@@ -106,7 +106,7 @@ def test_the_folder_itself_may_be_a_link_of_the_users(tmp_path: Path) -> None:
 def test_digests_of_inputs_are_never_read_or_written_through_something_else(
     kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(input_digests, "_SETTLED_NS", -(10**15))  # files of this moment count as settled
+    monkeypatch.setattr(inputs, "_SETTLED_NS", -(10**15))  # files of this moment count as settled
     (tmp_path / "out").mkdir()
     put(kind, tmp_path / "out" / "inputs.json")
     (tmp_path / "a.bag").write_bytes(b"x")

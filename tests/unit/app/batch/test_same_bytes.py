@@ -7,16 +7,17 @@ import pytest
 
 from calib_core.options import CalibrationOptions, CameraPositionPrior, RefiningOptions, SolvingOptions
 from calib_core.results import UnconfirmedClicks
+from cocalib.batch import solving
 from cocalib.batch.job import jobs_of
 from cocalib.batch.manifest import ManifestRow
 from cocalib.batch.outcome import Outcome
 from cocalib.batch.results_folder import OUTCOME_FILE, ResultsFolder
-from cocalib.batch.running import run_job, solving
+from cocalib.batch.running_job import run_job
 from cocalib.cli import run
 from cocalib.solving import automatic as automatic_solving
 from cocalib.solving.automatic import PlacedClicks
 
-SAMPLE = Path(__file__).resolve().parents[5] / "sample_data" / "rooftop"
+SAMPLE = Path(__file__).resolve().parents[4] / "sample_data" / "rooftop"
 BAGS = (SAMPLE / "radar.bag", SAMPLE / "camera.bag")
 CLICKS = SAMPLE / "clicks.json"
 SENSORS = {"vehicle_type": "long", "radar_serial": "R-1", "camera_serial": "C-2"}

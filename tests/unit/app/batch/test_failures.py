@@ -13,13 +13,14 @@ import pytest
 
 from calib_core.errors import InputError, RecordingError
 from calib_core.measurements import Unsolvable
+from cocalib.batch import running_job
 from cocalib.batch.job import Job, jobs_of
 from cocalib.batch.manifest import ManifestRow
 from cocalib.batch.outcome import Outcome
 from cocalib.batch.results_folder import LOG_FILE, ResultsFolder
-from cocalib.batch.running import run_job, running_job, steps
+from cocalib.batch.running_job import run_job
 
-SAMPLE = Path(__file__).resolve().parents[5] / "sample_data" / "rooftop"
+SAMPLE = Path(__file__).resolve().parents[4] / "sample_data" / "rooftop"
 
 
 @pytest.fixture
@@ -71,7 +72,7 @@ def test_a_file_that_only_the_worker_misses_is_not_final(
         except OSError as error:
             raise RecordingError("radar.bag: cannot be read") from error
 
-    monkeypatch.setattr(steps, "open_recording", unreached)
+    monkeypatch.setattr(running_job, "open_recording", unreached)
     assert not outcome_of(row, tmp_path / "results").is_final
 
 
@@ -125,7 +126,7 @@ def test_too_few_clicks_are_refused_with_a_hint(row: ManifestRow, tmp_path: Path
 def test_what_nobody_expected_is_not_final(
     error: Exception, words: str, row: ManifestRow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(steps, "solve_session", raising(error))
+    monkeypatch.setattr(running_job, "solve_session", raising(error))
     outcome = outcome_of(row, tmp_path / "results")
     assert (outcome.status, outcome.is_final) == ("failed", False)
     assert outcome.reason.startswith(words)
@@ -137,7 +138,7 @@ def test_what_nobody_expected_is_not_final(
 
 
 def test_to_be_interrupted_is_no_outcome(row: ManifestRow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(steps, "solve_session", raising(KeyboardInterrupt()))
+    monkeypatch.setattr(running_job, "solve_session", raising(KeyboardInterrupt()))
     with pytest.raises(KeyboardInterrupt):
         outcome_of(row, tmp_path / "results")
     assert not (tmp_path / "results" / "results").exists()
@@ -164,9 +165,9 @@ def test_a_step_fails_on_its_own(
     def export(*_arguments: object) -> dict[str, bytes]:
         return {"export/kitti.txt": b"P2: 1"}
 
-    monkeypatch.setattr(steps, "export_session", export)
-    monkeypatch.setattr(steps, "report_session", lambda *_: "<p>report</p>")
-    monkeypatch.setattr(steps, function, raising(error))
+    monkeypatch.setattr(running_job, "export_session", export)
+    monkeypatch.setattr(running_job, "report_session", lambda *_: "<p>report</p>")
+    monkeypatch.setattr(running_job, function, raising(error))
     outcome = outcome_of(dataclasses.replace(row, exports=("kitti",)), tmp_path / "results")
     assert (outcome.status, outcome.is_final) == ("solved", final)
     assert outcome.steps == {"evaluate": "done", "report": "done", "export": "done"} | {step: "failed"}
@@ -182,7 +183,7 @@ def test_an_input_that_changes_while_the_job_runs_is_no_result(
         os.utime(tmp_path / "camera.bag", (1, 1))
         return Unsolvable("too-few-pairs", "reason", "hint")
 
-    monkeypatch.setattr(steps, "solve_session", change)
+    monkeypatch.setattr(running_job, "solve_session", change)
     outcome = outcome_of(row, tmp_path / "results")
     assert (outcome.status, outcome.is_final) == ("failed", False)
     assert "an input changed" in outcome.reason
@@ -202,7 +203,7 @@ def test_an_input_that_changed_before_the_job_ran_is_not_read(
 def test_a_full_disk_is_an_outcome_that_nobody_keeps(
     row: ManifestRow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(steps, "solve_session", lambda *_: Unsolvable("too-few-pairs", "reason", "hint"))
+    monkeypatch.setattr(running_job, "solve_session", lambda *_: Unsolvable("too-few-pairs", "reason", "hint"))
     monkeypatch.setattr(running_job, "listed_files", raising(OSError(errno.ENOSPC, "No space left on device")))
     outcome = outcome_of(row, tmp_path / "results")
     assert (outcome.status, outcome.is_final) == ("failed", False)

@@ -5,9 +5,8 @@ from pathlib import Path
 import pytest
 
 from calib_core.errors import InputError
-from cocalib.batch.manifest import ManifestRow
-from cocalib.batch.manifest_files.first_manifest import first_manifest
-from cocalib.batch.manifest_files.reading import read_manifest
+from cocalib.batch.first_manifest import first_manifest
+from cocalib.batch.manifest import ManifestRow, read_manifest
 
 CLICKS = '{"schema": "cocalib/clicks-1", "clicks": []}'
 

@@ -6,8 +6,7 @@ from pathlib import Path
 import pytest
 
 from calib_core.errors import InputError
-from cocalib.batch.manifest import ManifestRow
-from cocalib.batch.manifest_files.reading import read_manifest
+from cocalib.batch.manifest import ManifestRow, read_manifest
 
 TOML = """
 [defaults]
