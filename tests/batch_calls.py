@@ -6,6 +6,7 @@ import sys
 import tempfile
 import threading
 from pathlib import Path
+from typing import Any
 
 from cocalib.batch.job import Job
 from cocalib.batch.manifest import ManifestRow
@@ -13,7 +14,18 @@ from cocalib.batch.outcome import Outcome, read_outcome
 from cocalib.batch.results_folder import OUTCOME_FILE, ResultsFolder
 
 __all__ = [
-    *("attempts", "dying", "dying_job", "endless", "failing", "quick_jobs", "squared", "temporary_file", "written"),
+    *(
+        "attempts",
+        "dying",
+        "dying_job",
+        "dying_start",
+        "endless",
+        "failing",
+        "quick_jobs",
+        "squared",
+        "temporary_file",
+        "written",
+    ),
 ]
 
 
@@ -64,6 +76,14 @@ def dying_job(job: Job, results: Path) -> Outcome:
     if job.row.vehicle == "v001":
         os.kill(os.getpid(), signal.SIGKILL)
     return run_once(job, results)
+
+
+def dying_start(*given: Any) -> None:
+    """Work as a worker does, except that the first two are killed while they start; DYING_START names where they leave a file."""
+    from cocalib.batch.worker_processes import _work
+
+    dying(os.environ["DYING_START"], "start", 2)
+    _work(*given)
 
 
 def attempts(folder: Path, name: str) -> int:

@@ -19,6 +19,10 @@ from cocalib.batch.engine import own_temporary_folder, workers_died
 _Found = TypeVar("_Found")
 _PROCESSES = multiprocessing.get_context("spawn")  # a forked child would share locks of our threads
 _MOST_FAILED_STARTS = 10
+_MOST_KILLED_STARTS = 100
+"""Whoever kills workers may hit new ones several times in a row, above all on a busy machine."""
+_END_S = 5.0
+"""A worker whose pipe is closed ends at once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +107,7 @@ class _Workers:
     def __init__(self, function: Callable[..., Any]) -> None:
         self._function = function
         self._workers: dict[Connection, _Worker] = {}
-        self._failed_starts = 0
+        self._failed_starts = self._killed_starts = 0
 
     def __enter__(self) -> "_Workers":
         return self
@@ -143,7 +147,7 @@ class _Workers:
                     self._fill(waiting, room)
                     yield call.number, found
                 else:
-                    self._failed_starts = 0
+                    self._failed_starts = self._killed_starts = 0
 
     def _busy(self) -> int:
         return sum(worker.call is not None for worker in self._workers.values())
@@ -164,10 +168,13 @@ class _Workers:
             InputError: so did those before it, all without a call.
         """
         del self._workers[worker.pipe]
+        worker.process.join(_END_S)
+        was_killed = (worker.process.exitcode or 0) < 0
         worker.end()
         if worker.call is None:
-            self._failed_starts += 1
-            if self._failed_starts >= _MOST_FAILED_STARTS:
+            self._failed_starts += not was_killed
+            self._killed_starts += was_killed
+            if self._failed_starts >= _MOST_FAILED_STARTS or self._killed_starts >= _MOST_KILLED_STARTS:
                 raise InputError("worker processes end as soon as they start; use --workers 1, which needs none")
 
 

@@ -19,7 +19,17 @@ from cocalib.batch.engine import InProcess
 from cocalib.batch.outcome import Outcome
 from cocalib.batch.results_folder import ResultsFolder
 from cocalib.batch.worker_processes import WorkerProcesses
-from tests.batch_calls import attempts, dying, dying_job, failing, quick_jobs, squared, temporary_file, written
+from tests.batch_calls import (
+    attempts,
+    dying,
+    dying_job,
+    dying_start,
+    failing,
+    quick_jobs,
+    squared,
+    temporary_file,
+    written,
+)
 
 pytestmark = pytest.mark.slow
 
@@ -128,6 +138,14 @@ def test_workers_that_never_start_are_told(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr("cocalib.batch.worker_processes._work", failing)
     with pytest.raises(InputError, match="end as soon as they start; use --workers 1"):
         list(WorkerProcesses(1).run_all(squared, [(3,)]))
+
+
+def test_workers_that_are_killed_while_they_start_are_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cocalib.batch.worker_processes._MOST_FAILED_STARTS", 1)
+    monkeypatch.setattr("cocalib.batch.worker_processes._work", dying_start)
+    monkeypatch.setenv("DYING_START", str(tmp_path))
+    assert list(WorkerProcesses(1).run_all(squared, [(3,)])) == [(0, 9)]
+    assert attempts(tmp_path, "start") == 3
 
 
 def test_what_a_function_raises_is_raised() -> None:
