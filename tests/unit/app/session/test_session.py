@@ -31,14 +31,13 @@ from cocalib.session import (
     apply,
     settled,
 )
+from tests.unit.app.session.drive import FACTS, START_NS, TIMES
 
-START_NS = 1_700_000_000_123_456_789
-FACTS = RecordingFacts("drive", START_NS + 100_000_000 * np.arange(50), width_px=640, height_px=480)
 NO_ANSWER = Unsolvable("too-few-pairs", "1 of at least 4 pairs", "click more")
 
 
 def frame_time(index: int) -> TimeNs:
-    return TimeNs(int(FACTS.image_times[index]))
+    return TIMES[index]
 
 
 def placed(*frames: int) -> Session:

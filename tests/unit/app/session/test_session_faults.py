@@ -8,7 +8,6 @@ import stat
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from benchmarks.reliability.sessions import (
@@ -22,9 +21,8 @@ from benchmarks.reliability.sessions import (
     made_session,
     sampled_bits,
 )
-from calib_core.measurements import TimeNs
 from calib_core.options import CalibrationOptions
-from cocalib.session import ClickPlaced, History, OptionsChanged, RecordingFacts, advance
+from cocalib.session import ClickPlaced, History, OptionsChanged, advance
 from cocalib.session.file import (
     SessionFile,
     SessionFileError,
@@ -35,10 +33,8 @@ from cocalib.session.file import (
 )
 from cocalib.session.file.guarded_folder import GuardedFolder
 from cocalib.session.file.journal import COPY, JOURNAL, bytes_of, sealed, taken_apart
+from tests.unit.app.session.drive import FACTS, TIMES, keep
 
-START_NS = 1_700_000_000_123_456_789
-FACTS = RecordingFacts("drive", START_NS + 100_000_000 * np.arange(50), width_px=640, height_px=480)
-TIMES = [TimeNs(int(time)) for time in FACTS.image_times]
 POSIX = pytest.mark.skipif(os.name == "nt", reason="Windows needs a right to make links, and has no pipes in folders")
 
 
@@ -49,12 +45,7 @@ def own_state_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def clicked(session_file: SessionFile, *frames: int) -> History:
-    history = session_file.restored.history
-    for frame in frames:
-        step = ClickPlaced(TIMES[frame], (float(frame), 1.0), "clicked")
-        history = advance(history, step, FACTS)
-        session_file.append(step, history)
-    return history
+    return keep(session_file, *(ClickPlaced(TIMES[frame], (float(frame), 1.0), "clicked") for frame in frames))
 
 
 def closed_session(folder: Path, *frames: int) -> None:

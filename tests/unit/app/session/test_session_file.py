@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from calib_core.measurements import ChosenReturn, ReflectorClick, TimeNs, Unsolvable, time_from_json, time_to_json
+from calib_core.measurements import ChosenReturn, ReflectorClick, Unsolvable, time_from_json, time_to_json
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 from cocalib.session import (
     Cleared,
@@ -35,7 +35,6 @@ from cocalib.session import (
     advance,
 )
 from cocalib.session.file import (
-    SessionFile,
     SessionFileError,
     open_session_file,
     recording_session_folder,
@@ -43,10 +42,8 @@ from cocalib.session.file import (
     user_session_folder,
 )
 from cocalib.session.file.journal import Line, bytes_of, sealed, taken_apart
+from tests.unit.app.session.drive import FACTS, START_NS, TIMES, files, keep, kept
 
-START_NS = 1_700_000_000_123_456_789
-FACTS = RecordingFacts("drive", START_NS + 100_000_000 * np.arange(50), width_px=640, height_px=480)
-TIMES = [TimeNs(int(time)) for time in FACTS.image_times]
 EARLIER_STEPS = (
     ClickPlaced(TIMES[3], (100.1, 200.2), None),
     ClickPlaced(TIMES[1], (0.1 + 0.2, 1e-17), None),
@@ -73,22 +70,6 @@ STEPS = (
     Cleared(),
     Undo(),
 )
-
-
-def keep(session_file: SessionFile, *steps) -> History:
-    history = session_file.restored.history
-    for step in steps:
-        history = advance(history, step, FACTS)
-        session_file.append(step, history)
-    return history
-
-
-def kept(folder: Path, *steps) -> History:
-    """Apply steps in a new session and close it."""
-    session_file = open_session_file(folder, FACTS)
-    history = keep(session_file, *steps)
-    session_file.close()
-    return history
 
 
 @pytest.mark.parametrize("step", STEPS, ids=lambda step: type(step).__name__)
@@ -190,10 +171,6 @@ def damaged(line: int, text: bytes, whole: bytes) -> bytes:
     lines = whole.split(b"\n")
     lines[line] = text
     return b"\n".join(lines)
-
-
-def files(folder: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in folder.iterdir() if path.name != "lock"}
 
 
 def reseal(line: int, content: bytes, whole: bytes) -> bytes:
