@@ -12,8 +12,7 @@ from calib_core.interchange import camera_info_text, read_camera
 from calib_core.interchange.own.documents import CameraDocument
 from calib_core.lens_models.lens_model import LensModel
 from calib_core.lens_models.registry import LENS_MODELS
-from calib_core.synthetic import typical_camera
-from cocalib.cli.simulate import SimulationFlags
+from calib_core.synthetic import SimulationOptions, typical_camera
 
 LENSES = list(LENS_MODELS.values())
 each_lens = pytest.mark.parametrize("lens", LENSES, ids=list(LENS_MODELS))
@@ -30,7 +29,7 @@ def test_names_are_keys_and_no_other_lens_is_read_from_them() -> None:
 
 def test_the_command_line_and_the_files_accept_what_is_registered() -> None:
     """The published schemas follow; test_formats_page.py says how to regenerate them."""
-    (camera_model,) = (field for field in fields(SimulationFlags) if field.name == "camera_model")
+    (camera_model,) = (field for field in fields(SimulationOptions) if field.name == "camera_model")
     for taken in (CameraModel, camera_model.type, CameraDocument.__annotations__["model"]):
         assert get_args(taken) == CAMERA_MODELS == tuple(LENS_MODELS)
 
