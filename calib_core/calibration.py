@@ -16,8 +16,8 @@ from calib_core.diagnostics.checks import warnings_of
 from calib_core.diagnostics.clocks import CLOCK_CODES, clocks
 from calib_core.diagnostics.elevation import flat_radar
 from calib_core.diagnostics.next_placement import next_placement
-from calib_core.diagnostics.picture import picture_sigma_px
 from calib_core.diagnostics.solved_fit import SolvedFit
+from calib_core.diagnostics.uncertainty_map import picture_sigma_px
 from calib_core.errors import InputError
 from calib_core.estimation import unsolved
 from calib_core.estimation.best_fit import BestFit, best_fit, quick_fit

@@ -1,20 +1,41 @@
-"""Pairing: each click and the radar scans around it give one pair, or a reason why there is none."""
+"""Pairing: each click and the radar scans around it give one pair, or a reason why there is none.
+
+Choices: where a person said which return a click belongs to, its pair has that return and no other.
+
+Novelty: what appears with a placement and leaves with it is the reflector; what stands there at other times is background.
+The windows of the other clicks show the scene without this placement. Where more of the recording is given, windows without
+any click show it too, which helps most while there are few clicks.
+
+Companions: an object that stands behind the reflector at every placement, such as the cart that carries it. It appears and
+leaves with the reflector, and it may echo more, so neither amplitude nor novelty tells which of the two was clicked. Both get
+nearly the same score, and the geometry of all pairs decides. The nearer one is preferred a little: what stands in front of a
+reflector hides it.
+"""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 
-from calib_core.association.choices import chosen_candidate, no_chosen_return, with_shared_choices
-from calib_core.association.cluster_scale import cluster_scale
-from calib_core.association.clustering import candidates_of, clusters_of, clusters_wanted, window_around
-from calib_core.association.companions import balanced_pairs
+from calib_core.arrays import Flags, Indices, Points3, Values, Vector3, frozen_array
+from calib_core.association.alternatives import alternative_rows
+from calib_core.association.clustering import (
+    CLUSTER_SCALE,
+    Cluster,
+    candidates_of,
+    cluster_at,
+    cluster_scale,
+    clusters_of,
+    clusters_wanted,
+    nearest_cluster,
+    window_around,
+)
 from calib_core.association.gating import static_returns
-from calib_core.association.novelty import background_windows, scores_of
 from calib_core.association.placement_groups import linked_clicks
 from calib_core.measurements import NS_PER_S, Candidate, Pair, RadarScans, ReflectorClick, TimeNs, Unpaired
-from calib_core.options import CalibrationOptions
+from calib_core.options import CalibrationOptions, LocatingOptions, NoiseOptions
+from calib_core.radar import direction_cosines, polar_from_cartesian
 
 
 class RadarSource(Protocol):
@@ -222,3 +243,279 @@ def _nothing_static(click: ReflectorClick, window: RadarScans, options: Calibrat
         f"{gate.max_speed_mps:g} m/s between {gate.min_range_m:g} and {gate.max_range_m:g} m",
         "stand clear of the reflector and let it rest for three seconds, or widen the gates",
     )
+
+
+CHOICE_GONE = "chosen-return-missing"
+_REACH = 8.0  # standard deviations of a click, from one click of a placement to another
+
+
+def with_shared_choices(clicks: Sequence[ReflectorClick], options: CalibrationOptions) -> list[ReflectorClick]:
+    """Give the other clicks of a placement the return that was chosen for one of them.
+
+    Clicks at one pixel whose windows overlap are clicks of one placement; one with a choice of its own keeps it.
+
+    Args:
+        clicks: in any order; the result has the same.
+        options: window and assumed click noise.
+    """
+    chosen = [click for click in clicks if click.chosen is not None]
+    if not chosen:
+        return list(clicks)
+    times = np.array([click.image_time for click in chosen], dtype=np.int64)
+    pixels = np.array([(click.u_px, click.v_px) for click in chosen])
+    shared = []
+    for click in clicks:
+        if click.chosen is None:
+            sigma_px = options.noise.sigma_px if click.sigma_px is None else click.sigma_px
+            apart_ns = np.abs(times - click.image_time)
+            near = (np.hypot(*(pixels - (click.u_px, click.v_px)).T) <= _REACH * sigma_px) & (
+                apart_ns <= options.locating.window_s * NS_PER_S
+            )
+            if near.any():
+                click = replace(click, chosen=chosen[int(np.where(near, apart_ns, apart_ns.max() + 1).argmin())].chosen)
+        shared.append(click)
+    return shared
+
+
+def chosen_candidate(
+    position_radar_m: Vector3,
+    window: RadarScans,
+    clusters: Sequence[Cluster],
+    *,
+    scale: Vector3,
+    locating: LocatingOptions,
+    noise: NoiseOptions,
+) -> Candidate | None:
+    """Return the candidate at a chosen position (3,) [m], with a score of 1; None if the window has no return there.
+
+    Args:
+        position_radar_m: as the radar reports it.
+        window: the static returns around the click.
+        clusters: of that window.
+        scale: (3,) one step of distance in range [m], u and w.
+        locating: how clusters become candidates.
+        noise: the assumed noise.
+    """
+    cluster = nearest_cluster(clusters, position_radar_m, scale=scale) or cluster_at(
+        window, position_radar_m, scale=scale
+    )
+    if cluster is None:
+        return None
+    score: Values = np.ones(1)
+    alone = replace(cluster, alternative_of=-1)
+    return candidates_of((alone,), score, locating, noise)[0]
+
+
+def no_chosen_return(click: ReflectorClick) -> Unpaired:
+    """Say that the return chosen for a click is not there."""
+    position = np.zeros(3) if click.chosen is None else np.array(click.chosen.position_m)
+    range_m, azimuth, _ = polar_from_cartesian(position[None])[0]
+    degrees = abs(np.rad2deg(azimuth))
+    side = "left" if azimuth > 0 else "right"
+    return Unpaired(
+        click.id,
+        CHOICE_GONE,
+        f"the radar has no static return at the chosen position, {range_m:.1f} m away and {degrees:.1f} deg to the {side}",
+        "choose another return for this click, or take the choice back",
+    )
+
+
+_LEAST_SCORE = 0.05  # relative to the best of the pair
+_LEAST_PAIRS = 4
+_LEAST_SHARE = 0.6  # of the pairs
+_SAME_OFFSET_M = 0.25
+_LEAST_OFFSET_M = 0.3
+_MOST_OFFSET_M = 4.0
+_MOST_ASIDE = 4.0  # steps in u: behind the reflector, not next to it
+_NEARER = 1.5  # how much more plausible the nearer one is, in each pair
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Companion:
+    """Two returns that stand at the same distance from each other in most pairs.
+
+    Attributes:
+        offset_m: range of the farther one minus that of the nearer one.
+        near: (n,) the nearer candidate of each pair; -1 where the two were not found.
+        far: (n,) the farther one.
+    """
+
+    offset_m: float
+    near: Indices
+    far: Indices
+
+    def __post_init__(self) -> None:
+        for name in ("near", "far"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), (len(self.near),), dtype=np.int64))
+
+
+@dataclass(frozen=True, slots=True)
+class _Offset:
+    """The range from a nearer candidate to a farther one of the same pair."""
+
+    offset_m: float
+    near: int
+    far: int
+
+
+def find_companion(pairs: Sequence[Pair]) -> Companion | None:
+    """Find the offset in range at which most pairs have a second plausible candidate; None if there is none.
+
+    Args:
+        pairs: with all their candidates, as the radar gave them or as a calibration kept them.
+    """
+    found = [_offsets(pair.candidates) for pair in pairs]
+    offsets = np.array([one.offset_m for own in found for one in own])
+    owner = np.array([i for i, own in enumerate(found) for _ in own], dtype=np.int64)
+    if not len(offsets):
+        return None
+    close = np.abs(offsets[:, None] - offsets) <= _SAME_OFFSET_M
+    counts = [len(np.unique(owner[row])) for row in close]
+    most = int(np.argmax(counts))
+    if counts[most] < max(_LEAST_PAIRS, _LEAST_SHARE * len(pairs)):
+        return None
+    offset_m = float(np.median(offsets[close[most]]))
+    near, far = np.full(len(pairs), -1), np.full(len(pairs), -1)
+    for i, own in enumerate(found):
+        best = min(own, key=lambda one: abs(one.offset_m - offset_m), default=None)
+        if best is not None and abs(best.offset_m - offset_m) <= _SAME_OFFSET_M:
+            near[i], far[i] = best.near, best.far
+    return Companion(offset_m, near, far)
+
+
+def _offsets(candidates: Sequence[Candidate]) -> list[_Offset]:
+    """Return the offsets between the best candidate and every other plausible one behind or in front of it."""
+    cosines = direction_cosines(np.array([one.position_radar_m for one in candidates]))
+    scores = np.array([one.score for one in candidates])
+    best = int(np.argmax(scores))
+    rows = []
+    for k in np.flatnonzero(scores >= _LEAST_SCORE * scores[best]).tolist():
+        behind_m, aside = cosines[k, :2] - cosines[best, :2]
+        if _LEAST_OFFSET_M <= abs(behind_m) <= _MOST_OFFSET_M and abs(aside) <= _MOST_ASIDE * CLUSTER_SCALE[1]:
+            near, far = (best, k) if behind_m > 0 else (k, best)
+            rows.append(_Offset(abs(float(behind_m)), near, far))
+    return rows
+
+
+def balanced_pairs(pairs: Sequence[Pair]) -> tuple[Pair, ...]:
+    """Give the reflector and its companion, if there is one, nearly the same score in every pair.
+
+    Args:
+        pairs: one per click; the scores of the two keep their sum.
+    """
+    companion = find_companion(pairs)
+    if companion is None:
+        return tuple(pairs)
+    return tuple(
+        pair if near < 0 else replace(pair, candidates=_balanced(pair.candidates, near, far))
+        for pair, near, far in zip(pairs, companion.near.tolist(), companion.far.tolist(), strict=True)
+    )
+
+
+def _balanced(candidates: tuple[Candidate, ...], near: int, far: int) -> tuple[Candidate, ...]:
+    """Divide the scores of two candidates between them; the alternatives of each share what it gets."""
+    alternatives = alternative_rows([one.alternative_of for one in candidates])
+    both = sum(candidates[k].score for k in {*alternatives[near].tolist(), *alternatives[far].tolist()})
+    scores: dict[int, float] = {}
+    for k, share in ((far, 1.0 / (1.0 + _NEARER)), (near, _NEARER / (1.0 + _NEARER))):
+        scores |= dict.fromkeys(alternatives[k].tolist(), both * share / len(alternatives[k]))
+    balanced = [replace(one, score=scores.get(k, one.score)) for k, one in enumerate(candidates)]
+    return tuple(sorted(balanced, key=lambda one: -one.score))
+
+
+_SAME_PLACE = 1.5  # steps within which a cluster of another window is the same object
+_FLOOR = 1e-6
+_PSEUDO_EMPTY = 0.5  # windows, so that a few windows that all show a place do not rule it out
+_MOST_BACKGROUND = 16
+_LEAST_SCANS = 2
+
+
+def background_windows(static: RadarScans, windows: Sequence[RadarScans], *, window_s: float) -> tuple[RadarScans, ...]:
+    """Cut windows from the parts of a recording that are clear of every click by a window's length.
+
+    At most 16 are taken, spread evenly; around the clicks alone there are none.
+
+    Args:
+        static: the static returns of all given scans.
+        windows: those of the clicks.
+        window_s: their length [s].
+    """
+    if not len(static) or not windows:
+        return ()
+    length_ns = round(window_s * NS_PER_S)
+    starts = np.arange(int(static.times_ns[0]), int(static.times_ns[-1]) - length_ns + 1, length_ns)
+    clear = np.ones(len(starts), dtype=np.bool_)
+    for window in windows:
+        near = starts + 2 * length_ns > window.times_ns[0]
+        clear &= ~(near & (starts < window.times_ns[-1] + length_ns))
+    shown = np.searchsorted(static.times_ns, starts + length_ns) - np.searchsorted(static.times_ns, starts)
+    free = starts[clear & (shown >= _LEAST_SCANS)]
+    chosen = free[np.linspace(0, len(free) - 1, min(len(free), _MOST_BACKGROUND)).round().astype(np.int64)]
+    return tuple(static.between(TimeNs(start), TimeNs(start + length_ns - 1)) for start in chosen.tolist())
+
+
+def scores_of(
+    windows: Sequence[RadarScans],
+    clusters: Sequence[tuple[Cluster, ...]],
+    *,
+    scale: Vector3 = CLUSTER_SCALE,
+    background: Sequence[tuple[Cluster, ...]] = (),
+) -> tuple[Values, ...]:
+    """Score every cluster of every window: amplitude x persistence x novelty, (k,) per window, each summing to 1.
+
+    Novelty is the share of the other windows in which the place is empty. Windows that overlap show the same placement and
+    are not compared. What has alternatives was there before only if all of them were, and they share its score.
+
+    Args:
+        windows: those of the clicks.
+        clusters: of each window.
+        scale: (3,) one step of distance in range [m], u and w.
+        background: the clusters of windows without clicks.
+    """
+    everything = (*clusters, *background)
+    places = np.array([cluster.centre for own in everything for cluster in own]).reshape(-1, 3) / scale
+    persistence = np.array([cluster.persistence for own in everything for cluster in own])
+    first = np.concatenate([[0], np.cumsum([len(own) for own in everything])]).astype(np.int64)
+    spans = np.array([(window.times_ns[0], window.times_ns[-1]) for window in windows], dtype=np.int64).reshape(-1, 2)
+    scores = []
+    for i, own in enumerate(clusters):
+        others = np.ones(len(everything), dtype=np.bool_)
+        others[: len(windows)] = (spans[:, 0] > spans[i, 1]) | (spans[:, 1] < spans[i, 0])
+        plain = np.array([cluster.amplitude * cluster.persistence**2 for cluster in own])
+        alternatives = alternative_rows([cluster.alternative_of for cluster in own])
+        score = plain * _novelty(places[first[i] : first[i + 1]], places, persistence, first, others, alternatives)
+        score /= np.array([len(rows) for rows in alternatives])
+        scores.append(score / score.sum() if len(score) else score)
+    return tuple(scores)
+
+
+def _novelty(
+    own: Points3,
+    places: Points3,
+    persistence: Values,
+    first: Indices,
+    others: Flags,
+    alternatives: Sequence[Indices],
+) -> Values:
+    """Return the novelty (k,) of each place of one window, 1 if no other window shows it.
+
+    Args:
+        own: (k, 3) in steps.
+        places: (n, 3) of all windows, concatenated.
+        persistence: (n,).
+        first: (m + 1,) window j owns the rows first[j] to first[j + 1].
+        others: (m,) the windows to compare with.
+        alternatives: for each of the k places, the rows of its alternatives, its own included.
+    """
+    if not len(own) or not others.any():
+        return np.ones(len(own))
+    filled = np.flatnonzero(np.diff(first) > 0)
+    squared = sum(
+        ((mine[:, None] - theirs) ** 2 for mine, theirs in zip(own.T, places.T, strict=True)), start=np.zeros(1)
+    )
+    seen = np.maximum.reduceat((squared <= _SAME_PLACE**2) * persistence, first[filled], axis=1)
+    if any(len(rows) > 1 for rows in alternatives):
+        seen = np.array([seen[rows].min(axis=0) for rows in alternatives])
+    empty = others.sum() - seen[:, others[filled]].sum(axis=1)
+    share = (np.maximum(empty, 0.0) + _PSEUDO_EMPTY) / (others.sum() + _PSEUDO_EMPTY)
+    return np.asarray(np.maximum(share**4, _FLOOR))

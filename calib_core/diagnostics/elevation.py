@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from calib_core.diagnostics.picture import picture_sigma_px
+from calib_core.diagnostics.uncertainty_map import picture_sigma_px
 from calib_core.estimation.covariance import PoseCovariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.options import RadarOptions

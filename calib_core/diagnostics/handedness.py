@@ -12,7 +12,7 @@ import numpy as np
 
 from calib_core.arrays import Points3, Values, Vector3
 from calib_core.diagnostics.solved_fit import SolvedFit
-from calib_core.estimation.mirror_test import MIRRORED_GAIN, NOT_MIRRORED_GAIN
+from calib_core.estimation.best_fit import MIRRORED_GAIN, NOT_MIRRORED_GAIN
 from calib_core.geometry import skew
 from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar
 from calib_core.results import DataWarning

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.arrays import Values, frozen_array
+from calib_core.estimation.covariance import PoseCovariance
+from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.geometry import RigidTransform, larger_eigenvalues
 from calib_core.results import Calibration
 
@@ -88,3 +90,19 @@ def pixel_quantile(covariance_quantile: float) -> float:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if 6.0 * fdtri(6.0, np.exp(middle), 0.95) > covariance_quantile else (low, middle)
     return max(_CHI2_95_2D, 2.0 * float(fdtri(2.0, np.exp(high), 0.95)))
+
+
+def picture_sigma_px(refined: ErrorsInVariablesFit, uncertainty: PoseCovariance) -> float:
+    """Return the standard deviation per axis [px] of a reprojection, root mean square over the inlier placements.
+
+    Pose and radar errors are uncertain together, and mostly cancel in the picture: a radar without elevation may be tilted by
+    degrees, but where its returns appear is known to pixels. The noise of a single radar position is not included.
+    """
+    inliers = refined.inliers
+    jacobian = refined.model.jacobian[inliers].copy()
+    for k, error in enumerate(refined.measurements.errors.estimated):
+        if error.axis is not None:  # the reflector's offset moves the click, not the reprojection
+            jacobian[:, :, 6 + k] = 0.0
+    jacobian_px = np.linalg.solve(refined.model.whitening[inliers], jacobian)
+    variances = (jacobian_px @ np.linalg.inv(uncertainty.information)) * jacobian_px
+    return float(np.sqrt(variances.sum(axis=(1, 2)).mean() / 2.0)) * uncertainty.growth

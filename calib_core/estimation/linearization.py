@@ -18,8 +18,7 @@ import numpy as np
 
 from calib_core.arrays import Indices, Points2, Points3, Values
 from calib_core.camera import Camera
-from calib_core.estimation.error_kinds import Sensitivity, SystematicError
-from calib_core.estimation.systematic_errors import NO_ERRORS, SystematicErrors
+from calib_core.estimation.systematic_errors import NO_ERRORS, Sensitivity, SystematicError, SystematicErrors
 from calib_core.geometry import RigidTransform, rotation_jacobian
 from calib_core.radar import position_planes
 

@@ -3,17 +3,20 @@
 Three sheets meet in the apex, so the picture shows three sectors of different brightness, each below 180 deg. Discs of several
 sizes propose pixels that look so (`sectors`), a fit with blurred boundaries gives the apex below a pixel (`sector_fit`), and
 the disc grows while the fit holds. The given pixel limits the search and enters no estimate.
+
+Three sectors that meet in one point: how well any pixel of a picture explains its surroundings in this way.
+
+Which fits of three sectors show the inner corner of a reflector, and not an edge, a line, a tip, an X or texture.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from calib_core.arrays import Matrix22, Vector2, Vector3, frozen_array
-from calib_core.vision.corner_checks import half_turn_correlation, has_angles_of_corner, is_corner, may_be_corner
 from calib_core.vision.sector_fit import SectorFit, fit_sectors
-from calib_core.vision.sectors import score_sectors
 
 _PROPOSING = ((1, 3.5), (1, 5.0), (1, 7.0), (2, 5.0), (2, 7.0), (4, 5.0), (4, 7.0))
 """How much the picture is reduced, and the radius of the disc there [px]."""
@@ -268,3 +271,206 @@ def _what_was_seen(proposals: list[_Proposal], reach_px: float) -> str:
     if not proposals:
         return f"nothing with three sheets within {reach_px:.0f} px"
     return f"no three sheets that meet in one point within {reach_px:.0f} px"
+
+
+@dataclass(frozen=True, slots=True)
+class _Limits:
+    """What a fit must show, for discs from a radius on: the smaller the disc, the more often chance looks like a corner.
+
+    Attributes:
+        from_px: the radius [px].
+        contrast: least step between two sheets, in standard deviations of what the fit leaves.
+        least_contrast: the same, at the worst place along a boundary.
+        step_grey: least step [linear grey levels of 255].
+        explained: least share of the variance.
+        narrowest_deg: least angle of a sheet.
+        widest_deg: greatest angle of a sheet: an edge or the tip of a sheet has 180 deg or more.
+        blur: greatest blur, relative to the radius: smooth shading has no edges.
+        score: least score of the proposal.
+    """
+
+    from_px: float
+    contrast: float
+    least_contrast: float
+    step_grey: float
+    explained: float
+    narrowest_deg: float
+    widest_deg: float
+    blur: float
+    score: float
+
+
+_STRICT = (
+    _Limits(12.0, 4.0, 2.5, 8.0, 0.98, 85.0, 157.0, 0.25, 0.50),
+    _Limits(6.0, 4.0, 2.5, 8.0, 0.965, 85.0, 157.0, 0.30, 0.55),
+    _Limits(4.0, 4.0, 2.5, 12.0, 0.94, 85.0, 155.0, 0.25, 0.55),
+    _Limits(0.0, 6.0, 6.0, 16.0, 0.95, 86.0, 152.0, 0.30, 0.60),
+)
+_LOOSE = _Limits(0.0, 1.5, 0.0, 2.0, 0.70, 40.0, 170.0, 1.0, 0.0)
+_STEEPEST = 2.2
+"""Greatest change within a sheet, relative to the smallest step between two."""
+_HALF_TURN = (-0.90, -0.15)
+"""Correlation of a disc with itself turned by 180 deg: -1 for a straight edge, 1 for a line or the X of a checkerboard."""
+
+
+def may_be_corner(fit: SectorFit) -> bool:
+    """Return whether a larger disc is worth a try."""
+    return _within(fit, _LOOSE)
+
+
+def has_angles_of_corner(fit: SectorFit) -> bool:
+    """Return whether the angles of the three sectors are those of three sheets seen from inside."""
+    return _angles_within(fit, next(one for one in _STRICT if fit.radius_px >= one.from_px))
+
+
+def is_corner(fit: SectorFit, score: float, half_turn: float) -> bool:
+    """Return whether a fit shows three sheets that meet in one point.
+
+    Args:
+        fit: the fit.
+        score: of the proposal that it began with.
+        half_turn: the correlation of its disc with itself turned by 180 deg.
+    """
+    limits = next(one for one in _STRICT if fit.radius_px >= one.from_px)
+    steady = fit.slope_grey <= _STEEPEST * fit.step_grey
+    return steady and score >= limits.score and _HALF_TURN[0] <= half_turn <= _HALF_TURN[1] and _within(fit, limits)
+
+
+def _within(fit: SectorFit, limits: _Limits) -> bool:
+    return bool(
+        fit.contrast >= limits.contrast
+        and fit.least_step_grey >= limits.least_contrast * fit.residual_grey
+        and fit.step_grey >= limits.step_grey
+        and fit.explained >= limits.explained
+        and fit.blur_px <= limits.blur * fit.radius_px
+        and _angles_within(fit, limits)
+    )
+
+
+def _angles_within(fit: SectorFit, limits: _Limits) -> bool:
+    widths_deg = np.rad2deg(fit.widths_rad)
+    return bool(widths_deg.min() >= limits.narrowest_deg and widths_deg.max() <= limits.widest_deg)
+
+
+def half_turn_correlation(grey: np.ndarray, fit: SectorFit) -> float:
+    """Return the correlation of the disc around the fitted apex with itself turned by 180 deg; 1 if it leaves the picture.
+
+    Args:
+        grey: (h, w) the picture of the fit.
+        fit: the fit.
+    """
+    half = int(np.ceil(fit.radius_px))
+    column, row = (round(float(v)) for v in fit.apex_px)
+    if not (half <= column < grey.shape[1] - half and half <= row < grey.shape[0] - half):
+        return 1.0
+    x, y = np.meshgrid(np.arange(-half, half + 1), np.arange(-half, half + 1))
+    levels = grey[row - half : row + half + 1, column - half : column + half + 1][x * x + y * y <= fit.radius_px**2]
+    levels = levels - levels.mean()
+    return float(levels @ levels[::-1]) / max(float(levels @ levels), 1e-9)
+
+
+_WEDGES = 12
+_NARROWEST, _WIDEST = 2, 5
+"""Wedges per sector: 60 to 150 deg. Seen from inside, each sheet of a trihedral spans less than 180 deg."""
+_FINE = 7
+_QUIET_GREY = 2.0
+"""Where grey levels vary less than this, there is nothing to find."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SectorScores:
+    """The best division into three sectors at each pixel.
+
+    Attributes:
+        score: (h, w) what the weakest of the three boundaries explains, relative to what remains unexplained.
+        starts_rad: (h, w, 3) where the sectors begin, from x towards y.
+    """
+
+    score: np.ndarray
+    starts_rad: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Divisions:
+    """All ways to divide the wedges into three sectors: (k, 3) first wedges, and the start in radians."""
+
+    first: np.ndarray
+    starts_rad: np.ndarray
+
+
+@lru_cache(maxsize=1)
+def _divisions() -> _Divisions:
+    widths = range(_NARROWEST, _WIDEST + 1)
+    first = np.array(
+        [
+            (start, start + one, start + one + two)
+            for start in range(_WEDGES)
+            for one in widths
+            for two in widths
+            if _WEDGES - one - two in widths and start + one + two < _WEDGES
+        ]
+    )
+    return _Divisions(first, first * (2.0 * np.pi / _WEDGES))
+
+
+@lru_cache(maxsize=8)
+def _wedge_kernels(radius_px: float) -> np.ndarray:
+    """Return the share of each pixel of a disc that lies in each wedge: (wedges, n, n)."""
+    half = int(np.ceil(radius_px))
+    side = 2 * half + 1
+    offsets = (np.arange(side * _FINE) + 0.5) / _FINE - 0.5 - half
+    x, y = np.meshgrid(offsets, offsets)
+    wedge = np.minimum((np.arctan2(y, x) % (2.0 * np.pi) / (2.0 * np.pi / _WEDGES)).astype(int), _WEDGES - 1)
+    distance = np.hypot(x, y)
+    inside = (distance <= radius_px) & (distance > 0.6)  # the middle pixel belongs to all
+    shares = [(wedge == number) & inside for number in range(_WEDGES)]
+    return np.array([share.reshape(side, _FINE, side, _FINE).mean(axis=(1, 3)) for share in shares], dtype=np.float32)
+
+
+def score_sectors(grey: np.ndarray, radius_px: float) -> SectorScores:
+    """Score each pixel whose disc lies inside the picture.
+
+    Args:
+        grey: (h + 2 n, w + 2 n) float32, with n the radius rounded up.
+        radius_px: of the disc.
+    """
+    import cv2
+
+    kernels = _wedge_kernels(radius_px)
+    half = kernels.shape[1] // 2
+    grey = grey - grey.mean()
+
+    def summed(picture: np.ndarray, kernel: np.ndarray) -> np.ndarray:
+        return cv2.filter2D(picture, cv2.CV_32F, kernel)[half:-half, half:-half]
+
+    areas = kernels.sum(axis=(1, 2))
+    sums = np.stack([summed(grey, kernel) for kernel in kernels])
+    squares = summed(grey * grey, kernels.sum(axis=0))
+    busy = np.nonzero(squares - sums.sum(axis=0) ** 2 / areas.sum() > areas.sum() * _QUIET_GREY**2)
+    divisions = _divisions()
+    score = np.zeros(squares.shape, dtype=np.float32)
+    starts_rad = np.zeros((*squares.shape, 3))
+    if len(busy[0]):
+        scores = _weakest_boundary(sums[:, busy[0], busy[1]], squares[busy], areas, divisions.first)
+        best = scores.argmax(axis=0)
+        score[busy] = scores[best, np.arange(len(best))]
+        starts_rad[busy] = divisions.starts_rad[best]
+    return SectorScores(score, starts_rad)
+
+
+def _weakest_boundary(sums: np.ndarray, squares: np.ndarray, areas: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """Return for each division (rows) and pixel (columns) the variance that its weakest boundary explains over the rest."""
+    before = np.concatenate([np.zeros((1, sums.shape[1]), np.float32), np.cumsum(sums, axis=0, dtype=np.float32)])
+    area_before = np.concatenate([[0.0], np.cumsum(areas)]).astype(np.float32)
+    one, two = (before[first[:, k + 1]] - before[first[:, k]] for k in (0, 1))
+    area_one, area_two = ((area_before[first[:, k + 1]] - area_before[first[:, k]])[:, None] for k in (0, 1))
+    three, area_three = before[-1] - one - two, area_before[-1] - area_one - area_two
+    means = (one / area_one, two / area_two, three / area_three)
+    rest = squares - one * means[0] - two * means[1] - three * means[2]
+    boundary = (means[0] - means[1]) ** 2 * (area_one * area_two / (area_one + area_two))
+    for (a, area_a), (b, area_b) in (
+        ((means[1], area_two), (means[2], area_three)),
+        ((means[2], area_three), (means[0], area_one)),
+    ):
+        np.minimum(boundary, (a - b) ** 2 * (area_a * area_b / (area_a + area_b)), out=boundary)
+    return np.asarray(boundary / (np.maximum(rest, 0.0) + area_before[-1]))

@@ -12,9 +12,8 @@ import numpy as np
 from calib_core.arrays import Indices, Values
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.measurement_model import PairMeasurements
-from calib_core.estimation.posterior.modes import refine_poses
-from calib_core.estimation.posterior.pose_batch import batch_of
-from calib_core.estimation.posterior.pose_posterior import pose_posterior
+from calib_core.estimation.posterior.pose_posterior import batch_of, pose_posterior
+from calib_core.estimation.posterior.samples import refine_poses
 
 _LEAST_MOVE = 2.6  # standard deviations without the pair; sets of right pairs exceed it in at most one of a hundred
 _LEAST_PAIRS = 6.0

@@ -16,6 +16,7 @@ The noise level is unknown too: one factor each on the sigmas of click, range, a
 the last three with a part in common. All functions take many states at once.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,9 +25,50 @@ from calib_core.arrays import Matrix66, Values, Vector3
 from calib_core.estimation.leave_one_out_prediction import PSEUDO_REDUNDANCY, PSEUDO_SHARED
 from calib_core.estimation.linearization import MeasurementPlanes
 from calib_core.estimation.measurement_model import PairMeasurements
-from calib_core.estimation.posterior.pose_batch import Poses
 from calib_core.geometry import RigidTransform, rotation_exp, rotation_jacobian, skew
 from calib_core.radar import position_planes
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Poses:
+    """Poses camera_from_radar as arrays.
+
+    Attributes:
+        rotations: (s, 3, 3).
+        translations_m: (s, 3).
+    """
+
+    rotations: np.ndarray
+    translations_m: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.rotations)
+
+    def perturbed(self, errors: np.ndarray) -> "Poses":
+        """Apply an error (s, 6) to each pose: t = t_hat + dt, R = Exp(dtheta) R_hat."""
+        return Poses(rotation_exp(errors[:, 3:]) @ self.rotations, self.translations_m + errors[:, :3])
+
+    def some(self, which: np.ndarray | slice) -> "Poses":
+        """Keep the poses of the given indices."""
+        return Poses(self.rotations[which], self.translations_m[which])
+
+    def transform(self, index: int) -> RigidTransform:
+        """Return one of them, re-orthonormalised."""
+        u, _, vt = np.linalg.svd(self.rotations[index])
+        return RigidTransform(u @ vt, self.translations_m[index])
+
+
+def batch_of(transforms: Sequence[RigidTransform]) -> Poses:
+    """Stack poses."""
+    return Poses(np.array([one.rotation for one in transforms]), np.array([one.translation_m for one in transforms]))
+
+
+def joined_poses(several: Sequence[Poses]) -> Poses:
+    """Concatenate batches of poses."""
+    return Poses(
+        np.concatenate([one.rotations for one in several]), np.concatenate([one.translations_m for one in several])
+    )
+
 
 NEAR_OUTLIER_FACTOR = 5.0
 """How many times noisier a near outlier is."""

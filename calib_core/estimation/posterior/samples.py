@@ -2,23 +2,181 @@
 
 Samples are drawn about the fit, about poses that other starts end in, and about the poses without each pair in turn. If the
 stated ellipsoid holds its share of the posterior, nothing is changed.
+
+Modes of the posterior: poses that many pairs agree on, each refined with inlier probabilities of its own.
+
+All poses are refined together as one batch, and each may use another set of pairs: without one pair in turn, or only some.
+
+Adaptive importance sampling: weighted samples of a density that is known up to a factor, from a mixture that learns.
+
+Samples are drawn from a mixture of Student's t distributions, whose heavy tails keep the weights bounded, and weighted by
+density over mixture. After each round the mixture is fitted to the weighted samples of all rounds (population Monte Carlo,
+Cappe et al. 2008), which then share one mixture (Owen and Zhou 2000): early, badly placed samples do no harm.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import lgamma
 
 import numpy as np
 
-from calib_core.arrays import Matrix66, Values, Vector3
+from calib_core.arrays import Flags, Matrix66, Values, Vector3
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.initialization import initial_poses
 from calib_core.estimation.measurement_model import PairMeasurements
-from calib_core.estimation.posterior.importance_sampling import Mixture, WeightedSamples, importance_samples
-from calib_core.estimation.posterior.modes import refine_poses
-from calib_core.estimation.posterior.pose_batch import Poses, batch_of, joined_poses
-from calib_core.estimation.posterior.pose_posterior import PosePosterior, pose_posterior
+from calib_core.estimation.posterior.pose_posterior import (
+    NEAR_OUTLIER_FACTOR,
+    PairTerms,
+    PosePosterior,
+    Poses,
+    batch_of,
+    joined_poses,
+    pose_posterior,
+)
 from calib_core.geometry import RigidTransform, rotation_log
 from calib_core.radar import cartesian_from_polar
+
+_DEGREES = 5.0  # of Student's t
+_LEAST_PER_DIMENSION = 4.0  # effective samples to learn from; weights are flattened until there are as many
+_LEAST_WEIGHT = 0.05  # of all components together, shared equally, so that none is ever forgotten
+_LARGEST_RATIO_KEPT = 1e-300
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mixture:
+    """Student's t distributions in d dimensions.
+
+    Attributes:
+        weights: (k,) adding up to 1.
+        centres: (k, d).
+        spreads: (k, d, d) scale matrices.
+    """
+
+    weights: Values
+    centres: np.ndarray
+    spreads: np.ndarray
+
+    def draw(self, count: int, rng: "np.random.Generator") -> np.ndarray:
+        """Draw samples (count, d), from each component as many as its weight says."""
+        which = np.searchsorted(np.cumsum(self.weights), (np.arange(count) + rng.random()) / count * (1.0 - 1e-12))
+        which = np.minimum(which, len(self.weights) - 1)
+        normal = rng.standard_normal((count, self.centres.shape[1]))
+        roots = np.linalg.cholesky(self.spreads)
+        wide = np.sqrt(_DEGREES / rng.chisquare(_DEGREES, count))
+        return np.asarray(self.centres[which] + (roots[which] @ normal[:, :, None])[:, :, 0] * wide[:, None])
+
+    def log_densities(self, samples: np.ndarray) -> np.ndarray:
+        """Return log weight plus log density (s, k) of each component at each sample."""
+        dimensions = samples.shape[1]
+        roots = np.linalg.cholesky(self.spreads)
+        inverse = np.linalg.inv(roots)
+        whitened = (samples[None] - self.centres[:, None]) @ np.swapaxes(inverse, 1, 2)
+        squared = (whitened**2).sum(axis=2).T
+        volume = np.log(np.diagonal(roots, axis1=1, axis2=2)).sum(axis=1)
+        half = 0.5 * (_DEGREES + dimensions)
+        constant = lgamma(half) - lgamma(0.5 * _DEGREES) - 0.5 * dimensions * np.log(_DEGREES * np.pi)
+        return np.asarray(constant + np.log(self.weights) - volume - half * np.log1p(squared / _DEGREES))
+
+    def log_density(self, samples: np.ndarray) -> Values:
+        """Return the log density (s,) of the mixture."""
+        return np.asarray(np.logaddexp.reduce(self.log_densities(samples), axis=1))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WeightedSamples:
+    """Samples of a density.
+
+    Attributes:
+        states: (s, d).
+        weights: (s,) adding up to 1.
+        costs: (s,) twice the negative log density.
+        mixture: fitted to the samples.
+    """
+
+    states: np.ndarray
+    weights: Values
+    costs: Values
+    mixture: Mixture
+
+    @property
+    def effective(self) -> float:
+        """The effective sample size: 1 over the sum of the squared weights."""
+        return _effective(self.weights)
+
+
+def importance_samples(
+    costs: Callable[[np.ndarray], Values],
+    start: Mixture,
+    *,
+    per_round: int,
+    rounds: tuple[int, int],
+    enough: float,
+    rng: "np.random.Generator",
+) -> WeightedSamples:
+    """Sample the density exp(-costs / 2).
+
+    Args:
+        costs: of states (s, d), up to a constant.
+        start: the first mixture: a component for each known peak.
+        per_round: samples in each round.
+        rounds: the smallest and the largest number.
+        enough: effective samples at which to stop.
+        rng: random generator.
+    """
+    mixtures = [start]
+    states = start.draw(per_round, rng)
+    found, drawn = costs(states), start.log_density(states)[:, None]
+    log_weights = -0.5 * found - drawn[:, 0]
+    for round_ in range(1, rounds[1]):
+        if round_ >= rounds[0] and _effective(_normalised(log_weights)) >= enough:
+            break
+        mixtures.append(_fitted(mixtures[-1], states, log_weights))
+        new = mixtures[-1].draw(per_round, rng)
+        drawn = np.concatenate([drawn, np.stack([one.log_density(new) for one in mixtures[:-1]], axis=1)])
+        states, found = np.concatenate([states, new]), np.concatenate([found, costs(new)])
+        drawn = np.concatenate([drawn, mixtures[-1].log_density(states)[:, None]], axis=1)
+        log_weights = -0.5 * found - np.logaddexp.reduce(drawn, axis=1)
+    return WeightedSamples(states, _normalised(log_weights), found, _fitted(mixtures[-1], states, log_weights))
+
+
+def _effective(weights: Values) -> float:
+    return float(1.0 / (weights**2).sum())
+
+
+def _normalised(log_weights: Values) -> Values:
+    weights = np.exp(log_weights - log_weights.max())
+    return np.asarray(weights / weights.sum())
+
+
+def _flattened(log_weights: Values, least: float) -> Values:
+    """Raise the weights to the largest power up to 1 that leaves enough effective samples."""
+    low, high = 0.0, 1.0
+    weights = _normalised(log_weights)
+    if _effective(weights) >= least:
+        return weights
+    for _ in range(12):
+        power = 0.5 * (low + high)
+        weights = _normalised(power * log_weights)
+        low, high = (power, high) if _effective(weights) >= least else (low, power)
+    return _normalised(low * log_weights)
+
+
+def _fitted(mixture: Mixture, states: np.ndarray, log_weights: Values) -> Mixture:
+    """Fit the mixture to weighted samples by one step of expectation-maximisation, held back where few samples count."""
+    count, dimensions = mixture.centres.shape
+    weights = _flattened(log_weights, _LEAST_PER_DIMENSION * dimensions)
+    each = mixture.log_densities(states)
+    owned = np.exp(each - np.logaddexp.reduce(each, axis=1)[:, None]) * weights[:, None]
+    total = np.maximum(owned.sum(axis=0), _LARGEST_RATIO_KEPT)
+    effective = total**2 / np.maximum((owned**2).sum(axis=0), _LARGEST_RATIO_KEPT)
+    trust = (effective / (effective + dimensions))[:, None]
+    means = (owned.T @ states) / total[:, None]
+    apart = states[None] - means[:, None]
+    spreads = np.swapaxes(apart * (owned.T / total[:, None])[:, :, None], 1, 2) @ apart
+    spreads = trust[:, :, None] * spreads + (1.0 - trust[:, :, None]) * mixture.spreads
+    shares = (1.0 - _LEAST_WEIGHT) * total / total.sum() + _LEAST_WEIGHT / count
+    return Mixture(shares / shares.sum(), trust * means + (1.0 - trust) * mixture.centres, spreads)
+
 
 MOST_ROWS = 300
 """Candidate rows up to which samples take a fraction of a second; of more pairs, the local covariance describes the posterior."""
@@ -200,3 +358,78 @@ def _mixture(posterior: PosePosterior, peaks: _Peaks, degrees_of_freedom: float)
     likely = 0.5 * np.linalg.slogdet(spreads)[1] - 0.5 * posterior.costs(states)
     weights = np.exp(_EVENING * (likely - likely.max()))
     return Mixture(weights / weights.sum(), states, spreads)
+
+
+_LARGEST_TURN_RAD, _LARGEST_SHIFT_M = 0.3, 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Modes:
+    """Refined poses.
+
+    Attributes:
+        poses: k of them.
+        hessians: (k, 6, 6) Gauss-Newton Hessians, camera prior included.
+        inlier: (k, n) probability that each pair is an inlier, whether or not it was used.
+        evidence: (k,) log likelihood of the pairs that were used, relative to all being outliers, camera prior included.
+    """
+
+    poses: Poses
+    hessians: np.ndarray
+    inlier: np.ndarray
+    evidence: Values
+
+
+def refine_poses(
+    posterior: PosePosterior,
+    poses: Poses,
+    log_scales: np.ndarray,
+    *,
+    share: float,
+    used: Flags | None = None,
+    rounds: int,
+) -> Modes:
+    """Refine poses at given noise levels by expectation-maximisation, with one Gauss-Newton step per round.
+
+    Args:
+        posterior: of the pairs.
+        poses: where to start, k of them.
+        log_scales: (k, 4) logarithm of the noise over the assumed one.
+        share: of inliers, before any pair is looked at.
+        used: (k, n) the pairs that count for each pose; None uses all.
+        rounds: number of steps.
+    """
+    counts = np.ones((len(poses), len(posterior.measurements)), dtype=bool) if used is None else used
+    for _ in range(rounds):
+        terms = posterior.pair_terms(poses, log_scales)
+        hessians, gradients = _normal_equations(posterior, poses, terms, share, counts)
+        poses = poses.perturbed(_steps(hessians, gradients))
+    terms = posterior.pair_terms(poses, log_scales)
+    hessians, _ = _normal_equations(posterior, poses, terms, share, counts)
+    mixed = np.log1p(share * np.expm1(np.minimum(terms.pair, 500.0)))
+    evidence = np.where(counts, mixed, 0.0).sum(axis=1) - 0.5 * posterior.prior_costs(poses)
+    return Modes(poses, hessians, 1.0 - terms.outlier_probabilities(share), evidence)
+
+
+def _normal_equations(
+    posterior: PosePosterior, poses: Poses, terms: PairTerms, share: float, counts: Flags
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return Hessians (k, 6, 6) and right-hand sides (k, 6), every candidate row weighted by its probability."""
+    outlier = terms.outlier_probabilities(share) / (1.0 - share) * share * counts
+    per_row = outlier if posterior.measurements.one_to_one else outlier[:, posterior.measurements.owner]
+    kinds = np.exp(np.minimum(terms.inlier, 500.0)) + np.exp(np.minimum(terms.near, 500.0)) / NEAR_OUTLIER_FACTOR**2
+    rows = terms.whitened() * np.sqrt(per_row * kinds)[:, None, None, :]
+    rows = rows.reshape(*rows.shape[:2], -1)
+    product = rows @ np.swapaxes(rows, 1, 2)
+    prior_hessians, prior_gradients = posterior.prior_information(poses)
+    return product[:, 1:, 1:] + prior_hessians, product[:, 1:, 0] + prior_gradients
+
+
+def _steps(hessians: np.ndarray, gradients: np.ndarray) -> np.ndarray:
+    """Solve for steps (k, 6) of limited length, slightly damped."""
+    scale = np.sqrt(np.maximum(np.diagonal(hessians, axis1=1, axis2=2), 1e-12))
+    scaled = hessians / (scale[:, :, None] * scale[:, None, :]) + 1e-9 * np.eye(6)
+    steps = np.linalg.solve(scaled, (gradients / scale)[:, :, None])[:, :, 0] / scale
+    turns, shifts = np.linalg.norm(steps[:, 3:], axis=1), np.linalg.norm(steps[:, :3], axis=1)
+    longest = np.maximum(np.maximum(turns / _LARGEST_TURN_RAD, shifts / _LARGEST_SHIFT_M), 1.0)
+    return np.asarray(steps / longest[:, None])

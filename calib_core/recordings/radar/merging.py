@@ -10,8 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib_core.arrays import Flags, Indices, TimesNs, Values, Vector3
-from calib_core.association.cluster_scale import report_spread
-from calib_core.association.clustering import CLUSTER_SCALE
+from calib_core.association.clustering import CLUSTER_SCALE, report_spread
 from calib_core.measurements import RadarScans
 from calib_core.radar import direction_cosines
 from calib_core.recordings.radar.columns import Returns

@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 from calib_core.association.clustering import clusters_of
-from calib_core.association.companions import balanced_pairs
 from calib_core.association.exclusive_returns import exclusive_rows, shared_returns
 from calib_core.association.gating import static_returns
-from calib_core.association.novelty import scores_of
-from calib_core.association.pairing import pair_clicks
+from calib_core.association.pairing import balanced_pairs, pair_clicks, scores_of
 from calib_core.association.placements import find_placements
 from calib_core.measurements import NS_PER_S, Candidate, Pair, RadarScan, RadarScans, ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions, GatingOptions

@@ -1,10 +1,30 @@
 """Every click gets radar positions, or a reason why it has none."""
 
-import numpy as np
+from dataclasses import replace
 
-from calib_core.association.pairing import pair_clicks
-from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, ReflectorClick, TimeNs
-from calib_core.options import CalibrationOptions
+import numpy as np
+import pytest
+
+from benchmarks.accuracy.clutter import SCENES
+from benchmarks.accuracy.scenes import Windows, draw_windows
+from calib_core.association.clustering import candidates_of, clusters_of, window_around
+from calib_core.association.pairing import background_windows, balanced_pairs, find_companion, pair_clicks, scores_of
+from calib_core.calibration import calibrate
+from calib_core.measurements import (
+    NS_PER_S,
+    ChosenReturn,
+    Pair,
+    RadarScan,
+    RadarScans,
+    ReflectorClick,
+    TimeNs,
+    Unsolvable,
+)
+from calib_core.options import CalibrationOptions, LocatingOptions, NoiseOptions
+from calib_core.results import Calibration
+from calib_core.synthetic import simulate_pairs
+from calib_core.synthetic.options import SimulationOptions
+from calib_core.synthetic.scans import simulate_scans
 
 
 def scans_at(times_s: list[float], *, doppler_mps: float = 0.0) -> RadarScans:
@@ -57,3 +77,237 @@ def test_a_pair_carries_the_stamp_of_the_nearest_scan() -> None:
     (pair,) = pair_clicks([click("a", 0.52)], scans_at([0.0, 0.5, 1.0]), CalibrationOptions()).pairs
     assert pair.radar_time == round(0.5 * NS_PER_S)
     assert pair.candidates[0].scans == 3
+
+
+OPTIONS = CalibrationOptions()
+SEED = 20261122
+
+
+@pytest.fixture(scope="module")
+def windows() -> Windows:
+    busy = max(SCENES, key=lambda scene: scene.objects)
+    return draw_windows(busy, np.random.default_rng(SEED))
+
+
+def position(pair: Pair, index: int) -> tuple[float, float, float]:
+    x, y, z = pair.candidates[index].position_radar_m.tolist()
+    return (x, y, z)
+
+
+def test_a_chosen_return_is_the_only_candidate_and_the_others_are_set_aside(windows: Windows) -> None:
+    free = pair_clicks(windows.clicks, windows.scans, OPTIONS).pairs
+    pair = next(pair for pair in free if len(pair.candidates) > 2)
+    chosen = ChosenReturn(position(pair, 2))
+    clicks = [replace(click, chosen=chosen) if click.id == pair.id else click for click in windows.clicks]
+    found = {one.id: one for one in pair_clicks(clicks, windows.scans, OPTIONS).pairs}
+    assert len(found[pair.id].candidates) == 1
+    assert found[pair.id].candidates[0].position_radar_m == pytest.approx(np.array(chosen.position_m), abs=1e-9)
+    assert found[pair.id].candidates[0].score == 1.0
+    assert len(found[pair.id].set_aside) == len(pair.candidates)
+    assert found[pair.id].chosen == chosen
+    for other in free:
+        if other.id != pair.id:
+            assert len(found[other.id].candidates) == len(other.candidates)
+
+
+def test_a_choice_where_the_radar_saw_nothing_leaves_the_click_unpaired_and_says_where(windows: Windows) -> None:
+    click = replace(windows.clicks[0], chosen=ChosenReturn((4.0, -40.0, 0.0)))
+    (lone,) = pair_clicks([click], windows.scans, OPTIONS).unpaired
+    assert lone.code == "chosen-return-missing"
+    assert "40.2 m away and 84.3 deg to the right" in lone.reason
+
+
+def test_the_other_clicks_of_a_placement_share_its_choice(windows: Windows) -> None:
+    free = pair_clicks(windows.clicks, windows.scans, OPTIONS).pairs
+    pair = next(pair for pair in free if len(pair.candidates) > 1)
+    click = next(click for click in windows.clicks if click.id == pair.id)
+    again = replace(click, id="again", image_time=TimeNs(click.image_time + NS_PER_S // 3), u_px=click.u_px + 1.0)
+    chosen = replace(click, chosen=ChosenReturn(position(pair, 1)))
+    found = pair_clicks([chosen, again], windows.scans, OPTIONS).pairs
+    assert [len(one.candidates) for one in found] == [1, 1]
+    away = replace(again, u_px=click.u_px + 60.0)
+    assert len(pair_clicks([chosen, away], windows.scans, OPTIONS).pairs[1].candidates) > 1
+
+
+def test_guesses_change_nothing_about_the_answer(windows: Windows) -> None:
+    measured = windows.clicks[:8]
+    guesses = [replace(click, mark="untouched") for click in windows.clicks[8:]]
+    alone = calibrate(measured, windows.scans, windows.rig.camera, OPTIONS).unwrap()
+    joined = calibrate([*measured, *guesses], windows.scans, windows.rig.camera, OPTIONS).unwrap()
+    assert isinstance(alone, Calibration)
+    assert isinstance(joined, Calibration)
+    assert joined.camera_from_radar.translation_m.tobytes() == alone.camera_from_radar.translation_m.tobytes()
+    assert joined.camera_from_radar.rotation.tobytes() == alone.camera_from_radar.rotation.tobytes()
+    assert joined.covariance.tobytes() == alone.covariance.tobytes()
+    assert joined.metrics == alone.metrics
+    assert joined.warnings == alone.warnings
+    assert sum(pair.excluded for pair in joined.pairs) == len(guesses)
+
+
+def test_guesses_do_not_make_up_the_four_pairs_that_a_pose_needs(windows: Windows) -> None:
+    clicks = [*windows.clicks[:3], *(replace(click, mark="untouched") for click in windows.clicks[3:])]
+    outcome = calibrate(clicks, windows.scans, windows.rig.camera, OPTIONS)
+    assert isinstance(outcome, Unsolvable)
+    assert outcome.reason == "3 of at least 4 required pairs, 17 untouched"
+    assert len(outcome.pairs) == len(clicks)
+
+
+def test_algorithm_1_says_that_it_does_not_use_a_choice(windows: Windows) -> None:
+    paper = CalibrationOptions(method="paper")
+    free = pair_clicks(windows.clicks, windows.scans, OPTIONS).pairs
+    chosen = replace(windows.clicks[0], chosen=ChosenReturn(position(free[0], 0)))
+    outcome = calibrate([chosen, *windows.clicks[1:]], windows.scans, windows.rig.camera, paper)
+    if isinstance(outcome, Calibration):
+        assert outcome.warnings[-1].code == "choices-unused"
+
+
+def test_without_clicks_there_is_nothing_to_pair() -> None:
+    assert pair_clicks([], RadarScans(), OPTIONS).pairs == ()
+
+
+def with_second(offsets_m: np.ndarray, *, score: float, seed: int = 1, aside_rad: float = 0.0) -> list[Pair]:
+    """Pairs with a second candidate that much farther away, and more plausible by its echo."""
+    pairs = []
+    for pair, offset_m in zip(
+        simulate_pairs(len(offsets_m), rng=np.random.default_rng(seed)).pairs, offsets_m, strict=True
+    ):
+        own = pair.candidates[0]
+        x, y, z = own.position_radar_m * (1.0 + offset_m / np.linalg.norm(own.position_radar_m))
+        turned = np.array(
+            [x * np.cos(aside_rad) - y * np.sin(aside_rad), x * np.sin(aside_rad) + y * np.cos(aside_rad), z]
+        )
+        second = replace(own, position_radar_m=turned, score=score)
+        pairs.append(replace(pair, candidates=(second, replace(own, score=0.95 - score))))
+    return pairs
+
+
+def test_the_cart_behind_every_placement_is_found_with_its_distance() -> None:
+    companion = find_companion(with_second(np.full(12, 1.0), score=0.6))
+    assert companion is not None
+    assert companion.offset_m == pytest.approx(1.0, abs=0.05)
+    assert companion.near.tolist() == [1] * 12
+    assert companion.far.tolist() == [0] * 12
+
+
+def test_reflector_and_cart_get_nearly_the_same_score_and_keep_their_sum() -> None:
+    for pair in balanced_pairs(with_second(np.full(12, 1.0), score=0.85)):
+        near, far = pair.candidates
+        assert np.linalg.norm(near.position_radar_m) < np.linalg.norm(far.position_radar_m)
+        assert near.score / far.score == pytest.approx(1.5)
+        assert near.score + far.score == pytest.approx(0.95)
+
+
+@pytest.mark.parametrize(
+    "pairs",
+    [
+        with_second(np.linspace(0.5, 3.9, 12), score=0.6),
+        with_second(np.full(12, 1.0), score=0.6, aside_rad=0.3),
+        with_second(np.full(12, 1.0), score=0.93),
+        with_second(np.full(3, 1.0), score=0.6),
+    ],
+    ids=["ghosts at any distance", "next to the reflector", "implausible", "three pairs"],
+)
+def test_what_is_no_companion_changes_no_score(pairs: list[Pair]) -> None:
+    assert find_companion(pairs) is None
+    assert all(after is before for after, before in zip(balanced_pairs(pairs), pairs, strict=True))
+
+
+def test_pairs_without_the_cart_are_left_alone() -> None:
+    pairs = with_second(np.full(12, 1.0), score=0.6)
+    pairs[4] = replace(pairs[4], candidates=pairs[4].candidates[1:])
+    companion = find_companion(pairs)
+    assert companion is not None
+    assert companion.near[4] == companion.far[4] == -1
+    assert balanced_pairs(pairs)[4] is pairs[4]
+
+
+def test_clicks_of_a_reflector_in_front_of_a_cart_prefer_the_reflector() -> None:
+    rng = np.random.default_rng(2)
+    places = simulate_pairs(8, rng=rng).points_radar_m
+    scans, clicks = [], []
+    for i, place in enumerate(places):
+        cart = place * (1.0 + 1.0 / np.linalg.norm(place))
+        for k in range(30):
+            points = np.stack([place, cart]) + 0.01 * rng.standard_normal((2, 3))
+            time = TimeNs(20 * i * NS_PER_S + k * NS_PER_S // 10)
+            scans.append(RadarScan(time, points, np.zeros(2), np.array([20.0, 26.0]), np.full((2, 3), np.nan)))
+        clicks.append(ReflectorClick(TimeNs(20 * i * NS_PER_S + 3 * NS_PER_S // 2), f"c{i}", 100.0 * i, 50.0))
+    for pair, place in zip(
+        pair_clicks(clicks, RadarScans.from_scans(scans), CalibrationOptions()).pairs, places, strict=True
+    ):
+        assert pair.candidates[0].position_radar_m == pytest.approx(place, abs=0.03)
+        assert pair.candidates[1].score > 0.3
+
+
+POST = (3.5, 0.1, 0.2)
+PLACES = tuple((8.0 + 0.5 * i, 1.0 - 0.4 * i, -1.0) for i in range(8))
+
+
+def recording(*, dwells: int = 8, seed: int = 0) -> RadarScans:
+    """A post that is always there and 25 dB stronger than a reflector, which rests for six of every fifteen seconds."""
+    rng = np.random.default_rng(seed)
+    scans = []
+    for k in range(150 * len(PLACES)):
+        i, since_s = divmod(k / 10.0, 15.0)
+        there = [POST, PLACES[int(i)]] if i < dwells and 5.0 <= since_s < 11.0 else [POST]
+        points = np.array(there) + 0.01 * rng.standard_normal((len(there), 3))
+        snr = np.array([45.0, 20.0][: len(there)]) + rng.standard_normal(len(there))
+        n = len(there)
+        scans.append(RadarScan(TimeNs(k * NS_PER_S // 10), points, np.zeros(n), snr, np.full((n, 3), np.nan)))
+    return RadarScans.from_scans(scans)
+
+
+def click_at(placement: int) -> ReflectorClick:
+    return ReflectorClick(TimeNs((15 * placement + 8) * NS_PER_S), f"c{placement}", 100.0 * placement, 50.0)
+
+
+def test_what_other_windows_show_too_is_no_candidate() -> None:
+    scans = recording()
+    windows = [window_around(scans, click_at(i).image_time, window_s=3.0) for i in range(8)]
+    clusters = [clusters_of(window, most=12) for window in windows]
+    for place, found, scores in zip(PLACES, clusters, scores_of(windows, clusters), strict=True):
+        (only,) = candidates_of(found, scores, LocatingOptions(), NoiseOptions())
+        assert only.position_radar_m == pytest.approx(place, abs=0.02)
+
+
+def test_one_click_is_enough_where_the_rest_of_the_recording_shows_the_background() -> None:
+    (pair,) = pair_clicks([click_at(3)], recording(), CalibrationOptions(), background=recording()).pairs
+    assert pair.candidates[0].position_radar_m == pytest.approx(PLACES[3], abs=0.02)
+    assert pair.candidates[0].score > 0.95
+
+
+def test_background_windows_are_clear_of_every_click_and_few() -> None:
+    scans = recording()
+    windows = [window_around(scans, click_at(i).image_time, window_s=3.0) for i in (1, 5)]
+    background = background_windows(scans, windows, window_s=3.0)
+    assert 8 < len(background) <= 16
+    for empty in background:
+        for window in windows:
+            assert empty.times_ns[0] > window.times_ns[-1] or empty.times_ns[-1] < window.times_ns[0]
+
+
+def test_scans_around_the_clicks_alone_have_no_background_windows() -> None:
+    around = recording().between(TimeNs(19 * NS_PER_S), TimeNs(27 * NS_PER_S))
+    window = window_around(around, click_at(1).image_time, window_s=3.0)
+    assert background_windows(around, [window], window_s=3.0) == ()
+    assert background_windows(RadarScans(), [], window_s=3.0) == ()
+
+
+def test_in_a_busy_window_more_candidates_are_kept_than_in_a_clear_one() -> None:
+    clear = np.array([0.97, 0.02, 0.005, 0.005])
+    busy = np.full(30, 1.0 / 30.0)
+    found = clusters_of(recording().between(TimeNs(0), TimeNs(3 * NS_PER_S)), most=1)
+    for scores, kept in ((clear, 2), (busy, 16)):
+        clusters = found * len(scores)
+        assert len(candidates_of(clusters, scores, LocatingOptions(), NoiseOptions())) == kept
+
+
+@pytest.mark.slow
+def test_no_static_object_replaces_the_reflector_in_a_heavily_cluttered_aisle() -> None:
+    session = simulate_scans(SimulationOptions(seed=880001, scene="aisle", clutter="heavy"))
+    outcome = calibrate(session.clicks, session.scans, session.camera)
+    assert isinstance(outcome, Calibration)
+    for pair, placement in zip(outcome.pairs, session.placements, strict=True):
+        assert np.linalg.norm(pair.point_radar_m - placement.position_radar_m) < 0.6
+    error = session.camera_from_radar.error_from(outcome.camera_from_radar)
+    assert error @ np.linalg.solve(outcome.covariance, error) < 1.5 * outcome.covariance_quantile

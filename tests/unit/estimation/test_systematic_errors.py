@@ -7,12 +7,11 @@ import pytest
 
 from calib_core.calibration import calibrate_pairs
 from calib_core.estimation.covariance import pose_covariance
-from calib_core.estimation.error_kinds import SystematicError
 from calib_core.estimation.errors_in_variables import fit_errors_in_variables
 from calib_core.estimation.gnc import GncSolution
 from calib_core.estimation.linearization import MeasurementPlanes
 from calib_core.estimation.measurement_model import PairMeasurements, pair_measurements
-from calib_core.estimation.systematic_errors import systematic_errors
+from calib_core.estimation.systematic_errors import SystematicError, systematic_errors
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions, without_systematic_errors
 from calib_core.radar import RadarErrors, cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration

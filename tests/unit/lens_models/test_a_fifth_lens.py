@@ -12,8 +12,8 @@ from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange import CalibrationFile, camera_info_text, export, read_any, read_calibration, read_camera
+from calib_core.lens_models.brown_conrady import project_distorted, unproject_distorted
 from calib_core.lens_models.lens_model import LensModel, NameElsewhere, TypicalLens
-from calib_core.lens_models.perspective import project_distorted, unproject_distorted
 from calib_core.lens_models.registry import LENS_MODELS
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 from calib_core.paper.pnp import project_points, solve_pnp_ransac

@@ -7,11 +7,9 @@ import numpy as np
 import pytest
 
 from calib_core.estimation.posterior import samples
-from calib_core.estimation.posterior.modes import Modes, refine_poses
-from calib_core.estimation.posterior.pose_batch import batch_of
-from calib_core.estimation.posterior.pose_posterior import pose_posterior
-from calib_core.estimation.posterior.samples import PosteriorSamples, sample_posterior
-from calib_core.estimation.posterior.summary import PosteriorSummary, possible_poses, summarize_posterior
+from calib_core.estimation.posterior.beyond_the_fit import PosteriorSummary, possible_poses, summarize_posterior
+from calib_core.estimation.posterior.pose_posterior import batch_of, pose_posterior
+from calib_core.estimation.posterior.samples import Modes, PosteriorSamples, refine_poses, sample_posterior
 from calib_core.geometry import RigidTransform
 from calib_core.synthetic import SimulatedPairs, simulate_pairs
 from tests.solved_draws import NARROW, SolvedDraw, solve_draw

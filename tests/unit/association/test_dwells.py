@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from calib_core.association.dwell_ends import FirmSpan, firm_span
+from calib_core.association.dwells import FirmSpan, firm_span
 
 TIMES_S = np.arange(0.0, 6.0, 0.1)
 
