@@ -18,7 +18,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.arrays import Matrix66, Points2, Values
-from calib_core.covariance_parts import CovarianceParts
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.gnc import normal_equations
 from calib_core.estimation.lens_prior import LensPrior, shared_out
@@ -26,6 +25,7 @@ from calib_core.estimation.prior_rows import prior_rows
 from calib_core.estimation.systematic_errors import SystematicErrors
 from calib_core.options import RadarOptions
 from calib_core.radar import polar_from_cartesian
+from calib_core.results.calibration import CovarianceParts
 from calib_core.results.radar_axes import mounting_moves
 from calib_core.results.shared_errors import SystematicErrorResult
 

@@ -6,12 +6,12 @@ import numpy as np
 
 from calib_core.arrays import Matrix66, Vector3, frozen_array
 from calib_core.camera import Camera
-from calib_core.covariance_parts import CovarianceParts
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import TimeNs
 from calib_core.options import CameraPositionPrior
 from calib_core.results import Calibration
+from calib_core.results.calibration import CovarianceParts
 from calib_core.results.verdict import degrees_of_freedom
 
 CHI2_95 = 12.591587243743977

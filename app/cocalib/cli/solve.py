@@ -227,7 +227,7 @@ def _placed_words(placed: "PlacedClicks") -> str:
     """Say how many clicks were placed, and how sure they are."""
     if placed.unconfirmed is None:
         return placed.words
-    from calib_core.diagnostics.confirmation import probability_text
+    from calib_core.results.confirmation import probability_text
 
     count = len(placed.unconfirmed.ids)
     return (

@@ -9,13 +9,13 @@ import numpy as np
 
 from calib_core.association.pairing import RadarSource
 from calib_core.camera import Camera
-from calib_core.diagnostics.confirmation import nobody_confirmed
 from calib_core.geometry import camera_position_jacobian
 from calib_core.measurements import ReflectorClick, Unpaired, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.proposing import ViewProgress
 from calib_core.proposing.automatic import automatic_clicks
 from calib_core.results import Calibration, UnconfirmedClicks
+from calib_core.results.confirmation import nobody_confirmed
 from calib_core.results.verdict import verdict_on
 from cocalib.proposing import REFLECTOR_M, RecordedFrames, find_proposals
 from cocalib.solving.solving import solve_clicks

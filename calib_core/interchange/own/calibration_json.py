@@ -17,8 +17,6 @@ from msgspec import UNSET, UnsetType
 
 from calib_core.arrays import Matrix66
 from calib_core.camera import Camera
-from calib_core.covariance_parts import CovarianceParts
-from calib_core.diagnostics.confirmation import rests_on_fleet_prior
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.input_files import encodable
@@ -55,6 +53,8 @@ from calib_core.interchange.vehicle_note import VehicleNote
 from calib_core.measurements import ReflectorClick, Unpaired
 from calib_core.radar import AngleMap, RadarErrors
 from calib_core.results import Calibration, CheckPoint, DataWarning, InputFile, Metrics
+from calib_core.results.calibration import CovarianceParts
+from calib_core.results.confirmation import rests_on_fleet_prior
 from calib_core.results.shared_errors import SystematicErrorResult
 from calib_core.results.verdict import Verdict, verdict_on
 

@@ -8,7 +8,6 @@ import pytest
 
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
-from calib_core.covariance_parts import CovarianceParts
 from calib_core.fleet import session_pose
 from calib_core.measurements import Pair
 from calib_core.options import (
@@ -21,6 +20,7 @@ from calib_core.options import (
 )
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration
+from calib_core.results.calibration import CovarianceParts
 from calib_core.synthetic import simulate_pairs
 
 _SIGMA_M = 0.02

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from calib_core.association.placements import Placement
-from calib_core.diagnostics.confirmation import probability_text
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.proposing import DwellView, Proposals
 from calib_core.proposing.proposals_json import named_proposals
+from calib_core.results.confirmation import probability_text
 
 _HEAD = ("id", "time [s]", "range [m]", "column [px]", "row [px]", "sigma [px]", "confidence", "reason")
 
