@@ -7,7 +7,7 @@ import numpy as np
 
 from calib_core.evaluation.figures import BoxFigures, Evaluation, HeldOut, ResidualFigures, Spread
 from calib_core.input_files import encodable
-from calib_core.interchange.syntax.json_text import json_text
+from calib_core.interchange.syntax.strict_json import json_text
 from calib_core.measurements import Stamp, TimeNs
 
 EVALUATION_SCHEMA = "cocalib/evaluation-1"

@@ -8,11 +8,15 @@ from calib_core.interchange.calibration_file import (
     Provenance,
     choose_check_point,
 )
-from calib_core.interchange.cameras.files import CameraFile, read_camera, read_camera_file
+from calib_core.interchange.cameras.files import (
+    CAMERA_FORMATS,
+    CameraFile,
+    camera_content,
+    read_camera,
+    read_camera_file,
+)
 from calib_core.interchange.cameras.formats.ros import camera_info_text
-from calib_core.interchange.cameras.written import CAMERA_FORMATS, camera_content
-from calib_core.interchange.check.agreement import AgreementLimits, Criterion, Judgement
-from calib_core.interchange.check.comparison import Comparison, compare
+from calib_core.interchange.check.agreement import AgreementLimits, Comparison, Criterion, Judgement, compare
 from calib_core.interchange.check.pair_residuals import CheckPairs, read_check_pairs, read_check_pairs_file
 from calib_core.interchange.check.pixel_differences import PixelDifference
 from calib_core.interchange.check.report import CheckReport, Verdict, check
@@ -43,11 +47,9 @@ from calib_core.interchange.own.clicks_json import read_clicks, write_clicks
 from calib_core.interchange.own.documents import CALIBRATION_SCHEMA, names_schema
 from calib_core.interchange.own.pairs_json import PairsFile, read_pairs, write_pairs
 from calib_core.interchange.syntax.content import Content
-from calib_core.interchange.trees.attaching import attached_export
 from calib_core.interchange.trees.frame_choice import WantedFrames
-from calib_core.interchange.trees.frame_tree import FrameTree
-from calib_core.interchange.trees.joint import Joint, Place
-from calib_core.interchange.trees.patching import Patch, patched
+from calib_core.interchange.trees.frame_tree import FrameTree, Joint, Place
+from calib_core.interchange.trees.patching import Patch, attached_export, patched
 from calib_core.interchange.trees.posed_in_tree import calibration_in_tree
 from calib_core.interchange.trees.reading import TreeFile, joined_tree
 from calib_core.interchange.vehicle_note import VehicleNote

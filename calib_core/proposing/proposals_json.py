@@ -9,7 +9,6 @@ import numpy as np
 from calib_core.association.placements import Placement
 from calib_core.input_files import encodable
 from calib_core.interchange.own.documents import ClickDocument, TimeDocument
-from calib_core.interchange.own.numbers import finite_or_none
 from calib_core.interchange.own.proposal_documents import (
     PROPOSALS_SCHEMA,
     DwellDocument,
@@ -19,7 +18,8 @@ from calib_core.interchange.own.proposal_documents import (
     RoughMountingDocument,
     UnproposedDocument,
 )
-from calib_core.interchange.syntax.json_text import json_text
+from calib_core.interchange.own.transform_document import finite_or_none
+from calib_core.interchange.syntax.strict_json import json_text
 from calib_core.measurements import TimeNs, time_parts
 from calib_core.proposing.dwell_views import DwellView
 from calib_core.proposing.picture_candidates import PictureCandidate

@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, rotation_exp
-from calib_core.interchange.trees.frame_tree import FrameTree
-from calib_core.interchange.trees.joint import Joint, Place
+from calib_core.interchange.trees.frame_tree import FrameTree, Joint, Place
 
 PLACE = Place("tree.urdf", 1)
 CLOSE = {"rtol": 0, "atol": 1e-9}

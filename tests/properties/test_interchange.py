@@ -33,7 +33,7 @@ from calib_core.interchange import (
 )
 from calib_core.interchange.calibration_file import choose_check_point
 from calib_core.interchange.rotations import matrix_from_rpy, rpy_from_matrix
-from calib_core.interchange.syntax.json_text import json_text
+from calib_core.interchange.syntax.strict_json import json_text
 from calib_core.interchange.syntax.yaml_text import load_yaml, number_text
 from calib_core.measurements import ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions

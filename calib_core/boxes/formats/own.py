@@ -17,8 +17,7 @@ from calib_core.interchange.own.detection_documents import (
     ScanDocument,
 )
 from calib_core.interchange.own.documents import TimeDocument
-from calib_core.interchange.syntax.json_text import json_text
-from calib_core.interchange.syntax.strict_json import checked, parse_document
+from calib_core.interchange.syntax.strict_json import checked, json_text, parse_document
 from calib_core.measurements import (
     Box,
     Boxes,

@@ -1,17 +1,27 @@
 """Read a camera from the file formats in common use."""
 
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
+
+import msgspec
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.input_files import file_text, read_input
-from calib_core.interchange.cameras.camera_format import FoundCamera
+from calib_core.interchange.cameras.camera_format import CameraFormat, FoundCamera
 from calib_core.interchange.cameras.fields import find_cameras
-from calib_core.interchange.cameras.written import CAMERA_FORMATS
-from calib_core.interchange.syntax.opencv_xml import load_opencv_xml
-from calib_core.interchange.syntax.strict_json import json_object
+from calib_core.interchange.cameras.formats.colmap import COLMAP_CAMERAS
+from calib_core.interchange.cameras.formats.kalibr import KALIBR_CHAIN
+from calib_core.interchange.cameras.formats.kitti import KITTI_CAMERAS_FILE
+from calib_core.interchange.cameras.formats.matlab import MATLAB_PARAMETERS
+from calib_core.interchange.cameras.formats.mrcal import MRCAL
+from calib_core.interchange.cameras.formats.opencv import OPENCV_JSON, OPENCV_XML, OPENCV_YAML
+from calib_core.interchange.cameras.formats.ros import ROS
+from calib_core.interchange.own.lens_documents import camera_document
+from calib_core.interchange.syntax.strict_json import json_object, json_text
+from calib_core.interchange.syntax.xml_places import load_opencv_xml
 from calib_core.interchange.syntax.yaml_text import load_yaml
 
 _MAX_BYTES = 512 * 1024 * 1024
@@ -165,3 +175,46 @@ def _chosen(cameras: tuple[FoundCamera, ...], name: str | None, *, source: str) 
             f"{source}: contains {len(cameras)} cameras; choose one: {', '.join(f'{source}#{n}' for n in names)}"
         )
     return cameras[0]
+
+
+def _write(camera: Camera, _name: str) -> str:
+    return json_text(msgspec.to_builtins(camera_document(camera)))
+
+
+OWN_JSON = CameraFormat("json", "JSON, with the covariance of the intrinsics", ".json", _write)
+
+
+CAMERA_FORMATS: dict[str, CameraFormat] = {
+    one.name: one
+    for one in (
+        ROS,
+        KALIBR_CHAIN,
+        OPENCV_YAML,
+        OPENCV_XML,
+        OPENCV_JSON,
+        MRCAL,
+        COLMAP_CAMERAS,
+        KITTI_CAMERAS_FILE,
+        MATLAB_PARAMETERS,
+        OWN_JSON,
+    )
+}
+"""By name, in display order."""
+
+
+def camera_content(camera: Camera, to: str, name: str = "camera") -> str | bytes:
+    """Return the content of a file with a camera's intrinsics.
+
+    Args:
+        camera: the intrinsics.
+        to: name of the format, one of CAMERA_FORMATS.
+        name: of the camera, for formats that state one.
+
+    Raises:
+        InputError: there is no such format, or it cannot store this camera.
+    """
+    if to not in CAMERA_FORMATS:
+        near = get_close_matches(to, CAMERA_FORMATS, n=1)
+        known = f"did you mean {near[0]}?" if near else f"known: {', '.join(CAMERA_FORMATS)}"
+        raise InputError(f"no format {to!r} for intrinsics; {known}")
+    return CAMERA_FORMATS[to].write(camera, name)

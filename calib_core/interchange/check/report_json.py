@@ -11,7 +11,7 @@ import numpy as np
 from calib_core.input_files import encodable
 from calib_core.interchange.check.report import CheckReport
 from calib_core.interchange.check.slips import CheckResult
-from calib_core.interchange.syntax.json_text import json_text
+from calib_core.interchange.syntax.strict_json import json_text
 
 CHECK_SCHEMA = "cocalib/check-1"
 _CODES = {"right": 0, "unproven": 0, "doubtful": 3, "wrong": 1}

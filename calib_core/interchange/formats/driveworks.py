@@ -8,13 +8,13 @@ import numpy as np
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile
-from calib_core.interchange.cameras.numbers import floats
+from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.formats.statement import STATEMENT_KEY, stated_lines, statement, with_statement
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL, matrix_from_rpy, rpy_from_matrix
 from calib_core.interchange.syntax.content import Content
-from calib_core.interchange.syntax.json_text import json_text
+from calib_core.interchange.syntax.strict_json import json_text
 
 _NOTES = (
     "nominalSensor2Rig_FLU is the sensor's pose in the rig: metres, roll-pitch-yaw in degrees about fixed axes, the camera with "

@@ -7,8 +7,7 @@ import numpy as np
 
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import FrameNames
-from calib_core.interchange.cameras.fields import find_cameras
-from calib_core.interchange.cameras.numbers import floats
+from calib_core.interchange.cameras.fields import find_cameras, floats
 from calib_core.interchange.format import Reads
 from calib_core.interchange.formats.statement import STATEMENT_KEY, stated_frames, with_statement
 from calib_core.interchange.formats.transform_choice import Ends, choose_transform

@@ -4,7 +4,7 @@ import numpy as np
 
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile
-from calib_core.interchange.cameras.numbers import floats
+from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.evidence import EVIDENCE_LEVELS, Evidence
 from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose

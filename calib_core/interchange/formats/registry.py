@@ -6,9 +6,6 @@ from difflib import get_close_matches
 from calib_core.errors import InputError
 from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.formats.apollo import APOLLO
-from calib_core.interchange.formats.arrays.mat import MATLAB
-from calib_core.interchange.formats.arrays.named_arrays import NUMPY
-from calib_core.interchange.formats.arrays.text_matrix import MATRIX
 from calib_core.interchange.formats.autoware import AUTOWARE
 from calib_core.interchange.formats.colmap import COLMAP
 from calib_core.interchange.formats.driveworks import DRIVEWORKS
@@ -30,6 +27,8 @@ from calib_core.interchange.formats.foreign.tum_pose import TUM_POSE
 from calib_core.interchange.formats.foxglove import FOXGLOVE
 from calib_core.interchange.formats.kalibr import KALIBR
 from calib_core.interchange.formats.kitti import KITTI
+from calib_core.interchange.formats.mat import MATLAB
+from calib_core.interchange.formats.named_arrays import NUMPY
 from calib_core.interchange.formats.nuscenes import NUSCENES
 from calib_core.interchange.formats.opencv import OPENCV
 from calib_core.interchange.formats.pack.deployment_pack import PACK
@@ -38,6 +37,7 @@ from calib_core.interchange.formats.ros.camera_info import CAMERA_INFO
 from calib_core.interchange.formats.ros.launch_files import LAUNCH_XML, TF2_LAUNCH_PY
 from calib_core.interchange.formats.ros.tf2_command import TF2
 from calib_core.interchange.formats.ros.urdf import URDF
+from calib_core.interchange.formats.text_matrix import MATRIX
 from calib_core.interchange.own.calibration_json import CALIBRATION_1
 from calib_core.interchange.own.truth_json import TRUTH
 from calib_core.interchange.syntax.content import Content

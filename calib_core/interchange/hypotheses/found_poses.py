@@ -1,9 +1,163 @@
 """Poses in a file's values: where they are, and each way in which their numbers can be read."""
 
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 from calib_core.arrays import Matrix33, Vector3, frozen_array
-from calib_core.interchange.hypotheses.key_words import KeyHints
+from calib_core.interchange.imported import Direction, looks_like_camera, looks_like_radar
+
+Part = Literal["rotation", "translation", "other"]
+
+_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
+_JOINED = re.compile(r"(cam|camera|radar|to|from)(?=(?:cam|radar|to|from))", re.IGNORECASE)
+_ROTATION = frozenset(
+    {
+        "r",
+        "rot",
+        "rotation",
+        "orientation",
+        "attitude",
+        "rmat",
+        "rotm",
+        "q",
+        "quat",
+        "quaternion",
+        "qvec",
+        "wxyz",
+        "xyzw",
+    }
+    | {"rvec", "rvecs", "rotvec", "rodrigues", "rpy", "ypr", "euler", "angles"}
+)
+_TRANSLATION = frozenset(
+    {"t", "trans", "translation", "tvec", "tvecs", "xyz", "position", "pos", "offset", "origin", "location"}
+)
+_WORDS_OF_PARTS: tuple[tuple[Part, frozenset[str]], ...] = (("rotation", _ROTATION), ("translation", _TRANSLATION))
+_UNITS = {
+    "mm": "mm",
+    "millimeter": "mm",
+    "millimeters": "mm",
+    "millimetres": "mm",
+    "cm": "cm",
+    "centimeters": "cm",
+    "m": "m",
+    "meter": "m",
+    "meters": "m",
+    "metres": "m",
+    "rad": "rad",
+    "radians": "rad",
+    "deg": "deg",
+    "degrees": "deg",
+}
+_OF_AXES = {
+    "optical": ("camera", "optical"),
+    "link": ("camera", "body"),
+    "body": ("camera", "body"),
+    "opengl": ("camera", "opengl"),
+    "blender": ("camera", "opengl"),
+    "flu": ("radar", "flu"),
+    "frd": ("radar", "frd"),
+    "rfu": ("radar", "rfu"),
+}
+_OTHERS = frozenset(
+    {"lidar", "velo", "velodyne", "livox", "ouster", "hesai", "imu", "gps", "gnss", "ego", "vehicle", "chassis"}
+    | {"base", "world", "map", "robot", "rig", "platform", "odom", "gripper", "tool", "flange", "effector", "drone"}
+)
+_NAMED = 0.2
+_FROM, _TO = ("from", "wrt", "in"), ("to", "2")
+
+
+@dataclass(frozen=True, slots=True)
+class KeyHints:
+    """What the names around a pose suggest.
+
+    Attributes:
+        carries_radar: probability that the numbers carry radar points into the camera, by the names alone.
+        camera_axes: the camera's axes that a name mentions; "" if none does.
+        radar_axes: the same for the radar.
+        unit: of length that a name mentions; "" if none does.
+        names_radar: whether a name mentions a radar.
+        other: another sensor or frame that a name mentions although none mentions a radar, or none a camera, such as
+            "lidar"; "" if none does.
+    """
+
+    carries_radar: float = 0.5
+    camera_axes: str = ""
+    radar_axes: str = ""
+    unit: str = ""
+    names_radar: bool = False
+    other: str = ""
+
+    @property
+    def named_direction(self) -> Direction | None:
+        """The direction that the names state; None if they leave it open."""
+        if abs(self.carries_radar - 0.5) < _NAMED:
+            return None
+        return "camera_from_radar" if self.carries_radar > 0.5 else "radar_from_camera"
+
+
+def words_of(key: object) -> tuple[str, ...]:
+    """Split a key into lower-case words: T_cam_radar, radarToCamera and radar2cam alike."""
+    return tuple(word.lower() for word in _WORD.findall(_JOINED.sub(r"\1_", str(key)[:200])))
+
+
+def part_of(key: object) -> tuple[Part, tuple[str, ...]]:
+    """Return which part of a pose a key names, and its other words: R_cam_radar is a rotation, and (cam, radar)."""
+    words = words_of(key)
+    for part, known in _WORDS_OF_PARTS:
+        if known & set(words):
+            rest = tuple(word for word in words if word not in known and word not in _UNITS)
+            return part, rest
+    return "other", words
+
+
+def unit_in(key: object) -> str:
+    """Return the unit that a key ends with: mm, cm, m, rad or deg; "" if it ends with none, or is nothing else."""
+    words = words_of(key)
+    return _UNITS.get(words[-1], "") if len(words) > 1 else ""
+
+
+def hints_of(keys: Sequence[object], texts: Sequence[str] = ()) -> KeyHints:
+    """Return what the names around a pose suggest.
+
+    Args:
+        keys: from the outermost to that of the pose itself.
+        texts: short texts beside it, such as the names of frames.
+    """
+    words = [word for key in keys for word in words_of(key)]
+    axes = {
+        whose: which
+        for word in [*words, *(part for text in texts for part in words_of(text))]
+        for whose, which in [_OF_AXES.get(word, ("", ""))]
+    }
+    names = (*reversed(keys), *texts)
+    innermost = next((hint for name in names if (hint := _direction(words_of(name))) != 0.5), 0.5)
+    units = [*(unit_in(key) for key in reversed(keys)), *(_UNITS.get(text.strip().lower(), "") for text in texts)]
+    unit = next((unit for unit in units if unit in ("mm", "cm", "m")), "")
+    said = [word for one in (*keys, *texts) for word in words_of(one)]
+    names_radar = any(map(looks_like_radar, said))
+    names_both = names_radar and any(map(looks_like_camera, said))
+    other = "" if names_both else next((word for word in words if word in _OTHERS), "")
+    return KeyHints(innermost, axes.get("camera", ""), axes.get("radar", ""), unit, names_radar, other)
+
+
+def _direction(words: Sequence[str]) -> float:
+    """Return the probability that a key names camera_from_radar, by the order of its words."""
+    if {"rvec", "tvec"} & set(words):
+        return 0.85  # OpenCV's names, and its direction
+    cameras = [at for at, word in enumerate(words) if looks_like_camera(word)]
+    radars = [at for at, word in enumerate(words) if looks_like_radar(word)]
+    if not cameras or not radars:
+        return 0.6 if "extrinsic" in words or "extrinsics" in words else 0.5
+    first, last = sorted((cameras[0], radars[0]))
+    between = words[first + 1 : last]
+    camera_first = first == cameras[0]
+    if set(between) & set(_FROM):
+        return 0.97 if camera_first else 0.03
+    if set(between) & set(_TO):
+        return 0.15 if camera_first else 0.85  # "radar to camera" is also said of the pose of the camera in the radar
+    return 0.8 if camera_first else 0.25  # T_camera_radar
 
 
 @dataclass(frozen=True, slots=True, eq=False)

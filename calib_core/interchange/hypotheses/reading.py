@@ -9,15 +9,14 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange.cameras.camera_format import FoundCamera
 from calib_core.interchange.cameras.fields import find_cameras
-from calib_core.interchange.formats.arrays.mat import MATLAB
-from calib_core.interchange.formats.arrays.named_arrays import NUMPY
-from calib_core.interchange.formats.arrays.text_matrix import MATRIX
+from calib_core.interchange.formats.mat import MATLAB
+from calib_core.interchange.formats.named_arrays import NUMPY
 from calib_core.interchange.formats.opencv import OPENCV
 from calib_core.interchange.formats.registry import reader_of
 from calib_core.interchange.formats.statement import stated_frames
+from calib_core.interchange.formats.text_matrix import MATRIX
 from calib_core.interchange.hypotheses.finding import find_poses
-from calib_core.interchange.hypotheses.found_poses import FoundPose, Unreadable
-from calib_core.interchange.hypotheses.key_words import hints_of
+from calib_core.interchange.hypotheses.found_poses import FoundPose, Unreadable, hints_of
 from calib_core.interchange.hypotheses.plain_values import array_of, plain_values
 from calib_core.interchange.hypotheses.ranking import Hypothesis, clear_one, hypotheses_of
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose

@@ -15,9 +15,8 @@ from calib_core.interchange.own.lens_documents import (
     LeftOutDocument,
     SourceDocument,
 )
-from calib_core.interchange.own.numbers import finite_or_none, nan_if_none
-from calib_core.interchange.syntax.json_text import json_text
-from calib_core.interchange.syntax.strict_json import parse_document
+from calib_core.interchange.own.transform_document import finite_or_none, nan_if_none
+from calib_core.interchange.syntax.strict_json import json_text, parse_document
 from calib_core.intrinsics import Board, BoardCorners, LeftOutPicture
 from calib_core.measurements import TimeNs
 

@@ -15,8 +15,7 @@ from calib_core.interchange.own.documents import (
     TimeDocument,
     UnconfirmedDocument,
 )
-from calib_core.interchange.syntax.json_text import json_text
-from calib_core.interchange.syntax.strict_json import parse_document
+from calib_core.interchange.syntax.strict_json import json_text, parse_document
 from calib_core.measurements import ChosenReturn, ReflectorClick, time_from_parts, time_parts
 from calib_core.results import UnconfirmedClicks
 

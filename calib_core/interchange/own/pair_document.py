@@ -6,7 +6,7 @@ from msgspec import UNSET, UnsetType
 from calib_core.errors import InputError
 from calib_core.interchange.own import documents
 from calib_core.interchange.own.clicks_json import chosen_of, return_document
-from calib_core.interchange.own.numbers import finite_or_none, nan_if_none, nested
+from calib_core.interchange.own.transform_document import finite_or_none, nan_if_none, nested
 from calib_core.measurements import Candidate, Pair, TimeNs, time_from_parts, time_parts
 from calib_core.radar import covariance_from_sigma_polar
 from calib_core.results import PairResult

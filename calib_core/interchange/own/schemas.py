@@ -22,7 +22,7 @@ from calib_core.interchange.own.lens_documents import (
     IntrinsicsDocument,
 )
 from calib_core.interchange.own.proposal_documents import PROPOSALS_SCHEMA, ProposalsDocument
-from calib_core.interchange.syntax.json_text import json_text
+from calib_core.interchange.syntax.strict_json import json_text
 
 _DOCUMENTS: dict[str, Any] = {
     CLICKS_SCHEMA: ClicksDocument,

@@ -1,13 +1,13 @@
 """A transform in our files: its rotation as a matrix and as a quaternion, compared as exactly as its digits allow."""
 
 from decimal import Decimal
+from typing import Any
 
 import numpy as np
 
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, matrix_from_quaternion_wxyz, quaternion_wxyz_from_matrix
 from calib_core.interchange.own.documents import TransformDocument
-from calib_core.interchange.own.numbers import nested
 from calib_core.interchange.rotations import nearest_rotation
 
 _AGREEMENT = 1e-5
@@ -101,3 +101,20 @@ def _rounding(numbers: "tuple[float, ...] | list[float]") -> float:
     largest = max([0.0, *(abs(float(one)) for one in written)])
     magnitude = int(np.floor(np.log10(largest))) + 1 if largest > 1.0 else 0
     return 0.5 * max(10.0**-decimals, 10.0 ** (magnitude - digits))
+
+
+def finite_or_none(value: float) -> float | None:
+    """Return a finite number as it is, and None for any other."""
+    return float(value) if np.isfinite(value) else None
+
+
+def nan_if_none(value: float | None) -> float:
+    """Return the number in a file, NaN for null."""
+    return float("nan") if value is None else value
+
+
+def nested(array: np.ndarray) -> Any:
+    """Return an array as nested tuples; None if any entry is not finite."""
+    if not np.isfinite(array).all():
+        return None
+    return tuple(map(tuple, array.tolist())) if array.ndim == 2 else tuple(array.tolist())

@@ -9,8 +9,8 @@ from xml.etree.ElementTree import Element
 from calib_core.errors import InputError
 from calib_core.interchange.syntax.mat_file import load_mat
 from calib_core.interchange.syntax.mcap_file import MCAP_MAGIC, McapFile, load_mcap
-from calib_core.interchange.syntax.opencv_xml import is_file_storage, opencv_values, parse_xml
 from calib_core.interchange.syntax.strict_json import json_value
+from calib_core.interchange.syntax.xml_places import is_file_storage, opencv_values, parse_xml
 from calib_core.interchange.syntax.yaml_text import joined_documents, load_yaml_documents
 from calib_core.interchange.syntax.zip_archives import unpack
 

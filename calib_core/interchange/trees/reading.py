@@ -6,8 +6,7 @@ from pathlib import Path
 
 from calib_core.errors import InputError
 from calib_core.interchange.syntax.content import Content, decoded, readings
-from calib_core.interchange.trees.frame_tree import FrameTree
-from calib_core.interchange.trees.joint import Joint
+from calib_core.interchange.trees.frame_tree import FrameTree, Joint
 from calib_core.interchange.trees.readers.autoware import read_autoware, recognizes_autoware
 from calib_core.interchange.trees.readers.camera_frames import cameras_named_in
 from calib_core.interchange.trees.readers.driveworks import has_one_of_each, read_driveworks, recognizes_driveworks

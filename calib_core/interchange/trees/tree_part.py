@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from calib_core.interchange.trees.frame_tree import FrameTree, Sensor
-from calib_core.interchange.trees.joint import Joint
+from calib_core.interchange.trees.frame_tree import FrameTree, Joint, Sensor
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -103,7 +103,7 @@ class Compare:
 
 def _json(a: str, b: str, figures: list[tuple[str, str]], verdict: str, compared: "ComparedOnRecording | None") -> str:
     from calib_core.evaluation import evaluation_document
-    from calib_core.interchange.syntax.json_text import json_text
+    from calib_core.interchange.syntax.strict_json import json_text
 
     document: dict[str, Any] = {
         "schema": COMPARISON_SCHEMA,

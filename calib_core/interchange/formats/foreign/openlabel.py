@@ -9,10 +9,9 @@ from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import FrameNames
 from calib_core.interchange.cameras.camera_format import FoundCamera
-from calib_core.interchange.cameras.numbers import floats
+from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.format import Reads
-from calib_core.interchange.formats.foreign.found_lens import with_camera
-from calib_core.interchange.formats.foreign.pose_parts import direction_by_facing, rigid, rigid_matrix
+from calib_core.interchange.formats.foreign.pose_parts import direction_by_facing, rigid, rigid_matrix, with_camera
 from calib_core.interchange.formats.statement import (
     STATEMENT_KEY,
     stated_check_point,

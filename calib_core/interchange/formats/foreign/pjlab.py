@@ -23,7 +23,7 @@ from calib_core.interchange.imported import (
     looks_like_radar,
 )
 from calib_core.interchange.syntax.content import Content
-from calib_core.interchange.syntax.json_text import json_text
+from calib_core.interchange.syntax.strict_json import json_text
 
 _NUMBERS = "sensor_calib.data carries radar points into the camera (p_target = matrix p_sensor)"
 _CV_64F = 6

@@ -1,6 +1,7 @@
 """What files of other tools have in common: numbers by name, 4x4 matrices, roles by frame name, a direction by facing."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,8 @@ from numpy.typing import ArrayLike
 from calib_core.arrays import Matrix33
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
-from calib_core.interchange.cameras.numbers import floats
+from calib_core.interchange.cameras.camera_format import FoundCamera
+from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.imported import (
     Direction,
     Form,
@@ -110,3 +112,24 @@ def direction_by_facing(rotation: Matrix33) -> Direction | None:
     }
     fitting = [direction for direction, cosines in looks.items() if min(cosines) > _FACING]
     return fitting[0] if len(fitting) == 1 else None
+
+
+def with_camera(found: ImportedCalibration, camera: FoundCamera | None, *, source: str) -> ImportedCalibration:
+    """Return what was read with its camera; without an image size the camera is completed later, by `camera_for`.
+
+    Raises:
+        InputError: a parameter is invalid.
+    """
+    if camera is None:
+        return found
+    if camera.size_px is not None:
+        return replace(found, camera=camera.camera(image_size_px=None, source=source))
+    model, distortion = camera.lens(source=source)
+    return replace(
+        found, matrix_px=np.reshape(camera.matrix_px, (3, 3)), lens_model=model, distortion=np.array(distortion)
+    )
+
+
+def pinhole_matrix(fx: float, fy: float, cx: float, cy: float) -> tuple[float, ...]:
+    """Return the camera matrix, row by row, for focal lengths and principal point [px]."""
+    return (fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0)

@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 
 from calib_core.errors import InputError
-from calib_core.interchange.cameras.numbers import floats
+from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.imported import WrittenPose
 from calib_core.interchange.syntax.content import Content
-from calib_core.interchange.syntax.yaml_places import PlacedValue, placed_yaml
-from calib_core.interchange.trees.joint import Joint, JointNumbers, Place
+from calib_core.interchange.syntax.yaml_text import PlacedValue, placed_yaml
+from calib_core.interchange.trees.frame_tree import Joint, JointNumbers, Place
 from calib_core.interchange.trees.tree_part import TreePart
 
 _NUMBERS = (("translation", "xyz"), ("rotation", "xyzw"))

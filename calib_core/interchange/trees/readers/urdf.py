@@ -5,11 +5,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from calib_core.interchange.cameras.numbers import floats
+from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.imported import WrittenPose
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.xml_places import PlacedElement, placed_xml
-from calib_core.interchange.trees.joint import Joint, JointNumbers, Place, Slot
+from calib_core.interchange.trees.frame_tree import Joint, JointNumbers, Place, Slot
 from calib_core.interchange.trees.tree_part import TreePart
 
 XACRO_COMMAND = "expand it first: xacro FILE.xacro > FILE.urdf"

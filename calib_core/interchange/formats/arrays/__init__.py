@@ -1,1 +1,0 @@
-"""Plain arrays: text, NumPy's npz, MATLAB's mat."""
