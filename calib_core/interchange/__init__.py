@@ -1,11 +1,11 @@
 """Read and write files: clicks, pairs, cameras, calibrations, and the formats of other tools."""
 
-from calib_core.interchange.adopting import Adoption, adopt, adopted_calibration, adoption
 from calib_core.interchange.calibration_file import (
     AssumptionNote,
     CalibrationFile,
     FrameNames,
     Provenance,
+    VehicleNote,
     choose_check_point,
 )
 from calib_core.interchange.cameras.files import (
@@ -27,6 +27,10 @@ from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.formats.registry import CAMERA_ONLY, FORMATS, format_named, written_formats
 from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose, imported
 from calib_core.interchange.importing import (
+    Adoption,
+    adopt,
+    adopted_calibration,
+    adoption,
     calibration_bytes,
     files_beside,
     read_any,
@@ -52,7 +56,6 @@ from calib_core.interchange.trees.frame_tree import FrameTree, Joint, Place
 from calib_core.interchange.trees.patching import Patch, attached_export, patched
 from calib_core.interchange.trees.posed_in_tree import calibration_in_tree
 from calib_core.interchange.trees.reading import TreeFile, joined_tree
-from calib_core.interchange.vehicle_note import VehicleNote
 
 __all__ = [
     "CALIBRATION_SCHEMA",

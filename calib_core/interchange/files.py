@@ -6,7 +6,7 @@ from typing import TypeAlias
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.input_files import file_text, read_input
-from calib_core.interchange.calibration_file import CalibrationFile, FrameNames, Provenance
+from calib_core.interchange.calibration_file import CalibrationFile, FrameNames, Provenance, VehicleNote
 from calib_core.interchange.cameras.files import read_camera_file
 from calib_core.interchange.check import report as reports
 from calib_core.interchange.check.agreement import AgreementLimits
@@ -16,7 +16,6 @@ from calib_core.interchange.exporting import export as export_file
 from calib_core.interchange.imported import ImportedCalibration, imported
 from calib_core.interchange.importing import read_any_file
 from calib_core.interchange.own import calibration_json, clicks_json, pairs_json
-from calib_core.interchange.vehicle_note import VehicleNote
 from calib_core.measurements import ReflectorClick
 from calib_core.options import NoiseOptions
 from calib_core.results import Calibration

@@ -11,8 +11,7 @@ from calib_core.arrays import Matrix33, Matrix66, Values, Vector2, Vector3, froz
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, matrix_from_quaternion_wxyz
-from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
-from calib_core.interchange.evidence import Evidence
+from calib_core.interchange.calibration_file import CalibrationFile, Evidence, FrameNames
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL, looks_forward, matrix_from_rpy, nearest_rotation
 
 Form = Literal["matrix", "quaternion_xyzw", "quaternion_wxyz", "rpy"]

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.interchange.calibration_file import CalibrationFile
-from calib_core.interchange.evidence import Evidence, stated_evidence
+from calib_core.interchange.calibration_file import CalibrationFile, Evidence, stated_evidence
 from calib_core.interchange.own.calibration_json import calibration_sha256
 from calib_core.results import Calibration
 

@@ -13,7 +13,7 @@ import pytest
 from playwright.sync_api import expect
 
 from calib_core.interchange import read_camera_file
-from calib_core.interchange.rectification import rectified_camera
+from calib_core.interchange.cameras.rectification import rectified_camera
 from calib_core.recordings import Recording, open_recording
 from calib_core.synthetic import PRESETS, WavedBoard, simulate, write_recording
 from cocalib.intrinsics import RecordedPictures

@@ -11,8 +11,8 @@ from msgspec import Meta, Struct
 
 from calib_core.errors import CalibrationError, InputError
 from calib_core.interchange import format_named
+from calib_core.interchange.calibration_file import MOST_CHARACTERS, require_label, require_name
 from calib_core.interchange.syntax.strict_json import checked
-from calib_core.interchange.vehicle_note import MOST_CHARACTERS, require_label, require_name
 from calib_core.options import CalibrationOptions, CameraPositionPrior
 from calib_core.recordings import RecordingOptions
 from cocalib.option_changes import options_from_tree

@@ -75,7 +75,7 @@ class VehicleFlags:
         Raises:
             InputError: a text is empty, too long or not printable, or a name has a slash; the message names the flag.
         """
-        from calib_core.interchange.vehicle_note import VehicleNote, require_label, require_name
+        from calib_core.interchange.calibration_file import VehicleNote, require_label, require_name
 
         for one in dataclasses.fields(self):
             if (text := getattr(self, one.name)) is not None:

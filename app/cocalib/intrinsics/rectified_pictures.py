@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from calib_core.camera import Camera
-from calib_core.interchange.rectification import rectification_maps, rectified_camera
+from calib_core.interchange.cameras.rectification import rectification_maps, rectified_camera
 from calib_core.intrinsics import CalibratedLens, LensView
 from cocalib.intrinsics.picture_sources import OpenPictures
 

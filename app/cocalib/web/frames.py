@@ -13,7 +13,7 @@ import numpy as np
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.interchange.rectification import rectification_maps, rectified_camera
+from calib_core.interchange.cameras.rectification import rectification_maps, rectified_camera
 from calib_core.recordings import Recording
 
 Size = Literal["full", "half", "thumbnail", "rectified"]

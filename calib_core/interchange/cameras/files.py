@@ -1,4 +1,4 @@
-"""Read a camera from the file formats in common use."""
+"""Read a camera from the file formats in common use, and write it in them."""
 
 from dataclasses import dataclass, replace
 from difflib import get_close_matches

@@ -1,4 +1,4 @@
-"""Do two calibrations agree: judged by limits, or else by the covariances that they state."""
+"""Do two calibrations agree: how far apart they are, judged by limits or by the covariances they state; if not, by which slip."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

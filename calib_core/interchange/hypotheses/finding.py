@@ -1,4 +1,4 @@
-"""Find every pose in a file's values: matrices, rotations with translations beside them, seven numbers."""
+"""Find every pose in a file's values, and every way to read its numbers: matrices, rotations with translations, seven numbers."""
 
 import math
 import re

@@ -1,4 +1,4 @@
-"""Poses in a file's values: where they are, and each way in which their numbers can be read."""
+"""Poses in a file's values: where they are, what their keys suggest, and each way in which their numbers can be read."""
 
 import re
 from collections.abc import Sequence

@@ -27,6 +27,7 @@ from calib_core.interchange.calibration_file import (
     FrameNames,
     KeptResult,
     Provenance,
+    VehicleNote,
     choose_check_point,
 )
 from calib_core.interchange.format import Format, Reads
@@ -54,7 +55,6 @@ from calib_core.interchange.own.transform_document import (
 )
 from calib_core.interchange.syntax.content import Content, decoded
 from calib_core.interchange.syntax.strict_json import document_in, json_object, json_text
-from calib_core.interchange.vehicle_note import VehicleNote
 from calib_core.measurements import ReflectorClick, Unpaired
 from calib_core.radar import AngleMap, RadarErrors
 from calib_core.results import Calibration, CheckPoint, DataWarning, InputFile, Metrics

@@ -11,8 +11,7 @@ import msgspec
 from msgspec import UNSET, Meta, Struct, UnsetType, field
 
 from calib_core.camera import CameraModel
-from calib_core.interchange.evidence import Evidence
-from calib_core.interchange.vehicle_note import MOST_CHARACTERS
+from calib_core.interchange.calibration_file import MOST_CHARACTERS, Evidence
 from calib_core.measurements import Mark
 from calib_core.options import RETIRED_METHODS, CalibrationOptions
 from calib_core.results.verdict import VerdictLevel

@@ -1,4 +1,4 @@
-"""The keys of two more of our files: views of a board that a search has found, and a lens calibrated from such views."""
+"""A camera in our files, and the keys of two more: views of a board that a search has found, and a lens calibrated from them."""
 
 from typing import Annotated, Any, Final, Literal
 

@@ -1,4 +1,4 @@
-"""A transform in our files: its rotation as a matrix and as a quaternion, compared as exactly as its digits allow."""
+"""A transform in our files: matrix and quaternion, compared as exactly as its digits allow; numbers and arrays for JSON."""
 
 from decimal import Decimal
 from typing import Any

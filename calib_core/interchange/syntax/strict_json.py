@@ -1,4 +1,4 @@
-"""Read and check JSON; every error is one line that names the file, the place in it and what to do."""
+"""Read, check and write JSON; every error is one line that names the file, the place in it and what to do."""
 
 import dataclasses
 import json

@@ -1,4 +1,4 @@
-"""XML with the place of every element in the text, so that single attributes can be changed without rewriting the file."""
+"""XML with the place of every element in the text, so that single attributes can be changed; OpenCV's FileStorage as values."""
 
 import re
 from collections.abc import Iterator, Mapping

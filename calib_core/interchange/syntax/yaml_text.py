@@ -1,4 +1,4 @@
-"""Read YAML with the safe loader only, including OpenCV's dialect; write numbers and names for every YAML reader."""
+"""Read YAML with the safe loader only, OpenCV's dialect too, with the place of every value; write numbers and names."""
 
 import json
 import re

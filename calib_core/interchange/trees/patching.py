@@ -1,5 +1,7 @@
 """Patch a frame tree's file in place so that its chain from radar to camera is a calibration; only the numbers of the one free
 joint change.
+
+Or export a static transform beside an existing tree: to the root of the camera's own chain, never a second parent.
 """
 
 import codecs

@@ -21,7 +21,7 @@ from calib_core.interchange import (
     read_calibration,
     write_calibration,
 )
-from calib_core.interchange.vehicle_note import MOST_CHARACTERS
+from calib_core.interchange.calibration_file import MOST_CHARACTERS
 
 FULL = VehicleNote("V017", "van", "2026-09-21", "R-0417", "C-\u00fc12")
 KEYS = [one.name for one in fields(VehicleNote)]

@@ -17,7 +17,7 @@ from calib_core.interchange import (
     missing_map,
     read_any,
 )
-from calib_core.interchange.evidence import Evidence
+from calib_core.interchange.calibration_file import Evidence
 from calib_core.results import DataWarning
 from cocalib.view import sentence, warning_in_sentences
 from cocalib.web.exports.check_point import CheckPointRow, check_point_row

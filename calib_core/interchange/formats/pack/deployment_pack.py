@@ -15,9 +15,8 @@ import numpy as np
 
 from calib_core.arrays import Flags, Indices, Points2, Points3
 from calib_core.errors import InputError
-from calib_core.interchange.calibration_file import EQUATION, CalibrationFile
+from calib_core.interchange.calibration_file import EQUATION, CalibrationFile, Evidence
 from calib_core.interchange.cameras.formats.ros import camera_info_text
-from calib_core.interchange.evidence import Evidence
 from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.formats.ros.launch_files import TF2_LAUNCH_PY
 from calib_core.interchange.formats.ros.tf2_command import TF2

@@ -27,7 +27,7 @@ from calib_core.interchange import (
     read_camera,
     write_calibration,
 )
-from calib_core.interchange.evidence import EVIDENCE_LEVELS
+from calib_core.interchange.calibration_file import EVIDENCE_LEVELS
 from calib_core.interchange.own.calibration_json import calibration_sha256
 from calib_core.interchange.syntax.zip_archives import pack, unpack
 from calib_core.lens_models.registry import LENS_MODELS
