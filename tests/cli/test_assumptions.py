@@ -10,6 +10,8 @@ import pytest
 from calib_core.recordings import RecordingOptions
 from cocalib.opening.choice import Choice
 from cocalib.opening.opened import with_remembered
+from cocalib.session import ColumnsMapped
+from tests.unit.app.session.drive import kept
 from tests.vendor_recording import STATED, vendor_sample
 
 Cocalib = Callable[..., Any]
@@ -66,8 +68,7 @@ def test_open_uses_the_map_that_the_session_remembers_unless_another_is_given(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     radar = (tmp_path / "radar.bag",)
-    step = {"n": 1, "step": {"type": "columns_mapped", "column_map": list(STATED)}}
-    (tmp_path / "journal.jsonl").write_text(json.dumps(step) + "\n")
+    kept(tmp_path, ColumnsMapped(tuple(STATED)))
     assert with_remembered(Choice(radar, session=tmp_path)).map == STATED
     assert "--map azimuth=f_Azimuth:rad" in capsys.readouterr().out
     assert with_remembered(Choice(radar, session=tmp_path, fresh=True)).map == ()

@@ -153,7 +153,7 @@ def _view_document(view: BoardCorners) -> BoardViewDocument:
         view.size_px,
         view.corner_ids.tolist(),
         [tuple(pixel) for pixel in view.pixels_px.tolist()],
-        time_ns=view.time_ns,
+        time_ns=None if view.time_ns is None else int(view.time_ns),
         blur_px=finite_or_none(view.blur_px),
     )
 
