@@ -14,7 +14,7 @@ from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.formats.statement import hash_comment, stated_check_point, stated_frames, statement
 from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose
 from calib_core.interchange.own.calibration_json import calibration_sha256
-from calib_core.interchange.own.lens_documents import refuse_skew
+from calib_core.interchange.own.camera_document import refuse_skew
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import quoted
 from calib_core.lens_models.naming import written_lens

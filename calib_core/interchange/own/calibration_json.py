@@ -33,6 +33,7 @@ from calib_core.interchange.calibration_file import (
 from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose, imported
 from calib_core.interchange.own import documents
+from calib_core.interchange.own.camera_document import camera_document, camera_of
 from calib_core.interchange.own.clicks_json import refuse_repeated_ids, unconfirmed_document, unconfirmed_of
 from calib_core.interchange.own.documents import (
     AngleMapDocument,
@@ -43,7 +44,6 @@ from calib_core.interchange.own.documents import (
 )
 from calib_core.interchange.own.documents import Matrix66 as StatedMatrix
 from calib_core.interchange.own.kept_results import kept_results, with_kept
-from calib_core.interchange.own.lens_documents import camera_document, camera_of
 from calib_core.interchange.own.pair_document import SOLVED_FROM_KEYS, solved_pair_document, solved_pair_of
 from calib_core.interchange.own.transform_document import (
     are_inverse,

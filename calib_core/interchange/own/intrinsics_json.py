@@ -11,6 +11,7 @@ from calib_core.interchange.own.board_views_json import (
     left_out_documents,
     source_document,
 )
+from calib_core.interchange.own.camera_document import camera_document
 from calib_core.interchange.own.documents import WarningDocument
 from calib_core.interchange.own.lens_documents import (
     INTRINSICS_SCHEMA,
@@ -22,7 +23,6 @@ from calib_core.interchange.own.lens_documents import (
     ModelTrialDocument,
     ResidualFieldDocument,
     UncertaintyDocument,
-    camera_document,
 )
 from calib_core.interchange.own.transform_document import finite_or_none
 from calib_core.interchange.syntax.strict_json import json_text

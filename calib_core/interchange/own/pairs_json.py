@@ -11,6 +11,7 @@ from calib_core.arrays import Vector3
 from calib_core.association.array_pairs import too_near
 from calib_core.camera import Camera
 from calib_core.errors import InputError
+from calib_core.interchange.own.camera_document import camera_document, camera_of
 from calib_core.interchange.own.clicks_json import refuse_repeated_ids
 from calib_core.interchange.own.documents import (
     PAIRS_SCHEMA,
@@ -19,7 +20,6 @@ from calib_core.interchange.own.documents import (
     PositionDocument,
     RadarDocument,
 )
-from calib_core.interchange.own.lens_documents import camera_document, camera_of
 from calib_core.interchange.syntax.strict_json import json_text, parse_document
 from calib_core.measurements import Candidate, Pair
 from calib_core.options import CalibrationOptions, CameraPositionPrior, NoiseOptions

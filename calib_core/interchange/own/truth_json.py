@@ -4,8 +4,8 @@ from collections.abc import Mapping
 
 from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.imported import TRUTH_FORMAT, ImportedCalibration, WrittenPose
+from calib_core.interchange.own.camera_document import camera_of
 from calib_core.interchange.own.documents import CameraDocument, TransformDocument
-from calib_core.interchange.own.lens_documents import camera_of
 from calib_core.interchange.own.transform_document import transform_of
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.strict_json import checked

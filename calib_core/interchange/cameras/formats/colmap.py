@@ -7,7 +7,7 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange.cameras.camera_format import CameraFormat, FoundCamera, OwnSyntax, found_or_refused
 from calib_core.interchange.cameras.fields import floats
-from calib_core.interchange.own.lens_documents import refuse_skew
+from calib_core.interchange.own.camera_document import refuse_skew
 from calib_core.interchange.syntax.yaml_text import numbers_text
 from calib_core.lens_models.naming import lenses_named, names_in, written_lens
 
