@@ -15,7 +15,7 @@ from calib_core.interchange.cameras.files import (
     read_camera,
     read_camera_file,
 )
-from calib_core.interchange.cameras.formats.ros import camera_info_text
+from calib_core.interchange.cameras.ros import camera_info_text
 from calib_core.interchange.check.agreement import AgreementLimits, Comparison, Criterion, Judgement, compare
 from calib_core.interchange.check.pair_residuals import CheckPairs, read_check_pairs, read_check_pairs_file
 from calib_core.interchange.check.pixel_differences import PixelDifference

@@ -11,14 +11,14 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.input_files import file_text, read_input
 from calib_core.interchange.cameras.camera_format import CameraFormat, FoundCamera
+from calib_core.interchange.cameras.colmap import COLMAP_CAMERAS
 from calib_core.interchange.cameras.fields import find_cameras
-from calib_core.interchange.cameras.formats.colmap import COLMAP_CAMERAS
-from calib_core.interchange.cameras.formats.kalibr import KALIBR_CHAIN
-from calib_core.interchange.cameras.formats.kitti import KITTI_CAMERAS_FILE
-from calib_core.interchange.cameras.formats.matlab import MATLAB_PARAMETERS
-from calib_core.interchange.cameras.formats.mrcal import MRCAL
-from calib_core.interchange.cameras.formats.opencv import OPENCV_JSON, OPENCV_XML, OPENCV_YAML
-from calib_core.interchange.cameras.formats.ros import ROS
+from calib_core.interchange.cameras.kalibr import KALIBR_CHAIN
+from calib_core.interchange.cameras.kitti import KITTI_CAMERAS_FILE
+from calib_core.interchange.cameras.matlab import MATLAB_PARAMETERS
+from calib_core.interchange.cameras.mrcal import MRCAL
+from calib_core.interchange.cameras.opencv import OPENCV_JSON, OPENCV_XML, OPENCV_YAML
+from calib_core.interchange.cameras.ros import ROS
 from calib_core.interchange.own.camera_document import camera_document
 from calib_core.interchange.syntax.strict_json import json_object, json_text
 from calib_core.interchange.syntax.xml_places import load_opencv_xml

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from calib_core.interchange.calibration_file import EQUATION, CalibrationFile
-from calib_core.interchange.cameras.formats.matlab import ONE_BASED, dated_nothing
+from calib_core.interchange.cameras.matlab import ONE_BASED, dated_nothing
 from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.formats.named_arrays import from_arrays
 from calib_core.interchange.formats.statement import STATEMENT_KEY, statement

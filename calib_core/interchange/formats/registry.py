@@ -7,37 +7,32 @@ from calib_core.errors import InputError
 from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.formats.apollo import APOLLO
 from calib_core.interchange.formats.autoware import AUTOWARE
+from calib_core.interchange.formats.autoware_ai import AUTOWARE_AI
+from calib_core.interchange.formats.camera_info import CAMERA_INFO
 from calib_core.interchange.formats.colmap import COLMAP
 from calib_core.interchange.formats.driveworks import DRIVEWORKS
-from calib_core.interchange.formats.foreign.autoware_ai import AUTOWARE_AI
-from calib_core.interchange.formats.foreign.easy_handeye import EASY_HANDEYE
-from calib_core.interchange.formats.foreign.kitti_raw import KITTI_ODOMETRY, KITTI_RAW
-from calib_core.interchange.formats.foreign.koide3 import KOIDE3
-from calib_core.interchange.formats.foreign.labelling import SCALE, SEGMENTS
-from calib_core.interchange.formats.foreign.not_between_both import (
-    K_RADAR_CAMERA,
-    K_RADAR_OFFSET,
-    KALIBR_CHAIN,
-    KITTI_CAMERAS,
-)
-from calib_core.interchange.formats.foreign.openlabel import OPENLABEL
-from calib_core.interchange.formats.foreign.pjlab import PJLAB
-from calib_core.interchange.formats.foreign.tf_echo import TF_ECHO
-from calib_core.interchange.formats.foreign.tum_pose import TUM_POSE
+from calib_core.interchange.formats.easy_handeye import EASY_HANDEYE
 from calib_core.interchange.formats.foxglove import FOXGLOVE
 from calib_core.interchange.formats.kalibr import KALIBR
 from calib_core.interchange.formats.kitti import KITTI
+from calib_core.interchange.formats.kitti_raw import KITTI_ODOMETRY, KITTI_RAW
+from calib_core.interchange.formats.koide3 import KOIDE3
+from calib_core.interchange.formats.labelling import SCALE, SEGMENTS
+from calib_core.interchange.formats.launch_files import LAUNCH_XML, TF2_LAUNCH_PY
 from calib_core.interchange.formats.mat import MATLAB
 from calib_core.interchange.formats.named_arrays import NUMPY
+from calib_core.interchange.formats.not_between_both import K_RADAR_CAMERA, K_RADAR_OFFSET, KALIBR_CHAIN, KITTI_CAMERAS
 from calib_core.interchange.formats.nuscenes import NUSCENES
 from calib_core.interchange.formats.opencv import OPENCV
+from calib_core.interchange.formats.openlabel import OPENLABEL
 from calib_core.interchange.formats.pack.deployment_pack import PACK
+from calib_core.interchange.formats.pjlab import PJLAB
 from calib_core.interchange.formats.plugins import plugin_formats
-from calib_core.interchange.formats.ros.camera_info import CAMERA_INFO
-from calib_core.interchange.formats.ros.launch_files import LAUNCH_XML, TF2_LAUNCH_PY
-from calib_core.interchange.formats.ros.tf2_command import TF2
-from calib_core.interchange.formats.ros.urdf import URDF
 from calib_core.interchange.formats.text_matrix import MATRIX
+from calib_core.interchange.formats.tf2_command import TF2
+from calib_core.interchange.formats.tf_echo import TF_ECHO
+from calib_core.interchange.formats.tum_pose import TUM_POSE
+from calib_core.interchange.formats.urdf import URDF
 from calib_core.interchange.own.calibration_json import CALIBRATION_1
 from calib_core.interchange.own.truth_json import TRUTH
 from calib_core.interchange.syntax.content import Content

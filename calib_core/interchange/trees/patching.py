@@ -15,10 +15,10 @@ from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.exporting import Export, export
-from calib_core.interchange.formats.ros.launch_files import write_python
-from calib_core.interchange.formats.ros.static_transform import ChildFrame, second_parent_notes
-from calib_core.interchange.formats.ros.tf2_command import write_command
-from calib_core.interchange.formats.ros.urdf import write_joint
+from calib_core.interchange.formats.launch_files import write_python
+from calib_core.interchange.formats.static_transform import ChildFrame, second_parent_notes
+from calib_core.interchange.formats.tf2_command import write_command
+from calib_core.interchange.formats.urdf import write_joint
 from calib_core.interchange.imported import Form
 from calib_core.interchange.origin import missing_map
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL, quaternion_xyzw_from_matrix, rpy_from_matrix

@@ -6,16 +6,16 @@ from pathlib import Path
 
 from calib_core.errors import InputError
 from calib_core.interchange.syntax.content import Content, decoded, readings
+from calib_core.interchange.trees.autoware import read_autoware, recognizes_autoware
+from calib_core.interchange.trees.camera_frames import cameras_named_in
+from calib_core.interchange.trees.driveworks import has_one_of_each, read_driveworks, recognizes_driveworks
+from calib_core.interchange.trees.foxglove import has_several_transforms, read_foxglove, recognizes_foxglove
 from calib_core.interchange.trees.frame_tree import FrameTree, Joint
-from calib_core.interchange.trees.readers.autoware import read_autoware, recognizes_autoware
-from calib_core.interchange.trees.readers.camera_frames import cameras_named_in
-from calib_core.interchange.trees.readers.driveworks import has_one_of_each, read_driveworks, recognizes_driveworks
-from calib_core.interchange.trees.readers.foxglove import has_several_transforms, read_foxglove, recognizes_foxglove
-from calib_core.interchange.trees.readers.nuscenes import read_nuscenes, recognizes_poses, recognizes_sensors
-from calib_core.interchange.trees.readers.publishers import PUBLISHER, read_publishers, recognizes_publishers
-from calib_core.interchange.trees.readers.stamped import read_stamped, recognizes_stamped
-from calib_core.interchange.trees.readers.urdf import read_urdf, recognizes_urdf
+from calib_core.interchange.trees.nuscenes import read_nuscenes, recognizes_poses, recognizes_sensors
+from calib_core.interchange.trees.publishers import PUBLISHER, read_publishers, recognizes_publishers
+from calib_core.interchange.trees.stamped import read_stamped, recognizes_stamped
 from calib_core.interchange.trees.tree_part import TreePart, joined
+from calib_core.interchange.trees.urdf import read_urdf, recognizes_urdf
 
 _PATTERNS = ("*.urdf", "*.xacro", "*calibration.yaml", "*extrinsics*.yaml", "*intrinsics*.yaml", "sensor.json")
 _POSES = "calibrated_sensor.json"

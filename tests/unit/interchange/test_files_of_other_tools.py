@@ -11,7 +11,7 @@ import pytest
 
 from calib_core.errors import InputError
 from calib_core.interchange import CalibrationFile, WantedFrames, export, read_any, read_any_file, read_calibration
-from calib_core.interchange.formats.foreign.pose_parts import direction_by_facing
+from calib_core.interchange.formats.pose_parts import direction_by_facing
 from tests.kept_files import KEPT, kept_file
 
 FORWARD = [0.1, -0.2, 0.3, -0.5, 0.5, -0.5, 0.5]  # a camera that looks along the radar's x axis, x y z qx qy qz qw

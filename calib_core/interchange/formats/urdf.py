@@ -11,7 +11,6 @@ from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
 from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.format import Format, Reads
-from calib_core.interchange.formats.ros.static_transform import ChildFrame, radar_from_child, second_parent_notes
 from calib_core.interchange.formats.statement import (
     POSE_ONLY,
     stated_check_point,
@@ -19,6 +18,7 @@ from calib_core.interchange.formats.statement import (
     statement,
     xml_comment,
 )
+from calib_core.interchange.formats.static_transform import ChildFrame, radar_from_child, second_parent_notes
 from calib_core.interchange.formats.transform_choice import Ends, choose_transform
 from calib_core.interchange.imported import (
     ImportedCalibration,

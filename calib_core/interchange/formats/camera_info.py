@@ -1,7 +1,7 @@
 """ROS camera_info YAML: the intrinsics that image pipelines load; it has no pose."""
 
 from calib_core.interchange.calibration_file import CalibrationFile
-from calib_core.interchange.cameras.formats.ros import camera_info_text
+from calib_core.interchange.cameras.ros import camera_info_text
 from calib_core.interchange.format import Format
 from calib_core.interchange.formats.statement import hash_comment, statement
 from calib_core.interchange.own.camera_document import refuse_skew

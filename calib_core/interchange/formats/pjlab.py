@@ -6,7 +6,7 @@ from typing import Any
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
 from calib_core.interchange.format import Format, Reads
-from calib_core.interchange.formats.foreign.pose_parts import AXES_ASSUMED, rigid_matrix
+from calib_core.interchange.formats.pose_parts import AXES_ASSUMED, rigid_matrix
 from calib_core.interchange.formats.statement import (
     POSE_ONLY,
     STATEMENT_KEY,

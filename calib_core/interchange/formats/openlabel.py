@@ -11,7 +11,7 @@ from calib_core.interchange.calibration_file import FrameNames
 from calib_core.interchange.cameras.camera_format import FoundCamera
 from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.format import Reads
-from calib_core.interchange.formats.foreign.pose_parts import direction_by_facing, rigid, rigid_matrix, with_camera
+from calib_core.interchange.formats.pose_parts import direction_by_facing, rigid, rigid_matrix, with_camera
 from calib_core.interchange.formats.statement import (
     STATEMENT_KEY,
     stated_check_point,

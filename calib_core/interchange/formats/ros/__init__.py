@@ -1,1 +1,0 @@
-"""ROS: static transforms as a command and as launch files, and URDF."""

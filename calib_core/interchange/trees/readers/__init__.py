@@ -1,1 +1,0 @@
-"""Readers of joints, one file per kind of file."""
