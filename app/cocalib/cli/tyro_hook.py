@@ -14,6 +14,8 @@ from typing import Any, TypeAlias, TypeVar
 
 import tyro
 
+from cocalib.cli.flags import VALUES
+
 _PRIVATE = "tyro._errors"
 _PARTS = {
     "UnrecognizedArgs": ("tokens",),
@@ -107,9 +109,10 @@ def parse(
 
     def read() -> Parsed:
         config = (tyro.conf.OmitSubcommandPrefixes, tyro.conf.FlagCreatePairsOff)
+        args = list(arguments)
         if default is None:
-            return tyro.cli(kind, prog=program, args=list(arguments), config=config)
-        return tyro.cli(kind, prog=program, args=list(arguments), config=config, default=default)
+            return tyro.cli(kind, prog=program, args=args, config=config, registry=VALUES)
+        return tyro.cli(kind, prog=program, args=args, config=config, registry=VALUES, default=default)
 
     def on_event(event: Any) -> None:
         if (fault := _fault(event)) is not None:
