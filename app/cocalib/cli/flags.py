@@ -38,6 +38,20 @@ def _optional_number(found: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] 
     )
 
 
+@VALUES.primitive_rule
+def _text(found: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] | None:
+    """Show a text as TEXT, not as STR."""
+    if found.type is not str:
+        return None
+    return PrimitiveConstructorSpec(
+        nargs=1,
+        metavar="TEXT",
+        instance_from_str=lambda words: words[0],
+        is_instance=lambda value: isinstance(value, str),
+        str_from_instance=lambda value: [value],
+    )
+
+
 File: TypeAlias = Annotated[Path | None, called("FILE")]
 NewFile: TypeAlias = Annotated[Path, tyro.conf.arg(metavar="FILE")]
 Folder: TypeAlias = Annotated[Path | None, called("FOLDER")]
