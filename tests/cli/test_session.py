@@ -174,6 +174,16 @@ def test_an_export_writes_the_clicks_of_a_sound_session(cocalib: Cocalib, home: 
     assert len(read_clicks((tmp_path / "clicks.json").read_text())) == 12
 
 
+def test_an_export_tells_of_a_last_step_that_is_not_whole(cocalib: Cocalib, home: Path, tmp_path: Path) -> None:
+    folder = clicked(home / "drive.bag.cocalib-session")
+    for path in folder.glob("journal*.jsonl"):
+        path.write_bytes(path.read_bytes()[:-1])
+    answer = cocalib("session", "export", folder, "--out", tmp_path / "clicks.json")
+    assert answer.code == 0
+    assert "a last step of" in answer.err
+    assert len(read_clicks((tmp_path / "clicks.json").read_text())) == 11
+
+
 def test_an_export_of_a_damaged_session_writes_what_is_proven_and_says_what_is_not(
     cocalib: Cocalib, home: Path, tmp_path: Path
 ) -> None:

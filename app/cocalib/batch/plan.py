@@ -5,7 +5,7 @@ sessions have no result yet, and which results belong to a name that was mistype
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final, Literal
@@ -58,10 +58,12 @@ class Plan:
     Attributes:
         sessions: by vehicle and session; of one that several manifests name, as the latest batch wants it.
         manifests: their names, in order.
+        unread: files that cannot be read, by their places below the folder of the results, and why.
     """
 
     sessions: Mapping[tuple[str, str], Wanted]
     manifests: tuple[str, ...] = ()
+    unread: Mapping[str, str] = field(default_factory=dict)
 
 
 def write_plan(folder: Path, manifest: Path, jobs: Sequence[Job]) -> None:
@@ -83,20 +85,20 @@ def write_plan(folder: Path, manifest: Path, jobs: Sequence[Job]) -> None:
 
 
 def read_plans(folder: Path) -> Plan:
-    """Return what all manifests of a folder want; a file that is none of ours is passed over.
+    """Return what all manifests of a folder want.
 
     Args:
         folder: of the results.
     """
-    found = []
+    found, unread = [], {}
     for path in sorted((folder / PLANS).glob("*.json")):
         try:
             content = ResultsFolder(folder).read(PLANS, path.name) or b""
             found.append((msgspec.json.decode(content, type=PlanDocument), path.name.removesuffix(".json")))
-        except (OSError, msgspec.DecodeError, CalibrationError):
-            continue
+        except (OSError, msgspec.DecodeError, CalibrationError) as error:
+            unread[f"{PLANS}/{path.name}"] = f"{error}; it says which sessions are wanted: run its batch again"
     sessions: dict[tuple[str, str], Wanted] = {}
     for document, _ in sorted(found, key=lambda one: one[0].started):
         for place, one in enumerate(document.sessions):
             sessions[(one.vehicle, one.session)] = Wanted(place, one.digest)
-    return Plan(sessions, tuple(name for _, name in found))
+    return Plan(sessions, tuple(name for _, name in found), unread)

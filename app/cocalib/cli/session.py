@@ -101,10 +101,9 @@ class Session:
         found = inspect_session(folder)
         write_whole(self.out, write_clicks(found.clicks))
         print(_printable(f"{len(found.clicks)} clicks of {found.recording} written to {self.out}"))
-        if found.is_complete:
-            return 0
-        print(_printable("\n".join(f"cocalib: {line}" for line in _findings(found))), file=sys.stderr)
-        return 3
+        if not found.is_complete or found.torn_bytes:
+            print(_printable("\n".join(f"cocalib: {line}" for line in _findings(found))), file=sys.stderr)
+        return 0 if found.is_complete else 3
 
 
 def _session_folder(place: Path) -> Path:

@@ -59,7 +59,7 @@ def read_fleet(folder: Path) -> FleetRecord:
     return FleetRecord(
         vehicles=tuple(vehicles),
         superseded=tuple(superseded),
-        unread=tuple(unread),
+        unread=(*unread, *(UnreadResult(place, reason) for place, reason in plan.unread.items())),
         missing=tuple(name for name in plan.sessions if name not in found_names),
         unlisted=tuple(sorted(name for name in found_names if name not in plan.sessions)) if plan.sessions else (),
         manifests=plan.manifests,

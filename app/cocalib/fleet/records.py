@@ -88,7 +88,7 @@ class VehicleRecord:
 
 @dataclass(frozen=True, slots=True)
 class UnreadResult:
-    """A folder of results that cannot be read.
+    """A folder of results, or a manifest's record, that cannot be read.
 
     Attributes:
         place: relative to the folder that holds results/.

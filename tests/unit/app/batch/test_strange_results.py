@@ -12,7 +12,7 @@ from cocalib.batch.driving import drive
 from cocalib.batch.engine import InProcess
 from cocalib.batch.job import jobs_of
 from cocalib.batch.manifest import ManifestRow
-from cocalib.batch.plan import Plan, read_plans, write_plan
+from cocalib.batch.plan import read_plans, write_plan
 from cocalib.batch.results_folder import OUTCOME_FILE, ResultsFolder
 from cocalib.cli import run
 from tests.batch_calls import quick_jobs
@@ -120,7 +120,9 @@ def test_digests_of_inputs_are_never_read_or_written_through_something_else(
 def test_what_a_manifest_wants_is_never_read_or_written_through_something_else(kind: str, tmp_path: Path) -> None:
     (tmp_path / "out" / "manifests").mkdir(parents=True)
     put(kind, tmp_path / "out" / "manifests" / "fleet.toml.json")
-    assert read_plans(tmp_path / "out") == Plan({})
+    plan = read_plans(tmp_path / "out")
+    assert (plan.sessions, plan.manifests) == ({}, ())
+    assert "neither read nor changed" in plan.unread["manifests/fleet.toml.json"]
     with pytest.raises(
         CalibrationError, match=r"fleet\.toml\.json: is .*, not a file; it was neither read nor changed"
     ):

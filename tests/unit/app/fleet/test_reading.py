@@ -86,6 +86,12 @@ def test_a_result_of_an_impossible_time_is_named(folder: Path) -> None:
     assert "states a time" in unread.reason
 
 
+def test_a_manifests_record_that_cannot_be_read_is_named(folder: Path) -> None:
+    _write_plan(folder, ("V000", "s0"))
+    (folder / "manifests" / "spoilt.json").write_text("garbage")
+    assert [one.place for one in read_fleet(folder).unread] == ["manifests/spoilt.json"]
+
+
 def test_results_of_another_version_are_left_out_and_named(folder: Path) -> None:
     place = ResultsFolder(folder).folder_of(digest_of("V000", "s0")) / "outcome.json"
     place.write_text(place.read_text().replace("outcome-1", "outcome-2"))
