@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from calib_core.arrays import Vector2, frozen_array
 from calib_core.association.placements import Placement
 from calib_core.geometry import RigidTransform
@@ -56,8 +54,3 @@ class Proposals:
     agreement: float = 0.0
     rival_agreement: float = 0.0
     trials: int = 0
-
-
-def no_pixel() -> Vector2:
-    """Return the pixel of nothing."""
-    return np.full(2, np.nan)

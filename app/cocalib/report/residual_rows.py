@@ -19,7 +19,6 @@ _FEWEST = 8
 """With fewer pairs a rank correlation shows nothing."""
 _SURE = 0.01
 """Below this probability under chance alone a trend is named; it is shared among the trends that one plot could show."""
-_AS_EXPECTED = 1.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)

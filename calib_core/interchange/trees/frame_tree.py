@@ -1,7 +1,7 @@
 """Coordinate frames and the joints between them: one parent per frame, no cycles, any two frames chained."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -213,10 +213,6 @@ class FrameTree:
         """Every frame, in the order of the joints."""
         return tuple(dict.fromkeys(name for joint in self.joints for name in (joint.parent, joint.child)))
 
-    def joint_above(self, frame: str) -> Joint | None:
-        """Return the joint between a frame and its parent; None if it has no parent."""
-        return self._above.get(frame)
-
     def root_of(self, frame: str) -> str:
         """Return the frame at the top of a frame's chain: itself if it has no parent."""
         return self._upwards(frame)[-1]
@@ -260,21 +256,6 @@ class FrameTree:
     def sensor_at(self, frame: str) -> Sensor | None:
         """Return what the files say about the sensor at a frame; None if they say nothing."""
         return next((sensor for sensor in self.sensors if sensor.frame == frame), None)
-
-    def completed_by(self, other: "FrameTree") -> "FrameTree":
-        """Add the joints of frames that have no parent here, such as a driver's below its base frame.
-
-        Raises:
-            InputError: a frame has another parent there.
-        """
-        added = []
-        for joint in other.joints:
-            known = self._above.get(joint.child)
-            if known is None:
-                added.append(joint)
-            elif known.parent != joint.parent:
-                raise InputError(_two_parents(known, joint))
-        return replace(self, joints=(*self.joints, *added), sensors=(*self.sensors, *other.sensors))
 
     def listed(self) -> str:
         """Return the names of its frames for a message."""
