@@ -95,8 +95,12 @@ def read_plans(folder: Path) -> Plan:
         try:
             content = ResultsFolder(folder).read(PLANS, path.name) or b""
             found.append((msgspec.json.decode(content, type=PlanDocument), path.name.removesuffix(".json")))
-        except (OSError, msgspec.DecodeError, CalibrationError) as error:
-            unread[f"{PLANS}/{path.name}"] = f"{error}; it says which sessions are wanted: run its batch again"
+        except CalibrationError as error:
+            unread[f"{PLANS}/{path.name}"] = str(error).rpartition(f"{path.name}: ")[2]
+        except OSError as error:
+            unread[f"{PLANS}/{path.name}"] = f"{error.strerror or error}; check its permissions"
+        except msgspec.DecodeError as error:
+            unread[f"{PLANS}/{path.name}"] = f"is no {_SCHEMA}: {error}; run the batch of its manifest again"
     sessions: dict[tuple[str, str], Wanted] = {}
     for document, _ in sorted(found, key=lambda one: one[0].started):
         for place, one in enumerate(document.sessions):

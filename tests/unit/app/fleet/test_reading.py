@@ -89,7 +89,9 @@ def test_a_result_of_an_impossible_time_is_named(folder: Path) -> None:
 def test_a_manifests_record_that_cannot_be_read_is_named(folder: Path) -> None:
     _write_plan(folder, ("V000", "s0"))
     (folder / "manifests" / "spoilt.json").write_text("garbage")
-    assert [one.place for one in read_fleet(folder).unread] == ["manifests/spoilt.json"]
+    (unread,) = read_fleet(folder).unread
+    assert unread.place == "manifests/spoilt.json"
+    assert unread.reason.startswith("is no cocalib/batch-plan-1: ")
 
 
 def test_results_of_another_version_are_left_out_and_named(folder: Path) -> None:
