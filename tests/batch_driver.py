@@ -1,5 +1,6 @@
 """A driver to be killed: it has two workers at calls that never end. python -m tests.batch_driver"""
 
+import os
 import signal
 
 from cocalib.batch.worker_processes import WorkerProcesses
@@ -11,4 +12,4 @@ if __name__ == "__main__":
         signal.signal(number, signal.SIG_DFL)  # tests may have been started in the background, where SIGINT is ignored
     stop_on_signals()
     for call, _ in WorkerProcesses(2).run_all(endless, [(0,), (1,), (2,)]):
-        print(f"finished {call}", flush=True)
+        os.write(1, f"finished {call}\n".encode())  # one write: the workers have the same pipe
