@@ -3,9 +3,13 @@
 import os
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import settings
+
+if TYPE_CHECKING:
+    from calib_core.interchange import CalibrationFile
 
 # The same examples on every run, without a time limit for each: a busy machine must not cause failures.
 settings.register_profile("cocalib", deadline=None, derandomize=True)
@@ -36,6 +40,20 @@ def pytest_xdist_auto_num_workers() -> int:
 def project_root() -> Path:
     """Return the top folder of the checkout."""
     return ROOT
+
+
+@pytest.fixture(scope="session")
+def golden_text(project_root: Path) -> str:
+    """Return the golden calibration as it is written."""
+    return (project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="session")
+def file(golden_text: str) -> "CalibrationFile":
+    """Return the golden calibration as it is read."""
+    from calib_core.interchange import read_calibration
+
+    return read_calibration(golden_text)
 
 
 @pytest.fixture(scope="session")

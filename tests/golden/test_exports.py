@@ -9,7 +9,6 @@ import json
 import shlex
 import xml.etree.ElementTree as ElementTree
 import zipfile
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +16,7 @@ from ruamel.yaml import YAML
 from scipy.io import loadmat
 from scipy.spatial.transform import Rotation
 
-from calib_core.interchange import FORMATS, CalibrationFile, export, format_named, read_any, read_calibration
+from calib_core.interchange import FORMATS, CalibrationFile, export, format_named, read_any
 
 RADAR_FROM_CAMERA_M = [0.006418, 0.000900, -0.062374]
 QUATERNION_XYZW = [-0.536832, 0.529679, -0.447351, 0.480758]
@@ -37,11 +36,6 @@ SIX = {"atol": 6e-7, "rtol": 0}
 EIGHT = {"atol": 6e-9, "rtol": 0}
 
 
-@pytest.fixture(scope="module")
-def published(project_root: Path) -> CalibrationFile:
-    return read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
-
-
 def text_of(file: CalibrationFile, name: str) -> str:
     return export(file, name, rectified=format_named(name).is_for_rectified).data.decode()
 
@@ -56,12 +50,12 @@ def yaml_of(text: str) -> dict:
     return YAML(typ="safe", pure=True).load(text)
 
 
-def test_the_published_vectors_are_what_they_say(published):
-    pose = published.calibration.camera_from_radar
+def test_the_published_vectors_are_what_they_say(file):
+    pose = file.calibration.camera_from_radar
 
     np.testing.assert_allclose(pose.as_matrix()[:3], ROWS, **EIGHT)
     np.testing.assert_allclose((pose @ np.array([P_RADAR_M]))[0], P_CAMERA_M, **SIX)
-    np.testing.assert_allclose(published.calibration.reproject(np.array([P_RADAR_M]))[0], PIXEL_PX, **SIX)
+    np.testing.assert_allclose(file.calibration.reproject(np.array([P_RADAR_M]))[0], PIXEL_PX, **SIX)
     np.testing.assert_allclose(pose.translation_m, CAMERA_FROM_RADAR_XYZ_M, **SIX)
     np.testing.assert_allclose(Rotation.from_matrix(pose.rotation).as_quat(), CAMERA_FROM_RADAR_XYZW, **SIX)
 
@@ -69,8 +63,8 @@ def test_the_published_vectors_are_what_they_say(published):
 @pytest.mark.parametrize(
     "form", [form.name for form in FORMATS if form.comment in ("#", "<!-- -->") and form.name != "colmap"]
 )
-def test_a_file_that_may_hold_comments_says_frames_equation_and_check_point(published, form):
-    text = text_of(published, form)
+def test_a_file_that_may_hold_comments_says_frames_equation_and_check_point(file, form):
+    text = text_of(file, form)
 
     assert "p_camera = R p_radar + t" in text
     assert 'radar frame "radar"' in text
@@ -79,8 +73,8 @@ def test_a_file_that_may_hold_comments_says_frames_equation_and_check_point(publ
     assert "-> pixel [212.918515" in text
 
 
-def test_the_command_publishes_the_camera_in_the_radar_frame(published):
-    command = text_of(published, "tf2").partition("ros2 run")[2].replace("\\\n", " ")
+def test_the_command_publishes_the_camera_in_the_radar_frame(file):
+    command = text_of(file, "tf2").partition("ros2 run")[2].replace("\\\n", " ")
 
     words = shlex.split(command)
 
@@ -91,7 +85,7 @@ def test_the_command_publishes_the_camera_in_the_radar_frame(published):
     assert (said["--frame-id"], said["--child-frame-id"]) == ("radar", "camera_optical")
 
 
-def test_the_python_launch_file_is_a_node_with_these_arguments(published, monkeypatch):
+def test_the_python_launch_file_is_a_node_with_these_arguments(file, monkeypatch):
     import sys
     import types
 
@@ -106,7 +100,7 @@ def test_the_python_launch_file_is_a_node_with_these_arguments(published, monkey
     for name, module in (("launch", launch), ("launch_ros", launch_ros), ("launch_ros.actions", actions)):
         monkeypatch.setitem(sys.modules, name, module)
     scope: dict = {}
-    exec(compile(text_of(published, "tf2-launch-py"), "radar_camera.launch.py", "exec"), scope)
+    exec(compile(text_of(file, "tf2-launch-py"), "radar_camera.launch.py", "exec"), scope)
 
     scope["generate_launch_description"]()
 
@@ -116,8 +110,8 @@ def test_the_python_launch_file_is_a_node_with_these_arguments(published, monkey
     assert built["arguments"][-4:] == ["--frame-id", "radar", "--child-frame-id", "camera_optical"]
 
 
-def test_urdf_hangs_the_optical_frame_on_the_body_frame(published):
-    robot = ElementTree.fromstring(text_of(published, "urdf"))
+def test_urdf_hangs_the_optical_frame_on_the_body_frame(file):
+    robot = ElementTree.fromstring(text_of(file, "urdf"))
 
     assert [link.get("name") for link in robot.findall("link")] == ["radar", "camera_link", "camera_optical"]
     body, optical = robot.findall("joint")
@@ -132,16 +126,16 @@ def test_urdf_hangs_the_optical_frame_on_the_body_frame(published):
     np.testing.assert_allclose(whole.as_euler("xyz"), RPY_RAD, **SIX)
 
 
-def test_autoware_gets_the_body_frame_in_the_kit(published):
-    kit = yaml_of(text_of(published, "autoware"))["sensor_kit_base_link"]
+def test_autoware_gets_the_body_frame_in_the_kit(file):
+    kit = yaml_of(text_of(file, "autoware"))["sensor_kit_base_link"]
 
     assert kit["radar"] == dict.fromkeys(("x", "y", "z", "roll", "pitch", "yaw"), 0.0)
     camera = [kit["camera_link"][key] for key in ("x", "y", "z", "roll", "pitch", "yaw")]
     np.testing.assert_allclose(camera, RADAR_FROM_CAMERA_M + LINK_RPY_RAD, **SIX)
 
 
-def test_kalibr_gets_the_matrix_and_four_coefficients(published):
-    cam0 = yaml_of(text_of(published, "kalibr"))["cam0"]
+def test_kalibr_gets_the_matrix_and_four_coefficients(file):
+    cam0 = yaml_of(text_of(file, "kalibr"))["cam0"]
 
     np.testing.assert_allclose(cam0["T_cam_radar"], [*ROWS, [0, 0, 0, 1]], **EIGHT)
     assert cam0["intrinsics"] == [554.4203610, 556.5392197, 299.0464167, 265.1770865]
@@ -149,8 +143,8 @@ def test_kalibr_gets_the_matrix_and_four_coefficients(published):
     assert (cam0["camera_model"], cam0["distortion_model"], cam0["resolution"]) == ("pinhole", "radtan", [640, 480])
 
 
-def test_kitti_has_its_seven_lines_in_order(published):
-    lines = [line.split(": ") for line in text_of(published, "kitti").splitlines()[:7]]
+def test_kitti_has_its_seven_lines_in_order(file):
+    lines = [line.split(": ") for line in text_of(file, "kitti").splitlines()[:7]]
 
     assert [key for key, _ in lines] == ["P0", "P1", "P2", "P3", "R0_rect", "Tr_velo_to_cam", "Tr_imu_to_velo"]
     values = {key: np.array(numbers.split(), dtype=float) for key, numbers in lines}
@@ -193,8 +187,8 @@ def test_the_second_camera_of_kitti_is_posed_with_its_offset():
     )
 
 
-def test_nuscenes_gets_w_first_and_the_camera_in_ego(published):
-    archive = zipfile.ZipFile(io.BytesIO(export(published, "nuscenes", rectified=True).data))
+def test_nuscenes_gets_w_first_and_the_camera_in_ego(file):
+    archive = zipfile.ZipFile(io.BytesIO(export(file, "nuscenes", rectified=True).data))
     radar, camera = json.loads(archive.read("calibrated_sensor.json"))
     sensors = {record["token"]: record for record in json.loads(archive.read("sensor.json"))}
     assert [sensors[record["sensor_token"]]["modality"] for record in (radar, camera)] == ["radar", "camera"]
@@ -206,11 +200,11 @@ def test_nuscenes_gets_w_first_and_the_camera_in_ego(published):
     assert camera["camera_intrinsic"][0] == [554.4203610, 0.0, 299.0464167]
 
 
-def test_opencv_reads_its_file_and_projects_the_check_point(published, tmp_path):
+def test_opencv_reads_its_file_and_projects_the_check_point(file, tmp_path):
     import cv2
 
     path = tmp_path / "radar_camera.yml"
-    path.write_bytes(export(published, "opencv").data)
+    path.write_bytes(export(file, "opencv").data)
     storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
     read = {key: storage.getNode(key).mat() for key in ("camera_matrix", "distortion_coefficients", "R", "T", "rvec")}
     point = storage.getNode("check_point_radar_m").mat()
@@ -225,8 +219,8 @@ def test_opencv_reads_its_file_and_projects_the_check_point(published, tmp_path)
     assert int(storage.getNode("image_width").real()) == 640
 
 
-def test_apollo_gets_the_pose_of_the_child(published):
-    content = yaml_of(text_of(published, "apollo"))
+def test_apollo_gets_the_pose_of_the_child(file):
+    content = yaml_of(text_of(file, "apollo"))
 
     assert (content["header"]["frame_id"], content["child_frame_id"]) == ("radar", "camera_optical")
     transform = content["transform"]
@@ -234,8 +228,8 @@ def test_apollo_gets_the_pose_of_the_child(published):
     np.testing.assert_allclose([transform["rotation"][k] for k in "xyzw"], QUATERNION_XYZW, **SIX)
 
 
-def test_matlab_counts_pixels_from_one(published):
-    content = loadmat(io.BytesIO(export(published, "matlab").data), simplify_cells=True)
+def test_matlab_counts_pixels_from_one(file):
+    content = loadmat(io.BytesIO(export(file, "matlab").data), simplify_cells=True)
 
     np.testing.assert_allclose(content["camera_from_radar"]["A"][:3], ROWS, **EIGHT)
     np.testing.assert_allclose(content["camera"]["PrincipalPoint"], [300.0464167, 266.1770865], rtol=1e-12)
@@ -244,12 +238,12 @@ def test_matlab_counts_pixels_from_one(published):
     assert content["check_point"]["radar_m"].tolist() == P_RADAR_M
 
 
-def test_loadtxt_reads_the_matrix(published):
-    np.testing.assert_allclose(np.loadtxt(io.StringIO(text_of(published, "matrix")))[:3], ROWS, **EIGHT)
+def test_loadtxt_reads_the_matrix(file):
+    np.testing.assert_allclose(np.loadtxt(io.StringIO(text_of(file, "matrix")))[:3], ROWS, **EIGHT)
 
 
-def test_colmap_puts_the_principal_point_half_a_pixel_on(published):
-    archive = zipfile.ZipFile(io.BytesIO(export(published, "colmap").data))
+def test_colmap_puts_the_principal_point_half_a_pixel_on(file):
+    archive = zipfile.ZipFile(io.BytesIO(export(file, "colmap").data))
     camera, image = (
         next(line for line in archive.read(name).decode().splitlines() if line and not line.startswith("#")).split()
         for name in ("cameras.txt", "images.txt")

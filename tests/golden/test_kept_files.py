@@ -1,18 +1,11 @@
 """Formats that are no longer written: what earlier versions exported is read as the calibration that it was made from."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from calib_core.errors import InputError
-from calib_core.interchange import CalibrationFile, check, export, imported, read_any, read_calibration
+from calib_core.interchange import CalibrationFile, check, export, imported, read_any
 from tests.kept_files import KEPT, kept_file
-
-
-@pytest.fixture(scope="module")
-def file(project_root: Path) -> CalibrationFile:
-    return read_calibration((project_root / "tests/golden/calibration-1.json").read_bytes())
 
 
 @pytest.mark.parametrize("name", KEPT)

@@ -6,7 +6,6 @@ import io
 import json
 import shlex
 import zipfile
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -20,16 +19,11 @@ from pytransform3d.urdf import UrdfTransformManager
 from scipy.io import loadmat
 from scipy.spatial.transform import Rotation
 
-from calib_core.interchange import CalibrationFile, export, format_named, parent_pose, read_any, read_calibration
+from calib_core.interchange import CalibrationFile, export, format_named, parent_pose, read_any
 
 BODY_FROM_OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 POINT_RADAR_M = np.array([8.0, -1.5, 0.4])
 CLOSE = {"rtol": 0, "atol": 1e-9}
-
-
-@pytest.fixture(scope="module")
-def file(project_root: Path) -> CalibrationFile:
-    return read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
 
 
 @pytest.fixture(scope="module")

@@ -1,22 +1,16 @@
 """Files for other calibration tools, read by the steps of those tools: JSON, YAML, SciPy's rotations, OpenCV's projection."""
 
 import json
-from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 import yaml
 
-from calib_core.interchange import CalibrationFile, export, read_calibration, read_camera
+from calib_core.interchange import CalibrationFile, export, read_camera
 
 CLOSE = {"rtol": 0, "atol": 1e-9}
 ON_THE_PIXEL = {"rtol": 0, "atol": 1e-6}
-
-
-@pytest.fixture(scope="module")
-def file(project_root: Path) -> CalibrationFile:
-    return read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
 
 
 @pytest.fixture(scope="module")

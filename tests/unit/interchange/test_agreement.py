@@ -1,7 +1,6 @@
 """Two calibrations are compared each through its own lens, and judged by their covariances and by limits."""
 
 import dataclasses
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,15 +16,9 @@ from calib_core.interchange import (
     export,
     imported,
     read_any,
-    read_calibration,
     read_check_pairs,
     write_calibration,
 )
-
-
-@pytest.fixture(scope="module")
-def file(project_root: Path) -> CalibrationFile:
-    return read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
 
 
 def moved(file: CalibrationFile, *error: float) -> CalibrationFile:

@@ -7,7 +7,6 @@ import os
 import re
 import subprocess
 import zipfile
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,7 +25,6 @@ from calib_core.interchange import (
     imported,
     read_any,
     read_any_file,
-    read_calibration,
     read_camera,
     write_calibration,
 )
@@ -34,11 +32,6 @@ from calib_core.interchange.rotations import quaternion_xyzw_from_matrix
 from calib_core.interchange.syntax.mat_file import load_mat
 from calib_core.interchange.syntax.zip_archives import pack, unpack
 from tests.kept_files import KEPT, kept_file
-
-
-@pytest.fixture(scope="module")
-def file(project_root: Path) -> CalibrationFile:
-    return read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
 
 
 def text_of(file: CalibrationFile, name: str) -> str:

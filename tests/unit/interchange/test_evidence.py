@@ -3,7 +3,6 @@
 import dataclasses
 import hashlib
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,16 +28,6 @@ from calib_core.interchange.own.calibration_json import calibration_sha256
 WITH_COMMENTS = [form.name for form in FORMATS if form.comment in ("#", "<!-- -->") and form.name != "colmap"]
 
 
-@pytest.fixture(scope="module")
-def golden(project_root: Path) -> str:
-    return (project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8")
-
-
-@pytest.fixture(scope="module")
-def file(golden: str) -> CalibrationFile:
-    return read_calibration(golden)
-
-
 def text_of(file: CalibrationFile, name: str) -> str:
     return export(file, name, rectified=format_named(name).is_for_rectified).data.decode()
 
@@ -49,17 +38,17 @@ def bare(file: CalibrationFile, *, inverse: bool = False) -> str:
     return "".join(" ".join(map(repr, row)) + "\n" for row in rows.tolist())
 
 
-def test_a_file_without_the_key_was_clicked_if_it_has_solved_pairs_and_assumed_if_not(golden, file):
-    assert "evidence" not in json.loads(golden)
+def test_a_file_without_the_key_was_clicked_if_it_has_solved_pairs_and_assumed_if_not(golden_text, file):
+    assert "evidence" not in json.loads(golden_text)
     assert file.rests_on == "clicked"
-    content = json.loads(golden)
+    content = json.loads(golden_text)
     content["pairs"] = []
     assert read_calibration(json.dumps(content)).rests_on == "imported_assumed"
 
 
-def test_an_older_file_is_written_again_without_the_key(golden, file):
-    assert write_calibration(file) == golden
-    assert calibration_sha256(file) == hashlib.sha256(golden.encode()).hexdigest()
+def test_an_older_file_is_written_again_without_the_key(golden_text, file):
+    assert write_calibration(file) == golden_text
+    assert calibration_sha256(file) == hashlib.sha256(golden_text.encode()).hexdigest()
 
 
 @pytest.mark.parametrize("level", ["clicked", "imported_proven", "imported_assumed"])
@@ -69,8 +58,8 @@ def test_the_level_is_kept_in_calibration_1(file, level):
     assert read_calibration(text).rests_on == level
 
 
-def test_an_unknown_level_is_refused(golden):
-    content = json.loads(golden) | {"evidence": "certain"}
+def test_an_unknown_level_is_refused(golden_text):
+    content = json.loads(golden_text) | {"evidence": "certain"}
     with pytest.raises(InputError, match="evidence"):
         read_calibration(json.dumps(content))
 
@@ -128,9 +117,9 @@ def test_what_was_assumed_stays_assumed_through_a_check_point_of_its_own(file):
     assert adopt(read_any(write_calibration(assumed)), "c.json").rests_on == "imported_assumed"
 
 
-def test_pairs_or_a_calibration_prove_what_a_file_means(golden, file):
+def test_pairs_or_a_calibration_prove_what_a_file_means(golden_text, file):
     found, camera = read_any(bare(file)), file.calibration.camera
-    pairs = read_check_pairs(golden)
+    pairs = read_check_pairs(golden_text)
     for proof in ({"pairs": pairs}, {"against": imported(file)}):
         assert adoption(found, "m.txt", camera=camera, **proof).file.rests_on == "imported_proven"
     assumed = adopt(found, "m.txt", camera=camera)

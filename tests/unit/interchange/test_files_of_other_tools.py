@@ -3,14 +3,13 @@
 import io
 import json
 import zipfile
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from calib_core.errors import InputError
-from calib_core.interchange import CalibrationFile, WantedFrames, export, read_any, read_any_file, read_calibration
+from calib_core.interchange import WantedFrames, export, read_any, read_any_file
 from calib_core.interchange.formats.pose_parts import direction_by_facing
 from tests.kept_files import KEPT, kept_file
 
@@ -18,11 +17,6 @@ FORWARD = [0.1, -0.2, 0.3, -0.5, 0.5, -0.5, 0.5]  # a camera that looks along th
 POSITION, TURN = FORWARD[:3], FORWARD[3:]
 MATRIX = [[0, 0, 1, 0.1], [-1, 0, 0, -0.2], [0, -1, 0, 0.3], [0, 0, 0, 1]]
 ECHO = "At time 0.0\n- Translation: [{}]\n- Rotation: in Quaternion [{}]\n"
-
-
-@pytest.fixture(scope="module")
-def file(project_root: Path) -> CalibrationFile:
-    return read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
 
 
 def refusal(content: str | dict[str, Any]) -> str:

@@ -18,7 +18,6 @@ from calib_core.interchange import (
     format_named,
     imported,
     read_any,
-    read_calibration,
     written_formats,
 )
 from calib_core.interchange.formats.plugins import GROUP, plugin_formats
@@ -81,11 +80,6 @@ BINARY = """
 """
 
 Install = Callable[..., Path]
-
-
-@pytest.fixture
-def file(project_root: Path) -> CalibrationFile:
-    return read_calibration((project_root / "tests/golden/calibration-1.json").read_bytes())
 
 
 @pytest.fixture

@@ -3,7 +3,6 @@
 import dataclasses
 import json
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,11 +29,6 @@ def pairs_text(pair: object = None, **changes: object) -> str:
     pair = pair or {"id": "p1", "radar_m": [5, 1, -0.5], "pixel_px": [212.9, 239.4]}
     content = {"schema": "cocalib/pairs-1", "camera": CAMERA, "pairs": [pair], **changes}
     return json.dumps({key: value for key, value in content.items() if value is not None})
-
-
-@pytest.fixture
-def golden_text(project_root: Path) -> str:
-    return (project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8")
 
 
 def test_clicks_come_back_in_order_of_time_with_every_nanosecond():

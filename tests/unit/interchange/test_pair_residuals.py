@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,20 +13,9 @@ from calib_core.interchange import (
     check,
     imported,
     read_any,
-    read_calibration,
     read_check_pairs,
     read_check_pairs_file,
 )
-
-
-@pytest.fixture(scope="module")
-def text(project_root: Path) -> str:
-    return (project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8")
-
-
-@pytest.fixture(scope="module")
-def file(text: str) -> CalibrationFile:
-    return read_calibration(text)
 
 
 @pytest.fixture
@@ -87,8 +75,8 @@ def test_pairs_of_other_sensors_disagree_without_a_slip(file, pairs):
     assert report.verdict == "wrong"
 
 
-def test_the_pairs_of_a_calibration_serve_as_well(file, text, tmp_path):
-    document = json.loads(text)
+def test_the_pairs_of_a_calibration_serve_as_well(file, golden_text, tmp_path):
+    document = json.loads(golden_text)
     document["pairs"] = document["pairs"] * 2
     for index, pair in enumerate(document["pairs"]):
         document["pairs"][index] = {**pair, "id": f"p{index}"}

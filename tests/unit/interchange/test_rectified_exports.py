@@ -4,7 +4,6 @@ import dataclasses
 import io
 import json
 import zipfile
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -21,7 +20,6 @@ from calib_core.interchange import (
     export,
     imported,
     read_any,
-    read_calibration,
 )
 from calib_core.interchange.own.calibration_json import calibration_sha256
 from cocalib.web.channel.export_preview import export_preview, exported
@@ -29,11 +27,6 @@ from cocalib.web.exports.format_list import format_rows
 
 MATRIX_ONLY = [known.name for known in FORMATS if known.camera == "matrix"]
 OTHERS = [known.name for known in FORMATS if known.camera != "matrix"]
-
-
-@pytest.fixture(scope="module")
-def file(project_root: Path) -> CalibrationFile:
-    return read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
 
 
 def through(file: CalibrationFile, model: str, distortion: list[float]) -> CalibrationFile:

@@ -1,19 +1,13 @@
 """The table of formats: every writer has a reader, and the readers are tried in one order."""
 
 import dataclasses
-from pathlib import Path
 
 import pytest
 
-from calib_core.interchange import FORMATS, CalibrationFile, Format, FrameNames, export, read_any, read_calibration
+from calib_core.interchange import FORMATS, CalibrationFile, Format, FrameNames, export, read_any
 from calib_core.interchange.formats.registry import readers
 from calib_core.interchange.syntax.content import Content, readings
 from calib_core.interchange.syntax.zip_archives import pack
-
-
-@pytest.fixture(scope="module")
-def file(project_root: Path) -> CalibrationFile:
-    return read_calibration((project_root / "tests/golden/calibration-1.json").read_bytes())
 
 
 @pytest.mark.parametrize("known", FORMATS, ids=lambda known: known.name)

@@ -27,11 +27,6 @@ from calib_core.interchange import (
 )
 
 
-@pytest.fixture(scope="module")
-def file(project_root: Path) -> CalibrationFile:
-    return read_calibration((project_root / "tests/golden/calibration-1.json").read_bytes())
-
-
 def with_camera(file: CalibrationFile, model: str, distortion: list[float]) -> CalibrationFile:
     camera = Camera(model, 640, 480, file.calibration.camera.matrix_px, np.array(distortion))
     calibration = dataclasses.replace(file.calibration, camera=camera, pairs=())

@@ -38,11 +38,6 @@ def with_vehicle(vehicle: object) -> str:
     return json.dumps({**json.loads(GOLDEN), "vehicle": vehicle})
 
 
-@pytest.fixture
-def file(project_root: Path) -> CalibrationFile:
-    return read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
-
-
 @pytest.mark.parametrize("note", [FULL, VehicleNote(radar_serial="R-1"), VehicleNote()])
 def test_it_is_read_back_and_only_what_is_stated_is_written(file: CalibrationFile, note: VehicleNote) -> None:
     text = write_calibration(replace(file, vehicle=note))

@@ -1,7 +1,6 @@
 """A calibration given for review: shown until the clicks give a new one, then compared with it."""
 
 import dataclasses
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +9,6 @@ import pytest
 from calib_core.errors import InputError
 from calib_core.interchange import (
     FORMATS,
-    CalibrationFile,
     FrameNames,
     adopt,
     export,
@@ -34,11 +32,6 @@ from cocalib.view import Reference, shown_calibration, view
 from cocalib.web.radar_sight import overlay_of
 
 FEW = Unsolvable("too-few-pairs", "1 of 4 pairs", "click more placements")
-
-
-@pytest.fixture
-def file(project_root: Path) -> CalibrationFile:
-    return read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
 
 
 @pytest.fixture

@@ -5,17 +5,11 @@ import zipfile
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
-from calib_core.interchange import CAMERA_ONLY, FORMATS, CalibrationFile, read_calibration
+from calib_core.interchange import CAMERA_ONLY, FORMATS
 from calib_core.radar import AngleMap
 from cocalib.web.channel import export_preview as panel
 from cocalib.web.exports.format_list import format_rows
-
-
-@pytest.fixture
-def file(project_root) -> CalibrationFile:
-    return read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
 
 
 def test_each_format_stands_once_under_the_heading_of_where_it_is_used():

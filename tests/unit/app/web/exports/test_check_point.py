@@ -7,15 +7,10 @@ import numpy as np
 import pytest
 
 from calib_core.camera import Camera
-from calib_core.interchange import CalibrationFile, choose_check_point, read_calibration
+from calib_core.interchange import choose_check_point
 from calib_core.results import CheckPoint
 from cocalib.web.channel.export_preview import export_preview
 from cocalib.web.exports.check_point import picture_of
-
-
-@pytest.fixture
-def file(project_root) -> CalibrationFile:
-    return read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
 
 
 def pixels_in(words):

@@ -8,21 +8,14 @@ import pytest
 
 from calib_core.interchange import (
     FORMATS,
-    CalibrationFile,
     FrameNames,
     ImportedCalibration,
     WrittenPose,
-    read_calibration,
 )
 from cocalib.web.channel.export_preview import export_preview
 from cocalib.web.exports.file_numbers import our_numbers, pose_in_file
 
 NAMES = FrameNames("front_radar", "front_camera_optical")
-
-
-@pytest.fixture
-def file(project_root) -> CalibrationFile:
-    return read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
 
 
 def preview(file, key, query=""):

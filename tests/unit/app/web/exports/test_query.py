@@ -4,15 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from calib_core.interchange import CalibrationFile, FrameNames, export, read_any, read_calibration
+from calib_core.interchange import FrameNames, export, read_any
 from calib_core.interchange.own.calibration_json import calibration_sha256
 from cocalib.web.channel.export_preview import export_preview, exported
 from cocalib.web.exports.query import FieldError, fields_in
-
-
-@pytest.fixture
-def file(project_root) -> CalibrationFile:
-    return read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
 
 
 @pytest.mark.parametrize("key", ["json", "tf2", "urdf", "autoware", "opencv", "matlab", "pjlab"])

@@ -14,25 +14,17 @@ import pytest
 from calib_core.errors import InputError
 from calib_core.interchange import (
     FORMATS,
-    CalibrationFile,
     choose_check_point,
     contents_text,
     export,
     format_named,
     parent_pose,
-    read_calibration,
 )
 from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
 from calib_core.results import Calibration
 from cocalib.session import Session
 from cocalib.web.port.routes import Reply, Routes
 from tests.picture_recording import PictureRecording, grey_pictures
-
-
-@pytest.fixture
-def file(project_root: Path) -> CalibrationFile:
-    return read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
-
 
 CLICKS = tuple(ReflectorClick(TimeNs(index), f"c{index}", 10.0, 10.0) for index in range(5))
 
