@@ -1,10 +1,9 @@
-"""Our files in the hands of readers that are not ours.
+"""Our files in the hands of readers that are not ours, and files that earlier versions wrote.
 
 xacro, pytransform3d, pyquaternion, PyYAML, SciPy, OpenCV, COLMAP."""
 
 import io
 import json
-import shlex
 import zipfile
 
 import cv2
@@ -13,13 +12,22 @@ import pytest
 import xacro
 import yaml
 from pyquaternion import Quaternion
-from pytransform3d.rotations import check_matrix, matrix_from_quaternion
 from pytransform3d.transformations import transform_from
 from pytransform3d.urdf import UrdfTransformManager
-from scipy.io import loadmat
 from scipy.spatial.transform import Rotation
 
-from calib_core.interchange import CalibrationFile, export, format_named, parent_pose, read_any
+from calib_core.errors import InputError
+from calib_core.interchange import (
+    CalibrationFile,
+    check,
+    export,
+    format_named,
+    imported,
+    parent_pose,
+    read_any,
+    read_camera,
+)
+from tests.kept_files import KEPT, kept_file
 
 BODY_FROM_OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 POINT_RADAR_M = np.array([8.0, -1.5, 0.4])
@@ -42,31 +50,6 @@ def into_camera(radar_from_camera: np.ndarray) -> np.ndarray:
     return (np.linalg.inv(radar_from_camera) @ [*POINT_RADAR_M, 1.0])[:3]
 
 
-def test_pytransform3d_reads_the_urdf_and_carries_a_point_into_the_camera(file, expected_m):
-    manager = UrdfTransformManager()
-    manager.load_urdf(text_of(file, "urdf"))
-    camera_from_radar = manager.get_transform(file.frames.radar, file.frames.camera)
-    np.testing.assert_allclose((camera_from_radar @ [*POINT_RADAR_M, 1.0])[:3], expected_m, **CLOSE)
-
-
-def test_pytransform3d_takes_the_static_transform_for_the_pose_of_the_child(file, expected_m):
-    words = shlex.split(text_of(file, "tf2"), comments=True)
-    value = {words[i][2:]: words[i + 1] for i in range(len(words) - 1) if words[i].startswith("--")}
-    qx, qy, qz, qw = (float(value[f"q{axis}"]) for axis in "xyzw")
-    pose = transform_from(matrix_from_quaternion([qw, qx, qy, qz]), [float(value[axis]) for axis in "xyz"])
-    np.testing.assert_allclose(into_camera(pose), expected_m, **CLOSE)
-    assert (value["frame-id"], value["child-frame-id"]) == (file.frames.radar, file.frames.camera)
-
-
-def test_pyyaml_reads_the_stamped_transform(file, expected_m):
-    stamped = yaml.safe_load(text_of(file, "apollo"))
-    turn, shift = stamped["transform"]["rotation"], stamped["transform"]["translation"]
-    rotation = matrix_from_quaternion([turn[axis] for axis in "wxyz"])
-    np.testing.assert_allclose(
-        into_camera(transform_from(rotation, [shift[axis] for axis in "xyz"])), expected_m, **CLOSE
-    )
-
-
 def test_pyyaml_reads_the_sensor_kit_with_the_radar_posed_in_it(file, expected_m):
     kit_from_radar = parent_pose([1.2, -0.3, 0.5, 0.0, 0.0, np.sin(0.2), np.cos(0.2)])
     kit = yaml.safe_load(export(file, "autoware", parent_from_radar=kit_from_radar).data)["sensor_kit_base_link"]
@@ -80,19 +63,6 @@ def test_pyyaml_reads_the_sensor_kit_with_the_radar_posed_in_it(file, expected_m
     np.testing.assert_allclose(
         into_camera(radar_from_link @ transform_from(BODY_FROM_OPTICAL, [0, 0, 0])), expected_m, **CLOSE
     )
-
-
-def test_pyyaml_and_opencv_read_the_camera_chain_and_the_file_storage(file, expected_m, tmp_path):
-    chain = yaml.safe_load(text_of(file, "kalibr"))
-    matrix = np.array(chain["cam0"]["T_cam_radar"])
-    check_matrix(matrix[:3, :3])
-    np.testing.assert_allclose((matrix @ [*POINT_RADAR_M, 1.0])[:3], expected_m, **CLOSE)
-    path = tmp_path / "radar_camera.yml"
-    path.write_bytes(export(file, "opencv").data)
-    storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
-    carried = storage.getNode("R").mat() @ POINT_RADAR_M + storage.getNode("T").mat().ravel()
-    storage.release()
-    np.testing.assert_allclose(carried, expected_m, **CLOSE)
 
 
 def test_xacro_takes_the_urdf_into_a_vehicle_and_pytransform3d_reads_what_comes_out(file, expected_m, tmp_path):
@@ -127,25 +97,6 @@ def test_nuscenes_records_carry_a_radar_point_into_the_image_as_the_devkit_does(
         expected_m[None], np.zeros(3), np.zeros(3), file.calibration.camera.matrix_px, np.zeros(5)
     )
     np.testing.assert_allclose(pixel[:2] / pixel[2], undistorted.ravel(), **CLOSE)
-
-
-def test_kitti_is_read_by_key_and_by_the_number_of_the_line(file, expected_m):
-    """Some readers look for the keys; others, View-of-Delft's among them, count lines: P2 is the third, Tr the sixth."""
-    lines = text_of(file, "kitti").splitlines()
-    by_key = {key: np.array(numbers.split(), float) for key, numbers in (line.split(":", 1) for line in lines)}
-    by_line = [np.array(line.strip().split(" ")[1:], dtype=np.float32) for line in lines]
-
-    np.testing.assert_array_equal(by_line[2], by_key["P2"].astype(np.float32))
-    np.testing.assert_array_equal(by_line[5], by_key["Tr_velo_to_cam"].astype(np.float32))
-    rectified = by_key["R0_rect"].reshape(3, 3) @ by_key["Tr_velo_to_cam"].reshape(3, 4) @ [*POINT_RADAR_M, 1.0]
-    np.testing.assert_allclose(rectified, expected_m, **CLOSE)
-
-
-def test_scipy_and_numpy_load_the_arrays(file, expected_m):
-    mat = loadmat(io.BytesIO(export(file, "matlab").data), simplify_cells=True)
-    text = np.loadtxt(io.StringIO(text_of(file, "matrix")))
-    for matrix in (mat["camera_from_radar"]["A"], text):
-        np.testing.assert_allclose((matrix @ [*POINT_RADAR_M, 1.0])[:3], expected_m, **CLOSE)
 
 
 def test_colmap_reads_its_model_and_finds_the_check_point_half_a_pixel_on(file, tmp_path):
@@ -187,9 +138,70 @@ def test_a_rig_is_read_as_its_other_readers_do(file, expected_m):
     ],
 )
 def test_a_rig_that_cannot_be_understood_is_refused_in_words(file, change, words):
-    from calib_core.errors import InputError
-
     rig = json.loads(text_of(file, "driveworks"))
     change(rig)
     with pytest.raises(InputError, match=words):
         read_any(json.dumps(rig), "rig.json")
+
+
+def test_sensors_calibration_takes_the_first_key_and_carries_a_radar_point_into_the_camera(file, expected_m):
+    root = json.loads(text_of(file, "pjlab"))
+    for first in (next(iter(root)), min(root)):  # in the file's order, and sorted as some JSON libraries do
+        data = root[first]["param"]["sensor_calib"]["data"]
+        extrinsic = np.array([[data[row][column] for column in range(4)] for row in range(4)])
+        np.testing.assert_allclose((extrinsic @ [*POINT_RADAR_M, 1.0])[:3], expected_m, **CLOSE)
+    assert next(iter(root)) == "radar-to-camera_optical-extrinsic"
+    assert (root[next(iter(root))]["sensor_name"], len(root)) == ("radar", 1)
+
+
+def test_camera_info_is_loaded_as_ros_does_and_by_camera_option(file):
+    text = export(file, "camera-info").data.decode()
+    info = yaml.safe_load(text)
+    matrix = np.reshape(info["camera_matrix"]["data"], (3, 3))
+    distortion = np.array(info["distortion_coefficients"]["data"])
+    point_camera_m = file.calibration.camera_from_radar @ file.check_point.radar_m[None]
+    pixel_px, _ = cv2.projectPoints(point_camera_m, np.zeros(3), np.zeros(3), matrix, distortion)
+    np.testing.assert_allclose(pixel_px.ravel(), file.check_point.pixel_px, rtol=0, atol=1e-6)
+    assert (info["image_width"], info["image_height"], info["distortion_model"]) == (640, 480, "plumb_bob")
+    assert np.array_equal(np.reshape(info["rectification_matrix"]["data"], (3, 3)), np.eye(3))
+    assert np.array_equal(np.reshape(info["projection_matrix"]["data"], (3, 4))[:, :3], matrix)
+    assert 'radar frame "radar"' in text
+    assert "check point: p_radar [5.0, 1.0, -0.5] m" in text
+
+    camera = read_camera(text)
+    assert np.array_equal(camera.matrix_px, file.calibration.camera.matrix_px)
+    assert np.array_equal(camera.distortion, file.calibration.camera.distortion)
+
+
+# Formats that are no longer written: what earlier versions exported is read as the calibration that it was made from.
+
+
+@pytest.mark.parametrize("name", KEPT)
+def test_it_is_read_as_its_calibration(file: CalibrationFile, name: str) -> None:
+    found = read_any(kept_file(name))
+
+    assert (found.format, found.frames, found.evidence, found.assumptions) == (name, file.frames, "clicked", ())
+    np.testing.assert_allclose(
+        found.camera_from_radar.as_matrix(), file.calibration.camera_from_radar.as_matrix(), rtol=0, atol=1e-12
+    )
+    assert found.check_point is not None
+    assert file.check_point is not None
+    np.testing.assert_array_equal(found.check_point.radar_m, file.check_point.radar_m)
+    report = check(found, of=imported(file), camera=file.calibration.camera)
+    assert report.verdict == "right"
+
+
+@pytest.mark.parametrize("name", ["koide3", "openlabel", "foxglove", "numpy"])
+def test_its_lens_is_read(file: CalibrationFile, name: str) -> None:
+    camera, wanted = read_any(kept_file(name)).camera, file.calibration.camera
+
+    assert camera is not None
+    assert (camera.width_px, camera.height_px) == (wanted.width_px, wanted.height_px)
+    np.testing.assert_array_equal(camera.matrix_px, wanted.matrix_px)
+    np.testing.assert_array_equal(camera.distortion, wanted.distortion)
+
+
+@pytest.mark.parametrize("name", KEPT)
+def test_it_is_no_longer_written(file: CalibrationFile, name: str) -> None:
+    with pytest.raises(InputError, match=f"unknown format '{name}'"):
+        export(file, name)

@@ -1,7 +1,6 @@
 """What of the covariance rests on stated sigmas, in a calibration's file."""
 
 import json
-from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -52,8 +51,3 @@ def test_a_part_that_is_no_covariance_is_refused_by_its_name(part: str) -> None:
         InputError, match=rf"file.json: covariance_parts.{part}: a variance on the diagonal is negative"
     ):
         read_calibration(json.dumps(document), source="file.json")
-
-
-def test_a_file_from_before_they_were_written_is_read() -> None:
-    old = calibration_text(replace(calibration(), covariance_parts=None))
-    assert read_calibration(old).calibration.covariance_parts is None

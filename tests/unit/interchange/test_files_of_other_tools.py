@@ -274,15 +274,6 @@ def test_kittis_folder_is_read_and_its_imu_refused(tmp_path):
         read_any_file(tmp_path / "calib_imu_to_velo.txt")
 
 
-@pytest.mark.parametrize(
-    ("content", "words"),
-    [("", "the file is empty"), ("no pose at all", "found text"), ("Größe: 1".encode("latin-1"), "save it as UTF-8")],
-)
-def test_a_file_without_a_calibration_is_named_in_words(content, words):
-    with pytest.raises(InputError, match=words):
-        read_any(content, "file")
-
-
 def _published(parent: str, child: str, position: list[float]) -> str:
     numbers = " ".join(map(str, position + TURN))
     return f"ros2 run tf2_ros static_transform_publisher {numbers} {parent} {child}\n"

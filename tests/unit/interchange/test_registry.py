@@ -4,20 +4,10 @@ import dataclasses
 
 import pytest
 
-from calib_core.interchange import FORMATS, CalibrationFile, Format, FrameNames, export, read_any
+from calib_core.interchange import FORMATS, CalibrationFile, FrameNames, export, read_any
 from calib_core.interchange.formats.registry import readers
 from calib_core.interchange.syntax.content import Content, readings
 from calib_core.interchange.syntax.zip_archives import pack
-
-
-@pytest.mark.parametrize("known", FORMATS, ids=lambda known: known.name)
-def test_what_a_format_writes_it_recognizes_and_reads_itself(file: CalibrationFile, known: Format) -> None:
-    data = export(file, known.name, rectified=known.is_for_rectified).data
-
-    assert known.reads is not None
-    recognized = next(reading for reading in readings(data, source="file") if known.reads.recognizes(reading))
-    assert known.reads.read(recognized, "file").format == known.name
-    assert next(reader for reader in readers() if reader.recognizes(recognized)) == known.reads
 
 
 def test_every_reader_is_tried() -> None:
