@@ -1,6 +1,9 @@
 """Two calibrations are compared each through its own lens, and judged by their covariances and by limits."""
 
 import dataclasses
+import json
+import re
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -8,17 +11,25 @@ import pytest
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange import (
+    FORMATS,
     AgreementLimits,
     CalibrationFile,
+    CheckReport,
+    FrameNames,
     ImportedCalibration,
+    adopt,
     check,
+    choose_check_point,
     compare,
     export,
+    format_named,
     imported,
     read_any,
     read_check_pairs,
+    read_check_pairs_file,
     write_calibration,
 )
+from calib_core.interchange.syntax.zip_archives import pack, unpack
 
 
 def moved(file: CalibrationFile, *error: float) -> CalibrationFile:
@@ -201,3 +212,290 @@ def test_points_behind_the_other_camera_are_said_to_be_there(file):
     assert "behind the camera" in str(report)
     assert "inf" not in str(report)
     assert "e+1" not in str(report)
+
+
+# `check --of`: is a file that calibration's file, up to the digits written, and not stale?
+
+
+NAMES = [known.name for known in FORMATS]
+WITH_LENS = ("json", "opencv", "colmap", "matlab", "kalibr")
+BINARY = ("matlab", "colmap")
+UNROUNDABLE = ("matlab", "json", "driveworks", "pack")
+"""Two that are binary, stated twice, in degrees, with check sums, and read as the product of two poses."""
+
+NUMBER = re.compile(
+    rb"-?(?!1\.57079)\d+\.\d{5,}(?:e-?\d+)?"
+)  # but a right angle, which URDF's optical joint needs in full
+
+
+@pytest.fixture(scope="module")
+def clicked(file: CalibrationFile) -> CalibrationFile:
+    return dataclasses.replace(file, evidence="clicked")
+
+
+def data_of(clicked: CalibrationFile, name: str) -> bytes:
+    return export(clicked, name, rectified=format_named(name).is_for_rectified).data
+
+
+def rounded(data: bytes, decimals: int, name: str) -> bytes:
+    """Round every long number of the pose; comments, with the check point in them, stay as they are."""
+    if data.startswith(b"PK"):
+        return pack({member: rounded(one, decimals, "") for member, one in unpack(data, source="").items()})
+    lines = re.sub(rb"<!--.*?-->", lambda comment: comment[0].replace(b"\n", b"\0"), data, flags=re.DOTALL).splitlines()
+    short = [
+        line
+        if line.lstrip().startswith((b"#", b"<!--"))
+        else NUMBER.sub(lambda number: repr(round(float(number[0]), decimals)).encode(), line)
+        for line in lines
+    ]
+    return b"\n".join(short).replace(b"\0", b"\n")
+
+
+def errors(report: CheckReport) -> set[str]:
+    return {result.code for result in report.results if result.level == "error"}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_what_we_write_is_that_calibrations_file(clicked, name):
+    report = check(read_any(data_of(clicked, name)), of=imported(clicked), against=imported(clicked))
+
+    assert report.verdict == "right"
+    assert all(result.level == "good" for result in report.results)
+    assert {"same-pose", "agrees"} <= {result.code for result in report.results}
+    assert any("0 deg apart" in line for line in report.lines())
+    assert "same-lens" in {result.code for result in report.results} or name not in ("json", "opencv")
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name not in UNROUNDABLE])
+def test_rounding_is_named_with_its_digits(clicked, name):
+    of = imported(clicked)
+    fine, coarse = (read_any(rounded(data_of(clicked, name), decimals, name)) for decimals in (6, 3))
+
+    assert check(fine, of=of).verdict == "right"
+    report = check(coarse, of=of)
+    assert errors(report) >= {"rounded"}
+    assert errors(report) <= {"rounded", "other-lens"}
+    assert "the numbers are rounded to" in str(report)
+
+
+@pytest.mark.parametrize(
+    "name", [known.name for known in FORMATS if known.comment in ("#", "<!-- -->") and known.name not in BINARY]
+)
+def test_a_rounded_file_is_named_by_its_own_check_point(clicked, name):
+    turned = clicked.calibration.camera_from_radar.perturbed(np.array([0.31, 0.12, 0.53, 0.2, 0.3, -0.1]))
+    calibration = dataclasses.replace(clicked.calibration, camera_from_radar=turned, pairs=())
+    data = data_of(
+        dataclasses.replace(clicked, calibration=calibration, check_point=choose_check_point(calibration)), name
+    )
+
+    assert check(read_any(rounded(data, 6, name))).verdict == "right"
+    assert "rounded" in errors(check(read_any(rounded(data, 3, name))))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_file_of_another_calibration_is_named_and_stale(clicked, name):
+    moved = dataclasses.replace(
+        clicked.calibration,
+        camera_from_radar=clicked.calibration.camera_from_radar.perturbed(np.array([0.002, 0, 0, 0, 1e-3, 0])),
+        pairs=(),
+    )
+    other = dataclasses.replace(clicked, calibration=moved, check_point=None)
+
+    report = check(read_any(data_of(other, name)), of=imported(clicked))
+
+    assert report.verdict == "wrong"
+    assert "other-pose" in errors(report)
+    assert ("stale" in errors(report)) == (read_any(data_of(other, name)).calibration_sha256 is not None)
+    if "stale" in errors(report):
+        assert "stale: exported from another calibration than this one (sha256 " in str(report)
+
+
+def test_a_stale_file_with_the_same_pose_is_a_warning(clicked):
+    solved_again = dataclasses.replace(
+        clicked, verdict=None, calibration=dataclasses.replace(clicked.calibration, warnings=())
+    )
+    assert write_calibration(solved_again) != write_calibration(clicked)
+
+    report = check(read_any(data_of(clicked, "tf2")), of=imported(solved_again))
+
+    assert report.ok
+    assert [result.code for result in report.results if result.level == "warning"] == ["stale"]
+
+
+@pytest.mark.parametrize("name", WITH_LENS)
+def test_another_cameras_intrinsics_are_named(clicked, name):
+    matrix_px = np.array(clicked.calibration.camera.matrix_px)
+    matrix_px[0, 0] += 5.0
+    camera = dataclasses.replace(clicked.calibration.camera, matrix_px=matrix_px)
+    other = dataclasses.replace(clicked, calibration=dataclasses.replace(clicked.calibration, camera=camera, pairs=()))
+    wrong = read_any(data_of(other, name))
+
+    assert "other-lens" in errors(check(wrong, of=imported(clicked)))
+    report = check(wrong, against=imported(dataclasses.replace(clicked, calibration=clicked.calibration)))
+    assert report.comparison.lens.text.startswith("fx ")
+
+
+def test_other_frame_names_are_named_unless_they_were_renamed_on_export(clicked):
+    renamed = dataclasses.replace(clicked, frames=FrameNames("front_radar", "front_optical"))
+    content = json.loads(write_calibration(clicked))
+    content["frames"] = {"radar": "front_radar", "camera": "front_optical"}
+
+    assert "other-frames" in errors(check(read_any(json.dumps(content)), of=imported(clicked)))
+    assert "'front_radar'" in str(check(read_any(data_of(renamed, "tf2")), of=imported(clicked)))
+
+
+def test_an_assumed_import_is_not_proven_by_its_own_check_point(clicked):
+    assumed = dataclasses.replace(
+        clicked, calibration=dataclasses.replace(clicked.calibration, pairs=()), evidence="imported_assumed"
+    )
+
+    report = check(imported(assumed))
+
+    assert report.verdict == "unproven"
+    assert "shows only that the file is whole" in str(report)
+    assert check(read_any(data_of(assumed, "tf2"))).verdict == "unproven"
+    assert check(imported(assumed), against=imported(clicked)).verdict == "right"
+    proven = dataclasses.replace(assumed, evidence="imported_proven")
+    assert check(imported(proven)).verdict == "right"
+
+
+def test_an_implausible_pose_of_an_assumed_import_is_doubtful(clicked):
+    inverse = dataclasses.replace(
+        clicked.calibration, camera_from_radar=clicked.calibration.camera_from_radar.inverse(), pairs=()
+    )
+    assumed = dataclasses.replace(clicked, calibration=inverse, evidence="imported_assumed", check_point=None)
+
+    assert check(imported(assumed)).verdict == "doubtful"
+
+
+def test_assumptions_are_said_to_be_assumed(clicked):
+    bare = b"".join(line for line in data_of(clicked, "kitti").splitlines(keepends=True) if b"cocalib" not in line)
+    lines = check(read_any(bare)).lines()
+
+    assert any(line.startswith("assumed: the format names no frames") for line in lines)
+
+
+# A bare matrix is tested against data from outside the file: pairs, and the ground truth of a simulation.
+
+
+@pytest.fixture
+def pairs(file: CalibrationFile) -> Callable[[int], str]:
+    """Return a function that writes pairs-1 with a given number of exact pairs."""
+
+    def written(count: int) -> str:
+        rng = np.random.default_rng(8)
+        points = np.column_stack([rng.uniform(4, 15, 40), rng.uniform(-0.3, 0.3, 40), rng.uniform(-0.2, 0.1, 40)])
+        points[:, 1:] *= points[:, :1]
+        camera = file.calibration.camera
+        rows = [
+            {"id": f"p{i}", "radar_m": point.tolist(), "pixel_px": pixel.tolist()}
+            for i, (point, pixel) in enumerate(zip(points, file.calibration.reproject(points), strict=True))
+        ]
+        described = {
+            "model": camera.model,
+            "width_px": camera.width_px,
+            "height_px": camera.height_px,
+            "matrix_px": camera.matrix_px.tolist(),
+            "distortion": camera.distortion.tolist(),
+        }
+        return json.dumps({"schema": "cocalib/pairs-1", "camera": described, "pairs": rows[:count]})
+
+    return written
+
+
+def matrix_text(matrix: np.ndarray) -> str:
+    return "\n".join(" ".join(map(repr, row)) for row in matrix.tolist())
+
+
+def test_pairs_confirm_a_bare_matrix_or_name_its_slip(file, pairs):
+    right = file.calibration.camera_from_radar.as_matrix()
+    millimetres = right.copy()
+    millimetres[:3, 3] *= 1000
+    transposed = right.copy()
+    transposed[:3, :3] = right[:3, :3].T
+    check_pairs = read_check_pairs(pairs(12))
+
+    for matrix, codes, verdict in (
+        (right, ["pairs-fit"], "right"),
+        (np.linalg.inv(right), ["swapped-direction"], "wrong"),
+        (millimetres, ["millimetres"], "wrong"),
+        (transposed, ["transposed-rotation"], "wrong"),
+    ):
+        report = check(read_any(matrix_text(matrix)), pairs=check_pairs)
+        assert [result.code for result in report.results] == codes
+        assert report.verdict == verdict
+
+
+def test_pairs_of_other_sensors_disagree_without_a_slip(file, pairs):
+    moved = file.calibration.camera_from_radar.perturbed(np.array([0, 0, 0, 0.1, 0.4, 0])).as_matrix()
+
+    report = check(read_any(matrix_text(moved)), pairs=read_check_pairs(pairs(12)))
+
+    assert [result.code for result in report.results] == ["pairs-missed"]
+    assert report.verdict == "wrong"
+
+
+def test_the_pairs_of_a_calibration_serve_as_well(file, golden_text, tmp_path):
+    document = json.loads(golden_text)
+    document["pairs"] = document["pairs"] * 2
+    for index, pair in enumerate(document["pairs"]):
+        document["pairs"][index] = {**pair, "id": f"p{index}"}
+    path = tmp_path / "calibration.json"
+    path.write_text(json.dumps(document), encoding="utf-8")
+    matrix = np.linalg.inv(file.calibration.camera_from_radar.as_matrix())
+
+    report = check(read_any(matrix_text(matrix)), pairs=read_check_pairs_file(path))
+
+    assert [result.code for result in report.results] == ["swapped-direction"]
+
+
+def test_too_few_pairs_and_files_of_something_else_are_refused(pairs, tmp_path):
+    with pytest.raises(InputError, match="contains 3 pairs; a check needs at least 4"):
+        read_check_pairs(pairs(3))
+    with pytest.raises(InputError, match="schema"):
+        read_check_pairs('{"schema": "cocalib/clicks-1", "clicks": []}')
+    with pytest.raises(InputError, match="cannot be read"):
+        read_check_pairs_file(tmp_path / "absent.json")
+    (tmp_path / "binary.json").write_bytes(b"\xff\xfe")
+    with pytest.raises(InputError, match="not a text file"):
+        read_check_pairs_file(tmp_path / "binary.json")
+
+
+def test_with_nothing_to_test_it_against_a_bare_matrix_is_unproven_and_a_sideways_one_doubtful(file):
+    right = file.calibration.camera_from_radar.as_matrix()
+
+    plausible, sideways = (check(read_any(matrix_text(matrix))) for matrix in (right, np.linalg.inv(right)))
+
+    assert (plausible.verdict, sideways.verdict) == ("unproven", "doubtful")
+    assert plausible.lines()[-1].startswith("not proven: ")
+    assert sideways.lines()[-1].startswith("DOUBTFUL: ")
+    assert all("--pairs FILE" in report.lines()[-1] for report in (plausible, sideways))
+
+
+def test_a_calibration_is_compared_with_the_truth_of_a_simulation_which_is_not_imported(file):
+    truth = json.dumps(
+        {
+            "schema": "cocalib/truth-1",
+            "camera_from_radar": {
+                "rotation": file.calibration.camera_from_radar.rotation.tolist(),
+                "translation_m": file.calibration.camera_from_radar.translation_m.tolist(),
+            },
+            "camera": {
+                "model": file.calibration.camera.model,
+                "width_px": file.calibration.camera.width_px,
+                "height_px": file.calibration.camera.height_px,
+                "matrix_px": file.calibration.camera.matrix_px.tolist(),
+                "distortion": file.calibration.camera.distortion.tolist(),
+            },
+        }
+    )
+
+    report = check(imported(file), against=read_any(truth))
+
+    assert report.verdict == "right"
+    assert report.comparison is not None
+    assert report.comparison.rotation_deg == pytest.approx(0, abs=1e-9)
+    with pytest.raises(InputError, match="is the ground truth of a simulation"):
+        adopt(read_any(truth), "truth.json")
+    with pytest.raises(InputError, match=r"camera_from_radar\.rotation: missing"):
+        read_any('{"schema": "cocalib/truth-1"}')

@@ -1,17 +1,25 @@
-"""The published schemas and the formats page match the code."""
+"""The published schemas and the formats page match the code, and the schemas hold in an independent validator."""
 
+import copy
+import json
 import re
 import runpy
+import subprocess
+import sys
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+import jsonschema
 import numpy as np
 import pytest
 
 from calib_core.interchange import (
     CAMERA_ONLY,
     FORMATS,
+    CalibrationFile,
     Content,
     export,
     read_calibration,
@@ -55,12 +63,11 @@ def test_the_examples_on_the_page_are_read(project_root: Path):
     assert len(read) == 3
 
 
-def test_formats_are_named_once_and_each_notes_what_it_lacks(project_root: Path):
+def test_formats_are_named_once_and_each_notes_what_it_lacks(file: CalibrationFile):
     names = [known.name for known in FORMATS]
     assert len(set(names)) == len(names)
     assert len({known.file_name for known in FORMATS}) == len(names)
 
-    file = read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
     for known in FORMATS:
         notes = export(file, known.name, rectified=known.is_for_rectified).notes
         assert (known.camera == "none") == any("contains the pose only" in note for note in notes)
@@ -68,15 +75,14 @@ def test_formats_are_named_once_and_each_notes_what_it_lacks(project_root: Path)
 
 
 def test_the_recipe_for_the_angle_map_gives_what_the_library_gives(
-    project_root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    file: CalibrationFile, project_root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     page = (project_root / "docs/formats.md").read_text(encoding="utf-8")
     _, recipe, _ = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
-    golden = read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
     add = np.deg2rad(np.random.default_rng(2).uniform(-2, 2, (4, 6, 2)))
     angle_map = AngleMap(np.linspace(-0.5, 0.5, 6), np.linspace(-0.2, 0.1, 4), add, np.abs(add), 9.0, 5.0)
     (tmp_path / "calibration.json").write_text(
-        write_calibration(replace(golden, calibration=replace(golden.calibration, angle_map=angle_map)))
+        write_calibration(replace(file, calibration=replace(file.calibration, angle_map=angle_map)))
     )
     monkeypatch.chdir(tmp_path)
 
@@ -88,15 +94,14 @@ def test_the_recipe_for_the_angle_map_gives_what_the_library_gives(
 
 
 def test_the_recipe_for_radar_errors_gives_what_the_library_gives(
-    project_root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    file: CalibrationFile, project_root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     page = (project_root / "docs/formats.md").read_text(encoding="utf-8")
     recipe, _, _ = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
-    golden = read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
     monkeypatch.chdir(tmp_path)
     for errors in (RadarErrors(), RadarErrors(0.02, -0.03, 0.12, 0.6), RadarErrors(squared_height_m2=1e3)):
-        calibration = replace(golden.calibration, radar_errors=errors)
-        (tmp_path / "calibration.json").write_text(write_calibration(replace(golden, calibration=calibration)))
+        calibration = replace(file.calibration, radar_errors=errors)
+        (tmp_path / "calibration.json").write_text(write_calibration(replace(file, calibration=calibration)))
         names: dict[str, Any] = {}
         exec(recipe, names)
         np.testing.assert_allclose(names["true"], errors.corrected(names["reported"]), rtol=0, atol=1e-12)
@@ -104,15 +109,89 @@ def test_the_recipe_for_radar_errors_gives_what_the_library_gives(
         np.testing.assert_allclose(pixels_px, calibration.reproject(names["reported"]), rtol=0, atol=1e-8)
 
 
-def test_the_example_of_a_format_writes_and_reads(project_root: Path):
+def test_the_example_of_a_format_writes_and_reads(file: CalibrationFile, project_root: Path):
     page = (project_root / "docs/formats.md").read_text(encoding="utf-8")
     _, _, example = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
-    golden = read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
     names: dict[str, Any] = {}
     exec(example, names)
     acme = names["ACME_FORMAT"]
-    text = acme.write(golden)
+    text = acme.write(file)
     content = Content("lines", text=text)
     assert acme.reads.recognizes(content)
     back = acme.reads.read(content, "acme.txt").camera_from_radar
-    assert np.array_equal(back.as_matrix(), golden.calibration.camera_from_radar.as_matrix())
+    assert np.array_equal(back.as_matrix(), file.calibration.camera_from_radar.as_matrix())
+
+
+@pytest.fixture(scope="module")
+def faults(project_root: Path) -> Callable[[dict[str, Any]], list[str]]:
+    @cache
+    def validator(name: str) -> jsonschema.Draft202012Validator:
+        schema = json.loads((project_root / f"docs/schemas/{name}.schema.json").read_text(encoding="utf-8"))
+        jsonschema.Draft202012Validator.check_schema(schema)
+        return jsonschema.Draft202012Validator(schema)
+
+    def found(document: dict[str, Any]) -> list[str]:
+        return [error.message for error in validator(document["schema"].removeprefix("cocalib/")).iter_errors(document)]
+
+    return found
+
+
+@pytest.fixture
+def golden(golden_text: str) -> dict[str, Any]:
+    return json.loads(golden_text)
+
+
+def test_what_we_write_and_what_an_earlier_version_wrote_is_valid(project_root: Path, faults, golden):
+    earlier = (project_root / "tests/golden/calibration-1-earlier.json").read_text(encoding="utf-8")
+
+    assert faults(golden) == []
+    assert faults(json.loads(earlier)) == []
+    with_prior = (project_root / "tests/golden/calibration-1-fleet-prior.json").read_text(encoding="utf-8")
+    assert faults(json.loads(with_prior)) == []
+    assert faults(json.loads(write_calibration(read_calibration(earlier)))) == []
+
+
+def test_the_examples_on_the_page_are_valid(project_root: Path, faults):
+    page = (project_root / "docs/formats.md").read_text(encoding="utf-8")
+    examples = [json.loads(text) for text in re.findall(r"```json\n(.*?)```", page, flags=re.DOTALL)]
+
+    assert [faults(example) for example in examples if "schema" in example] == [[], []]
+
+
+def test_a_result_may_grow_and_a_setting_may_not(faults, golden):
+    grown = copy.deepcopy(golden)
+    grown["metrics"]["weather"] = "rain"
+    grown["new"] = [1]
+    assert faults(grown) == []
+
+    for settings in (("options",), ("options", "noise"), ("camera",)):
+        changed = copy.deepcopy(golden)
+        owner = changed
+        for key in settings:
+            owner = owner[key]
+        owner["sigma_pixels"] = 1
+        assert any("sigma_pixels" in fault for fault in faults(changed))
+
+
+def test_a_missing_or_wrong_part_is_named(faults, golden):
+    del golden["camera_from_radar"]
+    golden["covariance"] = [[1, 2], [3, 4]]
+
+    assert any("'camera_from_radar' is a required property" in fault for fault in faults(golden))
+    assert len(faults(golden)) > 1
+
+
+# msgspec learns the types of our files when they are imported: two threads that did so at once crashed the process.
+_LEARNT = """
+import msgspec
+learnt = []
+decoder = msgspec.json.Decoder
+msgspec.json.Decoder = lambda document: learnt.append(document.__name__) or decoder(document)
+import calib_core.interchange.own.documents
+print(*learnt)
+"""
+
+
+def test_the_types_of_our_files_are_learnt_when_they_are_imported() -> None:
+    done = subprocess.run([sys.executable, "-c", _LEARNT], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["ClicksDocument", "PairsDocument", "CalibrationDocument"]

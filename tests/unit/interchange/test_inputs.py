@@ -3,13 +3,18 @@
 import dataclasses
 import json
 import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from calib_core.calibration import calibrate_pairs, solve_again
 from calib_core.errors import InputError
 from calib_core.interchange import (
     FrameNames,
+    Provenance,
     calibration_text,
     choose_check_point,
     read_calibration,
@@ -19,8 +24,19 @@ from calib_core.interchange import (
     write_clicks,
     write_pairs,
 )
-from calib_core.measurements import ReflectorClick, time_from_parts
+from calib_core.interchange.own.board_views_json import (
+    BoardViews,
+    PictureSource,
+    read_board_views,
+    runs_of,
+    write_board_views,
+)
+from calib_core.interchange.own.clicks_json import read_clicks_file
+from calib_core.intrinsics import BoardCorners, board_of_size
+from calib_core.measurements import Candidate, Pair, ReflectorClick, TimeNs, time_from_parts
 from calib_core.options import CalibrationOptions
+from calib_core.results import Calibration, UnconfirmedClicks
+from calib_core.synthetic import simulate_pairs
 
 CAMERA = {"model": "pinhole", "width_px": 640, "height_px": 480, "matrix_px": [[500, 0, 320], [0, 500, 240], [0, 0, 1]]}
 
@@ -267,3 +283,151 @@ def test_the_stamp_of_a_pair_comes_from_its_click_where_the_pair_has_none(golden
     content = json.loads(calibration_text(bare, clicks=[click]))
 
     assert content["pairs"][0]["image_time"] == {"sec": 12, "nanosec": 5}
+
+
+# What a clicks-1 file says of clicks that nobody confirmed.
+
+
+CLICKS = tuple(ReflectorClick(TimeNs(time), name, 3.0, 4.0) for time, name in ((1, "a"), (2, "b"), (3, "c")))
+
+
+def test_it_is_read_back() -> None:
+    unconfirmed = UnconfirmedClicks(("a", "c"), 0.875)
+    file = read_clicks_file(write_clicks(CLICKS, unconfirmed=unconfirmed))
+    assert (file.clicks, file.unconfirmed) == (CLICKS, unconfirmed)
+
+
+def test_a_file_whose_clicks_a_person_placed_says_nothing() -> None:
+    text = write_clicks(CLICKS)
+    assert "unconfirmed" not in text
+    assert read_clicks_file(text).unconfirmed is None
+
+
+def test_clicks_that_were_taken_out_of_the_file_no_longer_count() -> None:
+    text = write_clicks(CLICKS[1:], unconfirmed=UnconfirmedClicks(("a", "c"), 0.875))
+    assert read_clicks_file(text).unconfirmed == UnconfirmedClicks(("c",), 0.875)
+    assert read_clicks_file(write_clicks(CLICKS[1:2], unconfirmed=UnconfirmedClicks(("a",), 0.9))).unconfirmed is None
+
+
+@pytest.mark.parametrize("confidence", ["1.5", "-0.1", "null"])
+def test_a_confidence_that_is_no_probability_is_refused(confidence: str) -> None:
+    text = write_clicks(CLICKS, unconfirmed=UnconfirmedClicks(("a",), 0.875)).replace("0.875", confidence)
+    with pytest.raises(InputError, match=r"unconfirmed\.confidence"):
+        read_clicks(text)
+
+
+# What the files say about a radar with several topics.
+
+
+CLICK = ReflectorClick(TimeNs(1_700_000_000_000_000_000), "c1", 10.0, 20.0)
+
+
+@pytest.fixture(scope="module")
+def solved() -> Calibration:
+    simulated = simulate_pairs(rng=np.random.default_rng(3))
+    pairs = [replace(pair, candidates=_with_alternative(pair)) for pair in simulated.pairs]
+    return calibrate_pairs(pairs, simulated.camera).unwrap()
+
+
+def _with_alternative(pair: Pair) -> tuple[Candidate, Candidate]:
+    best = replace(pair.candidates[0], score=0.5, alternative_of=0)
+    elsewhere = best.position_radar_m * [1.0, -1.0, 1.0] + [0.0, 3.0, 0.0]
+    return best, replace(best, position_radar_m=elsewhere)
+
+
+def test_a_calibration_keeps_which_candidates_are_alternatives(solved: Calibration) -> None:
+    text = calibration_text(solved)
+    read = read_calibration(text).calibration
+    for pair in read.pairs:
+        assert pair.measured is not None
+        assert [one.alternative_of for one in pair.measured.candidates] == [0, 0]
+    again = solve_again(read)
+    assert isinstance(again, Calibration)
+    assert calibration_text(again) == text
+
+
+def test_candidates_without_alternatives_have_no_such_key() -> None:
+    simulated = simulate_pairs(rng=np.random.default_rng(3))
+    assert "alternative_of" not in calibration_text(calibrate_pairs(simulated.pairs, simulated.camera).unwrap())
+
+
+def test_the_provenance_names_all_topics_of_the_radar_and_why_it_was_used(solved: Calibration) -> None:
+    provenance = Provenance(radar_topic="/far", radar_topics=("/far", "/near"), radar_choice="/far + /near: 52 returns")
+    text = calibration_text(solved, provenance=provenance)
+    assert json.loads(text)["provenance"]["topics"] == {
+        "radar": "/far",
+        "image": None,
+        "camera_info": None,
+        "radar_all": ["/far", "/near"],
+        "radar_choice": "/far + /near: 52 returns",
+    }
+    assert read_calibration(text).provenance == provenance
+    single = Provenance(radar_topic="/radar", radar_topics=("/radar",))
+    text = calibration_text(solved, provenance=single)
+    assert set(json.loads(text)["provenance"]["topics"]) == {"radar", "image", "camera_info"}
+    assert read_calibration(text).provenance == single
+
+
+def test_clicks_say_which_topics_they_were_made_with_if_there_are_several() -> None:
+    text = write_clicks([CLICK], radar_topics=("/far", "/near"))
+    assert json.loads(text)["radar_topics"] == ["/far", "/near"]
+    assert read_clicks(text) == (CLICK,)
+    assert write_clicks([CLICK], radar_topics=("/radar",)) == write_clicks([CLICK])
+    with pytest.raises(InputError, match="radar_topics"):
+        read_clicks(text.replace('"/far"', "7"))
+
+
+# Views of a board are kept bit for bit, and a file that cannot be right is refused in words.
+
+
+BOARD = board_of_size("9x6", 22.14)
+SOURCE = PictureSource("board.mp4", 9, 64 * "a")
+
+
+def kept() -> BoardViews:
+    pixels = np.random.default_rng(2).uniform(0.0, 470.0, (54, 2))
+    views = (
+        BoardCorners(1, "frame 2", TimeNs(1_700_000_000_123_456_789), (640, 480), np.arange(54), pixels, 1.25),
+        BoardCorners(4, "frame 5", None, (640, 480), np.array([0, 7, 53]), pixels[:3]),
+    )
+    return BoardViews(BOARD, SOURCE, views, runs_of({0, 1, 2, 4, 7}))
+
+
+def test_views_come_back_as_they_were() -> None:
+    text = write_board_views(kept())
+    found = read_board_views(text)
+    assert (found.board, found.source, found.searched) == (BOARD, SOURCE, ((0, 2), (4, 4), (7, 7)))
+    assert found.searched_indices() == (0, 1, 2, 4, 7)
+    for view, same in zip(kept().views, found.views, strict=True):
+        assert np.array_equal(view.pixels_px, same.pixels_px)
+        assert np.array_equal(view.corner_ids, same.corner_ids)
+        assert (view.name, view.time_ns, view.index) == (same.name, same.time_ns, same.index)
+    assert found.views[0].blur_px == 1.25
+    assert np.isnan(found.views[1].blur_px)
+    assert write_board_views(found) == text
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda document: document["views"][0].update(index=9), r"views\[0\].index: 9 of 9 pictures"),
+        (lambda document: document["views"][1].update(corner_ids=[0, 7, 54]), "be below 54"),
+        (lambda document: document["views"][1].update(corner_ids=[7, 0, 5]), "must ascend"),
+        (lambda document: document["views"][1].update(index=1), "two are of the same picture"),
+        (lambda document: document["views"][1]["pixels_px"].__setitem__(0, [900, 5]), "outside its picture"),
+        (lambda document: document.update(searched=[[3, 20]]), r"searched\[0\]: 3 to 20 of 9 pictures"),
+        (lambda document: document.update(serched=[]), "unknown key"),
+    ],
+)
+def test_a_file_that_cannot_be_right_is_refused(change: Callable[[dict[str, Any]], None], words: str) -> None:
+    document = json.loads(write_board_views(kept()))
+    change(document)
+    with pytest.raises(InputError, match=words):
+        read_board_views(json.dumps(document), "views.json")
+
+
+def test_views_of_another_board_or_of_other_pictures_are_refused() -> None:
+    with pytest.raises(InputError, match=r"22\.14 mm, but the board is a checkerboard of 8 x 6"):
+        kept().require_same(board_of_size("8x6", 22.14), SOURCE, file="views.json")
+    with pytest.raises(InputError, match="give the same pictures"):
+        kept().require_same(BOARD, PictureSource("board.mp4", 9, 64 * "b"), file="views.json")

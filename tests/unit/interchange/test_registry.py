@@ -1,10 +1,24 @@
 """The table of formats: every writer has a reader, and the readers are tried in one order."""
 
 import dataclasses
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from calib_core.interchange import FORMATS, CalibrationFile, FrameNames, export, read_any
+from calib_core.errors import InputError
+from calib_core.interchange import (
+    FORMATS,
+    CalibrationFile,
+    FrameNames,
+    choose_check_point,
+    export,
+    export_all,
+    format_named,
+    read_any,
+    written_formats,
+)
+from calib_core.interchange.formats import registry
 from calib_core.interchange.formats.registry import readers
 from calib_core.interchange.syntax.content import Content, readings
 from calib_core.interchange.syntax.zip_archives import pack
@@ -70,3 +84,39 @@ def test_a_frame_that_a_driver_publishes_gets_a_note_on_its_second_parent(file: 
     (note,) = notes("camera_color_optical_frame")
     assert "publishes camera_color_optical_frame under its camera_link already" in note
     assert "--tree" in note
+
+
+# Every format at once: those that can represent a calibration are written, the others say why not.
+
+
+@pytest.fixture
+def with_k3(file: CalibrationFile) -> CalibrationFile:
+    """Return a calibration whose camera uses k3, which Kalibr cannot store."""
+    camera = replace(file.calibration.camera, distortion=np.array([-0.39, 0.17, -0.004, 0.002, 0.05]))
+    calibration = replace(file.calibration, camera=camera, pairs=())
+    return replace(file, calibration=calibration, check_point=choose_check_point(calibration))
+
+
+@pytest.mark.parametrize("rectified", [False, True])
+def test_each_format_is_written_as_alone_or_refused_as_alone(with_k3: CalibrationFile, rectified: bool) -> None:
+    written, refused = export_all(with_k3, rectified=rectified)
+
+    assert {*written, *(one.name for one in refused)} == {known.name for known in written_formats()}
+    assert "kalibr" in {one.name for one in refused}
+    for name, made in written.items():
+        assert made == export(with_k3, name, rectified=rectified and format_named(name).is_for_rectified)
+        assert format_named(name).reads is None or read_any(made.data).format == name
+    for one in refused:
+        with pytest.raises(InputError) as alone:
+            export(with_k3, one.name, rectified=rectified and format_named(one.name).is_for_rectified)
+        assert one.reason == str(alone.value)
+
+
+def test_two_formats_do_not_write_one_file(with_k3: CalibrationFile, monkeypatch: pytest.MonkeyPatch) -> None:
+    twin = replace(format_named("matrix"), name="matrix-twin")
+    monkeypatch.setattr(registry, "plugin_formats", lambda _reserved: (twin,))
+
+    written, refused = export_all(with_k3)
+
+    assert "matrix" in written
+    assert [one.name for one in refused if "is that of another format" in one.reason] == ["matrix-twin"]

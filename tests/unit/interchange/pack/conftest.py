@@ -27,8 +27,8 @@ class Run:
 
 
 @pytest.fixture(scope="session")
-def golden(project_root: Path) -> CalibrationFile:
-    return read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
+def golden(golden_text: str) -> CalibrationFile:
+    return read_calibration(golden_text)
 
 
 @pytest.fixture(scope="session")

@@ -1,7 +1,6 @@
 """Static transforms written beside a tree: never a second parent, and read back with the chain that they state."""
 
 import dataclasses
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +14,6 @@ from calib_core.interchange import (
     check,
     imported,
     read_any,
-    read_calibration,
 )
 from calib_core.interchange.trees.frame_tree import FrameTree
 from calib_core.interchange.trees.reading import TreeFile, read_tree
@@ -26,9 +24,8 @@ ECHO = TreeFile(vehicles.REALSENSE_ECHO.encode(), "echo.yaml")
 
 
 @pytest.fixture(scope="module")
-def calibration(project_root: Path) -> CalibrationFile:
-    read = read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
-    return dataclasses.replace(read, frames=FrameNames("radar", "camera_color_optical_frame"))
+def calibration(file: CalibrationFile) -> CalibrationFile:
+    return dataclasses.replace(file, frames=FrameNames("radar", "camera_color_optical_frame"))
 
 
 @pytest.fixture(scope="module")

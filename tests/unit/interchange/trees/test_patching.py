@@ -31,8 +31,8 @@ ECHO = TreeFile(vehicles.REALSENSE_ECHO.encode(), "echo.yaml")
 
 
 @pytest.fixture(scope="module")
-def calibration(project_root: Path) -> CalibrationFile:
-    return read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
+def calibration(golden_text: str) -> CalibrationFile:
+    return read_calibration(golden_text)
 
 
 def file(text: str, name: str = "car.urdf") -> TreeFile:
