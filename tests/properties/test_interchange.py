@@ -247,35 +247,6 @@ def test_any_json_is_read_or_refused_in_one_line(content, schema):
         assert "\n" not in refused
 
 
-@settings(max_examples=80, deadline=None)
-@given(
-    data=st.binary(max_size=60) | st.text(max_size=60).map(str.encode),
-    start=st.sampled_from([b"", b"PK\x03\x04", b"MATLAB 5.0 ", b"<launch>", b"%YAML:1.0\n", b"{", b"K: ", b"cam0:\n "]),
-)
-def test_any_bytes_are_read_or_refused(data, start):
-    refused = refusal(read_any, start + data, "file")
-
-    assert not refused or refused.startswith("file: ")
-
-
-@settings(max_examples=60, deadline=None)
-@given(
-    name=st.sampled_from([known.name for known in FORMATS]),
-    place=st.floats(0, 1),
-    junk=st.binary(max_size=4),
-    cut=st.integers(0, 9),
-)
-def test_a_damaged_file_is_read_or_refused(name, place, junk, cut):
-    pose = RigidTransform(matrix_from_rpy(np.array([-1.7, 0.03, -1.5])), [0.1, 0.2, 0.3])
-    data = export(file_of(pose, Camera("pinhole", 640, 480, np.diag([500.0, 500.0, 1.0]))), name).data
-    at = int(place * len(data))
-    damaged = data[:at] + junk + data[at + cut :]
-
-    refused = refusal(lambda: check(read_any(damaged, "file")))
-
-    assert not refused or refused.startswith("file: ")
-
-
 @settings(max_examples=30, deadline=None)
 @given(pose=poses(), edit=st.sampled_from(["direction", "axes", "translation", "rotation"]))
 def test_a_slip_is_never_missed(pose, edit):

@@ -1,6 +1,5 @@
 """The shared vocabulary: a spelling means the same as a column of a table, as a field of a message, and in --map."""
 
-import math
 import re
 
 import pytest
@@ -129,10 +128,3 @@ def test_a_unit_with_a_long_s_in_a_comment_is_read_as_any_other() -> None:
     unit = unit_in("[m/\u017f]", "speed")
     assert unit is not None
     assert unit.scale == 1.0
-
-
-def test_units_of_a_map_are_known_in_all_spellings() -> None:
-    (speed,) = parse_column_map(["doppler=v:kph"])
-    assert (speed.unit, speed.scale) == ("kmh", pytest.approx(1 / 3.6))
-    (angle,) = parse_column_map(["azimuth=-a:degrees"])
-    assert (angle.unit, angle.scale) == ("deg", pytest.approx(-math.pi / 180.0))

@@ -74,17 +74,6 @@ def test_a_chunk_that_no_index_names_is_found(tmp_path):
     assert not found.sound
 
 
-def test_a_wrong_checksum_makes_all_messages_of_its_chunk_damaged(tmp_path):
-    file = sound("mcap-checksums", tmp_path)
-    data = bytearray(file.data)
-    data[data.index(list(file.messages)[12]) + 100] ^= 1
-    path = tmp_path / "copy.mcap"
-    path.write_bytes(data)
-    found = verified(path)
-    assert [counts(found, topic)[2] for topic in ("/radar/points", "/rear/points")] == [4, 4]
-    assert "checksum" in [warning.code for warning in found.warnings]
-
-
 def test_rows_that_are_absent_are_told(tmp_path):
     file = sound("db3", tmp_path)
     path = tmp_path / "copy.db3"

@@ -27,25 +27,14 @@ SHAPES = [
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: "-".join(f"{k}" for k in shape) or "usual")
-def test_every_shape_of_the_format_gives_every_message(shape, ros, plain, jpeg, tmp_path):
+def test_every_shape_of_the_format_gives_every_message(shape, ros2, plain, jpeg, tmp_path):
     path = tmp_path / "made.mcap"
-    path.write_bytes(mcap(ros, plain(ros, jpeg, n=40), **shape))
+    path.write_bytes(mcap(ros2, plain(ros2, jpeg, n=40), **shape))
     with open_recording(path) as recording:
         np.testing.assert_array_equal(recording.radar_times, START_NS + 10**8 * np.arange(40))
         assert len(recording.radar_scans()) == 40
         assert recording.image_bytes(39).data == jpeg
         assert recording.warnings == ()
-
-
-@pytest.mark.parametrize("shape", [{"summary": False}, {"chunked": False}])
-def test_a_file_that_was_not_closed_is_read_to_its_end_with_a_warning(shape, ros2, plain, jpeg, tmp_path):
-    path = tmp_path / "made.mcap"
-    data = mcap(ros2, plain(ros2, jpeg, n=40), **shape)
-    path.write_bytes(data[: data.rindex(b"\x0f" + struct.pack("<Q", 4))] + b"\x05\x30")
-    with open_recording(path) as recording:
-        assert len(recording.radar_times) == 40
-        assert [warning.code for warning in recording.warnings] == ["not-closed"]
-        assert "120 complete messages" in recording.warnings[0].message
 
 
 def test_an_encoding_that_is_not_of_ros_is_a_problem_of_its_topic(ros2, plain, jpeg, tmp_path):

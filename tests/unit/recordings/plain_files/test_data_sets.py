@@ -65,6 +65,7 @@ def test_view_of_delft_brings_its_camera_and_names_its_pose(tmp_path, inner) -> 
     calib = root / inner / Path("radar/training" if inner == "." else "training" if inner == "radar" else ".") / "calib"
     assert f"its pose: --calibration {calib / '00000.txt'}" in text
     assert ("unused-files" in codes) == (inner == ".")
+    assert "numbered-files" in codes
     if inner == ".":
         assert "velodyne (3 lidar clouds, which this program does not use)" in text
 

@@ -210,69 +210,6 @@ def test_the_older_cloud_with_named_channels_is_read(ros, write):
 # -- lists
 
 
-def test_radar_msgs_scans_become_cartesian(ros, write):
-    fields = "float32 range\nfloat32 azimuth\nfloat32 elevation\nfloat32 doppler_velocity\nfloat32 amplitude\n"
-    ros.define("radar_msgs/msg/RadarReturn", fields)
-    ros.define("radar_msgs/msg/RadarScan", "Header header\nradar_msgs/RadarReturn[] returns\n")
-    rows = [(5.0, 0.25, 0.125, -1.5, 12.0), (7.5, -0.5, 0.0, 0.0, 3.0)]
-    names = ("range", "azimuth", "elevation", "doppler_velocity", "amplitude")
-    returns = [ros.new("radar_msgs/msg/RadarReturn", **dict(zip(names, row, strict=True))) for row in rows]
-    scan_type = "radar_msgs/msg/RadarScan"
-    messages = [
-        ros.new(scan_type, header=ros.header(START_NS), returns=returns),
-        ros.new(scan_type, header=ros.header(START_NS + 10**8), returns=[]),
-    ]
-    with opened(write, ros, messages) as recording:
-        scans = recording.radar_scans()
-    np.testing.assert_allclose(scans.points_radar_m, cartesian_from_polar(np.array(rows)[:, :3]))
-    np.testing.assert_array_equal(scans.doppler_mps, [-1.5, 0.0])
-    np.testing.assert_array_equal(scans.snr_db, [12.0, 3.0])
-    assert np.diff(scans.first_return).tolist() == [2, 0]
-
-
-def test_radar_tracks_become_scans_of_their_positions(ros, write):
-    track = (
-        "unique_identifier_msgs/UUID uuid\ngeometry_msgs/Point position\ngeometry_msgs/Vector3 velocity\n"
-        "uint16 classification\nfloat32[6] position_covariance\n"
-    )
-    ros.define("unique_identifier_msgs/msg/UUID", "uint8[16] uuid\n")
-    ros.define("radar_msgs/msg/RadarTrack", track)
-    ros.define("radar_msgs/msg/RadarTracks", "Header header\nradar_msgs/RadarTrack[] tracks\n")
-    uuid = ros.new("unique_identifier_msgs/msg/UUID", uuid=np.arange(16, dtype=np.uint8))
-    tracks = [
-        ros.new(
-            "radar_msgs/msg/RadarTrack",
-            uuid=uuid,
-            position=ros.new("geometry_msgs/msg/Point", x=3.0 * k, y=4.0 * k, z=0.5),
-            velocity=ros.new("geometry_msgs/msg/Vector3", x=1.0, y=0.0, z=0.0),
-            classification=k,
-            position_covariance=np.zeros(6, dtype=np.float32),
-        )
-        for k in (1, 2, 3)
-    ]
-    message = ros.new("radar_msgs/msg/RadarTracks", header=ros.header(START_NS), tracks=tracks)
-    with opened(write, ros, [message]) as recording:
-        scan = recording.radar_scans().scan(0)
-    np.testing.assert_array_equal(scan.points_radar_m, [[3, 4, 0.5], [6, 8, 0.5], [9, 12, 0.5]])
-    np.testing.assert_allclose(scan.doppler_mps[0], 3 / np.sqrt(25.25))
-
-
-def test_ainstein_angles_are_degrees(ros, write):
-    ros.define(
-        "ainstein_radar_msgs/msg/RadarTarget",
-        "uint16 target_id\nfloat64 snr\nfloat64 range\nfloat64 speed\nfloat64 azimuth\nfloat64 elevation\n",
-    )
-    ros.define("ainstein_radar_msgs/msg/RadarTargetArray", "Header header\nainstein_radar_msgs/RadarTarget[] targets\n")
-    target = ros.new(
-        "ainstein_radar_msgs/msg/RadarTarget", target_id=1, snr=9.0, range=2.0, speed=0.5, azimuth=90.0, elevation=0.0
-    )
-    array = "ainstein_radar_msgs/msg/RadarTargetArray"
-    with opened(write, ros, [ros.new(array, header=ros.header(START_NS), targets=[target])]) as recording:
-        scan = recording.radar_scans().scan(0)
-    np.testing.assert_allclose(scan.points_radar_m, [[0.0, 2.0, 0.0]], atol=1e-12)
-    assert (scan.doppler_mps[0], scan.snr_db[0]) == (0.5, 9.0)
-
-
 def test_a_list_of_poses_is_not_a_radar(ros, write, plain, jpeg):
     pose = ros.new(
         "geometry_msgs/msg/Pose",

@@ -179,13 +179,6 @@ def test_zero_stamps_of_the_radar_are_replaced_with_a_warning(ros, write, plain,
         assert (clocks["/radar/points"], clocks["/camera/image/compressed"]) == ("receive", "header")
 
 
-def test_stamps_of_another_year_are_kept_when_both_sensors_have_them(ros, write, plain, jpeg):
-    rows = plain(ros, jpeg, radar_shift_ns=-YEAR_NS, camera_shift_ns=-YEAR_NS)
-    with open_recording(write(ros, rows)) as recording:
-        assert recording.radar_times[0] == START_NS - YEAR_NS
-        assert recording.warnings == ()
-
-
 def test_the_user_can_choose_the_clock(ros, write, plain, jpeg):
     rows = plain(ros, jpeg, radar_shift_ns=-3600 * NS_PER_S, camera_shift_ns=-3600 * NS_PER_S)
     path = write(ros, rows)

@@ -94,19 +94,6 @@ def test_any_stamps_can_be_diagnosed(header, chosen):
     assert all(found.remarks)
 
 
-def test_the_diagnosis_is_in_the_text_and_the_summary(ros, write, plain, jpeg):
-    path = write(ros, plain(ros, jpeg))
-    with inspect_recording(path) as recording:
-        text = describe(recording)
-        reports = {topic.name: topic.clocks for topic in recording_summary(recording).topics}
-    assert "/radar/points: times are header stamps, because the stamps are sound" in text
-    assert "the recorder received each message 30.0 ms after its stamp (± 0.0 ms)" in text
-    assert reports["/camera/camera_info"] is None
-    radar = reports["/radar/points"]
-    assert radar is not None
-    assert (radar.chosen, radar.messages) == ("header", 20)
-
-
 def test_clocks_of_sensors_that_are_not_in_use_are_shown_too(ros, write, plain, jpeg, cloud_points):
     rows = plain(ros, jpeg)
     rows += [("/rear/points", at + 5 * MS, ros.cloud(0, cloud_points(3))) for at in SOUND_NS[:10].tolist()]
