@@ -39,7 +39,7 @@ export interface Figure {
   value: string;
   unit: string;
   hint: string;
-  level: "plain" | "good" | "warning";
+  level: "none" | "plain" | "good" | "warning";
 }
 
 /** A problem in the data or the result that the user must decide on. */
@@ -232,7 +232,7 @@ export interface SystematicErrorRow {
   position_percent: number;
   rotation_percent: number;
   hint: string;
-  level: "plain" | "good" | "warning";
+  level: "none" | "plain" | "good" | "warning";
 }
 
 /** The errors that all pairs share. */

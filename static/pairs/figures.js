@@ -8,14 +8,6 @@ import { drawWarnings } from "./warnings.js";
 /** @typedef {import("../messages.js").Figure} Figure */
 const figures = /** @type {HTMLElement} */ (document.getElementById("figures"));
 const posePage = /** @type {HTMLElement} */ (document.getElementById("page-pose"));
-/** Placeholders before the first calibration, so that the layout does not jump. @type {[string, string][]} */
-const EMPTY = [
-  ["aed", "average distance (AED)"],
-  ["held_out_aed", "new placement (held-out AED)"],
-  ["cdsd", "spread (CDSD)"],
-  ["rms", "root mean square (RMS)"],
-  ["inliers", "clicks that agree"],
-];
 const poseTable = make("table", "", []);
 const poseHead = make("div", "pose-head", "");
 const apartTable = make("table", "", []);
@@ -46,8 +38,7 @@ function draw() {
     figures.replaceChildren(...state.placementFigures.map(cell));
     return drawWarnings([{ code: "no-camera", message: view.status, hint: view.hint }], state.recording?.warnings ?? [], view.assumptions, view.acknowledged);
   }
-  const shown = view.metrics.length ? view.metrics : EMPTY.map(([key, label]) => ({ key, label, value: "–", unit: "", hint: "Available after the first calibration.", level: "none" }));
-  figures.replaceChildren(...shown.map(cell));
+  figures.replaceChildren(...view.metrics.map(cell));
   poseTable.replaceChildren(...(view.pose.length ? view.pose.map(row) : [make("tr", "", [make("td", "", "Available after the first calibration.")])]));
   assumedHead.hidden = assumedTable.hidden = view.pose_assumed.length === 0;
   assumedTable.replaceChildren(...view.pose_assumed.map(row));
@@ -99,7 +90,7 @@ function hinted(element, hint) {
   return element;
 }
 
-/** @param {Omit<Figure, "level"> & {level: string}} figure */
+/** @param {Figure} figure */
 function cell(figure) {
   const value = make("dd", "", [figure.value, make("span", "unit", figure.unit)]);
   const box = make("dl", `figure ${figure.level}`, [make("dt", "", inTwoLines(figure.label)), value]);

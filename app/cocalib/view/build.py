@@ -64,7 +64,7 @@ def view(
         has_calibration=calibration is not None,
         method=session.options.method,
         clicks=click_rows(session, facts),
-        metrics=metric_figures(calibration) if calibration else (),
+        metrics=metric_figures(calibration),
         pose=pose_figures(shown) if shown else (),
         pose_assumed=assumed_figures(shown) if shown else (),
         systematic_errors=systematic_errors(shown) if shown else SystematicErrorTable(),

@@ -8,64 +8,45 @@ from calib_core.arrays import Matrix33, Vector3, frozen_array
 from calib_core.geometry import skew
 from calib_core.results import Calibration
 from calib_core.results.radar_axes import sigma_in_radar_axes
-from cocalib.view.model import Figure
+from cocalib.view.model import Figure, Level
 from cocalib.view.reprojections import reprojections
 from cocalib.view.wording import plain, sentence, with_sigma
 
+_METRICS = {
+    "aed": "average distance (AED)",
+    "held_out_aed": "new placement (held-out AED)",
+    "cdsd": "spread (CDSD)",
+    "rms": "root mean square (RMS)",
+    "inliers": "pairs that agree",
+}
+_NOT_YET = "Available after the first calibration."
 _HELD_OUT_RATIO = 1.5
 """A higher ratio of held-out to fitted error means that the pose depends too much on single pairs."""
 
 
-def metric_figures(calibration: Calibration) -> tuple[Figure, ...]:
-    """Return the figures that say how well the pairs agree."""
+def metric_figures(calibration: Calibration | None) -> tuple[Figure, ...]:
+    """Return the figures that say how well the pairs agree; without values while there is no calibration."""
+    if calibration is None:
+        return tuple(Figure(key, label, "–", "", _NOT_YET, "none") for key, label in _METRICS.items())
     metrics = calibration.metrics
+    hints = {
+        "aed": f"Mean distance between click and reprojection over {metrics.n} pairs (paper: AED).",
+        "held_out_aed": "Mean distance when each pair is predicted from all the others: the error to expect at a new placement.",
+        "cdsd": "Standard deviation of these distances, with divisor N - 1 (paper: CDSD).",
+        "rms": "Root mean square of these distances: large ones count more than in AED.",
+    }
+    figures = {
+        key: Figure(key, _METRICS[key], plain(getattr(metrics, f"{key}_px")), "px", hint) for key, hint in hints.items()
+    }
+    if metrics.held_out_aed_px > _HELD_OUT_RATIO * metrics.aed_px:
+        held_out = figures["held_out_aed"]
+        warning = "It is well above the mean residual, so the pose depends on single pairs: add placements."
+        figures["held_out_aed"] = replace(held_out, hint=f"{held_out.hint} {warning}", level="warning")
     used = sum(not pair.excluded for pair in calibration.pairs)
     agreeing = sum(pair.inlier and not pair.excluded for pair in calibration.pairs)
-    over = f"over {metrics.n} pairs"
-    return (
-        _figure(
-            "aed",
-            "average distance (AED)",
-            metrics.aed_px,
-            f"Mean distance between click and reprojection {over} (paper: AED).",
-        ),
-        _held_out_figure(calibration),
-        _figure(
-            "cdsd",
-            "spread (CDSD)",
-            metrics.cdsd_px,
-            "Standard deviation of these distances, with divisor N - 1 (paper: CDSD).",
-        ),
-        _figure(
-            "rms",
-            "root mean square (RMS)",
-            metrics.rms_px,
-            "Root mean square of these distances: large ones count more than in AED.",
-        ),
-        Figure(
-            "inliers",
-            "clicks that agree",
-            f"{agreeing} of {used}",
-            "",
-            "Clicks that agree on the pose, out of all that you have not excluded.",
-            "good" if agreeing == used else "plain",
-        ),
-    )
-
-
-def _figure(key: str, label: str, value_px: float, hint: str) -> Figure:
-    return Figure(key, label, plain(value_px), "px", hint)
-
-
-def _held_out_figure(calibration: Calibration) -> Figure:
-    """Return the held-out error, with a warning if it is far above the fitted one."""
-    metrics = calibration.metrics
-    hint = "Mean distance when each pair is predicted from all the others: the error to expect at a new placement."
-    figure = _figure("held_out_aed", "new placement (held-out AED)", metrics.held_out_aed_px, hint)
-    if metrics.held_out_aed_px > _HELD_OUT_RATIO * metrics.aed_px:
-        warning = "It is well above the mean residual, so the pose depends on single pairs: add placements."
-        return replace(figure, hint=f"{hint} {warning}", level="warning")
-    return figure
+    hint = "Pairs that agree on the pose, out of all that you have not excluded."
+    level: Level = "good" if agreeing == used else "plain"
+    return (*figures.values(), Figure("inliers", _METRICS["inliers"], f"{agreeing} of {used}", "", hint, level))
 
 
 def pose_figures(calibration: Calibration) -> tuple[Figure, ...]:

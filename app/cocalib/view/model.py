@@ -11,7 +11,7 @@ from calib_core.options import CalibrationOptions, Method
 from calib_core.results import DataWarning
 from calib_core.results.verdict import VerdictLevel
 
-Level: TypeAlias = Literal["plain", "good", "warning"]
+Level: TypeAlias = Literal["none", "plain", "good", "warning"]
 
 
 @dataclass(frozen=True, slots=True)
