@@ -25,7 +25,6 @@ from calib_core.estimation.covariance import PoseCovariance, pose_covariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.influential_pairs import average_over_influential_pairs, find_influential_pairs
 from calib_core.estimation.leave_one_out import LeaveOneOut, leave_one_out
-from calib_core.estimation.lens_prior import useless_covariance
 from calib_core.estimation.measurement_model import PairMeasurements, pair_measurements
 from calib_core.estimation.pair_results import click_results, excluded_pair_results, fit_metrics, used_pair_results
 from calib_core.estimation.plausibility import implausible_input
@@ -34,6 +33,7 @@ from calib_core.measurements import MIN_PAIRS, Pair, RadarScans, ReflectorClick,
 from calib_core.options import CalibrationOptions, Method, checked_options
 from calib_core.radar import cartesian_from_polar
 from calib_core.results import Calibration
+from calib_core.systematic_errors import useless_covariance
 
 _UNDETERMINED_ROTATION_RAD = 0.5  # a larger standard deviation means that the pairs do not determine the rotation
 _AGREEING_SHARE = 0.9

@@ -15,12 +15,12 @@ from calib_core.arrays import Indices, Points2, Points3, Values, Vector3, frozen
 from calib_core.association.exclusive_returns import shared_returns
 from calib_core.camera import Camera
 from calib_core.estimation.linearization import MeasurementPlanes
-from calib_core.estimation.systematic_errors import NO_ERRORS, SystematicErrors, systematic_errors
 from calib_core.estimation.unmeasured_elevation import OWN_SIGMA_RAD, is_flat
 from calib_core.geometry import RigidTransform, skew
 from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions
 from calib_core.radar import polar_from_cartesian
+from calib_core.systematic_errors import NO_ERRORS, SystematicErrors, systematic_errors
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from calib_core.camera import Camera
-from calib_core.estimation.systematic_errors import systematic_errors
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 from calib_core.results.shared_errors import (
     ERROR_WORDS,
@@ -15,6 +14,7 @@ from calib_core.results.shared_errors import (
     error_words,
     knowledge_text,
 )
+from calib_core.systematic_errors import systematic_errors
 
 CAMERA = Camera("pinhole", 1920, 1080, np.array([[1000.0, 0, 960], [0, 1000, 540], [0, 0, 1]]))
 COVARIANCE = np.diag([0.03, 0.06, 0.06, 0.004, 0.004, 0.002]) ** 2
