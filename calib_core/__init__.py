@@ -59,8 +59,8 @@ if TYPE_CHECKING:
     from calib_core.recordings import Recording, RecordingOptions, open_recording
     from calib_core.results import Calibration, DataWarning, Metrics, NextPlacement, PairResult
     from calib_core.results.metrics import acc, aed, cdsd
-    from calib_core.results.shared_errors import SystematicErrorResult
     from calib_core.results.verdict import Verdict, verdict_on
+    from calib_core.systematic_errors import SystematicErrorResult
 
 __all__ = [
     "AgreementLimits",

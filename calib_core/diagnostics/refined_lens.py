@@ -15,8 +15,7 @@ import numpy as np
 from calib_core.arrays import Values
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.results import DataWarning
-from calib_core.results.shared_errors import error_words, is_beyond_its_prior, knowledge_text
-from calib_core.systematic_errors import LensPrior
+from calib_core.systematic_errors import LensPrior, error_words, is_beyond_its_prior, knowledge_text
 
 _LENS = ("lens_", "principal_", "focal_length", "distortion")
 _SCALES = ("azimuth_scale", "elevation_scale")

@@ -4,7 +4,7 @@ import numpy as np
 
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.results import DataWarning
-from calib_core.results.shared_errors import SystematicErrorResult
+from calib_core.systematic_errors import SystematicErrorResult
 
 _CLEAR_SIGMAS = 3.0
 _NOTABLE_SCALE = 0.015
