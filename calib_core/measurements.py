@@ -422,6 +422,21 @@ class Unsolvable:
 
 
 @dataclass(frozen=True, slots=True)
+class DataWarning:
+    """A problem in the data or the result that the user must decide on.
+
+    Attributes:
+        code: identifier for programs, such as "mirrored-axes"; stable.
+        message: what is wrong, with figures.
+        hint: what to do about it.
+    """
+
+    code: str
+    message: str
+    hint: str
+
+
+@dataclass(frozen=True, slots=True)
 class Box:
     """A rectangle around one object in one frame; pixel (0, 0) is the centre of the top-left pixel.
 

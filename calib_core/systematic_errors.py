@@ -1,4 +1,4 @@
-"""Systematic errors: what is wrong with every pair alike, with a prior for each, in the estimate and in the covariance.
+"""Systematic errors: what is wrong with every pair alike, with a prior for each, in the estimate, in the covariance and in words.
 
 With eta these errors, h the radar's way of reporting and o, K the click's and the lens's, the model of `linearization` is
 
@@ -16,7 +16,8 @@ focal lengths tied to one another) is no special case. What is reported is l, by
 errors of the lens are estimated, and the model is linearized through the camera at their present values.
 
 The derivative belongs at the estimated true position mu: at the measured one it is correlated with the noise, and a scale
-comes out too large. A new error is one more entry of `systematic_errors`.
+comes out too large. A new error is one more entry of `systematic_errors`, and of `ERROR_WORDS` with what it is called. Files keep
+what is known of it (`SystematicErrorResult`); `dominant_errors` and `systematic_error_warnings` say what to do about it.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,7 +27,7 @@ import numpy as np
 
 from calib_core.arrays import Matrix66, Values, Vector3, frozen_array
 from calib_core.camera import Camera, CameraCovariance
-from calib_core.measurements import Unsolvable
+from calib_core.measurements import DataWarning, Unsolvable
 from calib_core.options import CalibrationOptions, RadarOptions
 from calib_core.radar import RadarErrors
 
@@ -796,3 +797,88 @@ def _value_text(error: SystematicErrorResult) -> str:
     sigma = words.factor * error.sigma
     decimals = max(0, 1 - int(np.floor(np.log10(sigma)))) if sigma > 0.0 else 2
     return f"{words.factor * error.value:+.{decimals}f} ± {sigma:.{decimals}f} {words.unit}".rstrip()
+
+
+_CLEAR_SIGMAS = 3.0
+_NOTABLE_SCALE = 0.015
+_BEYOND_PRIOR = 2.0  # of the prior's standard deviations
+_SCALES = ("azimuth_scale", "elevation_scale")
+_SIDES = {
+    "reflector_right_m": ("to the right of", "to the left of"),
+    "reflector_down_m": ("below", "above"),
+    "reflector_forward_m": ("beyond", "in front of"),
+}
+
+
+def systematic_error_warnings(errors: Sequence[SystematicErrorResult], *, flat: bool) -> list[DataWarning]:
+    """Warn of errors that the pairs clearly show: scaled angles, with what would look the same, and clicks beside the target.
+
+    Args:
+        errors: all that the pairs share, with what is known of them.
+        flat: whether the radar does not measure elevation.
+    """
+    warnings = []
+    for one in errors:
+        if one.name in _SCALES and _is_clear(one) and abs(one.value) > _NOTABLE_SCALE:
+            warnings.append(_azimuth_scale(one, flat=flat) if one.name == "azimuth_scale" else _elevation_scale(one))
+    off = [
+        one
+        for one in errors
+        if one.name in _SIDES and _is_clear(one) and abs(one.value) > _BEYOND_PRIOR * one.prior_sigma
+    ]
+    return [*warnings, _clicks_off_centre(off)] if off else warnings
+
+
+def _is_clear(one: SystematicErrorResult) -> bool:
+    return one.estimated and abs(one.value) > _CLEAR_SIGMAS * one.sigma
+
+
+def _azimuth_scale(one: SystematicErrorResult, *, flat: bool) -> DataWarning:
+    size, length = ("large", "long") if one.value > 0.0 else ("small", "short")
+    tilted = "; so would a tilt of the radar" if flat and one.value > 0.0 else ""
+    return DataWarning(
+        "angle-scale",
+        f"the radar's azimuths look {_percent(one)} too {size}; a given focal length that is too {length} by the same amount "
+        f"would look the same, and pairs cannot tell them apart{tilted}",
+        "check the element spacing and wavelength that the radar's driver assumes, and whether the intrinsics belong to this "
+        "camera, lens, zoom and image size; whichever is known to be right, give it a smaller sigma among the options",
+    )
+
+
+def _elevation_scale(one: SystematicErrorResult) -> DataWarning:
+    size, side = ("large", "above") if one.value > 0.0 else ("small", "below")
+    return DataWarning(
+        "angle-scale",
+        f"the radar's elevations look {_percent(one)} too {size}; on flat ground, clicks {side} the radar's phase centre would "
+        "look the same",
+        "click the reflector's apex, where its three sheets meet, not its mouth or its stand; to tell the two apart, put a few "
+        "placements at other heights (a tripod)",
+    )
+
+
+def _clicks_off_centre(off: Sequence[SystematicErrorResult]) -> DataWarning:
+    """Warn that, with a measured camera position, all clicks clearly lie beside the radar's phase centre."""
+    parts = [f"{_centimetres(one)} {_SIDES[one.name][one.value < 0.0]}" for one in off]
+    return DataWarning(
+        "clicks-off-centre",
+        f"all clicks lie {' and '.join(parts)} the radar's phase centre, or the camera is that far from its measured "
+        "position: pairs cannot tell them apart",
+        "click the reflector's apex, where its three sheets meet, not its mouth or its stand; and measure again from the "
+        "radar's antennas to the lens",
+    )
+
+
+def _by_pairs_alone(one: SystematicErrorResult) -> tuple[float, float]:
+    """Return size and standard deviation of an error without its prior, which draws the estimate towards 0."""
+    share = 1.0 - min(one.sigma / one.prior_sigma, 0.99) ** 2
+    return abs(one.value) / share, one.sigma / float(np.sqrt(share))
+
+
+def _percent(one: SystematicErrorResult) -> str:
+    value, sigma = _by_pairs_alone(one)
+    return f"{100.0 * value:.1f} ± {100.0 * sigma:.1f} %"
+
+
+def _centimetres(one: SystematicErrorResult) -> str:
+    value, sigma = _by_pairs_alone(one)
+    return f"{100.0 * value:.0f} ± {100.0 * sigma:.0f} cm"

@@ -14,11 +14,11 @@ from calib_core.diagnostics.pose import camera_position, two_poses
 from calib_core.diagnostics.posterior import agreeing_outliers, pivotal_pair, possible_poses
 from calib_core.diagnostics.refined_lens import lens_or_scale, refined_too_far
 from calib_core.diagnostics.solved_fit import SolvedFit
-from calib_core.diagnostics.systematic import angle_scale, clicks_off_centre
 from calib_core.estimation.plausibility import PIXELS_SUSPECTED, implausible_input
 from calib_core.radar import cartesian_from_polar, direction_cosines
 from calib_core.results import DataWarning
 from calib_core.results.radar_axes import without_mounting
+from calib_core.systematic_errors import systematic_error_warnings
 
 _NARROW_CONDITION = 5e5
 _WEAK_ROTATION_RAD = np.deg2rad(2.5)
@@ -43,8 +43,7 @@ def warnings_of(fit: SolvedFit) -> tuple[DataWarning, ...]:
         _few_inliers,
         _wrong_lens,
         lens_or_scale,
-        angle_scale,
-        clicks_off_centre,
+        _systematic_errors,
         _noise_excess,
         _smooth_angle_errors,
         _weak_geometry,
@@ -69,6 +68,10 @@ def _other_poses(fit: SolvedFit) -> list[DataWarning]:
 def _wrong_lens(fit: SolvedFit) -> list[DataWarning]:
     """Warn of given intrinsics that the residuals contradict, or that refining had to change beyond belief."""
     return intrinsics(fit) or refined_too_far(fit)
+
+
+def _systematic_errors(fit: SolvedFit) -> list[DataWarning]:
+    return systematic_error_warnings(fit.uncertainty.systematic_errors, flat=fit.measurements.flat)
 
 
 def _flat_radar(fit: SolvedFit) -> list[DataWarning]:

@@ -10,8 +10,8 @@ which removes what these can explain,
 because the noise was estimated with nu degrees of freedom from residuals that the wrong intrinsics had made larger. A score
 test takes one step from the optimum and needs no second fit. A wrong principal point cannot be detected: the rotation
 absorbs it. A scale of the radar's azimuths looks like a focal length and has a prior of its own, so it is not blamed on the
-lens (`systematic.angle_scale` names both). A radar without elevation is not tested: its own residuals grow towards the near
-placements.
+lens (the warning of `systematic_errors` names both). A radar without elevation is not tested: its own residuals grow towards
+the near placements.
 """
 
 from dataclasses import dataclass

@@ -1,9 +1,9 @@
 """Results: a calibration with its pairs, metrics and warnings, and the verdict on it."""
 
+from calib_core.measurements import DataWarning
 from calib_core.results.calibration import (
     Calibration,
     CheckPoint,
-    DataWarning,
     InputFile,
     Metrics,
     NextPlacement,

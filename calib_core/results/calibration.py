@@ -9,7 +9,7 @@ from calib_core.arrays import Matrix66, Points2, Points3, Vector2, Vector3, froz
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
-from calib_core.measurements import Pair, TimeNs, Unpaired
+from calib_core.measurements import DataWarning, Pair, TimeNs, Unpaired
 from calib_core.options import CalibrationOptions
 from calib_core.radar import AngleMap, RadarErrors
 from calib_core.results.radar_axes import bias_moves, camera_axes_text, sigma_in_radar_axes, without_mounting
@@ -48,21 +48,6 @@ class CovarianceParts:
         if largest <= 1.0:
             return self
         return CovarianceParts(self.systematic / largest, self.camera_position / largest)
-
-
-@dataclass(frozen=True, slots=True)
-class DataWarning:
-    """A problem in the data or the result that the user must decide on.
-
-    Attributes:
-        code: identifier for programs, such as "mirrored-axes"; stable.
-        message: what is wrong, with figures.
-        hint: what to do about it.
-    """
-
-    code: str
-    message: str
-    hint: str
 
 
 @dataclass(frozen=True, slots=True)

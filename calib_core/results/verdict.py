@@ -11,8 +11,8 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from calib_core.geometry import skew
-from calib_core.measurements import Unsolvable
-from calib_core.results.calibration import Calibration, DataWarning, NextPlacement
+from calib_core.measurements import DataWarning, Unsolvable
+from calib_core.results.calibration import Calibration, NextPlacement
 
 _BEYOND = 0.05 / 3.0  # rotation, position and picture hold together, so each may fail in a third of the 5 %
 _LEAST_FREEDOM, _MOST_FREEDOM = 0.5, 1e5
