@@ -17,7 +17,7 @@ import numpy as np
 
 from calib_core.arrays import Points2, Points3, Values
 from calib_core.camera import Camera
-from calib_core.estimation.unmeasured_elevation import is_flat
+from calib_core.estimation.measurement_model import is_flat
 from calib_core.geometry import RigidTransform
 from calib_core.radar import AngleMap, cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration, PairResult

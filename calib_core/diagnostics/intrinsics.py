@@ -20,7 +20,7 @@ import numpy as np
 
 from calib_core.arrays import Flags, Values
 from calib_core.diagnostics.solved_fit import SolvedFit
-from calib_core.estimation.prior_rows import prior_rows
+from calib_core.estimation.measurement_model import prior_rows
 from calib_core.results import DataWarning
 
 _LEVEL = 0.0025  # false-alarm probability of each unknown

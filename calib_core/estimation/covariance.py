@@ -20,7 +20,7 @@ import numpy as np
 from calib_core.arrays import Matrix66, Points2, Values
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.gnc import normal_equations
-from calib_core.estimation.prior_rows import prior_rows
+from calib_core.estimation.measurement_model import prior_rows
 from calib_core.options import RadarOptions
 from calib_core.radar import polar_from_cartesian
 from calib_core.results.calibration import CovarianceParts

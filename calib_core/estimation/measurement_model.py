@@ -1,9 +1,15 @@
 """Measurement model: the measured pairs, the errors they share, and the camera prior, as arrays.
 
-Click density: where the pixels of outliers are to be expected.
+Click density: where the pixels of outliers are to be expected. Most outliers have a good click and a radar position of
+something else, so their pixels are spread as those of all clicks are. In an aisle, where all clicks are close together, an even
+density would take agreement by chance as evidence.
 
-Most outliers have a good click and a radar position of something else, so their pixels are spread as those of all clicks are.
-In an aisle, where all clicks are close together, an even density would take agreement by chance as evidence.
+Unmeasured elevation: a radar without elevation reports one elevation, or one height, for whatever it sees. A pitch or a roll of
+the radar against the plane of the placements is then exactly a rotation, and the height of that plane above or below the radar
+a shift along its up axis, but for the range along the plane, sqrt(r^2 - h^2). So each elevation is taken as reported, with a
+small noise of its own, h^2 is estimated with the pose (`systematic_errors`), and pitch, roll and height are added to the
+covariance afterwards (`radar_axes.mounting_moves`): the pose is the one that maps reported positions to pixels, its covariance
+that of the radar's housing.
 """
 
 from collections.abc import Sequence
@@ -15,12 +21,14 @@ from calib_core.arrays import Indices, Points2, Points3, Values, Vector3, frozen
 from calib_core.association.exclusive_returns import shared_returns
 from calib_core.camera import Camera
 from calib_core.estimation.linearization import MeasurementPlanes
-from calib_core.estimation.unmeasured_elevation import OWN_SIGMA_RAD, is_flat
 from calib_core.geometry import RigidTransform, skew
 from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions
 from calib_core.radar import polar_from_cartesian
 from calib_core.systematic_errors import NO_ERRORS, SystematicErrors, systematic_errors
+
+OWN_SIGMA_RAD = np.deg2rad(0.5)
+"""Standard deviation of each placement's elevation above or below the common plane: uneven ground."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -256,6 +264,39 @@ def _prior(options: CalibrationOptions, *, flat: bool) -> CameraPrior:
     if measured is None:
         return CameraPrior(np.zeros(3), options.solving.nominal_camera_distance_m, False, height_sigma_m)
     return CameraPrior(np.array(measured.position_m), measured.sigma_m, True, height_sigma_m)
+
+
+_SAME_ELEVATION_RAD = np.deg2rad(0.01)
+_SAME_HEIGHT_M = 0.001
+_LEAST_POSITIONS = 2
+_NEARLY_ALL = 0.9
+
+
+def is_flat(points_radar_m: Points3) -> bool:
+    """Return whether nearly all radar positions (n, 3) have one elevation or one height, up to rounding."""
+    if len(points_radar_m) < _LEAST_POSITIONS:
+        return False
+    height_m = points_radar_m[:, 2]
+    elevation_rad = np.arctan2(height_m, np.hypot(points_radar_m[:, 0], points_radar_m[:, 1]))
+    return _apart(height_m) < _SAME_HEIGHT_M or _apart(elevation_rad) < _SAME_ELEVATION_RAD
+
+
+def _apart(values: Values) -> float:
+    """Return how far from their median all but a few of the values lie."""
+    return float(np.quantile(np.abs(values - np.median(values)), _NEARLY_ALL))
+
+
+def prior_rows(measurements: PairMeasurements, camera_from_radar: RigidTransform) -> tuple[Values, np.ndarray]:
+    """Return the whitened residuals (p + k,) and Jacobian (p + k, 6 + k) of the p rows of the pose's prior and k errors."""
+    errors = measurements.errors
+    residual, jacobian = measurements.prior.rows(camera_from_radar)
+    count = len(residual)
+    rows = np.zeros((count + len(errors), 6 + len(errors)))
+    rows[:count, :6] = jacobian
+    if not len(errors):
+        return residual, rows
+    rows[count:, 6:] = np.diag(1.0 / errors.sigma)
+    return np.concatenate([residual, -errors.values / errors.sigma]), rows
 
 
 _ANYWHERE = 0.3  # share of the outliers whose click is anywhere on the image

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.estimation.candidate_fit import CandidateFit, candidate_fits
+from calib_core.estimation.pair_results import CandidateFit, candidate_fits
 from calib_core.measurements import Candidate, Pair
 from calib_core.radar import polar_from_cartesian
 from calib_core.results import Calibration

@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 
 from calib_core.arrays import Values
-from calib_core.diagnostics.residual_distribution import expected_shares
+from calib_core.estimation.pair_results import expected_shares
 from calib_core.interchange import CalibrationFile, ImportedCalibration, compare, imported
 from calib_core.measurements import Candidate
 from calib_core.radar import polar_from_cartesian

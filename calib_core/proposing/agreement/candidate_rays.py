@@ -7,7 +7,7 @@ import numpy as np
 
 from calib_core.arrays import Flags, Indices, Points2, Points3, Values, frozen_array
 from calib_core.camera import Camera
-from calib_core.estimation.unmeasured_elevation import OWN_SIGMA_RAD, is_flat
+from calib_core.estimation.measurement_model import OWN_SIGMA_RAD, is_flat
 from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
 from calib_core.proposing.dwell_views import DwellView

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from calib_core.diagnostics.residual_distribution import expected_shares
+from calib_core.estimation.pair_results import expected_shares
 
 
 def test_round_noise_gives_the_rayleigh_distribution() -> None:
