@@ -4,6 +4,10 @@ A placement is a strong static return that appears, stays in one place for secon
 time is clutter. What appears and disappears together with something stronger is its multipath ghost or what carries it, and
 what is much weaker is the person waiting next to it. Two reflectors that stand at the same time are as strong as each other
 and are moved in turn. The timeline shows the placements, and the N and P keys step through them.
+
+They are chosen among the dwells (`find_dwells`), the intervals during which a return stays at one place. What is there all the
+time is clutter and gives no dwell. The ends of a dwell, at which somebody holds the reflector and its echo is much weaker, are
+cut off.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -11,8 +15,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib_core.arrays import Vector3, frozen_array
-from calib_core.association.dwells import Dwell, find_dwells
+from calib_core.arrays import Flags, Indices, Points3, TimesNs, Values, Vector3, frozen_array
+from calib_core.association.alternatives import first_rows, return_keys
+from calib_core.association.clustering import CLUSTER_SCALE, cluster_scale
+from calib_core.association.gating import static_returns
 from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 from calib_core.options import GatingOptions
 from calib_core.radar import direction_cosines
@@ -29,6 +35,51 @@ _NOT_MOVED = 0.5  # reaches, between the two parts of an interrupted dwell
 _LONGEST_BREAK_S = 6.0  # while somebody walks between radar and reflector
 _LEAST_SCORE = 0.5  # times that of a good placement of this recording
 _GOOD_SHARE = 0.75  # of the placements score less than a good one
+_LEAST_COMMON = 0.25  # of the returns of two dwells that are alternatives
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Dwell:
+    """A placement before it is compared with the others.
+
+    Attributes:
+        start: first stamp.
+        end: last stamp.
+        position_radar_m: (3,) median.
+        presence: share of its scans that show it.
+        presence_outside: share of the other scans that show the same place.
+        snr_db: mean of its returns; NaN when unknown.
+        strength_db: SNR corrected for range, a measure of the radar cross-section; 0 if unknown.
+        reach: (3,) of its returns about their median in range [m], u and w.
+        begins: the scans show that it was not there before its start.
+        ends: the same after its end.
+        keys: (k,) numbers of those returns that have alternatives, which these share; ascending.
+        listed_first: share of its returns that the radar lists first among their alternatives.
+    """
+
+    start: TimeNs
+    end: TimeNs
+    position_radar_m: Vector3
+    presence: float
+    presence_outside: float
+    snr_db: float
+    strength_db: float
+    reach: Vector3
+    begins: bool
+    ends: bool
+    keys: Indices
+    listed_first: float
+
+    def is_alternative_of(self, other: "Dwell") -> bool:
+        """Return whether both are the same returns, at positions of which at most one is true."""
+        common = len(np.intersect1d(self.keys, other.keys, assume_unique=True))
+        return common > _LEAST_COMMON * min(len(self.keys), len(other.keys))
+
+    @property
+    def weight(self) -> float:
+        """Rank among simultaneous dwells: strength, presence and duration [dB]."""
+        lasted_s = (self.end - self.start) / NS_PER_S
+        return self.strength_db + float(10.0 * np.log10(self.presence * lasted_s))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -175,3 +226,277 @@ def _placement(dwell: Dwell, typical_db: float) -> Placement:
         score=dwell.presence * novelty * strength,
         snr_db=dwell.snr_db,
     )
+
+
+CELL = np.array([0.08, 0.04, 0.08])
+"""Size of a cell in range [m], u = y / r and w = z / r: the reflector's returns scatter over a few of them.
+
+It grows with the cluster scale for a radar that scatters more, and so does the reach.
+"""
+
+_REACH = np.array([0.07, 0.035, 0.09])  # of a dwell's returns about their median, in the same coordinates
+_LARGEST_GAP_S = 0.7  # a longer gap ends a dwell
+_SEED_GAP_S = 1.2  # within one cell, because the returns may alternate between neighbouring cells
+_SEED_SHARE_OF_DWELL = 0.5
+_LEAST_PRESENCE = 0.4  # share of a dwell's scans that show it
+_MOST_PRESENCE_OUTSIDE = 0.25  # the same for the rest of the recording, relative to the dwell's
+_MOST_OF_RECORDING = 0.5  # what stays longer is part of the scene
+_MARGIN_S = 1.0  # around a dwell, where the reflector is being put down or picked up
+_BEFORE_S = (0.5, 1.5)  # before a dwell's start, or after its end: scans there show that it had not begun
+_MOST_SEEDS = 4000
+
+
+def find_dwells(scans: RadarScans, options: GatingOptions, *, min_dwell_s: float) -> list["Dwell"]:
+    """Find the dwells of a recording; one return may give several that hardly differ. O(n log n) for n returns.
+
+    Args:
+        scans: of a whole recording.
+        options: which returns are static and in range.
+        min_dwell_s: the shortest dwell [s].
+    """
+    static = static_returns(scans, options)
+    grid = _Grid.of(static, cluster_scale([static]) / CLUSTER_SCALE)
+    return [dwell for seed in _seeds(grid, min_dwell_s) if (dwell := _dwell_of(grid, seed, min_dwell_s)) is not None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Grid:
+    """Static returns sorted by cell, and by time within a cell.
+
+    Attributes:
+        times_s: (m,) of all scans, from the first.
+        times_ns: (m,) the same as stamps.
+        cells: (k, 3) the occupied cells in the order of their keys.
+        keys: (k,) ascending.
+        first: (k + 1,) cell i owns the rows first[i] to first[i + 1].
+        scan: (n,) the scan of each row.
+        cosines: (n, 3) range [m], u, w.
+        points_radar_m: (n, 3).
+        snr_db: (n,) NaN where unknown.
+        key: (n,) as of `return_keys`.
+        listed_first: (n,) as of `first_rows`.
+        cell: (3,) size of a cell.
+        reach: (3,) of a dwell's returns about their median.
+    """
+
+    times_s: Values
+    times_ns: TimesNs
+    cells: Indices
+    keys: Indices
+    first: Indices
+    scan: Indices
+    cosines: Points3
+    points_radar_m: Points3
+    snr_db: Values
+    key: Indices
+    listed_first: Flags
+    cell: Vector3
+    reach: Vector3
+
+    @classmethod
+    def of(cls, static: RadarScans, growth: Vector3) -> "_Grid":
+        """Sort static returns into cells that are larger than the least size by a factor (3,)."""
+        cosines = direction_cosines(static.points_radar_m)
+        cells = np.floor(cosines / (CELL * growth)).astype(np.int64)
+        keys = _keys(cells)
+        keys_of_returns = return_keys(static)
+        order = np.argsort(keys, kind="stable")
+        unique, first = np.unique(keys[order], return_index=True)
+        start_ns = static.times_ns[0] if len(static) else 0
+        return cls(
+            times_s=(static.times_ns - start_ns) / NS_PER_S,
+            times_ns=static.times_ns,
+            cells=cells[order][first],
+            keys=unique,
+            first=np.append(first, len(order)),
+            scan=static.scan_of_return()[order],
+            cosines=cosines[order],
+            points_radar_m=static.points_radar_m[order],
+            snr_db=static.snr_db[order],
+            key=keys_of_returns[order],
+            listed_first=first_rows(keys_of_returns)[order],
+            cell=CELL * growth,
+            reach=_REACH * growth,
+        )
+
+    def around(self, cell: Indices) -> Indices:
+        """Return the rows of a cell and of its 26 neighbours."""
+        keys = _keys(cell + _NEIGHBOURS)
+        places = np.minimum(np.searchsorted(self.keys, keys), len(self.keys) - 1)
+        owned = places[self.keys[places] == keys]
+        return np.concatenate([np.arange(self.first[i], self.first[i + 1]) for i in owned.tolist()])
+
+
+_NEIGHBOURS = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1], [-1, 0, 1], indexing="ij"), axis=-1).reshape(-1, 3)
+_U_CELLS = 64  # u and w lie in -1 to 1: 51 and 26 cells, and a margin for neighbours
+_W_CELLS = 64
+
+
+def _keys(cells: Indices) -> Indices:
+    return (cells[..., 0] * _U_CELLS + cells[..., 1] + _U_CELLS // 2) * _W_CELLS + cells[..., 2] + _W_CELLS // 2
+
+
+@dataclass(frozen=True, slots=True)
+class _Seed:
+    """A run of returns in one cell: rows first to last of the grid."""
+
+    first: int
+    last: int
+
+
+def _seeds(grid: _Grid, min_dwell_s: float) -> Iterator[_Seed]:
+    """Yield the runs that may belong to a placement, those with the most scans first."""
+    if not len(grid.scan):
+        return
+    times_s = grid.times_s[grid.scan]
+    breaks = np.diff(times_s) > _SEED_GAP_S
+    breaks[grid.first[1:-1] - 1] = True
+    start = np.concatenate([[0], np.flatnonzero(breaks) + 1])
+    end = np.append(start[1:], len(times_s))
+    lasted_s = times_s[end - 1] - times_s[start]
+    in_cell = np.diff(grid.first)[np.searchsorted(grid.first, start, side="right") - 1]
+    inside = (end - start) / (lasted_s + _MARGIN_S)
+    presence_outside = (in_cell - (end - start)) / np.maximum(grid.times_s[-1] - lasted_s, _MARGIN_S)
+    likely = (lasted_s >= _SEED_SHARE_OF_DWELL * min_dwell_s) & (
+        presence_outside <= 2.0 * _MOST_PRESENCE_OUTSIDE * inside
+    )
+    rows = np.flatnonzero(likely)
+    for i in rows[np.argsort(start[rows] - end[rows], kind="stable")][:_MOST_SEEDS].tolist():
+        yield _Seed(int(start[i]), int(end[i]))
+
+
+def _dwell_of(grid: _Grid, seed: _Seed, min_dwell_s: float) -> Dwell | None:
+    """Extend a seed beyond its cell: collect the returns around its median and find when they are present."""
+    centre = np.median(grid.cosines[seed.first : seed.last], axis=0)
+    rows = grid.around(np.floor(centre / grid.cell).astype(np.int64))
+    seed_times_s = grid.times_s[grid.scan[seed.first : seed.last]]
+    members = rows[:0]
+    span: tuple[int, int] | None = None
+    for _ in range(2):  # the second time around the median of the dwell itself
+        members = rows[(np.abs(grid.cosines[rows] - centre) <= grid.reach).all(axis=1)]
+        span = _span(grid, members, float(np.median(seed_times_s)))
+        if span is None:
+            return None
+        in_span = (grid.scan[members] >= span[0]) & (grid.scan[members] <= span[1])
+        centre = np.median(grid.cosines[members[in_span]], axis=0)
+    if span is None or grid.times_s[span[1]] - grid.times_s[span[0]] < min_dwell_s:
+        return None
+    return _checked_dwell(grid, members, span)
+
+
+def _span(grid: _Grid, members: Indices, within_s: float) -> tuple[int, int] | None:
+    """Return the first and last scan of the uninterrupted presence around a time; None if there is none."""
+    shown = np.unique(grid.scan[members])
+    if not len(shown):
+        return None
+    nearest = int(np.argmin(np.abs(grid.times_s[shown] - within_s)))
+    ends = np.flatnonzero(np.diff(grid.times_s[shown]) > _LARGEST_GAP_S)
+    after = int(np.searchsorted(ends, nearest))
+    first = int(ends[after - 1]) + 1 if after > 0 else 0
+    last = int(ends[after]) if after < len(ends) else len(shown) - 1
+    return int(shown[first]), int(shown[last])
+
+
+def _without_hands(grid: _Grid, members: Indices, span: tuple[int, int]) -> tuple[int, int]:
+    """Leave out the scans at both ends of a span in which the reflector was held."""
+    strongest_db = np.full(span[1] - span[0] + 1, -np.inf)
+    rows = members[
+        (grid.scan[members] >= span[0]) & (grid.scan[members] <= span[1]) & np.isfinite(grid.snr_db[members])
+    ]
+    np.maximum.at(strongest_db, grid.scan[rows] - span[0], grid.snr_db[rows])
+    strongest_db[np.isinf(strongest_db)] = np.nan
+    firm = firm_span(grid.times_s[span[0] : span[1] + 1], strongest_db)
+    return span[0] + firm.first, span[0] + firm.last
+
+
+def _checked_dwell(grid: _Grid, members: Indices, span: tuple[int, int]) -> Dwell | None:
+    """Measure the presence inside and outside a dwell's span; None if the dwell is clutter or chance."""
+    span = _without_hands(grid, members, span)
+    shown = np.unique(grid.scan[members])
+    inside = (shown >= span[0]) & (shown <= span[1])
+    presence = float(inside.sum()) / (span[1] - span[0] + 1)
+    start_s, end_s = grid.times_s[span[0]], grid.times_s[span[1]]
+    others = _outside(grid.times_s, start_s, end_s)
+    presence_outside = float(_outside(grid.times_s[shown], start_s, end_s).sum()) / max(float(others.sum()), 1.0)
+    stays = end_s - start_s > _MOST_OF_RECORDING * grid.times_s[-1]
+    if stays or presence < _LEAST_PRESENCE or presence_outside > _MOST_PRESENCE_OUTSIDE * presence:
+        return None
+    mine = members[(grid.scan[members] >= span[0]) & (grid.scan[members] <= span[1])]
+    position_radar_m = np.median(grid.points_radar_m[mine], axis=0)
+    snr_db = grid.snr_db[mine]
+    known = snr_db[np.isfinite(snr_db)]
+    mean_db = float(known.mean()) if len(known) else float("nan")
+    range_m = float(np.linalg.norm(position_radar_m))
+    return Dwell(
+        start=TimeNs(int(grid.times_ns[span[0]])),
+        end=TimeNs(int(grid.times_ns[span[1]])),
+        position_radar_m=position_radar_m,
+        presence=presence,
+        presence_outside=presence_outside,
+        snr_db=mean_db,
+        strength_db=mean_db + 40.0 * float(np.log10(max(range_m, 1e-3))) if len(known) else 0.0,
+        reach=grid.reach,
+        begins=_any_within(grid.times_s, start_s - _BEFORE_S[1], start_s - _BEFORE_S[0]),
+        ends=_any_within(grid.times_s, end_s + _BEFORE_S[0], end_s + _BEFORE_S[1]),
+        keys=np.unique(grid.key[mine][grid.key[mine] >= 0]),
+        listed_first=float(grid.listed_first[mine].mean()),
+    )
+
+
+def _outside(times_s: Values, start_s: float, end_s: float) -> Flags:
+    return (times_s < start_s - _MARGIN_S) | (times_s > end_s + _MARGIN_S)
+
+
+def _any_within(times_s: Values, first_s: float, last_s: float) -> bool:
+    return bool(np.searchsorted(times_s, first_s) < np.searchsorted(times_s, last_s))
+
+
+_OUTSHONE_DB = 6.0
+
+_WEAKER_SCATTERS = 4.0
+"""How far below the dwell's median an echo is weak: in decibels at least, and in standard deviations of its echoes."""
+
+_LONGEST_END_S = 1.2
+"""What is weak for longer is a dwell whose echo changes, not an end."""
+
+_AT_END_S = 0.45
+
+_STRONG_SHARE = 0.5
+"""How many scans in the last moments are strong, relative to the whole dwell."""
+
+_FEW = 5
+
+
+@dataclass(frozen=True, slots=True)
+class FirmSpan:
+    """The first and last scan in which the reflector stood alone, counted from the first scan given."""
+
+    first: int
+    last: int
+
+
+def firm_span(times_s: Values, snr_db: Values) -> FirmSpan:
+    """Leave out weak echoes at both ends of a dwell; nothing is left out where the radar reports no strength.
+
+    Args:
+        times_s: (m,) of all scans from the first that shows the dwell to the last, ascending.
+        snr_db: (m,) of its strongest return in each; NaN where there is none, or unknown.
+    """
+    known = snr_db[np.isfinite(snr_db)]
+    last = len(times_s) - 1
+    if len(known) < _FEW:
+        return FirmSpan(0, last)
+    median_db = float(np.median(known))
+    scatter_db = 1.48 * float(np.median(np.abs(known - median_db)))
+    strong = np.nan_to_num(snr_db, nan=-np.inf) >= median_db - max(_OUTSHONE_DB, _WEAKER_SCATTERS * scatter_db)
+    first = _first_firm(times_s - times_s[0], strong)
+    return FirmSpan(first, last - _first_firm((times_s[-1] - times_s)[::-1], strong[::-1]))
+
+
+def _first_firm(since_s: Values, strong: Flags) -> int:
+    """Return the first strong scan after which as many are strong as usual; 0 if there is none near the end."""
+    for row in np.flatnonzero(strong & (since_s <= _LONGEST_END_S)).tolist():
+        after = (since_s >= since_s[row]) & (since_s <= since_s[row] + _AT_END_S)
+        if strong[after].mean() >= _STRONG_SHARE * strong.mean():
+            return int(row)
+    return 0
