@@ -12,9 +12,8 @@ from calib_core.association.pairing import pair_clicks
 from calib_core.association.placement_groups import PlacementGroup, placement_groups
 from calib_core.camera import Camera
 from calib_core.diagnostics.angle_map import learn_angle_map
-from calib_core.diagnostics.checks import warnings_of
+from calib_core.diagnostics.checks import flat_radar, warnings_of
 from calib_core.diagnostics.clocks import CLOCK_CODES, clocks
-from calib_core.diagnostics.elevation import flat_radar
 from calib_core.diagnostics.next_placement import next_placement
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.diagnostics.uncertainty_map import picture_sigma_px

@@ -659,6 +659,11 @@ class SystematicErrorResult:
         """What it is, within a sentence."""
         return error_words(self.name).text
 
+    @property
+    def of_lens(self) -> bool:
+        """Whether it is one of the intrinsics."""
+        return self.name.startswith(("lens_", "principal_", "focal_length", "distortion"))
+
 
 @dataclass(frozen=True, slots=True)
 class DominantError:

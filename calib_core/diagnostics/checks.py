@@ -6,18 +6,19 @@ A check returns an empty list if all is well. The texts are for people; the code
 import numpy as np
 
 from calib_core.association.clustering import CLUSTER_SCALE
-from calib_core.diagnostics.elevation import flat_radar
 from calib_core.diagnostics.handedness import assumed_axes, mirrored_axes
-from calib_core.diagnostics.intrinsics import intrinsics
-from calib_core.diagnostics.pairs import ambiguous_candidates, contradicted_pairs, decisive_pair, listed
-from calib_core.diagnostics.pose import camera_position, two_poses
-from calib_core.diagnostics.posterior import agreeing_outliers, pivotal_pair, possible_poses
-from calib_core.diagnostics.refined_lens import lens_or_scale, refined_too_far
+from calib_core.diagnostics.intrinsics import intrinsics, lens_or_scale, refined_too_far
+from calib_core.diagnostics.pairs import ambiguous_candidates, contradicted_pairs, decisive_pair, listed, pivotal_pair
+from calib_core.diagnostics.pose import agreeing_outliers, camera_position, possible_poses, two_poses
 from calib_core.diagnostics.solved_fit import SolvedFit
+from calib_core.diagnostics.uncertainty_map import picture_sigma_px
+from calib_core.estimation.covariance import PoseCovariance
+from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.plausibility import PIXELS_SUSPECTED, implausible_input
+from calib_core.options import RadarOptions
 from calib_core.radar import cartesian_from_polar, direction_cosines
 from calib_core.results import DataWarning
-from calib_core.results.radar_axes import without_mounting
+from calib_core.results.radar_axes import sigma_in_radar_axes, without_mounting
 from calib_core.systematic_errors import systematic_error_warnings
 
 _NARROW_CONDITION = 5e5
@@ -186,5 +187,33 @@ def _same_places(fit: SolvedFit) -> list[DataWarning]:
             f"{count} pairs cover only {places} places; a radar repeats its error at the same place, so the stated "
             "uncertainty is too small",
             "move the reflector between clicks; more clicks of one placement add little",
+        )
+    ]
+
+
+def flat_radar(refined: ErrorsInVariablesFit, uncertainty: PoseCovariance, radar: RadarOptions) -> list[DataWarning]:
+    """Say what the pairs of a radar without elevation determine, and what depends on how it is mounted.
+
+    Args:
+        refined: the fit.
+        uncertainty: its covariance.
+        radar: priors of the mounting.
+    """
+    if not refined.measurements.flat:
+        return []
+    pose, stated = refined.camera_from_radar, uncertainty.covariance
+    firm = sigma_in_radar_axes(pose, without_mounting(pose, stated, refined.placements_z_m, radar))
+    (forward, left), yaw = 100.0 * firm.position_m[:2], np.rad2deg(firm.rotation_rad[2])
+    assumed = sigma_in_radar_axes(pose, stated)
+    up, (roll, pitch) = 100.0 * assumed.position_m[2], np.rad2deg(assumed.rotation_rad[:2])
+    return [
+        DataWarning(
+            "flat-radar",
+            f"this radar measures no elevation. One sigma: the pairs determine forward ± {forward:.0f} cm, left ± {left:.0f} cm "
+            f"and yaw ± {yaw:.1f} deg in the plane of the placements, and where its returns appear in the picture, "
+            f"± {picture_sigma_px(refined, uncertainty):.0f} px; up ± {up:.0f} cm, pitch ± {pitch:.1f} and roll "
+            f"± {roll:.1f} deg are assumptions about how it is mounted",
+            "state among the options how well the radar's tilt and height are known, or measure the camera position; if the "
+            "radar does measure elevation, find out why it is missing",
         )
     ]

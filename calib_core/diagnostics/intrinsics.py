@@ -1,4 +1,6 @@
-"""Score test of the intrinsics: how much of the residuals another focal length or radial distortion would explain.
+"""Warnings about the intrinsics: contradicted by the residuals, changed too far by refining, or not told apart from the radar.
+
+Score test of the given ones: how much of the residuals another focal length or radial distortion would explain.
 
 To first order, a focal length longer by a share a moves a pixel by a d, with d its offset from the principal point; a
 radial distortion that is off by b moves it by b |d / f|^2 d, whatever the lens model. With whitened residuals e, whitened
@@ -12,6 +14,14 @@ test takes one step from the optimum and needs no second fit. A wrong principal 
 absorbs it. A scale of the radar's azimuths looks like a focal length and has a prior of its own, so it is not blamed on the
 lens (the warning of `systematic_errors` names both). A radar without elevation is not tested: its own residuals grow towards
 the near placements.
+
+Refined ones: a focal length longer by a share a moves every pixel almost as angles reported too large by a share -a, so pairs
+show the sum of the two well, and how it divides only by the priors. With C the covariance of all unknowns, f the focal length
+and s the scales,
+
+    C_fs C_ss^-1 C_sf / C_ff
+
+is the part of the focal length's variance that knowing the scales would remove.
 """
 
 from dataclasses import dataclass
@@ -22,6 +32,7 @@ from calib_core.arrays import Flags, Values
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.estimation.measurement_model import prior_rows
 from calib_core.results import DataWarning
+from calib_core.systematic_errors import LensPrior, error_words, is_beyond_its_prior, knowledge_text
 
 _LEVEL = 0.0025  # false-alarm probability of each unknown
 _LEAST_PAIRS = 10
@@ -175,3 +186,84 @@ def _chance(squared: float, degrees_of_freedom: float) -> float:
 
     nu = degrees_of_freedom
     return float(fdtrc(1.0, nu - 1.0, squared) if nu > 2.0 else chdtrc(1.0, squared))
+
+
+_SCALES = ("azimuth_scale", "elevation_scale")
+_UNTOLD_SHARE = 0.5  # of the focal length's variance
+_NOTABLE_FOCAL = 0.002  # a focal length known better than this is no concern
+
+
+@dataclass(frozen=True, slots=True)
+class _Focal:
+    """The refined focal length: change of the given one as a share, its standard deviation, and the part of the scales."""
+
+    change: float
+    sigma: float
+    scale_share: float
+
+
+def lens_or_scale(fit: SolvedFit) -> list[DataWarning]:
+    """Warn that the refined focal length and the radar's angle scale cannot be told apart."""
+    focal = _focal(fit)
+    if focal is None or focal.sigma < _NOTABLE_FOCAL or focal.scale_share < _UNTOLD_SHARE:
+        return []
+    scales = [one for one in fit.uncertainty.systematic_errors if one.name in _SCALES]
+    found = ", ".join(f"{error_words(one.name).text} {_percent(one.value, one.sigma)}" for one in scales)
+    return [
+        DataWarning(
+            "lens-or-radar-scale",
+            f"lens or radar scale, the data cannot tell: the focal length was changed by {_percent(focal.change, focal.sigma)}, "
+            f"with {found}; pairs show the sum of both, and only what was assumed before divides it",
+            "measure the radar's angle scale (turn it by known angles) and state radar.azimuth_scale_sigma and "
+            "radar.elevation_scale_sigma accordingly, or calibrate the lens with a board, whose result says how well it is known",
+        )
+    ]
+
+
+def refined_too_far(fit: SolvedFit) -> list[DataWarning]:
+    """Warn of refined intrinsics so far from the given ones that these, or what was stated of them, cannot be right."""
+    errors = fit.refined.measurements.errors
+    if errors.refined.start == errors.refined.stop:
+        return []
+    beyond = [one for one in fit.uncertainty.systematic_errors if one.of_lens and is_beyond_its_prior(one)]
+    if not beyond:
+        return []
+    found = "; ".join(f"{error_words(one.name).label} {knowledge_text(one)}" for one in beyond)
+    return [
+        DataWarning(
+            "intrinsics-suspected",
+            f"refining changed the intrinsics by more than three times what was stated of them: {found}; the refined camera is "
+            "not to be relied on",
+            "check that the intrinsics belong to this camera, lens, zoom and image size, also the signs of the distortion, and "
+            "calibrate the lens with a board; only if they are that rough, give refining a larger sigma",
+        )
+    ]
+
+
+def _percent(value: float, sigma: float) -> str:
+    return f"{100.0 * value:+.1f} ± {100.0 * sigma:.1f} %"
+
+
+def _focal(fit: SolvedFit) -> _Focal | None:
+    """Return what is known of the refined focal length; None if it was not refined together with a scale."""
+    errors = fit.refined.measurements.errors
+    scales = [6 + k for k, one in enumerate(errors.estimated) if one.name in _SCALES]
+    places = errors.refined
+    if errors.lens is None or places.start == places.stop or not scales:
+        return None
+    along = _focal_along(errors.lens)
+    covariance = np.linalg.inv(fit.uncertainty.information)
+    lens = list(range(6 + places.start, 6 + places.stop))
+    variance = float(along @ covariance[np.ix_(lens, lens)] @ along)
+    if variance <= 0.0:
+        return None
+    mixed = covariance[np.ix_(scales, lens)] @ along
+    removed = float(mixed @ np.linalg.solve(covariance[np.ix_(scales, scales)], mixed))
+    stated = fit.uncertainty.lens
+    sigma = float(np.sqrt(variance if stated is None else along @ stated @ along))
+    return _Focal(float(along @ errors.values[places]), sigma, removed / variance)
+
+
+def _focal_along(lens: LensPrior) -> Values:
+    """Return by what share both focal lengths together change along each axis of the prior: (r,)."""
+    return np.asarray((lens.along_axes[:2] / lens.camera.parameters[:2, None]).mean(axis=0))

@@ -58,6 +58,23 @@ def contradicted_pairs(fit: SolvedFit) -> list[DataWarning]:
     ]
 
 
+def pivotal_pair(fit: SolvedFit) -> list[DataWarning]:
+    """Name the pair without which the others, judged anew, agree on another pose."""
+    found = fit.beyond.pivotal
+    if found is None or any(influential.pair == found.pair for influential in fit.influential_pairs):
+        return []
+    name = fit.ids[found.pair]
+    changed = f", and {listed([fit.ids[i] for i in found.switched])} would change sides" if len(found.switched) else ""
+    return [
+        DataWarning(
+            "doubtful-pair",
+            f"the pose rests on {name}: without {name} the camera moves {100 * found.camera_move_m:.0f} cm, "
+            f"{found.standard_deviations:.1f} standard deviations{changed}",
+            f"check the click and the radar position of {name}, or add placements near it",
+        )
+    ]
+
+
 def decisive_pair(fit: SolvedFit) -> list[DataWarning]:
     """Name the pair that alone determines some direction of the pose: no other pair would reveal an error in it."""
     if fit.inliers.sum() < _LEAST_PAIRS:

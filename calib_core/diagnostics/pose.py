@@ -1,10 +1,12 @@
-"""Warnings about the pose as a whole: a second pose, and an implausible camera position."""
+"""Warnings about the pose as a whole: a second pose, also among the samples of the posterior or of the pairs set aside, and an
+implausible camera position."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib_core.arrays import Matrix33, Matrix66, Vector3
+from calib_core.arrays import Matrix33, Matrix66, Values, Vector3
+from calib_core.diagnostics.pairs import listed
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.estimation.covariance import pose_covariance
 from calib_core.estimation.errors_in_variables import fit_errors_in_variables
@@ -15,17 +17,8 @@ from calib_core.results import DataWarning
 _ALMOST_AS_LIKELY = 6.0  # a difference of twice the log-likelihood
 _WORTH_REFINING = 40.0
 _OTHER_POSE_SIGMAS = 6.0
-_CONTRADICTION_LEVEL = 0.99
-_OTHER_UNIT_SIGMAS = 4.0
-_SCREENING_SIGMAS = 1.8
-_AGREEING_SIGMAS = 3.0
-_UNIT_SLIPS = (
-    ("the measured position looks like centimetres", 0.01, 2.0),
-    ("the measured position looks like millimetres", 0.001, 2.0),
-    ("the measured position looks like feet", 0.3048, 0.0),
-    ("the radar's ranges look like feet", 1.0 / 0.3048, 0.0),
-)
-"""What would remove a contradiction, the factor on the measured position, and the smallest position [m] it is said of."""
+_LEAST_PROBABILITY = 0.05
+_OTHER_PEAK_SIGMAS = 4.0
 
 
 def two_poses(fit: SolvedFit) -> list[DataWarning]:
@@ -111,6 +104,59 @@ def _moved_m(fit: SolvedFit, other: GncSolution) -> float:
     """Return the distance between the camera centres of the solved pose and another."""
     here, there = _camera_centre(fit.refined.camera_from_radar), _camera_centre(other.camera_from_radar)
     return float(np.linalg.norm(here - there))
+
+
+def possible_poses(fit: SolvedFit) -> list[DataWarning]:
+    """Warn if the samples of the posterior lie about several separate poses."""
+    here = fit.refined.camera_from_radar
+    for other in fit.beyond.possible:
+        error = other.camera_from_radar.error_from(here)
+        sigmas = float(np.sqrt(error @ np.linalg.solve(fit.uncertainty.covariance, error)))
+        if other.probability >= _LEAST_PROBABILITY and sigmas > _OTHER_PEAK_SIGMAS:
+            return [
+                DataWarning(
+                    "two-poses",
+                    f"another pose, {_away(error)}, has a probability of {100 * other.probability:.0f} %: which of the pairs "
+                    "are wrong is not clear",
+                    "measure the camera position with a tape, or add placements nearer and farther than the present ones",
+                )
+            ]
+    return []
+
+
+def agreeing_outliers(fit: SolvedFit) -> list[DataWarning]:
+    """Name the outliers that agree among themselves on another pose."""
+    found = fit.beyond.agreeing
+    if found is None:
+        return []
+    names = [fit.ids[i] for i in found.pairs]
+    return [
+        DataWarning(
+            "agreeing-outliers",
+            f"{len(names)} pairs that were set aside agree on another pose, {_away(found.difference)}: {listed(names)}",
+            "check which group shows the reflector: an object that always stands near it, such as a cart, or a second "
+            "reflector gives such a group; exclude the wrong one",
+        )
+    ]
+
+
+def _away(error: Values) -> str:
+    """Return in words how far a pose error (6,) is."""
+    return f"{np.rad2deg(np.linalg.norm(error[3:])):.1f} deg and {100 * np.linalg.norm(error[:3]):.0f} cm away"
+
+
+_CONTRADICTION_LEVEL = 0.99
+_OTHER_UNIT_SIGMAS = 4.0
+_SCREENING_SIGMAS = 1.8
+_AGREEING_SIGMAS = 3.0
+
+_UNIT_SLIPS = (
+    ("the measured position looks like centimetres", 0.01, 2.0),
+    ("the measured position looks like millimetres", 0.001, 2.0),
+    ("the measured position looks like feet", 0.3048, 0.0),
+    ("the radar's ranges look like feet", 1.0 / 0.3048, 0.0),
+)
+"""What would remove a contradiction, the factor on the measured position, and the smallest position [m] it is said of."""
 
 
 def camera_position(fit: SolvedFit) -> list[DataWarning]:

@@ -18,13 +18,10 @@ def uncertainty_sentences(calibration: Calibration) -> tuple[str, ...]:
 
 def refined_sentences(calibration: Calibration) -> tuple[str, ...]:
     """Say by how much refining changed the intrinsics; empty if they were not refined."""
-    lens = ("lens_", "principal_", "focal_length", "distortion")
     refined = [
         one
         for one in calibration.systematic_errors
-        if one.estimated
-        and one.name.startswith(lens)
-        and (is_determined(one) or abs(one.value) >= one.prior_sigma > 0.0)
+        if one.estimated and one.of_lens and (is_determined(one) or abs(one.value) >= one.prior_sigma > 0.0)
     ]
     if calibration.given_camera is None:
         return ()
