@@ -64,7 +64,7 @@ def pivotal_pair(fit: SolvedFit) -> list[DataWarning]:
     if found is None or any(influential.pair == found.pair for influential in fit.influential_pairs):
         return []
     name = fit.ids[found.pair]
-    changed = f", and {listed([fit.ids[i] for i in found.switched])} would change sides" if len(found.switched) else ""
+    changed = f", and {listed([fit.ids[i] for i in found.switched])} would change sides" if found.switched else ""
     return [
         DataWarning(
             "doubtful-pair",

@@ -3,6 +3,11 @@
 A wrong pair that few others check can be too close to their prediction to be rejected as an outlier: near the camera and
 at the edge of the picture, the pose follows it. Each pair is tested against its prediction from the others. The
 false-alarm probability is divided among the pairs by leverage, so the test is most sensitive where an error would do most harm.
+
+A wrong pair can also agree with a few others, right or wrong, on a wrong pose and so have pairs set aside that contradict it.
+Leaving it out by one Newton step, or with the weights of the others kept, does not show that. The pivotal pair is the one without
+which the others, judged anew, agree on another pose: every pair is left out in turn, all fits run as one batch, and in each the
+others decide again which of them are inliers.
 """
 
 from collections.abc import Sequence
@@ -16,6 +21,8 @@ from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit, fit_
 from calib_core.estimation.gnc import GncSolution, associate
 from calib_core.estimation.leave_one_out_prediction import noise_parts, predict_left_out, tail_chance
 from calib_core.estimation.measurement_model import PairMeasurements
+from calib_core.estimation.posterior.pose_posterior import batch_of, pose_posterior
+from calib_core.estimation.posterior.samples import refine_poses
 
 _LEVEL = 0.055  # false-alarm probability per set of pairs
 _LARGEST_SHARE = 0.25  # of that level for one pair
@@ -33,13 +40,16 @@ class InfluentialPair:
         pair: its index in the measurements.
         move: (6,) change of the pose without it, (dt, dtheta) [m, rad].
         camera_move_m: distance by which the camera centre moves.
-        standard_deviations: distance of the pair from the prediction of the others.
+        standard_deviations: distance of the pair from the prediction of the others; of a pivotal pair, length of the move
+            under the covariance without it.
+        switched: indices of the pairs that are inliers either with it or without it, but not both; of a pivotal pair only.
     """
 
     pair: int
     move: Values
     camera_move_m: float
     standard_deviations: float
+    switched: tuple[int, ...] = ()
 
 
 def find_influential_pairs(
@@ -116,3 +126,43 @@ def average_over_influential_pairs(
     covariance = uncertainty.covariance + sum(0.25 * np.outer(pair.move, pair.move) for pair in influential_pairs)
     moved = replace(refined, camera_from_radar=refined.camera_from_radar.perturbed(move))
     return moved, replace(uncertainty, covariance=covariance)
+
+
+_PIVOTAL_MOVE = 2.6  # standard deviations without the pair; sets of right pairs exceed it in at most one of a hundred
+_LEAST_PAIRS_OF_PIVOT = 6.0
+_MOST_PAIRS_OF_PIVOT = 100  # in larger sets no single pair matters
+_ROUNDS = 8
+
+
+def find_pivotal_pair(measurements: PairMeasurements, refined: ErrorsInVariablesFit) -> InfluentialPair | None:
+    """Return the pair on which the pose depends most, if the pose moves far without it.
+
+    Args:
+        measurements: all pairs with the assumed noise.
+        refined: their fit.
+    """
+    inliers = np.flatnonzero(refined.inliers)
+    if refined.weights.sum() < _LEAST_PAIRS_OF_PIVOT or len(measurements) > _MOST_PAIRS_OF_PIVOT:
+        return None
+    posterior = pose_posterior(measurements, refined.camera_from_radar, np.zeros(3))
+    used = np.ones((len(inliers) + 1, len(measurements)), dtype=bool)
+    used[1 + np.arange(len(inliers)), inliers] = False
+    log_scales = np.tile(np.log(refined.noise_scale), (len(used), 1))
+    starts = batch_of([refined.camera_from_radar] * len(used))
+    modes = refine_poses(posterior, starts, log_scales, share=refined.inlier_share, used=used, rounds=_ROUNDS)
+    whole = modes.poses.transform(0)
+    moves = np.array([modes.poses.transform(1 + k).error_from(whole) for k in range(len(inliers))])
+    lengths = np.sqrt(np.einsum("ki,kij,kj->k", moves, modes.hessians[1:], moves))
+    most = int(np.argmax(lengths))
+    if not lengths[most] > _PIVOTAL_MOVE:
+        return None
+    agree = modes.inlier > 0.5
+    switched = np.flatnonzero(agree[0] != agree[1 + most])
+    centres = [modes.poses.transform(k).inverse().translation_m for k in (0, 1 + most)]
+    return InfluentialPair(
+        pair=int(inliers[most]),
+        move=moves[most],
+        camera_move_m=float(np.linalg.norm(centres[1] - centres[0])),
+        standard_deviations=float(lengths[most]),
+        switched=tuple(switched[switched != inliers[most]].tolist()),
+    )

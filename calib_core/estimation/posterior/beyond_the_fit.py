@@ -26,9 +26,9 @@ from calib_core.arrays import Indices, Matrix66, Values
 from calib_core.estimation.covariance import PoseCovariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.gnc import GncSolution, solve_gnc
+from calib_core.estimation.influential_pairs import InfluentialPair, find_pivotal_pair
 from calib_core.estimation.initialization import initial_poses
 from calib_core.estimation.measurement_model import PairMeasurements
-from calib_core.estimation.posterior.pivotal_pair import PivotalPair, find_pivotal_pair
 from calib_core.estimation.posterior.pose_posterior import batch_of, pose_posterior
 from calib_core.estimation.posterior.samples import (
     Modes,
@@ -276,7 +276,7 @@ class BeyondTheFit:
     refined: ErrorsInVariablesFit
     uncertainty: PoseCovariance
     possible: tuple[PossiblePose, ...] = ()
-    pivotal: PivotalPair | None = None
+    pivotal: InfluentialPair | None = None
     agreeing: AgreeingOutliers | None = None
 
 

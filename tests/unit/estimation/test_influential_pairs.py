@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from calib_core.calibration import calibrate, calibrate_pairs
+from calib_core.estimation.influential_pairs import find_pivotal_pair
 from calib_core.geometry import RigidTransform
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions, without_systematic_errors
 from calib_core.results import Calibration
 from calib_core.synthetic import SimulatedPairs, simulate_pairs
 from tests.rooftop import ClickedSample, read_rooftop
+from tests.solved_draws import solve_draw
 
 FREE = CalibrationOptions()
 EXACT = without_systematic_errors(FREE)
@@ -119,3 +121,24 @@ def test_algorithm_1_says_that_most_pairs_disagree_and_residuals_are_too_large(r
     calibration = solved_with(rooftop, "c1", options=CalibrationOptions(method="paper"))
     codes = {warning.code for warning in calibration.warnings}
     assert {"many-outliers", "residuals-too-large"} <= codes
+
+
+@pytest.mark.parametrize("seed", [1, 43])
+def test_without_the_pivotal_pair_a_wrong_pose_moves_to_the_truth(seed: int) -> None:
+    simulated = simulate_pairs(12, rng=np.random.default_rng(seed), outlier_share=0.3)
+    solved = solve_draw(simulated)
+    found = find_pivotal_pair(solved.measurements, solved.refined)
+    assert found is not None
+    pose = solved.refined.camera_from_radar
+    before, after = (
+        np.linalg.norm(simulated.camera_from_radar.error_from(one)) for one in (pose, pose.perturbed(found.move))
+    )
+    assert after < 0.5 * before
+    assert found.standard_deviations > 2.6
+    assert simulated.outlier[found.pair]
+
+
+def test_right_pairs_have_none() -> None:
+    for seed in range(12):
+        solved = solve_draw(simulate_pairs(12, rng=np.random.default_rng([3, seed])))
+        assert find_pivotal_pair(solved.measurements, solved.refined) is None
