@@ -20,6 +20,7 @@ from calib_core.diagnostics.uncertainty_map import picture_sigma_px
 from calib_core.errors import InputError
 from calib_core.estimation import unsolved
 from calib_core.estimation.best_fit import BestFit, best_fit, quick_fit
+from calib_core.estimation.beyond_the_fit import look_beyond
 from calib_core.estimation.covariance import PoseCovariance, pose_covariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.influential_pairs import average_over_influential_pairs, find_influential_pairs
@@ -27,7 +28,6 @@ from calib_core.estimation.leave_one_out import LeaveOneOut, leave_one_out
 from calib_core.estimation.measurement_model import PairMeasurements, pair_measurements
 from calib_core.estimation.pair_results import click_results, excluded_pair_results, fit_metrics, used_pair_results
 from calib_core.estimation.plausibility import implausible_input
-from calib_core.estimation.posterior.beyond_the_fit import look_beyond
 from calib_core.measurements import MIN_PAIRS, Pair, RadarScans, ReflectorClick, Unpaired, Unsolvable
 from calib_core.options import CalibrationOptions, Method, checked_options
 from calib_core.radar import cartesian_from_polar

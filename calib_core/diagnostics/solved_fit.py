@@ -4,13 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from calib_core.arrays import Flags
+from calib_core.estimation.beyond_the_fit import BeyondTheFit
 from calib_core.estimation.covariance import PoseCovariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.gnc import GncSolution
 from calib_core.estimation.influential_pairs import InfluentialPair
 from calib_core.estimation.leave_one_out import LeaveOneOut
 from calib_core.estimation.measurement_model import PairMeasurements
-from calib_core.estimation.posterior.beyond_the_fit import BeyondTheFit
 from calib_core.options import CalibrationOptions
 
 

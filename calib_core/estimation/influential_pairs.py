@@ -21,8 +21,8 @@ from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit, fit_
 from calib_core.estimation.gnc import GncSolution, associate
 from calib_core.estimation.leave_one_out_prediction import noise_parts, predict_left_out, tail_chance
 from calib_core.estimation.measurement_model import PairMeasurements
-from calib_core.estimation.posterior.pose_posterior import batch_of, pose_posterior
-from calib_core.estimation.posterior.samples import refine_poses
+from calib_core.estimation.pose_posterior import batch_of, pose_posterior
+from calib_core.estimation.posterior_samples import refine_poses
 
 _LEVEL = 0.055  # false-alarm probability per set of pairs
 _LARGEST_SHARE = 0.25  # of that level for one pair

@@ -29,8 +29,8 @@ from calib_core.estimation.gnc import GncSolution, solve_gnc
 from calib_core.estimation.influential_pairs import InfluentialPair, find_pivotal_pair
 from calib_core.estimation.initialization import initial_poses
 from calib_core.estimation.measurement_model import PairMeasurements
-from calib_core.estimation.posterior.pose_posterior import batch_of, pose_posterior
-from calib_core.estimation.posterior.samples import (
+from calib_core.estimation.pose_posterior import batch_of, pose_posterior
+from calib_core.estimation.posterior_samples import (
     Modes,
     PosteriorSamples,
     WeightedSamples,

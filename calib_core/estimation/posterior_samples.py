@@ -24,7 +24,7 @@ from calib_core.arrays import Flags, Matrix66, Values, Vector3
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.initialization import initial_poses
 from calib_core.estimation.measurement_model import PairMeasurements
-from calib_core.estimation.posterior.pose_posterior import (
+from calib_core.estimation.pose_posterior import (
     NEAR_OUTLIER_FACTOR,
     PairTerms,
     PosePosterior,

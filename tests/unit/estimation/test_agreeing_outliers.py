@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calib_core.estimation.posterior.beyond_the_fit import find_agreeing_outliers
+from calib_core.estimation.beyond_the_fit import find_agreeing_outliers
 from calib_core.measurements import Pair
 from calib_core.synthetic import SimulatedPairs, simulate_pairs
 from tests.solved_draws import solve_draw

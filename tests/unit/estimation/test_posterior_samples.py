@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calib_core.estimation.posterior import samples
-from calib_core.estimation.posterior.beyond_the_fit import PosteriorSummary, possible_poses, summarize_posterior
-from calib_core.estimation.posterior.pose_posterior import batch_of, pose_posterior
-from calib_core.estimation.posterior.samples import Modes, PosteriorSamples, refine_poses, sample_posterior
+from calib_core.estimation import posterior_samples as samples
+from calib_core.estimation.beyond_the_fit import PosteriorSummary, possible_poses, summarize_posterior
+from calib_core.estimation.pose_posterior import batch_of, pose_posterior
+from calib_core.estimation.posterior_samples import Modes, PosteriorSamples, refine_poses, sample_posterior
 from calib_core.geometry import RigidTransform
 from calib_core.synthetic import SimulatedPairs, simulate_pairs
 from tests.solved_draws import NARROW, SolvedDraw, solve_draw

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from calib_core.arrays import Values
-from calib_core.estimation.posterior.samples import Mixture, WeightedSamples, importance_samples
+from calib_core.estimation.posterior_samples import Mixture, WeightedSamples, importance_samples
 
 COVARIANCE = np.array([[1.0, 0.9, 0.0], [0.9, 1.0, 0.2], [0.0, 0.2, 0.3]])
 
