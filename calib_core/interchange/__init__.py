@@ -22,7 +22,15 @@ from calib_core.interchange.check.pixel_differences import PixelDifference
 from calib_core.interchange.check.report import CheckReport, Verdict, check
 from calib_core.interchange.check.report_json import CheckedFile, check_json, check_junit, exit_code
 from calib_core.interchange.check.slips import CheckResult
-from calib_core.interchange.exporting import Export, NotExported, contents_text, export, export_all, parent_pose
+from calib_core.interchange.exporting import (
+    Export,
+    NotExported,
+    attached_export,
+    contents_text,
+    export,
+    export_all,
+    parent_pose,
+)
 from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.formats.registry import CAMERA_ONLY, FORMATS, format_named, written_formats
 from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose, imported
@@ -53,7 +61,7 @@ from calib_core.interchange.own.pairs_json import PairsFile, read_pairs, write_p
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.trees.frame_choice import WantedFrames
 from calib_core.interchange.trees.frame_tree import FrameTree, Joint, Place
-from calib_core.interchange.trees.patching import Patch, attached_export, patched
+from calib_core.interchange.trees.patching import Patch, patched
 from calib_core.interchange.trees.posed_in_tree import calibration_in_tree
 from calib_core.interchange.trees.reading import TreeFile, joined_tree
 
