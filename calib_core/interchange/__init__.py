@@ -31,9 +31,9 @@ from calib_core.interchange.exporting import (
     export_all,
     parent_pose,
 )
-from calib_core.interchange.format import Format, Reads
+from calib_core.interchange.format import Format, ImportedCalibration, Reads, StatedCheckPoint, WrittenPose, imported
 from calib_core.interchange.formats.registry import CAMERA_ONLY, FORMATS, format_named, written_formats
-from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose, imported
+from calib_core.interchange.formats.statement import missing_map
 from calib_core.interchange.importing import (
     Adoption,
     adopt,
@@ -47,7 +47,6 @@ from calib_core.interchange.importing import (
     read_together,
     tree_files,
 )
-from calib_core.interchange.origin import missing_map
 from calib_core.interchange.own.calibration_json import (
     calibration_sha256,
     calibration_text,

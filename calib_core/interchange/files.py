@@ -13,7 +13,7 @@ from calib_core.interchange.check.agreement import AgreementLimits
 from calib_core.interchange.check.pair_residuals import read_check_pairs_file
 from calib_core.interchange.exporting import Export
 from calib_core.interchange.exporting import export as export_file
-from calib_core.interchange.imported import ImportedCalibration, imported
+from calib_core.interchange.format import ImportedCalibration, imported
 from calib_core.interchange.importing import read_any_file
 from calib_core.interchange.own import calibration_json, clicks_json, pairs_json
 from calib_core.measurements import ReflectorClick

@@ -19,9 +19,9 @@ from calib_core.interchange.calibration_file import (
 )
 from calib_core.interchange.check.pair_residuals import CheckPairs
 from calib_core.interchange.check.report import CheckReport, check
+from calib_core.interchange.format import TRUTH_FORMAT, ImportedCalibration
 from calib_core.interchange.formats.registry import is_ours, reader_of, readers
-from calib_core.interchange.imported import TRUTH_FORMAT, ImportedCalibration
-from calib_core.interchange.origin import stated_origin
+from calib_core.interchange.formats.statement import stated_origin
 from calib_core.interchange.syntax.content import Content, readings
 from calib_core.interchange.trees.frame_choice import WantedFrames
 from calib_core.interchange.trees.posed_in_tree import calibration_in_tree, chained_calibration

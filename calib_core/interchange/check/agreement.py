@@ -20,7 +20,7 @@ from calib_core.interchange.check.pixel_differences import (
     shown,
 )
 from calib_core.interchange.check.slips import CheckResult, explain, explained
-from calib_core.interchange.imported import ImportedCalibration, WrittenPose
+from calib_core.interchange.format import ImportedCalibration, WrittenPose
 
 CHI2_95 = 12.591587243743977
 """The 95 % quantile of chi2 with 6 degrees of freedom."""

@@ -13,7 +13,7 @@ from calib_core.geometry import RigidTransform
 from calib_core.input_files import file_text, read_input
 from calib_core.interchange.check.pixel_differences import LOST_TEXT, far_outside, lenses_of, shown
 from calib_core.interchange.check.slips import CheckResult, explain, explained, rounding_of
-from calib_core.interchange.imported import ImportedCalibration, WrittenPose
+from calib_core.interchange.format import ImportedCalibration, WrittenPose
 from calib_core.interchange.own.calibration_json import read_calibration
 from calib_core.interchange.own.documents import CALIBRATION_SCHEMA
 from calib_core.interchange.own.pairs_json import read_pairs

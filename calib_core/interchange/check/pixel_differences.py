@@ -7,7 +7,7 @@ import numpy as np
 from calib_core.arrays import Flags, Matrix66, Points2, Points3, Values
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, skew
-from calib_core.interchange.imported import ImportedCalibration
+from calib_core.interchange.format import ImportedCalibration
 
 DISTANCES_M = (5.0, 20.0, 60.0)
 LOST_TEXT = "behind the camera or far outside the picture"

@@ -27,7 +27,7 @@ from calib_core.interchange.check.slips import (
     undone_slips,
     within_rounding,
 )
-from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose
+from calib_core.interchange.format import ImportedCalibration, StatedCheckPoint, WrittenPose
 from calib_core.interchange.own.calibration_json import calibration_sha256
 from calib_core.interchange.rotations import looks_forward, off_forward_rad
 

@@ -16,7 +16,7 @@ from calib_core.geometry import (
     quaternion_wxyz_from_matrix,
     rotation_angle_rad,
 )
-from calib_core.interchange.imported import Direction, Form, WrittenPose
+from calib_core.interchange.format import Direction, Form, WrittenPose
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL, matrix_from_rpy, rpy_from_matrix
 
 _ROUNDED = 1.001

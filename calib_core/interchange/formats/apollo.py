@@ -8,7 +8,7 @@ import numpy as np
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.cameras.fields import floats
-from calib_core.interchange.format import Format, Reads
+from calib_core.interchange.format import Format, ImportedCalibration, Reads, WrittenPose, posed_between
 from calib_core.interchange.formats.statement import (
     POSE_ONLY,
     hash_comment,
@@ -17,7 +17,6 @@ from calib_core.interchange.formats.statement import (
     statement,
 )
 from calib_core.interchange.formats.transform_choice import Ends, choose_transform
-from calib_core.interchange.imported import ImportedCalibration, WrittenPose, posed_between
 from calib_core.interchange.rotations import quaternion_xyzw_from_matrix
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import number_text, quoted

@@ -9,20 +9,21 @@ from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.cameras.fields import floats
-from calib_core.interchange.format import Format, Reads
+from calib_core.interchange.format import (
+    Format,
+    ImportedCalibration,
+    Reads,
+    WrittenPose,
+    looks_like_camera,
+    looks_like_radar,
+    posed_between,
+)
 from calib_core.interchange.formats.statement import (
     POSE_ONLY,
     hash_comment,
     stated_check_point,
     stated_frames,
     statement,
-)
-from calib_core.interchange.imported import (
-    ImportedCalibration,
-    WrittenPose,
-    looks_like_camera,
-    looks_like_radar,
-    posed_between,
 )
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL, rpy_from_matrix
 from calib_core.interchange.syntax.content import Content

@@ -8,9 +8,8 @@ import numpy as np
 from calib_core.errors import InputError
 from calib_core.interchange.cameras.camera_format import FoundCamera
 from calib_core.interchange.cameras.fields import floats, lens_model_named
-from calib_core.interchange.format import Reads
+from calib_core.interchange.format import ImportedCalibration, Reads, WrittenPose
 from calib_core.interchange.formats.pose_parts import direction_by_facing, rigid_matrix, with_camera
-from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.syntax.content import Content
 
 _KEY = "CameraExtrinsicMat"

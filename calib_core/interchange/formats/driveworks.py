@@ -9,9 +9,8 @@ from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.cameras.fields import floats
-from calib_core.interchange.format import Format, Reads
+from calib_core.interchange.format import Format, ImportedCalibration, Reads, WrittenPose
 from calib_core.interchange.formats.statement import STATEMENT_KEY, stated_lines, statement, with_statement
-from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL, matrix_from_rpy, rpy_from_matrix
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.strict_json import json_text

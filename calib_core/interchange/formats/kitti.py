@@ -5,8 +5,7 @@ import numpy as np
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import EVIDENCE_LEVELS, CalibrationFile, Evidence
 from calib_core.interchange.cameras.fields import floats
-from calib_core.interchange.format import Format, Reads
-from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose
+from calib_core.interchange.format import Format, ImportedCalibration, Reads, StatedCheckPoint, WrittenPose
 from calib_core.interchange.own.calibration_json import calibration_sha256
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import numbers_text

@@ -8,7 +8,7 @@ import numpy as np
 from calib_core.errors import InputError
 from calib_core.interchange.cameras.camera_format import FoundCamera
 from calib_core.interchange.cameras.fields import floats, lens_model_named
-from calib_core.interchange.format import Reads
+from calib_core.interchange.format import ImportedCalibration, Reads, WrittenPose
 from calib_core.interchange.formats.pose_parts import pinhole_matrix, with_camera
 from calib_core.interchange.formats.statement import (
     STATEMENT_KEY,
@@ -16,7 +16,6 @@ from calib_core.interchange.formats.statement import (
     stated_frames,
     stated_lines,
 )
-from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.syntax.content import Content
 
 _KEY = "T_lidar_camera"

@@ -10,9 +10,8 @@ from calib_core.arrays import Matrix66
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import FrameNames
-from calib_core.interchange.format import Reads
+from calib_core.interchange.format import ImportedCalibration, Reads, StatedCheckPoint, WrittenPose
 from calib_core.interchange.formats.statement import STATEMENT_KEY, stated_lines, with_statement
-from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose
 from calib_core.interchange.own.calibration_json import COVARIANCE_CONVENTION
 from calib_core.interchange.rotations import upper_rows
 from calib_core.interchange.syntax.content import Content

@@ -11,7 +11,7 @@ from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.cameras.fields import floats
-from calib_core.interchange.format import Format, Reads
+from calib_core.interchange.format import Format, ImportedCalibration, Reads, WrittenPose
 from calib_core.interchange.formats.statement import (
     STATEMENT_KEY,
     stated_frames,
@@ -19,7 +19,6 @@ from calib_core.interchange.formats.statement import (
     statement,
     with_statement,
 )
-from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.syntax.content import Content, decoded
 from calib_core.interchange.syntax.strict_json import json_text, json_value
 from calib_core.interchange.syntax.zip_archives import pack

@@ -5,7 +5,15 @@ from typing import Any
 
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
-from calib_core.interchange.format import Format, Reads
+from calib_core.interchange.format import (
+    Direction,
+    Format,
+    ImportedCalibration,
+    Reads,
+    WrittenPose,
+    looks_like_camera,
+    looks_like_radar,
+)
 from calib_core.interchange.formats.pose_parts import AXES_ASSUMED, rigid_matrix
 from calib_core.interchange.formats.statement import (
     POSE_ONLY,
@@ -14,13 +22,6 @@ from calib_core.interchange.formats.statement import (
     stated_frames,
     stated_lines,
     statement,
-)
-from calib_core.interchange.imported import (
-    Direction,
-    ImportedCalibration,
-    WrittenPose,
-    looks_like_camera,
-    looks_like_radar,
 )
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.strict_json import json_text

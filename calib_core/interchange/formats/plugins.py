@@ -7,8 +7,7 @@ from functools import cache
 from typing import Any
 
 from calib_core.errors import CalibrationError, InputError
-from calib_core.interchange.format import Format, Reads
-from calib_core.interchange.imported import ImportedCalibration
+from calib_core.interchange.format import Format, ImportedCalibration, Reads
 from calib_core.interchange.syntax.content import Content
 from calib_core.plugins import Plugin, load_plugins, warn_skipped
 

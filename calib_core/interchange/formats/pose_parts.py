@@ -12,7 +12,7 @@ from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.cameras.camera_format import FoundCamera
 from calib_core.interchange.cameras.fields import floats
-from calib_core.interchange.imported import (
+from calib_core.interchange.format import (
     Direction,
     Form,
     ImportedCalibration,

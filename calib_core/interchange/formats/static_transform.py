@@ -10,9 +10,9 @@ from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.cameras.fields import floats
+from calib_core.interchange.format import Form, ImportedCalibration, WrittenPose, posed_between
 from calib_core.interchange.formats.statement import stated_check_point, stated_frames
 from calib_core.interchange.formats.transform_choice import Ends, choose_transform
-from calib_core.interchange.imported import Form, ImportedCalibration, WrittenPose, posed_between
 from calib_core.interchange.rotations import quaternion_xyzw_from_matrix
 from calib_core.interchange.syntax.yaml_text import number_text, numbers_text, quoted
 

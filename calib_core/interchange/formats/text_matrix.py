@@ -4,7 +4,7 @@ import numpy as np
 
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile
-from calib_core.interchange.format import Format, Reads
+from calib_core.interchange.format import Format, ImportedCalibration, Reads, WrittenPose
 from calib_core.interchange.formats.statement import (
     POSE_ONLY,
     hash_comment,
@@ -12,7 +12,6 @@ from calib_core.interchange.formats.statement import (
     stated_frames,
     statement,
 )
-from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.rotations import upper_rows
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import numbers_text

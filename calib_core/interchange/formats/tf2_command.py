@@ -4,7 +4,7 @@ import shlex
 
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile
-from calib_core.interchange.format import Format, Reads
+from calib_core.interchange.format import Format, ImportedCalibration, Reads
 from calib_core.interchange.formats.statement import POSE_ONLY, hash_comment, statement
 from calib_core.interchange.formats.static_transform import (
     LABELS,
@@ -17,7 +17,6 @@ from calib_core.interchange.formats.static_transform import (
     pose_numbers,
     second_parent_notes,
 )
-from calib_core.interchange.imported import ImportedCalibration
 from calib_core.interchange.syntax.content import Content
 
 

@@ -8,9 +8,8 @@ import numpy as np
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.cameras.fields import floats
-from calib_core.interchange.format import Reads
+from calib_core.interchange.format import ImportedCalibration, Reads, WrittenPose
 from calib_core.interchange.formats.pose_parts import between_named_frames, direction_by_facing, rigid
-from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.syntax.content import Content
 
 _LIST = r"\[([^\]]*)\]"

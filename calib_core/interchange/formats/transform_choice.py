@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import FrameNames
-from calib_core.interchange.imported import looks_like_camera, looks_like_radar
+from calib_core.interchange.format import looks_like_camera, looks_like_radar
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,9 +5,8 @@ import math
 import numpy as np
 
 from calib_core.errors import InputError
-from calib_core.interchange.format import Reads
+from calib_core.interchange.format import ImportedCalibration, Reads, WrittenPose
 from calib_core.interchange.formats.pose_parts import direction_by_facing, rigid
-from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.syntax.content import Content
 
 _COUNT = 8

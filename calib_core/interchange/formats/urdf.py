@@ -10,7 +10,15 @@ from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
 from calib_core.interchange.cameras.fields import floats
-from calib_core.interchange.format import Format, Reads
+from calib_core.interchange.format import (
+    Format,
+    ImportedCalibration,
+    Reads,
+    WrittenPose,
+    looks_like_camera,
+    looks_like_radar,
+    posed_between,
+)
 from calib_core.interchange.formats.statement import (
     POSE_ONLY,
     stated_check_point,
@@ -20,13 +28,6 @@ from calib_core.interchange.formats.statement import (
 )
 from calib_core.interchange.formats.static_transform import ChildFrame, radar_from_child, second_parent_notes
 from calib_core.interchange.formats.transform_choice import Ends, choose_transform
-from calib_core.interchange.imported import (
-    ImportedCalibration,
-    WrittenPose,
-    looks_like_camera,
-    looks_like_radar,
-    posed_between,
-)
 from calib_core.interchange.rotations import (
     LINK_FROM_OPTICAL,
     OPTICAL_RPY_RAD,

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from calib_core.arrays import Matrix33, Vector3, frozen_array
-from calib_core.interchange.imported import Direction, looks_like_camera, looks_like_radar
+from calib_core.interchange.format import Direction, looks_like_camera, looks_like_radar
 
 Part = Literal["rotation", "translation", "other"]
 

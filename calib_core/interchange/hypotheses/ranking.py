@@ -11,8 +11,8 @@ import numpy as np
 from calib_core.geometry import RigidTransform, rotation_angle_rad
 from calib_core.interchange.check.pair_residuals import CheckPairs
 from calib_core.interchange.check.pixel_differences import shown
+from calib_core.interchange.format import Direction
 from calib_core.interchange.hypotheses.found_poses import FoundPose, PoseReading
-from calib_core.interchange.imported import Direction
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL, off_forward_rad
 
 CameraAxes: TypeAlias = Literal["optical", "body", "opengl"]

@@ -9,6 +9,7 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange.cameras.camera_format import FoundCamera
 from calib_core.interchange.cameras.fields import find_cameras
+from calib_core.interchange.format import ImportedCalibration, WrittenPose
 from calib_core.interchange.formats.mat import MATLAB
 from calib_core.interchange.formats.named_arrays import NUMPY
 from calib_core.interchange.formats.opencv import OPENCV
@@ -19,7 +20,6 @@ from calib_core.interchange.hypotheses.finding import find_poses
 from calib_core.interchange.hypotheses.found_poses import FoundPose, Unreadable, hints_of
 from calib_core.interchange.hypotheses.plain_values import array_of, plain_values
 from calib_core.interchange.hypotheses.ranking import Hypothesis, clear_one, hypotheses_of
-from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.importing import read_any
 from calib_core.interchange.syntax.content import Content, readings
 

@@ -30,8 +30,7 @@ from calib_core.interchange.calibration_file import (
     VehicleNote,
     choose_check_point,
 )
-from calib_core.interchange.format import Format, Reads
-from calib_core.interchange.imported import ImportedCalibration, WrittenPose, imported
+from calib_core.interchange.format import Format, ImportedCalibration, Reads, WrittenPose, imported
 from calib_core.interchange.own import documents
 from calib_core.interchange.own.camera_document import camera_document, camera_of
 from calib_core.interchange.own.clicks_json import refuse_repeated_ids, unconfirmed_document, unconfirmed_of

@@ -2,8 +2,7 @@
 
 from collections.abc import Mapping
 
-from calib_core.interchange.format import Format, Reads
-from calib_core.interchange.imported import TRUTH_FORMAT, ImportedCalibration, WrittenPose
+from calib_core.interchange.format import TRUTH_FORMAT, Format, ImportedCalibration, Reads, WrittenPose
 from calib_core.interchange.own.camera_document import camera_of
 from calib_core.interchange.own.documents import CameraDocument, TransformDocument
 from calib_core.interchange.own.transform_document import transform_of

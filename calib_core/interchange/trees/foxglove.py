@@ -7,7 +7,7 @@ import numpy as np
 
 from calib_core.errors import InputError
 from calib_core.interchange.cameras.fields import floats
-from calib_core.interchange.imported import WrittenPose
+from calib_core.interchange.format import WrittenPose
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.trees.frame_tree import Joint, Place, Sensor
 from calib_core.interchange.trees.tree_part import TreePart

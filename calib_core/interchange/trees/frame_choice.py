@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from calib_core.errors import InputError
-from calib_core.interchange.imported import looks_like_camera, looks_like_radar
+from calib_core.interchange.format import looks_like_camera, looks_like_radar
 from calib_core.interchange.trees.frame_tree import FrameTree
 
 _FIXTURE = re.compile(r"mount|bracket|holder|support|housing|plate|base|rig|bar\b|rack|mast", re.IGNORECASE)

@@ -9,7 +9,7 @@ import numpy as np
 from calib_core.arrays import Matrix33
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
-from calib_core.interchange.imported import Axes, Form, WrittenPose
+from calib_core.interchange.format import Axes, Form, WrittenPose
 
 _SAME = 1e-6
 

@@ -9,8 +9,8 @@ import numpy as np
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import FrameNames
+from calib_core.interchange.format import Axes, ImportedCalibration, StatedCheckPoint, WrittenPose, posed_between
 from calib_core.interchange.formats.statement import stated_check_point, stated_frames
-from calib_core.interchange.imported import Axes, ImportedCalibration, StatedCheckPoint, WrittenPose, posed_between
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.trees.frame_choice import ChosenFrames, WantedFrames, choose_frames

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.errors import InputError
-from calib_core.interchange.imported import Form, WrittenPose
+from calib_core.interchange.format import Form, WrittenPose
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.xml_places import placed_xml
 from calib_core.interchange.trees.frame_tree import Joint, JointNumbers, Place, Slot

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from calib_core.interchange.cameras.fields import floats
-from calib_core.interchange.imported import WrittenPose
+from calib_core.interchange.format import WrittenPose
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.xml_places import PlacedElement, placed_xml
 from calib_core.interchange.trees.frame_tree import Joint, JointNumbers, Place, Slot

@@ -27,7 +27,7 @@ from calib_core.interchange import (
     write_calibration,
 )
 from calib_core.interchange.calibration_file import EVIDENCE_LEVELS
-from calib_core.interchange.origin import stated_origin
+from calib_core.interchange.formats.statement import stated_origin
 from calib_core.interchange.own.calibration_json import calibration_sha256
 from calib_core.interchange.syntax.mcap_file import load_mcap
 from tests.kept_files import kept_file

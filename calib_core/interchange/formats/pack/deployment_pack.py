@@ -17,12 +17,11 @@ from calib_core.arrays import Flags, Indices, Points2, Points3
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import EQUATION, CalibrationFile, Evidence
 from calib_core.interchange.cameras.ros import camera_info_text
-from calib_core.interchange.format import Format, Reads
+from calib_core.interchange.format import Format, ImportedCalibration, Reads
 from calib_core.interchange.formats.launch_files import TF2_LAUNCH_PY
+from calib_core.interchange.formats.statement import missing_map, origin_lines
 from calib_core.interchange.formats.tf2_command import TF2
 from calib_core.interchange.formats.urdf import URDF
-from calib_core.interchange.imported import ImportedCalibration
-from calib_core.interchange.origin import missing_map, origin_lines
 from calib_core.interchange.own.calibration_json import CALIBRATION_1, write_calibration
 from calib_core.interchange.syntax.content import Content, readings
 from calib_core.interchange.syntax.yaml_text import number_text, numbers_text, quoted
