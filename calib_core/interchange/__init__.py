@@ -19,8 +19,15 @@ from calib_core.interchange.cameras.ros import camera_info_text
 from calib_core.interchange.check.agreement import AgreementLimits, Comparison, Criterion, Judgement, compare
 from calib_core.interchange.check.pair_residuals import CheckPairs, read_check_pairs, read_check_pairs_file
 from calib_core.interchange.check.pixel_differences import PixelDifference
-from calib_core.interchange.check.report import CheckReport, Verdict, check
-from calib_core.interchange.check.report_json import CheckedFile, check_json, check_junit, exit_code
+from calib_core.interchange.check.report import (
+    CheckedFile,
+    CheckReport,
+    Verdict,
+    check,
+    check_json,
+    check_junit,
+    exit_code,
+)
 from calib_core.interchange.check.slips import CheckResult
 from calib_core.interchange.exporting import (
     Export,

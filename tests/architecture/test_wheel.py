@@ -63,7 +63,7 @@ def test_the_wheel_contains_the_page_the_sample_and_the_code_of_the_pack(wheel: 
         "cocalib/sample_data/rooftop/camera.bag",
     } <= names
     assert "calib_core/interchange/published/calibration-1.schema.json" in names
-    delivered = "calib_core/interchange/formats/pack/delivered"
+    delivered = "calib_core/interchange/formats/delivered"
     assert {f"{delivered}/{name}" for name in ("selftest.cpp", "selftest.py", "radar_correction.hpp")} <= names
     assert {"cocalib/py.typed", "calib_core/py.typed"} <= names
     assert {name.split("/")[0] for name in names if ".dist-info" not in name} == {

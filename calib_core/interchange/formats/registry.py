@@ -1,15 +1,23 @@
-"""Every format in one table. To add one: write its module, and add a line here."""
+"""Every format in one table. To add one: write its module, and add a line here.
 
-from collections.abc import Iterator
+Formats of other installed packages (entry points cocalib.formats) are checked when loaded and guarded when called.
+"""
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from functools import cache
+from typing import Any
 
-from calib_core.errors import InputError
-from calib_core.interchange.format import Format, Reads
+from calib_core.errors import CalibrationError, InputError
+from calib_core.interchange.format import Format, ImportedCalibration, Reads
 from calib_core.interchange.formats.apollo import APOLLO
 from calib_core.interchange.formats.autoware import AUTOWARE
 from calib_core.interchange.formats.autoware_ai import AUTOWARE_AI
 from calib_core.interchange.formats.camera_info import CAMERA_INFO
 from calib_core.interchange.formats.colmap import COLMAP
+from calib_core.interchange.formats.deployment_pack import PACK
 from calib_core.interchange.formats.driveworks import DRIVEWORKS
 from calib_core.interchange.formats.easy_handeye import EASY_HANDEYE
 from calib_core.interchange.formats.foxglove import FOXGLOVE
@@ -25,9 +33,7 @@ from calib_core.interchange.formats.not_between_both import K_RADAR_CAMERA, K_RA
 from calib_core.interchange.formats.nuscenes import NUSCENES
 from calib_core.interchange.formats.opencv import OPENCV
 from calib_core.interchange.formats.openlabel import OPENLABEL
-from calib_core.interchange.formats.pack.deployment_pack import PACK
 from calib_core.interchange.formats.pjlab import PJLAB
-from calib_core.interchange.formats.plugins import plugin_formats
 from calib_core.interchange.formats.text_matrix import MATRIX
 from calib_core.interchange.formats.tf2_command import TF2
 from calib_core.interchange.formats.tf_echo import TF_ECHO
@@ -36,6 +42,7 @@ from calib_core.interchange.formats.urdf import URDF
 from calib_core.interchange.own.calibration_json import CALIBRATION_1
 from calib_core.interchange.own.truth_json import TRUTH
 from calib_core.interchange.syntax.content import Content
+from calib_core.plugins import Plugin, load_plugins, warn_skipped
 
 FORMATS: tuple[Format, ...] = (
     CALIBRATION_1,
@@ -130,3 +137,87 @@ def _written() -> Iterator[Format]:
 
 def _reads(*formats: Format) -> Iterator[Reads]:
     return (known.reads for known in formats if known.reads is not None)
+
+
+GROUP = "cocalib.formats"
+_NAME = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
+
+
+@cache
+def plugin_formats(reserved: frozenset[str]) -> tuple[Format, ...]:
+    """Return the formats that installed packages add, loaded once, on first use.
+
+    Args:
+        reserved: names that are already taken.
+    """
+    taken = set(reserved)
+    formats = []
+    for plugin in load_plugins(GROUP, Format):
+        name = plugin.value.name
+        if not _NAME.fullmatch(name):
+            warn_skipped(plugin.distribution, f"the format name {name!r} may contain only a-z, 0-9 and single hyphens")
+        elif name in taken:
+            warn_skipped(plugin.distribution, f"the format name {name!r} is already taken")
+        else:
+            taken.add(name)
+            formats.append(_guarded(plugin))
+    return tuple(formats)
+
+
+def _guarded(plugin: Plugin[Format]) -> Format:
+    """Return a format whose functions fail with an error that names the package."""
+    added = plugin.value
+    owner = f"the format {added.name} of the package {plugin.distribution}"
+
+    def guard(call: Any, returns: type | tuple[type, ...]) -> Any:
+        return None if call is None else _Guarded(owner, call, returns)
+
+    reads = added.reads
+    return replace(
+        added,
+        write=guard(added.write, (str, bytes)),
+        write_in_parent=guard(added.write_in_parent, (str, bytes)),
+        reads=reads
+        and Reads(
+            _GuardedRecognizer(plugin.distribution, reads.recognizes),
+            guard(reads.read, ImportedCalibration),
+            reads.beside,
+        ),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Guarded:
+    """A function of a package; what it raises, or returns with the wrong type, becomes an InputError."""
+
+    owner: str
+    call: Callable[..., Any]
+    returns: type | tuple[type, ...]
+
+    def __call__(self, *arguments: Any) -> Any:
+        try:
+            result = self.call(*arguments)
+        except CalibrationError:
+            raise
+        except Exception as error:  # a package's code may raise anything
+            raise InputError(
+                f"{self.owner} failed ({type(error).__name__}: {error}); report it to its authors"
+            ) from error
+        if not isinstance(result, self.returns):
+            raise InputError(f"{self.owner} failed (it returned {type(result).__name__}); report it to its authors")
+        return result
+
+
+@dataclass(frozen=True, slots=True)
+class _GuardedRecognizer:
+    """A package's recognizer; if it fails, the file counts as not recognized."""
+
+    distribution: str
+    call: Callable[[Content], bool]
+
+    def __call__(self, content: Content) -> bool:
+        try:
+            return bool(self.call(content))
+        except Exception as error:  # noqa: BLE001  the same
+            warn_skipped(self.distribution, f"its recognizer failed ({type(error).__name__}: {error})")
+            return False

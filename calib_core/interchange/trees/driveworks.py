@@ -7,8 +7,7 @@ from typing import Any
 from calib_core.errors import InputError
 from calib_core.interchange.formats.driveworks import CORRECTED, is_corrected, posed_sensor
 from calib_core.interchange.syntax.content import Content
-from calib_core.interchange.trees.frame_tree import Joint, Place, Sensor
-from calib_core.interchange.trees.tree_part import TreePart
+from calib_core.interchange.trees.frame_tree import Joint, Place, Sensor, TreePart
 
 _POSE = "nominalSensor2Rig_FLU"
 _RIG = "rig"

@@ -8,8 +8,7 @@ import numpy as np
 from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.format import WrittenPose
 from calib_core.interchange.syntax.content import Content
-from calib_core.interchange.trees.frame_tree import Joint, Place, Sensor
-from calib_core.interchange.trees.tree_part import TreePart
+from calib_core.interchange.trees.frame_tree import Joint, Place, Sensor, TreePart
 
 _EGO = "ego"
 _NOTE = "nuScenes' camera frames have optical axes, and its pictures are undistorted"

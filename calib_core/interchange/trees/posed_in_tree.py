@@ -14,9 +14,8 @@ from calib_core.interchange.formats.statement import stated_check_point, stated_
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.trees.frame_choice import ChosenFrames, WantedFrames, choose_frames
-from calib_core.interchange.trees.frame_tree import FrameTree, Joint, Place, Sensor
+from calib_core.interchange.trees.frame_tree import FrameTree, Joint, Place, Sensor, joined
 from calib_core.interchange.trees.reading import may_have_several_joints, tree_in
-from calib_core.interchange.trees.tree_part import joined
 
 _STANDARD = 1e-4
 

@@ -11,8 +11,7 @@ from calib_core.errors import InputError
 from calib_core.interchange.format import Form, WrittenPose
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.xml_places import placed_xml
-from calib_core.interchange.trees.frame_tree import Joint, JointNumbers, Place, Slot
-from calib_core.interchange.trees.tree_part import TreePart
+from calib_core.interchange.trees.frame_tree import Joint, JointNumbers, Place, Slot, TreePart
 
 PUBLISHER = "static_transform_publisher"
 _QUATERNION = ("qx", "qy", "qz", "qw")

@@ -7,14 +7,12 @@ from pathlib import Path
 from calib_core.errors import InputError
 from calib_core.interchange.syntax.content import Content, decoded, readings
 from calib_core.interchange.trees.autoware import read_autoware, recognizes_autoware
-from calib_core.interchange.trees.camera_frames import cameras_named_in
 from calib_core.interchange.trees.driveworks import has_one_of_each, read_driveworks, recognizes_driveworks
 from calib_core.interchange.trees.foxglove import has_several_transforms, read_foxglove, recognizes_foxglove
-from calib_core.interchange.trees.frame_tree import FrameTree, Joint
+from calib_core.interchange.trees.frame_tree import FrameTree, Joint, Sensor, TreePart, joined
 from calib_core.interchange.trees.nuscenes import read_nuscenes, recognizes_poses, recognizes_sensors
 from calib_core.interchange.trees.publishers import PUBLISHER, read_publishers, recognizes_publishers
 from calib_core.interchange.trees.stamped import read_stamped, recognizes_stamped
-from calib_core.interchange.trees.tree_part import TreePart, joined
 from calib_core.interchange.trees.urdf import read_urdf, recognizes_urdf
 
 _PATTERNS = ("*.urdf", "*.xacro", "*calibration.yaml", "*extrinsics*.yaml", "*intrinsics*.yaml", "sensor.json")
@@ -178,3 +176,18 @@ def _posed_by_tables(poses: list[tuple[Content, str]], tables: Mapping[str, Cont
                 f"{source}: does not name its {len(content.value)} sensors; give sensor.json of the same folder as well"
             )
         yield read_nuscenes(content, source, table)
+
+
+def cameras_named_in(content: Content) -> TreePart | None:
+    """Return the camera whose frame a CameraInfo in YAML names; None if it is no such file.
+
+    A CameraInfo is about the optical frame; Apollo's files, too, pose that one.
+    """
+    info = content.mapping
+    header = info.get("header")
+    if content.syntax != "yaml" or not ({"K", "D"} <= set(info) or {"k", "d"} <= set(info)):
+        return None
+    frame = header.get("frame_id") if isinstance(header, dict) else info.get("frame_id")
+    if not isinstance(frame, str) or not frame.strip():
+        return TreePart("camera_info", ())
+    return TreePart("camera_info", (), (Sensor(frame.strip().lstrip("/"), "camera", "optical"),))

@@ -9,8 +9,7 @@ from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.format import WrittenPose
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import PlacedValue, placed_yaml
-from calib_core.interchange.trees.frame_tree import Joint, JointNumbers, Place
-from calib_core.interchange.trees.tree_part import TreePart
+from calib_core.interchange.trees.frame_tree import Joint, JointNumbers, Place, TreePart
 
 _NUMBERS = (("translation", "xyz"), ("rotation", "xyzw"))
 

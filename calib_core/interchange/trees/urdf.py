@@ -9,8 +9,7 @@ from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.format import WrittenPose
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.xml_places import PlacedElement, placed_xml
-from calib_core.interchange.trees.frame_tree import Joint, JointNumbers, Place, Slot
-from calib_core.interchange.trees.tree_part import TreePart
+from calib_core.interchange.trees.frame_tree import Joint, JointNumbers, Place, Slot, TreePart
 
 XACRO_COMMAND = "expand it first: xacro FILE.xacro > FILE.urdf"
 _EXPRESSION = re.compile(r"\$[({]")

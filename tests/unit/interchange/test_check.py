@@ -29,7 +29,7 @@ from calib_core.interchange import (
     read_camera,
     write_calibration,
 )
-from calib_core.interchange.check.report_json import CheckedFile, check_json
+from calib_core.interchange.check.report import CheckedFile, check_json
 from calib_core.interchange.rotations import quaternion_xyzw_from_matrix
 from calib_core.interchange.syntax.mat_file import load_mat
 from calib_core.interchange.syntax.zip_archives import pack, unpack

@@ -20,7 +20,7 @@ from calib_core.interchange import (
     read_any,
     written_formats,
 )
-from calib_core.interchange.formats.plugins import GROUP, plugin_formats
+from calib_core.interchange.formats.registry import GROUP, plugin_formats
 from cocalib.cli import run
 from cocalib.web.channel.export_preview import export_preview
 from cocalib.web.exports.format_list import format_rows

@@ -118,6 +118,6 @@ def test_no_other_module_catches_every_exception(project_root: Path) -> None:
         for path in sorted((project_root / folder).rglob("*.py"))
         if any(words in path.read_text() for words in ("except Exception", "except:"))
     ]
-    assert found == ["app/cocalib/platform/error_boundary.py", "calib_core/interchange/formats/plugins.py"], (
+    assert found == ["app/cocalib/platform/error_boundary.py", "calib_core/interchange/formats/registry.py"], (
         "plug-ins run foreign code"
     )

@@ -72,7 +72,7 @@ def _text(form: Format, file: CalibrationFile) -> bytes:
 
 def _delivered(name: str) -> bytes:
     """Return code that is the same in every pack; line ends do not depend on the machine."""
-    code = files("calib_core.interchange.formats.pack.delivered").joinpath(name).read_bytes()
+    code = files("calib_core.interchange.formats.delivered").joinpath(name).read_bytes()
     return code.replace(b"\r\n", b"\n")
 
 

@@ -219,7 +219,7 @@ def test_the_code_in_the_pack_has_a_licence_and_names_no_other_package(members) 
 
 
 def test_the_code_in_the_pack_is_the_installed_files(project_root: Path, members) -> None:
-    delivered = project_root / "calib_core/interchange/formats/pack/delivered"
+    delivered = project_root / "calib_core/interchange/formats/delivered"
     names = {path.name for path in delivered.iterdir() if path.is_file() and path.name != "__init__.py"}
 
     assert names == {"radar_correction.py", "selftest.py", "radar_correction.hpp", "selftest.cpp"}
