@@ -18,6 +18,8 @@ Matrix66: TypeAlias = Float64[np.ndarray, "6 6"]
 Points2: TypeAlias = Float64[np.ndarray, "n 2"]
 Points3: TypeAlias = Float64[np.ndarray, "n 3"]
 Values: TypeAlias = Float64[np.ndarray, "n"]
+Grid: TypeAlias = Float64[np.ndarray, "rows columns"]
+Counts: TypeAlias = Int64[np.ndarray, "rows columns"]
 Flags: TypeAlias = Bool[np.ndarray, "n"]
 TimesNs: TypeAlias = Int64[np.ndarray, "n"]
 """Stamps, nanoseconds since the epoch."""

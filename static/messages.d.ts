@@ -695,37 +695,22 @@ export interface Uncertainty {
   maps: ContourMap[];
 }
 
-/** One of the intrinsics. */
-export interface LensParameter {
-  name: string;
-  value: string;
-  unit: string;
-}
-
 /** A camera's intrinsics, as a table. */
 export interface LensCamera {
   about: string;
   model: string;
   size: string;
   field: string;
-  parameters: LensParameter[];
+  parameters: Figure[];
   known: boolean;
 }
 
-/** How many views there are of a kind. */
-export interface LensTally {
-  name: string;
-  count: number;
-}
-
-/** Which parts of the picture the board has been in, and how. */
-export interface LensCoverage {
-  columns: number;
-  rows: number;
-  counts: number[];
+/** What views of a board cover. */
+export interface Coverage {
+  counts: number[][];
   share: number;
-  tilts: LensTally[];
-  distances: LensTally[];
+  tilts: Record<string, number>;
+  distances: Record<string, number>;
   missing: string[];
 }
 
@@ -744,7 +729,7 @@ export interface LensState {
   problem: string;
   hint: string;
   can_resume: boolean;
-  coverage: LensCoverage | null;
+  coverage: Coverage | null;
   result: number;
   in_use: boolean;
 }
@@ -757,27 +742,35 @@ export interface LensViewRow {
   held_out_rms_px: number;
 }
 
-/** A picture that was not used. */
-export interface LensLeftOut {
-  frame: number;
+/** A picture that is not used. */
+export interface LeftOutPicture {
+  index: number;
   name: string;
   reason: string;
 }
 
 /** A lens model that was tried. */
-export interface LensTrial {
+export interface ModelTrial {
   model: string;
   rms_px: number;
   held_out_rms_px: number;
+  worse_by: number;
+  standard_error: number;
+  fault: string;
+}
+
+/** A lens model that was tried, and what to say of it. */
+export interface LensTrial {
+  trial: ModelTrial;
   note: string;
   chosen: boolean;
 }
 
-/** Values over the picture. */
-export interface LensGrid {
-  columns: number;
-  rows: number;
-  values: number[];
+/** Standard deviations over the picture. */
+export interface PictureGrid {
+  x_px: number[];
+  y_px: number[];
+  sigma_px: number[][];
 }
 
 /** A calibrated lens. */
@@ -790,12 +783,12 @@ export interface LensResult {
   rms_px: number;
   held_out_rms_px: number;
   views: LensViewRow[];
-  left_out: LensLeftOut[];
+  left_out: LeftOutPicture[];
   trials: LensTrial[];
   warnings: DataWarning[];
   residuals: [number, number, number, number][];
   pattern: string;
-  uncertainty: LensGrid | null;
+  uncertainty: PictureGrid | null;
   unseen: string;
 }
 

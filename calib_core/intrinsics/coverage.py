@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from calib_core.arrays import Vector3, frozen_array
+from calib_core.arrays import Counts, Vector3, frozen_array
 from calib_core.intrinsics.board import Board
 from calib_core.intrinsics.board_pictures import BoardCorners, LeftOutPicture
 
@@ -43,7 +43,7 @@ class Coverage:
         missing: sentences that say which view is missing and how to film it; none if nothing is.
     """
 
-    counts: np.ndarray
+    counts: Counts
     share: float
     tilts: Mapping[str, int]
     distances: Mapping[str, int]

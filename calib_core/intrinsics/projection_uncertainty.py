@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Points2, Values, frozen_array
+from calib_core.arrays import Grid, Points2, Values, frozen_array
 from calib_core.camera import Camera
 from calib_core.geometry import larger_eigenvalues, rotation_jacobian
 from calib_core.intrinsics.calibrated_lens import CalibratedLens
@@ -29,7 +29,7 @@ class PictureGrid:
 
     x_px: Values
     y_px: Values
-    sigma_px: np.ndarray
+    sigma_px: Grid
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "x_px", frozen_array(self.x_px, (None,)))

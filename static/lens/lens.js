@@ -196,10 +196,10 @@ function progressWords(lens) {
   return `${sentence}; the result says which of them it uses.`;
 }
 
-/** @param {import("../messages.js").LensCoverage} coverage */
+/** @param {import("../messages.js").Coverage} coverage */
 function tallies(coverage) {
-  const row = (/** @type {string} */ name, /** @type {import("../messages.js").LensTally[]} */ counts) =>
-    make("div", "", [make("dt", "", name), make("dd", "", counts.map((one) => make("span", one.count ? "" : "none", `${one.name} ${one.count}`)))]);
+  const row = (/** @type {string} */ name, /** @type {Record<string, number>} */ counts) =>
+    make("div", "", [make("dt", "", name), make("dd", "", Object.entries(counts).map(([one, count]) => make("span", count ? "" : "none", `${one} ${count}`)))]);
   const share = make("div", "", [make("dt", "", "Covered"), make("dd", "", [make("span", "", `${Math.round(100 * coverage.share)} % of the picture`)])]);
   return make("dl", "lens-tallies", [share, row("Turned", coverage.tilts), row("Distance", coverage.distances)]);
 }

@@ -90,7 +90,7 @@ export async function saveCamera(inUse) {
 
 /** @param {import("../messages.js").LensCamera} camera */
 export function parameters(camera) {
-  return make("dl", "lens-parameters", camera.parameters.map(({ name, value, unit }) => make("div", "", [make("dt", "", name), make("dd", "", [value, unit ? make("span", "unit", ` ${unit}`) : ""])])));
+  return make("dl", "lens-parameters", camera.parameters.map(({ label, value, unit }) => make("div", "", [make("dt", "", label), make("dd", "", [value, unit ? make("span", "unit", ` ${unit}`) : ""])])));
 }
 
 /** @param {number|null} value */
@@ -130,12 +130,12 @@ function views(found) {
 
 /** @param {import("../messages.js").LensResult} found */
 function leftOut(found) {
-  return table(`${found.left_out.length} pictures left out`, ["Picture", "Why"], found.left_out.map((one) => [frameButton(one.name), one.reason]), found.left_out.map((one) => one.frame), "reasons");
+  return table(`${found.left_out.length} pictures left out`, ["Picture", "Why"], found.left_out.map((one) => [frameButton(one.name), one.reason]), found.left_out.map((one) => one.index), "reasons");
 }
 
 /** @param {import("../messages.js").LensResult} found */
 function trials(found) {
-  const rows = found.trials.map((trial) => [make(trial.chosen ? "strong" : "span", "", trial.model), px(trial.rms_px), px(trial.held_out_rms_px), trial.chosen ? "chosen" : trial.note]);
+  const rows = found.trials.map(({ trial, note, chosen }) => [make(chosen ? "strong" : "span", "", trial.model), px(trial.rms_px), px(trial.held_out_rms_px), chosen ? "chosen" : note]);
   return table("Lens models that were tried", ["Model", "RMS", "left out", ""], rows, rows.map(() => null), "trials");
 }
 
@@ -206,14 +206,18 @@ function paper(canvas, wide, high) {
   return pen;
 }
 
-/** How many corners were in each part of the picture. @param {HTMLCanvasElement} canvas @param {import("../messages.js").LensCoverage} coverage @param {number} wide @param {number} high */
+/** Call for each value of a grid with its column and row. @param {number[][]} grid @param {(value: number, column: number, row: number) => void} draw */
+const eachCell = (grid, draw) => grid.forEach((values, row) => values.forEach((value, column) => draw(value, column, row)));
+
+/** How many corners were in each part of the picture. @param {HTMLCanvasElement} canvas @param {import("../messages.js").Coverage} coverage @param {number} wide @param {number} high */
 export function drawCoverage(canvas, coverage, wide, high) {
   const pen = paper(canvas, wide, high);
   if (!pen) return;
-  const [width, height] = [canvas.width / coverage.columns, canvas.height / coverage.rows];
+  const { counts } = coverage;
+  const [width, height] = [canvas.width / counts[0].length, canvas.height / counts.length];
   const [full, line] = [themeColour("accent"), themeColour("line")];
-  coverage.counts.forEach((count, index) => {
-    const [x, y] = [(index % coverage.columns) * width, Math.floor(index / coverage.columns) * height];
+  eachCell(counts, (count, column, row) => {
+    const [x, y] = [column * width, row * height];
     pen.globalAlpha = count ? 0.18 + 0.72 * Math.min(1, count / FULL) : 0;
     pen.fillStyle = full;
     pen.fillRect(x, y, width, height);
@@ -223,11 +227,12 @@ export function drawCoverage(canvas, coverage, wide, high) {
   });
 }
 
-/** The same over the frame: only what is still empty is veiled. @param {Ink} pen @param {import("../messages.js").LensCoverage} coverage @param {(u: number, v: number) => [number, number]} toDevice @param {number} wide @param {number} high */
+/** The same over the frame: only what is still empty is veiled. @param {Ink} pen @param {import("../messages.js").Coverage} coverage @param {(u: number, v: number) => [number, number]} toDevice @param {number} wide @param {number} high */
 function veilEmpty(pen, coverage, toDevice, wide, high) {
-  const [du, dv] = [wide / coverage.columns, high / coverage.rows];
-  coverage.counts.forEach((count, index) => {
-    const [u, v] = [(index % coverage.columns) * du - 0.5, Math.floor(index / coverage.columns) * dv - 0.5];
+  const { counts } = coverage;
+  const [du, dv] = [wide / counts[0].length, high / counts.length];
+  eachCell(counts, (count, column, row) => {
+    const [u, v] = [column * du - 0.5, row * dv - 0.5];
     const [[x, y], [right, bottom]] = [toDevice(u, v), toDevice(u + du, v + dv)];
     pen.fillStyle = count ? `rgb(87 182 242 / ${Math.round(2 + 10 * Math.min(1, count / FULL))}%)` : "rgb(13 16 20 / 46%)";
     pen.fillRect(x, y, right - x, bottom - y);
@@ -261,16 +266,17 @@ function rounded(value) {
   return Math.max(1, Math.floor(value / ten) * ten);
 }
 
-/** The standard deviation of a projection as colours, by its logarithm: it grows fast towards the corners. @param {HTMLCanvasElement} canvas @param {import("../messages.js").LensGrid} grid @param {number} wide @param {number} high @returns {[number, number]} the smallest and the largest value [px] */
+/** The standard deviation of a projection as colours, by its logarithm: it grows fast towards the corners. @param {HTMLCanvasElement} canvas @param {import("../messages.js").PictureGrid} grid @param {number} wide @param {number} high @returns {[number, number]} the smallest and the largest value [px] */
 function drawUncertainty(canvas, grid, wide, high) {
-  const known = grid.values.filter((value) => value !== null && Number.isFinite(value));
+  const { sigma_px } = grid;
+  const known = sigma_px.flat().filter((value) => value !== null && Number.isFinite(value));
   const [low, most] = [Math.min(...known), Math.max(...known)];
   const pen = paper(canvas, wide, high);
   if (!pen || !known.length) return [low, most];
-  const [width, height] = [canvas.width / grid.columns, canvas.height / grid.rows];
-  grid.values.forEach((value, index) => {
+  const [width, height] = [canvas.width / sigma_px[0].length, canvas.height / sigma_px.length];
+  eachCell(sigma_px, (value, column, row) => {
     if (value === null) return;
-    const [x, y] = [(index % grid.columns) * width, Math.floor(index / grid.columns) * height];
+    const [x, y] = [column * width, row * height];
     pen.fillStyle = rampColour(most > low ? Math.log(value / low) / Math.log(most / low) : 0);
     pen.fillRect(Math.floor(x), Math.floor(y), Math.ceil(width), Math.ceil(height));
   });

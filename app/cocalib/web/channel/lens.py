@@ -3,6 +3,7 @@
 import asyncio
 import logging
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -14,9 +15,11 @@ from calib_core.intrinsics import (
     MODEL_ERRORS_UNSEEN,
     Board,
     CalibratedLens,
+    Coverage,
     IntrinsicsOptions,
     LensView,
     ModelTrial,
+    PictureGrid,
     board_of_size,
     projection_uncertainty,
     residual_field,
@@ -25,21 +28,16 @@ from calib_core.recordings import Recording
 from cocalib.intrinsics import LensJob, LensSnapshot, RecordedPictures, field_of_view_text
 from cocalib.platform.error_boundary import error_boundary
 from cocalib.session import ChosenIntrinsics, IntrinsicsChosen
-from cocalib.view import sentence, warning_in_sentences
+from cocalib.view import Figure, sentence, warning_in_sentences
 from cocalib.view.wording import plain, with_sigma
 from cocalib.web.channel.outbox import Outbox
 from cocalib.web.messages import (
     LensCalibrate,
     LensCamera,
     LensCancel,
-    LensCoverage,
-    LensGrid,
-    LensLeftOut,
-    LensParameter,
     LensRequest,
     LensResult,
     LensState,
-    LensTally,
     LensTrial,
     LensViewRow,
     Outgoing,
@@ -75,7 +73,6 @@ class LensDesk:
         self._result_of: CalibratedLens | None = None
         self._number = 0
         self._shown_camera: Camera | None = None
-        self._state: LensState | None = None
 
     def start(self) -> None:
         """Begin to tell the pages, on the running loop."""
@@ -177,7 +174,7 @@ class LensDesk:
             problem=sentence(now.problem),
             hint=sentence(now.hint),
             can_resume=now.can_resume,
-            coverage=coverage_of(now),
+            coverage=_coverage(now),
             result=self._result.number if self._result else 0,
             in_use=_is_in_use(now, chosen),
         )
@@ -214,7 +211,7 @@ def camera_table(camera: Camera, about: str) -> LensCamera:
     for name, value in zip(camera.parameter_names, camera.parameters.tolist(), strict=True):
         sigma = known.sigma(name) if known is not None else 0.0
         text = with_sigma(value, sigma) if sigma > 0 else plain(value, 6)
-        rows.append(LensParameter(name.removesuffix("_px"), text, "px" if name.endswith("_px") else ""))
+        rows.append(Figure(name, name.removesuffix("_px"), text, "px" if name.endswith("_px") else "", ""))
     size = f"{camera.width_px} × {camera.height_px} px"
     return LensCamera(about, camera.model, size, field_of_view_text(camera), tuple(rows), known is not None)
 
@@ -238,7 +235,7 @@ def lens_result(number: int, lens: CalibratedLens, about: str) -> LensResult:
         views=tuple(
             LensViewRow(view.corners.index, view.corners.name, view.rms_px, view.held_out_rms_px) for view in views
         ),
-        left_out=tuple(LensLeftOut(one.index, one.name, one.reason) for one in lens.left_out),
+        left_out=lens.left_out,
         trials=tuple(_trial(one, lens.camera.model) for one in lens.trials),
         warnings=tuple(map(warning_in_sentences, lens.warnings)),
         residuals=_residuals(lens.views),
@@ -264,7 +261,7 @@ def _trial(trial: ModelTrial, chosen: str) -> LensTrial:
     note = trial.fault
     if not note and trial.model != chosen:
         note = f"{with_sigma(trial.worse_by, trial.standard_error)} px² worse" if trial.worse_by else ""
-    return LensTrial(trial.model, trial.rms_px, trial.held_out_rms_px, note, trial.model == chosen)
+    return LensTrial(trial, note, trial.model == chosen)
 
 
 def _residuals(views: tuple[LensView, ...]) -> tuple[tuple[float, float, float, float], ...]:
@@ -290,27 +287,16 @@ def _pattern(lens: CalibratedLens) -> str:
     return "The views share no pattern: the lens model explains what they show."
 
 
-def _uncertainty(lens: CalibratedLens) -> LensGrid | None:
+def _uncertainty(lens: CalibratedLens) -> PictureGrid | None:
     """Return how uncertain a projection is over the picture; None if the covariance is not known."""
     if lens.camera.covariance is None:
         return None
     columns, rows = _GRID
     grid = projection_uncertainty(lens, columns=columns, rows=rows)
-    return LensGrid(columns, rows, tuple(round(value, 5) for value in grid.sigma_px.ravel().tolist()))
+    return replace(grid, sigma_px=grid.sigma_px.round(5))
 
 
-def coverage_of(now: LensSnapshot) -> LensCoverage | None:
-    """Return where the board has been so far; None before the first view."""
+def _coverage(now: LensSnapshot) -> Coverage | None:
+    """Return where the board has been so far, with what is missing as sentences; None before the first view."""
     coverage = now.progress.coverage if now.progress else None
-    if coverage is None:
-        return None
-    rows, columns = coverage.counts.shape
-    return LensCoverage(
-        columns,
-        rows,
-        tuple(coverage.counts.ravel().tolist()),
-        float(coverage.share),
-        tuple(LensTally(name, count) for name, count in coverage.tilts.items()),
-        tuple(LensTally(name, count) for name, count in coverage.distances.items()),
-        tuple(map(sentence, coverage.missing)),
-    )
+    return coverage and replace(coverage, missing=tuple(map(sentence, coverage.missing)))

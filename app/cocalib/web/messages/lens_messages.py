@@ -6,8 +6,9 @@ from typing import Annotated, Literal, TypeAlias
 import msgspec
 from msgspec import Meta
 
-from calib_core.intrinsics import BoardKind
+from calib_core.intrinsics import BoardKind, Coverage, LeftOutPicture, ModelTrial, PictureGrid
 from calib_core.results import DataWarning
+from cocalib.view import Figure
 
 LensModelName: TypeAlias = Literal["auto", "pinhole", "plumb_bob", "rational_polynomial", "equidistant"]
 Stage: TypeAlias = Literal["idle", "searching", "calibrating", "cancelled", "failed", "done"]
@@ -40,21 +41,6 @@ LensRequest: TypeAlias = LensCalibrate | LensCancel | LensUse
 
 
 @dataclass(frozen=True, slots=True)
-class LensParameter:
-    """One of the intrinsics.
-
-    Attributes:
-        name: such as "fx".
-        value: with its standard deviation if that is known.
-        unit: "px", or "" for a coefficient.
-    """
-
-    name: str
-    value: str
-    unit: str
-
-
-@dataclass(frozen=True, slots=True)
 class LensCamera:
     """A camera's intrinsics, as a table.
 
@@ -71,44 +57,8 @@ class LensCamera:
     model: str
     size: str
     field: str
-    parameters: tuple[LensParameter, ...]
+    parameters: tuple[Figure, ...]
     known: bool
-
-
-@dataclass(frozen=True, slots=True)
-class LensTally:
-    """How many views there are of a kind.
-
-    Attributes:
-        name: such as "left" or "near".
-        count: how many.
-    """
-
-    name: str
-    count: int
-
-
-@dataclass(frozen=True, slots=True)
-class LensCoverage:
-    """Which parts of the picture the board has been in, and how.
-
-    Attributes:
-        columns: of the map.
-        rows: of the map.
-        counts: corners in each cell, row by row.
-        share: of the picture that is covered, 0 to 1.
-        tilts: views by the direction in which the board was turned.
-        distances: views by how far away it was.
-        missing: sentences that say which view is missing.
-    """
-
-    columns: int
-    rows: int
-    counts: tuple[int, ...]
-    share: float
-    tilts: tuple[LensTally, ...]
-    distances: tuple[LensTally, ...]
-    missing: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,7 +95,7 @@ class LensState:
     problem: str
     hint: str
     can_resume: bool
-    coverage: LensCoverage | None
+    coverage: Coverage | None
     result: int
     in_use: bool
 
@@ -168,52 +118,18 @@ class LensViewRow:
 
 
 @dataclass(frozen=True, slots=True)
-class LensLeftOut:
-    """A picture that was not used.
-
-    Attributes:
-        frame: index of its frame.
-        name: what messages call it.
-        reason: why.
-    """
-
-    frame: int
-    name: str
-    reason: str
-
-
-@dataclass(frozen=True, slots=True)
 class LensTrial:
-    """A lens model that was tried.
+    """A lens model that was tried, and what to say of it.
 
     Attributes:
-        model: its name.
-        rms_px: of the corners used.
-        held_out_rms_px: of views left out.
+        trial: its figures.
         note: how much worse it is than the chosen one, or why it could not be calibrated.
         chosen: whether it is the chosen one.
     """
 
-    model: str
-    rms_px: float
-    held_out_rms_px: float
+    trial: ModelTrial
     note: str
     chosen: bool
-
-
-@dataclass(frozen=True, slots=True)
-class LensGrid:
-    """Values over the picture.
-
-    Attributes:
-        columns: of the grid.
-        rows: of the grid.
-        values: row by row [px]; not a number where there is none.
-    """
-
-    columns: int
-    rows: int
-    values: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -244,10 +160,10 @@ class LensResult:
     rms_px: float
     held_out_rms_px: float
     views: tuple[LensViewRow, ...]
-    left_out: tuple[LensLeftOut, ...]
+    left_out: tuple[LeftOutPicture, ...]
     trials: tuple[LensTrial, ...]
     warnings: tuple[DataWarning, ...]
     residuals: tuple[tuple[float, float, float, float], ...]
     pattern: str
-    uncertainty: LensGrid | None
+    uncertainty: PictureGrid | None
     unseen: str

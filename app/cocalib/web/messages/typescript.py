@@ -4,9 +4,11 @@ import dataclasses
 import inspect
 import types
 import typing
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import msgspec
+import numpy as np
 
 from calib_core.measurements import Stamp, TimeNs
 from cocalib.web.messages.incoming import Message
@@ -55,7 +57,7 @@ def _declare(owner: Any, known: dict[str, str]) -> None:
 
 
 def _interface(owner: Any, known: dict[str, str], *, is_form: bool) -> str:
-    hints = typing.get_type_hints(owner, include_extras=False)
+    hints = typing.get_type_hints(owner, include_extras=True)
     written = dict(zip(owner.__struct_fields__, owner.__struct_encode_fields__, strict=True)) if is_form else {}
     lines = [f"/** {_summary(owner)} */", f"export interface {owner.__name__} {{"]
     tag = owner.__struct_config__.tag if is_form else TYPES.get(owner)
@@ -96,12 +98,13 @@ def _type(hint: Any, known: dict[str, str]) -> str:
     if hint is TimeNs:
         return _type(Stamp, known)
     if origin is Annotated:
-        return _type(arguments[0], known)
+        is_array = arguments[0] is np.ndarray
+        return "number" + "[]" * len(arguments[1].split()) if is_array else _type(arguments[0], known)
     if origin is Literal:
         return " | ".join(f'"{value}"' for value in arguments)
     if origin in (Union, types.UnionType):
         return " | ".join(dict.fromkeys(_type(argument, known) for argument in arguments))
-    if origin is dict:
+    if origin in (dict, Mapping):
         return f"Record<string, {_type(arguments[1], known)}>"
     if origin is tuple:
         return _sequence(arguments, known)

@@ -194,7 +194,7 @@ LENS = CalibratedLens(
 
 def test_intrinsics_are_shown_with_what_is_known_of_them() -> None:
     table = camera_table(CAMERA, "camera.yaml")
-    assert [(row.name, row.value, row.unit) for row in table.parameters[:2]] == [
+    assert [(row.label, row.value, row.unit) for row in table.parameters[:2]] == [
         ("fx", "500.0 ± 0.5", "px"),
         ("fy", "500.0 ± 0.5", "px"),
     ]
@@ -208,8 +208,8 @@ def test_intrinsics_are_shown_with_what_is_known_of_them() -> None:
 def test_a_lens_is_shown_with_its_views_what_was_left_out_and_why() -> None:
     shown = lens_result(4, LENS, "the board")
     assert [view.frame for view in shown.views] == [7, 9, 3], "the worst first"
-    assert [(one.frame, one.reason) for one in shown.left_out] == [(5, "blurred")]
-    assert [(trial.model, trial.chosen, trial.note) for trial in shown.trials] == [
+    assert [(one.index, one.reason) for one in shown.left_out] == [(5, "blurred")]
+    assert [(trial.trial.model, trial.chosen, trial.note) for trial in shown.trials] == [
         ("pinhole", True, ""),
         ("plumb_bob", False, "0.0100 ± 0.0020 px² worse"),
     ]
@@ -217,7 +217,8 @@ def test_a_lens_is_shown_with_its_views_what_was_left_out_and_why() -> None:
     assert shown.warnings[0].message == "The board is bent."
     assert len(shown.residuals) == 33, "of corners that were used"
     assert shown.uncertainty is not None
-    assert len(shown.uncertainty.values) == shown.uncertainty.columns * shown.uncertainty.rows
+    assert shown.uncertainty.sigma_px.shape == (16, 24)
+    assert '"sigma_px":[[' in encode(shown)
     assert '"held_out_rms_px":null' in encode(shown), "what is not known is no number"
 
 
