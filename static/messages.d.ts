@@ -192,9 +192,9 @@ export interface BoxTrackRow {
 }
 
 /** Acc of one class. */
-export interface ClassRow {
+export interface ClassFigure {
   label: string;
-  acc: string;
+  acc: number | null;
   frames: number;
   returns: number;
   inside: number;
@@ -213,7 +213,7 @@ export interface SensitivityRow {
 /** What the boxes of the page say about the calibration on the page. */
 export interface AccPanel {
   figures: Figure[];
-  classes: ClassRow[];
+  classes: ClassFigure[];
   sensitivity: SensitivityRow[];
   caution: string;
   rule: string;
@@ -224,15 +224,10 @@ export interface AccPanel {
 
 /** One error that all pairs share, as a row of a table. */
 export interface SystematicErrorRow {
-  key: string;
-  label: string;
-  value: string;
+  figure: Figure;
   prior: string;
-  unit: string;
   position_percent: number;
   rotation_percent: number;
-  hint: string;
-  level: "none" | "plain" | "good" | "warning";
 }
 
 /** The errors that all pairs share. */
@@ -624,13 +619,6 @@ export interface Review {
   words: string;
 }
 
-/** One line about a pair, as final text. */
-export interface PairFact {
-  label: string;
-  value: string;
-  hint: string;
-}
-
 /** One radar position that may be the reflector, as final text. */
 export interface ReviewedReturn {
   chosen: boolean;
@@ -649,7 +637,7 @@ export interface PairReview {
   type: "pair_review";
   id: string;
   why: string;
-  facts: PairFact[];
+  facts: Figure[];
   candidates: ReviewedReturn[];
 }
 

@@ -277,7 +277,7 @@ function parts(panel) {
   }));
   const classes = make("table", "acc-classes", [
     make("thead", "", [make("tr", "", ["Class", "Acc", "Frames", "Returns inside"].map((name) => make("th", "", name)))]),
-    make("tbody", "", panel.classes.map((row) => make("tr", "", [row.label, row.acc, String(row.frames), `${row.inside} of ${row.returns}`].map((cell) => make("td", "", cell))))),
+    make("tbody", "", panel.classes.map((row) => make("tr", "", [row.label || "without a box", row.acc === null ? "–" : `${(100 * row.acc).toFixed(1)} %`, String(row.frames), `${row.inside} of ${row.returns}`].map((cell) => make("td", "", cell))))),
   ]);
   const angles = make("table", "acc-angles", [
     make("caption", "", "Acc of the camera turned about one axis: where it is flat, or highest elsewhere, it cannot judge that angle"),

@@ -67,21 +67,21 @@ function drawSystematic(errors) {
 }
 
 /** @param {import("../messages.js").SystematicErrorRow} error */
-function systematicRow(error) {
+function systematicRow({ figure, prior, position_percent, rotation_percent }) {
   const bar = (/** @type {number} */ percent) => {
     const part = make("b", "", []);
     part.style.width = `${Math.min(percent, 100)}%`;
     return make("td", "", [make("span", "part", [make("i", "", [part]), make("span", "", percent > 0 ? `${percent} %` : "–")])]);
   };
-  const line = make("tr", error.level, [
-    make("td", "", error.label),
-    make("td", "", error.value === "–" ? error.value : [error.value, make("span", "unit", error.unit)]),
-    make("td", "", [error.prior, make("span", "unit", error.unit)]),
-    bar(error.position_percent),
-    bar(error.rotation_percent),
+  const line = make("tr", figure.level, [
+    make("td", "", figure.label),
+    make("td", "", figure.value === "–" ? figure.value : [figure.value, make("span", "unit", figure.unit)]),
+    make("td", "", [prior, make("span", "unit", figure.unit)]),
+    bar(position_percent),
+    bar(rotation_percent),
   ]);
-  line.dataset.key = error.key;
-  return hinted(line, error.hint);
+  line.dataset.key = figure.key;
+  return hinted(line, figure.hint);
 }
 
 /** @template {HTMLElement} T @param {T} element @param {string} hint @returns {T} */

@@ -295,7 +295,7 @@ function drawPair() {
 /** @param {import("../messages.js").PairReview} pair @returns {HTMLElement[]} */
 function pairParts(pair) {
   const facts = pair.facts.map((fact) => {
-    const box = make("div", "", [make("dt", "", fact.label), make("dd", "", fact.value)]);
+    const box = make("div", "", [make("dt", "", fact.label), make("dd", "", fact.unit ? `${fact.value} ${fact.unit}` : fact.value)]);
     box.dataset.hint = fact.hint;
     return box;
   });

@@ -64,11 +64,11 @@ def test_a_placement_can_be_marked_without_a_mouse(page: Driver, truth: Any) -> 
     page.press("n")
     page.until("__cocalib.state.shown.index === __cocalib.state.placements[8].frame")
     page.until("__cocalib.state.overlay.index === __cocalib.state.shown.index")
-    guess = page.value("__cocalib.state.overlay.guesses[0]")
+    guess, _ = page.value("__cocalib.state.overlay.guesses[0]")
     page.press("Enter", "Enter")
     assert len(page.view["clicks"]) == 9
     last = page.view["clicks"][-1]
-    assert (last["u_px"], last["v_px"]) == pytest.approx(guess[:2])
+    assert (last["u_px"], last["v_px"]) == pytest.approx(guess)
     assert last["state"] == "untouched"
 
 
@@ -101,9 +101,9 @@ def test_the_pose_tab_lists_the_errors_that_all_pairs_share(page: Driver, truth:
     assert rows.count() == len(errors["rows"]) > 0
     for index, row in enumerate(errors["rows"]):
         text = rows.nth(index).inner_text()
-        assert row["label"] in text
+        assert row["figure"]["label"] in text
         assert row["prior"] in text
-        assert rows.nth(index).get_attribute("data-hint") == row["hint"]
+        assert rows.nth(index).get_attribute("data-hint") == row["figure"]["hint"]
     for sentence in errors["sentences"]:
         assert sentence in page.text(".systematic")
     assert (

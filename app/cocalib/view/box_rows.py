@@ -9,7 +9,7 @@ from calib_core.evaluation import BoxFigures, Evaluation, Sensitivity
 from calib_core.evaluation.sentences import NOT_ACCURACY, sensitivity_sentences
 from cocalib.session import BoxTrack, RecordingFacts
 from cocalib.session.boxes_in_frames import BoxKind, CarriedTrack
-from cocalib.view.model import AccPanel, BoxTrackRow, ClassRow, Figure, SensitivityRow
+from cocalib.view.model import AccPanel, BoxTrackRow, Figure, SensitivityRow
 from cocalib.view.wording import sentence, warning_in_sentences
 
 _USUAL_LABELS = ("person", "car", "truck", "bicycle", "robot")
@@ -144,10 +144,7 @@ def acc_panel(evaluation: Evaluation) -> AccPanel:
     words = sensitivity_sentences(boxes)
     return AccPanel(
         figures=_figures(boxes),
-        classes=tuple(
-            ClassRow(one.label or "without a box", _percent(one.acc), one.frames, one.returns, one.inside)
-            for one in boxes.classes
-        ),
+        classes=boxes.classes,
         sensitivity=tuple(_sensitivity(curve, text) for curve, text in zip(boxes.sensitivity, words, strict=True)),
         caution=sentence(NOT_ACCURACY),
         rule=sentence(boxes.rule),

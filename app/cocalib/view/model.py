@@ -5,7 +5,7 @@ from typing import Literal, TypeAlias
 
 import msgspec
 
-from calib_core.evaluation.figures import Axis
+from calib_core.evaluation.figures import Axis, ClassFigure
 from calib_core.measurements import Mark, Stamp
 from calib_core.options import CalibrationOptions, Method
 from calib_core.results import DataWarning
@@ -116,26 +116,17 @@ class SystematicErrorRow:
     """One error that all pairs share, as a row of a table.
 
     Attributes:
-        key: its name in files.
-        label: for display.
-        value: with its standard deviation; a dash if the pairs do not determine it.
-        prior: its standard deviation before any pair.
-        unit: of both; "" if it has none.
+        figure: its value, a dash if the pairs do not determine it; what would reduce it is in the hint; a warning if it makes
+            up a third or more of the variance of position or rotation.
+        prior: its standard deviation before any pair, in the same unit.
         position_percent: its part of the variance of the position.
         rotation_percent: the same of the rotation.
-        hint: what it is and what would reduce it, shown on hover.
-        level: "warning" if it makes up a third or more of either.
     """
 
-    key: str
-    label: str
-    value: str
+    figure: Figure
     prior: str
-    unit: str
     position_percent: int
     rotation_percent: int
-    hint: str
-    level: Level = "plain"
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,25 +229,6 @@ class BoxTrackRow:
 
 
 @dataclass(frozen=True, slots=True)
-class ClassRow:
-    """Acc of one class.
-
-    Attributes:
-        label: the class, or "without a box".
-        acc: formatted, with its unit.
-        frames: number of frames with returns of this class.
-        returns: number of those returns.
-        inside: how many of them are in their box.
-    """
-
-    label: str
-    acc: str
-    frames: int
-    returns: int
-    inside: int
-
-
-@dataclass(frozen=True, slots=True)
 class SensitivityRow:
     """Acc of the calibration turned about one axis of the camera.
 
@@ -293,7 +265,7 @@ class AccPanel:
     """
 
     figures: tuple[Figure, ...] = ()
-    classes: tuple[ClassRow, ...] = ()
+    classes: tuple[ClassFigure, ...] = ()
     sensitivity: tuple[SensitivityRow, ...] = ()
     caution: str = ""
     rule: str = ""

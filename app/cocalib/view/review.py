@@ -14,6 +14,7 @@ from calib_core.measurements import Candidate
 from calib_core.radar import polar_from_cartesian
 from calib_core.results import Calibration, PairResult
 from cocalib.session import History
+from cocalib.view.model import Figure
 from cocalib.view.wording import direction_words, plain, sentence
 
 _CHI2_95_2D = 5.991464547107979
@@ -136,21 +137,6 @@ _MUCH_CLOSER = 3.0
 
 
 @dataclass(frozen=True, slots=True)
-class PairFact:
-    """One line about a pair, as final text.
-
-    Attributes:
-        label: what it is.
-        value: with its unit.
-        hint: one sentence that explains it, shown on hover.
-    """
-
-    label: str
-    value: str
-    hint: str
-
-
-@dataclass(frozen=True, slots=True)
 class ReviewedReturn:
     """One radar position that may be the reflector, as final text.
 
@@ -190,7 +176,7 @@ class PairReview:
 
     id: str
     why: str
-    facts: tuple[PairFact, ...] = ()
+    facts: tuple[Figure, ...] = ()
     candidates: tuple[ReviewedReturn, ...] = ()
 
 
@@ -265,35 +251,49 @@ def _why(pair: PairResult, candidates: Sequence[Candidate], distances_px: Values
     )
 
 
-def _facts(pair: PairResult) -> tuple[PairFact, ...]:
+def _facts(pair: PairResult) -> tuple[Figure, ...]:
     return (
-        PairFact("residual", _px(pair.distance_px), "Distance between the click and the reprojection under the pose."),
-        PairFact("held out", _px(pair.held_out_px), "The same under the pose that the other pairs give."),
-        PairFact(
+        Figure(
+            "residual",
+            "residual",
+            *_with_unit(pair.distance_px, "px"),
+            "Distance between the click and the reprojection under the pose.",
+        ),
+        Figure(
+            "held_out",
+            "held out",
+            *_with_unit(pair.held_out_px, "px"),
+            "The same under the pose that the other pairs give.",
+        ),
+        Figure(
+            "outlier_probability",
             "outlier probability",
-            f"{plain(100.0 * pair.outlier_probability, 2)} %" if np.isfinite(pair.outlier_probability) else "–",
+            *_with_unit(100.0 * pair.outlier_probability, "%", 2),
             "Probability that click and return do not belong together, judged by the other pairs.",
         ),
-        PairFact(
+        Figure(
             "influence",
-            f"{plain(pair.influence, 2)} sigma" if np.isfinite(pair.influence) else "–",
+            "influence",
+            *_with_unit(pair.influence, "sigma", 2),
             "How far leaving the pair out moves the pose, in standard deviations of the pose.",
         ),
     )
 
 
-def _noise_fact(candidate: Candidate) -> tuple[PairFact, ...]:
+def _noise_fact(candidate: Candidate) -> tuple[Figure, ...]:
     """Return how uncertain a radar position is; nothing if it is not known."""
     if not np.isfinite(candidate.sigma_polar).all():
         return ()
     range_m, azimuth_rad, elevation_rad = candidate.sigma_polar.tolist()
     azimuth, elevation = (plain(np.degrees(angle), 2) for angle in (azimuth_rad, elevation_rad))
     hint = "One standard deviation of the radar position: range, azimuth, elevation."
-    return (PairFact("radar noise", f"± {plain(100 * range_m, 2)} cm, {azimuth}°, {elevation}°", hint),)
+    return (
+        Figure("radar_noise", "radar noise", f"± {plain(100 * range_m, 2)} cm, {azimuth}°, {elevation}°", "", hint),
+    )
 
 
-def _px(length_px: float) -> str:
-    return f"{plain(length_px)} px" if np.isfinite(length_px) else "–"
+def _with_unit(value: float, unit: str, digits: int = 3) -> tuple[str, str]:
+    return (plain(value, digits), unit) if np.isfinite(value) else ("–", "")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from calib_core.results import Calibration
 from calib_core.systematic_errors import SystematicErrorResult, error_words, is_determined
-from cocalib.view.model import SystematicErrorRow, SystematicErrorTable
+from cocalib.view.model import Figure, Level, SystematicErrorRow, SystematicErrorTable
 from cocalib.view.wording import plain, sentence, with_sigma
 
 _SHOWN_SHARE = 0.03
@@ -66,14 +66,12 @@ def _row(group: Sequence[SystematicErrorResult]) -> SystematicErrorRow:
     words = error_words(one.name)
     label = words.family[0] if len(group) > 1 and words.family else words.label
     known = "Estimated with the pose." if one.estimated else "Not taken out of the pose, but part of its uncertainty."
+    value = with_sigma(words.factor * one.value, words.factor * one.sigma) if is_determined(one) else "–"
+    hint = " ".join((*(sentence(error_words(each.name).text) for each in group), known, sentence(words.remedy)))
+    level: Level = "warning" if max(position, rotation) >= _DOMINANT_SHARE else "plain"
     return SystematicErrorRow(
-        key=one.name,
-        label=label,
-        value=with_sigma(words.factor * one.value, words.factor * one.sigma) if is_determined(one) else "–",
+        Figure(one.name, label, value, words.unit, hint, level),
         prior=f"± {plain(words.factor * one.prior_sigma, 2)}",
-        unit=words.unit,
         position_percent=round(100.0 * position),
         rotation_percent=round(100.0 * rotation),
-        hint=" ".join((*(sentence(error_words(each.name).text) for each in group), known, sentence(words.remedy))),
-        level="warning" if max(position, rotation) >= _DOMINANT_SHARE else "plain",
     )
