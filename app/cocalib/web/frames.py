@@ -5,7 +5,7 @@ import threading
 from collections import OrderedDict
 from collections.abc import Callable
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal
 
@@ -15,6 +15,7 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange.cameras.rectification import rectification_maps, rectified_camera
 from calib_core.recordings import Recording
+from cocalib.web.messages import FrameHeader
 
 Size = Literal["full", "half", "thumbnail", "rectified"]
 
@@ -31,20 +32,12 @@ class Frame:
     """One compressed picture.
 
     Attributes:
-        index: place of the frame in the recording.
+        header: what it is; the number of the request is set when it is sent.
         data: JPEG or PNG bytes.
-        format: which of the two.
-        width_px: columns of the recorded picture, whatever the size of this one.
-        height_px: rows of the recorded picture.
-        scale: size of this picture relative to the recorded one: 1, 0.5 or less.
     """
 
-    index: int
+    header: FrameHeader
     data: bytes
-    format: Literal["jpeg", "png"]
-    width_px: int
-    height_px: int
-    scale: float
 
 
 class FrameStore:
@@ -139,7 +132,9 @@ class FrameStore:
             InputError: there are no intrinsics, or they cannot rectify it.
         """
         full = _full(self._source, index)
-        return _encoded(full, self._rectifier.rectified(_decoded(full.data, 1), camera), 1.0, _RECTIFIED_QUALITY)
+        rectified = self._rectifier.rectified(_decoded(full.data, 1), camera)
+        header = replace(full.header, format="jpeg", rectified=True)
+        return Frame(header, _encoded(rectified, _RECTIFIED_QUALITY))
 
     def _forget_others(self, camera: Camera | None) -> None:
         """Forget the frames that were rectified with another camera."""
@@ -167,15 +162,15 @@ def _retrieve(task: "asyncio.Task[Frame]") -> None:
 
 def _full(source: Recording, index: int) -> Frame:
     picture = source.image_bytes(index)
-    return Frame(index, picture.data, picture.format, picture.width_px, picture.height_px, 1.0)
+    return Frame(FrameHeader(index, 0, picture.width_px, picture.height_px, 1.0, picture.format), picture.data)
 
 
 def _half(source: Recording, index: int) -> Frame:
     """Halve a large picture; return a small one as it is."""
     full = _full(source, index)
-    if full.width_px * full.height_px <= HALF_ABOVE_PX:
+    if full.header.width_px * full.header.height_px <= HALF_ABOVE_PX:
         return full
-    return _encoded(full, _decoded(full.data, 2), 0.5, _PROXY_QUALITY)
+    return Frame(replace(full.header, scale=0.5, format="jpeg"), _encoded(_decoded(full.data, 2), _PROXY_QUALITY))
 
 
 def _thumbnail(source: Recording, index: int) -> Frame:
@@ -183,13 +178,15 @@ def _thumbnail(source: Recording, index: int) -> Frame:
     import cv2
 
     full = _full(source, index)
-    if full.width_px <= THUMBNAIL_WIDTH_PX and full.format == "jpeg":
+    width_px, height_px = full.header.width_px, full.header.height_px
+    if width_px <= THUMBNAIL_WIDTH_PX and full.header.format == "jpeg":
         return full
-    shrink = next((factor for factor in (8, 4, 2) if full.width_px >= factor * THUMBNAIL_WIDTH_PX), 1)
+    shrink = next((factor for factor in (8, 4, 2) if width_px >= factor * THUMBNAIL_WIDTH_PX), 1)
     pixels = _decoded(full.data, shrink)
-    scale = min(1.0, THUMBNAIL_WIDTH_PX / full.width_px)
-    size = (max(1, round(full.width_px * scale)), max(1, round(full.height_px * scale)))
-    return _encoded(full, cv2.resize(pixels, size, interpolation=cv2.INTER_AREA), scale, _THUMBNAIL_QUALITY)
+    scale = min(1.0, THUMBNAIL_WIDTH_PX / width_px)
+    size = (max(1, round(width_px * scale)), max(1, round(height_px * scale)))
+    data = _encoded(cv2.resize(pixels, size, interpolation=cv2.INTER_AREA), _THUMBNAIL_QUALITY)
+    return Frame(replace(full.header, scale=scale, format="jpeg"), data)
 
 
 def _decoded(data: bytes, shrink: int) -> np.ndarray:
@@ -207,13 +204,13 @@ def _decoded(data: bytes, shrink: int) -> np.ndarray:
     return np.asarray(pixels)
 
 
-def _encoded(full: Frame, pixels: np.ndarray, scale: float, quality: int) -> Frame:
+def _encoded(pixels: np.ndarray, quality: int) -> bytes:
     import cv2
 
     done, data = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, quality])
     if not done:
         raise ValueError("the picture cannot be encoded")
-    return Frame(full.index, data.tobytes(), "jpeg", full.width_px, full.height_px, scale)
+    return data.tobytes()
 
 
 _MAKERS: dict[str, Callable[[Recording, int], Frame]] = {"full": _full, "half": _half, "thumbnail": _thumbnail}

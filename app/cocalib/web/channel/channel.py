@@ -2,6 +2,7 @@
 
 import asyncio
 from concurrent.futures import Executor
+from dataclasses import replace
 from functools import partial
 from typing import Protocol
 
@@ -32,7 +33,6 @@ from cocalib.web.messages import (
     Done,
     FollowingStopped,
     FrameBoxes,
-    FrameHeader,
     FrameWanted,
     Hello,
     ImportWanted,
@@ -245,16 +245,14 @@ class Channel:
         await asyncio.sleep(_GREET_EVERY_S)
 
     async def _send_frame(self, wanted: FrameWanted) -> None:
-        store, size = self._hub.frames, wanted.size
         try:
-            frame = await store.get(wanted.index, size)
+            frame = await self._hub.frames.get(wanted.index, wanted.size)
         except (CalibrationError, ValueError, IndexError) as error:
             self.outbox.put(
                 encode(Problem(f"Frame {wanted.index + 1} cannot be shown: {error}", request=wanted.request))
             )
             return
-        shape = (frame.width_px, frame.height_px, frame.scale, frame.format, size == "rectified")
-        header = FrameHeader(frame.index, wanted.request, *shape)
+        header = replace(frame.header, request=wanted.request)
         self.outbox.put(encode_frame(header, frame.data), kind="frame")
         self._prefetch(wanted)
 
@@ -372,5 +370,5 @@ def _search(frame: Frame, pixel_px: tuple[float, float]) -> Apex | NoApex:
     flags = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION
     grey = cv2.imdecode(np.frombuffer(frame.data, dtype=np.uint8), flags)
     if grey is None:
-        raise InputError(f"frame {frame.index + 1} cannot be decoded; snap in another frame of this placement")
+        raise InputError(f"frame {frame.header.index + 1} cannot be decoded; snap in another frame of this placement")
     return find_apex(np.asarray(grey), np.array(pixel_px))

@@ -218,9 +218,9 @@ class TabScene:
 
     def _show_picture(self, sight: Sight) -> None:
         picture = sight.picture
-        if picture is None or picture.index == self._pictured:
+        if picture is None or picture.header.index == self._pictured:
             return
-        self._pictured = picture.index
+        self._pictured = picture.header.index
         self._frustum._format = "jpeg"
         self._frustum._image_data = picture.data  # compressed bytes as they are; the public property encodes again
 

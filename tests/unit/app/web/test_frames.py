@@ -14,6 +14,7 @@ import pytest
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from cocalib.web.frames import FrameStore
+from cocalib.web.messages import FrameHeader
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ def test_recorded_bytes_pass_through_untouched(executor: ThreadPoolExecutor) -> 
     pictures = Pictures(64, 48)
     frame = asyncio.run(FrameStore(pictures, 10, executor).get(3))
     assert frame.data is pictures.data
-    assert (frame.index, frame.width_px, frame.height_px, frame.scale) == (3, 64, 48, 1.0)
+    assert frame.header == FrameHeader(3, 0, 64, 48, 1.0, "jpeg")
 
 
 def test_a_large_frame_is_halved_for_playing_and_a_small_one_is_not(executor: ThreadPoolExecutor) -> None:
@@ -65,7 +66,7 @@ def test_a_large_frame_is_halved_for_playing_and_a_small_one_is_not(executor: Th
     picture = cv2.imdecode(np.frombuffer(halved.data, np.uint8), cv2.IMREAD_COLOR)
     assert picture is not None
     assert picture.shape[:2] == (750, 1000)
-    assert (halved.scale, halved.width_px, halved.height_px) == (0.5, 2000, 1500)
+    assert halved.header == FrameHeader(0, 0, 2000, 1500, 0.5, "jpeg")
     assert asyncio.run(FrameStore(small, 10, executor).get(0, "half")).data is small.data
 
 
@@ -76,7 +77,7 @@ def test_a_thumbnail_is_a_small_jpeg(executor: ThreadPoolExecutor, size: tuple[i
     thumbnail = asyncio.run(FrameStore(Pictures(*size, suffix=suffix), 10, executor).get(0, "thumbnail"))
     picture = cv2.imdecode(np.frombuffer(thumbnail.data, np.uint8), cv2.IMREAD_COLOR)
     assert picture is not None
-    assert thumbnail.format == "jpeg"
+    assert thumbnail.header.format == "jpeg"
     assert picture.shape[1] == min(480, size[0])
 
 

@@ -21,7 +21,7 @@ from cocalib.colours import residual_colours
 from cocalib.session import DismissedPlacement, History, RecordingFacts, Session
 from cocalib.view import Advice, view
 from cocalib.web.frames import Frame
-from cocalib.web.messages import Viewpoint
+from cocalib.web.messages import FrameHeader, Viewpoint
 from cocalib.web.view3d.extent import UNKNOWN, Extent
 from cocalib.web.view3d.returns import Returns
 from cocalib.web.view3d.scene import TabScene
@@ -139,7 +139,7 @@ def sight(outcome: Calibration | None = None, *, selected: str | None = None, in
     points, none = np.array([[4.0, 0.0, 0.0], [9.0, 1.0, 0.2]]), np.full(2, np.nan)
     scan = RadarScan(TimeNs(0), points, np.array([0.0, 1.5]), none, np.full((2, 3), np.nan))
     returns = Returns.of_scan(scan, session.options.gating, lambda reported: reported)
-    picture = Frame(index, b"jpeg", "jpeg", 640, 480, 1.0)
+    picture = Frame(FrameHeader(index, 0, 640, 480, 1.0, "jpeg"), b"jpeg")
     return Sight(
         number=index + 1,
         index=index,
