@@ -13,7 +13,7 @@ from calib_core.recordings.summary import RecordingSummary, clock_lines, describ
 from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis
 from calib_core.recordings.topics import TopicSummary
 from calib_core.recordings.verification import Verification, verification_text, verify_recording
-from calib_core.recordings.video_writing import LeftOut, WrittenVideo, video_format, write_video
+from calib_core.recordings.video_writing import SkippedFrames, WrittenVideo, video_format, write_video
 
 __all__ = [
     "AwaitedRecording",
@@ -22,10 +22,10 @@ __all__ = [
     "FollowedRecording",
     "FrameTransform",
     "Growth",
-    "LeftOut",
     "Recording",
     "RecordingOptions",
     "RecordingSummary",
+    "SkippedFrames",
     "TopicSummary",
     "Verification",
     "WrittenVideo",

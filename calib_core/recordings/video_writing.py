@@ -16,6 +16,33 @@ _TICK_NS = 1000
 _JPEG_QUALITY = 95
 
 
+@dataclass(slots=True)
+class SkippedFrames:
+    """The frames that are left out while a recording's pictures are written.
+
+    Attributes:
+        other_size: number of frames whose size differs from the first.
+        unreadable: number of frames that cannot be read.
+        fault: why the first of those cannot be read.
+    """
+
+    other_size: int = 0
+    unreadable: int = 0
+    fault: str = ""
+
+    def add_unreadable(self, error: RecordingError) -> None:
+        """Count a frame that cannot be read."""
+        self.unreadable += 1
+        self.fault = self.fault or str(error)
+
+    def notes(self) -> Iterator[str]:
+        """Say how many frames are left out, and why."""
+        if self.other_size:
+            yield f"{self.other_size} frames are left out: their size differs from the first frame's"
+        if self.unreadable:
+            yield f"{self.unreadable} frames are left out because they cannot be read: {self.fault}"
+
+
 @dataclass(frozen=True, slots=True)
 class WrittenVideo:
     """A summary of what was written.
@@ -24,26 +51,13 @@ class WrittenVideo:
         frames: number of frames in the video.
         start: stamp of the first frame, which has time 0 in the video.
         duration_s: from the first frame to the last.
-        other_size: number of frames skipped because their size differs from the first.
-        unreadable: number of frames skipped because they cannot be read.
-        fault: why the first of those cannot be read.
+        skipped: frames that it lacks.
     """
 
     frames: int
     start: TimeNs
     duration_s: float
-    other_size: int = 0
-    unreadable: int = 0
-    fault: str = ""
-
-
-@dataclass(slots=True)
-class LeftOut:
-    """What is left out of a video while it is written; the fields are those of WrittenVideo."""
-
-    other_size: int = 0
-    unreadable: int = 0
-    fault: str = ""
+    skipped: SkippedFrames
 
 
 def video_format(path: Path) -> str:
@@ -90,12 +104,12 @@ def write_video(
 def _write(recording: Recording, path: Path, form: str, progress: Callable[[int, int], None] | None) -> WrittenVideo:
     import av
 
-    left_out = LeftOut()
-    frames = _frames(recording, left_out, progress)
+    skipped = SkippedFrames()
+    frames = _frames(recording, skipped, progress)
     first = next(frames, None)
     if first is None:
         raise RecordingError(
-            f"{recording.name}: none of its {len(recording.image_times)} frames can be read: {left_out.fault}"
+            f"{recording.name}: none of its {len(recording.image_times)} frames can be read: {skipped.fault}"
         )
     start, picture = first
     options = {} if form == "matroska" else {"video_track_timescale": str(10**9 // _TICK_NS)}
@@ -114,11 +128,11 @@ def _write(recording: Recording, path: Path, form: str, progress: Callable[[int,
             container.mux(packet)
             count, last = count + 1, time
             first = next(frames, None)
-    return WrittenVideo(count, start, (last - start) / 1e9, left_out.other_size, left_out.unreadable, left_out.fault)
+    return WrittenVideo(count, start, (last - start) / 1e9, skipped)
 
 
 def _frames(
-    recording: Recording, left_out: LeftOut, progress: Callable[[int, int], None] | None
+    recording: Recording, skipped: SkippedFrames, progress: Callable[[int, int], None] | None
 ) -> Iterator[tuple[TimeNs, EncodedImage]]:
     """Yield the readable frames that have the size of the first one, as JPEG."""
     size: tuple[int, int] | None = None
@@ -129,13 +143,13 @@ def _frames(
         try:
             image = _as_jpeg(recording, index)
         except RecordingError as error:
-            left_out.unreadable, left_out.fault = left_out.unreadable + 1, left_out.fault or str(error)
+            skipped.add_unreadable(error)
             continue
         size = size or (image.width_px, image.height_px)
         if (image.width_px, image.height_px) == size:
             yield TimeNs(int(recording.image_times[index])), image
         else:
-            left_out.other_size += 1
+            skipped.other_size += 1
 
 
 def _as_jpeg(recording: Recording, index: int) -> EncodedImage:

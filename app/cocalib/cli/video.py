@@ -64,7 +64,8 @@ class Video:
         for warning in recording.warnings:
             if warning.code in ("picture-sizes", "unreadable-pictures"):
                 print(f"{warning.message}")
-        _tell_left_out(written.other_size, written.unreadable, written.fault)
+        for note in written.skipped.notes():
+            print(note)
         return 0
 
     def _write_overlay(self) -> int:
@@ -86,17 +87,10 @@ class Video:
         titles = tuple(name_text(path.name) for path in (self.calibration, self.against) if path is not None)
         with shown_recording(self.recording, self.topics, shown) as view, progress_bar("drawing frames") as progress:
             written = write_overlay(view, self.out, OverlayOptions(titles, self.trail), progress=progress)
-        width, height = written.size_px
+        video, (width, height) = written.video, written.size_px
         print(
-            f"{self.out}: {written.frames} frames, {written.duration_s:.3f} s, {width} x {height} px, encoded as {written.codec}"
+            f"{self.out}: {video.frames} frames, {video.duration_s:.3f} s, {width} x {height} px, encoded as {written.codec}"
         )
-        _tell_left_out(written.other_size, written.unreadable, written.fault)
+        for note in video.skipped.notes():
+            print(note)
         return 0
-
-
-def _tell_left_out(other_size: int, unreadable: int, fault: str) -> None:
-    """Print how many frames the video lacks, and why."""
-    if other_size:
-        print(f"{other_size} frames are left out: their size differs from the first frame's")
-    if unreadable:
-        print(f"{unreadable} frames are left out because they cannot be read: {fault}")

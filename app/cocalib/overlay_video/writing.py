@@ -11,7 +11,7 @@ import numpy as np
 
 from calib_core.errors import InputError, MessageError, RecordingError
 from calib_core.measurements import NS_PER_S, TimeNs
-from calib_core.recordings import LeftOut, video_format
+from calib_core.recordings import SkippedFrames, WrittenVideo, video_format
 from cocalib.overlay_video.panels import Panels
 from cocalib.platform.files import whole_path
 from cocalib.recorded_view import RecordedView, frame_blocks
@@ -47,22 +47,14 @@ class WrittenOverlay:
     """A summary of what was written.
 
     Attributes:
-        frames: number of frames in the video.
+        video: its frames.
         codec: what they are encoded with.
         size_px: width and height of the video.
-        duration_s: from the first frame to the last.
-        other_size: number of frames skipped because their size differs from the first.
-        unreadable: number of frames skipped because they cannot be read.
-        fault: why the first of those cannot be read.
     """
 
-    frames: int
+    video: WrittenVideo
     codec: str
     size_px: tuple[int, int]
-    duration_s: float
-    other_size: int = 0
-    unreadable: int = 0
-    fault: str = ""
 
 
 def write_overlay(
@@ -100,7 +92,7 @@ def _write(
     panels = Panels(view, options.titles, trail_scans=options.trail_scans, size_px=size_px)
     duration_s = float(times[-1] - times[0]) / NS_PER_S
     rate = (len(times) - 1) / duration_s if duration_s > 0 else 1.0
-    skipped, count, last = LeftOut(), 0, TimeNs(int(times[0]))
+    skipped, count, last = SkippedFrames(), 0, TimeNs(int(times[0]))
     with encoding(path, panels.video_size_px, rate) as encoder:
         for time, picture in _pictures(view, panels, skipped, size_px, options, progress):
             encoder.add(panels.compose(picture, time), time)
@@ -110,17 +102,15 @@ def _write(
                 f"{view.recording.name}: none of its {len(times)} frames can be read: {skipped.fault or 'other sizes'}"
             )
         encoder.finish()
-        written_s = (last - encoder.start) / NS_PER_S
+        video = WrittenVideo(count, encoder.start, (last - encoder.start) / NS_PER_S, skipped)
         codec = encoder.codec
-    return WrittenOverlay(
-        count, codec, panels.video_size_px, written_s, skipped.other_size, skipped.unreadable, skipped.fault
-    )
+    return WrittenOverlay(video, codec, panels.video_size_px)
 
 
 def _pictures(
     view: RecordedView,
     panels: Panels,
-    skipped: LeftOut,
+    skipped: SkippedFrames,
     size_px: tuple[int, int],
     options: OverlayOptions,
     progress: Callable[[int, int], None] | None,
@@ -135,7 +125,7 @@ def _pictures(
             try:
                 picture = recording.image(block.first + place)
             except MessageError as error:
-                skipped.unreadable, skipped.fault = skipped.unreadable + 1, skipped.fault or str(error)
+                skipped.add_unreadable(error)
                 continue
             if (picture.shape[1], picture.shape[0]) != size_px:
                 skipped.other_size += 1

@@ -1,7 +1,7 @@
 """What changes with time (radar cloud, pictures with returns, boxes, clicks, figures), and how the viewer lays it out."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import rerun as rr
@@ -10,6 +10,7 @@ import rerun.blueprint as rrb
 from calib_core.arrays import Indices, TimesNs
 from calib_core.errors import InputError, MessageError
 from calib_core.measurements import Box, TimeNs
+from calib_core.recordings import SkippedFrames
 from calib_core.results import PairResult
 from cocalib.colours import residual_colours
 from cocalib.recorded_view import FrameBlock, RecordedView, SeenReturns, box_words, frame_blocks, seen_in
@@ -46,13 +47,11 @@ class Streamed:
 
     Attributes:
         frames: number of pictures.
-        unreadable: number of frames left out because they cannot be read.
-        fault: why the first of those cannot be read.
+        skipped: frames that are left out.
     """
 
     frames: int = 0
-    unreadable: int = 0
-    fault: str = ""
+    skipped: SkippedFrames = field(default_factory=SkippedFrames)
 
 
 def stream_cloud(stream: rr.RecordingStream, view: RecordedView) -> Iterator[TimesNs]:
@@ -93,7 +92,7 @@ def _stream_pictures(
         try:
             picture = view.recording.image_bytes(block.first + place)
         except MessageError as error:
-            streamed.unreadable, streamed.fault = streamed.unreadable + 1, streamed.fault or str(error)
+            streamed.skipped.add_unreadable(error)
             continue
         pictures.append(picture.data)
         formats.append(f"image/{picture.format}")

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from calib_core.errors import InputError
+from calib_core.recordings import SkippedFrames
 from cocalib.platform.files import whole_path
 from cocalib.recorded_view import RecordedView
 from cocalib.rerun.sdk import require_sdk
@@ -28,14 +29,12 @@ class WrittenView:
     Attributes:
         frames: number of pictures.
         scans: number of radar scans.
-        unreadable: number of frames that are left out because they cannot be read.
-        fault: why the first of those cannot be read.
+        skipped: frames that are left out.
     """
 
     frames: int
     scans: int
-    unreadable: int = 0
-    fault: str = ""
+    skipped: SkippedFrames
 
 
 def write_view(view: RecordedView, path: Path, *, progress: Callable[[int, int], None] | None = None) -> WrittenView:
@@ -134,4 +133,4 @@ def _write(
         _require_space(part)
         if progress:
             progress(done, total)
-    return WrittenView(streamed.frames, scans, streamed.unreadable, streamed.fault)
+    return WrittenView(streamed.frames, scans, streamed.skipped)

@@ -5,7 +5,7 @@ import pytest
 
 from calib_core.errors import InputError
 from calib_core.measurements import NS_PER_S
-from calib_core.recordings import open_recording, video_writing, write_video
+from calib_core.recordings import SkippedFrames, open_recording, video_writing, write_video
 
 START_NS = 1_700_000_000 * NS_PER_S
 
@@ -38,7 +38,7 @@ def test_every_frame_is_in_the_video_as_recorded_at_its_recorded_time(ros, write
     found = packets(out)
     np.testing.assert_allclose([float(time) for time, _ in found], expected_s, atol=0.51 * exact_s)
     assert {data for _, data in found} == {jpeg}
-    assert (written.frames, written.start, written.other_size, written.unreadable) == (40, START_NS + 33_333_333, 0, 0)
+    assert (written.frames, written.start, written.skipped) == (40, START_NS + 33_333_333, SkippedFrames())
     assert written.duration_s == pytest.approx(expected_s[-1])
     assert seen[-1] == (39, 40)
     assert [path.name for path in tmp_path.glob("*.part")] == []
@@ -55,7 +55,7 @@ def test_png_is_encoded_and_unusable_frames_are_skipped_with_warnings(ros1, writ
         written = write_video(recording, tmp_path / "camera.mp4")
         assert [warning.code for warning in recording.warnings] == ["picture-sizes", "unreadable-pictures"]
         assert "neither JPEG nor PNG" in recording.warnings[1].message
-    assert (written.frames, written.other_size, written.unreadable) == (3, 0, 0)
+    assert (written.frames, written.skipped) == (3, SkippedFrames())
     assert [data[:2] for _, data in packets(tmp_path / "camera.mp4")] == [b"\xff\xd8"] * 3
 
 

@@ -33,7 +33,7 @@ class RecordRrd:
         ):
             written = write_view(view, self.out, progress=progress)
         print(f"{self.out}: {written.frames} frames, {written.scans} scans, {len(view.pairs)} clicks")
-        if written.unreadable:
-            print(f"{written.unreadable} frames are left out because they cannot be read: {written.fault}")
+        for note in written.skipped.notes():
+            print(note)
         print(f"open it with: rerun {self.out}")
         return 0

@@ -42,9 +42,9 @@ def test_every_frame_is_in_the_video_at_its_recorded_time(view: RecordedView, tm
     with av.open(str(path)) as container:
         frames = list(container.decode(video=0))
     np.testing.assert_allclose([frame.time for frame in frames], expected_s, atol=1e-4)
-    assert (written.frames, written.size_px) == (len(expected_s), (frames[0].width, frames[0].height))
+    assert (written.video.frames, written.size_px) == (len(expected_s), (frames[0].width, frames[0].height))
     assert written.codec == "H.264"
-    assert written.duration_s == pytest.approx(expected_s[-1])
+    assert written.video.duration_s == pytest.approx(expected_s[-1])
     assert done[-1] == (len(expected_s) - 1, len(expected_s))
     assert np.abs(frames[3].to_ndarray(format="bgr24")[5:20, 5:20].astype(int) - GREY).max() <= 6
     assert [file.name for file in tmp_path.iterdir()] == ["out.mp4"]

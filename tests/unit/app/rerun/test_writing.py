@@ -59,7 +59,7 @@ def read(view: RecordedView, tmp_path_factory: pytest.TempPathFactory) -> Read:
     done: list[tuple[int, int]] = []
     written = write_view(view, path, progress=lambda *now: done.append(now))
     frames = len(view.recording.image_times)
-    assert (written.frames, written.scans, written.unreadable) == (frames, len(view.recording.radar_times), 0)
+    assert (written.frames, written.scans, written.skipped.unreadable) == (frames, len(view.recording.radar_times), 0)
     assert done[-1] == (frames, frames)
     return Read(path)
 
