@@ -104,7 +104,7 @@ def test_the_loop_runs_on_while_a_frame_is_read(executor: ThreadPoolExecutor) ->
         await asyncio.sleep(0)
         assert not waiting.done()
         pictures.may_read.set()
-        assert (await waiting).index == 1
+        assert (await waiting).header.index == 1
 
     asyncio.run(ask())
 
@@ -119,7 +119,7 @@ def test_a_client_that_leaves_early_does_not_cancel_the_frame_for_others(executo
         await asyncio.sleep(0)
         leaver.cancel()
         pictures.may_read.set()
-        assert (await stayer).index == 1
+        assert (await stayer).header.index == 1
 
     asyncio.run(ask())
     assert pictures.read == [1]
@@ -182,7 +182,7 @@ def test_a_broken_frame_is_an_error_only_when_it_is_requested(executor: ThreadPo
         store.prefetch(6, "full", 1, ahead=1)
         with pytest.raises(ValueError, match="frame 7"):
             await store.get(7)
-        assert (await store.get(6)).index == 6
+        assert (await store.get(6)).header.index == 6
 
     asyncio.run(ask())
 
