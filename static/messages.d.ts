@@ -472,8 +472,8 @@ export interface Placements {
   figures: Figure[];
 }
 
-/** One radar return seen from above; written as an array, since there are many. */
-export type RadarReturn = [x_m: number, y_m: number, z_m: number, doppler_mps: number | null, snr_db: number | null, static: boolean, age_s: number];
+/** One radar return; written as an array, since there are many. */
+export type RadarReturn = [u_px: number | null, v_px: number | null, range_m: number, doppler_mps: number | null, snr_db: number | null, static: boolean, x_m: number, y_m: number, z_m: number, age_s: number, azimuth_deg: number, elevation_deg: number];
 
 /** The returns of the last seconds, for a recording without pictures. */
 export interface RadarLook {
@@ -495,8 +495,8 @@ export interface RadarMap {
   high_db: number | null;
 }
 
-/** A return that can be picked; written as an array, since there are many. */
-export type SpaceReturn = [x_m: number, y_m: number, z_m: number, range_m: number, azimuth_deg: number, elevation_deg: number, doppler_mps: number | null, snr_db: number | null, static: boolean, age_s: number, u_px: number | null, v_px: number | null, colour: string, size: number];
+/** A return of the 3D view, which can be picked; written as an array. */
+export type SpaceReturn = [seen: RadarReturn, colour: string, size: number];
 
 /** The true position of a pair's reflector, as estimated. */
 export interface SpaceReflector {
@@ -545,18 +545,15 @@ export interface SpaceLook {
   projected: boolean;
 }
 
-/** One radar return on the picture; written as an array, since there are many. */
-export type OverlayReturn = [u_px: number, v_px: number, range_m: number, doppler_mps: number | null, snr_db: number | null, static: boolean];
-
 /** Where the reflector of a placement is expected; written as an array. */
-export type OverlayGuess = [u_px: number, v_px: number, range_m: number];
+export type OverlayGuess = [pixel_px: [number, number], range_m: number];
 
 /** The nearest radar scan as the camera would see it. */
 export interface Overlay {
   type: "overlay";
   index: number;
   revision: number;
-  returns: OverlayReturn[] | null;
+  returns: RadarReturn[] | null;
   guesses: OverlayGuess[];
 }
 

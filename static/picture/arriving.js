@@ -51,7 +51,7 @@ function arrive() {
   if (mark) return settle();
   if (state.view && !state.view.has_calibration && !state.view.reference) return whole();
   if (state.overlay?.index !== awaited) return;
-  const [u, v] = expectedHere() ?? state.overlay.guesses[0] ?? [];
+  const [u, v] = expectedHere() ?? state.overlay.guesses[0]?.[0] ?? [];
   if (u === undefined || v === undefined) return whole();
   const wide = viewport.imageWidth * PART;
   if (closely && zoom() * wide < viewport.width * NEAR) lookInto(u, v, wide, viewport.imageHeight * PART);

@@ -134,7 +134,7 @@ function drawGrid() {
 }
 
 /** @param {Return} seen */
-function drawReturn([x, y, , , snr, isStill, age]) {
+function drawReturn([, , , , snr, isStill, x, y, , age]) {
   const [px, py] = toCanvas(x, y);
   const longest = Math.max(state.lookOptions.trail_s, 1e-3);
   pen.globalAlpha = 1 - 0.8 * Math.min(1, age / longest);
@@ -212,11 +212,11 @@ function placementNear(event) {
 function explain(event) {
   const lines = [];
   const [nearest] = (state.look?.returns ?? [])
-    .map((seen) => ({ seen, far: Math.hypot(toCanvas(seen[0], seen[1])[0] - event.offsetX, toCanvas(seen[0], seen[1])[1] - event.offsetY) }))
+    .map((seen) => ({ seen, far: Math.hypot(toCanvas(seen[6], seen[7])[0] - event.offsetX, toCanvas(seen[6], seen[7])[1] - event.offsetY) }))
     .filter(({ far }) => far <= REACH)
-    .sort((a, b) => a.far - b.far || a.seen[6] - b.seen[6]);
+    .sort((a, b) => a.far - b.far || a.seen[9] - b.seen[9]);
   if (nearest) {
-    const [x, y, z, doppler, snr, , age] = nearest.seen;
+    const [, , , doppler, snr, , x, y, z, age] = nearest.seen;
     lines.push([place(x, y, z), snr === null ? "" : `${snr.toFixed(0)} dB`, doppler === null ? "" : `${doppler.toFixed(2)} m/s`, age > 0.05 ? `${age.toFixed(1)} s ago` : ""].filter(Boolean).join(", "));
   }
   const near = placementNear(event);

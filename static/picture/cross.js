@@ -62,8 +62,8 @@ export function expectedHere() {
   const overlay = state.overlay;
   if (!overlay || overlay.index !== state.shown?.index) return null;
   const open = placementsAt(overlay.index).filter(isOffered).map((placement) => placement.range_m);
-  const guess = overlay.guesses.find(([, , range]) => open.some((one) => Math.abs(one - range) < 0.01));
-  return guess ? [guess[0], guess[1]] : null;
+  const guess = overlay.guesses.find(([, range]) => open.some((one) => Math.abs(one - range) < 0.01));
+  return guess ? guess[0] : null;
 }
 
 function start() {

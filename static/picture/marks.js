@@ -26,7 +26,7 @@ export function drawMarks(pen) {
   const index = state.shown?.index ?? -1;
   const overlay = overlayHere();
   if (state.layers.returns && overlay?.returns) drawReturns(pen, overlay.returns);
-  if (state.layers.predictions && overlay) for (const [u, v, range] of overlay.guesses) if (isOpen(index, range)) drawGuess(pen, u, v);
+  if (state.layers.predictions && overlay) for (const [[u, v], range] of overlay.guesses) if (isOpen(index, range)) drawGuess(pen, u, v);
   if (state.layers.predictions && state.view?.advice && !state.view.verdict.done) drawAdvice(pen, state.view.advice);
   const here = clicks();
   if (state.layers.others) for (const click of here) if (click.frame !== index) drawOther(pen, click);
@@ -43,7 +43,7 @@ export function drawEvaluated(pen) {
 /** Whether a placement in a frame still wants a click. @param {number} index @param {number} range its own [m] */
 const isOpen = (index, range) => placementsAt(index).some((one) => Math.abs(one.range_m - range) < 0.01 && isOffered(one));
 
-/** @param {Ink} pen @param {import("../messages.js").OverlayReturn[]} returns */
+/** @param {Ink} pen @param {import("../messages.js").RadarReturn[]} returns */
 function drawReturns(pen, returns) {
   const size = 3.2 * viewport.ratio;
   for (const [u, v, , , , isStill] of returns) {

@@ -168,7 +168,7 @@ function placementWords(index) {
 function markWords(index) {
   const here = clicksIn(index);
   if (here.length) return here.flatMap((click) => [oneMark(click), click.note]);
-  const guess = state.overlay?.index === index ? state.overlay.guesses[0] : undefined;
+  const guess = state.overlay?.index === index ? state.overlay.guesses[0]?.[0] : undefined;
   return [guess ? `No mark in this frame; the reflector is expected at column ${guess[0].toFixed(0)}, row ${guess[1].toFixed(0)}` : "No mark in this frame"];
 }
 

@@ -89,6 +89,9 @@ function placing() {
   return (_position, pixel) => (pixel && pixel[0] !== null && pixel[1] !== null ? [box.left + (pixel[0] + 0.5) * box.scale, box.top + (pixel[1] + 0.5) * box.scale] : null);
 }
 
+/** Where a return is in the view. @param {NonNullable<ReturnType<typeof placing>>} place @param {Return} seen */
+const placeReturn = (place, [u, v, , , , , x, y, z]) => place([x, y, z], [u, v]);
+
 /** Everything that can be picked, where it is in the view now. @returns {Item[]} */
 export function pickable() {
   const look = lookShown();
@@ -99,8 +102,8 @@ export function pickable() {
   const add = (kind, index, at, key, words) => {
     if (at && at[0] >= 0 && at[1] >= 0 && at[0] <= layer.clientWidth && at[1] <= layer.clientHeight) made.push({ kind, index, x: at[0], y: at[1], key, get words() { return words(); } });
   };
-  look.returns.forEach((seen, index) => add("return", index, place(seen.slice(0, 3).map(Number), [seen[10], seen[11]]), `return ${seen.slice(0, 4)}`, () => describeReturn(seen)));
-  look.window.forEach((seen, index) => add("window", index, place(seen.slice(0, 3).map(Number), [seen[10], seen[11]]), `return ${seen.slice(0, 4)}`, () => describeReturn(seen)));
+  look.returns.forEach(([seen], index) => add("return", index, placeReturn(place, seen), `return ${seen.slice(6, 9)}`, () => describeReturn(seen)));
+  look.window.forEach(([seen], index) => add("window", index, placeReturn(place, seen), `return ${seen.slice(6, 9)}`, () => describeReturn(seen)));
   look.placements.forEach(({ position_m, pixel_px, state: known }, index) =>
     add("placement", index, place(position_m, pixel_px), `placement ${index}`, () => `Placement ${index + 1}: ${describePlace(position_m)}${known === "open" ? ", not clicked yet" : `, ${known}`}`));
   look.reflectors.forEach(({ id, position_m, pixel_px }, index) => add("reflector", index, place(position_m, pixel_px), `reflector ${id}`, () => `Reflector of ${id}: ${describePlace(position_m)}${residualOf(id)}`));
@@ -199,9 +202,9 @@ function drawPicture(look) {
 
 /** @param {Look} look @param {NonNullable<ReturnType<typeof placing>>} place */
 function drawReturns(look, place) {
-  for (const seen of look.returns) {
-    const at = place([], [seen[10], seen[11]]);
-    if (at) dot(at[0], at[1], DOT * seen[13], seen[12], seen[8]);
+  for (const [[u, v, , , , isStill], colour, size] of look.returns) {
+    const at = place([], [u, v]);
+    if (at) dot(at[0], at[1], DOT * size, colour, isStill);
   }
   for (const { pixel_px } of look.reflectors) {
     const at = place([], pixel_px);
@@ -257,7 +260,7 @@ function write(words, x, y, colour) {
   pen.fillText(words, x, y + 0.5);
 }
 
-/** @typedef {import("../messages.js").SpaceReturn} Return */
+/** @typedef {import("../messages.js").RadarReturn} Return */
 /**
  * Something that can be picked, at its place in the view [CSS px].
  * @typedef {{kind: "return"|"window"|"placement"|"reflector"|"candidate", index: number, x: number, y: number, words: string, key: string}} Item
@@ -285,7 +288,7 @@ export function nearest(items, x, y) {
  * A return in words: "20.0 m, 2.5° right, 0.4° down, SNR 23 dB, 0.0 m/s, still".
  * @param {Return} seen
  */
-export function describeReturn([, , , range, azimuth, elevation, doppler, snr, isStill, age]) {
+export function describeReturn([, , range, doppler, snr, isStill, , , , age, azimuth, elevation]) {
   const words = [`${range.toFixed(1)} m`, sideways(azimuth), upwards(elevation)];
   if (snr !== null) words.push(`SNR ${snr.toFixed(0)} dB`);
   if (doppler !== null) words.push(`${fixed(doppler, 1)} m/s`, isStill ? "still" : "moving");

@@ -77,7 +77,7 @@ def test_the_view_from_above_explains_what_is_under_the_pointer(page: Driver) ->
 def test_returns_stay_as_long_as_chosen_and_playing_goes_through_the_scans(page: Driver) -> None:
     page.press("n", "n")
     page.until("__cocalib.state.look.index === __cocalib.state.placements[1].frame")
-    oldest = "Math.max(...__cocalib.state.look.returns.map((row) => row[6]))"
+    oldest = "Math.max(...__cocalib.state.look.returns.map((row) => row[9]))"
     assert 1.0 < page.value(oldest) <= 2.0
     page.page.click("#look-options .chip >> nth=0")
     page.until(f"{oldest} > 5")

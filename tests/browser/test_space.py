@@ -245,8 +245,8 @@ PICKING = """async () => {
     return {
         nearest: nearest([item("return", 100, 100), item("placement", 102, 100), item("return", 140, 100)], 100.5, 100)?.kind,
         none: nearest([item("return", 100, 100)], 130, 100),
-        words: describeReturn([0, 0, 0, 20.0, -2.5, -0.4, -0.01, 23.2, true, 0, null, null, "", 1]),
-        bare: describeReturn([0, 0, 0, 3.0, 0, 1.0, null, null, true, 1.5, null, null, "", 1]),
+        words: describeReturn([null, null, 20.0, -0.01, 23.2, true, 0, 0, 0, 0, -2.5, -0.4]),
+        bare: describeReturn([null, null, 3.0, null, null, true, 0, 0, 0, 1.5, 0, 1.0]),
         rings: ringPlaces([5, 10, 15], 0, above, new Board(400, 300), size),
         crowded: ringPlaces([5, 10, 15], 0, () => [50, 50], new Board(400, 300), size).length,
     };

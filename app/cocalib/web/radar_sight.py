@@ -1,20 +1,21 @@
 """What the radar saw at the time of a frame, and where the calibrated camera should see it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Flags, Indices
+from calib_core.arrays import Flags, Indices, Points2, Points3, Values
 from calib_core.association.gating import static_returns
 from calib_core.association.pairing import RadarSource
 from calib_core.association.placements import Placement
 from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs
 from calib_core.options import CalibrationOptions, GatingOptions
+from calib_core.radar import RadarErrors, polar_from_cartesian
 from calib_core.results import Calibration
 from cocalib.session import Session
 from cocalib.view import Reference, shown_calibration
-from cocalib.web.messages import Overlay, OverlayGuess, OverlayReturn, RadarLook, RadarReturn
+from cocalib.web.messages import Overlay, OverlayGuess, RadarLook, RadarReturn
 
 _NEAREST_WITHIN_S = 0.3
 _MOST_RETURNS = 4000
@@ -46,15 +47,93 @@ class RadarSight:
         return static_returns(scans, options.gating)
 
 
-def still_returns(scan: RadarScan, options: GatingOptions) -> Flags:
-    """Return which returns are slow enough to be the reflector; without Doppler, all of them are."""
-    return ~(np.abs(scan.doppler_mps) > options.max_speed_mps)
+@dataclass(frozen=True, slots=True, eq=False)
+class Returns:
+    """Returns as columns.
+
+    Attributes:
+        points_m: (n, 3) where they are drawn: estimated errors of the radar are taken out.
+        polar: (n, 3) range [m], azimuth and elevation [rad], as the radar reports them.
+        doppler_mps: (n,) NaN if the radar has none.
+        snr_db: (n,) NaN if the radar has none.
+        age_s: (n,) how long before the shown moment.
+        still: (n,) slow enough to be the reflector.
+    """
+
+    points_m: Points3
+    polar: Points3
+    doppler_mps: Values
+    snr_db: Values
+    age_s: Values
+    still: Flags
+
+    def __len__(self) -> int:
+        return len(self.points_m)
+
+    def rows(self, rows: Indices) -> "Returns":
+        """Return some of them."""
+        columns = (self.points_m, self.polar, self.doppler_mps, self.snr_db, self.age_s, self.still)
+        return Returns(*(column[rows] for column in columns))
+
+    def thinned(self, most: int) -> "Returns":
+        """Return at most so many of them, evenly spaced."""
+        step = -(-len(self) // most)
+        return self.rows(np.arange(0, len(self), step)) if step > 1 else self
+
+    def messages(self, pixels_px: Points2) -> tuple[RadarReturn, ...]:
+        """Return them as they are sent to a page.
+
+        Args:
+            pixels_px: (n, 2) where they are in the picture; NaN if they are not in it.
+        """
+        range_m, angles_deg = self.polar[:, :1], np.rad2deg(self.polar[:, 1:])
+        before = np.column_stack([pixels_px, range_m, self.doppler_mps, self.snr_db]).round(3).tolist()
+        after = np.column_stack([self.points_m, self.age_s, angles_deg]).round(3).tolist()
+        rows = zip(before, self.still.tolist(), after, strict=True)
+        return tuple(RadarReturn(*(*first, still, *last)) for first, still, last in rows)
+
+    @classmethod
+    def of(
+        cls, scans: RadarScans, time: TimeNs, gating: GatingOptions, corrected: Callable[[Points3], Points3]
+    ) -> "Returns":
+        """Collect the returns of some scans that have a position.
+
+        Args:
+            scans: to show.
+            time: the shown moment.
+            gating: which returns can be the reflector.
+            corrected: takes estimated errors of the radar out of positions (n, 3).
+        """
+        known = np.flatnonzero(np.isfinite(scans.points_radar_m).all(axis=1))
+        points, doppler = scans.points_radar_m[known], scans.doppler_mps[known]
+        ages_s = (time - scans.times_ns[scans.scan_of_return()[known]]) / NS_PER_S
+        return cls(
+            corrected(points),
+            polar_from_cartesian(points),
+            doppler,
+            scans.snr_db[known],
+            np.maximum(ages_s, 0.0),
+            ~(np.abs(doppler) > gating.max_speed_mps),
+        )
+
+    @classmethod
+    def of_scan(
+        cls, scan: RadarScan | None, gating: GatingOptions, corrected: Callable[[Points3], Points3]
+    ) -> "Returns":
+        """Collect the returns of one scan; none without one."""
+        if scan is None:
+            return cls.of(RadarScans(), TimeNs(0), gating, corrected)
+        return cls.of(RadarScans.from_scans([scan]), scan.time, gating, corrected)
 
 
-def shown_rows(scans: RadarScans, most: int) -> Indices:
-    """Return the rows of the returns that have a position; evenly spaced ones if there are too many."""
-    rows = np.flatnonzero(np.isfinite(scans.points_radar_m).all(axis=1))
-    return rows[:: -(-len(rows) // most)] if len(rows) > most else rows
+def pixels_of(calibration: Calibration | None, points_m: Points3) -> Points2:
+    """Return where points (n, 3), without errors of the radar, are in the picture (n, 2); NaN if they are not in it."""
+    pixels = np.full((len(points_m), 2), np.nan)
+    if calibration is not None and len(points_m):
+        points_camera = calibration.camera_from_radar @ points_m
+        seen = calibration.camera.sees(points_camera)
+        pixels[seen] = calibration.camera.project(points_camera[seen])
+    return pixels
 
 
 def look_of(index: int, time: TimeNs, trail: RadarScans, options: GatingOptions) -> RadarLook:
@@ -66,24 +145,8 @@ def look_of(index: int, time: TimeNs, trail: RadarScans, options: GatingOptions)
         trail: the scans of these seconds.
         options: which returns can be the reflector.
     """
-    ages_s = (time - trail.times_ns[trail.scan_of_return()]) / NS_PER_S
-    rows = shown_rows(trail, _MOST_RETURNS)
-    still = ~(np.abs(trail.doppler_mps) > options.max_speed_mps)
-    return RadarLook(
-        index,
-        tuple(
-            RadarReturn(
-                x_m=round(float(trail.points_radar_m[row, 0]), 3),
-                y_m=round(float(trail.points_radar_m[row, 1]), 3),
-                z_m=round(float(trail.points_radar_m[row, 2]), 3),
-                doppler_mps=_number(trail.doppler_mps[row]),
-                snr_db=_number(trail.snr_db[row]),
-                static=bool(still[row]),
-                age_s=round(float(ages_s[row]), 3),
-            )
-            for row in rows
-        ),
-    )
+    returns = Returns.of(trail, time, options, RadarErrors().corrected).thinned(_MOST_RETURNS)
+    return RadarLook(index, returns.messages(pixels_of(None, returns.points_m)))
 
 
 def overlay_of(
@@ -109,23 +172,12 @@ def overlay_of(
     return Overlay(index, session.revision, returns, _guesses(calibration, placements))
 
 
-def _returns(calibration: Calibration, scan: RadarScan, options: GatingOptions) -> tuple[OverlayReturn, ...]:
-    points_camera = calibration.camera_from_radar @ calibration.radar_errors.corrected(scan.points_radar_m)
-    seen = calibration.camera.sees(points_camera)
-    pixels = calibration.camera.project(points_camera[seen])
-    ranges = np.linalg.norm(scan.points_radar_m[seen], axis=1)
-    columns = (pixels, ranges, scan.doppler_mps[seen], scan.snr_db[seen], still_returns(scan, options)[seen])
-    return tuple(
-        OverlayReturn(
-            u_px=round(float(pixel[0]), 2),
-            v_px=round(float(pixel[1]), 2),
-            range_m=round(float(range_m), 3),
-            doppler_mps=_number(doppler),
-            snr_db=_number(snr),
-            static=bool(still),
-        )
-        for pixel, range_m, doppler, snr, still in zip(*columns, strict=True)
-    )
+def _returns(calibration: Calibration, scan: RadarScan, options: GatingOptions) -> tuple[RadarReturn, ...]:
+    """Return the returns of a scan that are in the picture."""
+    returns = Returns.of_scan(scan, options, calibration.radar_errors.corrected)
+    pixels = pixels_of(calibration, returns.points_m)
+    seen = np.flatnonzero(np.isfinite(pixels).all(axis=1))
+    return returns.rows(seen).messages(pixels[seen])
 
 
 def _guesses(calibration: Calibration, placements: Sequence[Placement]) -> tuple[OverlayGuess, ...]:
@@ -136,13 +188,9 @@ def _guesses(calibration: Calibration, placements: Sequence[Placement]) -> tuple
     ranges_m = np.linalg.norm(positions, axis=1)
     inside = calibration.camera.in_image(pixels)
     return tuple(
-        OverlayGuess(float(u), float(v), float(range_m))
+        OverlayGuess((float(u), float(v)), float(range_m))
         for (u, v), range_m in zip(pixels[inside], ranges_m[inside], strict=True)
     )
-
-
-def _number(value: float) -> float | None:
-    return None if np.isnan(value) else round(float(value), 3)
 
 
 def _finite(scan: RadarScan) -> RadarScan:

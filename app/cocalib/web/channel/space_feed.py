@@ -18,8 +18,8 @@ from cocalib.web.channel.hub import Hub
 from cocalib.web.channel.radar_survey import Survey
 from cocalib.web.frames import Frame
 from cocalib.web.messages import CursorMoved, SpaceLook
+from cocalib.web.radar_sight import Returns
 from cocalib.web.view3d.extent import UNKNOWN, Extent, extent_of
-from cocalib.web.view3d.returns import Returns
 from cocalib.web.view3d.scene import TabScene
 from cocalib.web.view3d.sight import Sight, space_look
 
@@ -95,8 +95,7 @@ class SpaceFeed:
             returns = Returns.of(scans, stamp, gating, corrected)
         else:
             returns = Returns.of_scan(await self._read(partial(radar.scan_at, stamp), None), gating, corrected)
-        step = -(-len(returns) // _MOST_RETURNS)
-        return returns.rows(np.arange(0, len(returns), step)) if step > 1 else returns
+        return returns.thinned(_MOST_RETURNS)
 
     async def _window(self, cursor: CursorMoved, corrected: Callable[[Points3], Points3]) -> Returns:
         session = self._hub.workspace.session

@@ -19,7 +19,7 @@ from cocalib.view.contours import ContourMap
 from cocalib.view.review import Compared, PairReview, Review
 from cocalib.web.messages.lens_messages import LensResult, LensState
 from cocalib.web.messages.opening_messages import FolderListing, OpeningChoices
-from cocalib.web.messages.space_messages import Placements, RadarLook, RadarMap, SpaceLook
+from cocalib.web.messages.space_messages import Placements, RadarLook, RadarMap, RadarReturn, SpaceLook
 
 _VIEW_FIELDS = tuple(field.name for field in fields(View) if field.name != "clicks")
 _ROW_FIELDS = tuple(field.name for field in fields(ClickRow))
@@ -311,37 +311,15 @@ class FollowNote:
     advice: str = ""
 
 
-class OverlayReturn(msgspec.Struct, frozen=True, array_like=True):
-    """One radar return on the picture; written as an array, since there are many.
-
-    Attributes:
-        u_px: column.
-        v_px: row.
-        range_m: from the radar.
-        doppler_mps: positive moving away; None or NaN if the radar has none.
-        snr_db: None or NaN if the radar has none.
-        static: slow enough to be the reflector.
-    """
-
-    u_px: float
-    v_px: float
-    range_m: float
-    doppler_mps: float | None
-    snr_db: float | None
-    static: bool
-
-
 class OverlayGuess(msgspec.Struct, frozen=True, array_like=True):
     """Where the reflector of a placement is expected; written as an array.
 
     Attributes:
-        u_px: column.
-        v_px: row.
+        pixel_px: column and row.
         range_m: of the placement.
     """
 
-    u_px: float
-    v_px: float
+    pixel_px: tuple[float, float]
     range_m: float
 
 
@@ -358,7 +336,7 @@ class Overlay:
 
     index: int
     revision: int
-    returns: tuple[OverlayReturn, ...] | None
+    returns: tuple[RadarReturn, ...] | None
     guesses: tuple[OverlayGuess, ...]
 
 

@@ -10,38 +10,48 @@ from cocalib.view import Figure
 PlacementState: TypeAlias = Literal["open", "clicked", "dismissed"]
 
 
-class SpaceReturn(msgspec.Struct, frozen=True, array_like=True):
-    """A return that can be picked; written as an array, since there are many.
+class RadarReturn(msgspec.Struct, frozen=True, array_like=True):
+    """One radar return; written as an array, since there are many.
 
     Attributes:
-        x_m: forward, where it is drawn.
+        u_px: column in the picture; None or NaN if it is not in it, or without a calibration.
+        v_px: row in the picture.
+        range_m: as the radar reports it.
+        doppler_mps: positive moving away; None or NaN if the radar has none.
+        snr_db: None or NaN if the radar has none.
+        static: slow enough to be the reflector.
+        x_m: forward, where it is drawn: the radar's estimated errors are taken out.
         y_m: to the left.
         z_m: up.
-        range_m: as the radar reports it.
-        azimuth_deg: positive to the left.
-        elevation_deg: positive upwards.
-        doppler_mps: positive moving away; None if the radar has none.
-        snr_db: None if the radar has none.
-        static: slow enough to be the reflector.
         age_s: how long before the shown moment.
-        u_px: column in the picture; None if it is not in it, or without a calibration.
-        v_px: row in the picture.
+        azimuth_deg: as the radar reports it, positive to the left.
+        elevation_deg: positive upwards.
+    """
+
+    u_px: float | None
+    v_px: float | None
+    range_m: float
+    doppler_mps: float | None
+    snr_db: float | None
+    static: bool
+    x_m: float
+    y_m: float
+    z_m: float
+    age_s: float
+    azimuth_deg: float
+    elevation_deg: float
+
+
+class SpaceReturn(msgspec.Struct, frozen=True, array_like=True):
+    """A return of the 3D view, which can be picked; written as an array.
+
+    Attributes:
+        seen: what the radar reports, and where it is.
         colour: as it is drawn, "#rrggbb".
         size: as it is drawn, relative to the middle size.
     """
 
-    x_m: float
-    y_m: float
-    z_m: float
-    range_m: float
-    azimuth_deg: float
-    elevation_deg: float
-    doppler_mps: float | None
-    snr_db: float | None
-    static: bool
-    age_s: float
-    u_px: float | None
-    v_px: float | None
+    seen: RadarReturn
     colour: str
     size: float
 
@@ -185,28 +195,6 @@ class Placements:
     placements: tuple[PlacementRow, ...]
     summary: str = ""
     figures: tuple[Figure, ...] = ()
-
-
-class RadarReturn(msgspec.Struct, frozen=True, array_like=True):
-    """One radar return seen from above; written as an array, since there are many.
-
-    Attributes:
-        x_m: forward.
-        y_m: to the left.
-        z_m: up.
-        doppler_mps: positive moving away; None if the radar has none.
-        snr_db: None if the radar has none.
-        static: slow enough to be the reflector.
-        age_s: how long before the shown moment.
-    """
-
-    x_m: float
-    y_m: float
-    z_m: float
-    doppler_mps: float | None
-    snr_db: float | None
-    static: bool
-    age_s: float
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,89 +1,24 @@
 """Radar returns of the 3D view: one scan or the last seconds, in clouds by size, and what their colours mean, with a legend."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from calib_core.arrays import Flags, Indices, Points3, Values
-from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs
-from calib_core.options import GatingOptions
-from calib_core.radar import polar_from_cartesian
+from calib_core.arrays import Indices, Points3, Values
 from cocalib.web.view3d.shapes import add_cloud, fill_cloud
 
 if TYPE_CHECKING:
     import viser
 from cocalib.colours import RETURN_RAMPS, STAYING, ramp_colours
 from cocalib.web.messages import RadarMap, ReturnColour, SpaceLegend
+from cocalib.web.radar_sight import Returns
 from cocalib.web.view3d.extent import Extent
 from cocalib.web.view3d.shapes import DARK, LIGHT
 
 SIZES = (0.55, 0.75, 1.0, 1.35, 1.8)
 """Sizes of returns from weak to strong, relative to the middle one."""
 _MIDDLE = len(SIZES) // 2
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Returns:
-    """Returns as columns.
-
-    Attributes:
-        points_m: (n, 3) where they are drawn: estimated errors of the radar are taken out.
-        polar: (n, 3) range [m], azimuth and elevation [rad], as the radar reports them.
-        doppler_mps: (n,) NaN if the radar has none.
-        snr_db: (n,) NaN if the radar has none.
-        age_s: (n,) how long before the shown moment.
-        still: (n,) slow enough to be the reflector.
-    """
-
-    points_m: Points3
-    polar: Points3
-    doppler_mps: Values
-    snr_db: Values
-    age_s: Values
-    still: Flags
-
-    def __len__(self) -> int:
-        return len(self.points_m)
-
-    def rows(self, rows: Indices) -> "Returns":
-        """Return some of them."""
-        columns = (self.points_m, self.polar, self.doppler_mps, self.snr_db, self.age_s, self.still)
-        return Returns(*(column[rows] for column in columns))
-
-    @classmethod
-    def of(
-        cls, scans: RadarScans, time: TimeNs, gating: GatingOptions, corrected: Callable[[Points3], Points3]
-    ) -> "Returns":
-        """Collect the returns of some scans that have a position.
-
-        Args:
-            scans: to show.
-            time: the shown moment.
-            gating: which returns can be the reflector.
-            corrected: takes estimated errors of the radar out of positions (n, 3).
-        """
-        known = np.flatnonzero(np.isfinite(scans.points_radar_m).all(axis=1))
-        points, doppler = scans.points_radar_m[known], scans.doppler_mps[known]
-        ages_s = (time - scans.times_ns[scans.scan_of_return()[known]]) / NS_PER_S
-        return cls(
-            corrected(points),
-            polar_from_cartesian(points),
-            doppler,
-            scans.snr_db[known],
-            np.maximum(ages_s, 0.0),
-            ~(np.abs(doppler) > gating.max_speed_mps),
-        )
-
-    @classmethod
-    def of_scan(
-        cls, scan: RadarScan | None, gating: GatingOptions, corrected: Callable[[Points3], Points3]
-    ) -> "Returns":
-        """Collect the returns of one scan; none without one."""
-        if scan is None:
-            return cls.of(RadarScans(), TimeNs(0), gating, corrected)
-        return cls.of(RadarScans.from_scans([scan]), scan.time, gating, corrected)
 
 
 def size_classes(snr_db: Values, ends_db: tuple[float, float] | None) -> Indices:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Points2, Points3, Values, Vector3
+from calib_core.arrays import Points3, Values, Vector3
 from calib_core.association.placements import Placement
 from calib_core.camera import Camera
 from calib_core.radar import RadarErrors
@@ -23,8 +23,9 @@ from cocalib.web.messages import (
     SpaceReflector,
     SpaceReturn,
 )
+from cocalib.web.radar_sight import Returns, pixels_of
 from cocalib.web.view3d.extent import Extent, ring_ranges_m
-from cocalib.web.view3d.returns import SIZES, Colouring, Returns, size_classes
+from cocalib.web.view3d.returns import SIZES, Colouring, size_classes
 
 _SAME_PLACE_M = 1.0
 """Of two placements at one time, a pair belongs to the one this close to its return."""
@@ -131,8 +132,8 @@ def space_look(sight: Sight) -> SpaceLook:
     return SpaceLook(
         number=sight.number,
         index=sight.index,
-        returns=_seen(sight, sight.returns, _MOST_RETURNS),
-        window=_seen(sight, sight.window, _MOST_IN_WINDOW),
+        returns=_seen(sight, sight.returns.thinned(_MOST_RETURNS)),
+        window=_seen(sight, sight.window.thinned(_MOST_IN_WINDOW)),
         reflectors=tuple(_reflectors(solved, pairs)) if isinstance(solved, Calibration) else (),
         placements=_placements(sight),
         labels=tuple(_labels(sight)),
@@ -151,46 +152,24 @@ def ground_m(sight: Sight) -> float:
     return float(min([0.0, *true_positions(calibration, inliers)[:, 2].tolist()])) if calibration else 0.0
 
 
-def _seen(sight: Sight, returns: Returns, most: int) -> tuple[SpaceReturn, ...]:
-    """Return at most so many returns, evenly spaced, as rows."""
-    if len(returns) > most:
-        returns = returns.rows(np.arange(0, len(returns), -(-len(returns) // most)))
-    pixels = _pixels(sight.calibration, returns.points_m)
-    colours = sight.colouring.of(returns, sight.trail_s)
-    sizes = [SIZES[number] for number in size_classes(returns.snr_db, sight.snr_db)]
-    degrees = np.column_stack([returns.polar[:, 0], np.rad2deg(returns.polar[:, 1:])])
-    columns = (returns.points_m, degrees, returns.doppler_mps, returns.snr_db, returns.still, returns.age_s, pixels)
-    return tuple(
-        SpaceReturn(
-            x_m=round(float(point[0]), 3),
-            y_m=round(float(point[1]), 3),
-            z_m=round(float(point[2]), 3),
-            range_m=round(float(polar[0]), 3),
-            azimuth_deg=round(float(polar[1]), 2),
-            elevation_deg=round(float(polar[2]), 2),
-            doppler_mps=_number(doppler),
-            snr_db=_number(snr),
-            static=bool(still),
-            age_s=round(float(age_s), 3),
-            u_px=_number(pixel[0]),
-            v_px=_number(pixel[1]),
-            colour="#{:02x}{:02x}{:02x}".format(*colour),
-            size=size,
-        )
-        for point, polar, doppler, snr, still, age_s, pixel, colour, size in zip(*columns, colours, sizes, strict=True)
-    )
+def _seen(sight: Sight, returns: Returns) -> tuple[SpaceReturn, ...]:
+    """Return returns with their colours and sizes."""
+    colours = ("#{:02x}{:02x}{:02x}".format(*colour) for colour in sight.colouring.of(returns, sight.trail_s))
+    sizes = (SIZES[number] for number in size_classes(returns.snr_db, sight.snr_db))
+    seen = returns.messages(pixels_of(sight.calibration, returns.points_m))
+    return tuple(map(SpaceReturn, seen, colours, sizes))
 
 
 def _reflectors(calibration: Calibration, pairs: tuple[PairResult, ...]) -> Iterator[SpaceReflector]:
     points = true_positions(calibration, pairs)
-    for pair, point, pixel in zip(pairs, points, _pixels(calibration, points), strict=True):
+    for pair, point, pixel in zip(pairs, points, pixels_of(calibration, points), strict=True):
         yield SpaceReflector(pair.id, _rounded(point), _pixel(pixel))
 
 
 def _placements(sight: Sight) -> tuple[SpacePlacement, ...]:
     positions = np.array([placement.position_radar_m for placement in sight.placements]).reshape(-1, 3)
     points = sight.errors.corrected(positions)
-    rows = zip(points, _pixels(sight.calibration, points), sight.placement_states(), strict=True)
+    rows = zip(points, pixels_of(sight.calibration, points), sight.placement_states(), strict=True)
     return tuple(SpacePlacement(_rounded(point), _pixel(pixel), state) for point, pixel, state in rows)
 
 
@@ -211,16 +190,6 @@ def _residual(pair: PairResult) -> str:
     return f"{pair.distance_px:.1f} px" if np.isfinite(pair.distance_px) else "behind the camera"
 
 
-def _pixels(calibration: Calibration | None, points_m: Points3) -> Points2:
-    """Return where points (n, 3) are in the picture (n, 2), through its lens; NaN if they are not in it."""
-    pixels = np.full((len(points_m), 2), np.nan)
-    if calibration is not None and len(points_m):
-        points_camera = calibration.camera_from_radar @ points_m
-        seen = calibration.camera.sees(points_camera)
-        pixels[seen] = calibration.camera.project(points_camera[seen])
-    return pixels
-
-
 def _pixel(pixel: Values) -> tuple[float, float] | None:
     return (round(float(pixel[0]), 2), round(float(pixel[1]), 2)) if np.isfinite(pixel).all() else None
 
@@ -228,7 +197,3 @@ def _pixel(pixel: Values) -> tuple[float, float] | None:
 def _rounded(point: Values) -> tuple[float, float, float]:
     x_m, y_m, z_m = point.tolist()
     return round(x_m, 3), round(y_m, 3), round(z_m, 3)
-
-
-def _number(value: float) -> float | None:
-    return None if np.isnan(value) else round(float(value), 3)

@@ -114,7 +114,7 @@ def test_returns_and_placements_are_drawn_where_the_calibration_reprojects_them(
         pytest.approx(pixel, abs=0.01) for pixel in expected_px
     ]
     assert [one.range_m for one in overlay.returns] == pytest.approx(np.linalg.norm(points, axis=1), abs=1e-3)
-    assert [(one.u_px, one.v_px) for one in overlay.guesses] == [pytest.approx(pixel) for pixel in expected_px]
+    assert [one.pixel_px for one in overlay.guesses] == [pytest.approx(pixel) for pixel in expected_px]
     assert [one.range_m for one in overlay.guesses] == pytest.approx(np.linalg.norm(points, axis=1))
     assert np.abs(expected_px - file.calibration.reproject(points)).max() > 2.0
 

@@ -39,10 +39,11 @@ from cocalib.web.messages import (
     ImportWanted,
     Incoming,
     Overlay,
-    OverlayReturn,
+    OverlayGuess,
     Problem,
     Progress,
     ProposingSwitch,
+    RadarReturn,
     RecordingNote,
     SensorNote,
     SessionNote,
@@ -240,13 +241,14 @@ def test_no_text_keeps_a_message_from_being_sent(text: str, surrogates: str) -> 
 
 
 def test_numbers_that_are_not_finite_become_null() -> None:
-    overlay = Overlay(3, 5, (OverlayReturn(1.0, 2.0, 3.0, float("nan"), float("inf"), True),), ((4.0, 5.0),))
+    seen = RadarReturn(1.0, 2.0, 3.0, float("nan"), float("inf"), True, 2.0, 1.0, 2.0, 0.0, 26.6, 41.8)
+    overlay = Overlay(3, 5, (seen,), (OverlayGuess((4.0, 5.0), 6.0),))
     assert json.loads(encode(overlay)) == {
         "type": "overlay",
         "index": 3,
         "revision": 5,
-        "returns": [[1.0, 2.0, 3.0, None, None, True]],
-        "guesses": [[4.0, 5.0]],
+        "returns": [[1.0, 2.0, 3.0, None, None, True, 2.0, 1.0, 2.0, 0.0, 26.6, 41.8]],
+        "guesses": [[[4.0, 5.0], 6.0]],
     }
 
 

@@ -14,8 +14,7 @@ from cocalib.web.channel.radar_survey import (
 )
 from cocalib.web.channel.space_feed import surveyed_extent
 from cocalib.web.messages import PlacementRow
-from cocalib.web.radar_sight import RadarSight, look_of, shown_rows
-from cocalib.web.view3d.returns import Returns
+from cocalib.web.radar_sight import RadarSight, Returns, look_of
 
 NAN = float("nan")
 
@@ -154,4 +153,5 @@ def test_returns_of_the_last_seconds_are_shown_with_their_age() -> None:
     walker = next(seen for seen in look.returns if seen.x_m == 4.0)
     assert (walker.static, walker.doppler_mps, walker.snr_db) == (False, 1.0, 25.0)
     assert len(sight.trail(now, 0.0)) == 1, "one scan"
-    assert len(shown_rows(trail, 10)) <= 10 < len(shown_rows(trail, 1000)) == len(trail.points_radar_m)
+    seen = Returns.of(trail, now, GatingOptions(), lambda points_m: points_m)
+    assert len(seen.thinned(10)) <= 10 < len(seen.thinned(1000)) == len(trail.points_radar_m)

@@ -7,8 +7,9 @@ from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs
 from calib_core.options import GatingOptions
 from calib_core.radar import RadarErrors
 from cocalib.web.messages import RadarMap, ReturnColour
+from cocalib.web.radar_sight import Returns
 from cocalib.web.view3d.extent import Extent
-from cocalib.web.view3d.returns import SIZES, Colouring, Returns, map_colours, size_classes
+from cocalib.web.view3d.returns import SIZES, Colouring, map_colours, size_classes
 
 NAN = float("nan")
 EXTENT = Extent(20.0, 0.5, -0.5, -1.0, 3.0)

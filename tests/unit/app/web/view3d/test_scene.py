@@ -22,8 +22,8 @@ from cocalib.session import DismissedPlacement, History, RecordingFacts, Session
 from cocalib.view import Advice, view
 from cocalib.web.frames import Frame
 from cocalib.web.messages import FrameHeader, Viewpoint
+from cocalib.web.radar_sight import Returns
 from cocalib.web.view3d.extent import UNKNOWN, Extent
-from cocalib.web.view3d.returns import Returns
 from cocalib.web.view3d.scene import TabScene
 from cocalib.web.view3d.shapes import (
     ellipsoids,
@@ -270,10 +270,10 @@ def test_what_can_be_picked_is_where_the_lens_shows_it() -> None:
     look = space_look(sight(solved, selected="c2"))
     assert look.projected
     pixels = solved.camera.project(solved.camera_from_radar @ np.array([[4.0, 0.0, 0.0]]))
-    assert (look.returns[0].u_px, look.returns[0].v_px) == pytest.approx(pixels[0], abs=0.01)
+    assert (look.returns[0].seen.u_px, look.returns[0].seen.v_px) == pytest.approx(pixels[0], abs=0.01)
     assert [one.id for one in look.reflectors] == ["c1", "c2", "c3", "c4"]
     assert [label.kind for label in look.labels] == ["selected"]
     before = space_look(sight())
     assert not before.projected
-    assert before.returns[0].u_px is None
+    assert np.isnan(before.returns[0].seen.u_px)
     assert before.rings_m[-1] >= UNKNOWN.range_m
