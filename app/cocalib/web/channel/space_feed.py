@@ -20,6 +20,7 @@ from cocalib.web.frames import Frame
 from cocalib.web.messages import CursorMoved, SpaceLook
 from cocalib.web.radar_sight import Returns
 from cocalib.web.view3d.extent import UNKNOWN, Extent, extent_of
+from cocalib.web.view3d.returns import Colouring
 from cocalib.web.view3d.scene import TabScene
 from cocalib.web.view3d.sight import Sight, space_look
 
@@ -78,14 +79,10 @@ class SpaceFeed:
             picture=await self._thumbnail(cursor) if has_pictures else None,
             camera=hub.camera,
             has_pictures=has_pictures,
-            extent=self._extent_now(survey, returns),
+            colouring=self._colouring(cursor, survey, returns),
             placements=survey.placements if survey else (),
             map=survey.map if survey and cursor.whole else None,
-            snr_db=_ends_db(survey, returns),
-            fastest_mps=self._fastest_now(returns),
-            colour=cursor.colour,
             reference=hub.workspace.reference,
-            light=cursor.light,
         )
 
     async def _returns(self, cursor: CursorMoved, stamp: TimeNs, corrected: Callable[[Points3], Points3]) -> Returns:
@@ -118,6 +115,10 @@ class SpaceFeed:
             return await self._hub.frames.get(cursor.index, "thumbnail")
         except (CalibrationError, ValueError):
             return None
+
+    def _colouring(self, cursor: CursorMoved, survey: Survey | None, returns: Returns) -> Colouring:
+        extent, fastest_mps = self._extent_now(survey, returns), self._fastest_now(returns)
+        return Colouring(cursor.colour, extent, _ends_db(survey, returns), fastest_mps, cursor.light)
 
     def _extent_now(self, survey: Survey | None, returns: Returns) -> Extent:
         if survey is not self._surveyed and survey is not None:

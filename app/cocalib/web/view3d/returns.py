@@ -67,8 +67,8 @@ class Colouring:
 
     Attributes:
         colour: what the colours mean.
-        extent: ends of the colours of range and height.
-        snr_db: ends of the colours of amplitudes; None if the radar has none.
+        extent: of the data: ends of the colours of range and height.
+        snr_db: ends of the sizes and colours of amplitudes; None if the radar has none.
         fastest_mps: end of the colours of Doppler.
         light: drawn on a light background.
     """

@@ -126,16 +126,16 @@ class TabScene:
 
     def _show_extent(self, sight: Sight) -> None:
         """Fit rings, grid, sizes and, unless the user has moved it, the viewpoint to the data once they are known."""
-        if sight.extent == self._extent:
+        if sight.colouring.extent == self._extent:
             return
-        self._extent = sight.extent
-        ranges_m = ring_ranges_m(sight.extent.range_m)
+        self._extent = sight.colouring.extent
+        ranges_m = ring_ranges_m(sight.colouring.extent.range_m)
         fill_lines(self._rings, range_rings(ranges_m))
         step_m, across_m = ranges_m[0], 2.0 * ranges_m[-1]
         self._grid.width = self._grid.height = across_m
         self._grid.cell_size, self._grid.section_size = step_m / 5.0, step_m
         self._grid.fade_distance = 3.0 * across_m
-        growth = _growth(sight.extent)
+        growth = _growth(sight.colouring.extent)
         self._axes.axes_length, self._axes.axes_radius, self._axes.origin_radius = (
             0.5 * growth,
             0.012 * growth,
@@ -148,7 +148,7 @@ class TabScene:
 
     def _show_theme(self, sight: Sight) -> None:
         """Recolour the single-colour nodes to suit the background."""
-        palette = LIGHT if sight.light else DARK
+        palette = LIGHT if sight.colouring.light else DARK
         if palette is self._palette:
             return
         self._palette, self._posed = palette, self
@@ -159,8 +159,8 @@ class TabScene:
     def _show_returns(self, sight: Sight) -> None:
         returns, window = sight.returns, sight.window
         colours = sight.colouring.of(returns, sight.trail_s)
-        classes = size_classes(returns.snr_db, sight.snr_db)
-        self._returns.fill(returns.points_m, colours, classes, _growth(sight.extent) * _USUAL_SIZE_M)
+        classes = size_classes(returns.snr_db, sight.colouring.snr_db)
+        self._returns.fill(returns.points_m, colours, classes, _growth(sight.colouring.extent) * _USUAL_SIZE_M)
         fill_cloud(
             self._window, window.points_m, np.tile(np.array([self._palette.window], dtype=np.uint8), (len(window), 1))
         )
@@ -214,7 +214,7 @@ class TabScene:
             self._next.visible = False
             return
         place = np.array(advice.position_radar_m)
-        fill_lines(self._next, next_place(place[None], radius_m=max(0.3, 0.04 * sight.extent.range_m)))
+        fill_lines(self._next, next_place(place[None], radius_m=max(0.3, 0.04 * sight.colouring.extent.range_m)))
 
     def _show_picture(self, sight: Sight) -> None:
         picture = sight.picture
@@ -272,8 +272,14 @@ class SurveyNodes:
     def show(self, sight: Sight) -> None:
         """Draw the map and the placements of a Sight."""
         self._show_map(sight)
-        states, palette = sight.placement_states(), LIGHT if sight.light else DARK
-        placed = (tuple(map(id, sight.placements)), states, sight.extent, sight.light, id(sight.calibration))
+        states, palette = sight.placement_states(), LIGHT if sight.colouring.light else DARK
+        placed = (
+            tuple(map(id, sight.placements)),
+            states,
+            sight.colouring.extent,
+            sight.colouring.light,
+            id(sight.calibration),
+        )
         if placed == self._placed:
             return
         self._placed = placed
@@ -283,10 +289,12 @@ class SurveyNodes:
         for state, rings in self._rings.items():
             chosen = np.array([one == state for one in states], dtype=bool)
             rings.colors = np.array(colours[state], dtype=np.uint8)  # type: ignore[index]
-            fill_lines(rings, next_place(places[chosen], radius_m=max(0.15, _RING_SHARE * sight.extent.range_m)))
+            fill_lines(
+                rings, next_place(places[chosen], radius_m=max(0.15, _RING_SHARE * sight.colouring.extent.range_m))
+            )
 
     def _show_map(self, sight: Sight) -> None:
-        shown = (sight.map, sight.colour, sight.light)
+        shown = (sight.map, sight.colouring.colour, sight.colouring.light)
         if shown == self._mapped:
             return
         self._mapped = shown
@@ -295,4 +303,4 @@ class SurveyNodes:
             return
         points = np.stack([sight.map.x_m, sight.map.y_m, sight.map.z_m], axis=1)
         self._map.point_size = sight.map.cell_m / 2.0
-        fill_cloud(self._map, points, map_colours(sight.map, sight.colour, light=sight.light))
+        fill_cloud(self._map, points, map_colours(sight.map, sight.colouring.colour, light=sight.colouring.light))

@@ -16,7 +16,6 @@ from cocalib.web.frames import Frame
 from cocalib.web.messages import (
     PlacementState,
     RadarMap,
-    ReturnColour,
     SpaceLabel,
     SpaceLook,
     SpacePlacement,
@@ -24,7 +23,7 @@ from cocalib.web.messages import (
     SpaceReturn,
 )
 from cocalib.web.radar_sight import Returns, pixels_of
-from cocalib.web.view3d.extent import Extent, ring_ranges_m
+from cocalib.web.view3d.extent import ring_ranges_m
 from cocalib.web.view3d.returns import SIZES, Colouring, size_classes
 
 _SAME_PLACE_M = 1.0
@@ -47,14 +46,10 @@ class Sight:
         picture: a thumbnail of the frame; None when it cannot be read, or without pictures.
         camera: the recording's intrinsics, used until there is a calibration; None without pictures.
         has_pictures: whether there is a camera to show.
-        extent: of the data.
+        colouring: what the colours of returns mean, with the extent of the data.
         placements: found in the whole recording.
         map: of the static returns of the whole recording; None until it is known, or if it is not to be drawn.
-        snr_db: ends of the sizes and colours of amplitudes; None if the radar has none.
-        fastest_mps: end of the colours of Doppler.
-        colour: what the colours of returns mean.
         reference: a calibration to show until there is a new one; None if there is none.
-        light: drawn on a light background.
     """
 
     number: int
@@ -68,14 +63,10 @@ class Sight:
     picture: Frame | None
     camera: Camera | None
     has_pictures: bool
-    extent: Extent
+    colouring: Colouring
     placements: Sequence[Placement] = ()
     map: RadarMap | None = None
-    snr_db: tuple[float, float] | None = None
-    fastest_mps: float = 1.0
-    colour: ReturnColour = "speed"
     reference: Reference | None = None
-    light: bool = False
 
     @property
     def calibration(self) -> Calibration | None:
@@ -86,11 +77,6 @@ class Sight:
     def errors(self) -> RadarErrors:
         """The radar's estimated errors, which are taken out of all positions."""
         return self.calibration.radar_errors if self.calibration else RadarErrors()
-
-    @property
-    def colouring(self) -> Colouring:
-        """What the colours of returns mean."""
-        return Colouring(self.colour, self.extent, self.snr_db, self.fastest_mps, self.light)
 
     def placement_states(self) -> tuple[PlacementState, ...]:
         """Say of each placement whether it has a click, or was dismissed."""
@@ -137,9 +123,9 @@ def space_look(sight: Sight) -> SpaceLook:
         reflectors=tuple(_reflectors(solved, pairs)) if isinstance(solved, Calibration) else (),
         placements=_placements(sight),
         labels=tuple(_labels(sight)),
-        rings_m=ring_ranges_m(sight.extent.range_m),
+        rings_m=ring_ranges_m(sight.colouring.extent.range_m),
         ground_m=round(ground_m(sight), 3),
-        range_m=round(sight.extent.range_m, 3),
+        range_m=round(sight.colouring.extent.range_m, 3),
         legend=sight.colouring.legend(),
         projected=calibration is not None,
     )
@@ -155,7 +141,7 @@ def ground_m(sight: Sight) -> float:
 def _seen(sight: Sight, returns: Returns) -> tuple[SpaceReturn, ...]:
     """Return returns with their colours and sizes."""
     colours = ("#{:02x}{:02x}{:02x}".format(*colour) for colour in sight.colouring.of(returns, sight.trail_s))
-    sizes = (SIZES[number] for number in size_classes(returns.snr_db, sight.snr_db))
+    sizes = (SIZES[number] for number in size_classes(returns.snr_db, sight.colouring.snr_db))
     seen = returns.messages(pixels_of(sight.calibration, returns.points_m))
     return tuple(map(SpaceReturn, seen, colours, sizes))
 

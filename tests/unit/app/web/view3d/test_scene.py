@@ -24,6 +24,7 @@ from cocalib.web.frames import Frame
 from cocalib.web.messages import FrameHeader, Viewpoint
 from cocalib.web.radar_sight import Returns
 from cocalib.web.view3d.extent import UNKNOWN, Extent
+from cocalib.web.view3d.returns import Colouring
 from cocalib.web.view3d.scene import TabScene
 from cocalib.web.view3d.shapes import (
     ellipsoids,
@@ -133,6 +134,10 @@ def drawn() -> Iterator[Drawn]:
         server.stop()
 
 
+def coloured(extent: Extent = UNKNOWN, *, light: bool = False) -> Colouring:
+    return Colouring("speed", extent, None, 1.0, light)
+
+
 def sight(outcome: Calibration | None = None, *, selected: str | None = None, index: int = 0) -> Sight:
     clicks = tuple(ReflectorClick(TimeNs(place * 1000), f"c{place + 1}", 100.0, 100.0) for place in range(4))
     session = Session(clicks=clicks, outcome=outcome, outcome_revision=0 if outcome else -1)
@@ -152,7 +157,7 @@ def sight(outcome: Calibration | None = None, *, selected: str | None = None, in
         picture=picture,
         camera=CAMERA,
         has_pictures=True,
-        extent=UNKNOWN,
+        colouring=coloured(),
     )
 
 
@@ -194,7 +199,7 @@ def test_in_the_light_theme_nothing_is_white_on_white(drawn: Drawn) -> None:
     solved = calibration()
     drawn.scene.show(sight(solved, selected="c2"))
     dark = drawn.node("/camera").color
-    drawn.scene.show(replace(sight(solved, selected="c2"), light=True))
+    drawn.scene.show(replace(sight(solved, selected="c2"), colouring=coloured(light=True)))
     assert drawn.node("/camera").color != dark
     for name in ("/ray", "/returns_2", "/window", "/ground/rings"):
         assert np.asarray(drawn.node(name).colors).reshape(-1, 3).mean(axis=1).max() < 170
@@ -239,12 +244,12 @@ def test_once_the_extent_is_known_the_viewpoint_fits_it_unless_the_user_has_move
     drawn.scene.show(sight())
     before = np.array(drawn.camera.position)
     road = Extent(200.0, 0.8, -0.8, -1.0, 4.0)
-    drawn.scene.show(replace(sight(), extent=road))
+    drawn.scene.show(replace(sight(), colouring=coloured(road)))
     stands = np.array(drawn.camera.position)
     assert np.linalg.norm(stands) > 5 * np.linalg.norm(before)
     assert polar_from_cartesian(drawn.node("/ground/rings").points.reshape(-1, 3))[:, 0].max() == pytest.approx(200)
     drawn.camera.position = moved = (1.0, 2.0, 3.0)
-    drawn.scene.show(replace(sight(), extent=replace(road, range_m=50.0)))
+    drawn.scene.show(replace(sight(), colouring=coloured(replace(road, range_m=50.0))))
     assert drawn.camera.position == moved
 
 
