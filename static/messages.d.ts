@@ -154,14 +154,18 @@ export interface CalibrationOptions {
   refining: RefiningOptions;
 }
 
-/** Where to put the reflector next. */
-export interface Advice {
-  u_px: number;
-  v_px: number;
-  range_m: number;
+/** The advised next placement and its expected gain. */
+export interface NextPlacement {
+  position_radar_m: number[];
+  pixel_px: number[];
   gain: number;
   may_stop: boolean;
-  position_radar_m: number[];
+}
+
+/** Where to put the reflector next. */
+export interface Advice {
+  best: NextPlacement;
+  range_m: number;
   words: string;
 }
 
@@ -173,7 +177,7 @@ export interface AssumptionRow {
 }
 
 /** A placement that the user dismissed. */
-export interface DismissedRow {
+export interface DismissedPlacement {
   time: Stamp;
   position_m: [number, number, number];
 }
@@ -271,7 +275,7 @@ export interface View {
   comparison: Figure[];
   pose_assumed: Figure[];
   assumptions: AssumptionRow[];
-  dismissed: DismissedRow[];
+  dismissed: DismissedPlacement[];
   acknowledged: string[];
   boxes: BoxTrackRow[];
   box_labels: string[];
@@ -779,8 +783,7 @@ export interface LensResult {
 
 /** A place in the picture where the reflector may stand. */
 export interface ProposalPlace {
-  u_px: number;
-  v_px: number;
+  pixel_px: [number, number];
   sigma_px: number;
 }
 

@@ -78,8 +78,8 @@ function drawGuess(pen, u, v) {
 
 /** The best next placement: a dashed diamond, since it lies on the ground. @param {Ink} pen @param {import("../messages.js").Advice} advice */
 function drawAdvice(pen, advice) {
-  if (advice.may_stop) return;
-  const [x, y] = toDevice(advice.u_px, advice.v_px);
+  if (advice.best.may_stop) return;
+  const [x, y] = toDevice(advice.best.pixel_px[0], advice.best.pixel_px[1]);
   const [wide, high] = [18 * viewport.ratio, 9 * viewport.ratio];
   outlined(pen, ink.guess, 1.4, () => {
     pen.moveTo(x - wide, y);

@@ -19,7 +19,7 @@ export function drawProposal(pen) {
   offer.row.places.forEach((place, index) => {
     if (index !== offer.number) drawOther(pen, place, index + 1);
   });
-  const [x, y] = toDevice(offer.place.u_px, offer.place.v_px);
+  const [x, y] = toDevice(...offer.place.pixel_px);
   const radius = Math.max(3 * ratio, RING * offer.place.sigma_px * scale);
   const gap = Math.max(4 * ratio, radius + 2 * ratio, CLEAR * offer.row.width_px * scale);
   outlined(pen, ink.guess, 1.2, () => pen.arc(x, y, radius, 0, 2 * Math.PI), [], 1.6);
@@ -29,7 +29,7 @@ export function drawProposal(pen) {
 /** @param {CanvasRenderingContext2D} pen @param {import("../messages.js").ProposalPlace} place @param {number} number */
 function drawOther(pen, place, number) {
   const { ratio } = viewport;
-  const [x, y] = toDevice(place.u_px, place.v_px);
+  const [x, y] = toDevice(...place.pixel_px);
   pen.globalAlpha = 0.7;
   outlined(pen, ink.guess, 1, () => pen.arc(x, y, 3 * ratio, 0, 2 * Math.PI), [2 * ratio, 2 * ratio], 1.4);
   const [bx, by] = [x + 11 * ratio, y - 11 * ratio];

@@ -104,7 +104,7 @@ function notice() {
 }
 
 /** @param {Place} one @param {Place|undefined} other */
-const samePlace = (one, other) => other !== undefined && Math.hypot(one.u_px - other.u_px, one.v_px - other.v_px) < SAME_PX;
+const samePlace = (one, other) => other !== undefined && Math.hypot(one.pixel_px[0] - other.pixel_px[0], one.pixel_px[1] - other.pixel_px[1]) < SAME_PX;
 
 /** Whether a placement still waits for a decision. @param {number} placement */
 const isOpen = (placement) => !sent.has(placement) && state.placements[placement] !== undefined && isOffered(state.placements[placement]);
@@ -215,7 +215,7 @@ function seenOffer() {
 
 /** Whether the cross of a proposal is in view, in the frame that it is of. @param {Offer} offer */
 function isInView({ row, place }) {
-  const [x, y] = toCss(place.u_px, place.v_px);
+  const [x, y] = toCss(...place.pixel_px);
   return state.shown?.index === row.frame && x >= 0 && y >= 0 && x <= viewport.width && y <= viewport.height;
 }
 
@@ -229,12 +229,12 @@ export async function acceptProposal() {
     moved = performance.now();
     return say("Back at the proposal: look, then press Enter again");
   }
-  const { u_px, v_px, sigma_px } = offer.place;
+  const { pixel_px, sigma_px } = offer.place;
   const { placement, image_time } = offer.row;
   const mark = /** @type {const} */ ("snapped");
   const key = `proposal-${placement}`;
-  state.local.set(key, { u: u_px, v: v_px, image_time, mark });
-  await decide(offer.row, "Accepted", { type: "click_placed", image_time, pixel_px: [u_px, v_px], mark, sigma_px }, key);
+  state.local.set(key, { u: pixel_px[0], v: pixel_px[1], image_time, mark });
+  await decide(offer.row, "Accepted", { type: "click_placed", image_time, pixel_px, mark, sigma_px }, key);
 }
 
 /** X: it is not the reflector. */
@@ -328,9 +328,10 @@ function within(at, box, size) {
 /** Zoom into the place that is taken of a proposal. @param {Offer} offer */
 function zoomInto({ row, place }) {
   const field = Math.max(WIDTHS * row.width_px, PART * viewport.imageWidth);
-  lookInto(place.u_px, place.v_px, field, field);
-  lookAt(within(place.u_px, viewport.width, viewport.imageWidth), within(place.v_px, viewport.height, viewport.imageHeight));
-  pan(0, Math.min(0, viewport.height - BELOW - toCss(place.u_px, place.v_px)[1]));
+  const [u, v] = place.pixel_px;
+  lookInto(u, v, field, field);
+  lookAt(within(u, viewport.width, viewport.imageWidth), within(v, viewport.height, viewport.imageHeight));
+  pan(0, Math.min(0, viewport.height - BELOW - toCss(u, v)[1]));
   redraw();
   emit("box");
 }

@@ -103,7 +103,7 @@ def off_px(page: Driver, pictures: Pictures) -> float:
     """Return how far the proposal on screen is from the reflector."""
     offer = page.value("__cocalib.shownOffer()")
     u_px, v_px = pictures.at(offer["row"]["image_time"])
-    return float(np.hypot(offer["place"]["u_px"] - u_px, offer["place"]["v_px"] - v_px))
+    return float(np.hypot(offer["place"]["pixel_px"][0] - u_px, offer["place"]["pixel_px"][1] - v_px))
 
 
 def test_twenty_placements_take_at_most_25_keys_and_clicks(
@@ -212,7 +212,7 @@ def test_a_proposal_is_rejected_corrected_and_undone_and_all_of_them_are_switche
     page.until(f"__cocalib.state.view.dismissed.length === 0 && __cocalib.shownOffer()?.row.placement === {placement}")
     assert guide(page).split(",")[0] == first.split(",")[0]
 
-    u, v = (page.value(f"__cocalib.shownOffer().place.{axis}") for axis in ("u_px", "v_px"))
+    u, v = page.value("__cocalib.shownOffer().place.pixel_px")
     page.click(u + 25, v + 25)
     page.until("__cocalib.state.view.clicks.length === 1")
     corrected = page.view["clicks"][0]

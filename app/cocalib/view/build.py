@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from calib_core.association.placements import Placement
-from calib_core.measurements import MIN_PAIRS, Stamp, Unpaired, Unsolvable
+from calib_core.measurements import MIN_PAIRS, Unpaired, Unsolvable
 from calib_core.results import Calibration, DataWarning
 from calib_core.results.verdict import Verdict, by_consequence, verdict_on
 from cocalib.session import History, RecordingFacts, Session
@@ -12,7 +12,7 @@ from cocalib.session.boxes_in_frames import CarriedTrack, carried_tracks
 from cocalib.view.box_rows import box_rows, known_labels
 from cocalib.view.click_rows import click_rows
 from cocalib.view.figures import assumed_figures, firm_text, metric_figures, pose_figures, residual_limit_px
-from cocalib.view.model import AccPanel, AssumptionRow, DismissedRow, Figure, Stage, SystematicErrorTable, View
+from cocalib.view.model import AccPanel, AssumptionRow, Figure, Stage, SystematicErrorTable, View
 from cocalib.view.reference import Reference, comparison_figures, reference_words, shown_calibration
 from cocalib.view.systematic_errors import refined_sentences, systematic_errors, uncertainty_sentences
 from cocalib.view.verdict_row import advice_for, shown_verdict, verdict_row
@@ -76,7 +76,7 @@ def view(
         comparison=comparison_figures(reference, calibration) if reference and calibration else (),
         assumptions=_assumptions(session, facts),
         verdict=verdict_row(verdict, session, placements),
-        dismissed=tuple(DismissedRow(Stamp.of(one.time), one.position_m) for one in session.dismissed),
+        dismissed=session.dismissed,
         acknowledged=session.acknowledged,
         boxes=box_rows(session.boxes, carried_tracks(session.boxes, facts) if carried is None else carried, facts),
         box_labels=known_labels(session.boxes),

@@ -8,8 +8,9 @@ import msgspec
 from calib_core.evaluation.figures import Axis, ClassFigure
 from calib_core.measurements import Mark, Stamp
 from calib_core.options import CalibrationOptions, Method
-from calib_core.results import DataWarning
+from calib_core.results import DataWarning, NextPlacement
 from calib_core.results.verdict import VerdictLevel
+from cocalib.session import DismissedPlacement
 
 Level: TypeAlias = Literal["none", "plain", "good", "warning"]
 
@@ -99,19 +100,6 @@ class ClickRow:
 
 
 @dataclass(frozen=True, slots=True)
-class DismissedRow:
-    """A placement that the user dismissed.
-
-    Attributes:
-        time: a stamp within it.
-        position_m: (x, y, z) in the radar frame.
-    """
-
-    time: Stamp
-    position_m: tuple[float, float, float]
-
-
-@dataclass(frozen=True, slots=True)
 class SystematicErrorRow:
     """One error that all pairs share, as a row of a table.
 
@@ -149,21 +137,13 @@ class Advice:
     """Where to put the reflector next.
 
     Attributes:
-        u_px: column where it would appear.
-        v_px: row.
+        best: where, and what it gains.
         range_m: how far from the radar.
-        gain: present uncertainty divided by the one expected afterwards, at least 1.
-        may_stop: no further placement would help noticeably.
-        position_radar_m: (x, y, z) in the radar frame.
         words: the same as text, one or two sentences.
     """
 
-    u_px: float
-    v_px: float
+    best: NextPlacement
     range_m: float
-    gain: float
-    may_stop: bool
-    position_radar_m: tuple[float, ...]
     words: str
 
 
@@ -332,7 +312,7 @@ class View:
     comparison: tuple[Figure, ...] = ()
     pose_assumed: tuple[Figure, ...] = ()
     assumptions: tuple[AssumptionRow, ...] = ()
-    dismissed: tuple[DismissedRow, ...] = ()
+    dismissed: tuple[DismissedPlacement, ...] = ()
     acknowledged: tuple[str, ...] = ()
     boxes: tuple[BoxTrackRow, ...] = ()
     box_labels: tuple[str, ...] = ()

@@ -82,10 +82,7 @@ def advice_for(calibration: Calibration, verdict: Verdict) -> Advice | None:
     best = calibration.next_placement
     if best is None:
         return None
-    u_px, v_px = (round(float(value), 1) for value in best.pixel_px)
-    range_m = float(np.linalg.norm(best.position_radar_m))
-    position = tuple(best.position_radar_m.tolist())
-    return Advice(u_px, v_px, range_m, best.gain, best.may_stop, position, _words(best, verdict))
+    return Advice(best, float(np.linalg.norm(best.position_radar_m)), _words(best, verdict))
 
 
 def _words(best: NextPlacement, verdict: Verdict) -> str:

@@ -179,7 +179,7 @@ class ProposingDesk:
     def _row(self, proposal: Proposal, placement: int, now: ProposingSnapshot) -> ProposalRow:
         view: DwellView = next(one for one in now.views if one.placement is proposal.placement)
         places = tuple(
-            ProposalPlace(*(round(float(value), 3) for value in (*one.pixel_px, one.sigma_px)))
+            ProposalPlace((round(one.pixel_px[0].item(), 3), round(one.pixel_px[1].item(), 3)), round(one.sigma_px, 3))
             for one in proposal.candidates
         )
         return ProposalRow(

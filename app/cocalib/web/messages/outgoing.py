@@ -77,13 +77,11 @@ class ProposalPlace:
     """A place in the picture where the reflector may stand.
 
     Attributes:
-        u_px: column.
-        v_px: row.
+        pixel_px: column and row.
         sigma_px: standard deviation of that pixel per axis, if it is the reflector.
     """
 
-    u_px: float
-    v_px: float
+    pixel_px: tuple[float, float]
     sigma_px: float
 
 

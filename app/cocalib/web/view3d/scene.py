@@ -210,10 +210,10 @@ class TabScene:
     def _show_advice(self, sight: Sight) -> None:
         """Draw a ring around the best next placement."""
         advice = sight.view.advice
-        if advice is None or advice.may_stop or sight.view.verdict.done:
+        if advice is None or advice.best.may_stop or sight.view.verdict.done:
             self._next.visible = False
             return
-        place = np.array(advice.position_radar_m)
+        place = advice.best.position_radar_m
         fill_lines(self._next, next_place(place[None], radius_m=max(0.3, 0.04 * sight.colouring.extent.range_m)))
 
     def _show_picture(self, sight: Sight) -> None:

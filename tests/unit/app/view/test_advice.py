@@ -27,25 +27,25 @@ def test_the_advised_place_is_in_the_picture_and_in_the_text() -> None:
     calibration = solved(6)
     advice = advised(calibration)
     assert advice is not None
-    assert not advice.may_stop
-    assert calibration.camera.in_image(np.array([[advice.u_px, advice.v_px]]))[0]
-    assert advice.range_m == pytest.approx(np.linalg.norm(advice.position_radar_m))
-    assert f"{advice.position_radar_m[0]:.1f} m ahead" in advice.words
+    assert not advice.best.may_stop
+    assert calibration.camera.in_image(advice.best.pixel_px[None])[0]
+    assert advice.range_m == pytest.approx(np.linalg.norm(advice.best.position_radar_m))
+    assert f"{advice.best.position_radar_m[0]:.1f} m ahead" in advice.words
     assert "would reduce the pose uncertainty by" in advice.words
 
 
 def test_the_side_is_named_as_the_radar_sees_it() -> None:
     advice = advised(solved(6))
     assert advice is not None
-    y = advice.position_radar_m[1]
-    expected = "straight ahead" if abs(y) < 0.1 * advice.position_radar_m[0] else ("left" if y > 0 else "right")
+    y = advice.best.position_radar_m[1]
+    expected = "straight ahead" if abs(y) < 0.1 * advice.best.position_radar_m[0] else ("left" if y > 0 else "right")
     assert expected in advice.words
 
 
 def test_many_placements_are_enough() -> None:
     advice = advised(solved(400))
     assert advice is not None
-    assert advice.may_stop
+    assert advice.best.may_stop
     assert "No further placement would" in advice.words
 
 

@@ -107,7 +107,7 @@ def test_pages_are_told_the_proposals_with_their_placements_and_frames(workspace
             view = DRAWN.views[row.placement]
             assert row.frame == row.placement
             assert row.image_time.time == view.image_time
-            assert (row.places[0].u_px, row.places[0].v_px) in [
+            assert row.places[0].pixel_px in [
                 tuple(round(float(value), 3) for value in one.pixel_px) for one in view.candidates
             ]
         gone = news.rows[0].placement

@@ -16,7 +16,7 @@ from calib_core.geometry import RigidTransform
 from calib_core.measurements import RadarScan, ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions, NoiseOptions
 from calib_core.radar import RadarErrors, cartesian_from_polar, polar_from_cartesian
-from calib_core.results import Calibration, Metrics, PairResult
+from calib_core.results import Calibration, Metrics, NextPlacement, PairResult
 from cocalib.colours import residual_colours
 from cocalib.session import DismissedPlacement, History, RecordingFacts, Session
 from cocalib.view import Advice, view
@@ -187,11 +187,13 @@ def test_with_a_calibration_the_camera_moves_to_its_place_and_the_pairs_appear(d
 
 def test_the_best_next_placement_is_ringed_until_no_more_are_needed(drawn: Drawn) -> None:
     seen = sight(calibration())
-    advice = Advice(10.0, 20.0, 5.0, 1.4, False, (4.0, 3.0, 0.0), "There.")
+    advice = Advice(NextPlacement(np.array([4.0, 3.0, 0.0]), np.array([10.0, 20.0]), 1.4, False), 5.0, "There.")
     drawn.scene.show(replace(seen, view=replace(seen.view, advice=advice)))
     assert "/next" in drawn.names()
     assert drawn.node("/next").points.reshape(-1, 3).mean(axis=0) == pytest.approx([4.0, 3.0, 0.0], abs=0.05)
-    drawn.scene.show(replace(seen, view=replace(seen.view, advice=replace(advice, may_stop=True))))
+    drawn.scene.show(
+        replace(seen, view=replace(seen.view, advice=replace(advice, best=replace(advice.best, may_stop=True))))
+    )
     assert "/next" not in drawn.names()
 
 
