@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from calib_core.errors import InputError
-from calib_core.options import CalibrationOptions
 from cocalib.cli.flags import File, Folder, Switch
-from cocalib.cli.recording_flags import CameraPosition, MeasuredCamera, Options, Recordings, TopicFlags, Topics
+from cocalib.cli.recording_flags import CameraFlags, GivenCamera, OptionFlags, Options, Recordings, TopicFlags, Topics
 from cocalib.cli.serving_flags import ServingFlags
 from cocalib.platform.files import read_text
 
@@ -25,10 +24,7 @@ class Open:
     recording: Recordings
     """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several are read as one recording.
     Without one, it is chosen in the page."""
-    camera: File = None
-    """Intrinsics to use if the recording has none, or instead of its own: any format that `cocalib intrinsics` writes."""
-    rescale_camera: Switch = False
-    """With --camera: scale its intrinsics to the recorded pictures, if these are the calibrated ones resized."""
+    camera: GivenCamera = field(default_factory=CameraFlags)
     calibration: File = None
     """A calibration to show, in any format: drawn until the clicks give a new one, then compared with it."""
     clicks: File = None
@@ -41,28 +37,26 @@ class Open:
     """Open a recording that is still being written (.bag, .mcap, .db3, folders): frames and placements appear as they come."""
     root: Folder = None
     """Folder in which recordings can be chosen in the page; none by default, so that only recent ones can be chosen."""
-    measured: CameraPosition = field(default_factory=MeasuredCamera)
     topics: Topics = field(default_factory=TopicFlags)
-    options: Options = field(default_factory=CalibrationOptions)
+    options: Options = field(default_factory=OptionFlags)
     serving: Annotated[ServingFlags, tyro.conf.arg(name="")] = field(default_factory=ServingFlags)
 
     def run(self) -> int:
         """Serve until Ctrl+C, SIGTERM or SIGHUP; return the exit code."""
-        from calib_core.interchange import CameraFile
         from calib_core.recordings import require_files
         from cocalib.opening import Choice, GivenClicks
 
         if not self.recording:
             return _serve(None, self.serving, self.root)
         paths = self.recording if self.follow else require_files(self.recording)
-        _require_given(self.camera, self.calibration, self.clicks)
+        _require_given(self.camera.camera, self.calibration, self.clicks)
         choice = Choice(
             paths,
             topics=self.topics,
-            camera_file=None if self.camera is None else CameraFile.read(self.camera, rescale=self.rescale_camera),
+            camera_file=self.camera.read(),
             calibration_file=self.calibration,
             clicks=None if self.clicks is None else GivenClicks(read_text(self.clicks), str(self.clicks)),
-            options=self.measured.over(self.options),
+            options=self.options.all(),
             session=self.session,
             fresh=self.fresh,
             follow=self.follow,

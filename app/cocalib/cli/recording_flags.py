@@ -1,7 +1,6 @@
 """Flags of the commands that read a recording: which files and topics, and the options of a calibration."""
 
-import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeAlias
 
@@ -9,10 +8,10 @@ import tyro
 
 from calib_core.options import CalibrationOptions, CameraPositionPrior
 from calib_core.recordings import RecordingOptions
-from cocalib.cli.flags import called, same
+from cocalib.cli.flags import File, Switch, called, same
 
 if TYPE_CHECKING:
-    from calib_core.interchange import VehicleNote
+    from calib_core.interchange import CameraFile, VehicleNote
 
 Recordings: TypeAlias = Annotated[tuple[Path, ...], tyro.conf.Positional, called("RECORDING...")]
 
@@ -38,6 +37,26 @@ Topics: TypeAlias = Annotated[TopicFlags, tyro.conf.arg(name="")]
 
 
 @dataclass(frozen=True, slots=True)
+class CameraFlags:
+    """Intrinsics from a file."""
+
+    camera: File = None
+    """Intrinsics to use if there are none, or instead of the recording's own: any format that `cocalib intrinsics` writes."""
+    rescale_camera: Switch = False
+    """With --camera: scale its intrinsics to the recorded pictures, if these are the calibrated ones resized."""
+
+    def read(self) -> "CameraFile | None":
+        """Read the file, if one is given.
+
+        Raises:
+            InputError: it cannot be read.
+        """
+        from calib_core.interchange import CameraFile
+
+        return None if self.camera is None else CameraFile.read(self.camera, rescale=self.rescale_camera)
+
+
+@dataclass(frozen=True, slots=True)
 class MeasuredCamera:
     """A tape-measured camera position; no other extra measurement helps as much."""
 
@@ -46,12 +65,33 @@ class MeasuredCamera:
     camera_position_sigma_m: float = 0.01
     """Standard deviation of that position, per axis [m]."""
 
-    def over(self, options: CalibrationOptions) -> CalibrationOptions:
+
+# The camera position has its own flags; in the options it would become a subcommand.
+_Options: TypeAlias = Annotated[
+    CalibrationOptions, tyro.conf.arg(name=""), tyro.conf.AvoidSubcommands, tyro.conf.FlagConversionOff
+]
+
+
+@dataclass(frozen=True, slots=True)
+class OptionFlags:
+    """The options of a calibration."""
+
+    measured: Annotated[MeasuredCamera, tyro.conf.arg(name="")] = field(default_factory=MeasuredCamera)
+    options: _Options = field(default_factory=CalibrationOptions)
+
+    @classmethod
+    def of(cls, options: CalibrationOptions) -> "OptionFlags":
+        """Return the flags that give these options."""
+        position = options.solving.camera_position
+        measured = MeasuredCamera(position.position_m, position.sigma_m) if position else MeasuredCamera()
+        return cls(measured, replace(options, solving=replace(options.solving, camera_position=None)))
+
+    def all(self) -> CalibrationOptions:
         """Return the options with the measured position, if there is one."""
-        if self.camera_position_m is None:
-            return options
-        prior = CameraPositionPrior(self.camera_position_m, self.camera_position_sigma_m)
-        return dataclasses.replace(options, solving=dataclasses.replace(options.solving, camera_position=prior))
+        if self.measured.camera_position_m is None:
+            return self.options
+        prior = CameraPositionPrior(self.measured.camera_position_m, self.measured.camera_position_sigma_m)
+        return replace(self.options, solving=replace(self.options.solving, camera_position=prior))
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +117,7 @@ class VehicleFlags:
         """
         from calib_core.interchange.calibration_file import VehicleNote, require_label, require_name
 
-        for one in dataclasses.fields(self):
+        for one in fields(self):
             if (text := getattr(self, one.name)) is not None:
                 require = require_name if one.name in ("vehicle", "session_name") else require_label
                 require(text, f"--{one.name.replace('_', '-')}")
@@ -86,8 +126,5 @@ class VehicleFlags:
 
 # Without a prefix, but in a group of their own in the help.
 Vehicle: TypeAlias = Annotated[VehicleFlags, tyro.conf.OmitArgPrefixes]
-CameraPosition: TypeAlias = Annotated[MeasuredCamera, tyro.conf.arg(name="")]
-# The camera position has its own flags; here it would become a subcommand.
-Options: TypeAlias = Annotated[
-    CalibrationOptions, tyro.conf.arg(name=""), tyro.conf.AvoidSubcommands, tyro.conf.FlagConversionOff
-]
+GivenCamera: TypeAlias = Annotated[CameraFlags, tyro.conf.arg(name="")]
+Options: TypeAlias = Annotated[OptionFlags, tyro.conf.arg(name="")]

@@ -2,16 +2,16 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
 import tyro
 
 from calib_core.errors import InputError
-from cocalib.cli.flags import File, Switch, called
+from cocalib.cli.flags import File, called
 from cocalib.cli.output import progress_bar, told_clicks_at_frames
-from cocalib.cli.recording_flags import TopicFlags
+from cocalib.cli.recording_flags import CameraFlags, GivenCamera, TopicFlags
 from cocalib.platform.files import read_text
 
 if TYPE_CHECKING:
@@ -24,10 +24,7 @@ class ShownFlags:
 
     calibration: File = None
     """Calibration to project the returns with, in any format that export writes."""
-    camera: File = None
-    """Intrinsics to use if the calibration has none, or instead of the recording's: camera_info YAML, OpenCV, Kalibr, JSON."""
-    rescale_camera: Switch = False
-    """With --camera: scale its intrinsics to the recorded pictures, if these are the calibrated ones resized."""
+    camera: GivenCamera = field(default_factory=CameraFlags)
     clicks: File = None
     """Clicks in this recording (cocalib/clicks-1 JSON); by default those in the calibration, if they are of this recording."""
     boxes: Annotated[str | None, called("FILE_OR_TOPIC")] = None
@@ -54,7 +51,7 @@ def shown_recording(paths: Sequence[Path], topics: TopicFlags, files: ShownFlags
         InputError: a file cannot be read, or is not of this recording.
         RecordingError: the recording cannot be opened.
     """
-    from calib_core.interchange import CameraFile, read_any_file, read_clicks
+    from calib_core.interchange import read_any_file, read_clicks
     from calib_core.recordings import open_recording
     from cocalib.evaluation.boxes import find_boxes
     from cocalib.evaluation.recording_check import calibration_of
@@ -65,7 +62,7 @@ def shown_recording(paths: Sequence[Path], topics: TopicFlags, files: ShownFlags
         raise InputError("RECORDING is missing; name one or more files or folders")
     if files.calibration is None:
         raise InputError("--calibration FILE is missing: the calibration that the returns are projected with")
-    camera_file = None if files.camera is None else CameraFile.read(files.camera, rescale=files.rescale_camera)
+    camera_file = files.camera.read()
     with open_recording(tuple(paths), topics) as recording:
         camera = camera_for(recording, camera_file)
         calibration = calibration_of(read_any_file(files.calibration), str(files.calibration), camera)

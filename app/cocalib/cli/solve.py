@@ -17,8 +17,9 @@ from calib_core.results import Calibration
 from cocalib.cli.flags import File, Switch
 from cocalib.cli.output import explain_unsolvable, write_whole
 from cocalib.cli.recording_flags import (
-    CameraPosition,
-    MeasuredCamera,
+    CameraFlags,
+    GivenCamera,
+    OptionFlags,
     Options,
     Recordings,
     TopicFlags,
@@ -59,18 +60,14 @@ class Solve:
     """With --auto: width of the reflector as the camera sees it [m]."""
     pairs: File = None
     """Instead of a recording: radar positions and pixels (cocalib/pairs-1 JSON), or a calibration to solve again."""
-    camera: File = None
-    """Intrinsics to use if the recording has none, or instead of its own: any format that `cocalib intrinsics` writes."""
-    rescale_camera: Switch = False
-    """With --camera: scale its intrinsics to the recorded pictures, if these are the calibrated ones resized."""
+    camera: GivenCamera = field(default_factory=CameraFlags)
     out: File = None
     """Output file (cocalib/calibration-1 JSON); stdout if omitted."""
     refine_intrinsics: Switch = False
     """Estimate focal length, principal point and k1 with the pose; their covariance or the refining options say how sure."""
-    measured: CameraPosition = field(default_factory=MeasuredCamera)
     vehicle: Vehicle = field(default_factory=VehicleFlags)
     topics: Topics = field(default_factory=TopicFlags)
-    options: Options = field(default_factory=CalibrationOptions)
+    options: Options = field(default_factory=OptionFlags)
     pairs_text: Annotated[str | None, tyro.conf.Suppress] = None
     """What the file of pairs holds, once it has been read: a pipe can be read only once."""
 
@@ -84,10 +81,7 @@ class Solve:
         if not names_schema(text, CALIBRATION_SCHEMA):
             return type(self)(pairs_text=text)
         options = read_calibration(text, str(self.pairs)).calibration.options
-        position = options.solving.camera_position
-        measured = MeasuredCamera(position.position_m, position.sigma_m) if position else MeasuredCamera()
-        free = dataclasses.replace(options, solving=dataclasses.replace(options.solving, camera_position=None))
-        return type(self)(options=free, measured=measured, pairs_text=text)
+        return type(self)(options=OptionFlags.of(options), pairs_text=text)
 
     def run(self) -> int:
         """Solve, write the calibration, print its summary; return the exit code."""
@@ -96,7 +90,7 @@ class Solve:
         vehicle = self.vehicle.note()
         if not self.auto and (self.clicks_out is not None or self.reflector_m != _REFLECTOR_M):
             raise InputError("--clicks-out and --reflector-m apply with --auto only; add it")
-        if self.pairs is not None and (self.camera or self.topics != TopicFlags()):
+        if self.pairs is not None and (self.camera.camera or self.topics != TopicFlags()):
             raise InputError(
                 "--camera and the options of a recording do not apply to --pairs, which brings its own camera"
             )
@@ -113,20 +107,19 @@ class Solve:
 
     def _all_options(self) -> CalibrationOptions:
         """Return the options with what has a flag of its own."""
-        options = self.measured.over(self.options)
+        options = self.options.all()
         if not self.refine_intrinsics:
             return options
         return dataclasses.replace(options, refining=dataclasses.replace(options.refining, intrinsics=True))
 
     def _solve_recording(self, vehicle: "VehicleNote") -> int:
-        from calib_core.interchange import CameraFile
         from calib_core.recordings import open_recording
         from cocalib.solving.automatic import solve_placed_clicks
         from cocalib.solving.recorded_clicks import require_confirmed
         from cocalib.solving.solving import calibration_text, required_camera
 
         self._require_folders()
-        camera_file = None if self.camera is None else CameraFile.read(self.camera, rescale=self.rescale_camera)
+        camera_file = self.camera.read()
         options = self._all_options()
         file = self._clicks_file()
         with open_recording(self.recording, self.topics) as recording:

@@ -1,13 +1,12 @@
 """`cocalib video`: write a recording's camera frames to a video file, as they are or with what the radar saw."""
 
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
 
 from calib_core.errors import InputError
-from cocalib.cli.flags import File, NewFile, Switch, called
+from cocalib.cli.flags import NewFile, Switch
 from cocalib.cli.output import progress_bar
 from cocalib.cli.recording_flags import Recordings, TopicFlags, Topics
-from cocalib.cli.shown_recording import ShownFlags, shown_recording
+from cocalib.cli.shown_recording import Shown, ShownFlags, shown_recording
 
 _TRAIL_SCANS, _MOST_TRAIL_SCANS = 5, 100
 
@@ -16,7 +15,8 @@ _TRAIL_SCANS, _MOST_TRAIL_SCANS = 5, 100
 class Video:
     """Write the camera's frames to a video, each at its recorded time; recorded JPEG is not re-encoded.
 
-    With --overlay, the frames are drawn over and encoded: radar returns, clicks, boxes, Acc.
+    With --overlay, the frames are drawn over and encoded: radar returns, clicks, boxes, Acc; all options about what is drawn
+    apply with it.
     """
 
     recording: Recordings
@@ -25,18 +25,7 @@ class Video:
     """Output video: .mp4 or .mov (times to a microsecond), or .mkv (to a millisecond)."""
     overlay: Switch = False
     """Draw what the radar saw over the frames, through a calibration."""
-    calibration: File = None
-    """With --overlay: calibration to project the returns with, in any format that export writes."""
-    against: File = None
-    """With --overlay: another calibration, drawn side by side."""
-    camera: File = None
-    """With --overlay: intrinsics to use if the calibration has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
-    clicks: File = None
-    """With --overlay: clicks (cocalib/clicks-1 JSON); by default the calibration's own, if they are of this recording."""
-    boxes: Annotated[str | None, called("FILE_OR_TOPIC")] = None
-    """With --overlay: boxes, drawn with their classes and evaluated (Acc): a file of a labelling tool, or a topic."""
-    colour: Literal["range", "speed"] = "range"
-    """With --overlay: what the colours of returns show."""
+    shown: Shown = field(default_factory=ShownFlags)
     trail: int = _TRAIL_SCANS
     """With --overlay: number of earlier scans whose returns stay, smaller the older they are; 0 for none."""
     topics: Topics = field(default_factory=TopicFlags)
@@ -45,12 +34,10 @@ class Video:
         """Write the video; return the exit code."""
         if self.overlay:
             return self._write_overlay()
-        if any((self.calibration, self.against, self.camera, self.clicks, self.boxes)):
+        if self.shown != ShownFlags() or self.trail != _TRAIL_SCANS:
             raise InputError(
-                "--calibration, --against, --camera, --clicks and --boxes apply with --overlay only; add it"
+                "--calibration, --against, --camera, --clicks, --boxes, --trail and --colour apply with --overlay only; add it"
             )
-        if self.colour != "range" or self.trail != _TRAIL_SCANS:
-            raise InputError("--trail and --colour apply with --overlay only; add it")
         from calib_core.recordings import open_recording, write_video
 
         with (
@@ -76,16 +63,13 @@ class Video:
         if not 0 <= self.trail <= _MOST_TRAIL_SCANS:
             raise InputError(f"--trail {self.trail}: give a number of scans from 0 to {_MOST_TRAIL_SCANS}")
         video_format(self.out)
-        shown = ShownFlags(
-            calibration=self.calibration,
-            camera=self.camera,
-            clicks=self.clicks,
-            boxes=self.boxes,
-            against=self.against,
-            colour=self.colour,
+        titles = tuple(
+            name_text(path.name) for path in (self.shown.calibration, self.shown.against) if path is not None
         )
-        titles = tuple(name_text(path.name) for path in (self.calibration, self.against) if path is not None)
-        with shown_recording(self.recording, self.topics, shown) as view, progress_bar("drawing frames") as progress:
+        with (
+            shown_recording(self.recording, self.topics, self.shown) as view,
+            progress_bar("drawing frames") as progress,
+        ):
             written = write_overlay(view, self.out, OverlayOptions(titles, self.trail), progress=progress)
         video, (width, height) = written.video, written.size_px
         print(

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from calib_core.errors import InputError
-from cocalib.cli.evaluation.evidence_flags import EvidenceFlags, EvidenceUsed
-from cocalib.cli.flags import File, Switch, called
+from cocalib.cli.evaluation.evidence_flags import EvidenceFlags, Judging, JudgingFlags
+from cocalib.cli.flags import Switch, called
 from cocalib.cli.output import progress_bar
-from cocalib.cli.recording_flags import Recordings, TopicFlags, Topics
-from cocalib.cli.tree_flags import FrameFlags, Frames
+from cocalib.cli.recording_flags import Recordings
 from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
@@ -35,24 +34,20 @@ class Compare:
     """Another calibration of the same sensors."""
     recording: Recordings = ()
     """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several are read as one recording."""
-    evidence: EvidenceUsed = field(default_factory=EvidenceFlags)
-    camera: File = None
-    """Intrinsics to use if a file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
     json: Switch = False
     """Print one JSON object instead of text."""
-    topics: Topics = field(default_factory=TopicFlags)
-    frames: Frames = field(default_factory=FrameFlags)
+    judging: Judging = field(default_factory=JudgingFlags)
 
     def run(self) -> int:
         """Print the comparison; return the exit code."""
-        from calib_core.interchange import compare, read_camera_file
+        from calib_core.interchange import compare
 
         if self.a is None or self.b is None:
             raise InputError("compare needs two calibrations; see cocalib compare --help")
-        if not self.recording and self.evidence != EvidenceFlags():
+        if not self.recording and self.judging.evidence != EvidenceFlags():
             raise InputError("clicks and boxes are those of a recording; give it too: cocalib compare A B RECORDING")
-        camera = None if self.camera is None else read_camera_file(self.camera)
-        found_a, found_b = (self.frames.read([path])[0] for path in (self.a, self.b))
+        camera = self.judging.read_camera()
+        found_a, found_b = (self.judging.frames.read([path])[0] for path in (self.a, self.b))
         compared = None
         if self.recording:
             compared, camera = self._on_recording(self.a, self.b, camera)
@@ -75,13 +70,13 @@ class Compare:
         from cocalib.evaluation.comparing import compare_on_recording
         from cocalib.evaluation.recording_check import judged_calibration
 
-        options = self.evidence.options()
-        with open_recording(self.recording, self.topics, require=("radar",)) as recording:
+        options = self.judging.evidence.options()
+        with open_recording(self.recording, self.judging.topics, require=("radar",)) as recording:
             of_a, of_b = (
-                judged_calibration(self.frames.read([one])[0], one, recording, camera=camera) for one in (a, b)
+                judged_calibration(self.judging.frames.read([one])[0], one, recording, camera=camera) for one in (a, b)
             )
-            clicks = self.evidence.clicks_in(recording, self.recording, [of_a.found, of_b.found])
-            boxes, labels = self.evidence.boxes_in(recording)
+            clicks = self.judging.evidence.clicks_in(recording, self.recording, [of_a.found, of_b.found])
+            boxes, labels = self.judging.evidence.boxes_in(recording)
             if not clicks and boxes is None:
                 raise InputError(
                     f"{self.recording[0]}: nothing to judge the two by: no clicks (--clicks CLICKS.json) and no boxes "

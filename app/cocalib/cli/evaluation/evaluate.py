@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from calib_core.errors import InputError
-from cocalib.cli.evaluation.evidence_flags import EvidenceFlags, EvidenceUsed
-from cocalib.cli.flags import File, Switch, called
+from cocalib.cli.evaluation.evidence_flags import Judging, JudgingFlags
+from cocalib.cli.flags import Switch, called
 from cocalib.cli.output import progress_bar
-from cocalib.cli.recording_flags import Recordings, TopicFlags, Topics
-from cocalib.cli.tree_flags import FrameFlags, Frames
+from cocalib.cli.recording_flags import Recordings
 from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
@@ -30,15 +29,11 @@ class Evaluate:
     """A calibration in any format that import reads."""
     recording: Recordings = ()
     """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several are read as one recording."""
-    evidence: EvidenceUsed = field(default_factory=EvidenceFlags)
-    camera: File = None
-    """Intrinsics to use if the file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
     no_held_out: Switch = False
     """Leave out the held-out figures, which take a solve per placement."""
     json: Switch = False
     """Print one JSON object instead of text."""
-    topics: Topics = field(default_factory=TopicFlags)
-    frames: Frames = field(default_factory=FrameFlags)
+    judging: Judging = field(default_factory=JudgingFlags)
 
     def run(self) -> int:
         """Print the figures; return the exit code."""
@@ -59,17 +54,16 @@ class Evaluate:
         return code
 
     def _evaluation(self, path: Path) -> "Evaluation":
-        from calib_core.interchange import read_camera_file
         from calib_core.recordings import open_recording
         from cocalib.evaluation.evaluating import evaluate_recording
         from cocalib.evaluation.recording_check import judged_calibration
 
-        options = self.evidence.options()
-        camera = None if self.camera is None else read_camera_file(self.camera)
-        with open_recording(self.recording, self.topics, require=("radar",)) as recording:
-            judged = judged_calibration(self.frames.read([path])[0], path, recording, camera=camera)
-            clicks = self.evidence.clicks_in(recording, self.recording, [judged.found])
-            boxes, labels = self.evidence.boxes_in(recording)
+        options = self.judging.evidence.options()
+        camera = self.judging.read_camera()
+        with open_recording(self.recording, self.judging.topics, require=("radar",)) as recording:
+            judged = judged_calibration(self.judging.frames.read([path])[0], path, recording, camera=camera)
+            clicks = self.judging.evidence.clicks_in(recording, self.recording, [judged.found])
+            boxes, labels = self.judging.evidence.boxes_in(recording)
             if not clicks and boxes is None:
                 raise InputError(
                     f"{self.recording[0]}: nothing to judge {path.name} by: no clicks (--clicks CLICKS.json; click reflectors "

@@ -1,7 +1,7 @@
 """Flags of what a recording is searched for: clicks, boxes, and how moving targets are found."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
@@ -10,9 +10,12 @@ import tyro
 from calib_core.errors import InputError
 from cocalib.cli.flags import File, called
 from cocalib.cli.output import progress_bar, told_clicks_at_frames
+from cocalib.cli.recording_flags import TopicFlags, Topics
+from cocalib.cli.tree_flags import FrameFlags, Frames
 from cocalib.platform.files import read_text
 
 if TYPE_CHECKING:
+    from calib_core.camera import Camera
     from calib_core.interchange import ImportedCalibration
     from calib_core.measurements import Boxes, ReflectorClick, ReturnLabels
     from calib_core.recordings import Recording
@@ -123,4 +126,30 @@ def _renaming(text: str) -> tuple[str, str]:
     return old, new
 
 
-EvidenceUsed: TypeAlias = Annotated[EvidenceFlags, tyro.conf.arg(name="")]
+@dataclass(frozen=True, slots=True)
+class JudgingFlags:
+    """What calibrations are judged on, and how they are read."""
+
+    evidence: Annotated[EvidenceFlags, tyro.conf.arg(name="")] = field(default_factory=EvidenceFlags)
+    camera: File = None
+    """Intrinsics to use if a calibration has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
+    topics: Topics = field(default_factory=TopicFlags)
+    frames: Frames = field(default_factory=FrameFlags)
+
+    @property
+    def of_recording(self) -> bool:
+        """Whether options are given that say nothing without a recording."""
+        return self.evidence != EvidenceFlags() or self.topics != TopicFlags()
+
+    def read_camera(self) -> "Camera | None":
+        """Read the intrinsics, if any are given.
+
+        Raises:
+            InputError: they cannot be read.
+        """
+        from calib_core.interchange import read_camera_file
+
+        return None if self.camera is None else read_camera_file(self.camera)
+
+
+Judging: TypeAlias = Annotated[JudgingFlags, tyro.conf.arg(name="")]

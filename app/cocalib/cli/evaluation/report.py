@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from calib_core.errors import InputError
-from cocalib.cli.evaluation.evidence_flags import EvidenceFlags, EvidenceUsed
+from cocalib.cli.evaluation.evidence_flags import Judging, JudgingFlags
 from cocalib.cli.flags import File, Switch, called
 from cocalib.cli.output import progress_bar, write_whole
-from cocalib.cli.recording_flags import Recordings, TopicFlags, Topics
-from cocalib.cli.tree_flags import FrameFlags, Frames
+from cocalib.cli.recording_flags import Recordings
 
 if TYPE_CHECKING:
     from calib_core.camera import Camera
@@ -33,13 +32,9 @@ class Report:
     """Output file (.html)."""
     pdf: Switch = False
     """Also print it to a PDF beside the HTML, with the same name, by Chrome, Chromium, Edge or Brave."""
-    evidence: EvidenceUsed = field(default_factory=EvidenceFlags)
     against: File = None
     """Compare it with this other calibration of the same sensors."""
-    camera: File = None
-    """Intrinsics to use if the file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
-    topics: Topics = field(default_factory=TopicFlags)
-    frames: Frames = field(default_factory=FrameFlags)
+    judging: Judging = field(default_factory=JudgingFlags)
 
     def run(self) -> int:
         """Write the report; return the exit code."""
@@ -67,21 +62,20 @@ class Report:
             raise InputError("report writes a file: give its name with --out FILE.html")
         if self.out.suffix.lower() not in (".html", ".htm"):  # such as that of the calibration itself
             raise InputError(f"{self.out}: the report is an .html file; name it NAME.html")
-        if not self.recording and (self.evidence != EvidenceFlags() or self.topics != TopicFlags()):
+        if not self.recording and self.judging.of_recording:
             raise InputError(
                 "clicks, boxes, and the options of a recording apply with a RECORDING only; give it after the calibration"
             )
         return self.out
 
     def _subject(self) -> "ReportSubject":
-        from calib_core.interchange import read_camera_file
         from cocalib.report import against_of, known_calibration, subject_of
 
         assert self.calibration is not None
         name = self.calibration.name
-        found, inputs = self.frames.read([self.calibration])
-        camera = read_camera_file(self.camera) if self.camera is not None else None
-        other, others = self.frames.read([self.against]) if self.against is not None else (None, ())
+        found, inputs = self.judging.frames.read([self.calibration])
+        camera = self.judging.read_camera()
+        other, others = self.judging.frames.read([self.against]) if self.against is not None else (None, ())
         if self.recording:
             subject, better = self._on_recording(found, other, camera)
         else:
@@ -102,7 +96,7 @@ class Report:
 
         assert self.calibration is not None
         name = self.calibration.name
-        with open_recording(self.recording, self.topics, require=("radar",)) as recording:
+        with open_recording(self.recording, self.judging.topics, require=("radar",)) as recording:
             recorded = recording.camera()
             calibration = known_calibration(found, name, camera=camera or recorded)
             if calibration is not None:
@@ -127,9 +121,9 @@ class Report:
         from cocalib.evaluation.evaluating import evaluate_recording
         from cocalib.report import Judged, known_calibration
 
-        options = self.evidence.options()
-        clicks = self.evidence.clicks_in(recording, self.recording, [subject.found])
-        boxes, labels = self.evidence.boxes_in(recording)
+        options = self.judging.evidence.options()
+        clicks = self.judging.evidence.clicks_in(recording, self.recording, [subject.found])
+        boxes, labels = self.judging.evidence.boxes_in(recording)
         if not clicks and boxes is None:
             return subject, ()
         with progress_bar("evaluating") as progress:

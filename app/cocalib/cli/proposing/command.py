@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 from calib_core.errors import InputError
 from calib_core.input_files import name_text
-from calib_core.options import CalibrationOptions, checked_options
+from calib_core.options import checked_options
 from cocalib.cli.flags import File, Switch
 from cocalib.cli.output import explain_unsolvable, write_whole
-from cocalib.cli.recording_flags import CameraPosition, MeasuredCamera, Options, Recordings, TopicFlags, Topics
+from cocalib.cli.recording_flags import CameraFlags, GivenCamera, OptionFlags, Options, Recordings, TopicFlags, Topics
 from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
@@ -32,23 +32,18 @@ class Propose:
     """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several are read as one recording."""
     clicks: File = None
     """Clicks that a person placed (cocalib/clicks-1 JSON): one shows what the reflector looks like."""
-    camera: File = None
-    """Intrinsics to use if the recording has none, or instead of its own: any format that `cocalib intrinsics` writes."""
-    rescale_camera: Switch = False
-    """With --camera: scale its intrinsics to the recorded pictures, if these are the calibrated ones resized."""
+    camera: GivenCamera = field(default_factory=CameraFlags)
     reflector_m: float = 0.24
     """Width of the reflector as the camera sees it [m]."""
     json: Switch = False
     """Print everything as JSON (cocalib/proposals-1)."""
     out: File = None
     """Write the same JSON to this file."""
-    measured: CameraPosition = field(default_factory=MeasuredCamera)
     topics: Topics = field(default_factory=TopicFlags)
-    options: Options = field(default_factory=CalibrationOptions)
+    options: Options = field(default_factory=OptionFlags)
 
     def run(self) -> int:
         """Find the proposals and print them; return the exit code."""
-        from calib_core.interchange import CameraFile
         from calib_core.measurements import Unsolvable
         from calib_core.recordings import open_recording
         from cocalib.cli.proposing.flags import checked_reflector_m, shown_progress
@@ -57,10 +52,10 @@ class Propose:
         from cocalib.solving.recorded_clicks import file_of_clicks, require_confirmed
         from cocalib.solving.solving import required_camera
 
-        options = checked_options(self.measured.over(self.options))
+        options = checked_options(self.options.all())
         reflector_m = checked_reflector_m(self.reflector_m)
         self._require_folder()
-        camera_file = None if self.camera is None else CameraFile.read(self.camera, rescale=self.rescale_camera)
+        camera_file = self.camera.read()
         clicks: tuple[ReflectorClick, ...] = () if self.clicks is None else file_of_clicks(self.clicks).clicks
         with open_recording(self.recording, self.topics) as recording:
             require_confirmed(recording)
