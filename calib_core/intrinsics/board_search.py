@@ -11,9 +11,9 @@ import numpy as np
 from calib_core.arrays import Points2, Values
 from calib_core.errors import CalibrationError
 from calib_core.intrinsics.board import Board
+from calib_core.intrinsics.board_detection import blur_px, board_in, find_board
 from calib_core.intrinsics.board_pictures import BoardCorners, BoardPictures, LeftOutPicture
 from calib_core.intrinsics.coverage import BoardSearch, SearchProgress, view_coverage
-from calib_core.intrinsics.detection import blur_px, board_in, find_board
 from calib_core.measurements import NS_PER_S, TimeNs, Unsolvable
 
 _LISTED = 200  # of so few pictures, each one without a board is named

@@ -7,16 +7,14 @@ import numpy as np
 
 from calib_core.arrays import Points3, Values
 from calib_core.camera import Camera, CameraCovariance
+from calib_core.intrinsics.adjustment import SharedCovariance, reduced, shared_covariance, start, typical_sigma
+from calib_core.intrinsics.bad_views import JudgedViews, judge_views
 from calib_core.intrinsics.board_pictures import BoardCorners, LeftOutPicture
+from calib_core.intrinsics.board_shape import ShapeTest, row_skew, try_shapes
 from calib_core.intrinsics.calibrated_lens import CalibratedLens, LensView
 from calib_core.intrinsics.coverage import BoardSearch
 from calib_core.intrinsics.lens_warnings import lens_warnings, shape_warnings, skew_warnings, worst_focal_sigma
-from calib_core.intrinsics.options import IntrinsicsOptions
-from calib_core.intrinsics.solving.adjustment import reduced, typical_sigma
-from calib_core.intrinsics.solving.bad_views import JudgedViews, judge_views
-from calib_core.intrinsics.solving.board_shape import ShapeTest, try_shapes
-from calib_core.intrinsics.solving.lens_covariance import SharedCovariance, shared_covariance
-from calib_core.intrinsics.solving.linearization import (
+from calib_core.intrinsics.linearization import (
     FLAT,
     BoardWarp,
     LensState,
@@ -26,7 +24,7 @@ from calib_core.intrinsics.solving.linearization import (
     residuals_of,
     stack_views,
 )
-from calib_core.intrinsics.solving.model_choice import (
+from calib_core.intrinsics.model_choice import (
     MODELS,
     ChosenModel,
     LensFit,
@@ -35,8 +33,7 @@ from calib_core.intrinsics.solving.model_choice import (
     held_out_squares,
     view_folds,
 )
-from calib_core.intrinsics.solving.row_skew import row_skew
-from calib_core.intrinsics.solving.starting import start
+from calib_core.intrinsics.options import IntrinsicsOptions
 from calib_core.measurements import Unsolvable
 
 _LEAST_VIEWS = 3

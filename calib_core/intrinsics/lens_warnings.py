@@ -7,10 +7,9 @@ from scipy.spatial import ConvexHull, QhullError
 
 from calib_core.arrays import Values
 from calib_core.camera import Camera
-from calib_core.intrinsics.solving.board_shape import ShapeTest
-from calib_core.intrinsics.solving.linearization import ViewStack
-from calib_core.intrinsics.solving.model_choice import folds_back, picture_places
-from calib_core.intrinsics.solving.row_skew import RowSkew
+from calib_core.intrinsics.board_shape import RowSkew, ShapeTest
+from calib_core.intrinsics.linearization import ViewStack
+from calib_core.intrinsics.model_choice import folds_back, picture_places
 from calib_core.results import DataWarning
 
 _LEAST_COVERED = 0.5

@@ -7,11 +7,10 @@ import numpy as np
 from calib_core.arrays import Flags, Points2, Values, frozen_array
 from calib_core.camera import Camera
 from calib_core.geometry import rotation_exp
+from calib_core.intrinsics.adjustment import adjust, reduced, shared_covariance
 from calib_core.intrinsics.calibrated_lens import CalibratedLens
+from calib_core.intrinsics.linearization import Freedom, LensState, ViewStack, linearize, stack_views
 from calib_core.intrinsics.projection_uncertainty import far_point_slopes, found_pixels, grid_covariance, picture_grid
-from calib_core.intrinsics.solving.adjustment import adjust, reduced
-from calib_core.intrinsics.solving.lens_covariance import shared_covariance
-from calib_core.intrinsics.solving.linearization import Freedom, LensState, ViewStack, linearize, stack_views
 from calib_core.measurements import Unsolvable
 
 _LEAST_VIEWS = 8

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from calib_core.intrinsics import BoardSearch, board_of_size, search_boards
-from calib_core.intrinsics.detection import blur_px, find_board
+from calib_core.intrinsics.board_detection import blur_px, find_board
 from calib_core.measurements import TimeNs, Unsolvable
 
 BOARD = board_of_size("9x6", 25.0)

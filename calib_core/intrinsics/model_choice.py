@@ -10,18 +10,9 @@ import numpy as np
 
 from calib_core.arrays import Flags, Indices, Points2, Values
 from calib_core.camera import Camera
+from calib_core.intrinsics.adjustment import adjust, start, weighted_cost
 from calib_core.intrinsics.calibrated_lens import ModelTrial
-from calib_core.intrinsics.solving.adjustment import adjust, weighted_cost
-from calib_core.intrinsics.solving.linearization import (
-    FLAT,
-    BoardWarp,
-    Freedom,
-    LensState,
-    ViewStack,
-    residuals_of,
-    warped,
-)
-from calib_core.intrinsics.solving.starting import start
+from calib_core.intrinsics.linearization import FLAT, BoardWarp, Freedom, LensState, ViewStack, residuals_of, warped
 
 MODELS = ("pinhole", "plumb_bob", "equidistant", "rational_polynomial")
 """From the simplest to the most flexible."""

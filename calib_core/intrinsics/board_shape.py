@@ -1,12 +1,61 @@
-"""Whether views are skewed along their rows, as a board that moves under a rolling shutter is."""
+"""Whether the board is bent or its squares are longer one way, as far as the views show it; and whether views are
+skewed along their rows, as a board that moves under a rolling shutter is.
+"""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calib_core.arrays import Values, frozen_array
-from calib_core.intrinsics.solving.linearization import Freedom, LensState, ViewStack, linearize, warped
-from calib_core.intrinsics.solving.model_choice import LensFit
+from calib_core.intrinsics.adjustment import adjust, reduced, shared_covariance
+from calib_core.intrinsics.linearization import BoardWarp, Freedom, LensState, ViewStack, linearize, warped
+from calib_core.intrinsics.model_choice import LensFit
+
+_CHANCE = 1e-4
+_BENDS = 3  # the first warps are of one kind, heights; the last is of lengths
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ShapeTest:
+    """The warps of a board, tried all at once.
+
+    Attributes:
+        found: those that the views show; none if the board is as stated.
+        amounts: (4,) of all that were tried.
+        sigmas: (4,) of the same.
+        lens_change: (p,) how much all of them together change the parameters of the camera.
+    """
+
+    found: BoardWarp
+    amounts: Values
+    sigmas: Values
+    lens_change: Values
+
+    def __post_init__(self) -> None:
+        for name in ("amounts", "sigmas", "lens_change"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), (None,)))
+
+
+def try_shapes(fit: LensFit, stack: ViewStack, warps: BoardWarp) -> ShapeTest:
+    """Estimate all warps together with the lens, and keep those that chance explains in less than one case of 10 000.
+
+    Args:
+        fit: to a board as stated.
+        stack: the views.
+        warps: those of `possible_warps`.
+    """
+    flat = fit.state
+    freedom = replace(fit.freedom, warp=warps)
+    state = adjust(LensState(flat.camera, flat.rotations, flat.translations_m), stack, freedom)
+    covariance = shared_covariance(reduced(linearize(state, stack, freedom)))
+    first = fit.freedom.lens.shape[1]
+    unlikely = covariance.chances(state.amounts, first) < _CHANCE
+    keep = np.full(len(warps), bool(unlikely[:_BENDS].any()))
+    keep[_BENDS:] = unlikely[_BENDS:]
+    found = BoardWarp(tuple(np.array(warps.names)[keep]), warps.directions[keep])
+    sigmas = np.sqrt(np.diag(covariance.matrix)[first:])
+    return ShapeTest(found, state.amounts, sigmas, state.camera.parameters - flat.camera.parameters)
+
 
 _LEAST_SHARE = 0.2
 _LEAST_RATIO = 1.4  # correlated noise reaches 1.3; a wrong lens model may exceed it too

@@ -8,7 +8,7 @@ import pytest
 
 from calib_core.camera import Camera, CameraModel
 from calib_core.intrinsics import Board
-from calib_core.intrinsics.detection import blur_px, board_in, find_board
+from calib_core.intrinsics.board_detection import blur_px, board_in, find_board
 from calib_core.synthetic import typical_camera
 from calib_core.synthetic.boards import BoardFilm, render_board, true_corners, waved_poses
 

@@ -8,10 +8,9 @@ from scipy.spatial import cKDTree
 
 from calib_core.arrays import Flags, Values, frozen_array
 from calib_core.camera import Camera
+from calib_core.intrinsics.adjustment import adjust, adjust_robustly, pose_views, typical_sigma
 from calib_core.intrinsics.board_pictures import BoardCorners
-from calib_core.intrinsics.solving.adjustment import adjust, adjust_robustly, typical_sigma
-from calib_core.intrinsics.solving.linearization import BoardWarp, Freedom, LensState, ViewStack, residuals_of
-from calib_core.intrinsics.solving.starting import pose_views
+from calib_core.intrinsics.linearization import BoardWarp, Freedom, LensState, ViewStack, residuals_of
 
 _ROUNDS = 4
 _CORNER_LIMIT = 8.0  # standard deviations of the view; real corners reach 4

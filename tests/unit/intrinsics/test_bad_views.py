@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from calib_core.intrinsics import BoardCorners, CalibratedLens, IntrinsicsOptions, calibrate_lens
-from calib_core.intrinsics.solving.bad_views import judge_views, mirror_twins
-from calib_core.intrinsics.solving.linearization import stack_views
-from calib_core.intrinsics.solving.starting import start
+from calib_core.intrinsics.adjustment import start
+from calib_core.intrinsics.bad_views import judge_views, mirror_twins
+from calib_core.intrinsics.linearization import stack_views
 from tests.unit.intrinsics.corner_draws import BOARD, CAMERAS, SIZE_PX, Errors, drawn_views, search_of
 
 OPTIONS = IntrinsicsOptions(model="plumb_bob")
