@@ -1,8 +1,8 @@
 """Least squares over lens, shape of the board and all poses (Levenberg-Marquardt, poses eliminated by the Schur complement).
 
-`adjust_robustly` weighs down corners and views that do not fit. `start` gives it a first lens and first poses, from corners alone;
-some of the views may be wrong. `shared_covariance` says how well lens and board shape are known afterwards, if the errors of
-corners in one view belong together.
+`adjust_robustly` weighs down corners and views that do not fit. `start` gives it a first lens and first poses, from corners
+alone; some of the views may be wrong. `shared_covariance` says how well lens and board shape are known afterwards, if the
+errors of corners in one view belong together.
 """
 
 from dataclasses import dataclass

@@ -8,10 +8,10 @@ import numpy as np
 from calib_core.camera import Camera
 from calib_core.measurements import ReflectorClick, Unsolvable
 from calib_core.options import CalibrationOptions
-from calib_core.proposing.agreement.candidate_rays import candidate_rays
-from calib_core.proposing.agreement.mounting_prior import mounting_prior
-from calib_core.proposing.agreement.pose_agreement import apex_log_odds, chance_score, chance_scores, pose_agreement
+from calib_core.proposing.candidate_rays import candidate_rays
 from calib_core.proposing.dwell_views import DwellView
+from calib_core.proposing.mounting_prior import mounting_prior
+from calib_core.proposing.pose_agreement import apex_log_odds, chance_score, chance_scores, pose_agreement
 from calib_core.proposing.proposals import Proposal, Proposals
 
 LEAST_WHOLE_CONFIDENCE = 0.9

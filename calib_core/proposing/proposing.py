@@ -10,10 +10,10 @@ from calib_core.association.placements import Placement
 from calib_core.camera import Camera
 from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
-from calib_core.proposing.agreement.candidate_rays import CandidateRays, candidate_rays, weaker_db
-from calib_core.proposing.agreement.mounting_prior import mounting_prior
-from calib_core.proposing.agreement.pose_agreement import PoseAgreement, apex_log_odds, pose_agreement
+from calib_core.proposing.candidate_rays import CandidateRays, candidate_rays, weaker_db
 from calib_core.proposing.dwell_views import DwellView
+from calib_core.proposing.mounting_prior import mounting_prior
+from calib_core.proposing.pose_agreement import PoseAgreement, apex_log_odds, pose_agreement
 from calib_core.proposing.proposals import Proposal, Proposals
 
 LEAST_CONFIDENCE = 0.4

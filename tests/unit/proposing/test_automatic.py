@@ -8,9 +8,9 @@ from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.proposing import AutomaticClicks, DwellView, PictureCandidate, automatic_clicks, proposals_of
-from calib_core.proposing.agreement.candidate_rays import candidate_rays
-from calib_core.proposing.agreement.mounting_prior import mounting_prior
-from calib_core.proposing.agreement.pose_agreement import chance_scores, pose_agreement
+from calib_core.proposing.candidate_rays import candidate_rays
+from calib_core.proposing.mounting_prior import mounting_prior
+from calib_core.proposing.pose_agreement import chance_scores, pose_agreement
 from calib_core.synthetic.rig import typical_camera
 from tests.drawn_views import Drawing, DrawnViews, draw_views, with_pictures_of
 

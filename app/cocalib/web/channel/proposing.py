@@ -9,7 +9,7 @@ import numpy as np
 from calib_core.association.placements import Placement
 from calib_core.measurements import NS_PER_S, Stamp
 from calib_core.proposing import DwellView, Proposal
-from calib_core.proposing.dwell_average import averaged_over_dwell
+from calib_core.proposing.dwell_views import averaged_over_dwell
 from calib_core.recordings import FollowedRecording, Recording
 from cocalib.proposing import ProposingJob, ProposingSnapshot, ProposingWish, view_at
 from cocalib.view import is_dismissed, sentence

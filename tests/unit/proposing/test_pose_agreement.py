@@ -8,10 +8,9 @@ import pytest
 from calib_core.measurements import TimeNs
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 from calib_core.proposing import DwellView, proposals_of
-from calib_core.proposing.agreement.candidate_rays import CandidateRays, candidate_rays
-from calib_core.proposing.agreement.mounting_prior import mounting_prior
-from calib_core.proposing.agreement.pose_agreement import PoseAgreement, pose_agreement
-from calib_core.proposing.agreement.rotation_consensus import rotation_consensus
+from calib_core.proposing.candidate_rays import CandidateRays, candidate_rays
+from calib_core.proposing.mounting_prior import mounting_prior
+from calib_core.proposing.pose_agreement import PoseAgreement, pose_agreement, rotation_consensus
 from tests.drawn_views import Drawing, draw_views
 
 OPTIONS = CalibrationOptions()

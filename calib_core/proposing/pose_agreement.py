@@ -1,0 +1,568 @@
+"""Pose agreement: the pose on which dwells and candidates agree, and how probable each candidate is under it.
+
+It starts from a consensus of rotations. Camera and radar stand close to each other, so directions nearly suffice: two dwells
+with a candidate each give a rotation, and a rotation is as good as it explains the other dwells. All such rotations near the
+nominal mounting are tried.
+
+A candidate is judged by the pose that all other dwells give, with its covariance, so that no dwell vouches for itself.
+
+Several rough poses are refined at once (expectation maximization): each candidate weighs as much as it is probably the reflector,
+given the pose; each step then solves for rotation, camera position and the scales of the radar's angles, with the mounting as
+prior. Tolerances shrink from step to step, and the noise level that explains a recording best is kept.
+
+How far chance goes is measured on the recording itself: the radar's positions are dealt to other dwells, neighbours
+in time too, as whoever carries a reflector down an aisle would be taken for right by the order alone. And a person
+who goes from place to place is seen by the radar and in the pictures alike; but where a reflector is large enough in
+the picture its three sheets meet in a point, and a person's clothes rarely do.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from calib_core.arrays import Flags, Indices, Points2, Values, frozen_array
+from calib_core.geometry import RigidTransform, rotation_exp
+from calib_core.proposing.candidate_rays import CandidateRays
+from calib_core.proposing.dwell_views import DwellView
+from calib_core.proposing.mounting_prior import MOST_TURNED_RAD, MountingPrior
+
+NOISE_LEVELS = (4.0, 2.0, 1.0, 0.5, 0.25)
+"""Factors on the stated standard deviations of the radar's angles, in the order in which they are tried."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RoughPoses:
+    """Several poses, the best first before they are refined, with the noise level at which each explains the candidates best.
+
+    Attributes:
+        rotations: (m, 3, 3) camera from radar.
+        centres_radar_m: (m, 3) the camera's position.
+        scales: (m, 2) azimuth and elevation as reported over the true ones, minus 1.
+        noise: (m,) factor on the radar's standard deviations.
+        scores: (m,) logarithms of how much better each explains the candidates than chance, prior included; before they are
+            refined, the prior not.
+        tried: how many rotations were compared.
+    """
+
+    rotations: np.ndarray
+    centres_radar_m: np.ndarray
+    scales: np.ndarray
+    noise: Values
+    scores: Values
+    tried: int = 0
+
+    def __post_init__(self) -> None:
+        m = len(self.scores)
+        for name, shape in (
+            ("rotations", (m, 3, 3)),
+            ("centres_radar_m", (m, 3)),
+            ("scales", (m, 2)),
+            ("noise", (m,)),
+            ("scores", (m,)),
+        ):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), shape))
+
+    def __len__(self) -> int:
+        return len(self.scores)
+
+    @classmethod
+    def of_rotations(cls, rotations: np.ndarray, centres_radar_m: np.ndarray, scores: Values, tried: int) -> Self:
+        """Take rotations as they are, with right scales and the stated noise."""
+        m = len(scores)
+        return cls(rotations, centres_radar_m, np.zeros((m, 2)), np.ones(m), scores, tried)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Expectation:
+    """How candidates lie to poses.
+
+    Attributes:
+        off_rad: (m, n, k, 2) prediction minus candidate, across its ray.
+        jacobian: (m, n, k, 2, 8) of it by rotation, camera position and scales.
+        covariance: (m, n, k, 2, 2) of it by the noise of radar and picture.
+        probability: (m, n, k) that the candidate is the reflector, given the pose.
+        weight: (m, n, k) of its offset in a fit: the probability, less for what lies aside.
+        log_odds: (m, n) of each dwell over chance.
+    """
+
+    off_rad: np.ndarray
+    jacobian: np.ndarray
+    covariance: np.ndarray
+    probability: np.ndarray
+    weight: np.ndarray
+    log_odds: np.ndarray
+
+
+_LEAST_DWELLS = 2
+
+_OTHER_POSE_RAD = np.radians(2.5)
+"""Mean angle between the predictions of two poses that differ clearly."""
+
+_RIVAL_STEP = 4.0
+"""How fast the probability of a pose changes with its score: slower than if dwells were independent."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseAgreement:
+    """The best pose, its rival, and what they say of each candidate.
+
+    Attributes:
+        camera_from_radar: the pose, rough to about a degree.
+        score: logarithm of how much better it explains the candidates than chance.
+        rival_score: the same of the best pose that differs clearly; 0 if there is none.
+        noise: factor on the stated noise of the radar's angles that the dwells show.
+        probability: (n, k) that each candidate is the reflector, judged by the other dwells.
+        rival_probability: (n, k) the same under the rival.
+        off_sigma: (n, k) distance of each candidate from where the other dwells predict it, in standard deviations.
+        trials: how many rotations were compared.
+    """
+
+    camera_from_radar: RigidTransform
+    score: float
+    rival_score: float
+    noise: float
+    probability: Points2
+    rival_probability: Points2
+    off_sigma: Points2
+    trials: int
+
+    def __post_init__(self) -> None:
+        for name in ("probability", "rival_probability", "off_sigma"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), (None, None)))
+
+    @property
+    def likeliest(self) -> Indices:
+        """The most probable candidate of each dwell (n,)."""
+        return np.argmax(self.probability, axis=1)
+
+    @property
+    def pose_probability(self) -> float:
+        """Probability of the pose against its rival."""
+        return float(1.0 / (1.0 + np.exp(min((self.rival_score - self.score) / _RIVAL_STEP, 50.0))))
+
+    def agreeing(self, rays: CandidateRays) -> float:
+        """Return the share of the dwells that have candidates which agree on the pose."""
+        return _share(rays, self.probability)
+
+    def agreeing_with_rival(self, rays: CandidateRays) -> float:
+        """Return the same for the rival."""
+        return _share(rays, self.rival_probability)
+
+
+def pose_agreement(rays: CandidateRays, prior: MountingPrior, *, most: int = 24) -> PoseAgreement | None:
+    """Find the pose; None with fewer than two dwells that have candidates, or if no two of them agree on a mounting.
+
+    Args:
+        rays: of all dwells.
+        prior: of the mounting.
+        most: how many rough rotations are refined.
+    """
+    if int((rays.odds > 0.0).any(axis=1).sum()) < _LEAST_DWELLS:
+        return None
+    rough = rotation_consensus(rays, prior, most=most)
+    if not len(rough):
+        return None
+    poses = refined_poses(rays, prior, rough)
+    best = int(np.argmax(poses.scores))
+    other = np.flatnonzero(_differs(rays, poses, best))
+    rival = int(other[np.argmax(poses.scores[other])]) if len(other) else None
+    probability, off_sigma = _judged_by_others(rays, prior, _one(poses, best))
+    rival_probability = np.zeros_like(probability)
+    if rival is not None:
+        rival_probability = _judged_by_others(rays, prior, _one(poses, rival))[0]
+    rotation, centre = poses.rotations[best], poses.centres_radar_m[best]
+    return PoseAgreement(
+        camera_from_radar=RigidTransform(rotation, -rotation @ centre),
+        score=float(poses.scores[best]),
+        rival_score=0.0 if rival is None else float(poses.scores[rival]),
+        noise=float(poses.noise[best]),
+        probability=probability,
+        rival_probability=rival_probability,
+        off_sigma=off_sigma,
+        trials=rough.tried,
+    )
+
+
+def _one(poses: RoughPoses, row: int) -> RoughPoses:
+    keep = slice(row, row + 1)
+    return RoughPoses(
+        poses.rotations[keep], poses.centres_radar_m[keep], poses.scales[keep], poses.noise[keep], poses.scores[keep]
+    )
+
+
+def _differs(rays: CandidateRays, poses: RoughPoses, best: int) -> Flags:
+    """Return which poses (m,) predict clearly other directions than the best one."""
+    away = rays.positions_radar_m[None] - poses.centres_radar_m[:, None]
+    away = away / np.maximum(np.linalg.norm(away, axis=-1, keepdims=True), 1e-6)
+    turned = np.einsum("mij,mnj->mni", poses.rotations, away)
+    cosine = np.clip((turned * turned[best]).sum(axis=-1), -1.0, 1.0)
+    return np.asarray(np.arccos(cosine).mean(axis=1) > _OTHER_POSE_RAD)
+
+
+def _judged_by_others(rays: CandidateRays, prior: MountingPrior, pose: RoughPoses) -> tuple[Points2, Points2]:
+    """Return the probability of each candidate (n, k) under the pose of the other dwells, and its distance from it."""
+    seen = expectation(rays, pose)
+    off_rad, jacobian, covariance = seen.off_rad[0], seen.jacobian[0], seen.covariance[0]
+    information = normal_equations(rays, prior, pose)[0][0]
+    weight = np.linalg.inv(covariance) * seen.weight[0][..., None, None]
+    own = np.einsum("nkap,nkab,nkbq->npq", jacobian, weight, jacobian)
+    pull = np.einsum("nkap,nkab,nkb->np", jacobian, weight, off_rad)
+    without = np.linalg.inv(information - own)
+    shift = np.einsum("npq,nq->np", without, pull)
+    off_rad = off_rad + np.einsum("nkap,np->nka", jacobian, shift)
+    covariance = covariance + np.einsum("nkap,npq,nkbq->nkab", jacobian, without, jacobian)
+    gain = sum(densities(off_rad, covariance)) * rays.odds / rays.density
+    squared = np.einsum("nka,nkab,nkb->nk", off_rad, np.linalg.inv(covariance), off_rad)
+    probability = gain / (rays.missing + gain.sum(axis=1))[:, None]
+    return probability, np.sqrt(np.maximum(squared, 0.0))
+
+
+def _share(rays: CandidateRays, probability: Points2) -> float:
+    with_any = (rays.odds > 0.0).any(axis=1)
+    return float(probability.max(axis=1)[with_any].sum() / max(int(with_any.sum()), 1))
+
+
+_MOST_PAIRED = 600
+"""Candidates of which any two give a rotation; of more, so many are drawn by their odds."""
+
+_MOST_TRIED = 6000
+
+_MOST_PREDICTIONS = 1_000_000
+"""Rotations times candidates that are compared."""
+
+_LEAST_APART_RAD = np.radians(3.0)
+"""Between two dwells that are to give a rotation."""
+
+_TOLERANCE = 3.0
+"""Standard deviations by which the angle between two candidates may differ from that between their dwells."""
+
+_ROUGH = 1.6
+"""Factor on the radar's standard deviations for a rotation that rests on two dwells."""
+
+_LEVER_M = 0.1
+"""What a rotation alone leaves of the lever arm, as a standard deviation."""
+
+_SAME_RAD, _OTHER_RAD = np.radians(1.2), np.radians(4.0)
+"""Between the better half of the rotations that are returned, and between the others."""
+
+
+def rotation_consensus(rays: CandidateRays, prior: MountingPrior, *, most: int = 24, seed: int = 0) -> RoughPoses:
+    """Find the rotations that explain the most dwells; none if no two dwells agree within the mounting's reach.
+
+    Args:
+        rays: of all dwells.
+        prior: of the mounting.
+        most: how many to return.
+        seed: of the choice of two-dwell rotations where there are too many to try all.
+    """
+    found: list[RoughPoses] = []
+    for centre in prior.starts_m:
+        rotations = _from_two_dwells(rays, prior, centre, np.random.default_rng(seed))
+        scores = _rotation_scores(rays, prior, centre, rotations)
+        kept = _best_apart(rotations, scores, most)
+        centres = np.tile(centre, (len(kept), 1))
+        found.append(RoughPoses.of_rotations(rotations[kept], centres, scores[kept], len(rotations)))
+    scores = np.concatenate([one.scores for one in found])
+    order = np.argsort(-scores, kind="stable")[:most]
+    return RoughPoses.of_rotations(
+        np.concatenate([one.rotations for one in found])[order],
+        np.concatenate([one.centres_radar_m for one in found])[order],
+        scores[order],
+        sum(one.tried for one in found),
+    )
+
+
+def _directions(rays: CandidateRays, centre: np.ndarray) -> np.ndarray:
+    away = rays.positions_radar_m - centre
+    return np.asarray(away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-6))
+
+
+def _from_two_dwells(
+    rays: CandidateRays, prior: MountingPrior, centre: np.ndarray, rng: np.random.Generator
+) -> np.ndarray:
+    """Return the rotations (h, 3, 3) that two candidates of two dwells give, those within the mounting's reach."""
+    directions = _directions(rays, centre)
+    dwell, which = np.nonzero(rays.odds > 0.0)
+    if len(dwell) > _MOST_PAIRED:
+        odds = rays.odds[dwell, which]
+        drawn = np.sort(rng.choice(len(dwell), _MOST_PAIRED, replace=False, p=odds / odds.sum()))
+        dwell, which = dwell[drawn], which[drawn]
+    one, other = np.triu_indices(len(dwell), 1)
+    apart_rad = np.arccos(np.clip(directions @ directions.T, -1.0, 1.0))
+    wide = apart_rad[dwell[one], dwell[other]] > _LEAST_APART_RAD
+    one, other = one[wide], other[wide]
+    seen = rays.rays[dwell, which]
+    seen_rad = np.arccos(np.clip((seen[one] * seen[other]).sum(axis=1), -1.0, 1.0))
+    range_m = rays.polar[dwell, 0]
+    slack = _TOLERANCE * (np.hypot(*rays.sigma_polar[dwell, 1:].T) + prior.centre_sigma_m[1] / np.maximum(range_m, 1.0))
+    agree = np.abs(seen_rad - apart_rad[dwell[one], dwell[other]]) < slack[one] + slack[other]
+    one, other = one[agree], other[agree]
+    rotations = _frames(seen[one], seen[other]) @ np.swapaxes(
+        _frames(directions[dwell[one]], directions[dwell[other]]), 1, 2
+    )
+    cosine = 0.5 * (np.einsum("hij,ij->h", rotations, prior.rotation) - 1.0)
+    near = np.flatnonzero(cosine > np.cos(MOST_TURNED_RAD))
+    most = min(_MOST_TRIED, max(_MOST_PREDICTIONS // len(dwell), 500)) if len(dwell) else 0
+    if len(near) > most:
+        odds = rays.odds[dwell, which]
+        likely = odds[one[near]] * odds[other[near]]
+        near = rng.choice(near, most, replace=False, p=likely / likely.sum())
+    return np.asarray(rotations[near])
+
+
+def _frames(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return right-handed axes (h, 3, 3), as columns, that two directions (h, 3) each define symmetrically."""
+    middle, across = one + other, np.cross(one, other)
+    middle = middle / np.maximum(np.linalg.norm(middle, axis=1, keepdims=True), 1e-9)
+    across = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-9)
+    return np.stack([middle, across, np.cross(middle, across)], axis=-1)
+
+
+def _rotation_scores(rays: CandidateRays, prior: MountingPrior, centre: np.ndarray, rotations: np.ndarray) -> Values:
+    """Return the log-odds (h,) of each rotation over chance, with tolerances that do not depend on it."""
+    directions = _directions(rays, centre)
+    scaled = rays.slopes * rays.sigma_polar[:, None, :] / np.maximum(rays.polar[:, 0], 1e-3)[:, None, None]
+    across = np.einsum("nkai,ij,njl->nkal", rays.tangents, prior.rotation, scaled) * _ROUGH
+    lever_rad = _LEVER_M / np.maximum(rays.polar[:, 0], 0.3)
+    own = rays.sigma_rad**2 + lever_rad[:, None] ** 2
+    covariance = across @ np.swapaxes(across, -1, -2) + own[..., None, None] * np.eye(2)
+    whitening = np.linalg.inv(np.linalg.cholesky(covariance))
+    height = np.linalg.det(whitening) / (2.0 * np.pi)
+    turned = np.einsum("hij,nj->hni", rotations, directions)
+    rows = whitening @ rays.tangents
+    forward = np.einsum("hni,nki->hnk", turned, rays.rays)
+    off = np.einsum("hni,nkai->hnka", turned, rows)
+    gain = rays.odds * height / rays.density
+    near = np.where(forward > 0.5, np.exp(-0.5 * (off**2).sum(axis=-1)), 0.0)
+    return np.log(rays.missing + (gain * near).sum(axis=-1)).sum(axis=-1)
+
+
+def _best_apart(rotations: np.ndarray, scores: Values, most: int) -> Indices:
+    """Return the rows of the best rotations: half of them close together, to refine; half far apart, to compare with."""
+    kept: list[int] = []
+    angle_rad = np.full(len(scores), np.inf)
+    for row in np.argsort(-scores, kind="stable").tolist():
+        if angle_rad[row] < (_SAME_RAD if len(kept) < most // 2 else _OTHER_RAD):
+            continue
+        kept.append(row)
+        if len(kept) == most:
+            break
+        cosine = 0.5 * (np.einsum("hij,ij->h", rotations, rotations[row]) - 1.0)
+        angle_rad = np.minimum(angle_rad, np.arccos(np.clip(cosine, -1.0, 1.0)))
+    return np.array(kept, dtype=np.int64)
+
+
+_FREE = 6.0
+"""Parameters that a fit adapts to noise: that much a smaller noise level gains by chance, times its logarithm."""
+
+_STEPS = 3
+
+_WIDE, _WIDE_SHARE = 3.0, 0.15
+"""Factor on all standard deviations of a dwell that another echo pulls aside, and the share of such dwells."""
+
+_LEAST_FORWARD = 0.3
+"""Cosine of the angle between a predicted and a seen direction below which they have nothing to do with each other."""
+
+_LEAST_SHARE_SQUARED = 0.25
+"""Of the range that is left along the plane of the placements."""
+
+
+def refined_poses(rays: CandidateRays, prior: MountingPrior, rough: RoughPoses) -> RoughPoses:
+    """Fit every rough rotation to the dwells, at each noise level, and return the best of each; in the given order."""
+    m, poses = len(rough), rough
+    best = replace(poses, scores=np.full(m, -np.inf))
+    for level in NOISE_LEVELS:
+        poses = replace(poses, noise=np.full(m, level))
+        for _ in range(_STEPS):
+            poses = _stepped(rays, prior, poses)
+        scored = replace(poses, scores=_scores(rays, prior, poses))
+        better = scored.scores > best.scores
+        best = RoughPoses(
+            _chosen(better, scored.rotations, best.rotations),
+            _chosen(better, scored.centres_radar_m, best.centres_radar_m),
+            _chosen(better, scored.scales, best.scales),
+            _chosen(better, scored.noise, best.noise),
+            _chosen(better, scored.scores, best.scores),
+        )
+    return best
+
+
+def _chosen(better: Flags, new: np.ndarray, old: np.ndarray) -> np.ndarray:
+    return np.where(better.reshape(len(better), *[1] * (new.ndim - 1)), new, old)
+
+
+def expectation(rays: CandidateRays, poses: RoughPoses) -> Expectation:
+    """Predict every dwell with every pose, and weigh the candidates."""
+    points, by_scale = _true_positions(rays, poses)
+    away = points - poses.centres_radar_m[:, None]
+    range_m = np.maximum(np.linalg.norm(away, axis=-1, keepdims=True), 0.1)
+    turned = np.einsum("mij,mnj->mni", poses.rotations, away / range_m)
+    forward = np.einsum("mni,nki->mnk", turned, rays.rays)
+    safe = np.maximum(forward, _LEAST_FORWARD)[..., None]
+    off_rad = np.einsum("nkai,mni->mnka", rays.tangents, turned) / safe
+    by_point = np.einsum("nkai,mij->mnkaj", rays.tangents, poses.rotations) / (safe * range_m[:, :, None])[..., None]
+    crossed = np.cross(turned[:, :, None, None], rays.tangents[None]) / safe[..., None]
+    jacobian = np.concatenate([crossed, -by_point, np.einsum("mnkaj,mnjs->mnkas", by_point, by_scale)], axis=-1)
+    factor = np.stack([np.ones_like(poses.noise), poses.noise, poses.noise], axis=-1)
+    spread = rays.slopes[None] * (rays.sigma_polar[None] * factor[:, None])[:, :, None]
+    across = np.einsum("mnkaj,mnjl->mnkal", by_point, spread)
+    covariance = across @ np.swapaxes(across, -1, -2) + (rays.sigma_rad**2)[None, ..., None, None] * np.eye(2)
+    near, wide = densities(off_rad, covariance)
+    odds = np.where(forward > _LEAST_FORWARD, rays.odds / rays.density, 0.0)
+    gain = (near + wide) * odds
+    total = rays.missing + gain.sum(axis=-1)
+    weight = (near + wide / _WIDE**2) * odds / total[..., None]
+    return Expectation(off_rad, jacobian, covariance, gain / total[..., None], weight, np.log(total))
+
+
+def densities(off: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the density (...) of offsets (..., 2) with covariances (..., 2, 2): of the usual, and of those pulled aside."""
+    near = (1.0 - _WIDE_SHARE) * _normal(off, covariance)
+    return near, _WIDE_SHARE / _WIDE**2 * _normal(off / _WIDE, covariance)
+
+
+def _normal(off: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    a, b, c = covariance[..., 0, 0], covariance[..., 0, 1], covariance[..., 1, 1]
+    determinant = a * c - b * b
+    x, y = off[..., 0], off[..., 1]
+    squared = (c * x * x - 2.0 * b * x * y + a * y * y) / determinant
+    return np.asarray(np.exp(-0.5 * squared) / (2.0 * np.pi * np.sqrt(determinant)))
+
+
+def normal_equations(rays: CandidateRays, prior: MountingPrior, poses: RoughPoses) -> tuple[np.ndarray, np.ndarray]:
+    """Return the information (m, 8, 8) of the dwells and the prior, and the gradient (m, 8) of the log-probability."""
+    seen = expectation(rays, poses)
+    weight = np.linalg.inv(seen.covariance) * seen.weight[..., None, None]
+    weighted = np.einsum("mnkab,mnkbp->mnkap", weight, seen.jacobian)
+    m = len(poses)
+    rows = seen.jacobian.reshape(m, -1, 8)
+    information = np.swapaxes(rows, 1, 2) @ weighted.reshape(m, -1, 8)
+    gradient = -np.einsum("mrp,mr->mp", weighted.reshape(m, -1, 8), seen.off_rad.reshape(m, -1))
+    off, precision = _prior_offsets(prior, poses)
+    return information + np.eye(8) * precision, gradient - precision * off
+
+
+def _stepped(rays: CandidateRays, prior: MountingPrior, poses: RoughPoses) -> RoughPoses:
+    """Make one Gauss-Newton step of every pose."""
+    information, gradient = normal_equations(rays, prior, poses)
+    step = np.linalg.solve(information, gradient[..., None])[..., 0]
+    return replace(
+        poses,
+        rotations=rotation_exp(step[:, :3]) @ poses.rotations,
+        centres_radar_m=poses.centres_radar_m + step[:, 3:6],
+        scales=poses.scales + step[:, 6:],
+    )
+
+
+def _scores(rays: CandidateRays, prior: MountingPrior, poses: RoughPoses) -> Values:
+    off, precision = _prior_offsets(prior, poses)
+    penalty = 0.5 * (precision * off**2).sum(axis=1)
+    overfit = _FREE * np.log(np.minimum(poses.noise, 1.0))
+    return np.asarray(expectation(rays, poses).log_odds.sum(axis=1) - penalty + overfit)
+
+
+def _prior_offsets(prior: MountingPrior, poses: RoughPoses) -> tuple[np.ndarray, Values]:
+    """Return how far poses are from the mounting (m, 8), and the prior's precision (8,)."""
+    relative = poses.rotations @ prior.rotation.T
+    offsets = np.concatenate(
+        [_rotation_logs(relative), poses.centres_radar_m - prior.centre_radar_m, poses.scales], axis=1
+    )
+    sigma = np.concatenate([np.full(3, prior.rotation_sigma_rad), prior.centre_sigma_m, prior.scale_sigma])
+    return offsets, sigma**-2.0
+
+
+def _rotation_logs(rotations: np.ndarray) -> np.ndarray:
+    """Return the rotation vectors (m, 3) of rotations (m, 3, 3) well below half a turn."""
+    axis = 0.5 * np.stack(
+        [
+            rotations[:, 2, 1] - rotations[:, 1, 2],
+            rotations[:, 0, 2] - rotations[:, 2, 0],
+            rotations[:, 1, 0] - rotations[:, 0, 1],
+        ],
+        axis=1,
+    )
+    sine = np.linalg.norm(axis, axis=1)
+    angle = np.arctan2(sine, 0.5 * (np.trace(rotations, axis1=1, axis2=2) - 1.0))
+    return np.asarray(axis * np.where(sine > 1e-9, angle / np.maximum(sine, 1e-9), 1.0)[:, None])
+
+
+def _true_positions(rays: CandidateRays, poses: RoughPoses) -> tuple[np.ndarray, np.ndarray]:
+    """Return positions (m, n, 3) with the scales taken out, and their derivative by these (m, n, 3, 2).
+
+    A radar without elevation reports the range to a plane below it as if it lay in that plane; the height is taken from the
+    camera's, which stands next to it.
+    """
+    by_scale = -rays.slopes[:, :, 1:] * rays.polar[:, None, 1:]
+    points = rays.positions_radar_m[None] + np.einsum("nis,ms->mni", by_scale, poses.scales)
+    if rays.is_flat:
+        height_m = poses.centres_radar_m[:, None, 2] - rays.positions_radar_m[None, :, 2]
+        range_m = np.maximum(rays.polar[None, :, 0], 1e-3)
+        points = points * np.sqrt(np.maximum(1.0 - (height_m / range_m) ** 2, _LEAST_SHARE_SQUARED))[..., None]
+    return points, np.broadcast_to(by_scale, (len(poses), *by_scale.shape))
+
+
+_DEALS = 16
+_SHIFTS = (1, -1, 2, -2)
+_REFINED = 8
+
+_SIGMAS = 4.0
+"""Standard deviations above the mean that chance reaches in about one of 10,000 recordings."""
+
+
+def chance_scores(rays: CandidateRays, prior: MountingPrior, *, seed: int = 0) -> Values:
+    """Return the scores (d,) of the best poses for wrong deals of the radar's positions; at least three dwells are needed."""
+    n = len(rays)
+    rng = np.random.default_rng(seed)
+    deals = [_deal(rng, n) for _ in range(_DEALS)]
+    deals += [np.roll(np.arange(n), shift) for shift in _SHIFTS if shift % n]
+    found = (pose_agreement(rays.with_radar_of(rows), prior, most=_REFINED) for rows in deals)
+    return np.array([0.0 if one is None else one.score for one in found])
+
+
+def chance_score(scores: Values) -> float:
+    """Return the score that chance hardly exceeds: beyond all deals, and beyond their spread."""
+    return float(max(scores.max(), scores.mean() + _SIGMAS * scores.std()))
+
+
+def _deal(rng: np.random.Generator, n: int) -> Indices:
+    """Draw a permutation that leaves nothing in its place."""
+    while True:
+        rows = rng.permutation(n)
+        if (rows != np.arange(n)).all():
+            return np.asarray(rows)
+
+
+_WIDE_ENOUGH_PX = 16.0
+"""Width of a reflector whose apex can be seen."""
+
+_OF_REFLECTOR, _OF_OTHERS = 0.85, 0.25
+"""Share of the places with an apex: of reflectors of that width 0.92 in simulated recordings, of people 0.1 to 0.4."""
+
+_BEFORE = 1.0
+"""Log-odds before any picture: most recordings contain a reflector."""
+
+_LEAST_SEEN = 3
+"""Fewer places of that width say nothing."""
+
+_PRESENT = 0.5
+
+
+def apex_log_odds(views: Sequence[DwellView], agreement: PoseAgreement) -> float:
+    """Return the log-odds that what stood there is a reflector; infinite where too little is large enough to tell.
+
+    Args:
+        views: as the agreement was found for, without confirmed clicks.
+        agreement: its most probable candidates are looked at.
+    """
+    log_odds, count = _BEFORE, 0
+    for i, view in enumerate(views):
+        row = int(agreement.likeliest[i])
+        if agreement.probability[i, row] < _PRESENT or not view.width_px >= _WIDE_ENOUGH_PX:
+            continue
+        shares = np.array([_OF_REFLECTOR, _OF_OTHERS])
+        seen = shares if view.candidates[row].has_apex else 1.0 - shares
+        log_odds += float(np.log(seen[0] / seen[1]))
+        count += 1
+    return log_odds if count >= _LEAST_SEEN else float("inf")
