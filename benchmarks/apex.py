@@ -13,11 +13,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from calib_core.proposing.apex import Apex, find_apex
 from calib_core.synthetic.options import SimulationOptions
 from calib_core.synthetic.recording import simulate
 from calib_core.synthetic.rendering.frames import FrameRenderer
-from calib_core.vision.apex import Apex, find_apex
-from tests.unit.vision.trihedral import background, draw_look, picture
+from tests.unit.proposing.trihedral import background, draw_look, picture
 
 _SCENES = ("rooftop", "field", "aisle", "checkerboard")
 _SIZES = ((960, 540), (1920, 1080))
@@ -122,7 +122,7 @@ def _simulated(seed: int) -> Iterator[Place]:
 
 
 def _our_own(seed: int, count: int) -> Iterator[Place]:
-    """Yield places in pictures of `tests.unit.vision.trihedral`, and in their backgrounds alone."""
+    """Yield places in pictures of `tests.unit.proposing.trihedral`, and in their backgrounds alone."""
     side = (220, 220)
     for low_px, high_px in _OWN_WIDTHS_PX:
         for number in range(count):

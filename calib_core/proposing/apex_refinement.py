@@ -7,9 +7,9 @@ import numpy as np
 
 from calib_core.arrays import Indices
 from calib_core.errors import CalibrationError
+from calib_core.proposing.apex import Apex, find_apex
 from calib_core.proposing.picture_candidates import PictureCandidate, surroundings_of
 from calib_core.proposing.still_pictures import FrameSource, in_light_of, stack_median
-from calib_core.vision.apex import Apex, find_apex
 
 _REACHES = (0.45, 0.25)
 """How far from where it is expected an apex is searched, in widths of the reflector: the nearer where two corners rival."""

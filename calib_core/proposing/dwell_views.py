@@ -13,6 +13,7 @@ from calib_core.association.placements import Placement
 from calib_core.camera import Camera
 from calib_core.errors import CalibrationError
 from calib_core.measurements import TimeNs
+from calib_core.proposing.apex import Apex, find_apex
 from calib_core.proposing.apex_refinement import full_picture, with_apexes
 from calib_core.proposing.picture_candidates import PictureCandidate, blobs
 from calib_core.proposing.still_pictures import (
@@ -26,7 +27,6 @@ from calib_core.proposing.still_pictures import (
     stack_median,
     still_pictures,
 )
-from calib_core.vision.apex import Apex, find_apex
 
 _SETTLED = 9
 """Once so many dwells are seen, further ones hardly change what is said about one of them."""

@@ -7,11 +7,11 @@ import numpy as np
 
 from calib_core.arrays import Vector2, frozen_array
 from calib_core.camera import Camera
+from calib_core.proposing.apex import Apex, find_apex
 from calib_core.proposing.apex_refinement import full_picture
 from calib_core.proposing.dwell_views import DwellView
 from calib_core.proposing.picture_candidates import PictureCandidate, Surroundings
 from calib_core.proposing.still_pictures import FrameSource
-from calib_core.vision.apex import Apex, find_apex
 
 _HALF = 0.75
 """Half the side of the patch, in widths of the reflector."""

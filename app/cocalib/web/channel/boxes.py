@@ -12,13 +12,13 @@ from typing import TypeAlias
 
 import numpy as np
 
+from calib_core.boxes.tracking import LostBox, TrackedBox, follow_box
 from calib_core.camera import Camera
 from calib_core.errors import CalibrationError, InputError
 from calib_core.evaluation import BoxFigures
 from calib_core.measurements import Boxes
 from calib_core.recordings import Recording
 from calib_core.results import Calibration
-from calib_core.vision import LostBox, TrackedBox, follow_box
 from cocalib.evaluation.evaluating import Evidence, evidence_in, judged
 from cocalib.platform.error_boundary import error_boundary
 from cocalib.session.boxes_in_frames import Followed, PlacedBox, Start, Stretch, stretches_of

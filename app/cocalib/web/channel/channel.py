@@ -12,8 +12,8 @@ from calib_core.arrays import TimesNs
 from calib_core.association.pairing import RadarSource
 from calib_core.errors import CalibrationError, InputError
 from calib_core.measurements import Candidate, RadarScan, RadarScans, ReflectorClick, TimeNs
+from calib_core.proposing.apex import Apex, NoApex, find_apex
 from calib_core.results import Calibration
-from calib_core.vision import Apex, NoApex, find_apex
 from cocalib.platform.error_boundary import error_boundary
 from cocalib.session import Session, Step
 from cocalib.solving.solving import window_candidates

@@ -14,7 +14,7 @@ from calib_core.recordings.camera.images import EncodedImage
 from cocalib.web.channel.channel import snapped
 from cocalib.web.frames import FrameStore
 from cocalib.web.messages import Snapped, SnapWanted, encode, parse
-from tests.unit.vision.trihedral import draw_look, picture
+from tests.unit.proposing.trihedral import draw_look, picture
 
 _RNG = np.random.default_rng(5)
 _LOOK = replace(

@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from calib_core.vision.apex import Apex, NoApex, find_apex
-from tests.unit.vision.trihedral import Look, background, draw_look, picture
+from calib_core.proposing.apex import Apex, NoApex, find_apex
+from tests.unit.proposing.trihedral import Look, background, draw_look, picture
 
 _SIDE = (200, 200)
 

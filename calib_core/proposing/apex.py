@@ -1,12 +1,9 @@
 """The apex of a trihedral corner reflector near a given pixel, with its own covariance, or the reason why there is none.
 
 Three sheets meet in the apex, so the picture shows three sectors of different brightness, each below 180 deg. Discs of several
-sizes propose pixels that look so (`sectors`), a fit with blurred boundaries gives the apex below a pixel (`sector_fit`), and
-the disc grows while the fit holds. The given pixel limits the search and enters no estimate.
-
-Three sectors that meet in one point: how well any pixel of a picture explains its surroundings in this way.
-
-Which fits of three sectors show the inner corner of a reflector, and not an edge, a line, a tip, an X or texture.
+sizes propose pixels that look so (`score_sectors`), a fit with blurred boundaries gives the apex below a pixel (`fit_sectors`),
+and the disc grows while the fit holds. The given pixel limits the search and enters no estimate. `is_corner` says which fits of
+three sectors show the inner corner of a reflector, and not an edge, a line, a tip, an X or texture.
 """
 
 from collections.abc import Iterator
@@ -18,17 +15,27 @@ from scipy.special import ndtr
 
 from calib_core.arrays import Matrix22, Values, Vector2, Vector3, frozen_array
 
-_SLOPES_FROM_PX = 5.0
-"""Smaller discs have too few pixels to tell a slope within a sector from the boundaries."""
-_FIRST_BLUR_PX = 0.7
-_LEAST_BLUR_PX = 0.35
-_MOST_BLUR = 0.35
-"""Largest blur, relative to the radius of the disc."""
-_ITERATIONS = 12
-_STEP_LIMIT = np.array([1.0, 1.0, 0.3, 0.3, 0.3, 0.3])
-_ENOUGH_PX = 0.02
-_NEXT, _LAST = [1, 2, 0], [2, 0, 1]
-_ROUNDING_GREY2 = 1.0 / 12.0
+_PROPOSING = ((1, 3.5), (1, 5.0), (1, 7.0), (2, 5.0), (2, 7.0), (4, 5.0), (4, 7.0))
+"""How much the picture is reduced, and the radius of the disc there [px]."""
+
+_GROWING = ((1, 3.5), (1, 5.0), (1, 7.0), (1, 10.0), (1, 14.0), (2, 10.0), (2, 14.0))
+_MARGIN_PX = 48
+_LEAST_SCORE = 0.5
+
+_TRIED = 3
+"""How many places are fitted."""
+
+_WORSE = 1.3
+"""A larger disc may leave this much more than the one before."""
+
+_RIVAL = 0.6
+"""A second corner with this share of the first one's contrast makes the choice open."""
+
+_FITTED, _BLUR, _MOVED, _FLOOR_PX2 = 3.4, 0.009, 0.14, 0.015
+"""How the covariance follows from the fit's, the blur's square, the square of the last move, and what is always added: fitted
+once to 560 simulated pictures (`python -m benchmarks.apex` measures the coverage on others)."""
+
+_FEW_PIXELS_PX, _FEW_PIXELS_PX2 = 4.0, 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,166 +79,6 @@ class SectorFit:
     def contrast(self) -> float:
         """The smallest step, in standard deviations of what the fit leaves."""
         return self.step_grey / self.residual_grey
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Disc:
-    """The pixels of a disc: offsets (n,) from its middle pixel, and grey levels (n,)."""
-
-    middle_px: Vector2
-    x: Values
-    y: Values
-    grey: Values
-    radius_px: float
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Linearized:
-    """The fit at one state (x, y, three directions, blur): what it leaves, and derivatives with the levels solved for."""
-
-    levels: Values
-    left: Values
-    jacobian: np.ndarray
-
-    @property
-    def cost(self) -> float:
-        return float(self.left @ self.left)
-
-
-def fit_sectors(
-    grey: np.ndarray, apex_px: Vector2, starts_rad: Vector3, radius_px: float, blur_px: float = _FIRST_BLUR_PX
-) -> SectorFit | None:
-    """Fit apex, directions, blur and grey levels to the disc around a first apex.
-
-    Args:
-        grey: (h, w) the picture.
-        apex_px: (2,) where to begin; the disc is centred on the nearest pixel.
-        starts_rad: (3,) where the sectors begin, ascending.
-        radius_px: of the disc.
-        blur_px: where to begin.
-
-    Returns:
-        None if the disc leaves the picture or the apex leaves the disc.
-    """
-    disc = _disc(grey, apex_px, radius_px)
-    if disc is None:
-        return None
-    state = np.array([*(np.asarray(apex_px) - disc.middle_px), *starts_rad, blur_px])
-    at = _linearize(disc, state)
-    damping = 1e-3
-    for _ in range(_ITERATIONS):
-        normal = at.jacobian @ at.jacobian.T
-        damped = normal + damping * np.diag(np.diag(normal) + 1e-9)
-        step = np.clip(np.linalg.solve(damped, at.jacobian @ at.left), -_STEP_LIMIT, _STEP_LIMIT)
-        new_state = state + step
-        new_state[5] = np.clip(new_state[5], _LEAST_BLUR_PX, _MOST_BLUR * radius_px)
-        new = _linearize(disc, new_state)
-        if new.cost >= at.cost:
-            damping *= 6.0
-            if damping > 1e3:
-                break
-            continue
-        settled = float(np.abs(new_state - state)[:2].max()) < _ENOUGH_PX
-        state, at, damping = new_state, new, damping / 4.0
-        if settled:
-            break
-    return _described(disc, state, at)
-
-
-def _disc(grey: np.ndarray, apex_px: Vector2, radius_px: float) -> _Disc | None:
-    half = int(np.ceil(radius_px))
-    column, row = (round(float(v)) for v in apex_px)
-    height, width = grey.shape
-    if not (half <= column < width - half and half <= row < height - half):
-        return None
-    x, y = np.meshgrid(np.arange(-half, half + 1), np.arange(-half, half + 1))
-    inside = x * x + y * y <= radius_px * radius_px
-    levels = grey[row - half : row + half + 1, column - half : column + half + 1][inside]
-    middle_px = np.array([column, row], dtype=np.float64)
-    return _Disc(middle_px, x[inside].astype(float), y[inside].astype(float), levels.astype(float), radius_px)
-
-
-def _linearize(disc: _Disc, state: Values) -> _Linearized:
-    """Solve for the grey levels at a state, and differentiate what is left (variable projection).
-
-    A sector is the product of two blurred half-planes, which is exact away from the apex; the shares are scaled to sum to 1.
-    """
-    x, y, blur = disc.x - state[0], disc.y - state[1], state[5]
-    cos, sin = np.cos(state[2:5, None]), np.sin(state[2:5, None])
-    across, along = (cos * y - sin * x) / blur, cos * x + sin * y
-    past = ndtr(across)
-    before = 1.0 - past[_NEXT]
-    products = past * before
-    total = products.sum(axis=0) + 1e-9
-    basis = shares = products / total
-    sloped = disc.radius_px >= _SLOPES_FROM_PX
-    if sloped:
-        basis = np.concatenate([shares, shares * (disc.x / disc.radius_px), shares * (disc.y / disc.radius_px)])
-    normal = basis @ basis.T
-    normal[np.diag_indices(len(normal))] += 1e-6 * len(disc.grey)
-    levels = np.linalg.solve(normal, basis @ disc.grey)
-    sheets = levels[:3, None]
-    if sloped:
-        sheets = sheets + (levels[3:6, None] * disc.x + levels[6:9, None] * disc.y) / disc.radius_px
-    fitted = levels @ basis
-    by_product = (sheets - fitted) / total
-    by_past = by_product * before - (by_product * past)[_LAST]
-    by_across = by_past * np.exp(-0.5 * across * across) / (blur * np.sqrt(2.0 * np.pi))
-    jacobian = np.empty((6, len(disc.grey)))
-    jacobian[0], jacobian[1] = sin[:, 0] @ by_across, -cos[:, 0] @ by_across
-    jacobian[2:5] = -by_across * along
-    jacobian[5] = -(by_across * across).sum(axis=0)
-    jacobian -= np.linalg.solve(normal, basis @ jacobian.T).T @ basis
-    return _Linearized(levels, disc.grey - fitted, jacobian)
-
-
-def _described(disc: _Disc, state: Values, at: _Linearized) -> SectorFit | None:
-    if float(np.hypot(state[0], state[1])) > disc.radius_px:
-        return None
-    freedom = max(len(disc.grey) - len(at.levels) - len(state), 1)
-    variance = at.cost / freedom + _ROUNDING_GREY2
-    normal = at.jacobian @ at.jacobian.T
-    normal[np.diag_indices(6)] += 1e-9
-    total = float(((disc.grey - disc.grey.mean()) ** 2).sum())
-    near, half_way, far = (_steps(disc, state, at.levels, share) for share in (0.15, 0.6, 0.9))
-    return SectorFit(
-        apex_px=disc.middle_px + state[:2],
-        starts_rad=state[2:5],
-        blur_px=float(state[5]),
-        radius_px=disc.radius_px,
-        residual_grey=float(np.sqrt(variance)),
-        explained=1.0 - at.cost / max(total, 1e-9),
-        step_grey=float(np.abs(half_way).min()),
-        least_step_grey=float(np.where(near * far > 0.0, np.minimum(np.abs(near), np.abs(far)), 0.0).min()),
-        slope_grey=float(np.hypot(at.levels[3:6], at.levels[6:9]).max()) if len(at.levels) == 9 else 0.0,
-        covariance_px2=variance * np.linalg.inv(normal)[:2, :2],
-    )
-
-
-def _steps(disc: _Disc, state: Values, levels: Values, share: float) -> Vector3:
-    """Return the differences of grey levels across the boundaries (3,) at a share of the radius from the apex."""
-    ends = share * disc.radius_px * np.stack([np.cos(state[2:5]), np.sin(state[2:5])], axis=1) + state[:2]
-    sheets = np.tile(levels[:3], (3, 1))
-    if len(levels) == 9:
-        sheets = sheets + ends @ levels[3:].reshape(2, 3) / disc.radius_px
-    return np.array([sheets[k, k] - sheets[k, k - 1] for k in range(3)])
-
-
-_PROPOSING = ((1, 3.5), (1, 5.0), (1, 7.0), (2, 5.0), (2, 7.0), (4, 5.0), (4, 7.0))
-"""How much the picture is reduced, and the radius of the disc there [px]."""
-_GROWING = ((1, 3.5), (1, 5.0), (1, 7.0), (1, 10.0), (1, 14.0), (2, 10.0), (2, 14.0))
-_MARGIN_PX = 48
-_LEAST_SCORE = 0.5
-_TRIED = 3
-"""How many places are fitted."""
-_WORSE = 1.3
-"""A larger disc may leave this much more than the one before."""
-_RIVAL = 0.6
-"""A second corner with this share of the first one's contrast makes the choice open."""
-_FITTED, _BLUR, _MOVED, _FLOOR_PX2 = 3.4, 0.009, 0.14, 0.015
-"""How the covariance follows from the fit's, the blur's square, the square of the last move, and what is always added: fitted
-once to 560 simulated pictures (`python -m benchmarks.apex` measures the coverage on others)."""
-_FEW_PIXELS_PX, _FEW_PIXELS_PX2 = 4.0, 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -472,6 +319,165 @@ def _what_was_seen(proposals: list[_Proposal], reach_px: float) -> str:
     return f"no three sheets that meet in one point within {reach_px:.0f} px"
 
 
+_SLOPES_FROM_PX = 5.0
+"""Smaller discs have too few pixels to tell a slope within a sector from the boundaries."""
+
+_FIRST_BLUR_PX = 0.7
+_LEAST_BLUR_PX = 0.35
+
+_MOST_BLUR = 0.35
+"""Largest blur, relative to the radius of the disc."""
+
+_ITERATIONS = 12
+_STEP_LIMIT = np.array([1.0, 1.0, 0.3, 0.3, 0.3, 0.3])
+_ENOUGH_PX = 0.02
+_NEXT, _LAST = [1, 2, 0], [2, 0, 1]
+_ROUNDING_GREY2 = 1.0 / 12.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Disc:
+    """The pixels of a disc: offsets (n,) from its middle pixel, and grey levels (n,)."""
+
+    middle_px: Vector2
+    x: Values
+    y: Values
+    grey: Values
+    radius_px: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Linearized:
+    """The fit at one state (x, y, three directions, blur): what it leaves, and derivatives with the levels solved for."""
+
+    levels: Values
+    left: Values
+    jacobian: np.ndarray
+
+    @property
+    def cost(self) -> float:
+        return float(self.left @ self.left)
+
+
+def fit_sectors(
+    grey: np.ndarray, apex_px: Vector2, starts_rad: Vector3, radius_px: float, blur_px: float = _FIRST_BLUR_PX
+) -> SectorFit | None:
+    """Fit apex, directions, blur and grey levels to the disc around a first apex.
+
+    Args:
+        grey: (h, w) the picture.
+        apex_px: (2,) where to begin; the disc is centred on the nearest pixel.
+        starts_rad: (3,) where the sectors begin, ascending.
+        radius_px: of the disc.
+        blur_px: where to begin.
+
+    Returns:
+        None if the disc leaves the picture or the apex leaves the disc.
+    """
+    disc = _disc(grey, apex_px, radius_px)
+    if disc is None:
+        return None
+    state = np.array([*(np.asarray(apex_px) - disc.middle_px), *starts_rad, blur_px])
+    at = _linearize(disc, state)
+    damping = 1e-3
+    for _ in range(_ITERATIONS):
+        normal = at.jacobian @ at.jacobian.T
+        damped = normal + damping * np.diag(np.diag(normal) + 1e-9)
+        step = np.clip(np.linalg.solve(damped, at.jacobian @ at.left), -_STEP_LIMIT, _STEP_LIMIT)
+        new_state = state + step
+        new_state[5] = np.clip(new_state[5], _LEAST_BLUR_PX, _MOST_BLUR * radius_px)
+        new = _linearize(disc, new_state)
+        if new.cost >= at.cost:
+            damping *= 6.0
+            if damping > 1e3:
+                break
+            continue
+        settled = float(np.abs(new_state - state)[:2].max()) < _ENOUGH_PX
+        state, at, damping = new_state, new, damping / 4.0
+        if settled:
+            break
+    return _described(disc, state, at)
+
+
+def _disc(grey: np.ndarray, apex_px: Vector2, radius_px: float) -> _Disc | None:
+    half = int(np.ceil(radius_px))
+    column, row = (round(float(v)) for v in apex_px)
+    height, width = grey.shape
+    if not (half <= column < width - half and half <= row < height - half):
+        return None
+    x, y = np.meshgrid(np.arange(-half, half + 1), np.arange(-half, half + 1))
+    inside = x * x + y * y <= radius_px * radius_px
+    levels = grey[row - half : row + half + 1, column - half : column + half + 1][inside]
+    middle_px = np.array([column, row], dtype=np.float64)
+    return _Disc(middle_px, x[inside].astype(float), y[inside].astype(float), levels.astype(float), radius_px)
+
+
+def _linearize(disc: _Disc, state: Values) -> _Linearized:
+    """Solve for the grey levels at a state, and differentiate what is left (variable projection).
+
+    A sector is the product of two blurred half-planes, which is exact away from the apex; the shares are scaled to sum to 1.
+    """
+    x, y, blur = disc.x - state[0], disc.y - state[1], state[5]
+    cos, sin = np.cos(state[2:5, None]), np.sin(state[2:5, None])
+    across, along = (cos * y - sin * x) / blur, cos * x + sin * y
+    past = ndtr(across)
+    before = 1.0 - past[_NEXT]
+    products = past * before
+    total = products.sum(axis=0) + 1e-9
+    basis = shares = products / total
+    sloped = disc.radius_px >= _SLOPES_FROM_PX
+    if sloped:
+        basis = np.concatenate([shares, shares * (disc.x / disc.radius_px), shares * (disc.y / disc.radius_px)])
+    normal = basis @ basis.T
+    normal[np.diag_indices(len(normal))] += 1e-6 * len(disc.grey)
+    levels = np.linalg.solve(normal, basis @ disc.grey)
+    sheets = levels[:3, None]
+    if sloped:
+        sheets = sheets + (levels[3:6, None] * disc.x + levels[6:9, None] * disc.y) / disc.radius_px
+    fitted = levels @ basis
+    by_product = (sheets - fitted) / total
+    by_past = by_product * before - (by_product * past)[_LAST]
+    by_across = by_past * np.exp(-0.5 * across * across) / (blur * np.sqrt(2.0 * np.pi))
+    jacobian = np.empty((6, len(disc.grey)))
+    jacobian[0], jacobian[1] = sin[:, 0] @ by_across, -cos[:, 0] @ by_across
+    jacobian[2:5] = -by_across * along
+    jacobian[5] = -(by_across * across).sum(axis=0)
+    jacobian -= np.linalg.solve(normal, basis @ jacobian.T).T @ basis
+    return _Linearized(levels, disc.grey - fitted, jacobian)
+
+
+def _described(disc: _Disc, state: Values, at: _Linearized) -> SectorFit | None:
+    if float(np.hypot(state[0], state[1])) > disc.radius_px:
+        return None
+    freedom = max(len(disc.grey) - len(at.levels) - len(state), 1)
+    variance = at.cost / freedom + _ROUNDING_GREY2
+    normal = at.jacobian @ at.jacobian.T
+    normal[np.diag_indices(6)] += 1e-9
+    total = float(((disc.grey - disc.grey.mean()) ** 2).sum())
+    near, half_way, far = (_steps(disc, state, at.levels, share) for share in (0.15, 0.6, 0.9))
+    return SectorFit(
+        apex_px=disc.middle_px + state[:2],
+        starts_rad=state[2:5],
+        blur_px=float(state[5]),
+        radius_px=disc.radius_px,
+        residual_grey=float(np.sqrt(variance)),
+        explained=1.0 - at.cost / max(total, 1e-9),
+        step_grey=float(np.abs(half_way).min()),
+        least_step_grey=float(np.where(near * far > 0.0, np.minimum(np.abs(near), np.abs(far)), 0.0).min()),
+        slope_grey=float(np.hypot(at.levels[3:6], at.levels[6:9]).max()) if len(at.levels) == 9 else 0.0,
+        covariance_px2=variance * np.linalg.inv(normal)[:2, :2],
+    )
+
+
+def _steps(disc: _Disc, state: Values, levels: Values, share: float) -> Vector3:
+    """Return the differences of grey levels across the boundaries (3,) at a share of the radius from the apex."""
+    ends = share * disc.radius_px * np.stack([np.cos(state[2:5]), np.sin(state[2:5])], axis=1) + state[:2]
+    sheets = np.tile(levels[:3], (3, 1))
+    if len(levels) == 9:
+        sheets = sheets + ends @ levels[3:].reshape(2, 3) / disc.radius_px
+    return np.array([sheets[k, k] - sheets[k, k - 1] for k in range(3)])
+
+
 @dataclass(frozen=True, slots=True)
 class _Limits:
     """What a fit must show, for discs from a radius on: the smaller the disc, the more often chance looks like a corner.
@@ -505,9 +511,12 @@ _STRICT = (
     _Limits(4.0, 4.0, 2.5, 12.0, 0.94, 85.0, 155.0, 0.25, 0.55),
     _Limits(0.0, 6.0, 6.0, 16.0, 0.95, 86.0, 152.0, 0.30, 0.60),
 )
+
 _LOOSE = _Limits(0.0, 1.5, 0.0, 2.0, 0.70, 40.0, 170.0, 1.0, 0.0)
+
 _STEEPEST = 2.2
 """Greatest change within a sheet, relative to the smallest step between two."""
+
 _HALF_TURN = (-0.90, -0.15)
 """Correlation of a disc with itself turned by 180 deg: -1 for a straight edge, 1 for a line or the X of a checkerboard."""
 
@@ -569,9 +578,12 @@ def half_turn_correlation(grey: np.ndarray, fit: SectorFit) -> float:
 
 
 _WEDGES = 12
+
 _NARROWEST, _WIDEST = 2, 5
 """Wedges per sector: 60 to 150 deg. Seen from inside, each sheet of a trihedral spans less than 180 deg."""
+
 _FINE = 7
+
 _QUIET_GREY = 2.0
 """Where grey levels vary less than this, there is nothing to find."""
 

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from calib_core.vision import LostBox, TrackedBox, follow_box
+from calib_core.boxes.tracking import LostBox, TrackedBox, follow_box
 
 SIZE = (320, 240)
 
