@@ -59,8 +59,8 @@ if TYPE_CHECKING:
     from calib_core.recordings import Recording, RecordingOptions, open_recording
     from calib_core.results import Calibration, DataWarning, Metrics, NextPlacement, PairResult
     from calib_core.results.metrics import acc, aed, cdsd
+    from calib_core.results.systematic_errors import SystematicErrorResult
     from calib_core.results.verdict import Verdict, verdict_on
-    from calib_core.systematic_errors import SystematicErrorResult
 
 __all__ = [
     "AgreementLimits",
@@ -160,7 +160,7 @@ _MODULES = {
     "recordings": ("Recording", "RecordingOptions", "open_recording"),
     "results": ("Calibration", "DataWarning", "Metrics", "NextPlacement", "PairResult"),
     "results.metrics": ("acc", "aed", "cdsd"),
-    "results.shared_errors": ("SystematicErrorResult",),
+    "results.systematic_errors": ("SystematicErrorResult",),
     "results.verdict": ("Verdict", "verdict_on"),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}

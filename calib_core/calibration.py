@@ -32,7 +32,7 @@ from calib_core.measurements import MIN_PAIRS, Pair, RadarScans, ReflectorClick,
 from calib_core.options import CalibrationOptions, Method, checked_options
 from calib_core.radar import cartesian_from_polar
 from calib_core.results import Calibration
-from calib_core.systematic_errors import useless_covariance
+from calib_core.results.systematic_errors import useless_covariance
 
 _UNDETERMINED_ROTATION_RAD = 0.5  # a larger standard deviation means that the pairs do not determine the rotation
 _AGREEING_SHARE = 0.9

@@ -19,7 +19,7 @@ from calib_core.options import RadarOptions
 from calib_core.radar import cartesian_from_polar, direction_cosines
 from calib_core.results import DataWarning
 from calib_core.results.radar_axes import sigma_in_radar_axes, without_mounting
-from calib_core.systematic_errors import systematic_error_warnings
+from calib_core.results.systematic_errors import systematic_error_warnings
 
 _NARROW_CONDITION = 5e5
 _WEAK_ROTATION_RAD = np.deg2rad(2.5)

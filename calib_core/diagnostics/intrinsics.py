@@ -32,7 +32,7 @@ from calib_core.arrays import Flags, Values
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.estimation.measurement_model import prior_rows
 from calib_core.results import DataWarning
-from calib_core.systematic_errors import LensPrior, error_words, is_beyond_its_prior, knowledge_text
+from calib_core.results.systematic_errors import LensPrior, error_words, is_beyond_its_prior, knowledge_text
 
 _LEVEL = 0.0025  # false-alarm probability of each unknown
 _LEAST_PAIRS = 10

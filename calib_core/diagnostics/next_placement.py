@@ -18,7 +18,7 @@ from calib_core.estimation.measurement_model import pair_measurements
 from calib_core.measurements import Pair
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration, NextPlacement
-from calib_core.systematic_errors import SystematicErrors
+from calib_core.results.systematic_errors import SystematicErrors
 
 _ENOUGH_GAIN = 1.04  # a placement that gains less is not worth the effort
 _MARGIN_SHARE = 0.04  # of the image, kept free at its edges

@@ -25,7 +25,7 @@ from calib_core.options import RadarOptions
 from calib_core.radar import polar_from_cartesian
 from calib_core.results.calibration import CovarianceParts
 from calib_core.results.radar_axes import mounting_moves
-from calib_core.systematic_errors import LensPrior, SystematicErrorResult, SystematicErrors, shared_out
+from calib_core.results.systematic_errors import LensPrior, SystematicErrorResult, SystematicErrors, shared_out
 
 _LEAST_SHARE = 0.25  # of the plain information that must remain after the correction for uncertain weights
 _CHI2_95_6 = 12.591587243743977

@@ -20,7 +20,7 @@ from calib_core.arrays import Indices, Points2, Points3, Values
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, rotation_jacobian
 from calib_core.radar import position_planes
-from calib_core.systematic_errors import NO_ERRORS, Sensitivity, SystematicError, SystematicErrors
+from calib_core.results.systematic_errors import NO_ERRORS, Sensitivity, SystematicError, SystematicErrors
 
 _FAR = 1e6  # whitened residual of a position the camera cannot see
 

@@ -25,7 +25,7 @@ from calib_core.geometry import RigidTransform, skew
 from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions
 from calib_core.radar import polar_from_cartesian
-from calib_core.systematic_errors import NO_ERRORS, SystematicErrors, systematic_errors
+from calib_core.results.systematic_errors import NO_ERRORS, SystematicErrors, systematic_errors
 
 OWN_SIGMA_RAD = np.deg2rad(0.5)
 """Standard deviation of each placement's elevation above or below the common plane: uneven ground."""

@@ -13,7 +13,13 @@ from calib_core.measurements import DataWarning, Pair, TimeNs, Unpaired
 from calib_core.options import CalibrationOptions
 from calib_core.radar import AngleMap, RadarErrors
 from calib_core.results.radar_axes import bias_moves, camera_axes_text, sigma_in_radar_axes, without_mounting
-from calib_core.systematic_errors import DominantError, SystematicErrorResult, dominance_text, dominant_errors, rescaled
+from calib_core.results.systematic_errors import (
+    DominantError,
+    SystematicErrorResult,
+    dominance_text,
+    dominant_errors,
+    rescaled,
+)
 
 _ROUNDING = 1e-12
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from calib_core.results import Calibration
-from calib_core.systematic_errors import SystematicErrorResult, error_words, is_determined
+from calib_core.results.systematic_errors import SystematicErrorResult, error_words, is_determined
 from cocalib.view.model import Figure, Level, SystematicErrorRow, SystematicErrorTable
 from cocalib.view.wording import plain, sentence, with_sigma
 

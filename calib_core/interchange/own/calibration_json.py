@@ -59,8 +59,8 @@ from calib_core.radar import AngleMap, RadarErrors
 from calib_core.results import Calibration, CheckPoint, DataWarning, InputFile, Metrics
 from calib_core.results.calibration import CovarianceParts
 from calib_core.results.confirmation import rests_on_fleet_prior
+from calib_core.results.systematic_errors import SystematicErrorResult
 from calib_core.results.verdict import Verdict, verdict_on
-from calib_core.systematic_errors import SystematicErrorResult
 
 _ABOUT_PRIOR = ("fleet-prior-untested", "fleet-prior-decides", "far-from-its-kind")
 COVARIANCE_CONVENTION = (

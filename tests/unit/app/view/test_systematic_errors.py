@@ -9,8 +9,8 @@ from calib_core.calibration import calibrate_pairs
 from calib_core.interchange import calibration_text, read_calibration
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
+from calib_core.results.systematic_errors import SystematicErrorResult
 from calib_core.synthetic import simulate_pairs
-from calib_core.systematic_errors import SystematicErrorResult
 from cocalib.view import summary_lines
 from cocalib.view.figures import assumed_figures, firm_text, pose_figures
 from cocalib.view.systematic_errors import systematic_errors

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from tests.unit.proposing.test_box_tracking import edges, picture
 
 from calib_core.errors import InputError
 from cocalib.session.boxes_in_frames import Start, Stretch
 from cocalib.web.channel.boxes import BoxFollower
+from tests.unit.boxes.test_tracking import edges, picture
 
 WAY = [(60 + 3.0 * step, 100.0) for step in range(60)]
 

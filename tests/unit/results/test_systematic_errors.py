@@ -27,16 +27,7 @@ from calib_core.options import (
 )
 from calib_core.radar import RadarErrors, cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration
-from calib_core.synthetic import (
-    FIELD,
-    RigOptions,
-    SimulatedPairs,
-    SystematicErrors,
-    draw_systematic_errors,
-    simulate_pairs,
-)
-from calib_core.synthetic.simulated_pairs import study_camera
-from calib_core.systematic_errors import (
+from calib_core.results.systematic_errors import (
     ERROR_WORDS,
     LensPrior,
     SystematicError,
@@ -48,6 +39,15 @@ from calib_core.systematic_errors import (
     shared_out,
     systematic_errors,
 )
+from calib_core.synthetic import (
+    FIELD,
+    RigOptions,
+    SimulatedPairs,
+    SystematicErrors,
+    draw_systematic_errors,
+    simulate_pairs,
+)
+from calib_core.synthetic.simulated_pairs import study_camera
 
 FREE = CalibrationOptions()
 MEASURED = CalibrationOptions(
