@@ -111,6 +111,18 @@ def is_ours(reader: Reads | None) -> bool:
     return reader is not None and reader in tuple(_reads(*_OURS))
 
 
+_GONE = {
+    "tf1-launch": "tf2 or tf2-launch-py",
+    "tf2-launch-xml": "tf2-launch-py",
+    "koide3": "tf2 or urdf",
+    "numpy": "matlab or matrix",
+    "npz": "matlab or matrix",
+    "foxglove": "mcap",
+    "openlabel": "tf2 or urdf",
+}
+"""Formats that are not written any more, each with what replaces it."""
+
+
 def format_named(name: str) -> Format:
     """Return a format that can be written by its name.
 
@@ -120,6 +132,8 @@ def format_named(name: str) -> Format:
     for known in _written():
         if known.name == name:
             return known
+    if name in _GONE:
+        raise InputError(f"format {name!r} went in 0.1: use {_GONE[name]}; its files are still read")
     names = [known.name for known in written_formats()]
     near = get_close_matches(name, names, n=1)
     raise InputError(
