@@ -52,6 +52,17 @@ def test_a_file_is_that_calibrations_file_or_stale(cocalib: Cocalib, solved: Pat
     assert "stale: exported from another calibration than this one (sha256 " in stale.out
 
 
+def test_a_pose_that_rests_on_a_fleets_prior_is_warned_of(cocalib: Cocalib, project_root: Path, tmp_path: Path) -> None:
+    drawn = project_root / "tests/golden/calibration-1-fleet-prior.json"
+    checked = cocalib("check", drawn)
+    assert checked.code in (0, 3)
+    assert "warning: an older version drew this pose to a fleet's prior" in checked.out
+    (file,) = json.loads(cocalib("check", drawn, "--json").out)["files"]
+    assert "rests-on-fleet-prior" in [result["code"] for result in file["results"]]
+    read = cocalib("import", drawn, "--out", tmp_path / "calibration.json")
+    assert "warning: an older version drew this pose to a fleet's prior" in read.err
+
+
 def test_a_difference_fails_the_gate_unless_the_limits_allow_it(cocalib: Cocalib, solved: Path, moved: Path) -> None:
     differs = cocalib("check", moved, "--against", solved)
     assert differs.code == 1
