@@ -184,6 +184,19 @@ def test_an_export_tells_of_a_last_step_that_is_not_whole(cocalib: Cocalib, home
     assert len(read_clicks((tmp_path / "clicks.json").read_text())) == 11
 
 
+def test_a_last_step_that_is_not_whole_is_listed_and_needs_no_repair(cocalib: Cocalib, home: Path) -> None:
+    folder = clicked(home / "drive.bag.cocalib-session", 1)
+    for path in folder.glob("journal*.jsonl"):
+        path.write_bytes(path.read_bytes() + b'{"type":"click_pl')
+    (found,) = json.loads(cocalib("session", "list", folder, "--json").out)
+    assert (found["state"], found["clicks"]) == ("torn", 1)
+    assert "a last step of 17 bytes was never confirmed" in found["about"]
+    answer = cocalib("session", "repair", folder)
+    assert answer.code == 0
+    assert "proven: 1 click, from 1 step of the journal" in answer.out
+    assert "Sound" not in answer.out
+
+
 def test_an_export_of_a_damaged_session_writes_what_is_proven_and_says_what_is_not(
     cocalib: Cocalib, home: Path, tmp_path: Path
 ) -> None:

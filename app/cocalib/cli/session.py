@@ -83,7 +83,11 @@ class Session:
         found = repair_session(folder) if self.yes else inspect_session(folder)
         print(_printable("\n".join(_findings(found))))
         if not found.faults:
-            print("Sound; nothing to repair.")
+            print(
+                "Nothing to repair: opening the session drops that step."
+                if found.torn_bytes
+                else "Sound; nothing to repair."
+            )
             return 0
         if self.yes:
             print(f"Repaired. The old files are kept as {' and '.join(found.backups)}.")
@@ -100,7 +104,7 @@ class Session:
         assert self.out is not None
         found = inspect_session(folder)
         write_whole(self.out, write_clicks(found.clicks))
-        print(_printable(f"{len(found.clicks)} clicks of {found.recording} written to {self.out}"))
+        print(_printable(f"{_counted(len(found.clicks), 'click')} of {found.recording} written to {self.out}"))
         if not found.is_complete or found.torn_bytes:
             print(_printable("\n".join(f"cocalib: {line}" for line in _findings(found))), file=sys.stderr)
         return 0 if found.is_complete else 3
@@ -128,20 +132,28 @@ def _session_folder(place: Path) -> Path:
 
 def _findings(found: "Repair") -> list[str]:
     """Return what a session proves and what is wrong with it, line by line."""
-    source = "the snapshot and the steps after it" if found.from_snapshot else f"{found.steps} steps of the journal"
+    source = (
+        "the snapshot and the steps after it"
+        if found.from_snapshot
+        else f"{_counted(found.steps, 'step')} of the journal"
+    )
     lines = [f"{found.folder}: session of {found.recording}", *(f"  {fault}" for fault in found.faults)]
-    lines.append(f"  proven: {len(found.clicks)} clicks, from {source}")
+    lines.append(f"  proven: {_counted(len(found.clicks), 'click')}, from {source}")
     if found.from_snapshot:
         lines.append("  what was done before the snapshot can no longer be undone")
     if found.unproven:
-        lines.append(f"  not proven, and left out: {found.unproven} lines of the journal")
+        lines.append(f"  not proven, and left out: {_counted(found.unproven, 'line')} of the journal")
     elif found.faults and found.is_complete:
         lines.append("  as far as the files show, no click is missing")
     elif found.faults:
         lines.append("  which of the two files is right cannot be proven; the other one stays as a backup")
     if found.torn_bytes:
-        lines.append(f"  a last step of {found.torn_bytes} bytes was never confirmed and is left out")
+        lines.append(f"  {found.torn}")
     return lines
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
 def _table(sessions: "tuple[SessionSummary, ...]") -> list[str]:

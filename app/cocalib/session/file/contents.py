@@ -304,6 +304,11 @@ class Repair:
     torn_bytes: int
     backups: tuple[str, ...] = ()
 
+    @property
+    def torn(self) -> str:
+        """What is left out of a half-written last step, as a clause; "" if there is none."""
+        return f"a last step of {self.torn_bytes} bytes was never confirmed and is left out" if self.torn_bytes else ""
+
 
 def inspect_session(folder: Path) -> Repair:
     """Return what a session proves; nothing is changed.

@@ -229,7 +229,7 @@ class SessionSummary:
         clicks: how many it has, or how many are proven.
         steps: how many steps its journal holds.
         changed_at_s: when it was last changed, in seconds since the epoch; None if unknown.
-        state: "sound", "damaged", "open" (in another process), or "unreadable".
+        state: "sound", "torn" (its last step was never confirmed), "damaged", "open" (in another process), or "unreadable".
         about: what is wrong, or which process has it open.
     """
 
@@ -272,6 +272,6 @@ def _summary(path: Path) -> SessionSummary:
         found = inspect_session(path)
     except (SessionFileError, OSError) as error:
         return SessionSummary(path, "", 0, 0, changed, "unreadable", str(error))
-    state = "open" if holder else "damaged" if found.faults else "sound"
-    about = "; ".join(filter(None, (holder, *found.faults)))
+    state = "open" if holder else "damaged" if found.faults else "torn" if found.torn_bytes else "sound"
+    about = "; ".join(filter(None, (holder, *found.faults, found.torn)))
     return SessionSummary(path, found.recording, len(found.clicks), found.steps, changed, state, about)
