@@ -90,8 +90,13 @@ def read_outcome(text: str) -> Outcome:
         return msgspec.json.decode(text, type=Outcome)
     except msgspec.ValidationError as error:
         schema = _schema_in(text)
-        if schema is None or schema == OUTCOME_SCHEMA:
+        if schema in (None, OUTCOME_SCHEMA) and "matching regex" not in str(error):
             raise
+        if schema in (None, OUTCOME_SCHEMA):
+            place = str(error).rpartition("`$.")[2].rstrip("`")
+            raise msgspec.ValidationError(
+                f"{place} is not the relative name of a file beside it; run the job again"
+            ) from error
         raise msgspec.ValidationError(
             f"a result of another version of cocalib ({schema}, this one reads {OUTCOME_SCHEMA}): name another folder with "
             "--out, or use that version"

@@ -4,6 +4,7 @@ import json
 import os
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from calib_core.errors import CalibrationError
@@ -12,6 +13,7 @@ from cocalib.batch.driving import drive
 from cocalib.batch.engine import InProcess
 from cocalib.batch.job import jobs_of
 from cocalib.batch.manifest import ManifestRow
+from cocalib.batch.outcome import read_outcome
 from cocalib.batch.plan import read_plans, write_plan
 from cocalib.batch.results_folder import OUTCOME_FILE, ResultsFolder
 from cocalib.cli import run
@@ -65,6 +67,10 @@ def test_an_outcome_that_lists_what_is_not_in_its_folder_is_none(name: str, tmp_
     outcome["files"][0]["name"] = name
     place.write_text(json.dumps(outcome))
     assert folder.outcome(DIGEST) is None
+    with pytest.raises(
+        msgspec.ValidationError, match=r"^files\[0\]\.name is not the relative name of a file beside it"
+    ):
+        read_outcome(place.read_text())
 
 
 @pytest.mark.parametrize("below", ["", "export"])
