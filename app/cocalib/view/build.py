@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+from calib_core.association.placement_groups import linked_clicks
 from calib_core.association.placements import Placement
 from calib_core.measurements import MIN_PAIRS, Unpaired, Unsolvable
 from calib_core.results import Calibration, DataWarning
@@ -172,6 +173,7 @@ def summary_lines(calibration: Calibration) -> tuple[str, ...]:
     For a radar without elevation what it determines comes first, and what it does not follows in one line.
     """
     metrics, pose, assumed = metric_figures(calibration), pose_figures(calibration), assumed_figures(calibration)
+    metrics = (*metrics, *_placements(calibration))
     figures = (*pose, *metrics) if assumed else (*metrics, *pose)
     figures = tuple(replace(one, label=_PAPER_NAMES.get(one.key, one.label)) for one in figures)
     width = max(len(figure.label) for figure in figures)
@@ -194,6 +196,15 @@ def summary_lines(calibration: Calibration) -> tuple[str, ...]:
     ]
     lines += [f"unpaired: {row.id}: {sentence(row.reason)} {sentence(row.hint)}" for row in calibration.unpaired]
     return (*head, *lines)
+
+
+def _placements(calibration: Calibration) -> tuple[Figure, ...]:
+    """Return at how many placements the clicks are, each of which makes one pair; nothing where each click counts by itself."""
+    pairs = [pair.measured for pair in calibration.pairs if not pair.excluded and pair.measured is not None]
+    if not calibration.options.models_noise or not pairs:
+        return ()
+    count = len(linked_clicks(pairs, calibration.options))
+    return (Figure("placements", "at placements", f"{count}, each of which is one pair", "", ""),)
 
 
 def _line(figure: Figure, width: int) -> str:

@@ -17,7 +17,7 @@ _METRICS = {
     "held_out_aed": "new placement (held-out AED)",
     "cdsd": "spread (CDSD)",
     "rms": "root mean square (RMS)",
-    "inliers": "pairs that agree",
+    "inliers": "clicks that agree",
 }
 _NOT_YET = "Available after the first calibration."
 _HELD_OUT_RATIO = 1.5
@@ -44,7 +44,7 @@ def metric_figures(calibration: Calibration | None) -> tuple[Figure, ...]:
         figures["held_out_aed"] = replace(held_out, hint=f"{held_out.hint} {warning}", level="warning")
     used = sum(not pair.excluded for pair in calibration.pairs)
     agreeing = sum(pair.inlier and not pair.excluded for pair in calibration.pairs)
-    hint = "Pairs that agree on the pose, out of all that you have not excluded."
+    hint = "Clicks whose radar position agrees with the pose, out of all that you have not excluded."
     level: Level = "good" if agreeing == used else "plain"
     return (*figures.values(), Figure("inliers", _METRICS["inliers"], f"{agreeing} of {used}", "", hint, level))
 

@@ -94,6 +94,15 @@ def test_a_radar_without_elevation_shows_first_what_is_firm(flat: Calibration) -
     assert firm_text(flat).endswith(" px")
 
 
+def test_the_summary_says_how_many_clicks_agree_and_at_how_many_placements(calibration: Calibration) -> None:
+    count = len(calibration.pairs)
+    lines = summary_lines(calibration)
+    assert [" ".join(line.split()) for line in lines if "agree" in line or "placements" in line.split("  ")[0]] == [
+        f"clicks that agree {count} of {count}",
+        f"at placements {count}, each of which is one pair",
+    ]
+
+
 def test_a_calibration_from_a_file_looks_the_same(calibration: Calibration, flat: Calibration) -> None:
     for one in (calibration, flat):
         read = read_calibration(calibration_text(one)).calibration
