@@ -6,7 +6,7 @@ import numpy as np
 
 from calib_core.arrays import Matrix66
 from calib_core.fleet import SessionPose
-from calib_core.fleet.mounting_coordinates import coordinate_jacobian, pose_from_coordinates
+from calib_core.fleet.mounting_scatter import coordinate_jacobian, pose_from_coordinates
 from calib_core.geometry import OPTICAL_FROM_LINK, RigidTransform, rotation_from_euler
 from calib_core.measurements import NS_PER_S, TimeNs
 

@@ -2,6 +2,8 @@
 
 The rule, which docs/boxes.md states: a stamp, or a time in a picture's name, is the recorded frame within 1 ms of it; a
 number counts the recorded frames from 0 or 1. A file whose stamps, count or pictures differ is of another recording.
+
+The formats are asked in the order of `BOX_FORMATS`. To add one: write its module in `formats/`, and add it there.
 """
 
 import io
@@ -16,14 +18,21 @@ from xml.etree import ElementTree
 import numpy as np
 
 from calib_core.arrays import Indices, TimesNs
-from calib_core.boxes.formats.box_format import BoxFile, FileBoxes, FileFrame
-from calib_core.boxes.formats.registry import BOX_FORMATS
+from calib_core.boxes.formats.box_format import BoxFile, BoxFormat, FileBoxes, FileFrame
+from calib_core.boxes.formats.coco import COCO
+from calib_core.boxes.formats.cvat import CVAT
+from calib_core.boxes.formats.kitti import KITTI_OBJECTS, KITTI_TRACKS
+from calib_core.boxes.formats.openlabel import OPENLABEL
+from calib_core.boxes.formats.own import OWN
+from calib_core.boxes.formats.yolo import YOLO
 from calib_core.errors import InputError
 from calib_core.input_files import file_text, name_text, read_input
 from calib_core.interchange.syntax.strict_json import json_value
 from calib_core.measurements import Box, Boxes, FrameBoxes, TimeNs
 from calib_core.recordings.box_topics import frames_of_stamps
 from calib_core.recordings.plain_files.file_stamps import times_in_names
+
+BOX_FORMATS: tuple[BoxFormat, ...] = (OWN, OPENLABEL, COCO, CVAT, KITTI_TRACKS, KITTI_OBJECTS, YOLO)
 
 
 def read_boxes(path: str | Path, *, image_times: TimesNs, image_size_px: tuple[int, int] | None) -> Boxes:
@@ -51,6 +60,7 @@ _MAX_XML_BYTES = 64 * 1024 * 1024
 _MOST_MEMBERS = 200_000
 _IS_WHAT = "a file of boxes"
 _SUFFIXES = (".txt", ".yaml", ".yml", ".json", ".xml", ".names")
+
 _DAMAGED = (
     EOFError,
     LookupError,

@@ -13,11 +13,7 @@ from calib_core.fleet import (
     mountings_of,
     transition,
 )
-from calib_core.fleet.mounting_coordinates import (
-    coordinate_jacobian,
-    coordinates,
-    pose_from_coordinates,
-)
+from calib_core.fleet.mounting_scatter import coordinate_jacobian, coordinates, pose_from_coordinates
 from calib_core.geometry import RigidTransform, rotation_exp
 
 _seeds = st.integers(0, 2**32 - 1)

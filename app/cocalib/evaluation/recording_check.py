@@ -10,7 +10,7 @@ import numpy as np
 from calib_core.association.pairing import RadarSource, pair_clicks, scans_around
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.evaluation.residual_test import ResidualTest, residual_test
+from calib_core.evaluation.residuals import ResidualTest, residual_test
 from calib_core.interchange import CheckReport, CheckResult, ImportedCalibration, adopted_calibration
 from calib_core.interchange.check.pixel_differences import LOST_TEXT, far_outside, lenses_of
 from calib_core.measurements import MIN_PAIRS, ReflectorClick

@@ -10,7 +10,7 @@ from benchmarks.accuracy.defects.wrong_lens import WrongLens, board_covariance, 
 from calib_core.calibration import calibrate_pairs, preview_pairs, solve_again
 from calib_core.camera import Camera, CameraCovariance
 from calib_core.errors import OptionError
-from calib_core.evaluation.residual_test import residual_test
+from calib_core.evaluation.residuals import residual_test
 from calib_core.interchange import calibration_text, read_calibration
 from calib_core.measurements import Pair, Unsolvable
 from calib_core.options import CalibrationOptions, RefiningOptions

@@ -23,8 +23,7 @@ from calib_core.fleet import (
     off_kinds,
 )
 from calib_core.fleet.deviation import deviation
-from calib_core.fleet.mounting_coordinates import coordinates, pose_from_coordinates
-from calib_core.fleet.mounting_scatter import SharedTape
+from calib_core.fleet.mounting_scatter import SharedTape, coordinates, pose_from_coordinates
 from calib_core.fleet.mountings import Mounting
 from calib_core.fleet.session_pose import SessionPose
 from calib_core.geometry import RigidTransform
