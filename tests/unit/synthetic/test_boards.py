@@ -10,8 +10,15 @@ from calib_core.camera import Camera, CameraModel
 from calib_core.geometry import RigidTransform, rotation_exp, rotation_log
 from calib_core.intrinsics import Board
 from calib_core.synthetic import typical_camera
-from calib_core.synthetic.boards import BoardFilm, BoardShape, Waving, render_board, true_corners, waved_poses
-from calib_core.synthetic.boards.board_picture import grid_rays
+from calib_core.synthetic.boards import (
+    BoardFilm,
+    BoardShape,
+    Waving,
+    grid_rays,
+    render_board,
+    true_corners,
+    waved_poses,
+)
 
 BOARD = Board("checkerboard", 7, 5, 0.03)
 FINER = 4
