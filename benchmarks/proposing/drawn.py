@@ -12,7 +12,7 @@ from calib_core.measurements import RadarScans
 from calib_core.options import CalibrationOptions
 from calib_core.proposing import FrameSource
 from calib_core.synthetic.recording import SimulatedPictures, SimulatedRecording, simulate
-from calib_core.synthetic.scene.placements import SimulatedPlacement
+from calib_core.synthetic.scene.stage import SimulatedPlacement
 
 __all__ = ["Drawn", "draw", "drawn_from", "true_placement"]
 

@@ -9,7 +9,7 @@ from benchmarks.proposing.drawn import Drawn, true_placement
 from calib_core.association.placements import Placement
 from calib_core.measurements import NS_PER_S, ReflectorClick
 from calib_core.proposing import Proposal
-from calib_core.synthetic.scene.placements import SimulatedPlacement
+from calib_core.synthetic.scene.stage import SimulatedPlacement
 
 __all__ = [
     "click_on_the_reflector",

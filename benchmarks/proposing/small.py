@@ -12,8 +12,8 @@ from calib_core.arrays import TimesNs
 from calib_core.proposing import FrameSource
 from calib_core.synthetic.recording import SimulatedPictures, SimulatedRecording, simulate
 from calib_core.synthetic.rendering.frames import FrameRenderer
-from calib_core.synthetic.rendering.light import sun_direction
 from calib_core.synthetic.rendering.still import Still, pixel_rays
+from calib_core.synthetic.rendering.surfaces import sun_direction
 
 __all__ = ["draw_small", "small_case"]
 

@@ -18,11 +18,11 @@ from calib_core.synthetic.options import (
     WavedBoard,
 )
 from calib_core.synthetic.presets import PRESETS, PresetName
-from calib_core.synthetic.radar_profiles import RADAR_PROFILES, RadarProfile
+from calib_core.synthetic.radar_returns import RADAR_PROFILES, RadarProfile
 from calib_core.synthetic.recording import SimulatedFrame, SimulatedRecording, simulate
 from calib_core.synthetic.rig import Rig, RigOptions, random_rig, typical_camera
 from calib_core.synthetic.scans import SimulatedScans, simulate_scans
-from calib_core.synthetic.scene.placements import SimulatedPlacement
+from calib_core.synthetic.scene.stage import SimulatedPlacement
 from calib_core.synthetic.simulated_pairs import (
     AISLE,
     FIELD,

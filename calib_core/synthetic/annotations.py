@@ -5,12 +5,11 @@ import numpy as np
 from calib_core.arrays import Points3, Vector3
 from calib_core.measurements import Box, Boxes, FrameBoxes, LabelledScan, ReturnLabels, TimeNs
 from calib_core.synthetic.recording import SimulatedRecording
-from calib_core.synthetic.rendering.solids import Solid, block
+from calib_core.synthetic.rendering.surfaces import Solid, block
 from calib_core.synthetic.scans import labelled_scans
 from calib_core.synthetic.scene.person import PersonState, capsules
 from calib_core.synthetic.scene.stage import Stage
-from calib_core.synthetic.scene.traffic import Actor
-from calib_core.synthetic.scene.vehicles import VehicleState, hidden_by, outline_points
+from calib_core.synthetic.scene.traffic import Actor, VehicleState, hidden_by, outline_points
 
 _LEAST_VISIBLE = 0.25
 """Least share of an object that must be visible for a box."""

@@ -7,8 +7,7 @@ import numpy as np
 
 from calib_core.arrays import Vector2
 from calib_core.measurements import ReflectorClick, TimeNs
-from calib_core.synthetic.scene.placements import SimulatedPlacement, clear_frames
-from calib_core.synthetic.scene.stage import Stage, child_rng
+from calib_core.synthetic.scene.stage import SimulatedPlacement, Stage, child_rng, clear_frames
 
 ClickFault = Literal["repeated", "low", "late", "hasty"]
 

@@ -12,11 +12,10 @@ from calib_core.geometry import RigidTransform
 from calib_core.measurements import RadarScan, ReflectorClick, TimeNs
 from calib_core.synthetic.clicking import SimulatedClick, clicks_of
 from calib_core.synthetic.options import SimulationOptions
-from calib_core.synthetic.radar_profiles import Antenna
+from calib_core.synthetic.radar_returns import Antenna
 from calib_core.synthetic.rendering.frames import FrameRenderer
 from calib_core.synthetic.scans import antenna_scans, radar_scans
-from calib_core.synthetic.scene.placements import SimulatedPlacement, placements_of
-from calib_core.synthetic.scene.stage import Stage, child_rng, set_stage
+from calib_core.synthetic.scene.stage import SimulatedPlacement, Stage, child_rng, placements_of, set_stage
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,16 +12,13 @@ from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, ReflectorClick, TimeNs
 from calib_core.synthetic.clicking import SimulatedClick, clicks_of
 from calib_core.synthetic.options import SimulationOptions
-from calib_core.synthetic.radar_profiles import Antenna
-from calib_core.synthetic.radar_returns import Targets, measure, second_azimuths, second_is_true
+from calib_core.synthetic.radar_returns import Antenna, Targets, measure, second_azimuths, second_is_true
 from calib_core.synthetic.scene.person import PersonState, capsules
-from calib_core.synthetic.scene.placements import SimulatedPlacement, placements_of
 from calib_core.synthetic.scene.scenes import USUAL_EDGE_M
-from calib_core.synthetic.scene.stage import Stage, child_rng, set_stage
+from calib_core.synthetic.scene.stage import SimulatedPlacement, Stage, child_rng, placements_of, set_stage
 from calib_core.synthetic.scene.story import Moment, Resting
 from calib_core.synthetic.scene.surroundings import cart_position
-from calib_core.synthetic.scene.traffic import Actor
-from calib_core.synthetic.scene.vehicles import VehicleState, echo_places, hidden_by
+from calib_core.synthetic.scene.traffic import Actor, VehicleState, echo_places, hidden_by
 
 _REFLECTOR_DBSM = 12.0
 """Of a reflector of the usual size."""

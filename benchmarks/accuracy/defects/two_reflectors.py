@@ -12,7 +12,7 @@ from calib_core.association.placements import Placement, find_placements
 from calib_core.options import GatingOptions
 from calib_core.synthetic import simulate_scans
 from calib_core.synthetic.presets import PRESETS, PresetName
-from calib_core.synthetic.scene.placements import SimulatedPlacement
+from calib_core.synthetic.scene.stage import SimulatedPlacement
 
 __all__ = ["ROWS", "measure_two", "section"]
 

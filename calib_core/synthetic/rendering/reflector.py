@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.arrays import Points3, Vector3
-from calib_core.synthetic.rendering.light import lit
+from calib_core.synthetic.rendering.surfaces import lit
 from calib_core.synthetic.scene.person import Capsule
 from calib_core.synthetic.scene.scenes import USUAL_EDGE_M, Scene
 

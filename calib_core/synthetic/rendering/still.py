@@ -6,9 +6,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.arrays import Vector3
-from calib_core.synthetic.rendering.light import display, lit, sun_direction
-from calib_core.synthetic.rendering.solids import Hits, Solid, block, shadowed, trace
-from calib_core.synthetic.rendering.surfaces import Patch, fractal_noise, ground_colour, hash_random, value_noise
+from calib_core.synthetic.rendering.surfaces import (
+    Hits,
+    Patch,
+    Solid,
+    block,
+    display,
+    fractal_noise,
+    ground_colour,
+    hash_random,
+    lit,
+    shadowed,
+    sun_direction,
+    trace,
+    value_noise,
+)
 from calib_core.synthetic.rig import Rig
 from calib_core.synthetic.scene.scenes import Backdrop, Scene
 

@@ -14,7 +14,7 @@ from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.recordings import open_recording
 from calib_core.synthetic.options import SimulationOptions
 from calib_core.synthetic.scans import simulate_scans
-from calib_core.synthetic.scene.placements import SimulatedPlacement
+from calib_core.synthetic.scene.stage import SimulatedPlacement
 
 REFLECTOR = (6.0, 1.0, -0.8)
 RATE_HZ = 10.0

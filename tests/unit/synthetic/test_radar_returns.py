@@ -19,8 +19,14 @@ from calib_core.synthetic import (
     simulate,
     simulate_scans,
 )
-from calib_core.synthetic.files import truth_text
-from calib_core.synthetic.messages import CLOUD_TOPIC, SECOND_COLUMN, SECOND_SUFFIX, camera_messages, radar_messages
+from calib_core.synthetic.files import (
+    CLOUD_TOPIC,
+    SECOND_COLUMN,
+    SECOND_SUFFIX,
+    camera_messages,
+    radar_messages,
+    truth_text,
+)
 from calib_core.synthetic.options import SecondAzimuth
 from calib_core.synthetic.radar_returns import Targets, measure, radar_from_reported, second_azimuths
 from calib_core.synthetic.rig import RigOptions, radar_stand

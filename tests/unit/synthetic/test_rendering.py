@@ -11,12 +11,11 @@ from calib_core.camera import CameraModel
 from calib_core.synthetic import Rig, SimulationOptions, random_rig, simulate, typical_camera
 from calib_core.synthetic.options import SceneName
 from calib_core.synthetic.rendering.frames import FrameRenderer
-from calib_core.synthetic.rendering.light import sun_direction
 from calib_core.synthetic.rendering.reflector import apex_edges
 from calib_core.synthetic.rendering.still import Still, pixel_rays, trace_still
-from calib_core.synthetic.rendering.surfaces import fractal_noise, line_coverage
-from calib_core.synthetic.scene.built_scenes import scene_named
+from calib_core.synthetic.rendering.surfaces import fractal_noise, line_coverage, sun_direction
 from calib_core.synthetic.scene.person import PersonState
+from calib_core.synthetic.scene.scenes import scene_named
 from calib_core.synthetic.scene.stage import Stage, set_stage
 from calib_core.synthetic.scene.story import Moment, Resting
 

@@ -13,8 +13,7 @@ import pytest
 
 from calib_core.recordings import open_recording
 from calib_core.recordings.containers.writing import write_ros1_bag
-from calib_core.synthetic.files import clicks_text, truth_text
-from calib_core.synthetic.messages import radar_messages
+from calib_core.synthetic.files import clicks_text, radar_messages, truth_text
 from calib_core.synthetic.recording import SimulatedRecording, simulate
 from calib_core.synthetic.sample import SAMPLE_NAME, SAMPLE_OPTIONS, write_sample
 

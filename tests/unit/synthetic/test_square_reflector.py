@@ -7,9 +7,9 @@ import pytest
 
 from calib_core.synthetic import SimulationOptions, simulate
 from calib_core.synthetic.rendering.frames import FrameRenderer
-from calib_core.synthetic.rendering.light import sun_direction
 from calib_core.synthetic.rendering.reflector import pole_limbs, square_edges
 from calib_core.synthetic.rendering.still import Still, pixel_rays
+from calib_core.synthetic.rendering.surfaces import sun_direction
 from calib_core.synthetic.scene.stage import Stage, set_stage
 
 OPTIONS = SimulationOptions(

@@ -10,10 +10,8 @@ from calib_core.measurements import NS_PER_S, RadarScans
 from calib_core.radar import direction_cosines
 from calib_core.synthetic import SimulatedScans, SimulationOptions, Surroundings, simulate, simulate_scans
 from calib_core.synthetic.rendering.frames import FrameRenderer
-from calib_core.synthetic.scene.built_scenes import scene_named
-from calib_core.synthetic.scene.placements import SimulatedPlacement
-from calib_core.synthetic.scene.scenes import Box
-from calib_core.synthetic.scene.stage import set_stage
+from calib_core.synthetic.scene.scenes import Box, scene_named
+from calib_core.synthetic.scene.stage import SimulatedPlacement, set_stage
 from calib_core.synthetic.scene.surroundings import cart_position, in_sight
 
 QUIET = SimulationOptions(
