@@ -1,7 +1,7 @@
 """Frames: the still backdrop with reflectors and people in front of it, plus camera noise.
 
-A person is capsules traced analytically, one ray per pixel, with smooth outlines and a soft shadow; robot cars, cars and carts are
-painted blocks on wheels, with a box of cardboard behind a reflector.
+A person is capsules traced analytically, one ray per pixel, with smooth outlines and a soft shadow; robot cars, cars and carts
+are painted blocks on wheels, with a box of cardboard behind a reflector.
 """
 
 from collections.abc import Callable

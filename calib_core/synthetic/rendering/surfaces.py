@@ -11,7 +11,7 @@ import numpy as np
 
 from calib_core.arrays import Vector3
 from calib_core.synthetic.rig import Rig
-from calib_core.synthetic.scene.scenes import Box, Cylinder, Ground, Material, Scene
+from calib_core.synthetic.scene.scenes import Box, Ground, Material, Scene
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -428,16 +428,12 @@ class Solid:
         return colours
 
 
-def block(item: Box | Cylinder) -> Solid:
+def block(item: Box) -> Solid:
     """Convert an object of a scene to a solid."""
-    half = (
-        np.array([item.radius_m, item.radius_m])
-        if isinstance(item, Cylinder)
-        else np.array([item.length_m, item.width_m]) / 2.0
-    )
+    half = np.array([item.length_m, item.width_m]) / 2.0
     low = np.array([item.x_m - half[0], item.y_m - half[1], item.base_m], dtype=np.float32)
     high = np.array([item.x_m + half[0], item.y_m + half[1], item.base_m + item.height_m], dtype=np.float32)
-    return Solid(low, high, isinstance(item, Cylinder), item.material)
+    return Solid(low, high, item.is_round, item.material)
 
 
 def trace(solids: list[Solid], eye: Vector3, rays: np.ndarray, rig: Rig, *, far_m: float, ceiling_m: float) -> Hits:

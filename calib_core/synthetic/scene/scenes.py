@@ -40,7 +40,7 @@ Backdrop = Literal["city", "trees", "hall"]
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """An upright block: centre of its base, sizes along x, y, z [m], rotated about z."""
+    """An upright block, or a round one: centre of its base, sizes along x, y, z [m], rotated about z."""
 
     x_m: float
     y_m: float
@@ -50,18 +50,12 @@ class Box:
     material: Material
     base_m: float = 0.0
     turn_deg: float = 0.0
+    is_round: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Cylinder:
-    """An upright pipe or post."""
-
-    x_m: float
-    y_m: float
-    radius_m: float
-    height_m: float
-    material: Material
-    base_m: float = 0.0
+def post(x_m: float, y_m: float, radius_m: float, height_m: float, material: Material, base_m: float = 0.0) -> Box:
+    """Return an upright pipe or post."""
+    return Box(x_m, y_m, 2.0 * radius_m, 2.0 * radius_m, height_m, material, base_m, is_round=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +119,7 @@ class Scene:
     name: SceneName
     ground: Ground
     backdrop: Backdrop
-    solids: tuple[Box | Cylinder, ...]
+    solids: tuple[Box, ...]
     scatterers: tuple[Scatterer, ...]
     layout: PairsLayout
     sun_azimuth_deg: float = 130.0
@@ -148,9 +142,7 @@ class Scene:
         for solid in self.solids:
             if solid.base_m > 2.0:
                 continue
-            half = np.array(
-                [solid.radius_m] * 2 if isinstance(solid, Cylinder) else [solid.length_m / 2, solid.width_m / 2]
-            )
+            half = np.array([solid.length_m / 2, solid.width_m / 2])
             outside = np.maximum(np.abs(place_m - [solid.x_m, solid.y_m]) - half, 0.0)
             if float(np.linalg.norm(outside)) < clearance_m:
                 return False
@@ -166,7 +158,7 @@ def open_rooftop() -> Scene:
     units = (
         Box(21.0, 7.4, 1.7, 2.4, 1.5, "louvre", base_m=0.15),
         Box(21.0, 7.4, 1.4, 2.0, 0.15, "dark"),
-        Cylinder(21.4, -6.2, 0.14, 1.2, "metal"),
+        post(21.4, -6.2, 0.14, 1.2, "metal"),
     )
     scatterers = (
         Scatterer(20.2, 6.3, 0.8, 6.0),
@@ -188,8 +180,8 @@ def open_yard() -> Scene:
     board = (
         Box(6.56, 2.25, 0.06, 2.9, 2.0, "white", base_m=0.25),
         Box(6.52, 2.25, 0.02, 2.7, 1.8, "checkerboard", base_m=0.35),
-        Cylinder(6.7, 3.45, 0.04, 2.2, "wood"),
-        Cylinder(6.7, 1.05, 0.04, 2.2, "wood"),
+        post(6.7, 3.45, 0.04, 2.2, "wood"),
+        post(6.7, 1.05, 0.04, 2.2, "wood"),
     )
     scatterers = (Scatterer(25.8, 0.3, 1.1, 13.0), Scatterer(25.7, -6.9, 1.0, 6.0), Scatterer(25.8, 6.0, 1.0, 8.0))
     layout = PairsLayout(2.3, 16.5, 31.0, height_m=0.19, roughness_m=0.004, separation_m=0.6)
@@ -207,9 +199,9 @@ def open_yard() -> Scene:
 
 def road() -> Scene:
     """Build a road on whose middle the sensors stand."""
-    lamps = tuple(Cylinder(x, side * 8.2, 0.08, 6.5, "metal") for x in (12.0, 36.0, 60.0, 84.0) for side in (1.0, -1.0))
+    lamps = tuple(post(x, side * 8.2, 0.08, 6.5, "metal") for x in (12.0, 36.0, 60.0, 84.0) for side in (1.0, -1.0))
     kerbs = tuple(Box(60.0, side * 6.6, 120.0, 0.2, 0.12, "render") for side in (1.0, -1.0))
-    signs = (Cylinder(24.0, -7.4, 0.04, 1.6, "metal"), Box(24.0, -7.4, 0.03, 0.8, 0.8, "blue", base_m=1.5))
+    signs = (post(24.0, -7.4, 0.04, 1.6, "metal"), Box(24.0, -7.4, 0.03, 0.8, 0.8, "blue", base_m=1.5))
     houses = (
         Box(40.0, 18.0, 14.0, 8.0, 6.0, "plaster"),
         Box(62.0, -20.0, 16.0, 9.0, 7.0, "brick"),
@@ -255,12 +247,12 @@ def _rooftop() -> Scene:
     )
     plinths = tuple(Box(u.x_m, u.y_m, u.length_m - 0.3, u.width_m - 0.4, 0.15, "dark") for u in units)
     pipes = (
-        Cylinder(9.6, 5.6, 0.11, 0.75, "metal"),
-        Cylinder(9.6, 5.6, 0.17, 0.10, "metal", base_m=0.75),
-        Cylinder(12.4, -6.4, 0.14, 0.95, "metal"),
-        Cylinder(12.4, -6.4, 0.21, 0.12, "metal", base_m=0.95),
-        Cylinder(20.6, -2.6, 0.045, 4.6, "metal"),
-        Cylinder(21.2, 4.9, 0.16, 1.5, "metal"),
+        post(9.6, 5.6, 0.11, 0.75, "metal"),
+        post(9.6, 5.6, 0.17, 0.10, "metal", base_m=0.75),
+        post(12.4, -6.4, 0.14, 0.95, "metal"),
+        post(12.4, -6.4, 0.21, 0.12, "metal", base_m=0.95),
+        post(20.6, -2.6, 0.045, 4.6, "metal"),
+        post(21.2, 4.9, 0.16, 1.5, "metal"),
     )
     skylight = (Box(10.6, -8.7, 2.4, 1.5, 0.42, "white"), Box(10.6, -8.7, 2.1, 1.2, 0.08, "blue", base_m=0.42))
     door = (Box(17.79, 9.0, 0.06, 0.95, 2.05, "door"),)
@@ -290,11 +282,11 @@ def _rooftop() -> Scene:
 
 def _field() -> Scene:
     goal = (
-        Cylinder(19.0, -3.66, 0.06, 2.44, "white"),
-        Cylinder(19.0, 3.66, 0.06, 2.44, "white"),
+        post(19.0, -3.66, 0.06, 2.44, "white"),
+        post(19.0, 3.66, 0.06, 2.44, "white"),
         Box(19.0, 0.0, 0.12, 7.44, 0.12, "white", base_m=2.44),
     )
-    fence = tuple(Cylinder(27.0, float(y), 0.05, 1.15, "wood") for y in range(-24, 25, 3))
+    fence = tuple(post(27.0, float(y), 0.05, 1.15, "wood") for y in range(-24, 25, 3))
     rails = (
         Box(27.0, 0.0, 0.05, 50.0, 0.09, "wood", base_m=0.95),
         Box(27.0, 0.0, 0.05, 50.0, 0.09, "wood", base_m=0.5),
@@ -305,7 +297,7 @@ def _field() -> Scene:
         Box(14.15, 7.3, 0.35, 0.08, 0.43, "dark"),
         Box(14.22, 8.0, 0.05, 1.7, 0.3, "wood", base_m=0.55),
     )
-    sign = (Cylinder(16.5, -7.6, 0.04, 1.3, "metal"), Box(16.5, -7.6, 0.03, 1.3, 0.7, "blue", base_m=1.25))
+    sign = (post(16.5, -7.6, 0.04, 1.3, "metal"), Box(16.5, -7.6, 0.03, 1.3, 0.7, "blue", base_m=1.25))
     scatterers = [
         Scatterer(19.0, -3.66, 1.0, 2.0),
         Scatterer(19.0, 3.66, 1.0, 2.0),
@@ -318,7 +310,7 @@ def _field() -> Scene:
 
 
 def _aisle() -> Scene:
-    racks: list[Box | Cylinder] = []
+    racks: list[Box] = []
     scatterers: list[Scatterer] = []
     for side in (1.0, -1.0):
         for bay in range(8):
@@ -361,10 +353,10 @@ def _checkerboard() -> Scene:
         Box(11.22, 0.6, 0.02, 2.7, 1.8, "checkerboard", base_m=1.1),
     )
     things = (
-        Cylinder(10.9, 5.6, 0.29, 0.88, "blue"),
+        post(10.9, 5.6, 0.29, 0.88, "blue"),
         Box(10.9, -5.2, 0.8, 1.2, 0.14, "wood"),
         Box(10.9, -5.2, 0.7, 1.0, 0.75, "cartons", base_m=0.14),
-        Cylinder(11.2, -2.9, 0.06, 4.4, "metal"),
+        post(11.2, -2.9, 0.06, 4.4, "metal"),
         Box(11.24, -7.9, 0.08, 1.0, 2.1, "door"),
     )
     scatterers = (

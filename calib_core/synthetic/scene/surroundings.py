@@ -7,7 +7,7 @@ import numpy as np
 from calib_core.arrays import Flags, Points3, Vector3
 from calib_core.errors import OptionError
 from calib_core.synthetic.options import Surroundings
-from calib_core.synthetic.scene.scenes import Box, Cylinder, Scatterer, Scene
+from calib_core.synthetic.scene.scenes import Box, Scatterer, Scene, post
 
 _CAR_M = (4.4, 1.8)
 _CAR_DBSM = (20.0, 14.0, 11.0)
@@ -60,12 +60,12 @@ def furnished(rng: np.random.Generator, scene: Scene, surroundings: Surroundings
     Raises:
         OptionError: the parked cars do not fit in the scene.
     """
-    solids: list[Box | Cylinder] = []
+    solids: list[Box] = []
     scatterers: list[Scatterer] = []
     if surroundings.fence:
         side = 1.0 if rng.uniform() < 0.5 else -1.0
         solids += _fence(side)
-        scatterers += [Scatterer(one.x_m, one.y_m, 0.6, _POST_DBSM) for one in solids if isinstance(one, Cylinder)]
+        scatterers += [Scatterer(one.x_m, one.y_m, 0.6, _POST_DBSM) for one in solids if one.is_round]
     for _ in range(surroundings.parked_cars):
         parts, echoes = _car(rng, replace(scene, solids=(*scene.solids, *solids)))
         solids += parts
@@ -73,7 +73,7 @@ def furnished(rng: np.random.Generator, scene: Scene, surroundings: Surroundings
     if surroundings.strong_target_dbsm is not None:
         x_m = float(rng.uniform(0.5, 0.8)) * scene.layout.max_range_m
         y_m = float(rng.choice([-1.0, 1.0])) * min(0.45 * x_m, scene.layout.max_lateral_m + 0.9)
-        solids.append(Cylinder(x_m, y_m, 0.05, 1.6, "metal"))
+        solids.append(post(x_m, y_m, 0.05, 1.6, "metal"))
         scatterers.append(Scatterer(x_m, y_m, 0.8, surroundings.strong_target_dbsm))
     if not solids:
         return scene, replace(scene, solids=())
@@ -81,9 +81,9 @@ def furnished(rng: np.random.Generator, scene: Scene, surroundings: Surroundings
     return whole, replace(scene, solids=tuple(solids))
 
 
-def _fence(side: float) -> list[Box | Cylinder]:
+def _fence(side: float) -> list[Box]:
     aside_m, begin_m, end_m = _FENCE_M
-    posts = [Cylinder(float(x), side * aside_m, 0.05, 1.2, "metal") for x in np.arange(begin_m, end_m, 2.0)]
+    posts = [post(float(x), side * aside_m, 0.05, 1.2, "metal") for x in np.arange(begin_m, end_m, 2.0)]
     middle_m, length_m = 0.5 * (begin_m + end_m), end_m - begin_m
     rails = [Box(middle_m, side * aside_m, length_m, 0.04, 0.08, "metal", base_m=base) for base in (0.5, 1.05)]
     return [*posts, *rails]

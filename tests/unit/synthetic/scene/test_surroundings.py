@@ -10,7 +10,7 @@ from calib_core.measurements import NS_PER_S, RadarScans
 from calib_core.radar import direction_cosines
 from calib_core.synthetic import SimulatedScans, SimulationOptions, Surroundings, simulate, simulate_scans
 from calib_core.synthetic.rendering.frames import FrameRenderer
-from calib_core.synthetic.scene.scenes import Box, scene_named
+from calib_core.synthetic.scene.scenes import scene_named
 from calib_core.synthetic.scene.stage import SimulatedPlacement, set_stage
 from calib_core.synthetic.scene.surroundings import cart_position, in_sight
 
@@ -81,7 +81,7 @@ def test_parked_cars_a_fence_and_a_target_of_29_dbsm_are_always_there_and_hide_n
     added = replace(scene, solids=scene.solids[len(plain.solids) :])
     places = session.stage.rig.radar_from_world.inverse() @ session.points_radar_m
     assert in_sight(added, places).all()
-    [car, *_] = [one for one in added.solids if isinstance(one, Box) and one.length_m == 4.4]
+    [car, *_] = [one for one in added.solids if one.length_m == 4.4]
     assert not in_sight(added, np.array([[1.5 * car.x_m, 1.5 * car.y_m, 0.2]])).any()
     strongest = max(scene.scatterers, key=lambda one: one.rcs_dbsm)
     position = (session.stage.rig.radar_from_world @ np.array([[strongest.x_m, strongest.y_m, strongest.z_m]]))[0]
