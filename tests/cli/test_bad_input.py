@@ -203,7 +203,6 @@ def test_an_unwritable_folder_is_named(cocalib: Cocalib, pairs_file: Callable[..
             ["solve", "--pairs", "a.json", "--fleet-prior", "b"],
             "--fleet-prior went in 0.1: each pose rests on its own pairs",
         ),
-        (["solve", "--pairs", "a.json", "--method", "pmm"], "--method pmm went in 0.1: use default or paper"),
         (["batch", "a.toml", "--engine=none"], "--engine went in 0.1: use --workers 1 for none"),
         (["batch", "a.toml", "--shard", "1/2"], "--shard went in 0.1: give --scheduler ADDRESS"),
         (["fleet", "rebuild"], "ACTION rebuild went in 0.1: the commands read the results themselves"),

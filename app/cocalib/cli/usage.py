@@ -26,8 +26,6 @@ _GONE = {
     "--parquet": "use --csv, which has the same columns",
     "--shard": "give --scheduler ADDRESS, or batches with manifests of their own and one --out",
     "--engine": "use --workers 1 for none, --scheduler ADDRESS for dask",
-    "pmm": "use default or paper",
-    "ccm": "use default or paper",
 }
 """Options and values that are gone, each with what replaces it."""
 _NUMBERS = {"INT": "a whole number", "FLOAT": "a number"}
