@@ -15,7 +15,7 @@ from calib_core.measurements import RadarScans, Unsolvable
 from calib_core.options import CalibrationOptions, CameraPositionPrior, NoiseOptions, SolvingOptions
 from calib_core.results import Calibration
 from calib_core.synthetic import simulate_pairs
-from cocalib.solving.solving import calibration_text_of_pairs, solve_pairs
+from cocalib.solving.solving import GivenPairs, calibration_text_of_pairs, solve_pairs
 from tests.rooftop import read_rooftop
 
 OPTIONS = {
@@ -44,9 +44,10 @@ def solved(request: pytest.FixtureRequest, project_root: Path) -> Calibration:
 
 def test_the_file_solved_again_differs_only_in_its_provenance(solved: Calibration) -> None:
     text = calibration_text(solved)
-    again = solve_pairs(text, "calibration.json")
+    given = GivenPairs.read(text, "calibration.json")
+    again = solve_pairs(given)
     assert isinstance(again, Calibration)
-    assert without_provenance(calibration_text_of_pairs(again, text, "calibration.json")) == without_provenance(text)
+    assert without_provenance(calibration_text_of_pairs(again, given)) == without_provenance(text)
 
 
 def test_a_calibration_solved_again_from_memory_has_the_same_bits(solved: Calibration) -> None:
@@ -83,21 +84,23 @@ def test_clock_warnings_of_the_recording_are_copied(project_root: Path) -> None:
 def test_given_options_replace_those_of_the_file(solved: Calibration) -> None:
     text = calibration_text(solved)
     louder = replace(solved.options, noise=replace(solved.options.noise, sigma_px=7.0))
-    again = solve_pairs(text, "calibration.json", louder)
+    again = solve_pairs(GivenPairs.read(text, "calibration.json"), louder)
     assert isinstance(again, Calibration)
     assert again.options == louder
     other = replace(solved.options, method="paper" if solved.options.method == "default" else "default")
-    turned = solve_pairs(text, "calibration.json", other)
+    turned = solve_pairs(GivenPairs.read(text, "calibration.json"), other)
     assert isinstance(turned, Calibration)
     assert turned.options == other
     with pytest.raises(OptionError, match=r"noise\.sigma_px"):
-        solve_pairs(text, "calibration.json", replace(solved.options, noise=NoiseOptions(sigma_px=-1.0)))
+        solve_pairs(
+            GivenPairs.read(text, "calibration.json"), replace(solved.options, noise=NoiseOptions(sigma_px=-1.0))
+        )
 
 
 def test_options_that_choose_returns_are_refused_for_pairs_that_exist(solved: Calibration) -> None:
     nearer = replace(solved.options, gating=replace(solved.options.gating, max_range_m=8.0))
     with pytest.raises(OptionError, match=r"^a\.json: gating\.max_range_m chooses radar returns, .* made with 60"):
-        solve_pairs(calibration_text(solved), "a.json", nearer)
+        solve_pairs(GivenPairs.read(calibration_text(solved), "a.json"), nearer)
 
 
 @pytest.mark.parametrize(
@@ -119,7 +122,7 @@ def test_an_edited_pair_that_contradicts_itself_is_refused_with_its_place(change
     content["pairs"][0]["id"] = "a"
     change(content["pairs"][1])
     with pytest.raises(InputError, match=words) as refusal:
-        solve_pairs(json.dumps(content), "edited.json")
+        solve_pairs(GivenPairs.read(json.dumps(content), "edited.json"))
     assert "edited.json" in str(refusal.value)
     assert "\n" not in str(refusal.value)
 
@@ -132,7 +135,7 @@ def test_a_pose_without_pairs_says_so(solved: Calibration) -> None:
 def test_pairs_without_candidates_cannot_be_solved_again_and_the_error_says_so(project_root: Path) -> None:
     earlier = (project_root / "tests" / "golden" / "calibration-1-earlier.json").read_text(encoding="utf-8")
     with pytest.raises(InputError, match=r"^earlier\.json: .* pairs have no candidates") as refusal:
-        solve_pairs(earlier, "earlier.json")
+        solve_pairs(GivenPairs.read(earlier, "earlier.json"))
     assert "\n" not in str(refusal.value)
 
 

@@ -11,9 +11,9 @@ from calib_core.measurements import ReflectorClick, Unsolvable
 from calib_core.recordings import Recording
 from calib_core.results import Calibration
 from cocalib.batch.manifest import ManifestRow
-from cocalib.solving.automatic import PlacedClicks, is_doubtful, place_clicks, solve_placed_clicks
+from cocalib.solving.automatic import PlacedClicks, place_clicks, solve_placed_clicks
 from cocalib.solving.recorded_clicks import clicks_in_recording, file_of_clicks, require_confirmed
-from cocalib.solving.solving import calibration_text, required_camera
+from cocalib.solving.solving import calibration_text, is_doubtful, required_camera
 
 CALIBRATION_FILE = "calibration.json"
 CLICKS_FILE = "clicks.json"

@@ -4,13 +4,12 @@ import dataclasses
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import tyro
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.input_files import name_text
 from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
@@ -68,20 +67,19 @@ class Solve:
     vehicle: Vehicle = field(default_factory=VehicleFlags)
     topics: Topics = field(default_factory=TopicFlags)
     options: Options = field(default_factory=OptionFlags)
-    pairs_text: Annotated[str | None, tyro.conf.Suppress] = None
-    """What the file of pairs holds, once it has been read: a pipe can be read only once."""
+    given: Annotated[Any, tyro.conf.Fixed, tyro.conf.Suppress] = None
+    """The file of pairs (GivenPairs), once it has been read: a pipe can be read only once."""
 
     def file_defaults(self) -> Self | None:
         """Take the options of a calibration that is to be solved again; typed options replace them."""
         if self.pairs is None or self.recording or self.clicks:
             return None
-        from calib_core.interchange import CALIBRATION_SCHEMA, names_schema, read_calibration
+        from cocalib.solving.solving import GivenPairs
 
-        text = read_text(self.pairs)
-        if not names_schema(text, CALIBRATION_SCHEMA):
-            return type(self)(pairs_text=text)
-        options = read_calibration(text, str(self.pairs)).calibration.options
-        return type(self)(options=OptionFlags.of(options), pairs_text=text)
+        given = GivenPairs.read(read_text(self.pairs), str(self.pairs))
+        if given.file is None:
+            return type(self)(given=given)
+        return type(self)(options=OptionFlags.of(given.file.calibration.options), given=given)
 
     def run(self) -> int:
         """Solve, write the calibration, print its summary; return the exit code."""
@@ -196,16 +194,16 @@ class Solve:
         print(f"clicks written to {self.clicks_out}", file=sys.stderr)
 
     def _solve_pairs(self, path: Path, vehicle: "VehicleNote") -> int:
-        from cocalib.solving.solving import calibration_text_of_pairs, solve_pairs
+        from cocalib.solving.solving import GivenPairs, calibration_text_of_pairs, solve_pairs
 
-        text = read_text(path) if self.pairs_text is None else self.pairs_text
-        outcome = solve_pairs(text, str(path), self._all_options())
+        given = GivenPairs.read(read_text(path), str(path)) if self.given is None else self.given
+        outcome = solve_pairs(given, self._all_options())
         if isinstance(outcome, Unsolvable):
             return explain_unsolvable(outcome)
-        return self._deliver(outcome, calibration_text_of_pairs(outcome, text, name_text(path.name), vehicle))
+        return self._deliver(outcome, calibration_text_of_pairs(outcome, given, vehicle))
 
     def _deliver(self, calibration: Calibration, text: str) -> int:
-        from cocalib.solving.automatic import is_doubtful
+        from cocalib.solving.solving import is_doubtful
 
         code = 3 if is_doubtful(calibration) else 0
         if self.out is None:

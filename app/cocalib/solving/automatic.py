@@ -150,12 +150,6 @@ def _least_distance_m(calibration: Calibration) -> float:
     return away_m - 2.0 * float(np.sqrt(along @ calibration.covariance @ along))
 
 
-def is_doubtful(calibration: Calibration) -> bool:
-    """Return whether a calibration from clicks that nobody confirmed is not to be relied on as it is."""
-    unconfirmed = any(warning.code == "nobody-confirmed" for warning in calibration.warnings)
-    return unconfirmed and verdict_on(calibration).level not in ("good", "usable")
-
-
 def _with_own_ids(clicks: Sequence[ReflectorClick], others: Sequence[ReflectorClick]) -> list[ReflectorClick]:
     """Rename the clicks whose id another one has."""
     taken = {click.id for click in others}

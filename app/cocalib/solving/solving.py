@@ -4,6 +4,7 @@ import dataclasses
 import hashlib
 import logging
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from operator import attrgetter
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from calib_core.input_files import name_text
 from calib_core.interchange import (
     CALIBRATION_SCHEMA,
     AssumptionNote,
+    CalibrationFile,
     CameraFile,
     FrameNames,
     Provenance,
@@ -30,6 +32,7 @@ from calib_core.measurements import Candidate, Pair, ReflectorClick, Unsolvable
 from calib_core.options import CalibrationOptions, checked_options
 from calib_core.recordings import Recording, about_assumptions
 from calib_core.results import Calibration, InputFile, PairResult, UnconfirmedClicks
+from calib_core.results.verdict import verdict_on
 from cocalib.platform.resources import version
 from cocalib.session import Outcome
 
@@ -148,29 +151,52 @@ _OPTIONS_OF_PAIRING = (
 """Options that choose radar returns: they cannot change pairs that exist already."""
 
 
-def solve_pairs(text: str, source: str, options: CalibrationOptions | None = None) -> Outcome:
-    """Solve for camera_from_radar from the text of a pairs-1 file, or again from that of a calibration-1 file.
+@dataclass(frozen=True, slots=True, eq=False)
+class GivenPairs:
+    """A file of pairs, or a calibration that is to be solved again.
+
+    Attributes:
+        text: its content.
+        source: its path, for error messages.
+        file: what it says, if it is a calibration.
+    """
+
+    text: str
+    source: str
+    file: CalibrationFile | None
+
+    @classmethod
+    def read(cls, text: str, source: str) -> "GivenPairs":
+        """Read a calibration; a file of pairs is read when the options are known.
+
+        Raises:
+            InputError: the calibration is not valid.
+        """
+        return cls(text, source, read_calibration(text, source) if names_schema(text, CALIBRATION_SCHEMA) else None)
+
+
+def solve_pairs(given: GivenPairs, options: CalibrationOptions | None = None) -> Outcome:
+    """Solve for camera_from_radar from a pairs-1 file, or again from a calibration-1 file.
 
     Args:
-        text: the file's content.
-        source: its name, for error messages.
+        given: the file.
         options: for the solver; None takes those of a calibration-1 file, and the defaults for a pairs-1 file, whose
             own statements about noise replace the options.
 
     Raises:
-        InputError: the text is neither, or a calibration without the candidates of its pairs.
+        InputError: it is neither, or a calibration without the candidates of its pairs.
         OptionError: an option, or what the file says about noise, is out of range or cannot apply.
     """
-    if names_schema(text, CALIBRATION_SCHEMA):
-        calibration = read_calibration(text, source).calibration
+    if given.file is not None:
+        calibration = given.file.calibration
         if options is not None:
-            _require_same_pairing(calibration.options, options, source)
+            _require_same_pairing(calibration.options, options, given.source)
         try:
             return solve_again(calibration, options)
         except InputError as error:
-            raise InputError(f"{source}: {error}") from None
+            raise InputError(f"{given.source}: {error}") from None
     options = checked_options(options or CalibrationOptions())
-    pairs_file = read_pairs(text, source, noise=options.noise)
+    pairs_file = read_pairs(given.text, given.source, noise=options.noise)
     return calibrate_pairs(pairs_file.pairs, pairs_file.camera, pairs_file.options(options))
 
 
@@ -243,7 +269,7 @@ def calibration_text(
     provenance = Provenance(
         inputs=(
             *recording.fingerprint(),
-            *([] if camera_file is None else [_input_file(camera_file)]),
+            *([] if camera_file is None else [_input_file(camera_file.source, camera_file.data)]),
         ),
         radar_topic=recording.radar_topic,
         radar_topics=recording.radar_topics,
@@ -262,10 +288,9 @@ def calibration_text(
     return interchange_text(calibration, _frame_names(recording), provenance, vehicle=vehicle)
 
 
-def _input_file(camera_file: CameraFile) -> InputFile:
-    """Identify a file of intrinsics by its content."""
-    name, data = name_text(Path(camera_file.source).name), camera_file.data
-    return InputFile(name, len(data), hashlib.sha256(data).hexdigest())
+def _input_file(source: str, data: bytes) -> InputFile:
+    """Identify a file by its content."""
+    return InputFile(name_text(Path(source).name), len(data), hashlib.sha256(data).hexdigest())
 
 
 def _frame_names(recording: Recording) -> FrameNames:
@@ -280,30 +305,28 @@ def _frame_names(recording: Recording) -> FrameNames:
         return usual
 
 
-def calibration_text_of_pairs(
-    calibration: Calibration,
-    text: str,
-    name: str,
-    vehicle: VehicleNote | None = None,
-) -> str:
+def calibration_text_of_pairs(calibration: Calibration, given: GivenPairs, vehicle: VehicleNote | None = None) -> str:
     """Write a calibration-1 file for a calibration solved from a pairs-1 file, or again from a calibration-1 file.
 
     Args:
         calibration: what was solved.
-        text: the content of the file of pairs.
-        name: its name without the folder.
+        given: the file.
         vehicle: which vehicle it is of; what it leaves out is taken from a calibration-1 file.
     """
     vehicle = vehicle or VehicleNote()
-    data = text.encode()
-    inputs = (InputFile(name, len(data), hashlib.sha256(data).hexdigest()),)
-    if names_schema(text, CALIBRATION_SCHEMA):
-        file = read_calibration(text, name)
+    inputs = (_input_file(given.source, given.text.encode()),)
+    if (file := given.file) is not None:
         provenance = dataclasses.replace(file.provenance, inputs=inputs, version=version())
         kept = tuple(warning for warning in file.calibration.warnings if warning.code in _KEPT_WARNINGS)
         calibration = dataclasses.replace(calibration, warnings=(*calibration.warnings, *kept))
         return interchange_text(calibration, file.frames, provenance, vehicle=vehicle.over(file.vehicle))
     return interchange_text(calibration, provenance=Provenance(inputs=inputs, version=version()), vehicle=vehicle)
+
+
+def is_doubtful(calibration: Calibration) -> bool:
+    """Return whether a calibration from clicks that nobody confirmed is not to be relied on as it is."""
+    unconfirmed = any(warning.code == "nobody-confirmed" for warning in calibration.warnings)
+    return unconfirmed and verdict_on(calibration).level not in ("good", "usable")
 
 
 def required_camera(recording: Recording, camera_file: CameraFile | None) -> Camera:

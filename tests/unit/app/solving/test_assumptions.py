@@ -13,7 +13,7 @@ from calib_core.recordings import Recording, RecordingOptions, open_recording
 from calib_core.results import Calibration
 from cocalib.session import AssumptionsConfirmed, ColumnsMapped, RecordingFacts, Session
 from cocalib.session.file import remembered_map
-from cocalib.solving.solving import calibration_text, calibration_text_of_pairs, solve_pairs
+from cocalib.solving.solving import GivenPairs, calibration_text, calibration_text_of_pairs, solve_pairs
 from cocalib.workspace import Workspace, open_workspace
 from tests.vendor_recording import STATED, vendor_sample
 
@@ -61,7 +61,8 @@ def test_an_unconfirmed_assumption_is_in_the_view_the_status_and_the_file(
     assert [(one.text, one.confirmed) for one in file.provenance.assumptions] == [(text, False) for text in texts]
     assert [warning.code for warning in file.calibration.warnings].count("assumed") == 2
     text = calibration_text(calibration, recording)
-    again = read_calibration(calibration_text_of_pairs(solve_pairs(text, "a.json"), text, "a.json"))
+    given = GivenPairs.read(text, "a.json")
+    again = read_calibration(calibration_text_of_pairs(solve_pairs(given), given))
     assert [warning.code for warning in again.calibration.warnings].count("assumed") == 2, (
         "solving again confirms nothing"
     )

@@ -21,6 +21,7 @@ from calib_core.results import Calibration, DataWarning
 from cocalib.platform.resources import version
 from cocalib.session import ClicksImported, OptionsChanged
 from cocalib.solving.solving import (
+    GivenPairs,
     calibration_text,
     calibration_text_of_pairs,
     camera_for,
@@ -70,7 +71,7 @@ def test_options_out_of_range_are_refused_here_too() -> None:
     with pytest.raises(OptionError, match=r"locating\.window_s: -1 is out of range"):
         solve_clicks(Radar(), [CLICK], CAMERA, wrong)
     with pytest.raises(OptionError, match=r"locating\.window_s"):
-        solve_pairs("{}", "pairs.json", wrong)
+        solve_pairs(GivenPairs.read("{}", "pairs.json"), wrong)
 
 
 def test_scans_are_read_around_every_click_once_excluded_ones_too() -> None:
@@ -236,17 +237,17 @@ def pairs_text(solved: Calibration, count: int) -> str:
 
 def test_a_file_of_pairs_is_solved_and_named_in_the_text(solved: Calibration) -> None:
     text = pairs_text(solved, 20)
-    outcome = solve_pairs(text, "pairs.json", CalibrationOptions())
+    outcome = solve_pairs(GivenPairs.read(text, "pairs.json"), CalibrationOptions())
     assert isinstance(outcome, Calibration)
-    inputs = json.loads(calibration_text_of_pairs(outcome, text, "pairs.json"))["provenance"]["inputs"]
+    inputs = json.loads(calibration_text_of_pairs(outcome, GivenPairs.read(text, "pairs.json")))["provenance"]["inputs"]
     assert [(row["name"], row["sha256"]) for row in inputs] == [("pairs.json", sha256(text.encode()).hexdigest())]
 
 
 def test_too_few_pairs_in_a_file_are_an_answer_and_no_file_of_pairs_is_an_error(solved: Calibration) -> None:
-    outcome = solve_pairs(pairs_text(solved, 3), "pairs.json", CalibrationOptions())
+    outcome = solve_pairs(GivenPairs.read(pairs_text(solved, 3), "pairs.json"), CalibrationOptions())
     assert isinstance(outcome, Unsolvable)
     with pytest.raises(InputError, match=r"pairs\.json"):
-        solve_pairs("{}", "pairs.json", CalibrationOptions())
+        solve_pairs(GivenPairs.read("{}", "pairs.json"), CalibrationOptions())
 
 
 @pytest.mark.parametrize("method", ["default", "paper"])
