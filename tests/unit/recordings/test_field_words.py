@@ -1,15 +1,18 @@
 """The shared vocabulary: a spelling means the same as a column of a table, as a field of a message, and in --map."""
 
+import math
 import re
 
 import pytest
 
+from calib_core.errors import OptionError
 from calib_core.recordings.field_words import (
     AMBIGUOUS,
     SPELLINGS,
     SPELT,
     SUBJECTS,
     UNITS_BY_SPELLING,
+    MappedColumn,
     Spelling,
     Unit,
     parse_column_map,
@@ -128,3 +131,40 @@ def test_a_unit_with_a_long_s_in_a_comment_is_read_as_any_other() -> None:
     unit = unit_in("[m/\u017f]", "speed")
     assert unit is not None
     assert unit.scale == 1.0
+
+
+# --map: which column holds which quantity, in which unit and with which sign.
+
+
+def test_a_map_names_quantity_column_and_unit():
+    assert parse_column_map(["x=posX:m", "range=dist:cm"]) == (
+        MappedColumn("x", "posX", "m"),
+        MappedColumn("range", "dist", "cm"),
+    )
+
+
+def test_a_minus_turns_the_sign():
+    (azimuth,) = parse_column_map(["azimuth=-target.theta:deg"])
+    assert azimuth.column == "target.theta"
+    assert azimuth.scale == pytest.approx(-math.pi / 180.0)
+
+
+def test_the_words_of_a_map_parse_to_the_same_map():
+    for text in ("x=posX:m", "azimuth=-theta:deg", "amplitude=rcs value", "time=stamp:us"):
+        (column,) = parse_column_map([text])
+        assert column.words == text
+        assert parse_column_map([column.words]) == (column,)
+
+
+@pytest.mark.parametrize(
+    ("texts", "said"),
+    [
+        (["x"], "QUANTITY=COLUMN:UNIT"),
+        (["width=w:m"], "unknown quantity 'width'"),
+        (["x=posX:deg"], "unknown unit 'deg' of x; known: m, cm"),
+        (["x=a:m", "x=b:m"], "x is already read from 'a'"),
+    ],
+)
+def test_a_map_that_cannot_be_meant_is_refused(texts, said):
+    with pytest.raises(OptionError, match=said):
+        parse_column_map(texts)
