@@ -1,13 +1,16 @@
 """Every click gets radar positions, or a reason why it has none."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 
 from benchmarks.accuracy.clutter import SCENES
 from benchmarks.accuracy.scenes import Windows, draw_windows
-from calib_core.association.clustering import candidates_of, clusters_of, window_around
+from calib_core.association.clustering import candidate_at, candidates_of, clusters_of, window_around
+from calib_core.association.exclusive_returns import exclusive_rows, shared_returns
+from calib_core.association.gating import static_returns
 from calib_core.association.pairing import background_windows, balanced_pairs, find_companion, pair_clicks, scores_of
 from calib_core.calibration import calibrate
 from calib_core.measurements import (
@@ -20,7 +23,7 @@ from calib_core.measurements import (
     TimeNs,
     Unsolvable,
 )
-from calib_core.options import CalibrationOptions, LocatingOptions, NoiseOptions
+from calib_core.options import CalibrationOptions, GatingOptions, LocatingOptions, NoiseOptions
 from calib_core.results import Calibration
 from calib_core.synthetic import simulate_pairs
 from calib_core.synthetic.options import SimulationOptions
@@ -311,3 +314,116 @@ def test_no_static_object_replaces_the_reflector_in_a_heavily_cluttered_aisle() 
         assert np.linalg.norm(pair.point_radar_m - placement.position_radar_m) < 0.6
     error = session.camera_from_radar.error_from(outcome.camera_from_radar)
     assert error @ np.linalg.solve(outcome.covariance, error) < 1.5 * outcome.covariance_quantile
+
+
+# Static returns in range are kept, all others dropped, and the stamps stay the same.
+
+
+NAN = float("nan")
+
+
+def scan(time: int, rows: list[tuple[float, float, float, float]]) -> RadarScan:
+    """Rows are x, y, z, Doppler."""
+    table = np.array(rows).reshape(-1, 4)
+    n = len(table)
+    return RadarScan(TimeNs(time), table[:, :3], table[:, 3], np.arange(n, dtype=float), np.full((n, 3), np.nan))
+
+
+def test_a_moving_return_is_dropped() -> None:
+    scans = RadarScans.from_scans([scan(1, [(5, 0, 0, 0.0), (5, 1, 0, 0.2), (5, 2, 0, -0.2), (5, 3, 0, 0.05)])])
+    kept = static_returns(scans, GatingOptions(max_speed_mps=0.05))
+    assert kept.points_radar_m[:, 1].tolist() == [0.0, 3.0]
+    assert kept.snr_db.tolist() == [0.0, 3.0]
+
+
+def test_a_return_without_doppler_is_kept() -> None:
+    kept = static_returns(RadarScans.from_scans([scan(1, [(5, 0, 0, NAN)])]), GatingOptions())
+    assert len(kept.points_radar_m) == 1
+
+
+@pytest.mark.parametrize("point", [(0.1, 0.0, 0.0), (80.0, 0.0, 0.0), (NAN, 0.0, 0.0), (5.0, 0.0, NAN)])
+def test_a_return_out_of_range_or_without_position_is_dropped(point: tuple[float, float, float]) -> None:
+    kept = static_returns(RadarScans.from_scans([scan(1, [(*point, 0.0), (5, 0, 0, 0.0)])]), GatingOptions())
+    assert kept.points_radar_m.tolist() == [[5.0, 0.0, 0.0]]
+
+
+def test_every_scan_is_kept_even_if_it_becomes_empty() -> None:
+    scans = RadarScans.from_scans([scan(1, [(5, 0, 0, 1.0)]), scan(2, [(5, 0, 0, 0.0)]), scan(3, [])])
+    kept = static_returns(scans, GatingOptions())
+    assert kept.times_ns.tolist() == [1, 2, 3]
+    assert [len(kept.scan(i)) for i in range(3)] == [0, 1, 0]
+
+
+# No radar return belongs to two clicks of one moment.
+
+
+LEFT, RIGHT, CART = (6.0, 1.5, -1.0), (6.2, -1.0, -1.0), (9.0, 0.0, -0.5)
+
+
+def pair(name: str, time_s: float | None, *positions: tuple[float, float, float]) -> Pair:
+    candidates = tuple(candidate_at(np.array(position), NoiseOptions(), score=0.3) for position in positions)
+    time = None if time_s is None else TimeNs(round(time_s * NS_PER_S))
+    return Pair(name, np.zeros(2), candidates, image_time=time)
+
+
+def first_of(pairs: list[Pair]) -> np.ndarray:
+    return np.concatenate([[0], np.cumsum([len(one.candidates) for one in pairs])])
+
+
+def test_returns_are_shared_within_a_moment_whatever_their_order() -> None:
+    labels = shared_returns([pair("a", 0.0, LEFT, RIGHT), pair("b", 0.2, CART, RIGHT, LEFT)], window_s=3.0)
+    assert labels[0] == labels[4] >= 0
+    assert labels[1] == labels[3] >= 0
+    assert labels[0] != labels[1]
+    assert labels[2] == -1
+
+
+def test_other_moments_and_pairs_without_a_time_share_nothing() -> None:
+    pairs = [pair("a", 0.0, LEFT), pair("b", 20.0, LEFT), pair("c", None, LEFT), pair("d", None, LEFT)]
+    assert shared_returns(pairs, window_s=3.0).tolist() == [-1] * 4
+
+
+def test_two_clicks_that_want_one_return_get_the_cheapest_assignment() -> None:
+    pairs = [pair("a", 0.0, LEFT, RIGHT), pair("b", 0.2, LEFT, RIGHT)]
+    labels = shared_returns(pairs, window_s=3.0)
+    # both prefer the left one; it costs a less to give way
+    assert exclusive_rows(np.array([1.0, 3.0, 1.0, 50.0]), first_of(pairs), labels).tolist() == [1, 2]
+    assert exclusive_rows(np.array([1.0, 90.0, 1.0, 50.0]), first_of(pairs), labels).tolist() == [0, 3]
+
+
+def test_without_a_conflict_every_pair_keeps_its_cheapest() -> None:
+    pairs = [pair("a", 0.0, LEFT, RIGHT), pair("b", 0.2, LEFT, RIGHT), pair("c", 60.0, CART, LEFT)]
+    cost = np.array([1.0, 3.0, 9.0, 5.0, 2.0, 1.0])
+    assert exclusive_rows(cost, first_of(pairs), shared_returns(pairs, window_s=3.0)).tolist() == [0, 3, 5]
+
+
+def test_a_pair_with_nothing_else_shares_rather_than_fails() -> None:
+    pairs = [pair("a", 0.0, LEFT), pair("b", 0.2, LEFT)]
+    assert exclusive_rows(np.array([1.0, 2.0]), first_of(pairs), shared_returns(pairs, window_s=3.0)).tolist() == [0, 1]
+    more = [pairs[0], replace(pairs[1], candidates=(*pairs[1].candidates, *pair("x", 0.0, CART).candidates))]
+    labels = shared_returns(more, window_s=3.0)
+    assert exclusive_rows(np.array([1.0, 2.0, 400.0]), first_of(more), labels).tolist() == [0, 2]
+
+
+def test_three_rivals_get_what_trying_everything_gives() -> None:
+    pairs = [pair(name, 0.1 * k, LEFT, RIGHT, CART) for k, name in enumerate("abc")]
+    labels, first = shared_returns(pairs, window_s=3.0), first_of(pairs)
+    rng = np.random.default_rng(1)
+    for _ in range(200):
+        cost = rng.uniform(0.0, 10.0, 9)
+        rows = exclusive_rows(cost, first, labels)
+        assert len(set(labels[rows].tolist())) == 3
+        every = [
+            sum(cost[3 * i + k] for i, k in enumerate(choice))
+            for choice in product(range(3), repeat=3)
+            if len(set(choice)) == 3
+        ]
+        assert cost[rows].sum() == min(every)
+
+
+def test_six_rivals_never_share() -> None:
+    places = tuple((5.0 + k, 0.0, -1.0) for k in range(7))
+    pairs = [pair(str(k), 0.1 * k, *places) for k in range(6)]
+    labels, first = shared_returns(pairs, window_s=3.0), first_of(pairs)
+    rows = exclusive_rows(np.random.default_rng(2).uniform(0.0, 9.0, 42), first, labels)
+    assert len(set(labels[rows].tolist())) == 6
