@@ -2,16 +2,30 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from calib_core.calibration import calibrate_pairs
+import calib_core.calibration
+from calib_core.calibration import calibrate, calibrate_pairs
 from calib_core.camera import Camera
-from calib_core.measurements import Pair, Unsolvable
-from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions, without_systematic_errors
-from calib_core.results import DataWarning
-from calib_core.synthetic import FIELD, simulate_pairs
+from calib_core.diagnostics.clocks import clock_offset
+from calib_core.diagnostics.pose import two_poses
+from calib_core.diagnostics.solved_fit import SolvedFit
+from calib_core.estimation.gnc import GncSolution
+from calib_core.measurements import NS_PER_S, Pair, RadarScan, RadarScans, TimeNs, Unsolvable
+from calib_core.options import (
+    CalibrationOptions,
+    CameraPositionPrior,
+    GatingOptions,
+    SolvingOptions,
+    without_systematic_errors,
+)
+from calib_core.results import Calibration, DataWarning, PairResult
+from calib_core.synthetic import FIELD, RigOptions, SimulatedPairs, simulate_pairs
+from calib_core.synthetic.simulated_pairs import NoiseName
+from tests.rooftop import ClickedSample, read_rooftop
 
 FREE = CalibrationOptions()
 
@@ -155,3 +169,200 @@ def test_two_radar_positions_that_fit_one_click_are_reported() -> None:
         if one.code == "uncertain-association"
     )
     assert "p1" in warning.message
+
+
+# A pair that alone determines part of the pose is reported; well-spread placements report none.
+
+
+FAR = replace(FIELD, min_range_m=8.0, max_range_m=10.0, max_azimuth_deg=12.0, separation_m=0.1)
+NEAR = replace(FIELD, min_range_m=2.0, max_range_m=2.5)
+
+
+def decisive(simulated: SimulatedPairs, *more: SimulatedPairs) -> list[str]:
+    pairs = [*simulated.pairs, *(replace(pair, id="near") for other in more for pair in other.pairs)]
+    outcome = calibrate_pairs(pairs, simulated.camera, CalibrationOptions())
+    assert isinstance(outcome, Calibration)
+    return [one.message for one in outcome.warnings if one.code == "one-pair-decides"]
+
+
+@pytest.mark.parametrize("noise", ["ti", "imaging"])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_one_near_placement_among_far_ones_decides(noise: str, seed: int) -> None:
+    rng = np.random.default_rng([31, seed])
+    far = simulate_pairs(19, rng=rng, noise=noise, layout=FAR)  # type: ignore[arg-type]
+    near = simulate_pairs(1, rng=rng, noise=noise, layout=NEAR, rig=far.rig)  # type: ignore[arg-type]
+    (text,) = decisive(far, near)
+    assert "depends on near alone" in text
+
+
+@pytest.mark.parametrize("noise", ["ti", "imaging"])
+def test_a_second_near_placement_takes_the_decision_from_the_first(noise: str) -> None:
+    rng = np.random.default_rng([31, 1])
+    far = simulate_pairs(18, rng=rng, noise=noise, layout=FAR)  # type: ignore[arg-type]
+    near = simulate_pairs(4, rng=rng, noise=noise, layout=NEAR, rig=far.rig)  # type: ignore[arg-type]
+    pairs = [replace(pair, id=f"near-{i}") for i, pair in enumerate(near.pairs)]
+    outcome = calibrate_pairs([*far.pairs, *pairs], far.camera, CalibrationOptions())
+    assert isinstance(outcome, Calibration)
+    assert "one-pair-decides" not in {one.code for one in outcome.warnings}
+
+
+@pytest.mark.parametrize("noise", ["ti", "imaging"])
+def test_no_pair_of_a_good_set_decides(noise: str) -> None:
+    for seed in range(8):
+        assert decisive(simulate_pairs(20, rng=np.random.default_rng([32, seed]), noise=noise)) == []  # type: ignore[arg-type]
+
+
+# A second pose is said when the pairs leave it open, and the expected distance only when it decides.
+
+
+def solved(simulated: SimulatedPairs, pairs: tuple[Pair, ...] | None = None) -> Calibration:
+    outcome = calibrate_pairs(pairs or simulated.pairs, simulated.camera)
+    assert isinstance(outcome, Calibration)
+    return outcome
+
+
+@pytest.fixture
+def fit(monkeypatch: pytest.MonkeyPatch) -> SolvedFit:
+    kept: list[SolvedFit] = []
+
+    def keep(one: SolvedFit) -> tuple[DataWarning, ...]:
+        kept.append(one)
+        return ()
+
+    monkeypatch.setattr(calib_core.calibration, "warnings_of", keep)
+    solved(simulate_pairs(20, rng=np.random.default_rng(71), noise="imaging"))
+    return kept[0]
+
+
+def with_another(fit: SolvedFit, step_m: float, *, worse_by_pairs: float) -> SolvedFit:
+    """Add an alternative whose camera is moved, and which the pairs alone find a little less likely."""
+    best, prior = fit.alternatives[0], fit.measurements.prior
+    pose = best.camera_from_radar.perturbed(np.array([step_m, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    by_prior = [float(prior.costs(one.rotation, one.translation_m)) for one in (pose, best.camera_from_radar)]
+    cost = best.cost + worse_by_pairs + by_prior[0] - by_prior[1]
+    return replace(fit, alternatives=(best, GncSolution(pose, cost, 1.0)))
+
+
+def test_a_pose_that_differs_in_position_only_is_said(fit: SolvedFit) -> None:
+    (warning,) = two_poses(with_another(fit, 0.5, worse_by_pairs=1.0))
+    assert warning.code == "two-poses"
+    assert "0.1 deg and 0.50 m away" in warning.message
+    assert two_poses(with_another(fit, 0.5, worse_by_pairs=30.0)) == []
+    assert two_poses(with_another(fit, 0.001, worse_by_pairs=0.0)) == []
+
+
+def test_the_expected_distance_is_asked_for_when_it_decides_between_two_poses(fit: SolvedFit) -> None:
+    (warning,) = two_poses(with_another(fit, 4.0, worse_by_pairs=1.0))
+    assert warning.code == "camera-far-away"
+    assert "only because about 1 m is expected" in warning.message
+    assert "same rig" in warning.hint
+
+
+@pytest.mark.parametrize("offset_m", [(0.0, 3.0, 0.5), (-3.0, 7.4, 1.0)])
+def test_sensors_far_apart_are_no_reason_for_a_warning(offset_m: tuple[float, float, float]) -> None:
+    for seed, noise in enumerate[NoiseName](("ti", "imaging")):
+        rig = RigOptions(camera_offset_m=offset_m)
+        simulated = simulate_pairs(40, rng=np.random.default_rng([72, seed]), noise=noise, rig_options=rig)
+        assert "camera-far-away" not in {one.code for one in solved(simulated).warnings}
+
+
+def test_an_object_that_always_stands_behind_the_reflector_is_said() -> None:
+    said = 0
+    for seed in range(4):
+        rng = np.random.default_rng([73, seed])
+        simulated = simulate_pairs(20, rng=rng)
+        behind_m = simulated.rig.radar_from_world.rotation @ np.array([1.0, 0.0, 0.3])
+        pairs = []
+        for pair in simulated.pairs:
+            (right,) = pair.candidates
+            position_m = right.position_radar_m + behind_m + 0.03 * rng.standard_normal(3)
+            stronger = replace(right, position_radar_m=position_m, score=0.6)
+            pairs.append(replace(pair, candidates=(stronger, replace(right, score=0.4))))
+        outcome = solved(simulated, tuple(pairs))
+        error = simulated.camera_from_radar.error_from(outcome.camera_from_radar)
+        texts = [one.message for one in outcome.warnings if one.code == "two-poses"]
+        assert all("with other radar positions for" in text for text in texts)
+        said += bool(texts) or float(np.linalg.norm(error[:3])) < 0.3
+    assert said >= 3
+
+
+# Clicks that miss their dwells to one side indicate a clock offset; single hasty clicks and clicks inside a dwell do not.
+
+
+DWELL_S = 4.0
+EVERY_S = 10.0
+AHEAD_S = 3.0
+
+
+@pytest.fixture(scope="module")
+def rooftop(project_root: Path) -> ClickedSample:
+    return read_rooftop(project_root, 8.0)
+
+
+def clock_warnings(rooftop: ClickedSample, ahead_s: float) -> list[str]:
+    clicks, scans, camera = rooftop
+    shifted = replace(scans, times_ns=scans.times_ns + round(ahead_s * NS_PER_S))
+    outcome = calibrate(clicks, shifted, camera, CalibrationOptions())
+    assert isinstance(outcome, Calibration)
+    return [one.message for one in outcome.warnings if one.code == "clock-bias-suspected"]
+
+
+@pytest.mark.parametrize("ahead_s", [0.0, 1.0, -1.0])
+def test_an_offset_that_leaves_the_clicks_in_their_dwells_gives_no_warning(
+    rooftop: ClickedSample, ahead_s: float
+) -> None:
+    assert clock_warnings(rooftop, ahead_s) == []
+
+
+@pytest.mark.parametrize(("ahead_s", "words"), [(AHEAD_S, "ahead of"), (-AHEAD_S, "behind")])
+def test_stamps_that_take_the_clicks_out_of_their_dwells_are_suspected(
+    rooftop: ClickedSample, ahead_s: float, words: str
+) -> None:
+    (text,) = clock_warnings(rooftop, ahead_s)
+    assert words in text
+
+
+def placed(offsets_s: list[float]) -> tuple[list[PairResult], RadarScans]:
+    """Make one dwell per click, and place each click at an offset from its middle."""
+    rng = np.random.default_rng(1)
+    scans, pairs = [], []
+    for i, offset_s in enumerate(offsets_s):
+        place = np.array([3.0 + i, 0.5 * (-1) ** i, -0.5])
+        middle_s = 100.0 + EVERY_S * i
+        for time_s in np.arange(middle_s - DWELL_S / 2, middle_s + DWELL_S / 2, 0.1):
+            nothing = np.full(1, np.nan)
+            point = (place + 0.005 * rng.standard_normal(3))[None]
+            time = TimeNs(round(time_s * NS_PER_S))
+            scans.append(RadarScan(time, point, nothing, nothing, np.full((1, 3), np.nan)))
+        click_ns = TimeNs(round((middle_s + offset_s) * NS_PER_S))
+        pairs.append(PairResult(f"c{i}", np.zeros(2), np.zeros(2), place, inlier=True, image_time=click_ns))
+    return pairs, RadarScans.from_scans(scans)
+
+
+def test_the_offset_lies_between_what_all_clicks_allow() -> None:
+    clicked_s = [-2.9, -1.7, -2.6, -2.5, -3.0]
+    offset = clock_offset(*placed(clicked_s), GatingOptions())
+    assert offset is not None
+    assert offset.least_s == pytest.approx(3.0 - DWELL_S / 2, abs=0.11)
+    assert offset.most_s == pytest.approx(1.7 + DWELL_S / 2, abs=0.21)
+    assert offset.nearest_s == offset.least_s
+    assert offset.outside == ("c0", "c2", "c3", "c4")
+    assert offset.clicks == len(clicked_s)
+
+
+def test_clicks_anywhere_inside_their_dwells_give_no_warning() -> None:
+    assert clock_offset(*placed([-1.9, 1.8, 0.0, -1.0, 1.5]), GatingOptions()) is None
+
+
+def test_clicks_that_miss_to_both_sides_are_not_a_clock_offset() -> None:
+    assert clock_offset(*placed([-2.9, 2.8, -3.1, 3.0, -2.7, 2.9]), GatingOptions()) is None
+
+
+def test_two_hasty_clicks_are_not_a_clock_offset() -> None:
+    assert clock_offset(*placed([-2.9, -2.8, 0.0, 0.1, -0.2, 0.3]), GatingOptions()) is None
+
+
+def test_without_scans_or_stamps_there_is_no_warning() -> None:
+    pairs, scans = placed([-2.9, -3.0, -2.8])
+    assert clock_offset(pairs, RadarScans(), GatingOptions()) is None
+    assert clock_offset([replace(pair, image_time=None) for pair in pairs], scans, GatingOptions()) is None
