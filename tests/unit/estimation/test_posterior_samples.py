@@ -6,11 +6,26 @@ from typing import Any
 import numpy as np
 import pytest
 
+from calib_core.arrays import Values
 from calib_core.estimation import posterior_samples as samples
-from calib_core.estimation.beyond_the_fit import PosteriorSummary, possible_poses, summarize_posterior
+from calib_core.estimation.beyond_the_fit import (
+    PosteriorSummary,
+    find_agreeing_outliers,
+    possible_poses,
+    summarize_posterior,
+)
 from calib_core.estimation.pose_posterior import batch_of, pose_posterior
-from calib_core.estimation.posterior_samples import Modes, PosteriorSamples, refine_poses, sample_posterior
+from calib_core.estimation.posterior_samples import (
+    Mixture,
+    Modes,
+    PosteriorSamples,
+    WeightedSamples,
+    importance_samples,
+    refine_poses,
+    sample_posterior,
+)
 from calib_core.geometry import RigidTransform
+from calib_core.measurements import Pair
 from calib_core.synthetic import SimulatedPairs, simulate_pairs
 from tests.solved_draws import NARROW, SolvedDraw, solve_draw
 
@@ -144,3 +159,96 @@ def test_a_start_whose_pose_is_not_determined_is_not_sampled(monkeypatch: pytest
     drawn = sampled(solved)
     assert np.isfinite(drawn.samples.states).all()
     assert drawn.mean().translation_m == pytest.approx(plain.mean().translation_m, abs=0.02)
+
+
+# Outliers that agree among themselves are found with their pose; outliers that are just wrong are not.
+
+
+COMPANION_M = np.array([0.7, 0.7, 0.4])  # behind the reflector, to its left and higher, in the world
+
+
+def with_companion(simulated: SimulatedPairs, which: range) -> list[Pair]:
+    """Give pairs the radar position of something that always stands in the same place relative to the reflector."""
+    moved_m = simulated.rig.radar_from_world.rotation @ COMPANION_M
+    pairs = list(simulated.pairs)
+    for i in which:
+        candidate = pairs[i].candidates[0]
+        pairs[i] = replace(
+            pairs[i], candidates=(replace(candidate, position_radar_m=candidate.position_radar_m + moved_m),)
+        )
+    return pairs
+
+
+@pytest.mark.parametrize("tape", [False, True])
+def test_pairs_of_a_companion_are_found_with_the_place_where_it_stands(tape: bool) -> None:
+    simulated = simulate_pairs(20, rng=np.random.default_rng(2), noise="imaging")
+    solved = solve_draw(simulated, pairs=with_companion(simulated, range(6)), tape=tape)
+    found = find_agreeing_outliers(solved.measurements, solved.refined, rng=np.random.default_rng(1))
+    assert found is not None
+    assert found.pairs.tolist() == list(range(6))
+    assert found.camera_move_m == pytest.approx(np.linalg.norm(COMPANION_M), abs=0.3)
+    assert np.linalg.norm(found.difference[3:]) < np.deg2rad(5.0)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.5])
+def test_outliers_that_are_just_wrong_do_not_agree(share: float) -> None:
+    for seed in range(6):
+        simulated = simulate_pairs(20, rng=np.random.default_rng([5, seed]), outlier_share=share)
+        solved = solve_draw(simulated)
+        assert find_agreeing_outliers(solved.measurements, solved.refined, rng=np.random.default_rng(1)) is None
+
+
+def test_three_outliers_are_too_few_to_agree() -> None:
+    simulated = simulate_pairs(20, rng=np.random.default_rng(2), noise="imaging")
+    solved = solve_draw(simulated, pairs=with_companion(simulated, range(3)))
+    assert find_agreeing_outliers(solved.measurements, solved.refined, rng=np.random.default_rng(1)) is None
+
+
+# Adaptive importance sampling finds means, covariances and shares of known densities.
+
+
+COVARIANCE = np.array([[1.0, 0.9, 0.0], [0.9, 1.0, 0.2], [0.0, 0.2, 0.3]])
+
+
+def normal_costs(states: np.ndarray, mean: float, covariance: np.ndarray) -> Values:
+    away = states - mean
+    return np.asarray((away * np.linalg.solve(covariance, away.T).T).sum(axis=1))
+
+
+def drawn_from(start: Mixture, *, apart: float | None = None) -> WeightedSamples:
+    """Sample a normal density, or one of two peaks with shares of 0.75 and 0.25."""
+
+    def costs(states: np.ndarray) -> Values:
+        first = normal_costs(states, 0.0, COVARIANCE)
+        if apart is None:
+            return first
+        second = normal_costs(states, apart, COVARIANCE)
+        return np.asarray(-2.0 * np.logaddexp(np.log(0.75) - 0.5 * first, np.log(0.25) - 0.5 * second))
+
+    return importance_samples(costs, start, per_round=500, rounds=(3, 8), enough=1000.0, rng=np.random.default_rng(1))
+
+
+def test_a_normal_density_gives_its_mean_and_covariance_even_from_a_bad_start() -> None:
+    bad = Mixture(np.ones(1), np.full((1, 3), 1.5), 4.0 * np.eye(3)[None])
+    samples = drawn_from(bad)
+    mean = samples.weights @ samples.states
+    away = samples.states - mean
+    assert samples.effective > 1000.0
+    assert mean == pytest.approx(np.zeros(3), abs=0.1)
+    assert (away * samples.weights[:, None]).T @ away == pytest.approx(COVARIANCE, abs=0.1)
+
+
+def test_two_peaks_get_their_shares_whatever_the_first_guess_of_them() -> None:
+    start = Mixture(np.array([0.1, 0.9]), np.array([[0.0] * 3, [6.0] * 3]), np.stack([COVARIANCE] * 2))
+    samples = drawn_from(start, apart=6.0)
+    assert samples.weights[samples.states.mean(axis=1) < 3.0].sum() == pytest.approx(0.75, abs=0.05)
+    assert samples.mixture.weights == pytest.approx([0.75, 0.25], abs=0.08)
+
+
+def test_a_mixture_s_samples_follow_its_density() -> None:
+    mixture = Mixture(np.array([0.3, 0.7]), np.array([[0.0], [5.0]]), np.array([[[1.0]], [[4.0]]]))
+    states = mixture.draw(4000, np.random.default_rng(2))[:, 0]
+    grid = np.linspace(-60.0, 60.0, 12001)
+    density = np.exp(mixture.log_density(grid[:, None]))
+    assert density.sum() * 0.01 == pytest.approx(1.0, abs=0.01)
+    assert (states < 2.5).mean() == pytest.approx(density[grid < 2.5].sum() * 0.01, abs=0.03)
