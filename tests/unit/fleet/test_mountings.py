@@ -4,15 +4,29 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import chdtri
 
 from benchmarks.fleet.simulated_poses import NOMINAL, Accuracy, Spread, simulated_fleet
+from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.fleet import RelevantChange, SessionPose, mounting_of, mountings_of, transition, transitions_of
+from calib_core.fleet import (
+    RelevantChange,
+    SessionPose,
+    mounting_of,
+    mountings_of,
+    session_pose,
+    transition,
+    transitions_of,
+)
+from calib_core.fleet.deviation import FALSE_RATE, deviation, quantile, tail
+from calib_core.fleet.random_effects import RandomEffects, random_effects
 from calib_core.fleet.session_pose import CHI2_95
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import NS_PER_S, TimeNs
-from calib_core.options import CameraPositionPrior
+from calib_core.options import CalibrationOptions, CameraPositionPrior
+from calib_core.results import Calibration, DataWarning
+from calib_core.synthetic import simulate_pairs
 
 COVARIANCE = np.diag(np.repeat([1e-4, 4e-6], 3))
 
@@ -230,3 +244,109 @@ def test_stated_parts_beyond_the_covariance_are_refused() -> None:
         SessionPose("van", "s", NOMINAL, np.eye(6), 2.0 * np.eye(6))
     with pytest.raises(InputError, match="rest on stated sigmas exceed it"):
         SessionPose("van", "s", NOMINAL, np.eye(6), 0.6 * np.eye(6), of_tape=0.6 * np.eye(6))
+
+
+# One test over six degrees of freedom: its false rate, and the quantiles that it rests on.
+
+
+EQUAL = np.full(6, 0.005)
+EXACT = 1e-7 * np.eye(6)
+
+
+def estimated(count: int, sigma: np.ndarray, error: np.ndarray, rng: np.random.Generator) -> RandomEffects:
+    vectors = sigma * rng.standard_normal((count, 6)) + rng.multivariate_normal(np.zeros(6), error, count)
+    return random_effects(vectors, np.repeat(error[None], count, axis=0))
+
+
+def squared_of_new(effects: RandomEffects, rng: np.random.Generator, count: int) -> np.ndarray:
+    away = EQUAL * rng.standard_normal((count, 6)) - effects.mean
+    return np.asarray(np.einsum("ni,ij,nj->n", away, np.linalg.inv(effects.covariance + EXACT), away))
+
+
+@pytest.mark.parametrize(("count", "fleets"), [(10, 60), (49, 20)])
+def test_the_false_rate_of_one_test_is_at_most_one_in_10000(count: int, fleets: int) -> None:
+    rng, beyond = np.random.default_rng(count), 0
+    for _ in range(fleets):
+        effects = estimated(count, EQUAL, EXACT, rng)
+        limit = deviation(effects, effects.mean, EXACT, freedom=1e7).limit
+        beyond += int((squared_of_new(effects, rng, 2000) > limit).sum())
+    assert beyond <= 2.0 * FALSE_RATE * fleets * 2000
+
+
+def test_the_limit_is_hotellings_where_the_scatter_is_all_and_f_where_the_calibration_is() -> None:
+    effects = estimated(49, EQUAL, EXACT, np.random.default_rng(1))
+    narrow = deviation(effects, effects.mean, 1e-12 * np.eye(6), freedom=20.0)
+    wide = deviation(effects, effects.mean, 1e6 * np.eye(6), freedom=20.0)
+    assert narrow.limit == pytest.approx(quantile(1.0 - FALSE_RATE, effects.freedom, whole=5.0), rel=1e-4)
+    assert wide.limit == pytest.approx(quantile(1.0 - FALSE_RATE, 20.0), rel=1e-4)
+
+
+def test_quantiles_are_chi2_f_and_hotellings() -> None:
+    rng = np.random.default_rng(2)
+    assert quantile(0.95, 1e9) == pytest.approx(CHI2_95, rel=1e-4)
+    level = rng.chisquare(6, 200_000) / (rng.chisquare(12, 200_000) / 12)
+    assert (level <= quantile(0.95, 12)).mean() == pytest.approx(0.95, abs=0.002)
+    samples = rng.standard_normal((4000, 13, 6))
+    scatter = np.swapaxes(samples[:, 1:], 1, 2) @ samples[:, 1:] / 12
+    squared = np.einsum("ni,ni->n", samples[:, 0], np.linalg.solve(scatter, samples[:, 0, :, None])[..., 0])
+    assert (squared <= quantile(0.95, 12, whole=5.0)).mean() == pytest.approx(0.95, abs=0.01)
+
+
+@pytest.mark.parametrize("whole", [0.0, 3.0])
+def test_the_tail_is_the_inverse_of_the_quantile(whole: float) -> None:
+    for probability in (0.1, 0.5, 0.95, 1.0 - FALSE_RATE):
+        assert tail(quantile(probability, 15.0, whole=whole), 15.0, whole=whole) == pytest.approx(1.0 - probability)
+
+
+def test_a_quantile_is_exceeded_as_often_as_it_says() -> None:
+    for freedom, whole in ((8.0, 0.0), (30.0, 5.0), (1e6, 2.0)):
+        assert tail(quantile(0.95, freedom, whole=whole), freedom, whole=whole) == pytest.approx(0.05, rel=1e-6)
+
+
+def test_the_quantile_of_a_known_covariance_is_that_of_chi2() -> None:
+    assert quantile(0.95, float("inf")) == pytest.approx(chdtri(6, 0.05), rel=1e-4)
+
+
+# What the fleet takes from a calibration.
+
+
+@pytest.fixture(scope="module")
+def calibration() -> Calibration:
+    simulated = simulate_pairs(20, rng=np.random.default_rng(5), noise="ti")
+    outcome = calibrate_pairs(simulated.pairs, simulated.camera)
+    assert isinstance(outcome, Calibration)
+    return outcome
+
+
+def test_pose_and_uncertainty_are_the_calibrations(calibration: Calibration) -> None:
+    pose = session_pose(calibration, vehicle="van", session="spring", radar_serial="R1")
+    np.testing.assert_array_equal(pose.covariance, calibration.covariance)
+    assert pose.quantile == calibration.covariance_quantile
+    assert pose.freedom < 1e4  # the noise level was estimated
+    assert pose.camera is calibration.camera
+    assert pose.reference_radar_m is not None
+    assert pose.sensors == ("R1", None)
+
+
+def test_what_rests_on_stated_sigmas_is_the_calibrations_and_all_of_it_if_nobody_says(calibration: Calibration) -> None:
+    pose, parts = session_pose(calibration, vehicle="van", session="spring"), calibration.covariance_parts
+    assert parts is not None
+    np.testing.assert_array_equal(pose.systematic, parts.systematic)
+    np.testing.assert_array_equal(pose.of_tape, parts.camera_position)
+    assert 0.0 < np.trace(pose.systematic[:3, :3]) < np.trace(pose.covariance[:3, :3])
+    silent = session_pose(replace(calibration, covariance_parts=None), vehicle="van", session="spring")
+    np.testing.assert_array_equal(silent.systematic, calibration.covariance)
+
+
+def test_a_method_without_a_noise_model_is_refused_with_what_to_do() -> None:
+    simulated = simulate_pairs(20, rng=np.random.default_rng(5), noise="ti")
+    outcome = calibrate_pairs(simulated.pairs, simulated.camera, CalibrationOptions(method="paper"))
+    assert isinstance(outcome, Calibration)
+    with pytest.raises(InputError, match=r"states no uncertainty.*default method"):
+        session_pose(outcome, vehicle="van", session="spring")
+
+
+def test_a_pose_that_an_older_version_drew_to_a_fleets_prior_is_refused(calibration: Calibration) -> None:
+    drawn = replace(calibration, warnings=(DataWarning("rests-on-fleet-prior", "drawn", "solve it again"),))
+    with pytest.raises(InputError, match=r"vehicle 'van', session 'spring': .* solve it again"):
+        session_pose(drawn, vehicle="van", session="spring")
