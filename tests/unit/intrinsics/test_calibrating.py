@@ -5,9 +5,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calib_core.geometry import rotation_exp
-from calib_core.intrinsics import BoardCorners, CalibratedLens, IntrinsicsOptions, calibrate_lens
+from calib_core.camera import Camera, CameraCovariance
+from calib_core.geometry import RigidTransform, rotation_exp, rotation_from_euler
+from calib_core.intrinsics import (
+    BoardCorners,
+    CalibratedLens,
+    Coverage,
+    IntrinsicsOptions,
+    LensView,
+    calibrate_lens,
+    projection_uncertainty,
+    residual_field,
+    split_difference,
+    view_coverage,
+)
+from calib_core.intrinsics.projection_uncertainty import far_point_slopes
 from calib_core.measurements import Unsolvable
+from calib_core.synthetic import typical_camera
 from tests.unit.intrinsics.corner_draws import BOARD, CAMERAS, SIZE_PX, drawn_views, search_of
 
 PINHOLE = IntrinsicsOptions(model="pinhole")
@@ -112,3 +126,161 @@ def test_one_view_given_many_times_is_no_calibration() -> None:
     answer = calibrate_lens(search_of(tuple(replace(VIEWS[0], index=index) for index in range(6))), PINHOLE)
     assert isinstance(answer, Unsolvable), answer.camera.parameters
     assert answer.code == "parallel-views"
+
+
+# What views cover, and which view is missing.
+
+
+CAMERA = typical_camera("plumb_bob", width_px=1280, height_px=720)
+MIDDLE = BOARD.corners_m.mean(axis=0)
+
+
+def seen(
+    pan_deg: float = 0.0,
+    tip_deg: float = 0.0,
+    at: tuple[float, float, float] = (0.0, 0.0, 0.5),
+    camera: Camera = CAMERA,
+):
+    """Return a view of the board turned about its upright and its level axis, with its middle at a point [m]."""
+    turned = rotation_from_euler(*np.deg2rad([tip_deg, pan_deg, 0.0]))
+    pose = RigidTransform(turned, np.array(at) - turned @ MIDDLE)
+    pixels = camera.project(pose @ BOARD.corners_m)
+    return BoardCorners(0, "view", None, (camera.width_px, camera.height_px), np.arange(54), pixels)
+
+
+def covered(*views: BoardCorners) -> Coverage:
+    return view_coverage(views, BOARD, (1280, 720))
+
+
+@pytest.mark.parametrize(
+    ("pan_deg", "tip_deg", "faces"),
+    [(0.0, 0.0, "square on"), (35.0, 0.0, "left"), (-35.0, 0.0, "right"), (0.0, 35.0, "down"), (0.0, -35.0, "up")],
+)
+@pytest.mark.parametrize("at", [(0.0, 0.0, 0.5), (0.15, -0.05, 0.5), (-0.1, 0.08, 0.7)])
+def test_a_tilt_is_named_by_where_the_board_faces(
+    pan_deg: float, tip_deg: float, faces: str, at: tuple[float, float, float]
+) -> None:
+    sideways = float(np.degrees(np.arctan2(at[0], at[2])))
+    upward = float(np.degrees(np.arctan2(at[1], at[2])))
+    tilts = covered(seen(pan_deg + sideways, tip_deg - upward, at)).tilts
+    assert tilts[faces] == 1
+    assert sum(tilts.values()) == 1
+
+
+def test_the_face_of_the_board_is_where_its_normal_points() -> None:
+    view = seen(35.0)
+    left, right = view.pixels_px[:9:8], view.pixels_px[-9::8]
+    heights = np.abs(right[:, 1] - left[:, 1])
+    assert heights[1] != pytest.approx(heights[0], rel=0.05)  # one side is nearer
+    nearer_right = heights[1] > heights[0]
+    assert covered(view).tilts["left" if nearer_right else "right"] == 1
+
+
+def test_distance_is_told_by_the_share_of_the_picture() -> None:
+    assert covered(seen(at=(0, 0, 0.25))).distances["near"] == 1
+    assert covered(seen(at=(0, 0, 0.45))).distances["middle"] == 1
+    assert covered(seen(at=(0, 0, 0.9))).distances["far"] == 1
+
+
+def test_what_is_missing_is_said_until_nothing_is() -> None:
+    few = covered(seen())
+    assert "1 views of the board" in few.missing[0]
+    assert any("upper left corner" in sentence for sentence in few.missing)
+    assert any("no view in which the board faces left" in sentence for sentence in few.missing)
+    every = [
+        seen(pan, tip, (x, y, z))
+        for x, y in ((-0.2, -0.1), (0.2, -0.1), (-0.2, 0.1), (0.2, 0.1), (0.0, 0.0))
+        for pan, tip, z in ((35, 0, 0.35), (-35, 0, 0.35), (0, 35, 0.35), (0, -35, 0.35), (0, 0, 0.22))
+    ]
+    assert covered(*every).missing == ()
+    assert covered(*every).share > 0.7
+
+
+def test_counts_are_those_of_all_corners() -> None:
+    coverage = covered(seen(), seen(35.0))
+    assert coverage.counts.sum() == 108
+    assert covered().share == 0.0
+
+
+# What is shown over the picture: projection uncertainty, residuals, and halves of the views calibrated apart.
+
+
+def calibrated_over_the_picture(model: str, count: int = 12, *, truth: str = "") -> CalibratedLens:
+    views = drawn_views(CAMERAS[truth or model], count, 9)
+    lens = calibrate_lens(search_of(views), IntrinsicsOptions(model=model, board_shape="flat", robust=False))
+    assert isinstance(lens, CalibratedLens), lens
+    return lens
+
+
+LENS = calibrated_over_the_picture("pinhole")
+
+
+def test_the_slopes_of_far_points_are_those_of_their_pixels() -> None:
+    camera, pixels = CAMERAS["plumb_bob"], np.array([[100.0, 80.0], [900.0, 600.0]])
+    rays = camera.rays(pixels)
+    lens, turn = far_point_slopes(camera, pixels)
+    for column in range(9):
+        step = np.zeros(9)
+        step[column] = 1e-5
+        ahead, behind = (camera.with_parameters(camera.parameters + sign * step).project(rays) for sign in (1, -1))
+        np.testing.assert_allclose(lens[:, :, column], (ahead - behind) / 2e-5, rtol=1e-5, atol=1e-5)
+    for axis in range(3):
+        ahead, behind = (camera.project(rays @ rotation_exp(sign * 1e-6 * np.eye(3)[axis]).T) for sign in (1, -1))
+        np.testing.assert_allclose(turn[:, :, axis], (ahead - behind) / 2e-6, rtol=1e-5, atol=1e-3)
+
+
+def test_the_projection_is_surest_where_corners_are_and_less_sure_at_the_edge() -> None:
+    grid = projection_uncertainty(LENS, columns=9, rows=7)
+    assert grid.sigma_px.shape == (7, 9)
+    assert (grid.x_px[0], grid.x_px[-1], grid.y_px[-1]) == (0.0, SIZE_PX[0] - 1.0, SIZE_PX[1] - 1.0)
+    assert grid.sigma_px.min() < 0.3 < 2.0 * np.median(grid.sigma_px) < 2.0 * grid.sigma_px.max()
+
+
+def test_a_shift_of_the_principal_point_that_a_rotation_undoes_is_nearly_no_uncertainty() -> None:
+    matrix = np.zeros((4, 4))
+    matrix[2, 2] = 100.0  # 10 px
+    camera = replace(LENS.camera, covariance=CameraCovariance(LENS.camera.parameter_names, matrix))
+    assert np.median(projection_uncertainty(replace(LENS, camera=camera)).sigma_px) < 2.0
+
+
+def test_residuals_of_the_true_model_are_noise() -> None:
+    field = residual_field(LENS)
+    assert not field.systematic
+    assert abs(field.neighbour_correlation) < 0.15
+    assert len(field.pixels_px) == len(field.residuals_px) == field.counts.sum() == 12 * 54
+    assert field.sentence == "The residuals show no pattern that is more than noise."
+
+
+def test_a_pattern_that_all_views_share_is_more_than_noise() -> None:
+    def off(view: LensView) -> LensView:
+        across = np.sin(view.corners.pixels_px / 150.0)
+        return replace(view, residuals_px=view.residuals_px + 0.1 * across)
+
+    field = residual_field(replace(LENS, views=tuple(off(view) for view in LENS.views)))
+    assert field.systematic
+    assert field.systematic_px == pytest.approx(0.1, abs=0.03)
+    assert f"the views share a pattern of {field.systematic_px:.3f} px over the picture" in field.sentence
+
+
+def test_residuals_of_a_model_that_is_too_simple_are_alike_in_neighbours() -> None:
+    field = residual_field(calibrated_over_the_picture("pinhole", 25, truth="plumb_bob"))
+    assert field.neighbour_correlation > 0.5
+    assert "neighbouring corners of a view err alike" in field.sentence
+
+
+def test_halves_of_the_views_agree_for_the_true_model() -> None:
+    agreeing = split_difference(LENS)
+    assert not isinstance(agreeing, Unsolvable)
+    assert agreeing.agrees
+    assert agreeing.apart_px.shape == agreeing.expected_px.shape == (10, 16)
+
+
+def test_seven_views_are_not_split() -> None:
+    answer = split_difference(replace(LENS, views=LENS.views[:7]))
+    assert isinstance(answer, Unsolvable)
+    assert "7 views cannot be calibrated in halves, 8 can" in answer.reason
+
+
+@pytest.mark.parametrize("columns", [2, 5])
+def test_grids_have_the_wanted_size(columns: int) -> None:
+    assert residual_field(LENS, columns=columns, rows=3).means_px.shape == (3, columns, 2)
