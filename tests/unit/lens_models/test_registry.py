@@ -1,6 +1,6 @@
 """What every registered lens model must satisfy: unambiguous names, and flags that match its mathematics."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import get_args
 
 import numpy as np
@@ -10,7 +10,9 @@ from calib_core.camera import CAMERA_MODELS, CameraModel
 from calib_core.errors import InputError
 from calib_core.interchange import camera_info_text, read_camera
 from calib_core.interchange.own.documents import CameraDocument
-from calib_core.lens_models.lens_model import LensModel
+from calib_core.lens_models.brown_conrady import PLUMB_BOB
+from calib_core.lens_models.lens_model import Elsewhere, LensModel, TypicalLens
+from calib_core.lens_models.naming import lenses_named, names_in, opencv_lens, written_lens
 from calib_core.lens_models.registry import LENS_MODELS
 from calib_core.synthetic import SimulationOptions, typical_camera
 
@@ -76,3 +78,79 @@ def test_unprojecting_the_image_plane_gives_the_original_rays(lens: LensModel) -
     plane, _ = lens.project(np.ascontiguousarray(points.T), distortion)
     rays = lens.unproject(plane.T, distortion)
     np.testing.assert_allclose(rays, points / np.linalg.norm(points, axis=1, keepdims=True), atol=1e-12)
+
+
+# A lens model that contradicts itself is refused where it is defined.
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"counts": ()}, "plumb_bob: counts must ascend"),
+        ({"counts": (5, 4)}, "counts must ascend"),
+        ({"counts": (-1, 5)}, "counts must ascend"),
+        ({"counts": (4,)}, "5 coefficients are named, but counts ends at 4"),
+        ({"typical": TypicalLens((0.1,))}, "the typical lens has 1 coefficient"),
+    ],
+)
+def test_a_lens_model_that_contradicts_itself_is_refused(changes, reason) -> None:
+    with pytest.raises(ValueError, match=reason):
+        replace(PLUMB_BOB, **changes)
+
+
+# The name of a lens in other formats, and how many coefficients are written.
+
+
+D = [-0.3, 0.1, 0.001, -0.002, 0.01, 0.2, 0.03, 0.004]
+
+
+@pytest.mark.parametrize(
+    ("model", "distortion", "where", "name", "coefficients"),
+    [
+        ("pinhole", [], "camera_info", "plumb_bob", [0.0] * 5),
+        ("pinhole", [], "kalibr", "none", []),
+        ("pinhole", [], "colmap", "PINHOLE", []),
+        ("plumb_bob", D[:4], "camera_info", "plumb_bob", [*D[:4], 0.0]),
+        ("plumb_bob", D[:4], "opencv", "plumb_bob", D[:4]),
+        ("plumb_bob", D[:5], "opencv", "plumb_bob", D[:5]),
+        ("plumb_bob", [*D[:4], 0.0], "kalibr", "radtan", D[:4]),
+        ("plumb_bob", [*D[:4], 0.0], "colmap", "OPENCV", D[:4]),
+        ("plumb_bob", D[:5], "colmap", "FULL_OPENCV", [*D[:5], 0.0, 0.0, 0.0]),
+        ("rational_polynomial", D, "foxglove", "rational_polynomial", D),
+        ("rational_polynomial", [*D[:4], 0.0, 0.0, 0.0, 0.0], "kalibr", "radtan", D[:4]),
+        ("equidistant", D[:4], "foxglove", "kannala_brandt", D[:4]),
+    ],
+)
+def test_a_lens_is_written_with_the_name_the_format_uses(
+    model: str, distortion: list[float], where: Elsewhere, name: str, coefficients: list[float]
+) -> None:
+    written = written_lens(LENS_MODELS[model], np.array(distortion), where)
+    assert (written.name, list(written.coefficients)) == (name, coefficients)
+
+
+@pytest.mark.parametrize(
+    ("model", "distortion", "missing"), [("plumb_bob", D[:5], "k3"), ("rational_polynomial", D, "k3 to k6")]
+)
+def test_a_coefficient_that_cannot_be_stored_is_never_dropped(
+    model: str, distortion: list[float], missing: str
+) -> None:
+    with pytest.raises(InputError) as refusal:
+        written_lens(LENS_MODELS[model], np.array(distortion), "kalibr")
+    assert str(refusal.value) == (
+        f"Kalibr's radtan model has no {missing}, which this camera uses; export with --to opencv, "
+        "or calibrate the camera with k1 k2 p1 p2 only"
+    )
+
+
+def test_a_name_may_stand_for_several_lenses() -> None:
+    assert [lens.name for lens in lenses_named("colmap", "FULL_OPENCV")] == ["plumb_bob", "rational_polynomial"]
+    assert lenses_named("colmap", "OMNI") == ()
+    assert names_in("camera_info") == ("plumb_bob", "rational_polynomial", "equidistant")
+
+
+@pytest.mark.parametrize(
+    ("count", "model"),
+    [(0, "pinhole"), (1, "plumb_bob"), (5, "plumb_bob"), (6, "rational_polynomial"), (14, "rational_polynomial")],
+)
+def test_opencv_distinguishes_its_lenses_by_the_number_of_coefficients(count: int, model: str) -> None:
+    assert opencv_lens(count).name == model
