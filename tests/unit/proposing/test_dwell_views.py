@@ -4,11 +4,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from calib_core.errors import CalibrationError
 from calib_core.proposing import DwellView, ViewProgress, dwell_views
 from calib_core.proposing.dwell_views import averaged_over_dwell, reflector_width_px
-from calib_core.proposing.still_pictures import frames_within
+from calib_core.proposing.look import Look, look_of, with_look
+from calib_core.proposing.picture_candidates import PictureCandidate
+from calib_core.proposing.still_pictures import frames_within, stack_median
 from tests.unit.proposing.drawn_dwells import CAMERA, DrawnDwell, DrawnFrames, placements_of
 
 ONE_BY_ONE = tuple(
@@ -203,3 +207,73 @@ def test_a_frame_that_cannot_be_read_is_left_out_unless_it_was_clicked() -> None
 def test_where_no_apex_is_the_click_is_all_there_is() -> None:
     assert averaged_over_dwell(view(), FRAMES, CLICKED, np.array([280.0, 180.0])) is None
     assert averaged_over_dwell(view(), FRAMES, CLICKED, APEX_PX + np.array([0.0, 9.0])) is None
+
+
+# The look of a confirmed reflector, found again where it is nearer or farther.
+
+
+LOOKED_AT = DrawnFrames(
+    tuple(
+        DrawnDwell(8.0 * k, 8.0 * k + 6.0, apex_px, range_m)
+        for k, (apex_px, range_m) in enumerate(
+            [((60.3, 60.8), 3.0), ((150.6, 120.2), 4.0), ((250.1, 80.7), 5.0), ((100.4, 150.1), 6.0)]
+        )
+    )
+)
+
+
+@pytest.fixture(scope="module")
+def views() -> tuple[DwellView, ...]:
+    return dwell_views(placements_of(LOOKED_AT.dwells), LOOKED_AT, CAMERA)
+
+
+def look_at(view: DwellView, pixel_px: tuple[float, float]) -> Look:
+    look = look_of(view, LOOKED_AT, np.array(pixel_px))
+    assert look is not None
+    return look
+
+
+def rough(view: DwellView, apex_px: tuple[float, float]) -> DwellView:
+    """A view whose stronger candidate is a wrong one, and whose right one is a blob."""
+    wrong = PictureCandidate(np.array([180.0, 40.0]), 3.0, 30.0)
+    right = PictureCandidate(np.array(apex_px) + np.array([0.2 * view.width_px, -0.25 * view.width_px]), 3.0, 20.0)
+    return replace(view, candidates=(wrong, right))
+
+
+def test_the_look_is_found_at_every_range_and_below_a_pixel(views: tuple[DwellView, ...]) -> None:
+    look = look_at(views[0], LOOKED_AT.dwells[0].apex_px)
+    blobs = [rough(view, dwell.apex_px) for view, dwell in zip(views, LOOKED_AT.dwells, strict=True)]
+    for view, dwell in zip(with_look(blobs, [look], LOOKED_AT, CAMERA), LOOKED_AT.dwells, strict=True):
+        best = view.candidates[0]
+        assert np.hypot(*(best.pixel_px - dwell.apex_px)) < 1.0
+        assert best.likeness > 0.6
+        assert all(other.likeness < best.likeness for other in view.candidates[1:])
+
+
+def test_a_click_beside_the_apex_is_carried_as_it_is(views: tuple[DwellView, ...]) -> None:
+    low_px = 0.3
+    clicked = np.array(LOOKED_AT.dwells[0].apex_px) + np.array([0.0, low_px * views[0].width_px])
+    look = look_of(views[0], LOOKED_AT, clicked)
+    assert look is not None
+    assert not look.at_apex
+    view = with_look([rough(views[1], LOOKED_AT.dwells[1].apex_px)], [look], LOOKED_AT, CAMERA)[0]
+    wanted = np.array(LOOKED_AT.dwells[1].apex_px) + np.array([0.0, low_px * view.width_px])
+    assert np.hypot(*(view.candidates[0].pixel_px - wanted)) < 1.5
+
+
+def test_without_a_look_nothing_changes(views: tuple[DwellView, ...]) -> None:
+    assert with_look(views, [], LOOKED_AT, CAMERA) == views
+
+
+def test_a_dwell_whose_frames_cannot_be_read_has_no_look(views: tuple[DwellView, ...]) -> None:
+    broken = replace(LOOKED_AT, broken=frozenset(views[0].frames.tolist()))
+    assert look_of(views[0], broken, np.array(LOOKED_AT.dwells[0].apex_px)) is None
+
+
+# The median of a few pictures against NumPy's.
+
+
+@given(st.integers(1, 14), st.integers(0, 2**32 - 1), st.sampled_from([np.uint8, np.uint16]))
+def test_the_median_is_numpys(count: int, seed: int, kind: type) -> None:
+    stack = np.random.default_rng(seed).integers(0, 255, (count, 4, 5, 3)).astype(kind)
+    assert np.abs(stack_median(list(stack)) - np.median(stack, axis=0)).max() <= 0.5

@@ -1,16 +1,33 @@
 """Proposals from dwell views drawn at random, with known truth."""
 
+import json
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from calib_core.geometry import rotation_angle_rad
-from calib_core.measurements import TimeNs
+from calib_core.association.placements import Placement
+from calib_core.geometry import RigidTransform, rotation_angle_rad, rotation_exp
+from calib_core.interchange.own.proposal_documents import ProposalsDocument
+from calib_core.measurements import NS_PER_S, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions, MountingOptions
-from calib_core.proposing import Proposal, Proposals, proposals_of
+from calib_core.proposing import (
+    AutomaticClicks,
+    DwellView,
+    PictureCandidate,
+    Proposal,
+    Proposals,
+    automatic_clicks,
+    proposals_of,
+)
+from calib_core.proposing.candidate_rays import candidate_rays
+from calib_core.proposing.mounting_prior import mounting_prior
+from calib_core.proposing.pose_agreement import chance_scores, pose_agreement
+from calib_core.proposing.proposals_json import ProposalSource, named_proposals, proposals_json
+from calib_core.synthetic.rig import typical_camera
 from tests.drawn_views import Drawing, DrawnViews, draw_views, with_pictures_of
 
 OPTIONS = CalibrationOptions()
@@ -184,3 +201,153 @@ def test_a_fairly_sure_proposal_says_when_its_apex_is_not_seen() -> None:
     fairly = [one for one in found if 0.8 <= one.confidence < 0.9]
     assert fairly
     assert {one.reason for one in fairly} == {"its apex is not seen clearly"}
+
+
+# Proposals as JSON: valid, the same each time, and with ids that confirming does not change.
+
+
+SOURCE = ProposalSource(("radar.bag",), "/image", ("/radar",), 0.24, ("c1",))
+
+
+def placement(number: int, x_m: float) -> Placement:
+    start = 10 * number * NS_PER_S
+    return Placement(TimeNs(start), TimeNs(start + 4 * NS_PER_S), np.array([x_m, 1.0, 0.0]), 0.9)
+
+
+def view(one: Placement) -> DwellView:
+    return DwellView(one, np.zeros(0, np.int64), one.start, np.zeros((0, 0, 3), np.uint8), 1.0)
+
+
+def proposal(one: Placement, confidence: float) -> Proposal:
+    candidate = PictureCandidate(np.array([30.0, 40.0]), 0.5, 12.0)
+    return Proposal(one, one.start, candidate.pixel_px, 0.5, confidence, (candidate,))
+
+
+PLACEMENTS = (placement(1, 5.0), placement(1, 9.0), placement(2, 7.0))
+VIEWS = tuple(map(view, PLACEMENTS))
+
+
+def test_an_id_is_the_number_of_the_placement_whatever_else_is_proposed() -> None:
+    first, second, third = (proposal(one, 0.9) for one in PLACEMENTS)
+    assert [name for name, _ in named_proposals(Proposals((third, first, second)), VIEWS)] == ["p3", "p1", "p2"]
+    assert [name for name, _ in named_proposals(Proposals((third,)), VIEWS)] == ["p3"]
+
+
+def test_an_id_that_a_click_has_is_not_given_twice() -> None:
+    named = named_proposals(Proposals((proposal(PLACEMENTS[0], 0.9),)), VIEWS, ["p1", "p1-proposed"])
+    assert [name for name, _ in named] == ["p1-proposed-proposed"]
+
+
+def test_the_document_follows_its_schema_and_unknown_figures_are_null() -> None:
+    proposals = Proposals(
+        (proposal(PLACEMENTS[2], 0.9),),
+        ((PLACEMENTS[0], "nothing changed"),),
+        RigidTransform(np.eye(3), np.zeros(3)),
+        0.8,
+        0.1,
+        99,
+    )
+    text = proposals_json(proposals, VIEWS, SOURCE)
+    assert text == proposals_json(proposals, VIEWS, SOURCE)
+    document = json.loads(text)
+    msgspec.convert(document, ProposalsDocument)
+    (one,) = document["proposals"]
+    assert one["click"] == {
+        "id": "p3",
+        "image_time": {"sec": 20, "nanosec": 0},
+        "pixel_px": [30.0, 40.0],
+        "sigma_px": 0.5,
+        "mark": "snapped",
+    }
+    assert one["candidates"][0]["likeness"] is None
+    assert one["placement"]["snr_db"] is None
+    assert document["unproposed"][0]["reason"] == "nothing changed"
+    assert document["camera_from_radar"]["agreement"] == 0.8
+
+
+def test_without_a_mounting_there_is_none_in_the_document() -> None:
+    assert json.loads(proposals_json(Proposals(()), VIEWS, SOURCE))["camera_from_radar"] is None
+
+
+# Automatic clicks: taken where chance would not do, refused with the reason elsewhere.
+
+CAMERA = typical_camera()
+
+
+def taken(views: tuple[DwellView, ...]) -> AutomaticClicks | Unsolvable:
+    return automatic_clicks(proposals_of(views, CAMERA, OPTIONS), views, CAMERA, OPTIONS)
+
+
+def test_clear_proposals_become_snapped_clicks_in_order_of_time() -> None:
+    drawn = draw_views(1, Drawing(count=10))
+    found = taken(drawn.views)
+    assert isinstance(found, AutomaticClicks)
+    assert found.confidence > 0.9
+    assert len(found.clicks) >= 8
+    assert {click.mark for click in found.clicks} == {"snapped"}
+    assert list(found.clicks) == sorted(found.clicks)
+    rows = {view.image_time: i for i, view in enumerate(drawn.views)}
+    for click in found.clicks:
+        assert click.sigma_px is not None
+        assert np.linalg.norm(drawn.pixels[rows[click.image_time]] - [click.u_px, click.v_px]) < 5.0 * click.sigma_px
+
+
+def test_the_radar_of_one_recording_with_the_pictures_of_another_is_refused_with_the_reason() -> None:
+    views = with_pictures_of(draw_views(1, Drawing(count=10)), draw_views(2, Drawing(count=10)))
+    found = taken(views)
+    assert isinstance(found, Unsolvable)
+    assert found.code == "not-confident"
+    assert "chance" in found.reason
+
+
+def test_a_pose_with_an_equal_rival_is_refused_and_the_reason_says_so() -> None:
+    """Every dwell has a second candidate, as strong as the first, where another mounting would see the reflector."""
+    drawn = draw_views(3, Drawing(count=10, decoys=0, clutter=0, listed_share=1.0))
+    turn = RigidTransform(rotation_exp(np.array([0.0, 0.12, 0.0])), np.zeros(3))
+    positions = np.array([view.placement.position_radar_m for view in drawn.views])
+    moved = CAMERA.project((turn @ drawn.camera_from_radar) @ positions)
+    views = tuple(
+        replace(view, candidates=(*view.candidates, replace(view.candidates[0], pixel_px=pixel)))
+        for view, pixel in zip(drawn.views, moved, strict=True)
+    )
+    found = taken(views)
+    assert isinstance(found, Unsolvable)
+    assert "another mounting fits nearly as well" in found.reason
+
+
+def test_too_few_placements_are_refused() -> None:
+    found = taken(draw_views(1, Drawing(count=4)).views)
+    assert isinstance(found, Unsolvable)
+    assert found.reason.startswith("the radar shows 4 placements")
+    assert isinstance(taken(()), Unsolvable)
+
+
+def test_wrong_deals_of_the_radar_score_far_below_the_right_one() -> None:
+    rays = candidate_rays(draw_views(4, Drawing(count=8)).views, CAMERA, OPTIONS)
+    prior = mounting_prior(OPTIONS, is_flat=False)
+    right = pose_agreement(rays, prior)
+    assert right is not None
+    assert right.score > chance_scores(rays, prior).max() + 5.0
+
+
+def test_a_person_who_stands_at_every_placement_is_refused_and_not_proposed() -> None:
+    """The radar and the pictures agree on the mounting, but no apex is seen although a reflector's would be."""
+    drawn = draw_views(1, Drawing(count=10, listed_share=1.0))
+    near = tuple(replace(view, width_px=30.0) for view in drawn.views)
+    assert not proposals_of(near, CAMERA, OPTIONS).ranked
+    found = taken(near)
+    assert isinstance(found, Unsolvable)
+    assert "it may be a person" in found.reason
+    assert len(proposals_of(near, CAMERA, OPTIONS, confirmed=[drawn.click(0)]).ranked) >= 8
+
+
+def test_apexes_where_the_reflector_is_large_confirm_it() -> None:
+    drawn = draw_views(1, Drawing(count=10, listed_share=1.0))
+    seen = [replace(view, width_px=30.0, candidates=_with_apex(drawn, i)) for i, view in enumerate(drawn.views)]
+    assert isinstance(taken(tuple(seen)), AutomaticClicks)
+
+
+def _with_apex(drawn: DrawnViews, row: int) -> tuple[PictureCandidate, ...]:
+    candidates = drawn.views[row].candidates
+    nearest = min(candidates, key=lambda one: float(np.linalg.norm(one.pixel_px - drawn.pixels[row])))
+    return tuple(replace(one, has_apex=one is nearest) for one in candidates)
