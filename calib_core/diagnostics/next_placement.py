@@ -13,8 +13,7 @@ import numpy as np
 
 from calib_core.arrays import Points3, Values
 from calib_core.association.placement_groups import placement_groups
-from calib_core.estimation.linearization import MeasurementPlanes
-from calib_core.estimation.measurement_model import pair_measurements
+from calib_core.estimation.measurement_model import MeasurementPlanes, pair_measurements
 from calib_core.measurements import Pair
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration, NextPlacement

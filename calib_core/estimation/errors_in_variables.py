@@ -4,7 +4,7 @@ Pose and true reflector positions mu are estimated together, by expectation-maxi
 
     sum_i w_i [ |z_i - pi(R p(mu_i) + t)|^2_C + |m_i - mu_i|^2_V ] + |c - c0|^2 / sigma_c^2,
 
-with the mu_i eliminated exactly (equation (2) of `linearization`). The estimated `systematic_errors` are further unknowns.
+with the mu_i eliminated exactly (equation (2) of `measurement_model`). The estimated `systematic_errors` are further unknowns.
 Plain PnP takes the noisy m_i as the truth; the resulting bias does not shrink with more pairs. w_i is the probability that
 pair i is an inlier: neither an outlier anywhere on the image nor a near outlier, several times farther off than noise
 explains. Each pair is judged by its leave-one-out prediction (`leave_one_out_prediction`): a wrong pair would pass a test
@@ -28,8 +28,7 @@ from calib_core.estimation.leave_one_out_prediction import (
     predict_left_out,
     shrunk_scales,
 )
-from calib_core.estimation.linearization import Linearization, MeasurementPlanes
-from calib_core.estimation.measurement_model import PairMeasurements
+from calib_core.estimation.measurement_model import Linearization, MeasurementPlanes, PairMeasurements
 from calib_core.geometry import RigidTransform
 
 _MOST_ROUNDS = 80

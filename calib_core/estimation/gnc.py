@@ -12,8 +12,7 @@ import numpy as np
 
 from calib_core.arrays import Indices, Values
 from calib_core.association.exclusive_returns import exclusive_rows
-from calib_core.estimation.linearization import Linearization, MeasurementPlanes
-from calib_core.estimation.measurement_model import PairMeasurements
+from calib_core.estimation.measurement_model import Linearization, MeasurementPlanes, PairMeasurements
 from calib_core.geometry import RigidTransform, rotation_exp
 
 RADII = (12.0, 8.0, 5.5, 4.0, 3.0)

@@ -2,7 +2,7 @@
 
 A pair with high leverage pulls the pose towards itself, and one with a large residual raises the noise level it is judged
 by. Both hide an outlier. Pair i is therefore judged by the pose and the noise of the others, each found by one Newton step
-from the fit of all. With H the information, w the weights, J and e whitened as in `linearization`,
+from the fit of all. With H the information, w the weights, J and e whitened as in `measurement_model`,
 
     P = (H - w_i J_i^T J_i)^-1,    d = P (g - w_i J_i^T e_i),    e_i - J_i d ~ N(0, S_i + J_i P J_i^T),      (4)
 
@@ -18,8 +18,7 @@ import numpy as np
 
 from calib_core.arrays import Values
 from calib_core.estimation.gnc import normal_equations
-from calib_core.estimation.linearization import Linearization
-from calib_core.estimation.measurement_model import PairMeasurements
+from calib_core.estimation.measurement_model import Linearization, PairMeasurements
 from calib_core.geometry import RigidTransform
 
 PSEUDO_REDUNDANCY = 6.0

@@ -15,8 +15,7 @@ from calib_core.camera import Camera
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.gnc import associate
 from calib_core.estimation.leave_one_out import LeaveOneOut
-from calib_core.estimation.linearization import Linearization
-from calib_core.estimation.measurement_model import PairMeasurements, pair_measurements
+from calib_core.estimation.measurement_model import Linearization, PairMeasurements, pair_measurements
 from calib_core.measurements import Candidate, Pair
 from calib_core.options import CalibrationOptions
 from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar

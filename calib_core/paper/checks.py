@@ -11,7 +11,7 @@ import numpy as np
 
 from calib_core.arrays import Flags, Points2, Points3
 from calib_core.camera import Camera
-from calib_core.estimation.linearization import Linearization, linearize
+from calib_core.estimation.measurement_model import Linearization, linearize
 from calib_core.estimation.plausibility import implausible_input
 from calib_core.geometry import RigidTransform, skew
 from calib_core.measurements import ReflectorClick

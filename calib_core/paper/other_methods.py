@@ -13,7 +13,7 @@ import numpy as np
 from calib_core.arrays import Flags
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.estimation.linearization import linearize
+from calib_core.estimation.measurement_model import linearize
 from calib_core.estimation.plausibility import implausible_input
 from calib_core.geometry import RigidTransform, mounting_rotation
 from calib_core.measurements import Pair, Unpaired

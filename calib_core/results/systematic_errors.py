@@ -1,6 +1,6 @@
 """Systematic errors: what is wrong with every pair alike, with a prior for each, in the estimate, in the covariance and in words.
 
-With eta these errors, h the radar's way of reporting and o, K the click's and the lens's, the model of `linearization` is
+With eta these errors, h the radar's way of reporting and o, K the click's and the lens's, the model of `measurement_model` is
 
     m = h(mu; eta) + noise(V),    z = pi_K(R p(mu) + t + d) + o + noise(C).                                (3)
 

@@ -9,8 +9,7 @@ from scipy.optimize import least_squares
 from calib_core.calibration import calibrate_pairs, preview_pairs
 from calib_core.estimation.errors_in_variables import fit_errors_in_variables
 from calib_core.estimation.gnc import GncSolution
-from calib_core.estimation.linearization import linearize
-from calib_core.estimation.measurement_model import CameraPrior, PairMeasurements, pair_measurements
+from calib_core.estimation.measurement_model import CameraPrior, PairMeasurements, linearize, pair_measurements
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions, without_systematic_errors

@@ -13,8 +13,7 @@ from calib_core.camera import Camera, CameraCovariance
 from calib_core.estimation.covariance import pose_covariance
 from calib_core.estimation.errors_in_variables import fit_errors_in_variables
 from calib_core.estimation.gnc import GncSolution
-from calib_core.estimation.linearization import MeasurementPlanes
-from calib_core.estimation.measurement_model import PairMeasurements, pair_measurements
+from calib_core.estimation.measurement_model import MeasurementPlanes, PairMeasurements, pair_measurements
 from calib_core.measurements import Pair
 from calib_core.options import (
     CalibrationOptions,
