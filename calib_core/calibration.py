@@ -375,7 +375,15 @@ class _Solution:
     @classmethod
     def local(cls, refined: ErrorsInVariablesFit, options: CalibrationOptions, *, smooth: bool = True) -> "_Solution":
         uncertainty = pose_covariance(refined, options.radar, smooth=smooth)
-        left_out = leave_one_out(refined, uncertainty.information, uncertainty.pose_information)
+        left_out = leave_one_out(
+            refined.measurements,
+            refined.camera_from_radar,
+            refined.model,
+            refined.weights,
+            refined.rows,
+            information=uncertainty.information,
+            pose_information=uncertainty.pose_information,
+        )
         return cls(refined, uncertainty, left_out)
 
 

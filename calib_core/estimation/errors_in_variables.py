@@ -7,7 +7,7 @@ Pose and true reflector positions mu are estimated together, by expectation-maxi
 with the mu_i eliminated exactly (equation (2) of `measurement_model`). The estimated `systematic_errors` are further unknowns.
 Plain PnP takes the noisy m_i as the truth; the resulting bias does not shrink with more pairs. w_i is the probability that
 pair i is an inlier: neither an outlier anywhere on the image nor a near outlier, several times farther off than noise
-explains. Each pair is judged by its leave-one-out prediction (`leave_one_out_prediction`): a wrong pair would pass a test
+explains. Each pair is judged by its leave-one-out prediction (`leave_one_out`): a wrong pair would pass a test
 against a fit and a noise level that it has itself distorted.
 """
 
@@ -18,7 +18,7 @@ import numpy as np
 
 from calib_core.arrays import Flags, Indices, Matrix66, Values
 from calib_core.estimation.gnc import GncSolution, associate, log_odds_of, normal_equations
-from calib_core.estimation.leave_one_out_prediction import (
+from calib_core.estimation.leave_one_out import (
     COMPONENTS,
     PSEUDO_SHARED,
     LeaveOneOutPrediction,

@@ -19,7 +19,7 @@ from calib_core.arrays import Values
 from calib_core.estimation.covariance import PoseCovariance, pose_covariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit, fit_errors_in_variables
 from calib_core.estimation.gnc import GncSolution, associate
-from calib_core.estimation.leave_one_out_prediction import noise_parts, predict_left_out, tail_chance
+from calib_core.estimation.leave_one_out import noise_parts, predict_left_out, tail_chance
 from calib_core.estimation.measurement_model import PairMeasurements
 from calib_core.estimation.pose_posterior import batch_of, pose_posterior
 from calib_core.estimation.posterior_samples import refine_poses

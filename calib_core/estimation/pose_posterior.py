@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib_core.arrays import Matrix66, Values, Vector3
-from calib_core.estimation.leave_one_out_prediction import PSEUDO_REDUNDANCY, PSEUDO_SHARED
+from calib_core.estimation.leave_one_out import PSEUDO_REDUNDANCY, PSEUDO_SHARED
 from calib_core.estimation.measurement_model import MeasurementPlanes, PairMeasurements
 from calib_core.geometry import RigidTransform, rotation_exp, rotation_jacobian, skew
 from calib_core.radar import position_planes
