@@ -88,17 +88,17 @@ COMMANDS: Mapping[str, Command] = {
         ),
         Command(
             "evaluate",
-            "cocalib.cli.evaluation.evaluate:Evaluate",
+            "cocalib.cli.evaluate:Evaluate",
             "Judge a calibration on a recording: residuals at clicks (AED, CDSD), radar returns in boxes (Acc).",
         ),
         Command(
             "compare",
-            "cocalib.cli.evaluation.compare:Compare",
+            "cocalib.cli.compare:Compare",
             "Compare two calibrations; with a recording, say which is better there, and whether that is more than noise.",
         ),
         Command(
             "report",
-            "cocalib.cli.evaluation.report:Report",
+            "cocalib.cli.report:Report",
             "Write a report on a calibration: one HTML file, and a PDF if wanted: how good, where, and how one knows.",
         ),
         Command(
@@ -113,12 +113,12 @@ COMMANDS: Mapping[str, Command] = {
         ),
         Command(
             "record-rrd",
-            "cocalib.cli.evaluation.record_rrd:RecordRrd",
+            "cocalib.cli.record_rrd:RecordRrd",
             "Write a recording with its calibration to an .rrd file for the Rerun viewer.",
         ),
         Command(
             "rerun",
-            "cocalib.cli.evaluation.rerun:Rerun",
+            "cocalib.cli.rerun:Rerun",
             "Show a recording with its calibration in the Rerun viewer.",
         ),
         Command(

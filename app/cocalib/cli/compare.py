@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from calib_core.errors import InputError
-from cocalib.cli.evaluation.evidence_flags import EvidenceFlags, Judging, JudgingFlags
 from cocalib.cli.flags import Switch, called
+from cocalib.cli.judging_flags import EvidenceFlags, Judging, JudgingFlags
 from cocalib.cli.output import progress_bar
 from cocalib.cli.recording_flags import Recordings
 from cocalib.platform.terminal import print_exactly

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from calib_core.errors import InputError
-from cocalib.cli.evaluation.evidence_flags import Judging, JudgingFlags
 from cocalib.cli.flags import Switch, called
+from cocalib.cli.judging_flags import Judging, JudgingFlags
 from cocalib.cli.output import progress_bar
 from cocalib.cli.recording_flags import Recordings
 from cocalib.platform.terminal import print_exactly

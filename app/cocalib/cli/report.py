@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from calib_core.errors import InputError
-from cocalib.cli.evaluation.evidence_flags import Judging, JudgingFlags
 from cocalib.cli.flags import File, Switch, called
+from cocalib.cli.judging_flags import Judging, JudgingFlags
 from cocalib.cli.output import progress_bar, write_whole
 from cocalib.cli.recording_flags import Recordings
 

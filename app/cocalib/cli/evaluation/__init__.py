@@ -1,1 +1,0 @@
-"""The commands that judge a calibration on a recording."""
