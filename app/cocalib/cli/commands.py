@@ -123,7 +123,7 @@ COMMANDS: Mapping[str, Command] = {
         ),
         Command(
             "batch",
-            "cocalib.cli.fleet.batch:Batch",
+            "cocalib.cli.batch:Batch",
             "Calibrate many sessions: solve, evaluate, report and export each; what is done already is not done again.",
         ),
         Command(
@@ -133,7 +133,7 @@ COMMANDS: Mapping[str, Command] = {
         ),
         Command(
             "fleet",
-            "cocalib.cli.fleet.fleet:Fleet",
+            "cocalib.cli.fleet:Fleet",
             "Tell how a fleet is calibrated, from the results of a batch: status, history, comparisons, summary page.",
         ),
         Command(

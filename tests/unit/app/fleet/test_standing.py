@@ -8,7 +8,7 @@ import pytest
 
 from calib_core.errors import InputError
 from calib_core.fleet import MountingScatter
-from cocalib.cli.fleet.text_tables import plan_lines
+from cocalib.cli.fleet_tables import plan_lines
 from cocalib.fleet.choosing import compare_sessions, vehicle_named
 from cocalib.fleet.json_documents import status_document
 from cocalib.fleet.kinds import kinds_of

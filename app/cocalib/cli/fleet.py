@@ -95,7 +95,7 @@ class Fleet:
         return folder
 
     def _status(self, fleet: "FleetRecord") -> int:
-        from cocalib.cli.fleet.text_tables import kind_lines, plan_lines, status_lines
+        from cocalib.cli.fleet_tables import kind_lines, plan_lines, status_lines
         from cocalib.fleet.json_documents import status_document
         from cocalib.fleet.kinds import kinds_of
         from cocalib.fleet.standing import standings_of
@@ -111,7 +111,7 @@ class Fleet:
         return _LOOK if fleet.unread or fleet.missing or any(one.needs for one in standings) else 0
 
     def _history(self, fleet: "FleetRecord", name: str) -> int:
-        from cocalib.cli.fleet.text_tables import history_lines
+        from cocalib.cli.fleet_tables import history_lines
         from cocalib.fleet.choosing import vehicle_named
         from cocalib.fleet.json_documents import history_document
 

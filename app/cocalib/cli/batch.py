@@ -62,7 +62,7 @@ class Batch:
         from cocalib.batch.job import jobs_of
         from cocalib.batch.plan import write_plan
         from cocalib.batch.results_folder import ResultsFolder
-        from cocalib.cli.fleet.batch_text import batch_lines, exit_code, shown_batch
+        from cocalib.cli.batch_text import batch_lines, exit_code, shown_batch
         from cocalib.fleet.reading import read_fleet
         from cocalib.fleet.summary_page import write_summary
 
