@@ -14,7 +14,7 @@ import pytest
 
 from calib_core.camera import Camera
 from calib_core.interchange import CAMERA_FORMATS, camera_content, read_camera_file
-from cocalib.cli.intrinsics import searching
+from cocalib.cli import board_searching as searching
 from cocalib.intrinsics.picture_sources import FilePictures
 
 Cocalib = Callable[..., Any]

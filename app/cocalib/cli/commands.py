@@ -63,7 +63,7 @@ COMMANDS: Mapping[str, Command] = {
         ),
         Command(
             "intrinsics",
-            "cocalib.cli.intrinsics.command:Intrinsics",
+            "cocalib.cli.intrinsics:Intrinsics",
             "Calibrate a camera's lens from pictures of a board, or convert a file with intrinsics.",
         ),
         Command(

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
 import tyro
 
@@ -14,16 +14,63 @@ from calib_core.input_files import name_text
 from calib_core.intrinsics.options import IntrinsicsOptions
 from calib_core.recordings import RecordingOptions
 from cocalib.cli.flags import File, Folder, Switch, called, same
-from cocalib.cli.intrinsics.board_flags import BoardFlags, BoardUsed
 from cocalib.cli.output import explain_unsolvable, write_whole
 from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
-    from calib_core.intrinsics import BoardSearch, CalibratedLens
+    from calib_core.intrinsics import Board, BoardSearch, CalibratedLens
     from calib_core.intrinsics.coverage import Coverage
     from calib_core.results import DataWarning
     from cocalib.intrinsics import OpenPictures
     from cocalib.intrinsics.resumed_search import ResumedSearch
+
+
+@dataclass(frozen=True, slots=True)
+class BoardFlags:
+    """Which calibration board is in the pictures."""
+
+    board: Annotated[str | None, called("COLUMNSxROWS")] = None
+    """Size of the board: inner corners of a checkerboard (9x6 for 10 x 7 squares), squares of a ChArUco board, tags of a grid."""
+    square_mm: Annotated[float | None, called("MM")] = None
+    """Side of a square, or of a tag of an AprilGrid [mm]."""
+    kind: Literal["checkerboard", "charuco", "aprilgrid"] = "checkerboard"
+    """Kind of board."""
+    marker_mm: Annotated[float | None, called("MM")] = None
+    """Side of a marker of a ChArUco board [mm]; three quarters of a square if not given."""
+    dictionary: Annotated[str | None, called("NAME")] = None
+    """Markers as OpenCV names them; DICT_5X5_250 for ChArUco and DICT_APRILTAG_36h11 for an AprilGrid if not given."""
+    tag_spacing: Annotated[float | None, called("RATIO")] = None
+    """Gap between the tags of an AprilGrid, as a share of a tag's side (Kalibr's tagSpacing); 0.3 if not given."""
+
+    def required(self) -> "Board":
+        """Return the board.
+
+        Raises:
+            InputError: something about it is missing, or does not apply to this kind.
+        """
+        from calib_core.intrinsics import board_of_size
+
+        if self.board is None or self.square_mm is None:
+            missing = " and ".join(
+                flag
+                for flag, value in (("--board 9x6", self.board), ("--square-mm 25", self.square_mm))
+                if value is None
+            )
+            raise InputError(
+                f"which board is in the pictures is not said: give {missing} "
+                "(a checkerboard of 10 x 7 squares has 9x6 inner corners)"
+            )
+        return board_of_size(
+            self.board,
+            self.square_mm,
+            self.kind,
+            marker_mm=self.marker_mm,
+            tag_spacing=self.tag_spacing,
+            dictionary=self.dictionary,
+        )
+
+
+BoardUsed: TypeAlias = Annotated[BoardFlags, tyro.conf.arg(name="")]
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,13 +117,13 @@ class Intrinsics:
         return self._calibrate()
 
     def _is_camera_file(self) -> bool:
-        from cocalib.cli.intrinsics.camera_files import CAMERA_SUFFIXES
+        from cocalib.cli.lens_output import CAMERA_SUFFIXES
 
         path = Path(str(self.source[0]).partition("#")[0])
         return len(self.source) == 1 and not path.is_dir() and path.suffix.lower() in CAMERA_SUFFIXES
 
     def _convert(self) -> int:
-        from cocalib.cli.intrinsics.camera_files import convert_camera, require_format, size_of
+        from cocalib.cli.lens_output import convert_camera, require_format, size_of
 
         unused = (self.views, self.report, self.rectified)
         if any(unused) or self.json or self.board != BoardFlags() or self.image_topic:
@@ -99,7 +146,7 @@ class Intrinsics:
         for path in (self.out, self.views, self.report):
             if path is not None and not path.absolute().parent.is_dir():
                 raise InputError(f"{path}: the folder {path.parent} does not exist; create it first")
-        from cocalib.cli.intrinsics.camera_files import require_format
+        from cocalib.cli.lens_output import require_format
 
         require_format(self.to)
         if self.rescale is not None:
@@ -110,8 +157,8 @@ class Intrinsics:
     def _calibrate(self) -> int:
         from calib_core.intrinsics import calibrate_lens
         from calib_core.measurements import Unsolvable
-        from cocalib.cli.intrinsics.lens_text import left_out_lines
-        from cocalib.cli.intrinsics.searching import kept_on_interruption, search_for, searched
+        from cocalib.cli.board_searching import kept_on_interruption, search_for, searched
+        from cocalib.cli.lens_output import left_out_lines
         from cocalib.intrinsics import open_pictures
 
         board = self.board.required()
@@ -135,8 +182,7 @@ class Intrinsics:
         """Write and print the lens; return the exit code."""
         from calib_core.interchange.own.intrinsics_json import write_intrinsics
         from calib_core.intrinsics.coverage import view_coverage
-        from cocalib.cli.intrinsics.camera_files import write_camera
-        from cocalib.cli.intrinsics.lens_text import DOUBTFUL, lens_lines
+        from cocalib.cli.lens_output import DOUBTFUL, lens_lines, write_camera
         from cocalib.intrinsics.field_of_view import field_of_view_deg
 
         coverage = view_coverage([view.corners for view in lens.views], lens.board, found.size_px)

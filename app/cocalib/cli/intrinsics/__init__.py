@@ -1,1 +1,0 @@
-"""`cocalib intrinsics`: calibrate a lens, and convert files with intrinsics."""
