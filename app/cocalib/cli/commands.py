@@ -68,7 +68,7 @@ COMMANDS: Mapping[str, Command] = {
         ),
         Command(
             "propose",
-            "cocalib.cli.proposing.command:Propose",
+            "cocalib.cli.propose:Propose",
             "Find where the reflector probably stands in the pictures, for a person or a script to confirm.",
         ),
         Command(

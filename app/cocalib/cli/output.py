@@ -11,7 +11,9 @@ from cocalib.platform import files
 from cocalib.platform.terminal import terminal_stream
 
 if TYPE_CHECKING:
+    from calib_core.camera import Camera
     from calib_core.measurements import ReflectorClick, Unsolvable
+    from calib_core.proposing import ViewProgress
     from calib_core.recordings import Recording
 
 
@@ -76,7 +78,52 @@ def told_clicks_at_frames(
     return found.clicks
 
 
+def recorded_clicks(
+    clicks: "Sequence[ReflectorClick]", recording: "Recording", camera: "Camera", *, source: Path
+) -> "tuple[ReflectorClick, ...]":
+    """Return the clicks of a file at the frames of a recording.
+
+    Raises:
+        InputError: a click is not of this recording.
+    """
+    from cocalib.solving.recorded_clicks import clicks_in_recording
+
+    found = clicks_in_recording(clicks, recording, camera, source=source)
+    tell_notes(found.moved)
+    return found.clicks
+
+
 def tell_notes(notes: Sequence[str]) -> None:
     """Print what a user may want to know to stderr, a line for each."""
     for line in notes:
         print(f"note: {line}", file=sys.stderr)
+
+
+@contextmanager
+def shown_progress() -> "Iterator[Callable[[ViewProgress | str], None]]":
+    """Show on stderr how far the search for proposals is: a bar on a terminal, else a line for each step."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    console = Console(file=terminal_stream(sys.stderr))
+    if not console.is_terminal:
+        yield _tell_step
+        return
+    with Progress(console=console, transient=True) as bar:
+        task = bar.add_task("searching for proposals", total=None)
+
+        def show(progress: "ViewProgress | str") -> None:
+            if isinstance(progress, str):
+                bar.update(task, description=progress)
+            else:
+                bar.update(task, description="looking at the pictures", completed=progress.done, total=progress.count)
+
+        yield show
+
+
+def _tell_step(progress: "ViewProgress | str") -> None:
+    """Print the beginning of each step; of the pictures only the first and the last dwell."""
+    if isinstance(progress, str):
+        print(f"{progress} ...", file=sys.stderr, flush=True)
+    elif progress.done in (1, progress.count):
+        print(f"looking at the pictures: {progress.done} of {progress.count} placements", file=sys.stderr, flush=True)

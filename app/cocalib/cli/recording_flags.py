@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 import tyro
 
+from calib_core.errors import InputError
 from calib_core.options import CalibrationOptions, CameraPositionPrior
 from calib_core.recordings import RecordingOptions
 from cocalib.cli.flags import File, Switch, called, same
@@ -54,6 +55,23 @@ class CameraFlags:
         from calib_core.interchange import CameraFile
 
         return None if self.camera is None else CameraFile.read(self.camera, rescale=self.rescale_camera)
+
+
+_LEAST_M, _MOST_M = 0.02, 2.0
+
+
+def checked_reflector_m(reflector_m: float) -> float:
+    """Return the width of the reflector.
+
+    Raises:
+        InputError: no corner reflector has it.
+    """
+    if not _LEAST_M <= reflector_m <= _MOST_M:
+        raise InputError(
+            f"--reflector-m {reflector_m:g}: give the width of the reflector as the camera sees it, "
+            f"from {_LEAST_M:g} to {_MOST_M:g} m"
+        )
+    return reflector_m
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
 from cocalib.cli.flags import File, Switch
-from cocalib.cli.output import explain_unsolvable, write_whole
+from cocalib.cli.output import explain_unsolvable, recorded_clicks, shown_progress, write_whole
 from cocalib.cli.recording_flags import (
     CameraFlags,
     GivenCamera,
@@ -25,6 +25,7 @@ from cocalib.cli.recording_flags import (
     Topics,
     Vehicle,
     VehicleFlags,
+    checked_reflector_m,
 )
 from cocalib.platform.files import read_text
 from cocalib.platform.terminal import print_exactly
@@ -161,8 +162,6 @@ class Solve:
         self, file: "ClicksFile", recording: "Recording", camera: Camera, options: CalibrationOptions
     ) -> "PlacedClicks | Unsolvable":
         """Return the clicks to solve with: those of the file, and with --auto the ones that are placed automatically."""
-        from cocalib.cli.proposing.flags import checked_reflector_m, shown_progress
-        from cocalib.cli.recorded_clicks import recorded_clicks
         from cocalib.solving.automatic import PlacedClicks, place_clicks
 
         clicks = file.clicks

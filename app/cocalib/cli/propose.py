@@ -8,8 +8,17 @@ from calib_core.errors import InputError
 from calib_core.input_files import name_text
 from calib_core.options import checked_options
 from cocalib.cli.flags import File, Switch
-from cocalib.cli.output import explain_unsolvable, write_whole
-from cocalib.cli.recording_flags import CameraFlags, GivenCamera, OptionFlags, Options, Recordings, TopicFlags, Topics
+from cocalib.cli.output import explain_unsolvable, recorded_clicks, shown_progress, write_whole
+from cocalib.cli.recording_flags import (
+    CameraFlags,
+    GivenCamera,
+    OptionFlags,
+    Options,
+    Recordings,
+    TopicFlags,
+    Topics,
+    checked_reflector_m,
+)
 from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
@@ -46,8 +55,6 @@ class Propose:
         """Find the proposals and print them; return the exit code."""
         from calib_core.measurements import Unsolvable
         from calib_core.recordings import open_recording
-        from cocalib.cli.proposing.flags import checked_reflector_m, shown_progress
-        from cocalib.cli.recorded_clicks import recorded_clicks
         from cocalib.proposing import find_proposals
         from cocalib.solving.recorded_clicks import file_of_clicks, require_confirmed
         from cocalib.solving.solving import required_camera
@@ -86,7 +93,7 @@ class Propose:
     def _explain_nothing(self, proposals: "Proposals", recording: "Recording") -> int:
         """Print to stderr why no placement is proposed; return 1."""
         from calib_core.measurements import TimeNs, Unsolvable
-        from cocalib.cli.proposing.table import unproposed_lines
+        from cocalib.cli.proposal_table import unproposed_lines
 
         print("\n".join(unproposed_lines(proposals, TimeNs(int(recording.image_times[0])))), file=sys.stderr)
         nothing = Unsolvable(
@@ -107,7 +114,7 @@ class Propose:
         """Print the proposals, and write them to the file if one is given; return the exit code."""
         from calib_core.measurements import TimeNs
         from calib_core.proposing.proposals_json import ProposalSource, proposals_json
-        from cocalib.cli.proposing.table import proposal_lines
+        from cocalib.cli.proposal_table import proposal_lines
         from cocalib.proposing import beside_the_reflector
 
         for click in clicks:

@@ -1,1 +1,0 @@
-"""`cocalib propose`, and what `cocalib solve --auto` shares with it."""
