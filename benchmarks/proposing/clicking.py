@@ -10,7 +10,7 @@ from calib_core.association.placements import Placement
 from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
 from calib_core.proposing import DwellView, Proposals
-from cocalib.proposing.finding import proposed_again
+from cocalib.proposing import proposed_again
 
 __all__ = ["Clicked", "after_one_click"]
 

@@ -18,7 +18,7 @@ from calib_core.measurements import NS_PER_S, RadarScans, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.proposing import ViewProgress
 from calib_core.synthetic.options import SimulationOptions, Surroundings
-from cocalib.proposing.finding import find_proposals
+from cocalib.proposing import find_proposals
 
 __all__ = ["speed_table"]
 

@@ -73,10 +73,10 @@ class Pictures:
 @pytest.fixture
 def pictures(monkeypatch: pytest.MonkeyPatch, truth: Any) -> Iterator[Pictures]:
     fake = Pictures(truth)
-    monkeypatch.setattr("cocalib.proposing.finding.dwell_views", fake)
-    monkeypatch.setattr("cocalib.proposing.job.looks_of", lambda *_: iter([object()]))
+    monkeypatch.setattr("cocalib.proposing.dwell_views", fake)
+    monkeypatch.setattr("cocalib.proposing.looks_of", lambda *_: iter([object()]))
     monkeypatch.setattr(
-        "cocalib.proposing.job.with_look",
+        "cocalib.proposing.with_look",
         lambda views, *_: tuple(
             replace(view, candidates=tuple(replace(one, likeness=0.5) for one in view.candidates)) for view in views
         ),

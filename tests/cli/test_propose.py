@@ -263,7 +263,7 @@ def test_an_interrupt_leaves_no_file_and_no_traceback(
     def interrupted(*_: object, **__: object) -> NoReturn:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("cocalib.proposing.finding.dwell_views", interrupted)
+    monkeypatch.setattr("cocalib.proposing.dwell_views", interrupted)
     answer = cocalib(*command, recording, "--out", tmp_path / "made.json")
     assert answer.code == 130
     assert "Traceback" not in answer.out + answer.err

@@ -55,7 +55,7 @@ def found(monkeypatch: pytest.MonkeyPatch) -> None:
         progress(ViewProgress(len(PLACEMENTS), len(PLACEMENTS), DRAWN.views))
         return DRAWN.views, None
 
-    monkeypatch.setattr("cocalib.proposing.job.find_proposals", find)
+    monkeypatch.setattr("cocalib.proposing.find_proposals", find)
 
 
 class Cameras(Sensors):
@@ -123,7 +123,7 @@ def test_a_click_is_averaged_over_the_frames_of_its_placement(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     views = tuple(replace(view, width_px=28.0) for view in DRAWN.views)
-    monkeypatch.setattr("cocalib.proposing.job.find_proposals", lambda *_, **__: (views, None))
+    monkeypatch.setattr("cocalib.proposing.find_proposals", lambda *_, **__: (views, None))
     time = views[1].image_time
 
     async def visit(desk: ProposingDesk, told: list[Any]) -> None:
