@@ -9,9 +9,16 @@ import pytest
 
 from calib_core.errors import InputError
 from calib_core.measurements import NS_PER_S, Box, TimeNs
-from cocalib.overlay_video import OverlayOptions, write_overlay, writing
-from cocalib.overlay_video.marks import draw_boxes, draw_clicks, draw_returns
-from cocalib.overlay_video.panels import Panels, time_text
+from cocalib import overlay_video as writing
+from cocalib.overlay_video import (
+    OverlayOptions,
+    Panels,
+    draw_boxes,
+    draw_clicks,
+    draw_returns,
+    time_text,
+    write_overlay,
+)
 from cocalib.recorded_view import RecordedView, frame_blocks
 from tests.recorded_view import boxes_around, nearest_rows, opened_view
 
