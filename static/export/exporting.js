@@ -295,8 +295,8 @@ function importer() {
   return make("span", "", [open, field]);
 }
 
-/** FileNumbers of app/cocalib/web/exports/file_numbers.py. @typedef {{title: string, rows: {name: string, values: string[], unit: string}[]}} Numbers */
-/** CheckPointRow of app/cocalib/web/exports/check_point.py. @typedef {{words: string, u_px: number, v_px: number, width_px: number, height_px: number, pair: string}} CheckPoint */
+/** FileNumbers of app/cocalib/web/exports.py. @typedef {{title: string, rows: {name: string, values: string[], unit: string}[]}} Numbers */
+/** CheckPointRow of app/cocalib/web/exports.py. @typedef {{words: string, u_px: number, v_px: number, width_px: number, height_px: number, pair: string}} CheckPoint */
 /** How much of the picture's width the inset shows, and its shape. */
 const INSET = 0.36;
 const INSET_ASPECT = 0.34;

@@ -142,7 +142,7 @@ const COLOURS = ["var(--axis-x)", "var(--axis-y)", "var(--axis-z)"];
 /**
  * Draw both frames, with a bold arrow the way that the file's numbers carry points. The directions of the axes are the solved
  * ones; the positions are not to scale.
- * @param {Record<string, any>} pose PoseInFile of app/cocalib/web/exports/file_numbers.py
+ * @param {Record<string, any>} pose PoseInFile of app/cocalib/web/exports.py
  */
 export function frameDrawing(pose) {
   const svg = shape("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, class: "frames", role: "img" });

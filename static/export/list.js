@@ -3,7 +3,7 @@
 import { make } from "../shell/notices.js";
 import { fitOf } from "../shell/searching.js";
 
-/** FormatRow in app/cocalib/web/exports/format_list.py. @typedef {{key: string, label: string, group: string, also: string, takes_parent: boolean, takes_rectified: boolean}} Format */
+/** FormatRow in app/cocalib/web/exports.py. @typedef {{key: string, label: string, group: string, also: string, takes_parent: boolean, takes_rectified: boolean}} Format */
 /** How much of the best fit a format must reach to be shown: a name that is met exactly hides the similar ones. */
 const NEARLY = 0.45;
 const field = make("input", "", []);

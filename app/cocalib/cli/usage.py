@@ -20,12 +20,12 @@ from cocalib.cli.tyro_hook import (
 from cocalib.platform.terminal import with_colours
 
 _GONE = {
-    "--fleet-prior": "each pose rests on its own pairs; add placements, or give --camera-position-m",
+    "fleet-prior": "each pose rests on its own pairs; add placements, or give --camera-position-m",
     "prior": "each pose rests on its own pairs; fleet compare shows how vehicles differ",
     "rebuild": "the commands read the results themselves",
-    "--parquet": "use --csv, which has the same columns",
-    "--shard": "give --scheduler ADDRESS, or batches with manifests of their own and one --out",
-    "--engine": "use --workers 1 for none, --scheduler ADDRESS for dask",
+    "parquet": "use --csv, which has the same columns",
+    "shard": "give --scheduler ADDRESS, or batches with manifests of their own and one --out",
+    "engine": "use --workers 1 for none, --scheduler ADDRESS for dask",
 }
 """Options and values that are gone, each with what replaces it."""
 _NUMBERS = {"INT": "a whole number", "FLOAT": "a number"}
@@ -87,9 +87,8 @@ def _unknown(token: str, kind: type[Runnable]) -> str:
     if not token.startswith("-"):
         return f"unexpected argument '{token}'"
     flag = token.split("=")[0].replace("_", "-")
-    gone = next((name for name in _GONE if flag == name or flag.startswith(f"{name}.")), None)
-    if gone is not None:
-        return f"{flag} went in 0.1: {_GONE[gone]}"
+    if flag.removeprefix("--") in _GONE:
+        return f"{flag} went in 0.1: {_GONE[flag.removeprefix('--')]}"
     known = sorted({"--help", *flags_of(kind)})
     near = [other for other in known if flag.strip("-") and other.endswith(flag.lstrip("-"))]
     near = near or get_close_matches(flag, known, n=2)

@@ -23,7 +23,7 @@ from calib_core.interchange import (
 from calib_core.interchange.formats.registry import GROUP, plugin_formats
 from cocalib.cli import run
 from cocalib.web.channel.export_preview import export_preview
-from cocalib.web.exports.format_list import format_rows
+from cocalib.web.exports import format_rows
 from tests.fake_distribution import install
 
 PARAMETERS = '''

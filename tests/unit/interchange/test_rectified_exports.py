@@ -23,7 +23,7 @@ from calib_core.interchange import (
 )
 from calib_core.interchange.own.calibration_json import calibration_sha256
 from cocalib.web.channel.export_preview import export_preview, exported
-from cocalib.web.exports.format_list import format_rows
+from cocalib.web.exports import format_rows
 
 MATRIX_ONLY = [known.name for known in FORMATS if known.camera == "matrix"]
 OTHERS = [known.name for known in FORMATS if known.camera != "matrix"]

@@ -20,9 +20,18 @@ from calib_core.interchange import (
 from calib_core.interchange.calibration_file import Evidence
 from calib_core.results import DataWarning
 from cocalib.view import sentence, warning_in_sentences
-from cocalib.web.exports.check_point import CheckPointRow, check_point_row
-from cocalib.web.exports.file_numbers import FileNumbers, PoseInFile, our_numbers, pose_in_file
-from cocalib.web.exports.query import Field, FieldError, Fields, fields_in
+from cocalib.web.exports import (
+    CheckPointRow,
+    Field,
+    FieldError,
+    Fields,
+    FileNumbers,
+    PoseInFile,
+    check_point_row,
+    fields_in,
+    our_numbers,
+    pose_in_file,
+)
 
 _EVIDENCE: dict[Evidence, str] = {
     "clicked": "Rests on clicks",

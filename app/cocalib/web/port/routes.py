@@ -29,9 +29,7 @@ from cocalib.web.channel.lens import LensDesk
 from cocalib.web.channel.open_meaning import drawn_meaning, meaning_rows
 from cocalib.web.channel.picture_changes import PictureChanges
 from cocalib.web.channel.radar_survey import Survey
-from cocalib.web.exports.check_point import picture_of
-from cocalib.web.exports.format_list import format_rows
-from cocalib.web.exports.query import FieldError
+from cocalib.web.exports import FieldError, format_rows, picture_of
 from cocalib.web.port.viser_hook import client_page
 from cocalib.workspace import Workspace
 

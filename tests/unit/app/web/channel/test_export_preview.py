@@ -9,7 +9,7 @@ import numpy as np
 from calib_core.interchange import CAMERA_ONLY, FORMATS
 from calib_core.radar import AngleMap
 from cocalib.web.channel import export_preview as panel
-from cocalib.web.exports.format_list import format_rows
+from cocalib.web.exports import format_rows
 
 
 def test_each_format_stands_once_under_the_heading_of_where_it_is_used():
