@@ -1,4 +1,4 @@
-"""The pose that a file holds, in its own numbers: which way they go, their order and their units."""
+"""What the export panel says: its formats and fields; of a file its numbers, their direction and the check point."""
 
 from dataclasses import dataclass
 from typing import Literal
