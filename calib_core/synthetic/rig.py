@@ -11,7 +11,7 @@ from calib_core.arrays import Matrix33, Vector3
 from calib_core.camera import Camera, CameraModel
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.lens_models.registry import LENS_MODELS
-from calib_core.options import RadarOptions, option
+from calib_core.options import option
 
 NOMINAL_ROTATION = ((0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0))
 """Optical axes (right, down, forward) in radar axes (forward, left, up): a camera that looks in the radar's direction."""
@@ -122,40 +122,3 @@ def random_rig(rng: np.random.Generator, *, camera: Camera, options: RigOptions 
     rotation = rotation_exp(error_rad) @ rotation_exp(np.deg2rad(options.camera_angles_deg)) @ nominal_rotation()
     centre = np.array(options.camera_offset_m) + options.camera_offset_sigma_m * rng.standard_normal(3)
     return Rig(camera, RigidTransform(rotation, -rotation @ centre), radar_stand(options))
-
-
-def random_rig_apart(
-    rng: np.random.Generator, *, camera: Camera, distance_m: float, options: RigOptions | None = None
-) -> Rig:
-    """Draw a camera far from the radar, beside or opposite it, that looks at a place ahead of the radar.
-
-    Args:
-        rng: the only source of randomness.
-        camera: the intrinsics.
-        distance_m: between the sensors, along the ground [m]; the camera is up to 1 m above or below the radar's height.
-        options: how the radar is mounted, and how accurately the camera is pointed; None takes the defaults.
-    """
-    options = options or RigOptions()
-    radar_from_world = radar_stand(options)
-    bearing_rad = np.deg2rad(rng.uniform(-110.0, 110.0))
-    height_m = max(0.5, options.radar_height_m + rng.uniform(-1.0, 1.0))
-    centre = np.array([distance_m * np.cos(bearing_rad), distance_m * np.sin(bearing_rad), height_m])
-    aims = np.array([[3.0, 0.0, 0.0], [9.0, 0.0, 0.0]])
-    aim = aims[np.argmax(np.linalg.norm(aims - centre, axis=1))]
-    forward = (aim - centre) / np.linalg.norm(aim - centre)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    error_rad = np.deg2rad(options.camera_angle_sigma_deg) * rng.standard_normal(3)
-    rotation = rotation_exp(error_rad) @ np.array([right, np.cross(forward, right), forward])
-    camera_from_world = RigidTransform(rotation, -rotation @ centre)
-    return Rig(camera, camera_from_world @ radar_from_world.inverse(), radar_from_world)
-
-
-def draw_flat_radar_rig(rng: np.random.Generator, radar: RadarOptions | None = None) -> RigOptions:
-    """Draw the tilt and the height above the ground of a radar that measures no elevation.
-
-    Both are normal with the standard deviations of the options; the height is positive, and at least 0.2 m.
-    """
-    radar = radar or RadarOptions()
-    tilt_deg, height_m = np.array([radar.tilt_sigma_deg, radar.height_sigma_m]) * rng.standard_normal(2)
-    return RigOptions(radar_height_m=max(0.2, abs(float(height_m))), radar_tilt_deg=float(tilt_deg))

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from benchmarks.accuracy.cases import tape_measured
+from benchmarks.accuracy.defects.pair_defects import draw_flat_radar_rig, random_rig_apart
 from benchmarks.accuracy.outcomes import solved_or_refused
 from calib_core.calibration import calibrate_pairs
 from calib_core.geometry import RigidTransform
@@ -14,7 +15,7 @@ from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
 from calib_core.synthetic import FIELD, PairsLayout, Rig, SimulatedPairs, SystematicErrors, simulate_pairs
-from calib_core.synthetic.rig import draw_flat_radar_rig, random_rig, random_rig_apart
+from calib_core.synthetic.rig import random_rig
 from calib_core.synthetic.simulated_pairs import NoiseName, draw_systematic_errors, study_camera
 
 __all__ = ["FLAT", "Adversary", "Change", "Draw", "Solved", "draw_flat", "generator"]

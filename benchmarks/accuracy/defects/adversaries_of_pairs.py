@@ -7,10 +7,7 @@ import numpy as np
 
 from benchmarks.accuracy.cases import tape_measured
 from benchmarks.accuracy.defects.adversaries import FLAT, Adversary, Change, Draw, Solved, draw_flat, generator
-from calib_core.calibration import calibrate_pairs
-from calib_core.options import CalibrationOptions, CameraPositionPrior
-from calib_core.synthetic import AISLE, PairsLayout, SimulatedPairs, SystematicErrors, simulate_pairs
-from calib_core.synthetic.pair_defects import (
+from benchmarks.accuracy.defects.pair_defects import (
     clicked_again,
     from_moved_camera,
     in_other_units,
@@ -19,6 +16,9 @@ from calib_core.synthetic.pair_defects import (
     with_rounded_elevations,
     with_zero_pair,
 )
+from calib_core.calibration import calibrate_pairs
+from calib_core.options import CalibrationOptions, CameraPositionPrior
+from calib_core.synthetic import AISLE, PairsLayout, SimulatedPairs, SystematicErrors, simulate_pairs
 from calib_core.synthetic.simulated_pairs import NoiseName
 
 __all__ = ["ADVERSARIES_OF_PAIRS"]

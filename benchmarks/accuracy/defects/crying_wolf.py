@@ -6,6 +6,7 @@ from itertools import product
 
 import numpy as np
 
+from benchmarks.accuracy.defects.pair_defects import random_rig_apart
 from benchmarks.accuracy.defects.shared_errors import Shared, draw_shared, measure_shared
 from benchmarks.accuracy.figures import MET, UNDECIDED, Measured, at_most, share, worst
 from benchmarks.accuracy.outcomes import codes_in, outcome_figures
@@ -13,7 +14,6 @@ from benchmarks.accuracy.rows import Claim, Figures, Kept, Part, Row, Section
 from calib_core.calibration import calibrate_pairs
 from calib_core.options import CalibrationOptions
 from calib_core.synthetic import simulate_pairs
-from calib_core.synthetic.rig import random_rig_apart
 from calib_core.synthetic.simulated_pairs import NoiseName, SystematicErrors, draw_systematic_errors, study_camera
 
 __all__ = ["HANDEDNESS_CODES", "ROWS", "measure_apart", "measure_clean_draw", "section"]

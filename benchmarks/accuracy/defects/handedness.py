@@ -8,14 +8,13 @@ from typing import Literal
 
 import numpy as np
 
+from benchmarks.accuracy.defects.pair_defects import clicked_again, mirrored, random_rig_apart, with_zero_pair
 from benchmarks.accuracy.figures import MET, MISSED, UNDECIDED
 from benchmarks.accuracy.outcomes import codes_in, outcome_figures, solved_or_refused
 from benchmarks.accuracy.rows import Claim, Figures, Kept, Part, Row, Section
 from calib_core.calibration import calibrate_pairs
 from calib_core.options import CalibrationOptions, SolvingOptions
 from calib_core.synthetic import Rig, random_rig, simulate_pairs
-from calib_core.synthetic.pair_defects import clicked_again, mirrored, with_zero_pair
-from calib_core.synthetic.rig import random_rig_apart
 from calib_core.synthetic.simulated_pairs import NoiseName, draw_systematic_errors, study_camera
 
 __all__ = ["ROWS", "Hand", "measure_hand", "section"]

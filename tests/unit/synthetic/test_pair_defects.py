@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from calib_core.radar import polar_from_cartesian
-from calib_core.synthetic import SimulatedPairs, SystematicErrors, simulate_pairs
-from calib_core.synthetic.pair_defects import (
+from benchmarks.accuracy.defects.pair_defects import (
     clicked_again,
     from_moved_camera,
     in_other_units,
@@ -14,6 +12,8 @@ from calib_core.synthetic.pair_defects import (
     with_rounded_elevations,
     with_zero_pair,
 )
+from calib_core.radar import polar_from_cartesian
+from calib_core.synthetic import SimulatedPairs, SystematicErrors, simulate_pairs
 
 
 @pytest.fixture

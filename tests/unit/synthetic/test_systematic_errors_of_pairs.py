@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks.accuracy.defects.pair_defects import draw_flat_radar_rig, random_rig_apart
 from calib_core.options import LensOptions, RadarOptions, ReflectorOptions
 from calib_core.radar import polar_from_cartesian
 from calib_core.synthetic import (
@@ -16,7 +17,6 @@ from calib_core.synthetic import (
     simulate_pairs,
     typical_camera,
 )
-from calib_core.synthetic.rig import draw_flat_radar_rig, random_rig_apart
 
 small = st.floats(-0.1, 0.1)
 pixels = st.floats(-20.0, 20.0)

@@ -1,4 +1,7 @@
-"""What goes wrong with simulated pairs beyond noise: clicks of one placement, companions, a moved camera, axes, units."""
+"""What goes wrong with simulated pairs beyond noise: clicks of one placement, companions, a moved camera, axes, units.
+
+And rigs that are hard: a camera far from the radar, a radar that measures no elevation, tilted.
+"""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -7,9 +10,12 @@ from typing import Literal
 import numpy as np
 
 from calib_core.arrays import Flags, Points3
+from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.measurements import Candidate, Pair
+from calib_core.options import RadarOptions
 from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, polar_from_cartesian
+from calib_core.synthetic.rig import Rig, RigOptions, radar_stand
 from calib_core.synthetic.simulated_pairs import SimulatedPairs
 
 
@@ -154,3 +160,40 @@ def _some(rng: np.random.Generator, count: int, share: float) -> Flags:
     chosen = np.zeros(count, dtype=np.bool_)
     chosen[rng.permutation(count)[: round(share * count)]] = True
     return chosen
+
+
+def random_rig_apart(
+    rng: np.random.Generator, *, camera: Camera, distance_m: float, options: RigOptions | None = None
+) -> Rig:
+    """Draw a camera far from the radar, beside or opposite it, that looks at a place ahead of the radar.
+
+    Args:
+        rng: the only source of randomness.
+        camera: the intrinsics.
+        distance_m: between the sensors, along the ground [m]; the camera is up to 1 m above or below the radar's height.
+        options: how the radar is mounted, and how accurately the camera is pointed; None takes the defaults.
+    """
+    options = options or RigOptions()
+    radar_from_world = radar_stand(options)
+    bearing_rad = np.deg2rad(rng.uniform(-110.0, 110.0))
+    height_m = max(0.5, options.radar_height_m + rng.uniform(-1.0, 1.0))
+    centre = np.array([distance_m * np.cos(bearing_rad), distance_m * np.sin(bearing_rad), height_m])
+    aims = np.array([[3.0, 0.0, 0.0], [9.0, 0.0, 0.0]])
+    aim = aims[np.argmax(np.linalg.norm(aims - centre, axis=1))]
+    forward = (aim - centre) / np.linalg.norm(aim - centre)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    error_rad = np.deg2rad(options.camera_angle_sigma_deg) * rng.standard_normal(3)
+    rotation = rotation_exp(error_rad) @ np.array([right, np.cross(forward, right), forward])
+    camera_from_world = RigidTransform(rotation, -rotation @ centre)
+    return Rig(camera, camera_from_world @ radar_from_world.inverse(), radar_from_world)
+
+
+def draw_flat_radar_rig(rng: np.random.Generator, radar: RadarOptions | None = None) -> RigOptions:
+    """Draw the tilt and the height above the ground of a radar that measures no elevation.
+
+    Both are normal with the standard deviations of the options; the height is positive, and at least 0.2 m.
+    """
+    radar = radar or RadarOptions()
+    tilt_deg, height_m = np.array([radar.tilt_sigma_deg, radar.height_sigma_m]) * rng.standard_normal(2)
+    return RigOptions(radar_height_m=max(0.2, abs(float(height_m))), radar_tilt_deg=float(tilt_deg))
