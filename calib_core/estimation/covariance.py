@@ -13,7 +13,8 @@ of the residuals gives the probability of each level and length. The least-squar
 becomes H^-1 (J^T V J) H^-1.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -101,29 +102,20 @@ def pose_covariance(
         condition=_scaled_condition(plain - prior_information),
         growth=growth,
         parts=_parts(refined, plain, assumed),
-        systematic_errors=tuple(_result(one, pose) for one in shared.found),
+        systematic_errors=_shares(shared.found, pose),
         lens=shared.lens,
     )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Found:
-    """What is known of one error: its value, the standard deviation of that, and the variance (6,) it gives the pose."""
-
-    name: str
-    prior_sigma: float
-    value: float
-    sigma: float
-    estimated: bool
-    variance: Values
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class _Shared:
-    """What the widening errors add to the pose's covariance (6, 6), every error, and the covariance of a refined lens."""
+    """What the widening errors add to the pose's covariance (6, 6), every error, and the covariance of a refined lens.
+
+    The errors hold the variance [m^2, rad^2] that each gives the pose, until `_shares` divides it by that of the pose.
+    """
 
     pose: Matrix66
-    found: list[_Found]
+    found: list[SystematicErrorResult]
     lens: np.ndarray | None = None
 
 
@@ -135,13 +127,13 @@ def _shared_errors(refined: ErrorsInVariablesFit, plain: np.ndarray, covariance:
     measurements, errors = refined.measurements, refined.measurements.errors
     variances = np.diag(covariance)[6:]
     found = [
-        _Found(
+        SystematicErrorResult(
             error.name,
-            error.sigma,
             float(errors.values[k]),
             float(variances[k] ** 0.5),
+            error.sigma,
             True,
-            covariance[:6, 6 + k] ** 2 / variances[k],
+            *_sums(covariance[:6, 6 + k] ** 2 / variances[k]),
         )
         for k, error in enumerate(errors.estimated)
         if not error.of_lens
@@ -159,7 +151,7 @@ def _shared_errors(refined: ErrorsInVariablesFit, plain: np.ndarray, covariance:
     moves = -solved[:6] * sigma
     values, sigmas = _suggested(refined, whitened, mixed, solved)
     found += [
-        _Found(error.name, error.sigma, values[k], sigmas[k], False, moves[:, k] ** 2)
+        SystematicErrorResult(error.name, values[k], sigmas[k], error.sigma, False, *_sums(moves[:, k] ** 2))
         for k, error in enumerate(errors.widening)
         if not error.of_lens
     ]
@@ -210,7 +202,7 @@ def _of_lens(
     own: np.ndarray,
     *,
     estimated: bool,
-) -> list[_Found]:
+) -> list[SystematicErrorResult]:
     """Say by name what is known of the lens along the r axes of its prior.
 
     Args:
@@ -228,7 +220,9 @@ def _of_lens(
     sigmas = np.sqrt(((axes @ covariance) * axes).sum(axis=1))
     variances = shared_out(mixed @ axes.T, axes @ own @ axes.T)
     return [
-        _Found(name, float(priors[k]), float(amounts[k]), float(sigmas[k]), estimated, variances[:, k])
+        SystematicErrorResult(
+            name, float(amounts[k]), float(sigmas[k]), float(priors[k]), estimated, *_sums(variances[:, k])
+        )
         for k, name in enumerate(prior.names)
         if priors[k] > 0.0
     ]
@@ -260,16 +254,15 @@ def _suggested_lens(
     return known @ (weighted.T @ refined.model.residual.reshape(-1)), known
 
 
-def _result(found: _Found, pose: Matrix66) -> SystematicErrorResult:
+def _sums(variance: Values) -> tuple[float, float]:
+    return float(variance[:3].sum()), float(variance[3:].sum())
+
+
+def _shares(found: Sequence[SystematicErrorResult], pose: Matrix66) -> tuple[SystematicErrorResult, ...]:
     position, rotation = float(np.trace(pose[:3, :3])), float(np.trace(pose[3:, 3:]))
-    return SystematicErrorResult(
-        name=found.name,
-        value=found.value,
-        sigma=found.sigma,
-        prior_sigma=found.prior_sigma,
-        estimated=found.estimated,
-        position_share=float(found.variance[:3].sum()) / position,
-        rotation_share=float(found.variance[3:].sum()) / rotation,
+    return tuple(
+        replace(one, position_share=one.position_share / position, rotation_share=one.rotation_share / rotation)
+        for one in found
     )
 
 
