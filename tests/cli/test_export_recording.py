@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
-import cocalib.cli.export_recording as command
+import cocalib.cli.export as command
 
 
 @pytest.fixture(scope="module")
