@@ -9,13 +9,204 @@ import tyro
 
 from calib_core.errors import InputError
 from cocalib.cli.flags import File, Switch, called
-from cocalib.cli.meanings import MeaningFlags
 from cocalib.cli.output import write_whole
 from cocalib.cli.tree_flags import FrameFlags, Frames, input_file
 
 if TYPE_CHECKING:
     from calib_core.camera import Camera
     from calib_core.interchange import ImportedCalibration
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from cocalib.cli.recording_flags import TopicFlags, Topics
+
+if TYPE_CHECKING:
+    from calib_core.camera import Camera
+    from calib_core.interchange import CheckPairs, ImportedCalibration, TreeFile
+    from calib_core.interchange.hypotheses.found_poses import FoundPose
+    from calib_core.interchange.hypotheses.ranking import Hypothesis
+    from calib_core.interchange.hypotheses.reading import UnstatedFile
+    from calib_core.recordings import Recording
+
+
+_CONTRADICTED = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class MeaningFlags:
+    """Which pose of a file, and what it means, if the file does not say."""
+
+    pose: Annotated[str | None, called("PLACE")] = None
+    """Which pose, if the file contains several: its place in the file, such as calibration.radar.T."""
+    as_: Annotated[str | None, tyro.conf.arg(name="as", metavar="MEANING", help_behavior_hint="")] = None
+    """What the numbers mean, if the file does not say: a meaning from the list that this command prints."""
+    sheet: File = None
+    """Draw each meaning over a frame of --recording and write the picture here (PNG)."""
+    recording: Annotated[tuple[Path, ...], called("RECORDING...")] = ()
+    """A recording of these sensors, one file or several: --sheet draws over one of its frames."""
+    at: Annotated[float | None, called("SECONDS")] = None
+    """Which frame to draw over, in seconds after the first; by default the one in the middle."""
+    topics: Topics = field(default_factory=TopicFlags)
+
+    def unstated(self, files: "Sequence[TreeFile] | None", source: str) -> "UnstatedFile | None":
+        """Return the poses in a file that does not say what they mean; None if it does, or if this is a tree of frames.
+
+        Args:
+            files: of the calibration; None if it is a recording.
+            source: the name of it all, for error messages.
+
+        Raises:
+            InputError: flags were given that a file which states its meaning does not need.
+        """
+        from calib_core.interchange.hypotheses.reading import read_unstated
+
+        alone = files[0] if files is not None and len(files) == 1 else None
+        file = None if alone is None else read_unstated(alone.data, alone.source)
+        if file is None:
+            self._refuse_needless(source)
+        return file
+
+    def chosen(
+        self,
+        file: "UnstatedFile",
+        *,
+        camera: "Camera | None" = None,
+        pairs: "CheckPairs | None" = None,
+        against: "ImportedCalibration | None" = None,
+    ) -> "ImportedCalibration | None":
+        """Return the meaning that is clear or picked; None if the numbers may mean several things, which have then been listed.
+
+        Args:
+            file: what was read.
+            camera: the intrinsics, to draw with.
+            pairs: radar positions and the pixels where they were seen.
+            against: a calibration of the same sensors that is known to be right.
+
+        Raises:
+            InputError: it contains no such pose or meaning; or the pairs contradict what was picked.
+        """
+        from calib_core.interchange.hypotheses.ranking import clear_one, hypotheses_of, likely_ones
+        from calib_core.interchange.hypotheses.reading import as_imported, picked
+
+        pose = file.pose_at(self.pose)
+        other = None if against is None else against.camera_from_radar
+        hypotheses = hypotheses_of(pose, pairs=pairs, against=other)
+        if self.sheet is not None:
+            self._write_sheet(self.sheet, file, likely_ones(hypotheses), camera)
+        if self.as_ is not None:
+            chosen = picked(hypotheses, self.as_, file.source)
+            if pairs is not None or against is not None:
+                _refuse_contradicted(chosen, hypotheses[0], file.source)
+            return as_imported(file, pose, chosen, by_hand=True)
+        clear = clear_one(pose, hypotheses)
+        if clear is None:
+            _list(hypotheses, Path(file.source), pose)
+            return None
+        _tell_of_others(hypotheses, tested=pairs is not None or against is not None)
+        return as_imported(file, pose, clear, by_hand=False)
+
+    def _refuse_needless(self, source: str) -> None:
+        """Refuse flags that a file which states its meaning does not need.
+
+        Raises:
+            InputError: one was given.
+        """
+        given = (("--as", self.as_), ("--pose", self.pose), ("--sheet", self.sheet))
+        for flag, value in given:
+            if value is not None:
+                raise InputError(f"{source}: its format states what the numbers mean; omit {flag}")
+
+    def _write_sheet(
+        self, out: Path, file: "UnstatedFile", hypotheses: "Sequence[Hypothesis]", camera: "Camera | None"
+    ) -> None:
+        """Draw the hypotheses over a frame of the recording.
+
+        Raises:
+            CalibrationError: there is no recording or no camera, or they cannot be read.
+        """
+        from calib_core.recordings import open_recording
+        from cocalib.hypothesis_sheet import contact_sheet, frame_with_returns, png
+        from cocalib.solving.solving import required_camera
+
+        if not self.recording:
+            raise InputError("--sheet draws over a frame of a recording; give it with --recording RECORDING")
+        with open_recording(self.recording, self.topics, require=("image", "radar")) as recording:
+            used = camera or _camera_in(file) or required_camera(recording, None)
+            frame = frame_with_returns(recording, used, _frame_at(recording, self.at))
+        write_whole(out, png(contact_sheet(frame, hypotheses)))
+        print(f"{out}: {len(hypotheses)} meanings drawn over a frame of {recording.name}", file=sys.stderr)
+
+
+def _camera_in(file: "UnstatedFile") -> "Camera | None":
+    """Return the camera in the file, if the size of its pictures is stated.
+
+    Raises:
+        InputError: a parameter is invalid.
+    """
+    found = file.camera
+    return None if found is None or found.size_px is None else found.camera(image_size_px=None, source=file.source)
+
+
+def _frame_at(recording: "Recording", seconds: float | None) -> int | None:
+    """Return the index of the frame nearest to a time after the first; None if no time is given.
+
+    Raises:
+        InputError: the time is not in the recording.
+    """
+    import numpy as np
+
+    if seconds is None:
+        return None
+    after_s = (recording.image_times - recording.image_times[0]) / 1e9
+    if not 0 <= seconds <= after_s[-1] + 1:
+        raise InputError(
+            f"--at {seconds:g}: the frames of {recording.name} last {after_s[-1]:.1f} s; give a time in them"
+        )
+    return int(np.argmin(np.abs(after_s - seconds)))
+
+
+def _list(hypotheses: "Sequence[Hypothesis]", path: Path, pose: "FoundPose") -> None:
+    """Print the hypotheses, how to choose one, and that nothing was written."""
+    from calib_core.interchange.hypotheses.ranking import contradicts_names, likely_ones
+
+    shown = likely_ones(hypotheses)
+    print(f"{path.name}: {pose.place} does not state what its numbers mean; they may be:")
+    for number, one in enumerate(shown, 1):
+        print(f"{number:>3}  {one.key}  ({one.score})\n     {one.words}")
+    others = len(hypotheses) - len(shown)
+    print(f"{others} other meanings are less plausible." if others else "There are no others.")
+    if pose.hints.other:
+        missing = "camera" if pose.hints.names_radar else "radar"
+        print(f"Its names mention {pose.hints.other!r} and no {missing}: is it the pose between radar and camera?")
+    if contradicts_names(pose, shown[0]):
+        print(
+            f"Its names say {pose.hints.named_direction}, its numbers look like the other direction: find out which is right."
+        )
+    print(
+        f"Nothing was written: pick one, such as --as {shown[0].key}; or let them be tested with --pairs FILE or --against FILE. "
+        "--sheet FILE.png --recording RECORDING draws each over a frame."
+    )
+
+
+def _tell_of_others(hypotheses: "Sequence[Hypothesis]", *, tested: bool) -> None:
+    """Print what was taken, and which other meanings are possible if nothing was tested."""
+    print(f"note: taken as {hypotheses[0].key} ({hypotheses[0].score}): {hypotheses[0].words}", file=sys.stderr)
+    others = [] if tested else [one for one in hypotheses[1:4] if one.fits]
+    if others:
+        named = "; ".join(f"{one.key} ({one.score})" for one in others)
+        print(f"note: less plausible, but possible: {named}; pick with --as MEANING", file=sys.stderr)
+
+
+def _refuse_contradicted(chosen: "Hypothesis", best: "Hypothesis", source: str) -> None:
+    """Refuse a meaning that the tests contradict while they support another.
+
+    Raises:
+        InputError: they do.
+    """
+    if best.fits and chosen is not best and (not chosen.fits or chosen.share < _CONTRADICTED):
+        raise InputError(
+            f"{source}: --as {chosen.key} is contradicted ({chosen.score}); the test supports {best.key} ({best.score})"
+        )
 
 
 @dataclass(frozen=True, slots=True)
