@@ -3,7 +3,7 @@
 Nothing here deals with files, threads or screens.
 """
 
-from cocalib.session.applying import EventError, apply
+from cocalib.session.applying import EventError, History, advance, apply, settled
 from cocalib.session.events import (
     AssumptionsConfirmed,
     AxesStated,
@@ -33,7 +33,6 @@ from cocalib.session.events import (
     Undo,
     WarningsAcknowledged,
 )
-from cocalib.session.history import History, advance, settled
 from cocalib.session.state import (
     AssumedReading,
     BoxEdges,

@@ -1,7 +1,7 @@
 """How each event changes the session: `apply`, one rule per event, and what events are checked against."""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import singledispatch
 from typing import TypeAlias
 
@@ -32,10 +32,12 @@ from cocalib.session.events import (
     IntrinsicsChosen,
     OptionsChanged,
     PlacementDismissed,
+    Redo,
     ReturnChosen,
     ScansAdded,
     Solved,
     Step,
+    Undo,
     WarningsAcknowledged,
 )
 from cocalib.session.state import (
@@ -447,3 +449,71 @@ def seconds(time: TimeNs) -> str:
     """Return a stamp as text, to the nanosecond."""
     sec, nanosec = time_parts(time)
     return f"{sec}.{nanosec:09d} s"
+
+
+@dataclass(frozen=True, slots=True)
+class History:
+    """The current session, with those before it (undo) and those undone (redo), nearest last."""
+
+    present: Session = field(default_factory=Session)
+    past: tuple[Session, ...] = ()
+    future: tuple[Session, ...] = ()
+
+
+def advance(history: History, step: Step, facts: RecordingFacts) -> History:
+    """Apply one step; a step that changes nothing returns the same History object.
+
+    Raises:
+        EventError: the event does not fit the session or the recording.
+        OptionError: an option is unknown or out of range.
+    """
+    if isinstance(step, Undo):
+        return _undone(history)
+    if isinstance(step, Redo):
+        return _redone(history)
+    present = apply(history.present, step, facts)
+    if present is history.present:
+        return history
+    if isinstance(step, Solved | ScansAdded | ColumnsMapped | AssumptionsConfirmed | WarningsAcknowledged):
+        return replace(history, present=present)
+    return History(present, (*history.past, history.present))
+
+
+def settled(step: Step, session: Session) -> Step:
+    """Turn a change of some options into the full set of options, so that the journalled step does not depend on earlier ones.
+
+    Raises:
+        OptionError: an option is unknown, of the wrong type or out of range.
+    """
+    if isinstance(step, OptionsChanged):
+        return OptionsChanged.of(changed_options(session.options, changes_from_tree(step.options)))
+    return step
+
+
+def _undone(history: History) -> History:
+    if not history.past:
+        return history
+    *past, before = history.past
+    return History(_resumed(before, history.present), tuple(past), (*history.future, history.present))
+
+
+def _redone(history: History) -> History:
+    if not history.future:
+        return history
+    *future, after = history.future
+    return History(_resumed(after, history.present), (*history.past, history.present), tuple(future))
+
+
+def _resumed(kept: Session, current: Session) -> Session:
+    """Return to a kept session under a new revision, so that no pending answer can be mistaken for an answer to this."""
+    revision = current.revision + 1
+    return replace(
+        kept,
+        revision=revision,
+        next_click=current.next_click,
+        next_box=current.next_box,
+        outcome_revision=revision if kept.is_solved else kept.outcome_revision,
+        column_map=current.column_map,
+        confirmed=current.confirmed,
+        acknowledged=current.acknowledged,
+    )
