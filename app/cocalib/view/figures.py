@@ -8,8 +8,8 @@ from calib_core.arrays import Matrix33, Vector3, frozen_array
 from calib_core.geometry import skew
 from calib_core.results import Calibration
 from calib_core.results.radar_axes import sigma_in_radar_axes
+from cocalib.view.click_rows import reprojections
 from cocalib.view.model import Figure, Level
-from cocalib.view.reprojections import reprojections
 from cocalib.view.wording import plain, sentence, with_sigma
 
 _METRICS = {

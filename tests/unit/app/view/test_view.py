@@ -17,8 +17,8 @@ from calib_core.results.verdict import verdict_on
 from calib_core.synthetic import NoiseProfile, simulate_pairs
 from cocalib.session import ClickExcluded, ClickMoved, ClickPlaced, History, RecordingFacts, Solved, Undo, advance
 from cocalib.view import View, summary_lines, view
+from cocalib.view.click_rows import ellipses_of, reprojections
 from cocalib.view.figures import OPTICAL_FROM_BODY, mounting_of, pose_figures
-from cocalib.view.reprojections import ellipses_of, reprojections
 from cocalib.view.wording import plain, sentence, with_sigma
 
 FACTS = RecordingFacts("drive", 1_700_000_000_123_456_789 + 100_000_000 * np.arange(50), width_px=640, height_px=480)
