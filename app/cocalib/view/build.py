@@ -12,10 +12,18 @@ from cocalib.session import History, RecordingFacts, Session
 from cocalib.session.boxes_in_frames import CarriedTrack, carried_tracks
 from cocalib.view.box_rows import box_rows, known_labels
 from cocalib.view.click_rows import click_rows
-from cocalib.view.figures import assumed_figures, firm_text, metric_figures, pose_figures, residual_limit_px
+from cocalib.view.figures import (
+    assumed_figures,
+    firm_text,
+    metric_figures,
+    pose_figures,
+    refined_sentences,
+    residual_limit_px,
+    systematic_errors,
+    uncertainty_sentences,
+)
 from cocalib.view.model import AccPanel, AssumptionRow, Figure, Stage, SystematicErrorTable, View
 from cocalib.view.reference import Reference, comparison_figures, reference_words, shown_calibration
-from cocalib.view.systematic_errors import refined_sentences, systematic_errors, uncertainty_sentences
 from cocalib.view.verdict_row import advice_for, shown_verdict, verdict_row
 from cocalib.view.wording import plain, sentence, warning_in_sentences
 

@@ -15,7 +15,7 @@ from calib_core.interchange import calibration_text, read_calibration
 from calib_core.measurements import Pair, Unsolvable
 from calib_core.options import CalibrationOptions, RefiningOptions
 from calib_core.results import Calibration
-from cocalib.view.systematic_errors import refined_sentences
+from cocalib.view.figures import refined_sentences
 
 TOLD = WrongLens("focal 2 %", refined=True, scale_told=True, alone=True)
 UNTOLD = WrongLens("focal 2 %", refined=True)

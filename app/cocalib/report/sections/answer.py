@@ -8,8 +8,14 @@ from calib_core.results.verdict import Verdict, verdict_on
 from cocalib.report.markup import Child, Markup, tag
 from cocalib.report.plots import drawing, rounded_step, text
 from cocalib.report.subject import ReportSubject
-from cocalib.view.figures import Mounting, assumed_figures, metric_figures, mounting_of, pose_figures
-from cocalib.view.systematic_errors import uncertainty_sentences
+from cocalib.view.figures import (
+    Mounting,
+    assumed_figures,
+    metric_figures,
+    mounting_of,
+    pose_figures,
+    uncertainty_sentences,
+)
 from cocalib.view.wording import plain, sentence
 
 LEVEL_SIGNS = {"good": "●", "usable": "◐", "weak": "○", "contradictory": "✕", "nothing": "–", "not judged": "–"}

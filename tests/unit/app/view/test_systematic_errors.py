@@ -12,8 +12,7 @@ from calib_core.results import Calibration
 from calib_core.results.systematic_errors import SystematicErrorResult
 from calib_core.synthetic import simulate_pairs
 from cocalib.view import summary_lines
-from cocalib.view.figures import assumed_figures, firm_text, pose_figures
-from cocalib.view.systematic_errors import systematic_errors
+from cocalib.view.figures import assumed_figures, firm_text, pose_figures, systematic_errors
 
 
 def solved(*, flat: bool = False, options: CalibrationOptions | None = None) -> Calibration:
