@@ -1,36 +1,31 @@
-"""`cocalib export`: write a calibration in another tool's format."""
+"""`cocalib export`: write a calibration in another tool's format, into a frame tree, or into a recording."""
 
+import errno
 import sys
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from calib_core.errors import InputError
+from calib_core.errors import InputError, RecordingError
+from calib_core.interchange.syntax.zip_archives import unpack
 from cocalib.cli.flags import File, Switch, called
-from cocalib.cli.output import write_whole
+from cocalib.cli.output import progress_bar, write_whole
 from cocalib.cli.recording_flags import TopicFlags, Topics
 from cocalib.cli.tree_flags import FrameFlags, Frames, TreeFlags, Trees
+from cocalib.platform.files import writing_whole
 from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
-    from calib_core.geometry import RigidTransform
-    from calib_core.interchange import CalibrationFile
-import errno
-from collections.abc import Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING
-
-from calib_core.errors import RecordingError
-from cocalib.cli.output import progress_bar
-from cocalib.platform.files import writing_whole
-
-if TYPE_CHECKING:
     from calib_core.deployment import RecordingWritten
+    from calib_core.geometry import RigidTransform
     from calib_core.interchange import CalibrationFile, Provenance
     from calib_core.recordings import Recording
-from calib_core.interchange.syntax.zip_archives import unpack
+
+MCAP = "mcap"
+_LAYOUT_ENDING = ".foxglove-layout.json"
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,10 +170,6 @@ def _own_calibration(path: Path) -> "CalibrationFile":
     from calib_core.interchange import consistent_file, read_any_file
 
     return consistent_file(read_any_file(path), str(path))
-
-
-MCAP = "mcap"
-_LAYOUT_ENDING = ".foxglove-layout.json"
 
 
 def export_recording(

@@ -1,6 +1,7 @@
-"""`cocalib import`."""
+"""`cocalib import`: convert a calibration from any format; if a file does not say what its numbers mean, list what they may."""
 
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,15 +11,8 @@ import tyro
 from calib_core.errors import InputError
 from cocalib.cli.flags import File, Switch, called
 from cocalib.cli.output import write_whole
-from cocalib.cli.tree_flags import FrameFlags, Frames, input_file
-
-if TYPE_CHECKING:
-    from calib_core.camera import Camera
-    from calib_core.interchange import ImportedCalibration
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
-
 from cocalib.cli.recording_flags import TopicFlags, Topics
+from cocalib.cli.tree_flags import FrameFlags, Frames, input_file
 
 if TYPE_CHECKING:
     from calib_core.camera import Camera

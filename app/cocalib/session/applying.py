@@ -1,4 +1,4 @@
-"""How each event changes the session: `apply`, one rule per event, and what events are checked against."""
+"""How each event changes the session: `apply`, one rule per event, and its checks; `advance` with undo and redo as steps."""
 
 import math
 from dataclasses import dataclass, field, replace

@@ -17,6 +17,8 @@ from cocalib.view.model import ClickRow, ClickState, Ellipse
 from cocalib.view.wording import plain, sentence
 
 _CHI2_95_2D = 5.991464547107979  # 95 % quantile of chi-squared with 2 degrees of freedom
+# Pixels are rounded to steps of at most 1 % of the pair's ellipse and a quarter of a pixel, which cannot be seen: with many
+# clicks, one more then leaves most pairs as they are, and only the others are sent to the page.
 _SHARE, _FINEST_PX, _COARSEST_PX = 0.01, 2.0**-7, 0.25
 """Steps of pixels: this share of the ellipse's semi-major axis, within these limits, then down to a power of two."""
 _DECIMALS_RAD, _DECIMALS_POSITION, _DECIMALS_PROBABILITY = 2, 4, 3

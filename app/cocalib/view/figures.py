@@ -1,4 +1,4 @@
-"""The figures next to the picture, each with one sentence that explains it, and how the camera is mounted."""
+"""The figures next to the picture, each with one sentence, how the camera is mounted, and the errors that all pairs share."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

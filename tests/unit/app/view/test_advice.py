@@ -8,8 +8,8 @@ from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
 from calib_core.results.verdict import verdict_on
 from calib_core.synthetic import simulate_pairs
+from cocalib.view.build import advice_for
 from cocalib.view.model import Advice
-from cocalib.view.verdict_row import advice_for
 
 
 def solved(count: int, options: CalibrationOptions | None = None) -> Calibration:

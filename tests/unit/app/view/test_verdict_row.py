@@ -10,8 +10,8 @@ from calib_core.measurements import ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions, NoiseOptions
 from calib_core.results.verdict import DONE, Verdict
 from cocalib.session import ClickPlaced, History, PlacementDismissed, RecordingFacts, Session, advance
+from cocalib.view.build import placements_left, verdict_row
 from cocalib.view.click_rows import disagreement
-from cocalib.view.verdict_row import placements_left, verdict_row
 
 FACTS = RecordingFacts("drive", 1_000_000_000 * np.arange(50), width_px=640, height_px=480)
 
