@@ -141,6 +141,7 @@ def test_a_number_reads_back_bit_for_bit_in_every_reader(value):
     assert "e" not in text or "." in text
 
 
+@settings(max_examples=40)
 @given(
     clicks=st.lists(
         st.builds(
@@ -272,7 +273,7 @@ def test_a_slip_is_never_missed(pose, edit):
     assert all(result.code not in ("check-point-missed", "disagrees") for result in explained)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(
     value=st.recursive(
         st.none() | st.integers(-(2**53), 2**53) | st.floats() | st.text(),

@@ -245,7 +245,7 @@ def lived(taken: Sequence[Step]) -> list[tuple[Step, History]]:
     return kept
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(taken=st.lists(steps, max_size=12), share=st.floats(0.0, 1.0))
 def test_a_journal_cut_at_any_byte_gives_the_last_confirmed_session_back(taken: list[Step], share: float) -> None:
     kept = lived(taken)
@@ -269,7 +269,7 @@ def test_a_journal_cut_at_any_byte_gives_the_last_confirmed_session_back(taken: 
         assert whole.startswith(journal.read_bytes())
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(taken=st.lists(steps, max_size=6), place=st.floats(0.0, 1.0), byte=st.integers(0, 255))
 def test_a_changed_byte_of_the_journal_never_changes_the_session(taken: list[Step], place: float, byte: int) -> None:
     kept = lived(taken)

@@ -106,20 +106,17 @@ def test_excluding_an_influential_pair_moves_the_camera_as_stated_in_the_warning
 
 @pytest.fixture(scope="module")
 def good_sets() -> list[SimulatedPairs]:
-    return [simulate_pairs(20, rng=np.random.default_rng(7000 + seed), noise="ti_fine") for seed in range(50)]
+    return [simulate_pairs(20, rng=np.random.default_rng(7000 + seed), noise="ti_fine") for seed in range(30)]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("options", [FREE, MEASURED], ids=["free", "measured"])
-def test_fifty_good_sets_give_hardly_any_warning(options: CalibrationOptions, good_sets: list[SimulatedPairs]) -> None:
-    warned = wrongly_out = 0
+def test_thirty_good_sets_give_no_warning(options: CalibrationOptions, good_sets: list[SimulatedPairs]) -> None:
+    """A share of warnings of 10 % would pass with a chance of 4 %, as with fewer than two in fifty."""
     for simulated in good_sets:
-        outcome = calibrate_pairs(simulated.pairs, simulated.camera, options)
-        assert isinstance(outcome, Calibration)
-        warned += any(warning.code == "doubtful-pair" for warning in outcome.warnings)
-        wrongly_out += sum(not pair.inlier for pair in outcome.pairs)
-    assert warned < 2
-    assert wrongly_out <= 2  # of 1000
+        outcome = calibrate_pairs(simulated.pairs, simulated.camera, options).unwrap()
+        assert "doubtful-pair" not in [warning.code for warning in outcome.warnings]
+        assert all(pair.inlier for pair in outcome.pairs)
 
 
 def test_algorithm_1_says_that_most_pairs_disagree_and_residuals_are_too_large(rooftop: ClickedSample) -> None:

@@ -257,8 +257,9 @@ def covered_with_stated(there: float, share: float, sigma: np.ndarray) -> float:
     return float(np.mean(inside))
 
 
-@pytest.mark.parametrize("share", [0.3, 1.0])
-@pytest.mark.parametrize("sigma", [EQUAL, 2.0 * EQUAL], ids=["half the errors", "as large as the errors"])
+@pytest.mark.parametrize(
+    ("share", "sigma"), [(0.3, 2.0 * EQUAL), (1.0, EQUAL)], ids=["as large as the errors", "half the errors"]
+)
 def test_errors_smaller_than_stated_do_not_make_it_overconfident(share: float, sigma: np.ndarray) -> None:
     shares = [covered_with_stated(there, share, sigma) for there in (0.0, 0.3, 1.0)]
     assert np.mean(shares) >= 0.93
