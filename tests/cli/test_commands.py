@@ -62,35 +62,14 @@ def test_clicks_with_rounded_stamps_are_solved_at_their_frames_and_told(
     )
 
 
-def test_solve_gives_the_same_bytes_twice_and_for_shuffled_clicks(
+def test_solve_prints_the_same_bytes_for_shuffled_clicks(
     cocalib: Cocalib, clicks_file: Path, calibration: Path, tmp_path: Path
 ) -> None:
     document = json.loads(clicks_file.read_text())
     document["clicks"].reverse()
     clicks_file.write_text(json.dumps(document))
-    again = tmp_path / "again.json"
-    assert cocalib("solve", tmp_path / "made.mcap", "--clicks", clicks_file, "--out", again).code == 0
-    assert again.read_bytes() == calibration.read_bytes()
-
-
-def test_solve_without_out_prints_the_calibration(
-    cocalib: Cocalib, clicks_file: Path, calibration: Path, tmp_path: Path
-) -> None:
     answer = cocalib("solve", tmp_path / "made.mcap", "--clicks", clicks_file)
-    assert answer.code == 0
-    assert answer.out.encode() == calibration.read_bytes()
-
-
-@pytest.mark.parametrize("method", ["default", "paper"])
-def test_solve_takes_pairs_by_either_method(
-    cocalib: Cocalib, pairs_file: Callable[..., Path], tmp_path: Path, method: str
-) -> None:
-    out = tmp_path / "calibration.json"
-    answer = cocalib("solve", "--pairs", pairs_file(), "--out", out, "--method", method)
-    assert answer.code == 0, answer.err
-    document = json.loads(out.read_text())
-    assert document["options"]["method"] == method
-    assert document["metrics"]["aed_px"] < 0.01
+    assert (answer.code, answer.out) == (0, calibration.read_text())
 
 
 def test_solve_refines_the_intrinsics_and_solves_its_file_again(
@@ -186,18 +165,15 @@ def test_info_describes_a_recording_that_cannot_be_calibrated(cocalib: Cocalib, 
     assert re.search(r"^radar +no readable topic", answer.out, re.MULTILINE)
 
 
-@pytest.mark.parametrize("name", ["tf2", "urdf", "json"])
-def test_export_writes_what_check_reads_back(cocalib: Cocalib, calibration: Path, tmp_path: Path, name: str) -> None:
-    out = tmp_path / f"export.{name}"
-    assert cocalib("export", calibration, "--to", name, "--out", out).code == 0
+def test_export_writes_what_check_reads_back(cocalib: Cocalib, calibration: Path, tmp_path: Path) -> None:
+    out = tmp_path / "export.sh"
+    assert cocalib("export", calibration, "--to", "tf2", "--out", out).code == 0
     answer = cocalib("check", out, "--against", calibration)
     assert answer.code == 0, answer.out
-
-
-def test_export_list_names_every_format(cocalib: Cocalib) -> None:
-    answer = cocalib("export", "--to", "list")
-    assert answer.code == 0
-    assert {"tf2", "urdf", "json"} <= {line.split()[0] for line in answer.out.splitlines()}
+    refused = cocalib("import", out, "--out", tmp_path / "back.json")
+    assert refused.code == 2
+    assert "--camera FILE" in refused.err
+    assert not (tmp_path / "back.json").exists()
 
 
 def test_export_of_another_tools_file_says_how_to_convert_it(
@@ -235,28 +211,6 @@ def test_export_without_out_prints_and_into_a_folder_names_itself(
     assert cocalib("export", calibration, "--to", "urdf", "--out", folder).code == 0
     (written,) = folder.iterdir()
     assert written.read_text() == printed
-
-
-def test_check_finds_a_transposed_rotation(cocalib: Cocalib, calibration: Path, tmp_path: Path) -> None:
-    document = json.loads(calibration.read_text())
-    rotation = np.array(document["camera_from_radar"]["rotation"])
-    document["camera_from_radar"]["rotation"] = rotation.T.tolist()
-    wrong = tmp_path / "wrong.json"
-    wrong.write_text(json.dumps(document))
-    answer = cocalib("check", wrong)
-    assert answer.code == 1
-    assert "transposed" in answer.out
-
-
-def test_version_is_printed(cocalib: Cocalib) -> None:
-    assert cocalib("--version").out.startswith("cocalib ")
-
-
-@pytest.mark.parametrize("command", ["demo", "open", "info", "solve", "export", "check", "import", "simulate"])
-def test_help_shows_every_command(cocalib: Cocalib, command: str) -> None:
-    answer = cocalib(command, "--help")
-    assert answer.code == 0
-    assert f"cocalib {command}" in answer.out
 
 
 def test_import_converts_another_tools_file_to_a_calibration(
@@ -354,14 +308,6 @@ def test_a_format_without_a_place_for_distortion_is_written_for_rectified_pictur
     assert cocalib("export", calibration, "--to", "opencv", "--rectified").code == 2
 
 
-def test_import_says_that_the_camera_is_missing(cocalib: Cocalib, calibration: Path, tmp_path: Path) -> None:
-    cocalib("export", calibration, "--to", "tf2", "--out", tmp_path / "tf.sh")
-    refused = cocalib("import", tmp_path / "tf.sh", "--out", tmp_path / "back.json")
-    assert refused.code == 2
-    assert "--camera FILE" in refused.err
-    assert not (tmp_path / "back.json").exists()
-
-
 def test_export_poses_the_radar_in_the_kit(cocalib: Cocalib, calibration: Path, tmp_path: Path) -> None:
     posed = cocalib(
         "export", calibration, "--to", "autoware", "--parent-from-radar", *["1.5", "0", "0.25", "0", "0", "0", "1"]
@@ -393,12 +339,6 @@ def test_a_bare_matrix_that_looks_wrong_has_its_own_exit_code_until_pairs_prove_
     proven = cocalib("check", tmp_path / "inverse.txt", "--pairs", calibration)
     assert proven.code == 1
     assert "the direction is swapped" in proven.out
-
-
-def test_check_takes_the_camera_that_the_file_lacks(cocalib: Cocalib, calibration: Path, tmp_path: Path) -> None:
-    cocalib("export", calibration, "--to", "matrix", "--out", tmp_path / "m.txt")
-    compared = cocalib("check", tmp_path / "m.txt", "--against", tmp_path / "m.txt", "--camera", calibration)
-    assert "at 20 m" in compared.out
 
 
 def test_video_writes_the_camera_and_says_when_it_begins(

@@ -12,8 +12,6 @@ from typing import Any
 import pytest
 
 from calib_core import input_files
-from calib_core.errors import InputError
-from calib_core.interchange import FrameNames
 from calib_core.recordings.containers.writing import RecordedMessage, write_ros2
 from tests.cli.conftest import Made
 
@@ -61,19 +59,6 @@ def test_what_could_never_end_is_refused_at_once(
     assert str(path) in line
 
 
-@POSIX
-def test_the_output_of_another_command_can_be_given_as_pairs(
-    cocalib: Cocalib, pairs_file: Callable[..., Path], tmp_path: Path
-) -> None:
-    reading, writing = os.pipe()
-    os.write(writing, pairs_file().read_bytes())
-    os.close(writing)
-    try:
-        assert cocalib("solve", "--pairs", f"/dev/fd/{reading}", "--out", tmp_path / "c.json").code == 0
-    finally:
-        os.close(reading)
-
-
 @pytest.mark.parametrize(
     "text", ["a: " + "[" * 5000, "- " * 5000 + "x", "a: 2001-99-99", "!!int x", "? [a]\n: b"], ids=str.__len__
 )
@@ -111,7 +96,7 @@ def test_half_a_character_in_our_files_is_refused(
     assert "half of a character" in one_line(cocalib("solve", made(), "--clicks", clicks_file))
 
 
-@pytest.mark.parametrize("depth", [101, 300, 900, 100_000])
+@pytest.mark.parametrize("depth", [101, 100_000])
 @pytest.mark.parametrize("kind", ["json", "yaml", "xml"])
 def test_deep_nesting_is_refused(cocalib: Cocalib, tmp_path: Path, depth: int, kind: str) -> None:
     opening, closing = ("<a>", "</a>") if kind == "xml" else ("[", "]")
@@ -154,13 +139,6 @@ def test_a_table_with_a_long_cell_is_read_in_time(cocalib: Cocalib, tmp_path: Pa
 @pytest.mark.parametrize("name", ["", "  ", ","])
 def test_a_topic_without_a_name_is_not_chosen_for_the_user(cocalib: Cocalib, made: MadeRecording, name: str) -> None:
     assert "no topic" in one_line(cocalib("info", made(), "--radar-topic", name))
-
-
-@pytest.mark.parametrize("text", ["[" * 100_000, '{"a":' * 100_000], ids=["lists", "objects"])
-def test_deeply_nested_pairs_are_refused(cocalib: Cocalib, tmp_path: Path, text: str) -> None:
-    path = tmp_path / "deep.json"
-    path.write_text(text)
-    one_line(cocalib("solve", "--pairs", path))
 
 
 @pytest.mark.parametrize("sigma", [1e308, 1e200, 5e-324, 1e-200])
@@ -233,10 +211,3 @@ def test_names_from_a_recording_do_not_reach_the_terminal(cocalib: Cocalib, tmp_
     assert "\\u001b[2J" in text.out
     assert not any(line.startswith("warning   forged") for line in text.out.splitlines())
     assert any(row["name"] == topic for row in json.loads(data.out)["topics"])
-
-
-@pytest.mark.parametrize("name", ["../../etc/passwd", "radar/../../x", "..", "./radar", "radar/.."])
-def test_a_frame_name_is_no_path(name: str) -> None:
-    with pytest.raises(InputError, match="which is a path"):
-        FrameNames(radar=name)
-    assert FrameNames(radar="front/radar..1").radar == "front/radar..1"

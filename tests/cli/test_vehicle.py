@@ -50,17 +50,6 @@ def test_a_calibration_from_a_recording_differs_in_what_was_stated_alone(
     assert document == json.loads(plain.out)
 
 
-def test_exports_and_imports_of_the_whole_calibration_keep_it(
-    cocalib: Cocalib, pairs_file: Callable[..., Path], tmp_path: Path
-) -> None:
-    out, copy, pack, unpacked = (tmp_path / name for name in ("a.json", "copy.json", "pack.zip", "unpacked.json"))
-    assert cocalib("solve", "--pairs", pairs_file(), "--vehicle", "V017", "--out", out).code == 0
-    assert cocalib("export", out, "--to", "json", "--out", copy).code == 0
-    assert cocalib("export", out, "--to", "pack", "--out", pack).code == 0
-    assert cocalib("import", pack, "--out", unpacked).code == 0
-    assert copy.read_bytes() == unpacked.read_bytes() == out.read_bytes()
-
-
 @pytest.mark.parametrize(
     ("flags", "fault"),
     [
@@ -76,8 +65,3 @@ def test_a_flag_that_no_file_can_hold_is_refused_before_anything_is_read(
     answer = cocalib("solve", tmp_path / "absent.mcap", "--clicks", tmp_path / "absent.json", *flags)
     assert answer.code == 2
     assert fault in answer.err
-
-
-def test_the_flags_are_a_group_of_the_help(cocalib: Cocalib) -> None:
-    group = cocalib("solve", "--help").out.partition("vehicle options")[2].partition("gating options")[0]
-    assert all(f"{flag} " in group for flag in ("--vehicle", "--vehicle-type", "--session-name", "--radar-serial"))
