@@ -13,21 +13,6 @@ from cocalib.batch.manifest import ManifestRow
 from cocalib.batch.outcome import Outcome, read_outcome
 from cocalib.batch.results_folder import OUTCOME_FILE, ResultsFolder
 
-__all__ = [
-    *(
-        "attempts",
-        "dying",
-        "dying_job",
-        "dying_start",
-        "endless",
-        "failing",
-        "quick_jobs",
-        "squared",
-        "temporary_file",
-        "written",
-    ),
-]
-
 
 def quick_jobs(folder: Path, count: int) -> tuple[Job, ...]:
     """Return jobs that fail at once and for good, because their recordings are none, each in words of its own."""

@@ -11,8 +11,6 @@ from pathlib import Path
 import psutil
 from distributed import Client, Nanny
 
-__all__ = ["scheduler_process", "worker_process", "worker_processes"]
-
 _ROOT = Path(__file__).resolve().parent.parent
 
 

@@ -3,8 +3,6 @@
 from pathlib import Path
 from textwrap import dedent
 
-__all__ = ["install"]
-
 
 def install(folder: Path, name: str, module: str, group: str, value: str) -> Path:
     """Write a distribution of one module, whose one entry point names a value in it.

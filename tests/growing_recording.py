@@ -16,8 +16,6 @@ import lz4.frame
 from calib_core.recordings.containers.opening import open_sources
 from calib_core.recordings.containers.sources import Channel
 
-__all__ = ["SampleWriter"]
-
 _NS = 1_000_000_000
 _SAMPLE = Path(__file__).resolve().parents[1] / "sample_data" / "rooftop"
 _MAGIC = b"\x89MCAP0\r\n"

@@ -5,8 +5,6 @@ from typing import Any
 
 from websockets.sync.client import ClientConnection
 
-__all__ = ["PageView", "applied"]
-
 
 def applied(view: dict[str, Any], change: dict[str, Any]) -> dict[str, Any]:
     """Return the View after a change."""

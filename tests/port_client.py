@@ -8,8 +8,6 @@ from typing import Any, Protocol
 
 from websockets.sync.client import ClientConnection, connect
 
-__all__ = ["Answer", "channel", "come_in", "get", "wanted"]
-
 
 class Served(Protocol):
     """A server, in this process or another one."""

@@ -16,8 +16,6 @@ from cocalib.recorded_view import RecordedView, recorded_view
 from cocalib.solving.solving import solve_clicks
 from tests.cli.conftest import Made
 
-__all__ = ["boxes_around", "nearest_rows", "opened_view"]
-
 
 @contextmanager
 def opened_view(folder: Path, **more: object) -> Iterator[RecordedView]:

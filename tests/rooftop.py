@@ -7,8 +7,6 @@ from calib_core.interchange import read_clicks
 from calib_core.measurements import RadarScans, ReflectorClick
 from calib_core.recordings import open_recording
 
-__all__ = ["ClickedSample", "read_rooftop"]
-
 ClickedSample = tuple[tuple[ReflectorClick, ...], RadarScans, Camera]
 
 

@@ -10,8 +10,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["ServedProcess", "served_process"]
-
 
 @dataclass(slots=True)
 class ServedProcess:

@@ -13,8 +13,6 @@ from cocalib.view import Reference
 from tests.picture_recording import PictureRecording
 from tests.street import CAMERA, TRUE_POSE, Street, street
 
-__all__ = ["StreetRecording", "reference_calibration"]
-
 _GOLDEN = Path(__file__).parent / "golden" / "calibration-1.json"
 
 

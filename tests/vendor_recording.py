@@ -10,8 +10,6 @@ from calib_core.measurements import NS_PER_S
 from calib_core.radar import polar_from_cartesian
 from calib_core.recordings import open_recording
 
-__all__ = ["STATED", "vendor_sample"]
-
 _DETECTION = "vendor_msgs/msg/Detection"
 _PACKET = "vendor_msgs/msg/DetectionPacket"
 _NAMES = ("f_RangeM", "f_Azimuth", "f_Elevation", "f_VelRad", "s_Snr")

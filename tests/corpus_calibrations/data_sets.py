@@ -20,8 +20,6 @@ from tests.corpus_calibrations.truth import (
     words,
 )
 
-__all__ = ["DATA_SETS"]
-
 KITTI = ".12e"
 RECTIFYING = posed(Rotation.from_euler("xyz", [0.4, -0.9, 0.2], degrees=True).as_matrix(), (0, 0, 0))
 CAMERA2_FROM_CAMERA0 = posed(np.eye(3), (0.0598, -0.0003, 0.0027))

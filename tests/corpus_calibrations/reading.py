@@ -11,8 +11,6 @@ from calib_core.interchange import ImportedCalibration, WantedFrames, read_toget
 from calib_core.interchange.hypotheses.reading import read_clear, read_unstated
 from tests.corpus_calibrations.truth import CAMERA_FROM_RADAR, DISTORTION, SIZE, Calibration, K
 
-__all__ = ["Outcome", "Reading", "read"]
-
 Outcome = Literal["right", "refused", "wrong"]
 
 

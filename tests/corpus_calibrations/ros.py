@@ -17,8 +17,6 @@ from tests.corpus_calibrations.truth import (
     words,
 )
 
-__all__ = ["ROS"]
-
 RADAR, CAMERA, LINK = "radar_front", "camera_color_optical_frame", "camera_link"
 RADAR_FROM_LINK = RADAR_FROM_CAMERA @ inverse(LINK_FROM_OPTICAL)
 BASE_FROM_RADAR = posed(np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), (3.4, 0.2, 0.6))

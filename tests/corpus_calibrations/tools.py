@@ -21,8 +21,6 @@ from tests.corpus_calibrations.truth import (
     words,
 )
 
-__all__ = ["TOOLS"]
-
 WORLD_FROM_DEVICE = posed(Rotation.from_euler("xyz", [2, -1, 130], degrees=True).as_matrix(), (512.0, -90.5, 12.25))
 VEHICLE_FROM_RADAR = posed(Rotation.from_euler("xyz", [0, 1, -4], degrees=True).as_matrix(), (3.6, 0.0, 0.55))
 OPENGL = np.diag([1.0, -1, -1, 1])

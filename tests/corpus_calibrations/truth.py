@@ -6,21 +6,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-__all__ = [
-    "CAMERA_FROM_RADAR",
-    "DISTORTION",
-    "LINK_FROM_OPTICAL",
-    "RADAR_FROM_CAMERA",
-    "SIZE",
-    "Calibration",
-    "K",
-    "inverse",
-    "posed",
-    "quaternion",
-    "rpy",
-    "words",
-]
-
 
 def posed(rotation: np.ndarray, translation_m: tuple[float, ...] | np.ndarray) -> np.ndarray:
     """Return the 4x4 matrix of a rotation and a translation."""

@@ -117,7 +117,6 @@ class Bag:
     ) -> None:
         """Write a PointCloud2 of a structured array, which may be padded and of either byte order."""
         datatypes = {"i1": 1, "u1": 2, "i2": 3, "u2": 4, "i4": 5, "u4": 6, "f4": 7, "f8": 8}
-        assert rows.dtype.fields is not None
         fields = [
             self.make("sensor_msgs/msg/PointField", name=name, offset=offset, datatype=datatypes[kind.str[1:]], count=1)
             for name, (kind, offset) in ((name, entry[:2]) for name, entry in rows.dtype.fields.items())

@@ -6,8 +6,6 @@ from pathlib import Path
 from tests.corpus_layouts import clouds, data_sets, files, messages, odd_messages
 from tests.corpus_layouts.truth import Truth
 
-__all__ = ["LAYOUTS"]
-
 LAYOUTS: dict[str, Callable[[Path], Truth]] = {
     layout.__name__: layout
     for layout in (

@@ -9,8 +9,6 @@ from calib_core.errors import CalibrationError
 from calib_core.recordings import Recording, RecordingOptions, open_recording
 from tests.corpus_layouts.truth import CAMERA, Returns, Truth, grey_of_frame
 
-__all__ = ["Outcome", "Reading", "read"]
-
 Outcome = Literal["right", "right as assumed", "differs as assumed", "refused", "wrong"]
 
 

@@ -8,19 +8,6 @@ import numpy as np
 
 from calib_core.recordings import RecordingOptions
 
-__all__ = [
-    "CAMERA",
-    "START_NS",
-    "Returns",
-    "Truth",
-    "grey_of_frame",
-    "jpeg",
-    "mirrored",
-    "picture_times",
-    "polar",
-    "scene",
-]
-
 START_NS = 1_715_938_951_208_764_000  # 2024-05-17T09:42:31.208764Z
 SCANS, FRAMES = 40, 48
 WIDTH_PX, HEIGHT_PX = 160, 120

@@ -12,8 +12,6 @@ from calib_core.recordings.box_topics import box_layout, frames_in_message
 from calib_core.recordings.messages.decoding import decode
 from calib_core.recordings.messages.definitions import parse_definition
 
-__all__ = ["FILE_SEEDS", "FILE_TOKENS", "MESSAGE_SEEDS", "box_file_reader", "box_message_reader"]
-
 _START_NS = TimeNs(1_700_000_000_000_000_000)
 _TIMES = _START_NS + 100_000_000 * np.arange(10)
 _BOXES = Boxes((FrameBoxes(_START_NS, (Box(1.0, 2.0, 30.0, 40.0, "person", 0.5, "p1"),)),), "boxes", (640, 480))

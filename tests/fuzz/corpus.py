@@ -2,8 +2,6 @@
 
 from pathlib import Path
 
-__all__ = ["FOLDER", "corpus_of"]
-
 FOLDER = Path(__file__).parent / "corpus"
 
 

@@ -14,8 +14,6 @@ from calib_core.errors import CalibrationError
 from tests.fuzz.mutation import mutated
 from tests.fuzz.reached_lines import ReachedLines
 
-__all__ = ["Finding", "Report", "Target", "fuzz", "offence"]
-
 PATIENCE_S = 30.0
 """An input that takes longer is a finding: a hang."""
 

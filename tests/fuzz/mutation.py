@@ -4,8 +4,6 @@ import random
 import struct
 from collections.abc import Callable, Sequence
 
-__all__ = ["mutated"]
-
 _INTERESTING = (0, 1, -1, 127, 128, 255, 32767, 65535, 2**31 - 1, -(2**31), 2**32 - 1, 2**63 - 1)
 _WORDS = (
     b"nan",

@@ -44,8 +44,6 @@ from tests.fuzz.tree_target import SEEDS, tree_reader
 from tests.unit.recordings.conftest import START_NS, Ros, plain_rows, write_rows
 from tests.unit.recordings.containers.malformed import CASES, Kit
 
-__all__ = ["TARGETS"]
-
 GOLDEN = Path(__file__).resolve().parents[1] / "golden"
 FACTS = RecordingFacts("drive", START_NS + 100_000_000 * np.arange(20), width_px=640, height_px=480)
 _LONGEST_SEED = 1 << 17

@@ -7,8 +7,6 @@ from calib_core.interchange import WantedFrames, patched, read_calibration
 from calib_core.interchange.trees.reading import TreeFile, read_tree
 from tests.unit.interchange.trees import vehicles
 
-__all__ = ["SEEDS", "tree_reader"]
-
 _GOLDEN = Path(__file__).resolve().parents[1] / "golden/calibration-1.json"
 _SCRIPT = (
     "ros2 run tf2_ros static_transform_publisher --x=1.2 --roll 0.1 --frame-id base --child-frame-id 'radar'\n"

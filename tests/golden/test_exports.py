@@ -42,7 +42,6 @@ def text_of(file: CalibrationFile, name: str) -> str:
 
 def origin_of(joint: ElementTree.Element) -> tuple[list[float], list[float]]:
     origin = joint.find("origin")
-    assert origin is not None
     return [float(n) for n in origin.get("xyz", "").split()], [float(n) for n in origin.get("rpy", "").split()]
 
 
@@ -166,7 +165,6 @@ def test_view_of_delft_s_own_calibration_is_read():
     np.testing.assert_allclose(pose.translation_m, [0.05283124, 0.98100483, 1.44445002], rtol=1e-12)
     np.testing.assert_allclose(pose.rotation[0], [-0.013857, -0.9997468, 0.01772762], atol=1e-6)
     camera = read_any(text).camera_for((1936, 1216))
-    assert camera is not None
     assert (camera.model, camera.width_px, camera.matrix_px[0, 2]) == ("pinhole", 1936, 961.272442)
 
 
@@ -180,7 +178,6 @@ def test_the_second_camera_of_kitti_is_posed_with_its_offset():
     found = read_any(text)
 
     camera = found.camera_for((1242, 375))
-    assert camera is not None
     column, row, scale = p2 @ [*(pose @ point_m), 1.0]
     np.testing.assert_allclose(
         camera.project(found.camera_from_radar @ point_m[None, :3])[0], [column / scale, row / scale], atol=1e-9

@@ -280,8 +280,6 @@ def test_algorithm_1_line_7_is_opencvs_ransac_with_the_iterative_solver(outliers
     options = replace(AS_PRINTED, ransac_threshold_px=15.0)
     found = pose_by_iterative_ransac(points, pixels, simulated.camera, options)
     expected = solve_pnp_ransac(points, pixels, simulated.camera, "iterative", threshold_px=15.0, iterations=10_000)
-    assert found is not None
-    assert expected is not None
     np.testing.assert_array_equal(found.camera_from_radar.as_matrix(), expected.camera_from_radar.as_matrix())
     np.testing.assert_array_equal(found.inliers, expected.inliers)
 
@@ -294,8 +292,6 @@ def test_algorithm_1_line_8_is_opencvs_ransac_with_sqpnp() -> None:
     expected = solve_pnp_ransac(
         points, pixels, simulated.camera, "sqpnp", threshold_px=15.0, iterations=300, confidence=0.9
     )
-    assert found is not None
-    assert expected is not None
     np.testing.assert_array_equal(found.camera_from_radar.as_matrix(), expected.camera_from_radar.as_matrix())
 
 
@@ -303,7 +299,6 @@ def test_algorithm_1_lines_7_and_8_measure_the_mean_error_over_all_pairs() -> No
     simulated = simulate_pairs(20, rng=np.random.default_rng(3), noise="imaging", outlier_share=0.1)
     points, pixels = arrays_of(simulated)
     found = pose_by_sqpnp_ransac(points, pixels, simulated.camera, replace(AS_PRINTED, ransac_threshold_px=15.0))
-    assert found is not None
     reprojected = project_points(points, found.camera_from_radar, simulated.camera)
     assert found.mean_error_px == pytest.approx(float(np.linalg.norm(reprojected - pixels, axis=1).mean()), rel=1e-9)
 
@@ -347,8 +342,6 @@ def test_algorithm_1_line_10_refines_on_all_pairs_outliers_included() -> None:
     clean = np.arange(20) != 3
     on_all = refined_on_all_pairs(points, pixels, simulated.camera, simulated.camera_from_radar)
     on_inliers = refine_lm(points[clean], pixels[clean], simulated.camera, simulated.camera_from_radar)
-    assert on_all is not None
-    assert on_inliers is not None
     assert rotation_angle_rad(on_inliers.rotation @ simulated.camera_from_radar.rotation.T) < 1e-6
     assert rotation_angle_rad(on_all.rotation @ simulated.camera_from_radar.rotation.T) > 1e-4
 
@@ -364,9 +357,7 @@ def test_algorithm_1_line_10_is_what_the_calibration_holds() -> None:
         pose_by_iterative_ransac(points, pixels, simulated.camera, options.paper),
         pose_by_sqpnp_ransac(points, pixels, simulated.camera, options.paper),
     )
-    assert start is not None
     refined = refined_on_all_pairs(points, pixels, simulated.camera, start.camera_from_radar)
-    assert refined is not None
     np.testing.assert_array_equal(result.camera_from_radar.as_matrix(), refined.as_matrix())
     inliers = {pair.id: pair.inlier for pair in result.pairs}
     assert [inliers[simulated.pairs[i].id] for i in order] == start.inliers.tolist()

@@ -22,7 +22,6 @@ from benchmarks.paper.settings import (
 )
 from calib_core.calibration import calibrate
 from calib_core.options import CalibrationOptions
-from calib_core.results import Calibration
 from calib_core.synthetic import SimulatedScans, simulate, simulate_scans, write_recording
 from cocalib.cli import run as cocalib
 
@@ -48,8 +47,7 @@ def solved(folder: Path, options: CalibrationOptions, *flags: object) -> dict[st
 @pytest.mark.parametrize("dataset", ["d1", "d3", "dr-a", "dr-b"])
 def test_bags_clicks_and_the_command_give_what_the_scans_alone_give(dataset: Dataset, tmp_path: Path) -> None:
     simulated = recorded(dataset, tmp_path)
-    alone = calibrate(simulated.clicks, simulated.scans, simulated.camera, ppm_options(SMALL))
-    assert isinstance(alone, Calibration)
+    alone = calibrate(simulated.clicks, simulated.scans, simulated.camera, ppm_options(SMALL)).unwrap()
     found = solved(tmp_path, ppm_options(SMALL))
     assert found["n"] == alone.metrics.n == 5
     assert found["aed_px"] == pytest.approx(alone.metrics.aed_px, abs=0.02)

@@ -5,7 +5,6 @@ import pytest
 
 from calib_core.camera import CAMERA_MODELS, Camera, CameraModel
 from calib_core.geometry import RigidTransform, rotation_angle_rad
-from calib_core.lens_models.registry import LENS_MODELS
 from calib_core.paper.pnp import PnPSolver, project_points, refine_lm, solve_pnp, solve_pnp_ransac, spans_a_plane
 from calib_core.synthetic import SimulatedPairs, simulate_pairs, typical_camera
 from calib_core.synthetic.simulated_pairs import study_camera
@@ -30,7 +29,6 @@ def squared_error_px2(points: np.ndarray, pixels: np.ndarray, camera: Camera, po
 def test_pnp_gives_the_true_pose_through_every_lens(model: CameraModel, solver: PnPSolver) -> None:
     simulated = pairs_without_noise(typical_camera(model))
     pose = solve_pnp(simulated.points_radar_m, simulated.pixels_px, simulated.camera, solver)
-    assert pose is not None
     assert angle_deg(pose, simulated.camera_from_radar) < 0.01
     np.testing.assert_allclose(pose.translation_m, simulated.camera_from_radar.translation_m, atol=2e-3)
 
@@ -43,7 +41,6 @@ def test_ransac_names_the_wrong_pairs_through_every_lens(model: CameraModel, sol
     wrong = [2, 7, 11]
     pixels[wrong] += [[150.0, -90.0], [-120.0, 130.0], [200.0, 60.0]]
     solution = solve_pnp_ransac(simulated.points_radar_m, pixels, simulated.camera, solver, threshold_px=4.0)
-    assert solution is not None
     assert np.flatnonzero(~solution.inliers).tolist() == wrong
     assert angle_deg(solution.camera_from_radar, simulated.camera_from_radar) < 0.02
 
@@ -71,8 +68,6 @@ def test_our_own_refinement_agrees_with_opencvs() -> None:
     start = simulated.camera_from_radar.perturbed(np.array([0.1, -0.1, 0.1, 0.02, -0.02, 0.02]))
     theirs = refine_lm(simulated.points_radar_m, pixels, simulated.camera, start)
     ours = refine_lm(simulated.points_radar_m, pixels, skewed(simulated.camera, 1e-9), start)
-    assert theirs is not None
-    assert ours is not None
     assert angle_deg(theirs, ours) < 1e-4
     np.testing.assert_allclose(theirs.translation_m, ours.translation_m, atol=1e-5)
 
@@ -90,13 +85,6 @@ def test_skew_is_not_dropped_silently() -> None:
     assert angle_deg(pose, simulated.camera_from_radar) < 0.01
     with pytest.raises(ValueError, match="skew"):
         project_points(simulated.points_radar_m, pose, simulated.camera)
-
-
-@pytest.mark.parametrize("model", [name for name, lens in LENS_MODELS.items() if lens.opencv])
-def test_opencv_projects_as_our_camera_does(model: CameraModel) -> None:
-    simulated = pairs_without_noise(typical_camera(model))
-    theirs = project_points(simulated.points_radar_m, simulated.camera_from_radar, simulated.camera)
-    np.testing.assert_allclose(theirs, simulated.pixels_px, atol=1e-6)
 
 
 def test_opencv_projects_no_points_to_no_pixels() -> None:
@@ -145,7 +133,6 @@ def test_a_fisheye_click_at_ninety_degrees_is_no_inlier_but_does_no_harm() -> No
     points = np.concatenate([simulated.points_radar_m, [[0.0, -3.0, 0.0]]])
     pixels = np.concatenate([simulated.pixels_px, sideways_px])
     solution = solve_pnp_ransac(points, pixels, camera, "sqpnp")
-    assert solution is not None
     assert solution.inliers.tolist() == [True] * 20 + [False]
 
 
@@ -154,7 +141,5 @@ def test_the_same_pairs_give_the_same_bits() -> None:
     points = np.stack([pair.candidates[0].position_radar_m for pair in simulated.pairs])
     pixels = np.stack([pair.pixel_px for pair in simulated.pairs])
     first, second = (solve_pnp_ransac(points, pixels, simulated.camera, threshold_px=15.0) for _ in range(2))
-    assert first is not None
-    assert second is not None
     assert first.camera_from_radar.as_matrix().tobytes() == second.camera_from_radar.as_matrix().tobytes()
     assert first.inliers.tobytes() == second.inliers.tobytes()

@@ -104,7 +104,6 @@ def test_a_pose_is_among_the_hypotheses_however_it_is_written(
     writer: str, pose: RigidTransform, convention: tuple[str, str, str, str]
 ) -> None:
     file = read_unstated(json.dumps(WRITERS[writer](written(pose, *convention))), "file.json")
-    assert file is not None
     hypotheses = hypotheses_of(file.pose_at(None))
     fitting = [one for one in hypotheses if _same(one.camera_from_radar, pose)]
     assert fitting
@@ -125,7 +124,6 @@ def test_pairs_find_the_pose_among_the_hypotheses(
     points_radar_m = pose.inverse() @ (CAMERA.rays(pixels_px) * rng.uniform(3, 15, (20, 1)))
     pairs = CheckPairs(points_radar_m, pixels_px + rng.normal(0, 1, (20, 2)), CAMERA)
     file = read_unstated(json.dumps(WRITERS[writer](written(pose, *convention))), "file.json")
-    assert file is not None
     first = hypotheses_of(file.pose_at(None), pairs=pairs)[0]
     assert first.fits
     at_right = np.linalg.norm(pairs.camera.project(first.camera_from_radar @ points_radar_m) - pixels_px, axis=1)
@@ -140,7 +138,6 @@ def test_another_calibration_finds_the_pose_among_the_hypotheses(
     pose: RigidTransform, convention: tuple[str, str, str, str]
 ) -> None:
     file = read_unstated(json.dumps({"T": written(pose, *convention).as_matrix().tolist()}), "file.json")
-    assert file is not None
     first = hypotheses_of(file.pose_at(None), against=pose)[0]
     assert first.fits
     if np.abs(pose.translation_m).max() > 0.1:
@@ -153,7 +150,6 @@ def test_the_shares_add_up_and_no_two_hypotheses_are_one_pose(
     pose: RigidTransform, convention: tuple[str, str, str, str]
 ) -> None:
     file = read_unstated(json.dumps({"T": written(pose, *convention).as_matrix().tolist()}), "file.json")
-    assert file is not None
     hypotheses = hypotheses_of(file.pose_at(None))
     assert sum(one.share for one in hypotheses) == pytest.approx(1.0)
     keys = [meaning.key for one in hypotheses for meaning in one.meanings]

@@ -24,7 +24,6 @@ LENS = calibrated(VIEWS)
 
 
 def same_lens(one: CalibratedLens, other: np.ndarray) -> None:
-    assert one.camera.covariance is not None
     apart = (one.camera.parameters - other) / np.sqrt(np.diag(one.camera.covariance.matrix))
     assert np.abs(apart).max() < 1e-3  # of a standard deviation
 

@@ -41,7 +41,6 @@ def test_the_road_recording_opens_in_every_container(road, name):
         assert (frame.format, frame.width_px, frame.height_px) == ("jpeg", 1920, 1200)
         assert recording.image(3).shape == (1200, 1920, 3)
         camera = recording.camera()
-        assert camera is not None
         assert camera.model == "plumb_bob"
         np.testing.assert_allclose(camera.matrix_px, [[2117.87, 0, 950.144], [0, 2121.65, 588.036], [0, 0, 1]])
         assert [warning.code for warning in recording.warnings] == ["flat-radar"]

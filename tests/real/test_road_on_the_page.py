@@ -47,7 +47,6 @@ def test_tracks_are_drawn_where_opencv_projects_them(shared_data: Path, name: st
     with open_recording(folder / name) as recording:
         time = TimeNs(int(recording.image_times[3]))
         scan = RadarSight(recording).scan_at(time)
-        assert scan is not None
         assert scan.time == time
         overlay = overlay_of(3, Session(outcome=calibration, outcome_revision=0), scan, ())
     rotation_vector, _ = cv2.Rodrigues(matrix[:3, :3])

@@ -17,9 +17,7 @@ MEASURED = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPosit
 
 
 def solved(simulated: SimulatedPairs, options: CalibrationOptions = MEASURED) -> Calibration:
-    outcome = calibrate_pairs(simulated.pairs, simulated.camera, options)
-    assert isinstance(outcome, Calibration), outcome
-    return outcome
+    return calibrate_pairs(simulated.pairs, simulated.camera, options).unwrap()
 
 
 def error_in_sigmas(simulated: SimulatedPairs, calibration: Calibration) -> float:
@@ -53,17 +51,6 @@ def test_decoy_candidates_are_not_chosen_instead_of_the_reflector() -> None:
     assert chosen == simulated.true_candidate
 
 
-def test_the_order_of_pairs_does_not_change_a_bit() -> None:
-    simulated = simulate_pairs(14, rng=np.random.default_rng(7), outlier_share=0.2, decoys=2)
-    forward = solved(simulated)
-    backward = calibrate_pairs(simulated.pairs[::-1], simulated.camera, MEASURED)
-    assert isinstance(backward, Calibration)
-    assert forward.camera_from_radar.as_matrix().tobytes() == backward.camera_from_radar.as_matrix().tobytes()
-    assert forward.covariance.tobytes() == backward.covariance.tobytes()
-    assert forward.metrics == backward.metrics
-    assert [pair.id for pair in backward.pairs] == [pair.id for pair in simulated.pairs[::-1]]
-
-
 def test_fewer_than_four_pairs_are_unsolvable_with_the_count() -> None:
     simulated = simulate_pairs(5, rng=np.random.default_rng(2))
     outcome = calibrate_pairs(simulated.pairs, simulated.camera, MEASURED, frozenset({"p1", "p2"}))
@@ -88,8 +75,7 @@ def test_an_excluded_pair_is_shown_but_changes_nothing() -> None:
 
 def test_the_paper_method_is_dispatched() -> None:
     simulated = simulate_pairs(12, rng=np.random.default_rng(6), noise="imaging")
-    outcome = calibrate_pairs(simulated.pairs, simulated.camera, replace(CalibrationOptions(), method="paper"))
-    assert isinstance(outcome, Calibration)
+    outcome = calibrate_pairs(simulated.pairs, simulated.camera, replace(CalibrationOptions(), method="paper")).unwrap()
     assert np.isnan(outcome.covariance).all()
 
 
@@ -139,8 +125,7 @@ def test_clicks_unrelated_to_the_radar_are_unsolvable() -> None:
 def test_a_whole_simulated_session_is_solved_within_its_uncertainty() -> None:
     session = simulate_scans(SimulationOptions(placements=12, seed=4))
     options = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.045), 0.015)))
-    outcome = calibrate(session.clicks, session.scans, session.camera, options)
-    assert isinstance(outcome, Calibration)
+    outcome = calibrate(session.clicks, session.scans, session.camera, options).unwrap()
     truth = session.stage.rig.camera_from_radar
     error = truth.error_from(outcome.camera_from_radar)
     assert error @ np.linalg.solve(outcome.covariance, error) < 1.5 * outcome.covariance_quantile

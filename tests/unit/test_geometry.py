@@ -24,29 +24,6 @@ def test_a_transform_moves_points_from_source_to_target() -> None:
     np.testing.assert_allclose(points_camera, [[10.0, 1.0, 0.0], [8.0, 0.0, 3.0]])
 
 
-def test_transforms_compose_right_to_left() -> None:
-    turn = RigidTransform(QUARTER_ABOUT_Z, np.zeros(3))
-    shift = RigidTransform(np.eye(3), np.array([1.0, 0.0, 0.0]))
-    point = np.array([[1.0, 0.0, 0.0]])
-    np.testing.assert_allclose(turn @ shift @ point, [[0.0, 2.0, 0.0]], atol=1e-15)
-    np.testing.assert_allclose(shift @ turn @ point, [[1.0, 1.0, 0.0]], atol=1e-15)
-
-
-def test_the_translation_is_where_the_source_origin_lies_in_the_target() -> None:
-    camera_from_radar = RigidTransform(QUARTER_ABOUT_Z, np.array([1.0, 2.0, 3.0]))
-    np.testing.assert_array_equal(camera_from_radar @ np.zeros((1, 3)), [[1.0, 2.0, 3.0]])
-
-
-def test_a_matrix_and_back_is_the_same_transform() -> None:
-    camera_from_radar = RigidTransform(QUARTER_ABOUT_Z, np.array([1.0, 2.0, 3.0]))
-    matrix = camera_from_radar.as_matrix()
-    np.testing.assert_array_equal(matrix[3], [0.0, 0.0, 0.0, 1.0])
-    again = RigidTransform.from_matrix(matrix)
-    np.testing.assert_array_equal(again.rotation, camera_from_radar.rotation)
-    np.testing.assert_array_equal(again.translation_m, camera_from_radar.translation_m)
-    np.testing.assert_array_equal(RigidTransform.from_matrix(matrix[:3]).as_matrix(), matrix)
-
-
 def test_a_mirrored_rotation_is_refused_and_the_message_says_so() -> None:
     with pytest.raises(ValueError, match="left-handed"):
         RigidTransform(np.diag([1.0, -1.0, 1.0]), np.zeros(3))

@@ -21,9 +21,7 @@ from calib_core.options import CalibrationOptions
 from calib_core.radar import RadarErrors
 from calib_core.recordings import RecordingOptions, open_recording
 from calib_core.results import Calibration, Metrics
-from tests.unit.recordings.conftest import Ros, plain_rows, some_points, write_rows
-
-__all__ = ["START_NS", "Ros", "some_points"]
+from tests.unit.recordings.conftest import Ros, plain_rows, write_rows
 
 START_NS = 1_700_000_000 * NS_PER_S
 CAMERA_FROM_RADAR = RigidTransform(

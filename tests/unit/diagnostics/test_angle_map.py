@@ -41,9 +41,7 @@ def positions(simulated: SimulatedPairs) -> Points3:
 
 
 def solved(simulated: SimulatedPairs, count: int, options: CalibrationOptions | None = None) -> Calibration:
-    outcome = calibrate_pairs(simulated.pairs[:count], simulated.camera, options or CalibrationOptions())
-    assert isinstance(outcome, Calibration)
-    return outcome
+    return calibrate_pairs(simulated.pairs[:count], simulated.camera, options or CalibrationOptions()).unwrap()
 
 
 def unseen_aed_px(simulated: SimulatedPairs, count: int, calibration: Calibration, angle_map: AngleMap | None) -> float:
@@ -59,7 +57,6 @@ def test_a_smooth_error_is_learnt_and_new_placements_come_out_closer() -> None:
     simulated = drawn(40, bend=True)
     calibration = solved(simulated, 40)
     angle_map = learn_angle_map(calibration)
-    assert angle_map is not None
     assert angle_map.pays
     before, after = (unseen_aed_px(simulated, 40, calibration, known) for known in (None, angle_map))
     assert after < 0.75 * before
@@ -79,7 +76,6 @@ def test_sigma_grows_where_no_placement_was() -> None:
     simulated = drawn(30, bend=True)
     calibration = solved(simulated, 30)
     angle_map = learn_angle_map(calibration)
-    assert angle_map is not None
     reported = np.array([pair.point_radar_m for pair in calibration.pairs])
     directions = polar_from_cartesian(calibration.radar_errors.corrected(reported))[:, 1:]
     grid = np.stack([*np.meshgrid(angle_map.azimuth_rad, angle_map.elevation_rad)], axis=-1)
@@ -128,8 +124,6 @@ def test_many_pairs_are_thinned_out_and_the_map_is_reproducible() -> None:
     simulated = drawn(200, bend=True)
     calibration = solved(simulated, 200)
     first, second = learn_angle_map(calibration), learn_angle_map(calibration)
-    assert first is not None
-    assert second is not None
     np.testing.assert_array_equal(first.correction_rad, second.correction_rad)
     before, after = (unseen_aed_px(simulated, 200, calibration, known) for known in (None, first))
     assert after < 0.75 * before

@@ -180,8 +180,7 @@ NEAR = replace(FIELD, min_range_m=2.0, max_range_m=2.5)
 
 def decisive(simulated: SimulatedPairs, *more: SimulatedPairs) -> list[str]:
     pairs = [*simulated.pairs, *(replace(pair, id="near") for other in more for pair in other.pairs)]
-    outcome = calibrate_pairs(pairs, simulated.camera, CalibrationOptions())
-    assert isinstance(outcome, Calibration)
+    outcome = calibrate_pairs(pairs, simulated.camera, CalibrationOptions()).unwrap()
     return [one.message for one in outcome.warnings if one.code == "one-pair-decides"]
 
 
@@ -201,8 +200,7 @@ def test_a_second_near_placement_takes_the_decision_from_the_first(noise: str) -
     far = simulate_pairs(18, rng=rng, noise=noise, layout=FAR)  # type: ignore[arg-type]
     near = simulate_pairs(4, rng=rng, noise=noise, layout=NEAR, rig=far.rig)  # type: ignore[arg-type]
     pairs = [replace(pair, id=f"near-{i}") for i, pair in enumerate(near.pairs)]
-    outcome = calibrate_pairs([*far.pairs, *pairs], far.camera, CalibrationOptions())
-    assert isinstance(outcome, Calibration)
+    outcome = calibrate_pairs([*far.pairs, *pairs], far.camera, CalibrationOptions()).unwrap()
     assert "one-pair-decides" not in {one.code for one in outcome.warnings}
 
 
@@ -216,9 +214,7 @@ def test_no_pair_of_a_good_set_decides(noise: str) -> None:
 
 
 def solved(simulated: SimulatedPairs, pairs: tuple[Pair, ...] | None = None) -> Calibration:
-    outcome = calibrate_pairs(pairs or simulated.pairs, simulated.camera)
-    assert isinstance(outcome, Calibration)
-    return outcome
+    return calibrate_pairs(pairs or simulated.pairs, simulated.camera).unwrap()
 
 
 @pytest.fixture
@@ -302,8 +298,7 @@ def rooftop(project_root: Path) -> ClickedSample:
 def clock_warnings(rooftop: ClickedSample, ahead_s: float) -> list[str]:
     clicks, scans, camera = rooftop
     shifted = replace(scans, times_ns=scans.times_ns + round(ahead_s * NS_PER_S))
-    outcome = calibrate(clicks, shifted, camera, CalibrationOptions())
-    assert isinstance(outcome, Calibration)
+    outcome = calibrate(clicks, shifted, camera, CalibrationOptions()).unwrap()
     return [one.message for one in outcome.warnings if one.code == "clock-bias-suspected"]
 
 
@@ -342,7 +337,6 @@ def placed(offsets_s: list[float]) -> tuple[list[PairResult], RadarScans]:
 def test_the_offset_lies_between_what_all_clicks_allow() -> None:
     clicked_s = [-2.9, -1.7, -2.6, -2.5, -3.0]
     offset = clock_offset(*placed(clicked_s), GatingOptions())
-    assert offset is not None
     assert offset.least_s == pytest.approx(3.0 - DWELL_S / 2, abs=0.11)
     assert offset.most_s == pytest.approx(1.7 + DWELL_S / 2, abs=0.21)
     assert offset.nearest_s == offset.least_s

@@ -12,7 +12,7 @@ from calib_core.camera import Camera
 from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions, CameraPositionPrior, RadarOptions, SolvingOptions
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
-from calib_core.results import Calibration, DataWarning
+from calib_core.results import DataWarning
 from calib_core.synthetic import FIELD, RigOptions, SimulatedPairs, simulate_pairs
 from calib_core.synthetic.simulated_pairs import NoiseName
 
@@ -37,8 +37,7 @@ def moved(pairs: Sequence[Pair], change: np.ndarray) -> list[Pair]:
 
 
 def handedness(pairs: Sequence[Pair], simulated: SimulatedPairs, options: CalibrationOptions) -> set[str]:
-    outcome = calibrate_pairs(pairs, simulated.camera, options)
-    assert isinstance(outcome, Calibration)
+    outcome = calibrate_pairs(pairs, simulated.camera, options).unwrap()
     return {one.code for one in outcome.warnings} & HANDEDNESS
 
 
@@ -112,8 +111,7 @@ def suspected(seed: int, noise: str, options: CalibrationOptions, *, focal: floa
 
 
 def warning_with(camera: Camera, pairs: object, options: CalibrationOptions) -> str | None:
-    outcome = calibrate_pairs(pairs, camera, options)  # type: ignore[arg-type]
-    assert isinstance(outcome, Calibration)
+    outcome = calibrate_pairs(pairs, camera, options).unwrap()  # type: ignore[arg-type]
     return text_of(outcome.warnings)
 
 

@@ -23,9 +23,7 @@ OPTIONS = CalibrationOptions(noise=NoiseOptions(2.0, 0.015, 0.55, 1.0))
 
 
 def solved(pairs: list[Pair], simulated: SimulatedPairs) -> Calibration:
-    outcome = calibrate_pairs(pairs, simulated.camera, OPTIONS)
-    assert isinstance(outcome, Calibration)
-    return outcome
+    return calibrate_pairs(pairs, simulated.camera, OPTIONS).unwrap()
 
 
 def positions(simulated: SimulatedPairs) -> np.ndarray:
@@ -55,7 +53,6 @@ def test_following_the_advice_beats_random_placements() -> None:
         advised = list(simulated.pairs[:6])
         while len(advised) < 14:
             advice = next_placement(solved(advised, simulated))
-            assert advice is not None
             advised.append(measured_at(advice.position_radar_m, f"a{len(advised)}", simulated, rng))
         random = solved(list(simulated.pairs), simulated)
         ratios.append(rotation_sigma(random) / rotation_sigma(solved(advised, simulated)))
@@ -69,7 +66,6 @@ def test_the_promised_gain_is_what_a_pair_there_brings() -> None:
         simulated = simulate_pairs(10, rng=rng)
         before = calibrate_pairs(simulated.pairs, simulated.camera, options).unwrap()
         advice = next_placement(before)
-        assert advice is not None
         added = measured_at(advice.position_radar_m, "added", simulated, rng)
         after = calibrate_pairs([*simulated.pairs, added], simulated.camera, options).unwrap()
         points = np.array([pair.point_radar_m for pair in before.pairs])
@@ -86,8 +82,6 @@ def test_more_clicks_of_the_same_placements_leave_the_gain_unchanged() -> None:
         replace(result, measured=replace(result.measured, id=result.id)) for result in repeated if result.measured
     ]
     once, thrice = next_placement(before), next_placement(replace(before, pairs=tuple(measured)))
-    assert once is not None
-    assert thrice is not None
     assert len(measured) == 3 * len(before.pairs)
     assert thrice.gain == pytest.approx(once.gain, rel=0.05)
 
@@ -100,7 +94,6 @@ def test_no_placement_is_said_to_level_a_radar_without_elevation() -> None:
         for pair, point in zip(simulated.pairs, flat, strict=True)
     ]
     advice = next_placement(solved(pairs, simulated))
-    assert advice is not None
     assert advice.gain < 1.5
 
 
@@ -108,7 +101,6 @@ def test_the_advised_place_is_in_view_and_new() -> None:
     simulated = simulate_pairs(10, rng=np.random.default_rng(3))
     calibration = solved(list(simulated.pairs), simulated)
     advice = next_placement(calibration, limits=PlacementLimits(separation_m=1.0))
-    assert advice is not None
     assert calibration.camera.in_image(advice.pixel_px[None]).all()
     used = np.array([pair.point_radar_m for pair in calibration.pairs])
     assert np.linalg.norm(used - advice.position_radar_m, axis=1).min() >= 1.0
@@ -118,8 +110,6 @@ def test_the_advised_place_is_in_view_and_new() -> None:
 def test_the_advice_is_to_stop_after_many_placements_and_not_after_few() -> None:
     simulated = simulate_pairs(60, rng=np.random.default_rng(4))
     few, many = (next_placement(solved(list(simulated.pairs[:n]), simulated)) for n in (6, 60))
-    assert few is not None
-    assert many is not None
     assert not few.may_stop
     assert many.may_stop
     assert few.gain > many.gain
@@ -127,8 +117,7 @@ def test_the_advice_is_to_stop_after_many_placements_and_not_after_few() -> None
 
 def test_there_is_no_advice_without_a_covariance() -> None:
     simulated = simulate_pairs(12, rng=np.random.default_rng(5), noise="imaging")
-    outcome = calibrate_pairs(simulated.pairs, simulated.camera, CalibrationOptions(method="paper"))
-    assert isinstance(outcome, Calibration)
+    outcome = calibrate_pairs(simulated.pairs, simulated.camera, CalibrationOptions(method="paper")).unwrap()
     assert next_placement(outcome) is None
 
 
@@ -178,7 +167,6 @@ def test_many_placements_on_one_side_are_not():
     coverage = placement_coverage(one_side, half_view_rad=HALF_VIEW_RAD)
     assert coverage.placements == 20
     assert not coverage.is_enough
-    assert coverage.next is not None
     assert coverage.next.side != "left"
 
 

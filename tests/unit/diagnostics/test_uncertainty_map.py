@@ -17,9 +17,7 @@ _CHI2_95_2D, _CHI2_95_6D = 5.991464547107979, 12.591587243743977
 @pytest.fixture(scope="module")
 def solved() -> Calibration:
     drawn = simulate_pairs(20, rng=np.random.default_rng(7))
-    outcome = calibrate_pairs(drawn.pairs, drawn.camera)
-    assert isinstance(outcome, Calibration)
-    return outcome
+    return calibrate_pairs(drawn.pairs, drawn.camera).unwrap()
 
 
 @pytest.mark.parametrize("distance_m", [5.0, 20.0, 60.0])
@@ -73,8 +71,7 @@ def test_a_radar_without_elevation_is_mapped_by_what_its_pairs_determine() -> No
     from calib_core.synthetic import SystematicErrors
 
     drawn = simulate_pairs(20, rng=np.random.default_rng(5), systematic=SystematicErrors(measures_elevation=False))
-    flat = calibrate_pairs(drawn.pairs, drawn.camera)
-    assert isinstance(flat, Calibration)
+    flat = calibrate_pairs(drawn.pairs, drawn.camera).unwrap()
     assert not flat.sees_elevation
     firm = uncertainty_map(flat, 20.0).semi_major_px
     whole = uncertainty_map(replace(flat, warnings=()), 20.0).semi_major_px

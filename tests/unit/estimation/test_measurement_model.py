@@ -146,8 +146,7 @@ def flattened(pair: Pair) -> Pair:
 def solved(seed: int, height_m: float, options: CalibrationOptions) -> tuple[Calibration, RigidTransform]:
     layout = replace(FIELD, height_m=height_m)
     simulated = simulate_pairs(20, rng=np.random.default_rng([9, seed]), layout=layout, rig_options=LEVEL)
-    outcome = calibrate_pairs([flattened(pair) for pair in simulated.pairs], simulated.camera, options)
-    assert isinstance(outcome, Calibration)
+    outcome = calibrate_pairs([flattened(pair) for pair in simulated.pairs], simulated.camera, options).unwrap()
     return outcome, simulated.camera_from_radar
 
 
@@ -176,8 +175,7 @@ def test_a_radar_that_reports_one_height_or_rounded_zeros_is_flat_too(reported_z
             z_m = reported_z_m if reported_z_m > 0.1 else reported_z_m * rng.standard_normal()
             raised = candidate.position_radar_m + np.array([0.0, 0.0, z_m])
             pairs.append(replace(pair, candidates=(replace(candidate, position_radar_m=raised),)))
-        outcome = calibrate_pairs(pairs, simulated.camera, FREE)
-        assert isinstance(outcome, Calibration)
+        outcome = calibrate_pairs(pairs, simulated.camera, FREE).unwrap()
         error = simulated.camera_from_radar.error_from(outcome.camera_from_radar)
         inside += bool(error @ np.linalg.solve(outcome.covariance, error) < outcome.covariance_quantile)
         assert "flat-radar" in {one.code for one in outcome.warnings}
@@ -195,8 +193,7 @@ def test_the_warning_says_what_the_pairs_determine_and_what_is_assumed() -> None
 
 def test_the_covariance_of_a_radar_with_elevation_is_not_widened() -> None:
     simulated = simulate_pairs(20, rng=np.random.default_rng(2))
-    outcome = calibrate_pairs(simulated.pairs, simulated.camera, MEASURED)
-    assert isinstance(outcome, Calibration)
+    outcome = calibrate_pairs(simulated.pairs, simulated.camera, MEASURED).unwrap()
     assert np.sqrt(outcome.covariance[3:, 3:].trace()) < np.deg2rad(1.5)
 
 

@@ -184,7 +184,6 @@ def test_pairs_of_a_companion_are_found_with_the_place_where_it_stands(tape: boo
     simulated = simulate_pairs(20, rng=np.random.default_rng(2), noise="imaging")
     solved = solve_draw(simulated, pairs=with_companion(simulated, range(6)), tape=tape)
     found = find_agreeing_outliers(solved.measurements, solved.refined, rng=np.random.default_rng(1))
-    assert found is not None
     assert found.pairs.tolist() == list(range(6))
     assert found.camera_move_m == pytest.approx(np.linalg.norm(COMPANION_M), abs=0.3)
     assert np.linalg.norm(found.difference[3:]) < np.deg2rad(5.0)

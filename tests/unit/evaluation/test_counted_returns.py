@@ -92,7 +92,6 @@ def test_the_turn_and_the_parallax_are_found():
     bearing = ACROSS + 5.0 + np.rad2deg(0.4 / near)
     matches = match_by_bearing(sightings((ACROSS, near)), box_table(boxes(bearing)), CAMERA)
 
-    assert matches.bearings is not None
     expected = np.deg2rad(5.0) + 0.4 / near
     assert np.abs(matches.bearings.turn_rad + matches.bearings.parallax_m / near - expected).max() < np.deg2rad(1.0)
 

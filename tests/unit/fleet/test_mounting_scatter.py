@@ -165,7 +165,6 @@ def test_a_measured_position_that_several_vehicles_state_is_one_measurement() ->
         sessions = [simulated_session(pose, Accuracy(0.01, 0.05), rng, vehicle=f"v{k}") for k, pose in enumerate(drawn)]
         stated = [replace(one, measured=copied) for one in sessions]
         scatter = scattered([mounting_of([one]) for one in stated])
-        assert scatter.shared_tape is not None
         assert (scatter.shared_tape.vehicles, scatter.shared_tape.sigma_m) == (rows, 0.01)
         narrow += np.sqrt(np.diag(scatter.scatter))[:3].min() < 0.01
         following = simulated_mounting(NARROW, rng)
@@ -192,7 +191,6 @@ def test_measured_positions_that_differ_less_than_their_sigma_are_one_measuremen
 
         assert told(np.full(3, 0.01), rng, sessions) is None
         alike = told(np.full(3, 0.0003), rng, sessions)
-        assert alike is not None
         assert (alike.vehicles, alike.sigma_m) == (20, 0.01)
         assert 0.0002 < alike.spread_m < 0.0004
         assert "20 vehicles differ by ± 0.0" in alike.words

@@ -313,9 +313,7 @@ def test_the_quantile_of_a_known_covariance_is_that_of_chi2() -> None:
 @pytest.fixture(scope="module")
 def calibration() -> Calibration:
     simulated = simulate_pairs(20, rng=np.random.default_rng(5), noise="ti")
-    outcome = calibrate_pairs(simulated.pairs, simulated.camera)
-    assert isinstance(outcome, Calibration)
-    return outcome
+    return calibrate_pairs(simulated.pairs, simulated.camera).unwrap()
 
 
 def test_pose_and_uncertainty_are_the_calibrations(calibration: Calibration) -> None:
@@ -330,7 +328,6 @@ def test_pose_and_uncertainty_are_the_calibrations(calibration: Calibration) -> 
 
 def test_what_rests_on_stated_sigmas_is_the_calibrations_and_all_of_it_if_nobody_says(calibration: Calibration) -> None:
     pose, parts = session_pose(calibration, vehicle="van", session="spring"), calibration.covariance_parts
-    assert parts is not None
     np.testing.assert_array_equal(pose.systematic, parts.systematic)
     np.testing.assert_array_equal(pose.of_tape, parts.camera_position)
     assert 0.0 < np.trace(pose.systematic[:3, :3]) < np.trace(pose.covariance[:3, :3])
@@ -340,8 +337,7 @@ def test_what_rests_on_stated_sigmas_is_the_calibrations_and_all_of_it_if_nobody
 
 def test_a_method_without_a_noise_model_is_refused_with_what_to_do() -> None:
     simulated = simulate_pairs(20, rng=np.random.default_rng(5), noise="ti")
-    outcome = calibrate_pairs(simulated.pairs, simulated.camera, CalibrationOptions(method="paper"))
-    assert isinstance(outcome, Calibration)
+    outcome = calibrate_pairs(simulated.pairs, simulated.camera, CalibrationOptions(method="paper")).unwrap()
     with pytest.raises(InputError, match=r"states no uncertainty.*default method"):
         session_pose(outcome, vehicle="van", session="spring")
 

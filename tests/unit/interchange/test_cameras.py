@@ -332,7 +332,6 @@ def test_mrcals_dictionary_names_model_and_size() -> None:
     text = str(camera_content(typical_camera("rational_polynomial"), "mrcal"))
     assert "'LENSMODEL_OPENCV8'" in text
     numbers = re.search(r"'intrinsics': \[ (.*) \]", text)
-    assert numbers is not None
     np.testing.assert_array_equal(
         [float(number) for number in numbers[1].split(",")], typical_camera("rational_polynomial").parameters
     )
@@ -344,8 +343,6 @@ def test_the_covariance_travels(to: str) -> None:
     spread = np.random.default_rng(2).standard_normal((9, 9))
     camera = plain.with_parameters(plain.parameters, CameraCovariance(plain.parameter_names, spread @ spread.T))
     again = read_back(camera_content(camera, to))
-    assert again.covariance is not None
-    assert camera.covariance is not None
     assert again.covariance.order == camera.covariance.order
     np.testing.assert_array_equal(again.covariance.matrix, camera.covariance.matrix)
 

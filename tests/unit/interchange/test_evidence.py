@@ -158,7 +158,6 @@ def test_a_frame_without_optical_has_body_axes_unless_its_numbers_fit_optical_on
 ):
     found = read_any(command(child, pose))
     assert found.pose.axes == axes
-    assert found.frames is not None
     assert found.frames.camera == optical_frame
     assert bool(found.assumptions) == ("optical" not in child)
 
@@ -193,8 +192,6 @@ def test_a_file_states_its_evidence_its_calibration_and_its_check_point(proven: 
     assert found.evidence == "imported_proven"
     assert found.calibration_sha256 == calibration_sha256(proven)
     assert found.assumptions == ()
-    assert point is not None
-    assert check_point is not None
     np.testing.assert_array_equal(check_point.radar_m, point.radar_m)
     if check_point.camera_m is not None:
         seen_m = proven.calibration.camera_from_radar @ point.radar_m[None]
@@ -256,7 +253,6 @@ def test_a_covariance_in_an_unknown_order_is_not_taken_for_ours(proven: Calibrat
 
 def test_foxglove_s_messages_are_read_as_json_too() -> None:
     found = load_mcap(kept_file("foxglove"), source="file")
-    assert found is not None
     transforms, camera = (json.loads(message.data) for message in found.messages)
 
     earlier = read_any(json.dumps({"FrameTransform": transforms["transforms"][0], "CameraCalibration": camera}))

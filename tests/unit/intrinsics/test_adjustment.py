@@ -55,7 +55,6 @@ def test_the_optimum_is_that_of_opencv() -> None:
     stack = stacked("plumb_bob", 10)
     stack = replace(stack, pixels_px=stack.pixels_px.astype(np.float32))  # as OpenCV takes them
     first = start("plumb_bob", stack)
-    assert first is not None
     ours = adjust(first, stack, Freedom.of(first.camera))
     board = [BOARD.corners_m.astype(np.float32)] * len(stack)
     seen = [np.ascontiguousarray(view.T, dtype=np.float32) for view in stack.pixels_px]
@@ -68,7 +67,6 @@ def test_the_optimum_is_that_of_opencv() -> None:
 def test_at_the_optimum_no_free_number_has_a_gradient() -> None:
     stack = stacked("equidistant")
     first = start("equidistant", stack)
-    assert first is not None
     freedom = Freedom.of(first.camera)
     at = reduced(linearize(adjust(first, stack, freedom), stack, freedom))
     scale = np.sqrt(np.diag(at.information.sum(axis=0)))
@@ -78,7 +76,6 @@ def test_at_the_optimum_no_free_number_has_a_gradient() -> None:
 def test_rational_coefficients_that_the_views_leave_free_stay_small() -> None:
     stack = stacked("plumb_bob", 8)
     first = start("rational_polynomial", stack)
-    assert first is not None
     free = Freedom(np.eye(12))
     pulled = Freedom.of(first.camera)
     alone, held = adjust(first, stack, free), adjust(first, stack, pulled)
@@ -117,7 +114,6 @@ def test_a_corner_without_weight_changes_nothing() -> None:
 def test_from_the_start_an_adjustment_reaches_the_noise(model: str) -> None:
     stack = stack_views(drawn_views(CAMERAS[model], 12, 4), BOARD.corners_m, SIZE_PX)
     first = start(model, stack)
-    assert first is not None
     state = adjust(first, stack, Freedom.of(first.camera))
     assert np.sqrt(stack.mean_square(residuals_of(state, stack)).mean()) < 0.145
     assert state.camera.matrix_px[0, 0] == pytest.approx(CAMERAS[model].matrix_px[0, 0], rel=0.01)
@@ -138,7 +134,6 @@ def test_a_fisheye_of_200_degrees_is_found() -> None:
         )
     stack = stack_views(views, BOARD.corners_m, (1000, 1000))
     first = start("equidistant", stack)
-    assert first is not None
     state = adjust(first, stack, Freedom.of(first.camera))
     assert np.abs(state.camera.parameters[:4] - camera.parameters[:4]).max() < 0.5
     most = max(np.degrees(np.arccos(state.camera.rays(view.pixels_px)[:, 2])).max() for view in views)
@@ -161,7 +156,6 @@ def test_a_third_of_views_that_show_something_else_does_not_mislead_the_start() 
         for n in range(5)
     ]
     first = start("plumb_bob", stack_views([*views, *strange], BOARD.corners_m, SIZE_PX))
-    assert first is not None
     assert first.camera.matrix_px[0, 0] == pytest.approx(900.0, rel=0.01)
 
 
@@ -232,7 +226,6 @@ def test_a_flat_board_stays_as_stated() -> None:
 def test_a_bend_that_must_not_be_modelled_is_warned_about_and_enters_the_sigma() -> None:
     lens = calibrated(Errors(bend_m=0.0014), "flat")
     assert any("it was not taken into account, because board_shape is flat" in one.message for one in lens.warnings)
-    assert lens.camera.covariance is not None
     off_px = abs(lens.camera.matrix_px[0, 0] - 900.0)
     assert 5.0 < off_px < 1.96 * lens.camera.covariance.sigma("fx_px")
 

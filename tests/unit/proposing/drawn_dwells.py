@@ -11,8 +11,6 @@ from calib_core.camera import Camera
 from calib_core.errors import CalibrationError
 from calib_core.measurements import NS_PER_S, TimeNs
 
-__all__ = ["CAMERA", "DrawnDwell", "DrawnFrames", "placements_of", "wall"]
-
 _SIZE_PX = (320, 200)
 _FOCAL_PX = 400.0
 CAMERA = Camera(

@@ -145,7 +145,6 @@ def view(numbers: np.ndarray = NUMBERS) -> DwellView:
 @pytest.mark.parametrize("off_px", [(0.5, -0.4), (-1.8, 1.5), (3.0, 2.0)])
 def test_a_click_near_the_apex_is_averaged_over_all_clear_frames(off_px: tuple[float, float]) -> None:
     found = averaged_over_dwell(view(), FRAMES, CLICKED, APEX_PX + off_px)
-    assert found is not None
     assert found.frames == len(NUMBERS)
     assert np.hypot(*(found.pixel_px - APEX_PX)) < min(0.3, np.hypot(*off_px))
 
@@ -153,8 +152,6 @@ def test_a_click_near_the_apex_is_averaged_over_all_clear_frames(off_px: tuple[f
 def test_the_answer_does_not_depend_on_the_click() -> None:
     one = averaged_over_dwell(view(), FRAMES, CLICKED, APEX_PX + np.array([1.0, 1.0]))
     other = averaged_over_dwell(view(), FRAMES, CLICKED, APEX_PX - np.array([1.3, 0.4]))
-    assert one is not None
-    assert other is not None
     assert np.hypot(*(one.pixel_px - other.pixel_px)) < 0.05
 
 
@@ -162,8 +159,6 @@ def test_noise_is_averaged_but_never_below_what_all_frames_share() -> None:
     noisy = Shaken(sigma_grey=8.0)
     alone = averaged_over_dwell(view(NUMBERS[:0]), noisy, CLICKED, APEX_PX)
     averaged = averaged_over_dwell(view(), noisy, CLICKED, APEX_PX)
-    assert alone is not None
-    assert averaged is not None
     assert (alone.frames, averaged.frames) == (1, len(NUMBERS))
     assert np.hypot(*(averaged.pixel_px - APEX_PX)) < np.hypot(*(alone.pixel_px - APEX_PX)) + 0.02
     assert averaged.sigma_px > 0.12
@@ -173,8 +168,6 @@ def test_a_shaking_camera_is_followed_and_widens_the_sigma() -> None:
     shifts_px = {int(number): ((-1) ** k, (k % 3) - 1) for k, number in enumerate(NUMBERS)} | {CLICKED: (0, 0)}
     found = averaged_over_dwell(view(), Shaken(shifts_px), CLICKED, APEX_PX + np.array([0.5, 0.5]))
     still = averaged_over_dwell(view(), FRAMES, CLICKED, APEX_PX + np.array([0.5, 0.5]))
-    assert found is not None
-    assert still is not None
     mean_px = APEX_PX + np.mean([shifts_px[int(number)] for number in NUMBERS], axis=0)
     assert np.hypot(*(found.pixel_px - mean_px)) < 0.3
     assert found.sigma_px > 1.5 * still.sigma_px
@@ -183,7 +176,6 @@ def test_a_shaking_camera_is_followed_and_widens_the_sigma() -> None:
 def test_frames_of_another_picture_do_not_enter() -> None:
     shifts_px = {int(number): (25, 0) for number in NUMBERS[4:]}
     found = averaged_over_dwell(view(), Shaken(shifts_px), CLICKED, APEX_PX)
-    assert found is not None
     assert found.frames == 4
     assert np.hypot(*(found.pixel_px - APEX_PX)) < 0.3
 
@@ -191,14 +183,12 @@ def test_frames_of_another_picture_do_not_enter() -> None:
 def test_frames_in_which_somebody_stands_before_it_do_not_enter() -> None:
     hidden = replace(FRAMES, people=[(3.0, 6.0, 120, 60, 60, 80)])
     found = averaged_over_dwell(view(), hidden, int(NUMBERS[0]), APEX_PX)
-    assert found is not None
     assert found.frames == int((NUMBERS < 6).sum())
 
 
 def test_a_frame_that_cannot_be_read_is_left_out_unless_it_was_clicked() -> None:
     broken = replace(FRAMES, broken=frozenset({int(NUMBERS[0])}))
     found = averaged_over_dwell(view(), broken, CLICKED, APEX_PX)
-    assert found is not None
     assert found.frames == len(NUMBERS) - 1
     with pytest.raises(CalibrationError):
         averaged_over_dwell(view(), broken, int(NUMBERS[0]), APEX_PX)
@@ -254,7 +244,6 @@ def test_a_click_beside_the_apex_is_carried_as_it_is(views: tuple[DwellView, ...
     low_px = 0.3
     clicked = np.array(LOOKED_AT.dwells[0].apex_px) + np.array([0.0, low_px * views[0].width_px])
     look = look_of(views[0], LOOKED_AT, clicked)
-    assert look is not None
     assert not look.at_apex
     view = with_look([rough(views[1], LOOKED_AT.dwells[1].apex_px)], [look], LOOKED_AT, CAMERA)[0]
     wanted = np.array(LOOKED_AT.dwells[1].apex_px) + np.array([0.0, low_px * view.width_px])

@@ -69,7 +69,6 @@ def test_nearly_every_reflector_is_proposed_and_few_proposals_are_wrong(drawing:
 def test_the_pose_is_right_to_a_few_degrees() -> None:
     drawn = draw_views(3)
     found = proposed(drawn).camera_from_radar
-    assert found is not None
     assert rotation_angle_rad(found.rotation @ drawn.camera_from_radar.rotation.T) < np.radians(3.0)
 
 
@@ -326,7 +325,6 @@ def test_wrong_deals_of_the_radar_score_far_below_the_right_one() -> None:
     rays = candidate_rays(draw_views(4, Drawing(count=8)).views, CAMERA, OPTIONS)
     prior = mounting_prior(OPTIONS, is_flat=False)
     right = pose_agreement(rays, prior)
-    assert right is not None
     assert right.score > chance_scores(rays, prior).max() + 5.0
 
 

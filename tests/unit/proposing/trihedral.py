@@ -10,8 +10,6 @@ from typing import Literal
 import cv2
 import numpy as np
 
-__all__ = ["Look", "background", "draw_look", "picture"]
-
 _FINE = 5
 _SHAPES = ("triangles", "squares", "quarters")
 

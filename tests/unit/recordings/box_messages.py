@@ -7,8 +7,6 @@ import numpy as np
 from calib_core.measurements import Box
 from tests.unit.recordings.conftest import START_NS, Ros, Row, plain_rows
 
-__all__ = ["EXPECTED", "FIRST_FRAME_NS", "KINDS", "recorded"]
-
 HEAD = "Header header\n"
 NEW = {
     "vision_msgs/msg/Point2D": "float64 x\nfloat64 y\n",

@@ -72,7 +72,6 @@ class Ros:
         """Build a PointCloud2 from a structured array, keeping padding and byte order."""
         dtype = points.dtype
         point_field = self.store.types["sensor_msgs/msg/PointField"]
-        assert dtype.fields is not None
         fields = [
             point_field(name=name, offset=place[1], datatype=POINT_CODES[place[0].str[1:]], count=1)
             for name, place in dtype.fields.items()

@@ -225,7 +225,6 @@ def test_equal_receive_times_are_not_preferred_to_sound_stamps(received_ns, ros,
         assert len(recording.image_times) == len(recording.radar_times) == 40
         assert recording.image_clock == recording.radar_clock == "header"
         (clocks,) = [topic.clocks for topic in recording.topics if topic.name == "/radar/points"]
-    assert clocks is not None
     assert clocks.reason.endswith("and the stamps are sound")
 
 
@@ -331,7 +330,6 @@ def test_clocks_of_sensors_that_are_not_in_use_are_shown_too(ros, write, plain, 
     with inspect_recording(write(ros, sorted(rows, key=lambda row: row[1]))) as recording:
         text = describe(recording)
         (rear,) = [topic for topic in recording_summary(recording).topics if topic.name == "/rear/points"]
-    assert rear.clocks is not None
     assert (rear.chosen, rear.clocks.chosen, rear.clocks.zero_stamps) == (False, "receive", 10)
     assert (
         "/rear/points: not in use; times are the recorder's receive times, because it has only zero stamps (10 messages)"

@@ -32,8 +32,6 @@ def test_a_spelling_means_the_same_as_a_column_and_as_a_field(spelling: Spelling
     quantity = quantity_of(spelling)
     for name in ("_".join(spelling.words.split()), "target." + ".".join(spelling.words.split())):
         column, field = read_column_name(name), meaning_of(name)
-        assert column is not None
-        assert field is not None
         assert column.quantity == quantity
         assert field.quantity == ("amplitude" if quantity in LEVELS else quantity)
         assert (field.rank, field.sigma, field.second, field.vague) == (spelling.rank, False, False, False)
@@ -42,11 +40,8 @@ def test_a_spelling_means_the_same_as_a_column_and_as_a_field(spelling: Spelling
 @pytest.mark.parametrize("subject", sorted(SUBJECTS))
 def test_the_word_for_a_return_may_precede_columns_and_fields(subject: str) -> None:
     column, field = read_column_name(f"{subject}.pos.x"), meaning_of(f"{subject}.pos.x")
-    assert column is not None
-    assert field is not None
     assert column.quantity == field.quantity == "x"
     time = read_column_name(f"{subject}.timestamp")
-    assert time is not None
     assert time.quantity == "time"
 
 
@@ -67,7 +62,6 @@ def test_an_ambiguous_spelling_is_not_shared(spelling: Spelling) -> None:
 def test_a_unit_means_the_same_everywhere(word: str, unit: Unit) -> None:
     quantity = MEASURED[unit.dimension]
     column = read_column_name(f"{quantity} [{word}]")
-    assert column is not None
     assert (column.quantity, column.unit) == (quantity, unit.flag)
     assert column.unit_is_known
     assert unit_of_word(word) == unit
@@ -87,9 +81,6 @@ def test_a_unit_means_the_same_everywhere(word: str, unit: Unit) -> None:
 )  # fmt: skip
 def test_a_unit_at_the_end_of_a_name_is_the_same_in_tables_and_messages(name: str, flag: str) -> None:
     column, field = read_column_name(name), meaning_of(name)
-    assert column is not None
-    assert field is not None
-    assert field.unit is not None
     assert column.unit == field.unit.flag == flag
 
 
@@ -108,7 +99,6 @@ def test_names_of_other_things_are_no_columns_of_returns(name: str) -> None:
 )
 def test_messages_keep_their_ambiguous_names(name: str, quantity: str, rank: int) -> None:
     meaning = meaning_of(name)
-    assert meaning is not None
     assert (meaning.quantity, meaning.rank) == (quantity, rank)
 
 
@@ -129,7 +119,6 @@ def test_only_the_documented_spelling_has_rank_zero() -> None:
 
 def test_a_unit_with_a_long_s_in_a_comment_is_read_as_any_other() -> None:
     unit = unit_in("[m/\u017f]", "speed")
-    assert unit is not None
     assert unit.scale == 1.0
 
 

@@ -60,7 +60,6 @@ def test_the_followed_recording_equals_the_finished_one(tmp_path, container_ros,
         assert recording.image_times[:before].tolist() == given
         given = recording.image_times.tolist()
         assert len(given) - before == growth.frames or not before
-    assert recording is not None
     replay.finish()
     assert not recording.is_complete
     assert recording.grow().completed
@@ -99,7 +98,6 @@ def test_a_recording_is_waited_for_until_there_is_enough_of_it(tmp_path, contain
     assert awaited.missing == "less than 3 s of the radar so far"
     replay.finish()
     recording = awaited.look()
-    assert recording is not None
     assert recording.is_complete
     recording.close()
 

@@ -24,9 +24,7 @@ def simulated() -> SimulatedPairs:
 
 
 def solved(simulated: SimulatedPairs, options: CalibrationOptions | None = None) -> Calibration:
-    outcome = calibrate_pairs(simulated.pairs, simulated.camera, options)
-    assert isinstance(outcome, Calibration)
-    return outcome
+    return calibrate_pairs(simulated.pairs, simulated.camera, options).unwrap()
 
 
 def test_unwrap_gives_the_calibration_or_raises_with_reason_and_hint(simulated: SimulatedPairs) -> None:
@@ -96,8 +94,7 @@ def test_arrays_become_pairs_that_give_the_same_pose(simulated: SimulatedPairs) 
     pixels = np.array([pair.pixel_px for pair in simulated.pairs])
     sigmas = np.array([pair.candidates[0].sigma_polar for pair in simulated.pairs])
     pairs = pairs_from_arrays(points, pixels, sigma_polar=sigmas, ids=[pair.id for pair in simulated.pairs])
-    outcome = calibrate_pairs(pairs, simulated.camera)
-    assert isinstance(outcome, Calibration)
+    outcome = calibrate_pairs(pairs, simulated.camera).unwrap()
     assert outcome.camera_from_radar.as_matrix().tobytes() == solved(simulated).camera_from_radar.as_matrix().tobytes()
     assert [pair.id for pair in pairs_from_arrays(points[:2], pixels[:2])] == ["pair-1", "pair-2"]
     assert pairs_from_arrays(points[:1], pixels[:1], sigma_px=2.5)[0].sigma_px == 2.5
@@ -151,8 +148,7 @@ def test_invalid_options_are_refused_by_name(simulated: SimulatedPairs, options:
 
 
 def test_the_housing_is_less_certain_by_the_biases_of_the_angles(simulated: SimulatedPairs) -> None:
-    calibration = calibrate_pairs(simulated.pairs, simulated.camera)
-    assert isinstance(calibration, Calibration)
+    calibration = calibrate_pairs(simulated.pairs, simulated.camera).unwrap()
     added = calibration.housing_covariance - calibration.covariance
     about = calibration.camera_from_radar.rotation.T @ added[3:, 3:] @ calibration.camera_from_radar.rotation
     np.testing.assert_allclose(about, np.diag([0.0, np.deg2rad(1.0) ** 2, np.deg2rad(1.0) ** 2]), atol=1e-12)

@@ -141,9 +141,7 @@ TAPED = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPosition
 
 
 def solved(simulated: SimulatedPairs, options: CalibrationOptions = FREE) -> Calibration:
-    outcome = calibrate_pairs(simulated.pairs, simulated.camera, options)
-    assert isinstance(outcome, Calibration)
-    return outcome
+    return calibrate_pairs(simulated.pairs, simulated.camera, options).unwrap()
 
 
 def distance(simulated: SimulatedPairs, calibration: Calibration) -> float:

@@ -23,9 +23,7 @@ def solved(
 ) -> Calibration:
     simulated = simulate_pairs(count, rng=np.random.default_rng(8), noise=noise)
     options = replace(CalibrationOptions(solving=tape_measured(tape_m)), method=method)
-    outcome = calibrate_pairs(simulated.pairs, simulated.camera, options)
-    assert isinstance(outcome, Calibration)
-    return outcome
+    return calibrate_pairs(simulated.pairs, simulated.camera, options).unwrap()
 
 
 @pytest.fixture(scope="module")

@@ -215,7 +215,6 @@ def test_placements_at_the_checkerboard_are_at_its_corners_in_the_picture() -> N
     options = replace(PRESETS["paper-d2"], placements=2, board_corners=6, dwell_s=4.0, radar_rate_hz=2.0)
     session = simulate_scans(options)
     board = session.stage.scene.board
-    assert board is not None
     world = session.stage.rig.radar_from_world.inverse() @ session.points_radar_m
     apart = np.linalg.norm(world[:, None] - board.corners_m[None], axis=2).min(axis=1)
     assert (apart < 0.03).sum() == 6

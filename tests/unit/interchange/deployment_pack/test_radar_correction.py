@@ -66,8 +66,6 @@ def true_m(file, reported_m) -> np.ndarray:
 
 def loaded(folder, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     spec = importlib.util.spec_from_file_location("radar_correction", folder / "radar_correction.py")
-    assert spec is not None
-    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     monkeypatch.setitem(sys.modules, "radar_correction", module)
     spec.loader.exec_module(module)

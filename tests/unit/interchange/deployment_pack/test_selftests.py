@@ -76,7 +76,6 @@ def changed(pattern: str, change: Callable[[str], str]) -> Callable[[str], str]:
 
     def edit(text: str) -> str:
         match = re.search(pattern, text, re.DOTALL)
-        assert match is not None
         return text[: match.start(1)] + change(match[1]) + text[match.end(1) :]
 
     return edit

@@ -105,21 +105,18 @@ def _is_pose(found: RigidTransform, tolerance: float = 1e-6) -> bool:
 @pytest.mark.parametrize("name", CORPUS)
 def test_a_file_in_a_usual_shape_has_the_pose_as_its_first_hypothesis(name: str) -> None:
     file = read_unstated(CORPUS[name], name)
-    assert file is not None
     assert _is_pose(hypotheses_of(file.pose_at(None))[0].camera_from_radar)
 
 
 @pytest.mark.parametrize("name", CORPUS)
 def test_the_meaning_of_a_usual_mounting_is_clear(name: str) -> None:
     file = read_unstated(CORPUS[name], name)
-    assert file is not None
     pose = file.pose_at(None)
     hypotheses = hypotheses_of(pose)
     chosen = clear_one(pose, hypotheses)
     if name in NOT_CERTAIN:
         assert chosen is None or _is_pose(chosen.camera_from_radar)
         return
-    assert chosen is not None
     found = as_imported(file, pose, chosen, by_hand=False)
     assert _is_pose(found.camera_from_radar)
     assert len(found.assumptions) == 1
@@ -128,7 +125,6 @@ def test_the_meaning_of_a_usual_mounting_is_clear(name: str) -> None:
 
 def test_body_axes_in_both_frames_leave_the_direction_open() -> None:
     file = read_unstated(json.dumps({"T": {"x": 1.2, "y": 0.1, "z": 0.4, "qw": 1, "qx": 0, "qy": 0, "qz": 0}}))
-    assert file is not None
     pose = file.pose_at(None)
     hypotheses = hypotheses_of(pose)
     assert clear_one(pose, hypotheses) is None
@@ -147,7 +143,6 @@ def test_body_axes_in_both_frames_leave_the_direction_open() -> None:
 def test_the_name_of_a_key_ranks_the_direction_and_decides_nothing(name: str, first: str) -> None:
     pose = RigidTransform(np.eye(3), [1.2, 0.1, 0.4]).as_matrix().tolist()
     file = read_unstated(json.dumps({name: pose}))
-    assert file is not None
     hypotheses = hypotheses_of(file.pose_at(None))
     assert hypotheses[0].meanings[0].direction == first
     assert {one.meanings[0].direction for one in hypotheses if one.fits} == {"camera_from_radar", "radar_from_camera"}
@@ -156,7 +151,6 @@ def test_the_name_of_a_key_ranks_the_direction_and_decides_nothing(name: str, fi
 def test_several_poses_are_listed_by_their_place() -> None:
     text = json.dumps({"front": {"T": MATRIX.tolist()}, "rear": {"T": MATRIX.tolist()}})
     file = read_unstated(text, "rig.json")
-    assert file is not None
     with pytest.raises(InputError, match=r"contains 2 poses; choose one with --pose PLACE: 'front.T', 'rear.T'"):
         file.pose_at(None)
     with pytest.raises(InputError, match=r"no pose at 'side.T'"):
@@ -169,7 +163,6 @@ def test_each_radar_of_a_mapping_is_a_pose_of_its_own() -> None:
         {"R_left": POSE.rotation.tolist(), "t_left": TRANSLATION, "R_right": np.eye(3).tolist(), "t_right": [1, 2, 3]}
     )
     file = read_unstated(text, "rig.json")
-    assert file is not None
     assert [pose.place for pose in file.poses] == ["R_left", "R_right"]
     assert file.poses[1].readings[0].translation.tolist() == [1.0, 2.0, 3.0]
 
@@ -236,7 +229,6 @@ def test_a_damaged_array_is_refused() -> None:
 
 def test_a_meaning_is_picked_by_as_many_parts_as_are_needed() -> None:
     file = read_unstated(json.dumps({"T": np.linalg.inv(MATRIX).tolist()}), "file.json")
-    assert file is not None
     hypotheses = hypotheses_of(file.pose_at(None))
     assert _is_pose(picked(hypotheses, "radar_from_camera,optical,m", "file.json").camera_from_radar)
     assert picked(hypotheses, "mm,camera_from_radar,body,frd", "file.json").meanings[0].unit == "mm"
@@ -253,10 +245,8 @@ def test_the_camera_in_the_file_comes_along() -> None:
         {"K": [[500, 0, 320], [0, 500, 240], [0, 0, 1]], "D": [], "width": 640, "height": 480, "T": MATRIX.tolist()}
     )
     file = read_unstated(text, "file.json")
-    assert file is not None
     pose = file.pose_at(None)
     found = as_imported(file, pose, hypotheses_of(pose)[0], by_hand=True)
-    assert found.camera is not None
     assert (found.camera.width_px, found.camera.matrix_px[0, 0]) == (640, 500.0)
 
 
@@ -273,13 +263,11 @@ def test_the_camera_in_the_file_comes_along() -> None:
 def test_names_of_frames_beside_a_pose_rank_the_direction(names: dict[str, str], first: str) -> None:
     matrix = RigidTransform(np.eye(3), [1.2, 0.1, 0.4]).as_matrix().tolist()
     file = read_unstated(json.dumps(names | {"transform": {"matrix": matrix}}), "file.json")
-    assert file is not None
     assert hypotheses_of(file.pose_at(None))[0].meanings[0].direction == first
 
 
 def test_the_pose_of_another_sensor_is_not_taken_for_the_radars() -> None:
     file = read_unstated(json.dumps({"T_cam_lidar": MATRIX.tolist()}), "file.json")
-    assert file is not None
     pose = file.pose_at(None)
     assert clear_one(pose, hypotheses_of(pose)) is None
     assert clear_one(pose, hypotheses_of(pose, against=POSE)) is not None
@@ -311,7 +299,6 @@ def test_intrinsics_are_no_pose() -> None:
 
 def test_units_in_names_rank_first() -> None:
     file = read_unstated(json.dumps({"R": POSE.rotation.tolist(), "t_mm": [120.0, -310.0, 70.0]}), "file.json")
-    assert file is not None
     first = hypotheses_of(file.pose_at(None))[0]
     assert first.meanings[0].unit == "mm"
     assert _is_pose(first.camera_from_radar)
@@ -320,7 +307,6 @@ def test_units_in_names_rank_first() -> None:
 def test_numbers_that_contradict_their_name_are_left_to_a_person() -> None:
     transposed = RigidTransform(POSE.rotation.T, POSE.translation_m)
     file = read_unstated(json.dumps({"T_camera_radar": transposed.as_matrix().tolist()}), "file.json")
-    assert file is not None
     pose = file.pose_at(None)
     hypotheses = hypotheses_of(pose)
     assert hypotheses[0].meanings[0].direction == "radar_from_camera"
@@ -332,7 +318,6 @@ def test_numbers_that_contradict_their_name_are_left_to_a_person() -> None:
 @pytest.mark.parametrize("name", ["T_robot_camera", "T_base_radar", "cam_to_rig", "gripper_from_camera"])
 def test_the_pose_of_one_of_the_two_in_something_else_is_left_to_a_person(name: str) -> None:
     file = read_unstated(json.dumps({name: POSE.inverse().as_matrix().tolist()}), "file.json")
-    assert file is not None
     pose = file.pose_at(None)
     assert pose.hints.other
     assert clear_one(pose, hypotheses_of(pose)) is None

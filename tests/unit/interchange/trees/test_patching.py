@@ -203,7 +203,6 @@ def test_expressions_and_moving_joints_are_refused_with_the_numbers_to_write(cal
         "car.xacro:32: the joint from roof_rack to camera_front_link is not changed: its origin is an"
     )
     numbers = re.search(r'Write there by hand: xyz="(.*?)" rpy="(.*?)"', message)
-    assert numbers is not None
     by_hand = re.sub(r'xyz="\$.*?" rpy=".*?"', f'xyz="{numbers[1]}" rpy="{numbers[2]}"', text)
     again = chained([file(by_hand)], "radar_front", "camera_front_optical_frame")
     np.testing.assert_allclose(

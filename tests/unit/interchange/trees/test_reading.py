@@ -292,5 +292,4 @@ def test_files_and_folders_without_joints_are_refused(tmp_path):
 def test_the_frames_of_a_file_that_is_no_tree_are_called_as_the_user_says():
     found = read_any("1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n", "m.txt", WantedFrames("radar_front"))
 
-    assert found.frames is not None
     assert (found.frames.radar, found.frames.camera) == ("radar_front", "camera_optical")

@@ -11,8 +11,6 @@ from rosbags.rosbag2 import Writer as Writer2
 
 from calib_core.recordings.containers.sources import Source
 
-__all__ = ["LoggedDatabase", "Replay", "messages_of", "write_in_chunks"]
-
 _INDEX_POSITION = re.compile(rb"index_pos=([\x00-\xff]{8})")
 
 

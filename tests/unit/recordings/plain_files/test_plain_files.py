@@ -430,7 +430,6 @@ def test_view_of_delft_brings_its_camera_and_names_its_pose(tmp_path, inner) -> 
         assert (recording.radar_topic, recording.image_topic) == ("/velodyne/radar", "/image_2/image")
         text = describe(recording)
         codes = {warning.code for warning in recording.warnings}
-    assert camera is not None
     np.testing.assert_allclose(camera.matrix_px, K)
     assert (camera.model, camera.width_px, camera.height_px) == ("pinhole", *SIZE)
     calib = root / inner / Path("radar/training" if inner == "." else "training" if inner == "radar" else ".") / "calib"
@@ -490,7 +489,6 @@ def test_raw_kitti_brings_its_camera_and_its_stamps(tmp_path, rectified) -> None
         assert recording.image_topic == "/image_02/image"
         assert recording.image_times[0] == 1_317_042_140_964_389_445
         assert "data (3 lidar clouds, which this program does not use)" in describe(recording)
-    assert camera is not None
     np.testing.assert_allclose(camera.matrix_px, matrix_px)
     assert camera.model == ("pinhole" if rectified else "plumb_bob")
 
@@ -546,7 +544,6 @@ def test_nuscenes_opens_at_its_front_with_the_camera_of_its_car(tmp_path) -> Non
             "/RADAR_FRONT/radar",
         }
         text = describe(recording)
-    assert camera is not None
     np.testing.assert_allclose(np.diag(camera.matrix_px), [126.6 * 1.1, 126.6 * 1.1, 1.0])
     assert "LIDAR_TOP (3 lidar clouds" in text
     assert "sweeps (frames between the annotated ones" in text

@@ -124,7 +124,6 @@ def test_a_polar_cloud_with_its_own_noise_is_converted(ros, write):
 def test_angles_are_not_used_if_there_are_positions():
     """The sign of CARLA's azimuth is opposite to that of its y."""
     plan = plan_columns(["x", "y", "z", "Range", "Velocity", "AzimuthAngle", "ElevationAngle"])
-    assert plan is not None
     assert (plan.position, plan.polar, plan.doppler) == (("x", "y", "z"), False, "Velocity")
 
 
@@ -142,7 +141,6 @@ def test_angles_are_not_used_if_there_are_positions():
 )
 def test_the_columns_of_known_drivers_are_recognised(names, doppler, amplitude):
     plan = plan_columns(names.split())
-    assert plan is not None
     assert (plan.position, plan.doppler, plan.amplitude) == (("x", "y", "z"), doppler, amplitude)
     assert plan.looks_like_radar
 

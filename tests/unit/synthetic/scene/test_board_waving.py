@@ -46,7 +46,6 @@ def test_the_board_is_where_the_truth_says(recording: SimulatedRecording) -> Non
     seen = []
     for frame, moment_s in zip(recording.frames(12), stage.frame_times.moment_s, strict=False):
         moving = stage.waving.at(float(moment_s))
-        assert moving is not None
         true = moving.pixels(moving.printed.corners_m)
         found, corners = cv2.findChessboardCorners(frame.pixels, (9, 6))
         if found:
@@ -58,7 +57,6 @@ def test_the_board_is_where_the_truth_says(recording: SimulatedRecording) -> Non
 
 def test_the_board_is_held_still_between_poses_and_moves_in_between(recording: SimulatedRecording) -> None:
     waving = recording.stage.waving
-    assert waving is not None
     speeds = [float(np.linalg.norm(moving.film.velocity_mps)) for s in (0.2, 0.7, 1.2, 1.7) if (moving := waving.at(s))]
     assert speeds[0] == speeds[2] == 0.0
     assert min(speeds[1], speeds[3]) > 0.02
