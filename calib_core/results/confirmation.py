@@ -26,9 +26,6 @@ def nobody_confirmed(unconfirmed: UnconfirmedClicks, count: int) -> DataWarning:
     )
 
 
-FLEET_PRIOR = "rests-on-fleet-prior"
-
-
 def rests_on_fleet_prior(vehicle_type: str) -> DataWarning:
     """Warn that an older version drew the pose of a file to the mean of other vehicles.
 
@@ -36,7 +33,7 @@ def rests_on_fleet_prior(vehicle_type: str) -> DataWarning:
         vehicle_type: of the vehicles.
     """
     return DataWarning(
-        FLEET_PRIOR,
+        "rests-on-fleet-prior",
         f"an older version drew this pose to a fleet's prior of type {vehicle_type}, so it may hide how this vehicle differs "
         "from the others",
         "solve it again, from its recording or with solve --pairs from this file: the pose then rests on its own pairs",

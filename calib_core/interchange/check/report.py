@@ -38,7 +38,6 @@ from calib_core.interchange.format import ImportedCalibration, StatedCheckPoint,
 from calib_core.interchange.own.calibration_json import calibration_sha256
 from calib_core.interchange.rotations import looks_forward, off_forward_rad
 from calib_core.interchange.syntax.strict_json import json_text
-from calib_core.results.confirmation import FLEET_PRIOR
 
 Verdict = Literal["right", "wrong", "doubtful", "unproven"]
 """Confirmed; contradicted; implausible, with nothing to test it against; plausible, with nothing to test it against."""
@@ -173,7 +172,9 @@ def check(
         results += by_plausibility(imported.pose, verified=bool(tested))
     if imported.file is not None:
         own = imported.file.calibration.warnings
-        results += [CheckResult("warning", one.code, one.message, one.hint) for one in own if one.code == FLEET_PRIOR]
+        results += [
+            CheckResult("warning", one.code, one.message, one.hint) for one in own if one.code == "rests-on-fleet-prior"
+        ]
     return CheckReport(imported, tuple(results), comparison, judgement, no_proof)
 
 
