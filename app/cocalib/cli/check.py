@@ -1,7 +1,9 @@
 """`cocalib check`: check calibration files, compare them, and hold them against a recording."""
 
 import sys
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,20 +19,9 @@ from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
     from calib_core.camera import Camera
-    from calib_core.interchange import AgreementLimits, CheckedFile, CheckPairs, CheckReport, ImportedCalibration
+    from calib_core.interchange import CheckedFile, CheckReport, ImportedCalibration
     from calib_core.measurements import ReflectorClick
     from calib_core.recordings import Recording
-
-
-@dataclass(frozen=True, slots=True)
-class Against:
-    """What calibrations are compared with, read once for all files."""
-
-    of: "ImportedCalibration | None"
-    against: "ImportedCalibration | None"
-    limits: "AgreementLimits"
-    camera: "Camera | None"
-    pairs: "CheckPairs | None"
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,11 +62,12 @@ class Check:
 
     def run(self) -> int:
         """Print the results; return the exit code."""
-        from calib_core.interchange import check_json, check_junit, exit_code
+        from calib_core.interchange import check_json, check_junit, exit_code, read_camera_file
 
         self._require_fitting()
-        context = self._against()
-        checked = [self._checked(path, context) for path in self.calibration]
+        camera = read_camera_file(self.camera) if self.camera else None
+        judge = self._judge(camera)
+        checked = [self._checked(path, judge, camera) for path in self.calibration]
         if self.junit is not None:
             write_whole(self.junit, check_junit(checked))
         if self.json:
@@ -102,38 +94,32 @@ class Check:
                 "the options of a recording apply with --recording RECORDING only; see cocalib check --help"
             )
 
-    def _against(self) -> Against:
-        from calib_core.interchange import AgreementLimits, read_any_file, read_camera_file, read_check_pairs_file
+    def _judge(self, camera: "Camera | None") -> "Callable[[ImportedCalibration], CheckReport]":
+        """Return the check of one file; what all files are compared with is read once."""
+        from calib_core.interchange import AgreementLimits, check, read_any_file, read_check_pairs_file
 
-        return Against(
+        return partial(
+            check,
             of=read_any_file(self.of) if self.of else None,
             against=read_any_file(self.against) if self.against else None,
             limits=AgreementLimits(self.max_deg, self.max_cm, self.max_px, self.max_sigma),
-            camera=read_camera_file(self.camera) if self.camera else None,
+            camera=camera,
             pairs=read_check_pairs_file(self.pairs) if self.pairs else None,
         )
 
-    def _checked(self, path: Path, context: Against) -> "CheckedFile":
+    def _checked(
+        self, path: Path, judge: "Callable[[ImportedCalibration], CheckReport]", camera: "Camera | None"
+    ) -> "CheckedFile":
         """Check one file; if it cannot be read, say so instead."""
-        from calib_core.interchange import CheckedFile, check
+        from calib_core.interchange import CheckedFile
 
         try:
-            found, _ = self.frames.read([path])
-            report = check(
-                found,
-                of=context.of,
-                against=context.against,
-                limits=context.limits,
-                camera=context.camera,
-                pairs=context.pairs,
-            )
-            return CheckedFile(str(path), self._on_recording(report, path, context) if self.recording else report)
+            report = judge(self.frames.read([path])[0])
+            return CheckedFile(str(path), self._on_recording(report, path, camera) if self.recording else report)
         except CalibrationError as error:
             return CheckedFile(str(path), unreadable=str(error))
 
-    def _on_recording(self, report: "CheckReport", path: Path, context: Against) -> "CheckReport":
-        from dataclasses import replace
-
+    def _on_recording(self, report: "CheckReport", path: Path, camera: "Camera | None") -> "CheckReport":
         from calib_core.recordings import open_recording
         from cocalib.evaluation.recording_check import other_camera, stale_inputs, with_recording
 
@@ -142,7 +128,7 @@ class Check:
             stale = stale_inputs(report.imported, recording.fingerprint())
             lens = other_camera(report.imported, recording.camera())
             known = replace(report, results=(*report.results, *stale, *lens))
-            return with_recording(known, str(path), recording, clicks, camera=context.camera or recording.camera())
+            return with_recording(known, str(path), recording, clicks, camera=camera or recording.camera())
 
     def _clicks(self, report: "CheckReport", recording: "Recording") -> "tuple[ReflectorClick, ...]":
         """Return the clicks: of the file given, else of the recording's session, else those in the calibration.
