@@ -562,7 +562,7 @@ export interface Overlay {
 }
 
 /** One box in a frame; written as an array, since it is sent with every frame. */
-export type BoxInFrame = [id: string, label: string, left_px: number, top_px: number, right_px: number, bottom_px: number, kind: "stated" | "followed" | "between", confidence: number];
+export type BoxInFrame = [id: string, label: string, edges_px: [number, number, number, number], kind: "stated" | "followed" | "between", confidence: number];
 
 /** A return of a moving target on the picture; written as an array. */
 export type BoxedReturn = [u_px: number, v_px: number, box: string, inside: boolean];

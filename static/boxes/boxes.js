@@ -34,7 +34,7 @@ export function shownBoxes() {
   const index = state.shown?.index ?? -1;
   const draft = boxing.draft?.frame === index ? boxing.draft : null;
   const known = boxing.frame?.index === index ? boxing.frame.boxes : [];
-  const rows = known.filter(([id]) => id !== draft?.id).map(([id, label, left, top, right, bottom, kind, confidence]) => /** @type {Shown} */ ({ id, label, edges: [left, top, right, bottom], kind, confidence }));
+  const rows = known.filter(([id]) => id !== draft?.id).map(([id, label, edges, kind, confidence]) => /** @type {Shown} */ ({ id, label, edges, kind, confidence }));
   if (draft) rows.push({ id: draft.id, label: draft.label, edges: draft.edges, kind: "draft", confidence: 1 });
   return rows;
 }

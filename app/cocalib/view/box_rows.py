@@ -9,6 +9,7 @@ from calib_core.evaluation import BoxFigures, Evaluation, Sensitivity
 from calib_core.evaluation.sentences import NOT_ACCURACY, sensitivity_sentences
 from cocalib.session import BoxTrack, RecordingFacts
 from cocalib.session.boxes_in_frames import BoxKind, CarriedTrack
+from cocalib.session.state import BoxEdges
 from cocalib.view.model import AccPanel, BoxTrackRow, Figure, SensitivityRow
 from cocalib.view.wording import sentence, warning_in_sentences
 
@@ -21,20 +22,14 @@ class BoxInFrame(msgspec.Struct, frozen=True, array_like=True):
     Attributes:
         id: of the track.
         label: its class.
-        left_px: left edge.
-        top_px: upper edge.
-        right_px: right edge.
-        bottom_px: lower edge.
+        edges_px: left, top, right, bottom.
         kind: stated, followed or in between.
         confidence: 0 to 1.
     """
 
     id: str
     label: str
-    left_px: float
-    top_px: float
-    right_px: float
-    bottom_px: float
+    edges_px: BoxEdges
     kind: BoxKind
     confidence: float
 
@@ -92,7 +87,7 @@ def boxes_in_frame(carried: Sequence[CarriedTrack], frame: int) -> tuple[BoxInFr
     """Return the boxes of one frame."""
     found = ((track, track.at(frame)) for track in carried)
     return tuple(
-        BoxInFrame(track.id, track.label, *one.edges_px, one.kind, round(one.confidence, 2))
+        BoxInFrame(track.id, track.label, one.edges_px, one.kind, round(one.confidence, 2))
         for track, one in found
         if one is not None
     )
