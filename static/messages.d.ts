@@ -781,6 +781,15 @@ export interface LensResult {
   unseen: string;
 }
 
+/** How far proposing is. */
+export interface ProposingProgress {
+  stage: "off" | "looking" | "comparing" | "ready" | "failed";
+  done: number;
+  count: number;
+  problem: string;
+  hint: string;
+}
+
 /** A place in the picture where the reflector may stand. */
 export interface ProposalPlace {
   pixel_px: [number, number];
@@ -808,11 +817,7 @@ export interface UnproposedRow {
 export interface ProposalNews {
   type: "proposals";
   on: boolean;
-  stage: "off" | "looking" | "comparing" | "ready" | "failed";
-  done: number;
-  count: number;
-  problem: string;
-  hint: string;
+  progress: ProposingProgress;
   rows: ProposalRow[];
   unproposed: UnproposedRow[];
 }

@@ -228,9 +228,9 @@ class ProposingWish:
         return tuple(click for click in self.clicks if click.counts)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ProposingSnapshot:
-    """How far the proposals are.
+@dataclass(frozen=True, slots=True)
+class ProposingProgress:
+    """How far proposing is.
 
     Attributes:
         stage: what is being done.
@@ -238,8 +238,6 @@ class ProposingSnapshot:
         count: of all.
         problem: why there are no proposals, if the stage is "failed".
         hint: what to do about it.
-        views: of the placements, in their order, as far as they are known.
-        proposals: as far as they can be made; they stay while better ones are being found.
     """
 
     stage: ProposingStage = "off"
@@ -247,6 +245,19 @@ class ProposingSnapshot:
     count: int = 0
     problem: str = ""
     hint: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ProposingSnapshot:
+    """The proposals at one moment.
+
+    Attributes:
+        progress: how far they are.
+        views: of the placements, in their order, as far as they are known.
+        proposals: as far as they can be made; they stay while better ones are being found.
+    """
+
+    progress: ProposingProgress = ProposingProgress()
     views: tuple[DwellView, ...] = ()
     proposals: Proposals = field(default_factory=lambda: Proposals(()))
 
@@ -335,7 +346,7 @@ class ProposingJob:
             if not self._is_wanted(wish):
                 return
             if isinstance(found, Unsolvable):
-                self._set(wish, stage="failed", problem=found.reason, hint=found.hint, proposals=Proposals(()))
+                self._set(wish, Proposals(()), stage="failed", problem=found.reason, hint=found.hint)
                 return
             self._seen, self._seen_for = found[0], wish
             self._carried, self._carried_from = list(found[0]), [()] * len(found[0])
@@ -393,7 +404,7 @@ class ProposingJob:
             return
         kept = [view for number, view in enumerate(views) if number not in wish.dismissed]
         found = proposals_of(kept, wish.camera, wish.options, confirmed=wish.confirmed)
-        self._set(wish, views=tuple(views), proposals=found, **changes)
+        self._set(wish, found, tuple(views), **changes)
 
     def _is_wanted(self, wish: ProposingWish) -> bool:
         """Whether looking at the pictures for this wish serves the newest one, too."""
@@ -404,12 +415,24 @@ class ProposingJob:
         _log.warning("nothing could be proposed: %s", line)
         self._set(self._wish, stage="failed", problem=line, hint="")
 
-    def _set(self, wish: ProposingWish | None, **changes: object) -> None:
-        """Change the snapshot, unless proposing was stopped meanwhile."""
+    def _set(
+        self,
+        wish: ProposingWish | None,
+        proposals: Proposals | None = None,
+        views: tuple[DwellView, ...] | None = None,
+        **changes: object,
+    ) -> None:
+        """Change the progress, the proposals and the views if they are given, unless proposing was stopped meanwhile."""
         with self._news:
             if self._wish is None or wish is None:
                 return
-            self._snapshot = replace(self._snapshot, **changes)  # type: ignore[arg-type]
+            now = self._snapshot
+            progress = replace(now.progress, **changes)  # type: ignore[arg-type]
+            self._snapshot = ProposingSnapshot(
+                progress,
+                now.views if views is None else views,
+                now.proposals if proposals is None else proposals,
+            )
         self._changed()
 
 

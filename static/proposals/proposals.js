@@ -90,10 +90,10 @@ export function say(text, ms = 5000) {
 export const saidWords = () => (performance.now() < said.until && said.text ? `${said.text}. ` : "");
 
 /** While proposals are still being found. */
-export const isSearching = () => Boolean(state.proposals?.on && state.proposals.stage === "looking");
+export const isSearching = () => Boolean(state.proposals?.on && state.proposals.progress.stage === "looking");
 
 /** How far the search is, as a sentence. */
-export const searchWords = () => `Proposals are being looked for: ${state.proposals?.done} of ${state.proposals?.count}`;
+export const searchWords = () => `Proposals are being looked for: ${state.proposals?.progress.done} of ${state.proposals?.progress.count}`;
 
 /** Take note of a proposal that has just appeared on screen. */
 function notice() {

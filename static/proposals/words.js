@@ -15,7 +15,7 @@ const howMany = () => `${openProposals().length} proposal${openProposals().lengt
 export function sayNone() {
   const news = state.proposals;
   if (!news?.on) return;
-  if (news.problem) say(`No proposals: ${[news.problem.replace(/\.$/, ""), news.hint.replace(/\.$/, "")].filter(Boolean).join(". ")}`);
+  if (news.progress.problem) say(`No proposals: ${[news.progress.problem.replace(/\.$/, ""), news.progress.hint.replace(/\.$/, "")].filter(Boolean).join(". ")}`);
   else if (isSearching()) say(searchWords());
 }
 
@@ -44,7 +44,7 @@ const surely = (confidence) => (confidence > 0.99 ? "over 99 % sure" : `${Math.r
 export function silentWords(placement) {
   const news = state.proposals;
   if (!news?.on) return "";
-  if (isSearching()) return `Not compared yet: pictures of ${news.done} of ${news.count} placements looked at.`;
+  if (isSearching()) return `Not compared yet: pictures of ${news.progress.done} of ${news.progress.count} placements looked at.`;
   const reason = news.unproposed.find((one) => one.placement === placement)?.reason;
   return reason ? `Not proposed: ${reason}.` : "";
 }
@@ -53,10 +53,10 @@ export function silentWords(placement) {
 function progressWords() {
   const news = state.proposals;
   if (!news?.on) return "";
-  if (news.problem) return [news.problem, news.hint].filter(Boolean).join(" ");
-  if (news.stage === "off") return "Waits for the placements in the radar data.";
-  if (news.stage === "looking") return `Looks at the pictures of placement ${Math.min(news.done + 1, news.count)} of ${news.count}.`;
-  if (news.stage === "comparing") return `Compares ${news.done} of ${news.count} placements with what was confirmed.`;
+  if (news.progress.problem) return [news.progress.problem, news.progress.hint].filter(Boolean).join(" ");
+  if (news.progress.stage === "off") return "Waits for the placements in the radar data.";
+  if (news.progress.stage === "looking") return `Looks at the pictures of placement ${Math.min(news.progress.done + 1, news.progress.count)} of ${news.progress.count}.`;
+  if (news.progress.stage === "comparing") return `Compares ${news.progress.done} of ${news.progress.count} placements with what was confirmed.`;
   return `${openProposals().length} to decide${news.unproposed.length ? `; for ${news.unproposed.length} nothing can be proposed` : ""}.`;
 }
 
@@ -83,10 +83,10 @@ export async function toggleProposals() {
 
 function drawChip() {
   const news = state.proposals;
-  const busy = news?.on && (news.stage === "looking" || news.stage === "comparing");
+  const busy = news?.on && (news.progress.stage === "looking" || news.progress.stage === "comparing");
   chip.hidden = !news || state.looking;
   chip.setAttribute("aria-pressed", String(Boolean(news?.on)));
-  chip.classList.toggle("troubled", Boolean(news?.on && news.problem));
-  chip.replaceChildren(make("kbd", "", "O"), busy ? `Proposals ${news.done}/${news.count}` : news?.on && news.problem ? "Proposals: none" : "Proposals");
+  chip.classList.toggle("troubled", Boolean(news?.on && news.progress.problem));
+  chip.replaceChildren(make("kbd", "", "O"), busy ? `Proposals ${news.progress.done}/${news.progress.count}` : news?.on && news.progress.problem ? "Proposals: none" : "Proposals");
   chip.dataset.hint = ["Proposes where the reflector stood: the radar says when, the picture shows where. Nothing counts before it is accepted. (O)", progressWords()].filter(Boolean).join("\n");
 }

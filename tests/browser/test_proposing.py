@@ -26,7 +26,7 @@ HELD_FROM = 8
 """Looking at the pictures waits before this placement until the test goes on."""
 UNCERTAIN = 4.0
 """Standard deviation of a place whose apex is not seen [px]."""
-READY = "__cocalib.state.proposals?.stage === 'ready'"
+READY = "__cocalib.state.proposals?.progress.stage === 'ready'"
 ON_SCREEN = "__cocalib.shownOffer() && __cocalib.state.shown.index === __cocalib.state.cursor && !__cocalib.justMoved()"
 
 
@@ -235,7 +235,7 @@ def test_only_what_is_seen_is_decided_and_the_line_says_how_far_the_search_is(
 ) -> None:
     page = open_page(proposing.url)
     user = page.page
-    page.until("__cocalib.state.proposals?.rows.length >= 5 && __cocalib.state.proposals.done === 8")
+    page.until("__cocalib.state.proposals?.rows.length >= 5 && __cocalib.state.proposals.progress.done === 8")
     page.press("Enter")
     assert "Proposals are being looked for: 8 of 20" in page.text("#guide")
     assert page.value("__cocalib.state.cross") is None
@@ -324,7 +324,7 @@ def test_without_intrinsics_the_line_says_why_nothing_is_proposed(
     running = start(opened, sample, ServerOptions(port=0, token="test", proposes=True))
     try:
         page = open_page(running.url)
-        page.until("__cocalib.state.proposals?.problem")
+        page.until("__cocalib.state.proposals?.progress.problem")
         page.press("n")
         page.until("document.getElementById('guide').textContent.includes('No proposals: ')")
         page.until("__cocalib.state.shown.index === __cocalib.state.cursor")

@@ -88,10 +88,10 @@ class Watched:
     def until(self, stage: ProposingStage, open_ones: int | None = None) -> ProposingSnapshot:
         def holds() -> bool:
             now = self.job.snapshot
-            return now.stage == stage and (open_ones is None or _count(now) == open_ones)
+            return now.progress.stage == stage and (open_ones is None or _count(now) == open_ones)
 
         with self.told:
-            assert self.told.wait_for(holds, timeout=20), (self.job.snapshot.stage, _count(self.job.snapshot))
+            assert self.told.wait_for(holds, timeout=20), (self.job.snapshot.progress.stage, _count(self.job.snapshot))
         return self.job.snapshot
 
 
@@ -111,7 +111,7 @@ def test_first_proposals_come_while_the_pictures_are_looked_at(finding: Finding,
     watched.job.ask(WISH)
     early = watched.until("looking", 8)
     assert early.proposals.ranked
-    assert early.count == len(VIEWS)
+    assert early.progress.count == len(VIEWS)
     finding.allowed.set()
     assert len(watched.until("ready", len(VIEWS)).views) == len(VIEWS)
 
@@ -173,13 +173,16 @@ def test_why_there_are_none_is_said(finding: Finding, watched: Watched) -> None:
     finding.end = Unsolvable("no-camera", "the camera intrinsics are missing", "calibrate the lens")
     watched.job.ask(replace(WISH, camera=None))
     failed = watched.until("failed", 0)
-    assert (failed.problem, failed.hint) == ("the camera intrinsics are missing", "calibrate the lens")
+    assert (failed.progress.problem, failed.progress.hint) == (
+        "the camera intrinsics are missing",
+        "calibrate the lens",
+    )
     finding.error = RecordingError("camera.bag: frame 7 cannot be read")
     watched.job.ask(replace(WISH))
     watched.job.stop()
     watched.job.ask(replace(WISH))
     with watched.told:
-        assert watched.told.wait_for(lambda: "frame 7" in watched.job.snapshot.problem, timeout=20)
+        assert watched.told.wait_for(lambda: "frame 7" in watched.job.snapshot.progress.problem, timeout=20)
 
 
 def test_nothing_is_asked_of_a_job_that_is_closed(finding: Finding, watched: Watched) -> None:

@@ -3,6 +3,7 @@
 import asyncio
 import logging
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from calib_core.measurements import NS_PER_S, Stamp
 from calib_core.proposing import DwellView, Proposal
 from calib_core.proposing.dwell_views import averaged_over_dwell
 from calib_core.recordings import FollowedRecording, Recording
-from cocalib.proposing import ProposingJob, ProposingSnapshot, ProposingWish, view_at
+from cocalib.proposing import ProposingJob, ProposingProgress, ProposingSnapshot, ProposingWish, view_at
 from cocalib.view import is_dismissed, sentence
 from cocalib.web.channel.outbox import Outbox
 from cocalib.web.messages import (
@@ -161,10 +162,10 @@ class ProposingDesk:
 
     def _news(self) -> ProposalNews:
         now = self._job.snapshot
-        problem, hint = self._obstacle() or (now.problem, now.hint)
+        problem, hint = map(sentence, self._obstacle() or (now.progress.problem, now.progress.hint))
         if not self._on:
-            return ProposalNews(False, "off", 0, 0, sentence(problem), sentence(hint))
-        stage = "failed" if problem else now.stage
+            return ProposalNews(False, ProposingProgress(problem=problem, hint=hint))
+        stage = "failed" if problem else now.progress.stage
         number = {id(one): self._numbers[at] for at, one in enumerate(self._placements or ())}
         rows = tuple(
             self._row(one, number[id(one.placement)], now)
@@ -174,7 +175,7 @@ class ProposingDesk:
         without = tuple(
             UnproposedRow(number[id(one)], reason) for one, reason in now.proposals.unproposed if id(one) in number
         )
-        return ProposalNews(True, stage, now.done, now.count, sentence(problem), sentence(hint), rows, without)
+        return ProposalNews(True, replace(now.progress, stage=stage, problem=problem, hint=hint), rows, without)
 
     def _row(self, proposal: Proposal, placement: int, now: ProposingSnapshot) -> ProposalRow:
         view: DwellView = next(one for one in now.views if one.placement is proposal.placement)

@@ -13,6 +13,7 @@ from calib_core.arrays import TimesNs
 from calib_core.measurements import NS_PER_S, Stamp, time_to_json
 from calib_core.results import DataWarning
 from cocalib.option_changes import OptionGroup, option_groups
+from cocalib.proposing import ProposingProgress
 from cocalib.view import ClickRow, FollowState, PairCandidates, View
 from cocalib.view.box_rows import BoxedReturn, BoxInFrame
 from cocalib.view.contours import ContourMap
@@ -67,9 +68,6 @@ class ViewChange:
     number: int
     fields: dict[str, Any]
     clicks: ClickChange | None
-
-
-ProposalStage: TypeAlias = Literal["off", "looking", "comparing", "ready", "failed"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,21 +125,13 @@ class ProposalNews:
 
     Attributes:
         on: whether proposals are wanted.
-        stage: what is being done.
-        done: placements whose pictures were looked at, or compared with what was clicked.
-        count: of all.
-        problem: why there are none; "" if nothing is wrong.
-        hint: what to do about it.
+        progress: how far they are, and why there are none.
         rows: the most confident first; placements that have a click are left out.
         unproposed: placements for which nothing can be proposed.
     """
 
     on: bool
-    stage: ProposalStage
-    done: int
-    count: int
-    problem: str
-    hint: str
+    progress: ProposingProgress
     rows: tuple[ProposalRow, ...] = ()
     unproposed: tuple[UnproposedRow, ...] = ()
 

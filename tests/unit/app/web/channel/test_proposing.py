@@ -99,8 +99,8 @@ async def until(told: list[Any], holds: Callable[[ProposalNews], bool]) -> Propo
 def test_pages_are_told_the_proposals_with_their_placements_and_frames(workspace: Workspace) -> None:
     async def visit(desk: ProposingDesk, told: list[Any]) -> None:
         desk.surveyed(PLACEMENTS)
-        news = await until(told, lambda one: one.stage == "ready")
-        assert (news.on, news.problem) == (True, "")
+        news = await until(told, lambda one: one.progress.stage == "ready")
+        assert (news.on, news.progress.problem) == (True, "")
         assert len(news.rows) + len(news.unproposed) == len(PLACEMENTS)
         assert news.rows[0].confidence == max(row.confidence for row in news.rows)
         for row in news.rows:
@@ -130,7 +130,7 @@ def test_a_click_is_averaged_over_the_frames_of_its_placement(
         early = await desk.averaged(SnapWanted(time, (31.0, 25.0), over_dwell=True))
         assert (early.pixel_px, early.words) == (None, "The pictures of this placement were not looked at.")
         desk.surveyed(PLACEMENTS)
-        await until(told, lambda one: one.stage == "ready")
+        await until(told, lambda one: one.progress.stage == "ready")
         found = await desk.averaged(SnapWanted(time, (31.5, 25.0), over_dwell=True))
         assert found.pixel_px == pytest.approx((30.0, 24.0), abs=0.3)
         assert found.sigma_px is not None
@@ -149,10 +149,10 @@ def test_nothing_is_proposed_until_it_is_switched_on_and_again_once_it_is_off(wo
     async def visit(desk: ProposingDesk, told: list[Any]) -> None:
         desk.surveyed(PLACEMENTS)
         desk.switch(ProposingSwitch(on=True))
-        await until(told, lambda one: one.stage == "ready" and bool(one.rows))
+        await until(told, lambda one: one.progress.stage == "ready" and bool(one.rows))
         desk.switch(ProposingSwitch(on=False))
         off = await until(told, lambda one: not one.on)
-        assert (off.stage, off.rows) == ("off", ())
+        assert (off.progress.stage, off.rows) == ("off", ())
 
     at_desk(workspace, visit, on=False)
 
@@ -161,8 +161,8 @@ def test_without_radar_scans_it_says_so(workspace: Workspace) -> None:
     async def visit(desk: ProposingDesk, told: list[Any]) -> None:
         desk.surveyed(())
         desk.switch(ProposingSwitch(on=True))
-        news = await until(told, lambda one: one.stage == "failed")
-        assert "no radar scans" in news.problem
-        assert news.hint == "Open the radar's recording, too."
+        news = await until(told, lambda one: one.progress.stage == "failed")
+        assert "no radar scans" in news.progress.problem
+        assert news.progress.hint == "Open the radar's recording, too."
 
     at_desk(workspace, visit, Sensors(0))
