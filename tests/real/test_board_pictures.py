@@ -8,7 +8,7 @@ import pytest
 
 from calib_core.intrinsics import BoardSearch, board_of_size, search_boards
 from calib_core.intrinsics.board_detection import blur_px, find_board
-from calib_core.measurements import TimeNs, Unsolvable
+from calib_core.measurements import TimeNs
 
 BOARD = board_of_size("9x6", 25.0)
 
@@ -63,11 +63,3 @@ def test_every_good_photograph_is_chosen_and_every_blurred_copy_called_blurred(s
     assert [view.name for view in search.views] == list(shown)
     assert [one.name for one in search.left_out] == [*blurred, *moved]
     assert all(one.reason.startswith("blurred: edges are 3.") for one in search.left_out)
-
-
-@pytest.mark.real
-def test_of_the_wrong_size_the_right_one_is_said(shared_data: Path) -> None:
-    found = search_boards(Photographs(photographs(shared_data, "right")), board_of_size("8x6", 25.0))
-    assert isinstance(found, Unsolvable)
-    assert found.code == "other-board"
-    assert found.hint.startswith("state 9x6 ")

@@ -1,7 +1,6 @@
 """Pairs that other people measured, with the poses they published (lidar instead of radar; sources lie beside the data)."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +10,9 @@ from calib_core.association.clustering import candidate_at
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, rotation_angle_rad
-from calib_core.measurements import Pair
+from calib_core.measurements import Candidate, Pair
 from calib_core.options import CalibrationOptions, NoiseOptions, without_systematic_errors
+from calib_core.paper.algorithm_1 import solve_pairs_as_printed
 from calib_core.paper.pnp import refine_lm, solve_pnp_ransac
 from calib_core.results import Calibration
 
@@ -130,8 +130,33 @@ def test_another_robust_fit_to_the_hasty_clicks_lies_inside_the_uncertainty(shar
     assert error @ np.linalg.solve(calibration.covariance, error) < calibration.covariance_quantile
 
 
-def test_the_order_of_real_pairs_does_not_change_a_bit(shared_data: Path) -> None:
-    rows, camera, _ = load(shared_data, "acfr_lidar_chessboard_40", (1920, 1208))
-    noise = replace(NoiseOptions(), sigma_px=1.0)
-    forward, backward = (solve(order, camera, noise) for order in (rows, rows[::-1]))
-    assert forward.camera_from_radar.as_matrix().tobytes() == backward.camera_from_radar.as_matrix().tobytes()
+def as_printed(folder: Path, name: str, size_px: tuple[int, int]) -> tuple[Calibration, RigidTransform]:
+    """Solve a set of pairs by Algorithm 1; return the result and the published pose."""
+    rows, camera, published = load(folder, name, size_px)
+    unknown = np.full((3, 3), np.nan)
+    pairs = [
+        Pair(row["id"], np.array(row["uv"]), (Candidate(np.array(row["xyz"]), unknown[0], unknown),)) for row in rows
+    ]
+    return solve_pairs_as_printed(pairs, camera, CalibrationOptions(method="paper")).unwrap(), published
+
+
+def test_by_the_paper_forty_board_centres_give_about_the_published_pose(shared_data: Path) -> None:
+    result, published = as_printed(shared_data, "acfr_lidar_chessboard_40", (1920, 1208))
+    apart_deg = np.rad2deg(rotation_angle_rad(result.camera_from_radar.rotation @ published.rotation.T))
+    assert apart_deg < 1.0
+    assert np.linalg.norm(result.camera_from_radar.translation_m - published.translation_m) < 0.15
+    assert result.metrics.n == 40
+    assert result.metrics.aed_px < 6.0
+
+
+def test_ransac_marks_the_one_wrong_board_that_the_last_line_uses_all_the_same(shared_data: Path) -> None:
+    result, _ = as_printed(shared_data, "acfr_lidar_chessboard_40", (1920, 1208))
+    worst = max(result.pairs, key=lambda pair: pair.distance_px)
+    assert worst.distance_px > 40.0
+    assert not worst.inlier
+
+
+def test_sixteen_human_clicks_with_wrong_ones_among_them_are_not_solved_to_a_click(shared_data: Path) -> None:
+    result, _ = as_printed(shared_data, "heethesh_lidar_clicks_16", (964, 724))
+    assert 0 < sum(pair.inlier for pair in result.pairs) < 16
+    assert result.metrics.aed_px > 5.0
