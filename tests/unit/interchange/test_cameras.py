@@ -18,7 +18,6 @@ from calib_core.interchange import (
     CAMERA_FORMATS,
     CameraFile,
     camera_content,
-    camera_info_text,
     read_camera,
     read_camera_file,
 )
@@ -176,18 +175,6 @@ def test_a_missing_image_size_is_taken_from_the_recording():
     text = ROS.replace("image_width: 640\n", "")
 
     assert read_camera(text, image_size_px=(640, 480)).width_px == 640
-
-
-@pytest.mark.parametrize("model", ["pinhole", "plumb_bob", "rational_polynomial", "equidistant"])
-def test_the_camera_we_write_for_ros_is_the_camera_we_read(model):
-    coefficients = {"pinhole": [], "plumb_bob": D, "rational_polynomial": [*D, 0.1, 1e-7, 0.3], "equidistant": D[:4]}
-    camera = Camera(model, 640, 480, np.array(K), np.array(coefficients[model]))
-
-    again = read_camera(camera_info_text(camera, "front: left"))
-
-    np.testing.assert_array_equal(again.matrix_px, camera.matrix_px)
-    point = np.array([[0.3, -0.2, 2.0]])
-    np.testing.assert_array_equal(again.project(point), camera.project(point))
 
 
 def test_what_opencv_writes_is_read(tmp_path):

@@ -12,7 +12,7 @@ from calib_core.errors import InputError, OptionError, UnsolvableError
 from calib_core.measurements import Unpaired, Unsolvable
 from calib_core.options import CalibrationOptions, NoiseOptions
 from calib_core.results import Calibration
-from calib_core.results.metrics import acc, aed, cdsd, distances, inside_boxes, metrics_of, rms
+from calib_core.results.metrics import acc, aed, cdsd, inside_boxes, metrics_of, rms
 from calib_core.synthetic import SimulatedPairs, simulate_pairs
 
 POINT = np.array([[8.0, 0.5, 0.0]])
@@ -161,10 +161,6 @@ def test_the_housing_is_less_certain_by_the_biases_of_the_angles(simulated: Simu
 LENGTHS = np.array([1.0, 2.0, 6.0])
 
 
-def test_rms_is_the_root_of_the_mean_square() -> None:
-    assert rms(LENGTHS) == pytest.approx(math.sqrt(41.0 / 3.0))
-
-
 def test_rms_aed_and_cdsd_belong_together() -> None:
     n = len(LENGTHS)
     assert n * rms(LENGTHS) ** 2 == pytest.approx(n * aed(LENGTHS) ** 2 + (n - 1) * cdsd(LENGTHS) ** 2)
@@ -194,12 +190,6 @@ def test_without_held_out_pairs_that_figure_is_unknown() -> None:
     metrics = metrics_of(LENGTHS)
     assert math.isnan(metrics.held_out_aed_px)
     assert metrics.acc is None
-
-
-def test_distances_are_euclidean() -> None:
-    np.testing.assert_allclose(
-        distances(np.array([[3.0, 4.0], [1.0, 1.0]]), np.array([[0.0, 0.0], [1.0, 1.0]])), [5, 0]
-    )
 
 
 def test_a_pixel_on_a_box_edge_is_inside_and_one_past_it_is_not() -> None:

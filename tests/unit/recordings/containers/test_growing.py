@@ -86,20 +86,6 @@ def test_pieces_of_any_size_give_the_index_of_the_finished_file(finished, tmp_pa
     files.close()
 
 
-def test_a_killed_writer_leaves_the_messages_of_its_complete_records(finished, tmp_path):
-    growing = tmp_path / f"killed{finished.suffix}"
-    files, replay = FollowedFiles([growing]), Replay(finished, growing)
-    replay.write_up_to(len(replay) // 2)
-    files.grow()
-    replay.kill()
-    found = messages_of(files.sources)
-    assert is_beginning(found, opened(finished))
-    assert sum(map(len, found.values())) > 3
-    assert files.grow() == 0
-    assert not files.is_complete
-    files.close()
-
-
 def test_a_truncated_file_is_refused_and_what_was_read_stays(finished, tmp_path):
     growing = tmp_path / f"cut{finished.suffix}"
     files, replay = FollowedFiles([growing]), Replay(finished, growing)
@@ -213,44 +199,6 @@ def test_damage_in_the_middle_ends_the_following_in_words(finished, tmp_path):
         file.write(b"\xaa" * 5_000_000)
     with pytest.raises(RecordingError, match="no record at byte"):
         files.grow()
-    files.close()
-
-
-@pytest.mark.parametrize("container", ["mcap"])
-def test_split_files_appear(tmp_path, container_ros, plain, jpeg):
-    folder = tmp_path / "drive"
-    folder.mkdir()
-    rows = plain(container_ros, jpeg, n=12)
-    files = FollowedFiles([folder])
-    assert files.grow() == 0
-    for number, part in enumerate((rows[:15], rows[15:30], rows[30:])):
-        written = write_in_chunks(tmp_path / f"drive_{number}", container_ros, part, "mcap", per_chunk=4)
-        shutil.copyfile(written, folder / f"drive_{number}.mcap")
-        assert files.grow() == len(part)
-        assert len(files.sources) == number + 1
-        assert not files.is_complete
-    (folder / "metadata.yaml").write_text("rosbag2_bagfile_information: {}\n")
-    assert files.is_complete
-    files.close()
-
-
-def test_rows_are_found_as_they_are_committed(tmp_path, ros2, plain, jpeg):
-    path = tmp_path / "drive.db3"
-    files = FollowedFiles([path])
-    assert files.grow() == 0
-    database = LoggedDatabase(path, ros2)
-    rows = plain(ros2, jpeg, n=10)
-    for first in range(0, len(rows), 4):
-        database.write(rows[first : first + 4])
-        assert files.grow() == len(rows[first : first + 4])
-        assert not files.is_complete
-    found = messages_of(files.sources)
-    assert {topic: len(each) for topic, each in found.items()} == {row[0]: 10 for row in rows}
-    database.close()
-    assert files.grow() == 0
-    assert files.is_complete
-    assert not list(tmp_path.glob("*-wal"))
-    assert messages_of(files.sources) == found == opened(path)
     files.close()
 
 
