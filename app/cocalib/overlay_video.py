@@ -37,7 +37,7 @@ _BACKGROUND = (20, 16, 13)
 _TITLE_FROM = 0.5
 """A title has room between this share of the width and the legend; a longer one is left out."""
 _INK, _DIM = (240, 236, 232), (164, 152, 140)
-HUES = ((255, 210, 80), (110, 220, 130), (90, 190, 255), (255, 140, 120), (200, 160, 255), (240, 240, 240))
+_HUES = ((255, 210, 80), (110, 220, 130), (90, 190, 255), (255, 140, 120), (200, 160, 255), (240, 240, 240))
 """Colours of the classes of boxes, red first."""
 LARGE_PX = 30.0
 """Residuals from here on have the last colour, as on the page."""
@@ -125,11 +125,11 @@ class Panels:
             size_px: width and height of the recorded pictures.
         """
         width, height = size_px
-        strip_px = footer_height_px(height)
+        strip_px = _footer_height_px(height)
         self.video_size_px = (width * len(titles) + (width * len(titles)) % 2, height + strip_px)
         self._view, self._trail_scans = view, trail_scans
         self._calibrations = [one for one in (view.calibration, view.against) if one is not None]
-        self._strips = footers(width, strip_px, view.colours, titles)
+        self._strips = _footers(width, strip_px, view.colours, titles)
         self._boxes, self._acc = view.boxes_by_frame(), view.acc_by_frame()
         self._labels = view.boxes.labels if view.boxes else ()
         self._clicked = sorted(view.pairs_by_frame().items())
@@ -161,7 +161,7 @@ class Panels:
             frame[:rows, own] = panel
             below = strip.copy()
             if place == 0:
-                write_changing(below, self._words(time))
+                _write_changing(below, self._words(time))
             frame[rows:, own] = below
         return frame
 
@@ -172,7 +172,7 @@ class Panels:
             earlier = seen.trail(time, self._trail_scans)
             scan_of = np.searchsorted(scans.first_return, earlier, side="right") - 1
             newest = scans.nearest(time) if len(scans) else 0
-            draw_trail(
+            _draw_trail(
                 panel, seen.pixels_px[earlier], colours.of(scans, earlier), (newest - scan_of) / self._trail_scans
             )
         rows = seen.near(time)
@@ -195,7 +195,7 @@ class Panels:
         return words
 
 
-def footer_height_px(picture_height_px: int) -> int:
+def _footer_height_px(picture_height_px: int) -> int:
     """Return how high the strip is below a picture, so that both together have an even height."""
     height = max(30, round(0.055 * picture_height_px))
     return height + (picture_height_px + height) % 2
@@ -207,7 +207,7 @@ def time_text(time: TimeNs, start: TimeNs) -> str:
     return f"{day:%Y-%m-%d %H:%M:%S}.{time % NS_PER_S // 10**6:03d} UTC   +{(time - start) / NS_PER_S:.2f} s"
 
 
-def footers(width_px: int, height_px: int, colours: ReturnColours, titles: Sequence[str]) -> list[np.ndarray]:
+def _footers(width_px: int, height_px: int, colours: ReturnColours, titles: Sequence[str]) -> list[np.ndarray]:
     """Return the strips of the panels, without what changes: titles in the right half, the legend at the end.
 
     Args:
@@ -221,13 +221,13 @@ def footers(width_px: int, height_px: int, colours: ReturnColours, titles: Seque
         left = _legend(strip, colours)
         if title:
             letters = _letters(strip)
-            width = label_width_px(title, letters)
+            width = _label_width_px(title, letters)
             if width < left - _TITLE_FROM * width_px:
                 label(strip, title, (left - width - letters, _base_line(strip)), _DIM, letters)
     return strips
 
 
-def write_changing(strip: np.ndarray, words: str) -> None:
+def _write_changing(strip: np.ndarray, words: str) -> None:
     """Write what changes from frame to frame at the left end of a strip."""
     letters = _letters(strip)
     label(strip, words, (letters, _base_line(strip)), _INK, letters)
@@ -253,17 +253,17 @@ def _legend(strip: np.ndarray, colours: ReturnColours) -> float:
     stops = np.linspace(0.0, 1.0, len(ramp))
     row = np.stack([np.interp(shares, stops, channel) for channel in ramp[:, ::-1].T], axis=1)
     right = width - round(letters)
-    high_px = round(label_width_px(high, letters))
+    high_px = round(_label_width_px(high, letters))
     bar_right = right - high_px - round(0.6 * letters)
     top, bottom = round(0.36 * height), round(0.64 * height)
     strip[top:bottom, bar_right - bar_px : bar_right] = np.rint(row).astype(np.uint8)
     label(strip, high, (right - high_px, _base_line(strip)), _DIM, letters)
-    low_px = bar_right - bar_px - round(0.6 * letters) - round(label_width_px(low, letters))
+    low_px = bar_right - bar_px - round(0.6 * letters) - round(_label_width_px(low, letters))
     label(strip, low, (low_px, _base_line(strip)), _DIM, letters)
     return float(low_px - letters)
 
 
-def text_height_px(picture: np.ndarray) -> float:
+def _text_height_px(picture: np.ndarray) -> float:
     """Return the height of capital letters that suits the picture."""
     return 12.0 * max(0.75, picture.shape[0] / _REFERENCE_HEIGHT_PX)
 
@@ -277,7 +277,7 @@ def draw_returns(picture: np.ndarray, pixels_px: Points2, colours: np.ndarray, s
         colours: (n, 3), red first.
         still: (n,) which are static.
     """
-    size = 0.4 * text_height_px(picture)
+    size = 0.4 * _text_height_px(picture)
     smooth = cv2.LINE_AA if len(pixels_px) < _MANY else cv2.LINE_8
     blue_first = colours[:, ::-1].tolist()
     for (u_px, v_px), colour, stays in zip(pixels_px.tolist(), blue_first, still.tolist(), strict=True):
@@ -290,7 +290,7 @@ def draw_returns(picture: np.ndarray, pixels_px: Points2, colours: np.ndarray, s
             _triangle(picture, u_px, v_px, 1.3 * size, colour, smooth)
 
 
-def draw_trail(picture: np.ndarray, pixels_px: Points2, colours: np.ndarray, ages: np.ndarray) -> None:
+def _draw_trail(picture: np.ndarray, pixels_px: Points2, colours: np.ndarray, ages: np.ndarray) -> None:
     """Draw earlier returns as dots that become smaller with age.
 
     Args:
@@ -299,7 +299,7 @@ def draw_trail(picture: np.ndarray, pixels_px: Points2, colours: np.ndarray, age
         colours: (n, 3), red first.
         ages: (n,) 0 for the newest, 1 for the oldest.
     """
-    radii = 0.3 * text_height_px(picture) * (1.0 - 0.75 * ages)
+    radii = 0.3 * _text_height_px(picture) * (1.0 - 0.75 * ages)
     rows = zip(pixels_px.tolist(), colours[:, ::-1].tolist(), radii.tolist(), strict=True)
     for (u_px, v_px), colour, radius_px in rows:
         cv2.circle(picture, _fixed(u_px, v_px), round(radius_px * (1 << _SHIFT)), colour, -1, cv2.LINE_8, _SHIFT)
@@ -307,7 +307,7 @@ def draw_trail(picture: np.ndarray, pixels_px: Points2, colours: np.ndarray, age
 
 def draw_clicks(picture: np.ndarray, clicks_px: Points2, projected_px: Points2, ids: Sequence[str]) -> None:
     """Draw clicks as crosses, their reprojections as rings, and the residuals between them, with their lengths."""
-    size = text_height_px(picture)
+    size = _text_height_px(picture)
     lengths_px = np.linalg.norm(projected_px - clicks_px, axis=1)
     colours = residual_colours(lengths_px, LARGE_PX)[:, ::-1].tolist()
     rows = zip(clicks_px.tolist(), projected_px.tolist(), ids, lengths_px.tolist(), colours, strict=True)
@@ -321,7 +321,7 @@ def draw_clicks(picture: np.ndarray, clicks_px: Points2, projected_px: Points2, 
             cv2.line(picture, _fixed(u_px, v_px), _fixed(*projected), colour, 2, cv2.LINE_AA, _SHIFT)
             cv2.circle(picture, _fixed(*projected), round(0.7 * size * (1 << _SHIFT)), _RING, 2, cv2.LINE_AA, _SHIFT)
         words = f"{name}: {length_px:.1f} px" if seen else f"{name}: behind the camera"
-        width = label_width_px(words, size)
+        width = _label_width_px(words, size)
         fits = u_px + 1.8 * size + width < picture.shape[1]
         left = u_px + 1.8 * size if fits else u_px - 1.8 * size - width
         label(picture, words, (left, v_px - 0.9 * size), _WHITE, plate=True)
@@ -330,13 +330,13 @@ def draw_clicks(picture: np.ndarray, clicks_px: Points2, projected_px: Points2, 
 def draw_boxes(picture: np.ndarray, boxes: Sequence[Box], labels: Sequence[str]) -> None:
     """Draw boxes with their classes and tracks, one colour per class."""
     for box in boxes:
-        hue = HUES[labels.index(box.label) % len(HUES)][::-1] if box.label in labels else _WHITE
+        hue = _HUES[labels.index(box.label) % len(_HUES)][::-1] if box.label in labels else _WHITE
         corners = (_fixed(box.left_px, box.top_px), _fixed(box.right_px, box.bottom_px))
         cv2.rectangle(picture, *corners, _EDGE, 4, cv2.LINE_AA, _SHIFT)
         cv2.rectangle(picture, *corners, hue, 2, cv2.LINE_AA, _SHIFT)
         words = box_words(box)
         if words:
-            label(picture, words, (box.left_px, box.top_px - 0.6 * text_height_px(picture)), hue, plate=True)
+            label(picture, words, (box.left_px, box.top_px - 0.6 * _text_height_px(picture)), hue, plate=True)
 
 
 def label(
@@ -358,7 +358,7 @@ def label(
         height_px: of capital letters.
         plate: darken what is behind the line, so that it can be read on any picture.
     """
-    height_px = text_height_px(picture) if height_px is None else height_px
+    height_px = _text_height_px(picture) if height_px is None else height_px
     plain, scale, width = _measured(words, height_px)
     u_px = min(max(place_px[0], 2.0), max(2.0, picture.shape[1] - width - 2.0))
     v_px = min(max(place_px[1], 1.5 * height_px), picture.shape[0] - 0.5 * height_px)
@@ -371,7 +371,7 @@ def label(
     return width
 
 
-def label_width_px(words: str, height_px: float) -> float:
+def _label_width_px(words: str, height_px: float) -> float:
     """Return how wide a line is [px]."""
     return _measured(words, height_px)[2]
 
@@ -443,7 +443,7 @@ def _pictures(
 
 
 @dataclass(slots=True)
-class Encoder:
+class _Encoder:
     """A video that is being written.
 
     Attributes:
@@ -478,7 +478,7 @@ class Encoder:
 
 
 @contextmanager
-def encoding(path: Path, size_px: tuple[int, int], frames_per_s: float) -> Iterator[Encoder]:
+def encoding(path: Path, size_px: tuple[int, int], frames_per_s: float) -> Iterator[_Encoder]:
     """Yield an encoder that writes a file; the caller finishes it.
 
     Args:
@@ -506,7 +506,7 @@ def encoding(path: Path, size_px: tuple[int, int], frames_per_s: float) -> Itera
         stream.codec_context.colorspace = stream.codec_context.color_primaries = stream.codec_context.color_trc = _BT709
         if name != "mjpeg":
             stream.codec_context.color_range = _LIMITED_RANGE
-        yield Encoder(label, container, stream)
+        yield _Encoder(label, container, stream)
 
 
 def _can_write(name: str) -> bool:

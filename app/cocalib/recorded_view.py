@@ -137,7 +137,7 @@ class ReturnColours:
         return f"{self.low:g} m", f"{self.high:g} m"
 
 
-def return_colours(recording: Recording, quantity: ReturnQuantity) -> ReturnColours:
+def _return_colours(recording: Recording, quantity: ReturnQuantity) -> ReturnColours:
     """Choose the ends of the colours from scans spread over the recording: they hold 98 % of its returns, or of what moves.
 
     Args:
@@ -249,7 +249,7 @@ def recorded_view(
         recording,
         calibration,
         pairs or _own_pairs(recording, calibration),
-        return_colours(recording, quantity),
+        _return_colours(recording, quantity),
         boxes=boxes,
         evaluation=evaluation,
         against=against,

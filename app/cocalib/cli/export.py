@@ -88,8 +88,8 @@ class Export:
         _print_warnings(file)
         for note in written.notes:
             print(f"note: {note}", file=sys.stderr)
-        if self.out is not None and format_named(self.to).is_unpacked and is_meant_as_folder(self.out):
-            names = write_unpacked(self.out, written.data)
+        if self.out is not None and format_named(self.to).is_unpacked and _is_meant_as_folder(self.out):
+            names = _write_unpacked(self.out, written.data)
             print(f"written to {self.out}: {', '.join(names)}")
         elif self.out is not None:
             target = self.out / written.file_name if self.out.is_dir() else self.out
@@ -123,7 +123,7 @@ class Export:
                 f"export into a recording: cocalib export CALIBRATION.json --to {MCAP} --recording RECORDING... --out NEW.mcap"
             )
         file = _own_calibration(self.calibration[0])
-        code = export_recording(file, self.recording, self.out, topics=self.topics, force=self.force)
+        code = _into_recording(file, self.recording, self.out, topics=self.topics, force=self.force)
         _print_warnings(file)
         return code
 
@@ -172,7 +172,7 @@ def _own_calibration(path: Path) -> "CalibrationFile":
     return consistent_file(read_any_file(path), str(path))
 
 
-def export_recording(
+def _into_recording(
     file: "CalibrationFile", paths: Sequence[Path], out: Path, *, topics: TopicFlags, force: bool
 ) -> int:
     """Write the new recording and a layout for Foxglove beside it; return the exit code.
@@ -272,12 +272,12 @@ def _report(recording: "Recording", written: "RecordingWritten", out: Path, layo
     print(f"Foxglove layout: {layout} (in Foxglove: layout menu, Import from file)")
 
 
-def is_meant_as_folder(path: Path) -> bool:
+def _is_meant_as_folder(path: Path) -> bool:
     """Return whether an output is a folder: it is one, or there is nothing yet and its name does not end in .zip."""
     return path.is_dir() or (not path.exists() and path.suffix.lower() != ".zip")
 
 
-def write_unpacked(folder: Path, archive: bytes) -> tuple[str, ...]:
+def _write_unpacked(folder: Path, archive: bytes) -> tuple[str, ...]:
     """Write the files of an archive into a folder, which is made if there is none; return their paths in it.
 
     Raises:

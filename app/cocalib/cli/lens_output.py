@@ -43,7 +43,7 @@ _MOST_LEFT_OUT = 12
 _ORDINARY = ("the same view as", "not needed")
 
 
-def camera_lines(camera: Camera) -> Iterator[str]:
+def _camera_lines(camera: Camera) -> Iterator[str]:
     """Yield the parameters of a camera, one a line, with their standard deviations if they are known."""
     yield f"model          {camera.model}, pictures of {camera.width_px} x {camera.height_px} px"
     known = camera.covariance
@@ -63,7 +63,7 @@ def lens_lines(lens: CalibratedLens, search: BoardSearch, coverage: Coverage, *,
         coverage: of the used views.
         verbose: whether to list every view.
     """
-    yield from camera_lines(lens.camera)
+    yield from _camera_lines(lens.camera)
     yield f"choice         {sentence(lens.choice)}"
     yield f"RMS            {lens.rms_px:.3f} px in the used views, {lens.held_out_rms_px:.3f} px in views left out in turn"
     yield f"views          {len(lens.views)} used, {len(lens.left_out)} left out, {search.searched} pictures searched"
@@ -127,7 +127,7 @@ def convert_camera(path: Path, *, to: str | None, out: Path | None, size_px: tup
 
     camera = CameraFile.read(path, rescale=size_px is not None).camera(image_size_px=size_px)
     if out is None and to is None:
-        print("\n".join([f"{path}", *camera_lines(camera)]))
+        print("\n".join([f"{path}", *_camera_lines(camera)]))
         return 0
     write_camera(camera, to, out)
     return 0

@@ -74,7 +74,7 @@ def told_clicks_at_frames(
     from cocalib.session.click_stamps import clicks_at_frames
 
     found = clicks_at_frames(clicks, recording.image_times, source=source)
-    tell_notes(found.moved)
+    _tell_notes(found.moved)
     return found.clicks
 
 
@@ -89,11 +89,11 @@ def recorded_clicks(
     from cocalib.solving.recorded_clicks import clicks_in_recording
 
     found = clicks_in_recording(clicks, recording, camera, source=source)
-    tell_notes(found.moved)
+    _tell_notes(found.moved)
     return found.clicks
 
 
-def tell_notes(notes: Sequence[str]) -> None:
+def _tell_notes(notes: Sequence[str]) -> None:
     """Print what a user may want to know to stderr, a line for each."""
     for line in notes:
         print(f"note: {line}", file=sys.stderr)

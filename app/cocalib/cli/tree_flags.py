@@ -70,7 +70,7 @@ class FrameFlags:
         found = self.files(paths) if files is None else files
         if found is None:
             source = ", ".join(map(str, paths))
-            return calibration_in_tree(tree_of(paths), self.wanted, source=source), ()
+            return calibration_in_tree(_tree_of(paths), self.wanted, source=source), ()
         return read_together(found, self.wanted), tuple(map(input_file, found))
 
     def renamed(self, file: "CalibrationFile") -> "CalibrationFile":
@@ -115,7 +115,7 @@ class TreeFlags:
         if to != "list":
             raise InputError("--into changes an existing file, --to writes a new one; give one of them")
         files = tree_files(self.into)
-        known = tree_of(self.tree).joints if self.tree else ()
+        known = _tree_of(self.tree).joints if self.tree else ()
         change = patched(files, known, file, frames.wanted, joint=self.joint)
         for line in (f"solved for {change.why}", *(f"note: {note}" for note in change.notes)):
             print(line, file=sys.stderr)
@@ -144,7 +144,7 @@ class TreeFlags:
         if self.joint is not None or self.write:
             raise InputError("--joint and --write are for --into FILE; give that too")
         if self.tree:
-            return attached_export(file, to, tree_of(self.tree))
+            return attached_export(file, to, _tree_of(self.tree))
         return export(file, to, parent_from_radar=parent_from_radar, rectified=rectified)
 
 
@@ -158,7 +158,7 @@ def input_file(file: "TreeFile") -> "InputFile":
     return InputFile(name_text(Path(file.source).name), len(file.data), hashlib.sha256(file.data).hexdigest())
 
 
-def tree_of(paths: Sequence[Path]) -> "FrameTree":
+def _tree_of(paths: Sequence[Path]) -> "FrameTree":
     """Read the frame tree of files, folders and recordings together.
 
     Raises:

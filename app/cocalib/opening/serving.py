@@ -273,7 +273,7 @@ def _served_to_the_end(choice: Choice, service: Service, desk: OpeningDesk, serv
     with ExitStack() as stack:
         opened = open_choice(choice, stack, service.tell)
         workspace, settled = opened.workspace, choice.settled()
-        desk.put(choices_of(settled, opened), settled, opened)
+        desk.put(_choices_of(settled, opened), settled, opened)
         if not choice.is_sample:
             serving.recent.add(choice.paths, choice.title, len(workspace.session.clicks))
         goes_on = service.serve(workspace, opened.recording)
@@ -292,7 +292,7 @@ def _ask(choice: Choice | None, problem: str, service: Service, desk: OpeningDes
     choices = OpeningChoices(0) if choice is None else OpeningChoices(0, choice.title, problem)
     if choice is not None:
         with error_boundary("listing what can be chosen", lambda _line: None):  # `problem` says what is wrong
-            choices = choices_after(choice, problem)
+            choices = _choices_after(choice, problem)
     service.ask(desk.put(choices, choice))
 
 
@@ -338,7 +338,7 @@ def _size_of(path: Path) -> int:
         return 0
 
 
-def choices_of(choice: Choice, opened: Opened) -> OpeningChoices:
+def _choices_of(choice: Choice, opened: Opened) -> OpeningChoices:
     """Describe what can be chosen instead of what is open."""
     workspace = opened.workspace
     described = _described(choice, opened.recording)
@@ -354,7 +354,7 @@ def choices_of(choice: Choice, opened: Opened) -> OpeningChoices:
     )
 
 
-def choices_after(choice: Choice, problem: str) -> OpeningChoices:
+def _choices_after(choice: Choice, problem: str) -> OpeningChoices:
     """Describe what can be chosen after a recording could not be opened as chosen.
 
     Args:

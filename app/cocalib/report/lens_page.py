@@ -42,13 +42,13 @@ def lens_report_html(lens: CalibratedLens, source: PictureSource, coverage: Cove
         tag(
             "main",
             _answer(lens, searched),
-            warning_list(lens),
-            uncertainty_over_the_picture(lens),
-            residuals_over_the_picture(lens),
-            coverage_of_views(lens, coverage),
-            errors_of_views(lens),
-            view_table(lens),
-            left_out_table(lens),
+            _warning_list(lens),
+            _uncertainty_over_the_picture(lens),
+            _residuals_over_the_picture(lens),
+            _coverage_of_views(lens, coverage),
+            _errors_of_views(lens),
+            _view_table(lens),
+            _left_out_table(lens),
         ),
         tag("footer", _foot()),
     )
@@ -66,7 +66,7 @@ def _answer(lens: CalibratedLens, searched: int) -> Markup:
         "section",
         tag("h2", "The lens"),
         tag("p", said),
-        tag("div", parameter_table(lens), model_table(lens), class_="two"),
+        tag("div", _parameter_table(lens), _model_table(lens), class_="two"),
         id="lens",
     )
 
@@ -82,7 +82,7 @@ def _foot() -> str:
     )
 
 
-def warning_list(lens: CalibratedLens) -> Markup:
+def _warning_list(lens: CalibratedLens) -> Markup:
     """Return the warnings with what to do."""
     items = [
         tag("li", tag("code", one.code), " ", sentence(one.message), " ", tag("b", sentence(one.hint)))
@@ -92,7 +92,7 @@ def warning_list(lens: CalibratedLens) -> Markup:
     return tag("section", tag("h2", "Cautions"), body, id="cautions")
 
 
-def parameter_table(lens: CalibratedLens) -> Markup:
+def _parameter_table(lens: CalibratedLens) -> Markup:
     """Return the parameters with their standard deviations."""
     camera = lens.camera
     known = camera.covariance
@@ -106,7 +106,7 @@ def parameter_table(lens: CalibratedLens) -> Markup:
     return tag("div", tag("h3", f"Parameters ({camera.model})"), _table("Parameters", ("", "value ± sigma"), rows))
 
 
-def model_table(lens: CalibratedLens) -> Markup:
+def _model_table(lens: CalibratedLens) -> Markup:
     """Return the models that were tried."""
     rows = [
         _row(
@@ -123,7 +123,7 @@ def model_table(lens: CalibratedLens) -> Markup:
     )
 
 
-def view_table(lens: CalibratedLens) -> Markup:
+def _view_table(lens: CalibratedLens) -> Markup:
     """Return every used view with its errors."""
     rows = [
         _row(
@@ -139,7 +139,7 @@ def view_table(lens: CalibratedLens) -> Markup:
     return tag("section", tag("h2", "Every view"), _table("Views", heads, rows), id="every-view")
 
 
-def left_out_table(lens: CalibratedLens) -> Markup:
+def _left_out_table(lens: CalibratedLens) -> Markup:
     """Return the pictures that were not used, with the reasons."""
     rows = [tag("li", tag("b", one.name), f": {one.reason}") for one in lens.left_out[:_MOST_ROWS]]
     if len(lens.left_out) > _MOST_ROWS:
@@ -161,7 +161,7 @@ def _pixels(value: float) -> str:
     return f"{value:.3f}" if math.isfinite(value) else "–"
 
 
-def residuals_over_the_picture(lens: CalibratedLens) -> Markup:
+def _residuals_over_the_picture(lens: CalibratedLens) -> Markup:
     """Return the mean residuals as arrows over the picture, and all residuals as a scatter."""
     found = residual_field(lens)
     return tag(
@@ -198,7 +198,7 @@ def _scatter(found: ResidualField) -> Markup:
     return captioned("All residuals", drawing(said, axes.drawn("right [px]", "down, negative [px]"), *points), said)
 
 
-def uncertainty_over_the_picture(lens: CalibratedLens) -> Markup:
+def _uncertainty_over_the_picture(lens: CalibratedLens) -> Markup:
     """Return how far the projection of far points is known, and two halves of the views calibrated separately."""
     grid = projection_uncertainty(lens, columns=16, rows=10)
     sigmas = grid.sigma_px
@@ -284,7 +284,7 @@ def _over_picture(alternative: str, camera: Camera, *shapes: Child) -> Markup:
     return drawing(alternative, *shapes, width=_WIDTH, height=_height(camera))
 
 
-def coverage_of_views(lens: CalibratedLens, coverage: Coverage) -> Markup:
+def _coverage_of_views(lens: CalibratedLens, coverage: Coverage) -> Markup:
     """Return where the corners are, how the board was turned and how far it was, and what to film next."""
     missing: list[Child] = [tag("li", sentence(one)) for one in coverage.missing]
     return tag(
@@ -325,7 +325,7 @@ def _distances(lens: CalibratedLens) -> Markup:
     return captioned("Distances", drawing(said, axes.drawn("distance [m]", "RMS [px]"), *marks), said)
 
 
-def errors_of_views(lens: CalibratedLens) -> Markup:
+def _errors_of_views(lens: CalibratedLens) -> Markup:
     """Return the root mean square error of each view: bars where it was used, circles where it was left out."""
     used = np.array([view.rms_px for view in lens.views])
     held_out = np.array([view.held_out_rms_px for view in lens.views])

@@ -18,10 +18,10 @@ TIMELINE = "recorded"
 RADAR = "radar"
 """The root: the radar's frame, x forward, y left, z up."""
 RETURNS = f"{RADAR}/returns"
-REFLECTORS = f"{RADAR}/reflectors"
+_REFLECTORS = f"{RADAR}/reflectors"
 CAMERA = f"{RADAR}/camera"
-CAMERA_POSITION = f"{RADAR}/camera_position_95"
-AGAINST_CAMERA = f"{RADAR}/against"
+_CAMERA_POSITION = f"{RADAR}/camera_position_95"
+_AGAINST_CAMERA = f"{RADAR}/against"
 PICTURE = f"{CAMERA}/picture"
 SEEN_RETURNS = f"{PICTURE}/returns"
 AGAINST_RETURNS = f"{PICTURE}/returns_against"
@@ -55,7 +55,9 @@ def log_unmoving(stream: rr.RecordingStream, view: RecordedView) -> None:
     _log_camera(stream, CAMERA, PICTURE, view.calibration, _FRUSTUM_SHARE * far_m, _CAMERA)
     if view.against is not None:
         stream.log(AGAINST_RETURNS, rr.Points2D.from_fields(radii=rr.Radius.ui_points(3.0)), static=True)
-        _log_camera(stream, AGAINST_CAMERA, f"{AGAINST_CAMERA}/frustum", view.against, _FRUSTUM_SHARE * far_m, _AGAINST)
+        _log_camera(
+            stream, _AGAINST_CAMERA, f"{_AGAINST_CAMERA}/frustum", view.against, _FRUSTUM_SHARE * far_m, _AGAINST
+        )
     _log_camera_position(stream, view.calibration)
     if view.pairs:
         _log_pairs(stream, view)
@@ -101,7 +103,7 @@ def _log_camera_position(stream: rr.RecordingStream, calibration: Calibration) -
     position_m2 = (moves @ covariance @ moves.T)[None] * heavier
     centre = pose.inverse().translation_m[None]
     stream.log(
-        CAMERA_POSITION,
+        _CAMERA_POSITION,
         _ellipsoids(centre, position_m2, np.array([_CAMERA], dtype=np.uint8), ["camera, 95 %"]),
         static=True,
     )
@@ -130,8 +132,8 @@ def _log_pairs(stream: rr.RecordingStream, view: RecordedView) -> None:
         [noise.sigma_range_m, np.deg2rad(noise.sigma_azimuth_deg), np.deg2rad(noise.sigma_elevation_deg)]
     ) * np.array(scale[1:])
     covariances = covariance_from_sigma_polar(points, np.broadcast_to(sigma, points.shape))
-    stream.log(f"{REFLECTORS}/ellipsoids_95", _ellipsoids(points, covariances, colours, ids), static=True)
-    stream.log(REFLECTORS, rr.Points3D(points, colors=colours, radii=rr.Radius.ui_points(4.0)), static=True)
+    stream.log(f"{_REFLECTORS}/ellipsoids_95", _ellipsoids(points, covariances, colours, ids), static=True)
+    stream.log(_REFLECTORS, rr.Points3D(points, colors=colours, radii=rr.Radius.ui_points(4.0)), static=True)
 
 
 def ellipse_strips(pairs: Sequence[PairResult]) -> list[Points2]:

@@ -130,8 +130,8 @@ def _changed(event: Step, session: Session, facts: RecordingFacts) -> Session:
 
 @_changed.register
 def _placed(event: ClickPlaced, session: Session, facts: RecordingFacts) -> Session:
-    require_frame(event.image_time, facts)
-    u_px, v_px = require_pixel(event.pixel_px, facts)
+    _require_frame(event.image_time, facts)
+    u_px, v_px = _require_pixel(event.pixel_px, facts)
     for click in session.clicks:
         if click.image_time != event.image_time:
             continue
@@ -160,7 +160,7 @@ def _marked(click: ReflectorClick, mark: Mark, sigma_px: float | None) -> Reflec
 
 @_changed.register
 def _moved(event: ClickMoved, session: Session, facts: RecordingFacts) -> Session:
-    u_px, v_px = require_pixel(event.pixel_px, facts)
+    u_px, v_px = _require_pixel(event.pixel_px, facts)
     click = _click(session, event.id)
     if (click.u_px, click.v_px) == event.pixel_px and event.mark == "moved":
         return session
@@ -195,7 +195,7 @@ def _options_changed(event: OptionsChanged, session: Session, facts: RecordingFa
 @_changed.register
 def _intrinsics_chosen(event: IntrinsicsChosen, session: Session, facts: RecordingFacts) -> Session:
     if event.intrinsics is not None:
-        require_camera(event.intrinsics, facts)
+        _require_camera(event.intrinsics, facts)
     return replace(session, intrinsics=event.intrinsics)
 
 
@@ -208,8 +208,8 @@ def _cleared(event: Cleared, session: Session, facts: RecordingFacts) -> Session
 def _imported(event: ClicksImported, session: Session, facts: RecordingFacts) -> Session:
     imported = sorted(map(click_of, event.clicks))
     for click in imported:
-        require_frame(click.image_time, facts)
-        require_pixel((click.u_px, click.v_px), facts)
+        _require_frame(click.image_time, facts)
+        _require_pixel((click.u_px, click.v_px), facts)
         _require_sigma(click)
     times = {click.image_time for click in imported}
     clicks = [click for click in session.clicks if click.image_time not in times]
@@ -260,7 +260,7 @@ def _boxes_changed(event: _BoxEvent, session: Session, facts: RecordingFacts) ->
 
 @_boxes_changed.register
 def _drawn(event: BoxDrawn, session: Session, facts: RecordingFacts) -> Session:
-    require_frame(event.image_time, facts, "a box")
+    _require_frame(event.image_time, facts, "a box")
     keyframe = BoxKeyframe(event.image_time, _checked_edges(event.edges_px, facts))
     track = BoxTrack(f"b{session.next_box}", _checked_label(event.label), (keyframe,))
     if not track.label:
@@ -270,13 +270,13 @@ def _drawn(event: BoxDrawn, session: Session, facts: RecordingFacts) -> Session:
 
 @_boxes_changed.register
 def _box_moved(event: BoxMoved, session: Session, facts: RecordingFacts) -> Session:
-    require_frame(event.image_time, facts, "a box")
+    _require_frame(event.image_time, facts, "a box")
     return _with_keyframe(session, event.id, BoxKeyframe(event.image_time, _checked_edges(event.edges_px, facts)))
 
 
 @_boxes_changed.register
 def _hidden(event: BoxHidden, session: Session, facts: RecordingFacts) -> Session:
-    require_frame(event.image_time, facts, "the end of a box")
+    _require_frame(event.image_time, facts, "the end of a box")
     if not any(one.image_time < event.image_time for one in _track(session, event.id).keyframes):
         raise EventError(f"box '{event.id}' begins in this frame or later; delete it instead, or go to a later frame")
     return _with_keyframe(session, event.id, BoxKeyframe(event.image_time, None))
@@ -310,7 +310,7 @@ def _labelled(event: BoxLabelled, session: Session, facts: RecordingFacts) -> Se
 @_boxes_changed.register
 def _loaded(event: BoxesLoaded, session: Session, facts: RecordingFacts) -> Session:
     for time in event.empty_frames:
-        require_frame(time, facts, "an annotated frame")
+        _require_frame(time, facts, "an annotated frame")
     if sum(len(track.keyframes) for track in event.tracks) > _MOST_BOXES:
         raise EventError(f"more than {_MOST_BOXES} boxes; load a file with fewer, or use cocalib evaluate --boxes")
     if len({track.id for track in event.tracks}) < len(event.tracks):
@@ -322,7 +322,7 @@ def _loaded(event: BoxesLoaded, session: Session, facts: RecordingFacts) -> Sess
 
 def _checked_track(track: BoxTrack, facts: RecordingFacts) -> BoxTrack:
     for keyframe in track.keyframes:
-        require_frame(keyframe.image_time, facts, "a box")
+        _require_frame(keyframe.image_time, facts, "a box")
         if keyframe.edges_px is not None:
             _checked_edges(keyframe.edges_px, facts)
     times = [keyframe.image_time for keyframe in track.keyframes]
@@ -392,7 +392,7 @@ class EventError(CalibrationError):
     """An event that does not fit the session or the recording; the session is unchanged."""
 
 
-def require_frame(time: TimeNs, facts: RecordingFacts, what: str = "a click") -> None:
+def _require_frame(time: TimeNs, facts: RecordingFacts, what: str = "a click") -> None:
     """Check that a frame has a stamp.
 
     Args:
@@ -414,7 +414,7 @@ def require_frame(time: TimeNs, facts: RecordingFacts, what: str = "a click") ->
     )
 
 
-def require_pixel(pixel_px: tuple[float, float], facts: RecordingFacts) -> tuple[float, float]:
+def _require_pixel(pixel_px: tuple[float, float], facts: RecordingFacts) -> tuple[float, float]:
     """Return a pixel that is in the frame.
 
     Raises:
@@ -428,7 +428,7 @@ def require_pixel(pixel_px: tuple[float, float], facts: RecordingFacts) -> tuple
     return pixel_px
 
 
-def require_camera(intrinsics: ChosenIntrinsics, facts: RecordingFacts) -> None:
+def _require_camera(intrinsics: ChosenIntrinsics, facts: RecordingFacts) -> None:
     """Check that intrinsics are a camera's, for frames of this size.
 
     Raises:

@@ -58,7 +58,7 @@ def view(
     calibration = outcome if isinstance(outcome, Calibration) else None
     shown = shown_calibration(session, reference)
     stage = _stage(session)
-    verdict = shown_verdict(session, facts, placements)
+    verdict = _shown_verdict(session, facts, placements)
     status, hint = _words(session, stage, reference, verdict) if facts.has_pictures else _WITHOUT_PICTURES
     if stage == "solved" and facts.unconfirmed(session):
         status += "; unconfirmed assumptions"
@@ -244,7 +244,7 @@ def is_dismissed(placement: Placement, session: Session) -> bool:
     return any(float(np.linalg.norm(placement.position_radar_m - one.position_m)) < _SAME_M for one in at)
 
 
-def shown_verdict(session: Session, facts: RecordingFacts, placements: Sequence[Placement] | None) -> Verdict:
+def _shown_verdict(session: Session, facts: RecordingFacts, placements: Sequence[Placement] | None) -> Verdict:
     """Return the verdict on the latest outcome; without one, on what is there."""
     left = placements_left(session, placements)
     outcome = session.outcome if session.clicks else None

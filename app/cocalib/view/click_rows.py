@@ -130,7 +130,7 @@ _NOISE = {"sigma_px": "click noise", "sigma_range_m": "range noise", "sigma_azim
 
 
 @dataclass(frozen=True, slots=True)
-class Disagreement:
+class _Disagreement:
     """Why pairs are outliers under some options.
 
     Attributes:
@@ -170,7 +170,7 @@ def _with_likely_return(row: ClickRow, pair: Pair) -> ClickRow:
 
 @lru_cache(maxsize=1 << 15)
 def _row(
-    click: ReflectorClick, frame: int, pair: Reprojection | None, lone: Unpaired | None, cause: Disagreement
+    click: ReflectorClick, frame: int, pair: Reprojection | None, lone: Unpaired | None, cause: _Disagreement
 ) -> ClickRow:
     stamp = Stamp.of(click.image_time)
     if pair is None:
@@ -234,7 +234,7 @@ def _uncounted(click: ReflectorClick) -> ClickState | None:
     return "excluded" if click.excluded else None if click.counts else "untouched"
 
 
-def _note(state: ClickState, residual_px: float | None, pair: Reprojection, cause: Disagreement) -> str:
+def _note(state: ClickState, residual_px: float | None, pair: Reprojection, cause: _Disagreement) -> str:
     if state == "untouched":
         return _GUESS
     if state not in ("outlier", "excluded"):
@@ -247,18 +247,18 @@ def _note(state: ClickState, residual_px: float | None, pair: Reprojection, caus
     return f"{cause.what}{chance}: its radar position {where}. {cause.action}"
 
 
-def disagreement(options: CalibrationOptions) -> Disagreement:
+def disagreement(options: CalibrationOptions) -> _Disagreement:
     """Say what makes a pair an outlier: the pair itself, the paper's method, or options that allow too little noise."""
     if not options.models_noise:
-        return Disagreement(
+        return _Disagreement(
             f"Outside the {options.paper.ransac_threshold_px:g} px of Algorithm 1's RANSAC, which uses it all the same",
             "The default method tells whether it is wrong.",
         )
     usual, given = NoiseOptions(), options.noise
     strict = [text for name, text in _NOISE.items() if getattr(given, name) < _STRICT * getattr(usual, name)]
     if not strict:
-        return Disagreement("Disagrees with the other pairs", "Check the click, or exclude it.")
-    return Disagreement(
+        return _Disagreement("Disagrees with the other pairs", "Check the click, or exclude it.")
+    return _Disagreement(
         f"Does not fit the noise that the options state ({' and '.join(strict)} far below the default)",
         "Check these options before the click.",
     )

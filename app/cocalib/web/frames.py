@@ -19,10 +19,10 @@ from cocalib.web.messages import FrameHeader
 
 Size = Literal["full", "half", "thumbnail", "rectified"]
 
-HALF_ABOVE_PX = 2_500_000
+_HALF_ABOVE_PX = 2_500_000
 """Pictures with more pixels than this are sent at half size while playing [px]."""
-THUMBNAIL_WIDTH_PX = 480
-BUDGET_BYTES = 16 << 20
+_THUMBNAIL_WIDTH_PX = 480
+_BUDGET_BYTES = 16 << 20
 """Enough for the frames read ahead and those just shown: the recording's file, which the system caches, has all the others."""
 _PROXY_QUALITY, _THUMBNAIL_QUALITY, _RECTIFIED_QUALITY = 85, 80, 92
 
@@ -49,7 +49,7 @@ class FrameStore:
         count: int,
         executor: Executor,
         *,
-        budget_bytes: int = BUDGET_BYTES,
+        budget_bytes: int = _BUDGET_BYTES,
         camera: Callable[[], Camera | None] = lambda: None,
     ) -> None:
         self._source = source
@@ -62,7 +62,7 @@ class FrameStore:
         self._closed = False
         self._camera = camera
         self._rectified_with: Camera | None = None
-        self._rectifier = FrameRectifier()
+        self._rectifier = _FrameRectifier()
 
     def __len__(self) -> int:
         return self._count
@@ -168,7 +168,7 @@ def _full(source: Recording, index: int) -> Frame:
 def _half(source: Recording, index: int) -> Frame:
     """Halve a large picture; return a small one as it is."""
     full = _full(source, index)
-    if full.header.width_px * full.header.height_px <= HALF_ABOVE_PX:
+    if full.header.width_px * full.header.height_px <= _HALF_ABOVE_PX:
         return full
     return Frame(replace(full.header, scale=0.5, format="jpeg"), _encoded(_decoded(full.data, 2), _PROXY_QUALITY))
 
@@ -179,11 +179,11 @@ def _thumbnail(source: Recording, index: int) -> Frame:
 
     full = _full(source, index)
     width_px, height_px = full.header.width_px, full.header.height_px
-    if width_px <= THUMBNAIL_WIDTH_PX and full.header.format == "jpeg":
+    if width_px <= _THUMBNAIL_WIDTH_PX and full.header.format == "jpeg":
         return full
-    shrink = next((factor for factor in (8, 4, 2) if width_px >= factor * THUMBNAIL_WIDTH_PX), 1)
+    shrink = next((factor for factor in (8, 4, 2) if width_px >= factor * _THUMBNAIL_WIDTH_PX), 1)
     pixels = _decoded(full.data, shrink)
-    scale = min(1.0, THUMBNAIL_WIDTH_PX / width_px)
+    scale = min(1.0, _THUMBNAIL_WIDTH_PX / width_px)
     size = (max(1, round(width_px * scale)), max(1, round(height_px * scale)))
     data = _encoded(cv2.resize(pixels, size, interpolation=cv2.INTER_AREA), _THUMBNAIL_QUALITY)
     return Frame(replace(full.header, scale=scale, format="jpeg"), data)
@@ -216,7 +216,7 @@ def _encoded(pixels: np.ndarray, quality: int) -> bytes:
 _MAKERS: dict[str, Callable[[Recording, int], Frame]] = {"full": _full, "half": _half, "thumbnail": _thumbnail}
 
 
-class FrameRectifier:
+class _FrameRectifier:
     """Rectifies pictures; the maps of one camera are kept. Every method may be called from any thread."""
 
     def __init__(self) -> None:

@@ -56,7 +56,7 @@ def find_session_folder(paths: Sequence[Path], facts: RecordingFacts) -> FoundFo
     if own is not None and is_same_recording(own.recording, facts):
         return FoundFolder(named)
     places = dict.fromkeys([*(path.resolve().parent for path in paths), state_folder() / "sessions"])
-    folders = [folder for place in places for folder in session_folders_in(place) if folder != named]
+    folders = [folder for place in places for folder in _session_folders_in(place) if folder != named]
     same = [
         candidate
         for folder in folders
@@ -192,7 +192,7 @@ def unused_session_folder(folder: Path) -> Path:
     return free
 
 
-def session_folders_in(folder: Path, *, set_aside: bool = False) -> tuple[Path, ...]:
+def _session_folders_in(folder: Path, *, set_aside: bool = False) -> tuple[Path, ...]:
     """Return the session folders directly in a folder, by name; none if it cannot be read.
 
     Args:
@@ -255,7 +255,7 @@ def session_summaries(places: Sequence[Path]) -> tuple[SessionSummary, ...]:
 def _folders(place: Path) -> tuple[Path, ...]:
     if holds_session_files(place):
         return (place,)
-    inside = session_folders_in(place, set_aside=True)
+    inside = _session_folders_in(place, set_aside=True)
     named = recording_session_folder([place]) if place.exists() else place
     return (*inside, named) if named.is_dir() and named not in inside else inside
 

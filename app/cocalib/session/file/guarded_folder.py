@@ -63,7 +63,7 @@ class GuardedFolder:
         try:
             if create and not os.path.lexists(path):
                 path.mkdir(parents=True, exist_ok=True)
-            if not shared and (fault := folder_fault(path)):
+            if not shared and (fault := _folder_fault(path)):
                 raise SessionFileError(f"{path}: {fault}")
             if _BY_DESCRIPTOR:
                 self._descriptor = os.open(path, os.O_RDONLY | _FOLDER)
@@ -284,7 +284,7 @@ class GuardedFolder:
             os.fsync(self._descriptor)
 
 
-def folder_fault(path: Path) -> str:
+def _folder_fault(path: Path) -> str:
     """Return why a path is not a folder of this user, and what to do; "" if it is one.
 
     Raises:

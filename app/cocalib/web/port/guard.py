@@ -223,7 +223,7 @@ class Guard:
         hosts = request.headers.get("host", ())
         if len(hosts) != 1:
             return Refused(400, "A request needs exactly one Host header.")
-        name = host_name(hosts[0].strip().lower())
+        name = _host_name(hosts[0].strip().lower())
         if name in self._names or (self._takes_addresses and is_address(name)):
             return hosts[0].strip().lower()
         return Refused(421, "This server does not accept that host name. Use the link shown in the terminal.")
@@ -252,7 +252,7 @@ def _bytes(text: str) -> bytes:
     return text.encode("utf-8", "backslashreplace")
 
 
-def host_name(host: str) -> str:
+def _host_name(host: str) -> str:
     """Return a Host header without its port; the whole of one that has more than a name and a port."""
     found = _HOST.fullmatch(host)
     return found[1] if found else host

@@ -25,7 +25,7 @@ from websockets.http11 import Request, Response
 from cocalib.platform.error_boundary import report_of
 
 Fault = Literal[400, 414, 431, 505]
-MAX_HEAD_BYTES = 64 * 1024
+_MAX_HEAD_BYTES = 64 * 1024
 _MAX_LINE_BYTES = 8 * 1024
 _MAX_HEADERS = 100
 _TOKEN = re.compile(rb"[-!#$%&'*+.^_`|~0-9A-Za-z]{1,64}")
@@ -70,9 +70,9 @@ def read_head(received: bytes) -> Head | None:
     """
     if received and not _TOKEN.match(received):
         return _faulty(400)  # such as the beginning of TLS
-    end = received.find(b"\r\n\r\n", 0, MAX_HEAD_BYTES)
+    end = received.find(b"\r\n\r\n", 0, _MAX_HEAD_BYTES)
     if end < 0:
-        return _faulty(431) if len(received) >= MAX_HEAD_BYTES else None
+        return _faulty(431) if len(received) >= _MAX_HEAD_BYTES else None
     first, *headers = received[:end].split(b"\r\n")
     parts = first.split(b" ")
     if len(first) > _MAX_LINE_BYTES:
