@@ -13,8 +13,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias, TypeVar
 
 import tyro
-
-from cocalib.cli.flags import VALUES
+from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, PrimitiveTypeInfo
 
 _PRIVATE = "tyro._errors"
 _PARTS = {
@@ -86,6 +85,39 @@ class BadValue:
 Fault: TypeAlias = UnknownArgument | MissingArguments | MissingValue | WrongChoice | BadValue
 
 
+_VALUES = ConstructorRegistry()
+"""How values are read and shown that tyro would show with its own words."""
+
+
+@_VALUES.primitive_rule
+def _optional_number(found: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] | None:
+    """Show a number that may be unset as FLOAT or INT, not as {None}|FLOAT."""
+    kind = next((kind for kind in (float, int) if set(typing.get_args(found.type)) == {kind, type(None)}), None)
+    if kind is None:
+        return None
+    return PrimitiveConstructorSpec(
+        nargs=1,
+        metavar=kind.__name__.upper(),
+        instance_from_str=lambda words: kind(words[0]),
+        is_instance=lambda value: value is None or isinstance(value, kind | int),
+        str_from_instance=lambda value: ["unset" if value is None else str(value)],
+    )
+
+
+@_VALUES.primitive_rule
+def _text(found: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] | None:
+    """Show a text as TEXT, not as STR."""
+    if found.type is not str:
+        return None
+    return PrimitiveConstructorSpec(
+        nargs=1,
+        metavar="TEXT",
+        instance_from_str=lambda words: words[0],
+        is_instance=lambda value: isinstance(value, str),
+        str_from_instance=lambda value: [value],
+    )
+
+
 def parse(
     kind: type[Parsed],
     arguments: Sequence[str],
@@ -111,8 +143,8 @@ def parse(
         config = (tyro.conf.OmitSubcommandPrefixes, tyro.conf.FlagCreatePairsOff)
         args = list(arguments)
         if default is None:
-            return tyro.cli(kind, prog=program, args=args, config=config, registry=VALUES)
-        return tyro.cli(kind, prog=program, args=args, config=config, registry=VALUES, default=default)
+            return tyro.cli(kind, prog=program, args=args, config=config, registry=_VALUES)
+        return tyro.cli(kind, prog=program, args=args, config=config, registry=_VALUES, default=default)
 
     def on_event(event: Any) -> None:
         if (fault := _fault(event)) is not None:
