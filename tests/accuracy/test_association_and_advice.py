@@ -5,7 +5,6 @@ import pytest
 
 from benchmarks.accuracy.advice import Advised, measure_advice
 from benchmarks.accuracy.clutter import SCENES, measure_clutter
-from benchmarks.accuracy.mirrored import Mirrored, measure_mirrored
 from benchmarks.accuracy.scenes import Scene
 
 _OF_SCENE = {scene.name: scene for scene in SCENES}
@@ -24,13 +23,6 @@ def test_no_placement_gets_the_position_of_something_else(scene: Scene) -> None:
     trials = [measure_clutter(scene, trial) for trial in range(2)]
     assert sum(trial["wrong"] or 0.0 for trial in trials) == 0.0
     assert sum(trial["paper_wrong"] or 0.0 for trial in trials) >= 0.8 * 40
-
-
-@pytest.mark.parametrize("case", [Mirrored("ti", 10), Mirrored("imaging", 20), Mirrored("ti", 20, axis="up")], ids=str)
-def test_mirrored_axes_are_caught_in_every_trial(case: Mirrored) -> None:
-    trials = [measure_mirrored(case, trial) for trial in range(5)]
-    assert [trial["caught"] for trial in trials] == [1.0] * 5
-    assert sum(trial["false_alarm"] or 0.0 for trial in trials) == 0.0
 
 
 def test_advice_shrinks_the_rotation_sigma_at_equal_numbers() -> None:

@@ -1,6 +1,4 @@
-"""A slice of the benchmark of proposals: ten small recordings, and pictures and radar that do not belong together."""
-
-from dataclasses import replace
+"""A slice of the benchmark of proposals: ten small recordings."""
 
 import numpy as np
 import pytest
@@ -8,29 +6,21 @@ import pytest
 from benchmarks.accuracy.rows import Figures
 from benchmarks.proposing.cases import case_of
 from benchmarks.proposing.clicking import after_one_click
-from benchmarks.proposing.drawn import Drawn
 from benchmarks.proposing.left_alone import automatic_figures
 from benchmarks.proposing.pixels import placement_figures, proposal_figures
 from benchmarks.proposing.small import draw_small
 from benchmarks.proposing.tables import limit_95, summed
-from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions
-from calib_core.proposing import DwellView, dwell_views, proposals_of
-from calib_core.proposing.automatic import automatic_clicks
+from calib_core.proposing import dwell_views, proposals_of
 
 SEEDS = (540, 541, 542, 546, 547, 548, 549, 552, 553, 554)
 
 
 @pytest.fixture(scope="module")
-def seen() -> list[tuple[Drawn, tuple[DwellView, ...]]]:
-    drawn = [draw_small(seed) for seed in SEEDS]
-    return [(one, dwell_views(one.placements, one.frames, one.recording.camera)) for one in drawn]
-
-
-@pytest.fixture(scope="module")
-def figures(seen: list[tuple[Drawn, tuple[DwellView, ...]]]) -> list[Figures]:
+def figures() -> list[Figures]:
     found = []
-    for drawn, views in seen:
+    for drawn in map(draw_small, SEEDS):
+        views = dwell_views(drawn.placements, drawn.frames, drawn.recording.camera)
         first = proposals_of(views, drawn.recording.camera, CalibrationOptions())
         after = after_one_click(first, views, drawn)
         rest, clicked = ((), []) if after is None else (after.proposals.ranked, [after.placement])
@@ -58,20 +48,6 @@ def test_most_proposals_lie_on_the_reflector_and_more_after_one_click(figures: l
 def test_nothing_is_confidently_wrong(figures: list[Figures]) -> None:
     assert summed(figures, "auto far") == 0
     assert summed(figures, "auto wrong clicks") <= 0.1 * summed(figures, "auto clicks")
-
-
-def test_pictures_of_one_recording_with_the_radar_of_another_are_refused(
-    seen: list[tuple[Drawn, tuple[DwellView, ...]]],
-) -> None:
-    for (drawn, pictures), (_, radar) in zip(seen, [*seen[1:], seen[0]], strict=True):
-        mixed = [
-            replace(one, placement=replace(one.placement, position_radar_m=other.placement.position_radar_m))
-            for one, other in zip(pictures, radar, strict=False)
-        ]
-        camera, options = drawn.recording.camera, CalibrationOptions()
-        outcome = automatic_clicks(proposals_of(mixed, camera, options), mixed, camera, options)
-        assert isinstance(outcome, Unsolvable), drawn.case.name
-        assert outcome.code == "not-confident"
 
 
 def test_any_24_seeds_have_every_scene_with_both_radars_and_all_clutter() -> None:

@@ -81,14 +81,6 @@ def test_a_person_who_stood_still_is_not_proposed_and_the_reason_says_why() -> N
     assert all("weaker" in left_out[start] for start in persons)
 
 
-def test_the_radar_of_one_recording_with_the_pictures_of_another_proposes_nothing() -> None:
-    for seed in range(3):
-        one, other = draw_views(seed), draw_views(100 + seed)
-        proposals = proposals_of(with_pictures_of(one, other), other.camera, OPTIONS)
-        assert not proposals.ranked
-        assert {reason for _, reason in proposals.unproposed} == {"picture and radar agree on no pose yet"}
-
-
 def test_what_is_confirmed_is_not_proposed_again_and_counts() -> None:
     drawn = draw_views(2, Drawing(count=5, first_share=0.2))
     before, after = proposed(drawn), proposed(drawn, (0, 3))

@@ -18,7 +18,6 @@ from calib_core.errors import InputError
 from calib_core.interchange import (
     FORMATS,
     adopt,
-    check,
     contents_text,
     export,
     format_named,
@@ -30,7 +29,6 @@ from calib_core.interchange import (
 from calib_core.interchange.calibration_file import EVIDENCE_LEVELS
 from calib_core.interchange.own.calibration_json import calibration_sha256
 from calib_core.interchange.syntax.zip_archives import pack, unpack
-from calib_core.lens_models.registry import LENS_MODELS
 
 
 @pytest.fixture
@@ -172,15 +170,6 @@ def test_a_pack_zipped_again_with_its_folder_is_read(corrected, members) -> None
     )
 
 
-def test_a_slip_in_a_pack_is_named(golden) -> None:
-    transposed = replace(golden.calibration.camera_from_radar, rotation=golden.calibration.camera_from_radar.rotation.T)
-    wrong = replace(golden, calibration=replace(golden.calibration, camera_from_radar=transposed, pairs=()))
-
-    report = check(read_any(export(wrong, "pack").data))
-
-    assert [result.code for result in report.results if result.level == "error"] == ["transposed-rotation"]
-
-
 @pytest.mark.parametrize("name", [known.name for known in FORMATS])
 def test_a_format_that_cannot_hold_the_angle_map_says_so_first_with_both_figures(name, corrected) -> None:
     written = export(corrected, name, rectified=format_named(name).is_for_rectified)
@@ -204,11 +193,6 @@ def test_the_contents_are_shown_as_text(corrected) -> None:
 
     assert "[tf/static_transform.sh]\n#!/bin/sh" in text
     assert "[radar_angle_map.npz]\nazimuth_rad  float64  6" in text
-
-
-def test_every_lens_of_the_registry_can_be_packed(through_lens) -> None:
-    for lens in LENS_MODELS:
-        assert read_any(export(through_lens(lens), "pack").data).camera.model == lens
 
 
 def test_the_code_in_the_pack_has_a_licence_and_names_no_other_package(members) -> None:
