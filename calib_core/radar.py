@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Points3, Values, frozen_array
+from calib_core.arrays import Points3, Values, Vector3, frozen_array
+from calib_core.options import NoiseOptions
 
 _LEAST_SHARE_SQUARED = 0.25  # of the range that is left along the plane of the placements
 
@@ -70,6 +71,11 @@ def cartesian_jacobian(polar: Points3) -> np.ndarray:
         np.stack([se, zero, range_m * ce], axis=-1),
     ]
     return np.stack(rows, axis=-2)
+
+
+def sigma_polar_of(noise: NoiseOptions) -> Vector3:
+    """Return the standard deviations of range [m], azimuth and elevation [rad] that the options assume: (3,)."""
+    return np.array([noise.sigma_range_m, *np.deg2rad([noise.sigma_azimuth_deg, noise.sigma_elevation_deg])])
 
 
 def covariance_from_sigma_polar(points_radar_m: Points3, sigma_polar: Points3) -> np.ndarray:

@@ -14,7 +14,7 @@ from benchmarks.accuracy.rows import Figures, Kept, Part, Row, Section
 from calib_core.calibration import calibrate_pairs
 from calib_core.diagnostics.next_placement import PlacementLimits, next_placement
 from calib_core.measurements import Candidate, Pair
-from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, polar_from_cartesian
+from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, polar_from_cartesian, sigma_polar_of
 from calib_core.results import Calibration
 from calib_core.synthetic import FIELD, NOISE_PROFILES, SimulatedPairs
 from calib_core.synthetic.simulated_pairs import NoiseName
@@ -84,10 +84,10 @@ def _measured_at(
 ) -> Pair:
     """Simulate a measurement of the reflector at a place."""
     profile = NOISE_PROFILES[noise]
-    point = cartesian_from_polar(polar_from_cartesian(place) + profile.sigma_polar * rng.standard_normal(3))
+    point = cartesian_from_polar(polar_from_cartesian(place) + sigma_polar_of(profile) * rng.standard_normal(3))
     pixel = simulated.camera.project(simulated.camera_from_radar @ place[None])[0]
     pixel = pixel + profile.sigma_px * rng.standard_normal(2)
-    candidate = Candidate(point, profile.sigma_polar, covariance_from_sigma_polar(point, profile.sigma_polar))
+    candidate = Candidate(point, sigma_polar_of(profile), covariance_from_sigma_polar(point, sigma_polar_of(profile)))
     return Pair(name, pixel, (candidate,), sigma_px=profile.sigma_px)
 
 

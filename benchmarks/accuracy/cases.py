@@ -17,7 +17,7 @@ from calib_core.options import (
     ReflectorOptions,
     SolvingOptions,
 )
-from calib_core.radar import covariance_from_sigma_polar
+from calib_core.radar import covariance_from_sigma_polar, sigma_polar_of
 from calib_core.synthetic import AISLE, FIELD, NOISE_PROFILES, RigOptions, SimulatedPairs, random_rig, simulate_pairs
 from calib_core.synthetic.simulated_pairs import NoiseName, study_camera
 
@@ -139,7 +139,7 @@ def bound_of(
     points = simulated.points_radar_m[~simulated.outlier] if points_radar_m is None else points_radar_m
     jacobian = simulated.camera.pose_jacobian(pose, points)
     d_point = simulated.camera.project_with_jacobian(pose @ points)[1] @ pose.rotation
-    radar = covariance_from_sigma_polar(points, np.tile(profile.sigma_polar, (len(points), 1)))
+    radar = covariance_from_sigma_polar(points, np.tile(sigma_polar_of(profile), (len(points), 1)))
     spread = d_point @ radar @ np.swapaxes(d_point, 1, 2) + profile.sigma_px**2 * np.eye(2)
     information = (np.swapaxes(jacobian, 1, 2) @ np.linalg.solve(spread, jacobian)).sum(axis=0)
     one_metre = CameraPrior(np.zeros(3), 1.0, measured=True)

@@ -13,6 +13,7 @@ from calib_core.calibration import calibrate_pairs
 from calib_core.geometry import RigidTransform
 from calib_core.options import CalibrationOptions
 from calib_core.paper.pnp import refine_lm, solve_pnp
+from calib_core.radar import sigma_polar_of
 from calib_core.results import Calibration
 from calib_core.synthetic import NOISE_PROFILES, SimulatedPairs
 
@@ -27,7 +28,7 @@ _DEFAULT_PX = 8.0  # OpenCV's
 def best_threshold_px(case: Case, camera_focal_px: float) -> float:
     """Return three sigmas of the residual, which only the simulation knows."""
     profile = NOISE_PROFILES[case.noise]
-    angles_px = camera_focal_px * profile.sigma_polar[1:]
+    angles_px = camera_focal_px * sigma_polar_of(profile)[1:]
     return float(3.0 * np.sqrt((angles_px**2).mean() + profile.sigma_px**2))
 
 
@@ -122,7 +123,7 @@ def _gmlpnp(simulated: SimulatedPairs, case: Case) -> RigidTransform | None:
 def _bias_compensated(simulated: SimulatedPairs, case: Case) -> RigidTransform | None:
     """Run the bias-compensated PnP with the true noise."""
     profile = NOISE_PROFILES[case.noise]
-    sigma_polar = np.tile(profile.sigma_polar, (len(simulated.pairs), 1))
+    sigma_polar = np.tile(sigma_polar_of(profile), (len(simulated.pairs), 1))
     return bias_compensated_pnp(*_arrays(simulated), sigma_polar, profile.sigma_px, simulated.camera)
 
 

@@ -10,7 +10,7 @@ from calib_core.arrays import Points2, Points3
 from calib_core.errors import InputError
 from calib_core.measurements import Candidate, Pair
 from calib_core.options import NoiseOptions
-from calib_core.radar import covariance_from_sigma_polar
+from calib_core.radar import covariance_from_sigma_polar, sigma_polar_of
 
 
 def pairs_from_arrays(
@@ -81,10 +81,7 @@ def _kind(values: Any) -> str:
 
 
 def _sigma_polar_rows(sigma_polar: np.ndarray | None, noise: NoiseOptions, count: int) -> Points3:
-    if sigma_polar is None:
-        angles_rad = np.deg2rad([noise.sigma_azimuth_deg, noise.sigma_elevation_deg])
-        sigma_polar = np.array([noise.sigma_range_m, *angles_rad])
-    sigmas = np.asarray(sigma_polar, dtype=np.float64)
+    sigmas = np.asarray(sigma_polar_of(noise) if sigma_polar is None else sigma_polar, dtype=np.float64)
     if sigmas.shape not in ((3,), (count, 3)):
         raise InputError(
             f"sigma_polar: expected an array of 3 or of {count} x 3, got {' x '.join(map(str, sigmas.shape))}"

@@ -21,7 +21,7 @@ from calib_core.arrays import Flags, Points3, Values, Vector3, frozen_array
 from calib_core.association.alternatives import cluster_alternatives
 from calib_core.measurements import NS_PER_S, Candidate, RadarScans, TimeNs
 from calib_core.options import LocatingOptions, NoiseOptions
-from calib_core.radar import covariance_from_sigma_polar, direction_cosines
+from calib_core.radar import covariance_from_sigma_polar, direction_cosines, sigma_polar_of
 
 CLUSTER_SCALE = np.array([0.06, np.deg2rad(1.2), np.deg2rad(2.5)])
 """The least step of distance in range [m], u and w: about a range bin, an angle bin, and an elevation error.
@@ -284,9 +284,7 @@ def candidate_at(position_radar_m: Vector3, noise: NoiseOptions, *, score: float
         score: plausibility before any pose is known, 0 to 1.
     """
     position = np.asarray(position_radar_m, dtype=np.float64)
-    sigma_polar = np.array(
-        [noise.sigma_range_m, np.deg2rad(noise.sigma_azimuth_deg), np.deg2rad(noise.sigma_elevation_deg)]
-    )
+    sigma_polar = sigma_polar_of(noise)
     return Candidate(position, sigma_polar, covariance_from_sigma_polar(position, sigma_polar), score)
 
 
@@ -296,8 +294,7 @@ def floor_sigma_polar(position_radar_m: Vector3, noise: NoiseOptions) -> Vector3
     The options refer to a placement straight ahead; an array's error is constant in u and w, so to the side it grows as
     1 / cos(azimuth) and 1 / cos(elevation).
     """
-    assumed = [noise.sigma_range_m, np.deg2rad(noise.sigma_azimuth_deg), np.deg2rad(noise.sigma_elevation_deg)]
-    return np.asarray(np.array(assumed) / _cosines(position_radar_m))
+    return np.asarray(sigma_polar_of(noise) / _cosines(position_radar_m))
 
 
 def _cosines(position_radar_m: Vector3) -> Vector3:

@@ -16,7 +16,7 @@ from calib_core.estimation.plausibility import implausible_input
 from calib_core.geometry import RigidTransform, skew
 from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
-from calib_core.radar import polar_from_cartesian
+from calib_core.radar import polar_from_cartesian, sigma_polar_of
 from calib_core.results import DataWarning
 
 _MOST_DISAGREEING = 0.35
@@ -103,7 +103,7 @@ def _modelled(
     options: CalibrationOptions,
 ) -> _Modelled:
     noise, degrees = options.noise, 2 * len(points_radar_m) - 6
-    sigma_polar = [noise.sigma_range_m, *np.deg2rad([noise.sigma_azimuth_deg, noise.sigma_elevation_deg])]
+    sigma_polar = sigma_polar_of(noise)
     model = linearize(
         camera_from_radar,
         camera,

@@ -18,7 +18,7 @@ from calib_core.estimation.plausibility import implausible_input
 from calib_core.geometry import RigidTransform, mounting_rotation
 from calib_core.measurements import Pair, Unpaired
 from calib_core.options import CalibrationOptions
-from calib_core.radar import polar_from_cartesian
+from calib_core.radar import polar_from_cartesian, sigma_polar_of
 from calib_core.results import Calibration, DataWarning, PairResult
 from calib_core.results.metrics import metrics_of
 
@@ -177,7 +177,7 @@ def _explained(calibration: Calibration) -> Flags:
     """Return whether the noise that the options assume explains each residual: (n,)."""
     noise, pairs = calibration.options.noise, calibration.pairs
     points = calibration.radar_errors.corrected(np.array([pair.point_radar_m for pair in pairs]))
-    sigma_polar = [noise.sigma_range_m, *np.deg2rad([noise.sigma_azimuth_deg, noise.sigma_elevation_deg])]
+    sigma_polar = sigma_polar_of(noise)
     clicks = [pair.measured.sigma_px if pair.measured is not None else None for pair in pairs]
     model = linearize(
         calibration.camera_from_radar,

@@ -18,8 +18,8 @@ from calib_core.arrays import Flags, Points2, Points3, Vector3, frozen_array
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.measurements import Candidate, Pair
-from calib_core.options import LensOptions, RadarOptions, ReflectorOptions
-from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, polar_from_cartesian
+from calib_core.options import LensOptions, NoiseOptions, RadarOptions, ReflectorOptions
+from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, polar_from_cartesian, sigma_polar_of
 from calib_core.synthetic.rig import Rig, RigOptions, random_rig, typical_camera
 
 
@@ -140,31 +140,12 @@ def _triple(values: Vector3) -> tuple[float, float, float]:
 NoiseName = Literal["ti", "ti_fine", "ti_aisle", "imaging", "none"]
 
 
-@dataclass(frozen=True, slots=True)
-class NoiseProfile:
-    """Standard deviations of one placement: independent, Gaussian, in range, azimuth, elevation and pixels."""
-
-    sigma_range_m: float = 0.015
-    """Of the range [m]."""
-    sigma_azimuth_deg: float = 0.55
-    """Of the azimuth [deg]."""
-    sigma_elevation_deg: float = 1.0
-    """Of the elevation [deg]."""
-    sigma_px: float = 2.0
-    """Of the click, per axis [px]."""
-
-    @property
-    def sigma_polar(self) -> Vector3:
-        """Range [m], azimuth [rad], elevation [rad] in one (3,) array."""
-        return np.array([self.sigma_range_m, *np.deg2rad([self.sigma_azimuth_deg, self.sigma_elevation_deg])])
-
-
-NOISE_PROFILES: dict[NoiseName, NoiseProfile] = {
-    "ti": NoiseProfile(),
-    "ti_fine": NoiseProfile(0.008, 0.20, 0.7),
-    "ti_aisle": NoiseProfile(0.02, 0.8, 2.0),
-    "imaging": NoiseProfile(0.03, 0.12, 0.25),
-    "none": NoiseProfile(0.0, 0.0, 0.0, 0.0),
+NOISE_PROFILES: dict[NoiseName, NoiseOptions] = {
+    "ti": NoiseOptions(2.0, 0.015, 0.55, 1.0),
+    "ti_fine": NoiseOptions(2.0, 0.008, 0.20, 0.7),
+    "ti_aisle": NoiseOptions(2.0, 0.02, 0.8, 2.0),
+    "imaging": NoiseOptions(2.0, 0.03, 0.12, 0.25),
+    "none": NoiseOptions(0.0, 0.0, 0.0, 0.0),
 }
 """Assumed noise of radar families; "none" is exact, and its candidates have the "ti_fine" sigmas."""
 
@@ -252,7 +233,7 @@ def simulate_pairs(
     count: int = 20,
     *,
     rng: np.random.Generator,
-    noise: NoiseProfile | NoiseName = "ti",
+    noise: NoiseOptions | NoiseName = "ti",
     outlier_share: float = 0.0,
     outlier_mix: OutlierMix | None = None,
     decoys: int = 0,
@@ -286,14 +267,14 @@ def simulate_pairs(
     aimed = systematic.aimed_pixels(rig.camera, rig.camera_from_radar @ points)
     polar = systematic.reported_polar(points)
     reported = points if systematic == SystematicErrors() else cartesian_from_polar(polar)
-    measured = cartesian_from_polar(polar + profile.sigma_polar * rng.standard_normal(points.shape))
+    measured = cartesian_from_polar(polar + sigma_polar_of(profile) * rng.standard_normal(points.shape))
     clicks = aimed + profile.sigma_px * rng.standard_normal(aimed.shape)
     outlier = np.zeros(count, dtype=np.bool_)
     outlier[rng.permutation(count)[: round(outlier_share * count)]] = True
     mix = outlier_mix or OutlierMix()
     for i in np.flatnonzero(outlier).tolist():
         _make_outlier(rng, i, measured, clicks, rig=rig, layout=layout, mix=mix, reported=reported)
-    sigma_polar = (profile if profile.sigma_range_m > 0 else NOISE_PROFILES["ti_fine"]).sigma_polar
+    sigma_polar = sigma_polar_of(profile if profile.sigma_range_m > 0 else NOISE_PROFILES["ti_fine"])
     pairs, true_candidate = [], []
     for i in range(count):
         positions, chosen = _positions(rng, measured[i], decoys, rig, layout)

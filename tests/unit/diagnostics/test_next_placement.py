@@ -15,7 +15,7 @@ from calib_core.diagnostics.next_placement import (
 )
 from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions, NoiseOptions
-from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, polar_from_cartesian
+from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, polar_from_cartesian, sigma_polar_of
 from calib_core.results import Calibration
 from calib_core.synthetic import NOISE_PROFILES, SimulatedPairs, simulate_pairs
 
@@ -32,7 +32,7 @@ def positions(simulated: SimulatedPairs) -> np.ndarray:
 
 def measured_at(position: np.ndarray, name: str, simulated: SimulatedPairs, rng: np.random.Generator) -> Pair:
     """Put the reflector at the advised place and measure it as the simulation does."""
-    sigma = NOISE_PROFILES["ti"].sigma_polar
+    sigma = sigma_polar_of(NOISE_PROFILES["ti"])
     point = cartesian_from_polar(polar_from_cartesian(position) + sigma * rng.standard_normal(3))
     pixel = simulated.camera.project(simulated.camera_from_radar @ position[None])[0] + 2.0 * rng.standard_normal(2)
     example = simulated.pairs[0].candidates[0]

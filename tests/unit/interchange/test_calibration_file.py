@@ -35,11 +35,11 @@ from calib_core.interchange import (
 from calib_core.interchange.calibration_file import MOST_CHARACTERS
 from calib_core.interchange.own.calibration_json import calibration_file
 from calib_core.measurements import time_from_parts
-from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
+from calib_core.options import CalibrationOptions, CameraPositionPrior, NoiseOptions, SolvingOptions
 from calib_core.radar import RadarErrors, cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration
 from calib_core.results.verdict import verdict_on
-from calib_core.synthetic import NoiseProfile, simulate_pairs
+from calib_core.synthetic import simulate_pairs
 
 
 @pytest.fixture
@@ -170,7 +170,7 @@ def test_a_file_of_the_required_keys_alone_is_read(golden_text: str):
 
 
 def test_the_radars_angle_errors_are_stored_with_the_calibration_if_correcting_them_helps():
-    simulated = simulate_pairs(30, rng=np.random.default_rng(7), noise=NoiseProfile(0.008, 0.1, 0.25))
+    simulated = simulate_pairs(30, rng=np.random.default_rng(7), noise=NoiseOptions(2.0, 0.008, 0.1, 0.25))
     pairs = []
     for pair in simulated.pairs:
         polar = polar_from_cartesian(pair.candidates[0].position_radar_m)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from calib_core.radar import polar_from_cartesian
+from calib_core.radar import polar_from_cartesian, sigma_polar_of
 from calib_core.synthetic import (
     AISLE,
     NOISE_PROFILES,
@@ -48,7 +48,7 @@ def test_clicks_and_radar_errors_have_the_profiles_standard_deviations() -> None
         [polar_from_cartesian(_radar_points(s)) - polar_from_cartesian(s.points_radar_m) for s in sets]
     )
     assert click_errors.std(axis=0) == pytest.approx([2.0, 2.0], rel=0.1)
-    assert polar_errors.std(axis=0) == pytest.approx(profile.sigma_polar, rel=0.1)
+    assert polar_errors.std(axis=0) == pytest.approx(sigma_polar_of(profile), rel=0.1)
 
 
 def test_as_many_pairs_are_wrong_as_requested_and_they_are_far_off() -> None:

@@ -14,7 +14,7 @@ from calib_core.options import CalibrationOptions, NoiseOptions
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration, DataWarning, Metrics, PairResult
 from calib_core.results.verdict import verdict_on
-from calib_core.synthetic import NoiseProfile, simulate_pairs
+from calib_core.synthetic import simulate_pairs
 from cocalib.session import ClickExcluded, ClickMoved, ClickPlaced, History, RecordingFacts, Solved, Undo, advance
 from cocalib.view import View, summary_lines, view
 from cocalib.view.click_rows import ellipses_of, reprojections
@@ -225,7 +225,7 @@ def test_every_figure_has_a_value_and_a_sentence_that_explains_it() -> None:
 
 
 def test_smooth_angle_errors_of_the_radar_are_a_figure_if_correcting_them_helps() -> None:
-    simulated = simulate_pairs(30, rng=np.random.default_rng(7), noise=NoiseProfile(0.008, 0.1, 0.25))
+    simulated = simulate_pairs(30, rng=np.random.default_rng(7), noise=NoiseOptions(2.0, 0.008, 0.1, 0.25))
     solved = calibrate_pairs(simulated.pairs, simulated.camera, CalibrationOptions())
     assert isinstance(solved, Calibration)
     assert "radar_angles" not in {figure.key for figure in pose_figures(solved)}
