@@ -18,9 +18,8 @@ from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import EQUATION, CalibrationFile, Evidence
 from calib_core.interchange.cameras.ros import camera_info_text
 from calib_core.interchange.format import Format, ImportedCalibration, Reads
-from calib_core.interchange.formats.launch_files import TF2_LAUNCH_PY
 from calib_core.interchange.formats.statement import missing_map, origin_lines
-from calib_core.interchange.formats.tf2_command import TF2
+from calib_core.interchange.formats.static_transform import TF2, TF2_LAUNCH_PY
 from calib_core.interchange.formats.urdf import URDF
 from calib_core.interchange.own.calibration_json import CALIBRATION_1, write_calibration
 from calib_core.interchange.syntax.content import Content, readings

@@ -26,7 +26,6 @@ from calib_core.interchange.formats.kitti import KITTI
 from calib_core.interchange.formats.kitti_raw import KITTI_ODOMETRY, KITTI_RAW
 from calib_core.interchange.formats.koide3 import KOIDE3
 from calib_core.interchange.formats.labelling import SCALE, SEGMENTS
-from calib_core.interchange.formats.launch_files import LAUNCH_XML, TF2_LAUNCH_PY
 from calib_core.interchange.formats.mat import MATLAB
 from calib_core.interchange.formats.named_arrays import NUMPY
 from calib_core.interchange.formats.not_between_both import K_RADAR_CAMERA, K_RADAR_OFFSET, KALIBR_CHAIN, KITTI_CAMERAS
@@ -34,8 +33,8 @@ from calib_core.interchange.formats.nuscenes import NUSCENES
 from calib_core.interchange.formats.opencv import OPENCV
 from calib_core.interchange.formats.openlabel import OPENLABEL
 from calib_core.interchange.formats.pjlab import PJLAB
+from calib_core.interchange.formats.static_transform import LAUNCH_XML, TF2, TF2_LAUNCH_PY
 from calib_core.interchange.formats.text_matrix import MATRIX
-from calib_core.interchange.formats.tf2_command import TF2
 from calib_core.interchange.formats.tf_echo import TF_ECHO
 from calib_core.interchange.formats.tum_pose import TUM_POSE
 from calib_core.interchange.formats.urdf import URDF

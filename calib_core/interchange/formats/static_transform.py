@@ -1,8 +1,13 @@
-"""The arguments of tf2's static_transform_publisher, in all its forms: the pose of the child in the parent."""
+"""What publishes a static transform: the command of ROS 2, alone or in a shell script, and launch files.
 
+All of them give tf2's static_transform_publisher the pose of the child in the parent. The command and ROS 2's launch file in
+Python are written and read; launch files in XML, of ROS 2 and ROS 1, are read alike.
+"""
+
+import ast
 import re
 import shlex
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,16 +15,23 @@ from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.cameras.fields import floats
-from calib_core.interchange.format import Form, ImportedCalibration, WrittenPose, posed_between
-from calib_core.interchange.formats.statement import stated_check_point, stated_frames
+from calib_core.interchange.format import Form, Format, ImportedCalibration, Reads, WrittenPose, posed_between
+from calib_core.interchange.formats.statement import (
+    POSE_ONLY,
+    hash_comment,
+    stated_check_point,
+    stated_frames,
+    statement,
+)
 from calib_core.interchange.formats.transform_choice import Ends, choose_transform
 from calib_core.interchange.rotations import quaternion_xyzw_from_matrix
+from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import number_text, numbers_text, quoted
 
 PUBLISHER = "static_transform_publisher"
 _DRIVERS_ENDING = "_optical_frame"
-LABELS = ("--x", "--y", "--z", "--qx", "--qy", "--qz", "--qw")
-NUMBERS = "pose of the child (camera, optical) in the parent (radar); quaternion x y z w"
+_LABELS = ("--x", "--y", "--z", "--qx", "--qy", "--qz", "--qw")
+_NUMBERS = "pose of the child (camera, optical) in the parent (radar); quaternion x y z w"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,13 +88,13 @@ def radar_from_child(file: CalibrationFile, child: ChildFrame | None = None) -> 
 
 
 def pose_numbers(file: CalibrationFile, child: ChildFrame | None = None) -> list[str]:
-    """Return x, y, z [m] and the quaternion x, y, z, w of the child in the radar frame, in the order of LABELS."""
+    """Return x, y, z [m] and the quaternion x, y, z, w of the child in the radar frame, in the order of _LABELS."""
     posed = radar_from_child(file, child)
     quaternion = quaternion_xyzw_from_matrix(posed.rotation)
     return [number_text(value) for value in (*posed.translation_m, *quaternion)]
 
 
-def from_publishers(found: list[list[str]], text: str, *, source: str, name: str) -> ImportedCalibration:
+def _from_publishers(found: list[list[str]], text: str, *, source: str, name: str) -> ImportedCalibration:
     """Return the calibration of the one publisher that is between the radar and the camera.
 
     Args:
@@ -180,3 +192,128 @@ def _is_number(word: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+def write_command(file: CalibrationFile, child: ChildFrame | None = None) -> str:
+    """Write the ROS 2 command that publishes the camera's pose in the radar frame."""
+    flags = [f"{label} {number}" for label, number in zip(_LABELS, pose_numbers(file, child), strict=True)]
+    return (
+        "#!/bin/sh\n"
+        + hash_comment(statement(file, meaning(file, child)))
+        + f"ros2 run tf2_ros {PUBLISHER} {' '.join(flags[:3])} \\\n"
+        + f"  {' '.join(flags[3:])} \\\n"
+        + f"  --frame-id {shlex.quote(file.frames.radar)} --child-frame-id {shlex.quote(child_of(file, child).name)}\n"
+    )
+
+
+def _recognizes_command(content: Content) -> bool:
+    return any(PUBLISHER in line for line in content.lines)
+
+
+def _read_command(content: Content, source: str) -> ImportedCalibration:
+    """Read a command line or a script with one.
+
+    Raises:
+        InputError: there is no static_transform_publisher with a pose in it.
+    """
+    text = content.text
+    commands = "\n".join(line for line in text.replace("\\\n", " ").splitlines() if not line.lstrip().startswith("#"))
+    lines = [line for line in commands.splitlines() if PUBLISHER in line]
+    try:
+        found = [shlex.split(line.partition(PUBLISHER)[2], comments=True) for line in lines]
+    except ValueError as error:
+        raise InputError(f"{source}: the command cannot be split ({error}); correct the quotes") from None
+    return _from_publishers(found, text, source=source, name="tf2")
+
+
+TF2 = Format(
+    name="tf2",
+    title="ROS 2 command",
+    used_in="ROS",
+    also="tf tf_static transform broadcaster rviz",
+    numbers=_NUMBERS,
+    file_name="static_transform.sh",
+    camera="none",
+    comment="#",
+    notes=(POSE_ONLY,),
+    notes_on=second_parent_notes,
+    write=write_command,
+    reads=Reads(_recognizes_command, _read_command),
+)
+
+
+def write_python(file: CalibrationFile, child: ChildFrame | None = None) -> str:
+    """Write a ROS 2 launch file in Python."""
+    arguments = [part for pair in zip(_LABELS, pose_numbers(file, child), strict=True) for part in pair]
+    arguments += ["--frame-id", file.frames.radar, "--child-frame-id", child_of(file, child).name]
+    rows = [f"                    {a!a}, {b!a},\n" for a, b in zip(arguments[::2], arguments[1::2], strict=True)]
+    return (
+        hash_comment(statement(file, meaning(file, child)))
+        + "from launch import LaunchDescription\n"
+        + "from launch_ros.actions import Node\n\n\n"
+        + "def generate_launch_description():\n"
+        + "    return LaunchDescription(\n        [\n            Node(\n"
+        + f'                package="tf2_ros",\n                executable="{PUBLISHER}",\n'
+        + "                arguments=[\n"
+        + "".join(rows)
+        + "                ],\n            )\n        ]\n    )\n"
+    )
+
+
+def _recognizes_python(content: Content) -> bool:
+    return content.syntax == "lines" and "generate_launch_description" in content.text
+
+
+def _read_python(content: Content, source: str) -> ImportedCalibration:
+    """Read the arguments in a ROS 2 launch file in Python, without running it.
+
+    Raises:
+        InputError: there are none, or they are not plain strings.
+    """
+    try:
+        tree = ast.parse(content.text)
+    except (SyntaxError, ValueError, RecursionError) as error:
+        raise InputError(f"{source}: not Python ({error}); correct it there") from None
+    found = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.keyword) and node.arg == "arguments" and isinstance(node.value, ast.List):
+            words = [str(item.value) for item in node.value.elts if isinstance(item, ast.Constant)]
+            if len(words) == len(node.value.elts):
+                found.append(words)
+    if found:
+        return _from_publishers(found, content.text, source=source, name="tf2-launch-py")
+    raise InputError(f"{source}: no arguments=[...] of plain strings in it; give a file with a {PUBLISHER}")
+
+
+def _recognizes_xml(content: Content) -> bool:
+    return content.root.tag == "launch"
+
+
+def _read_xml(content: Content, source: str) -> ImportedCalibration:
+    """Read a launch file of ROS 2 or ROS 1.
+
+    Raises:
+        InputError: there is no static_transform_publisher in it.
+    """
+    nodes = content.root.iter("node")
+    publishers = [node for node in nodes if PUBLISHER in (node.get("exec"), node.get("type"))]
+    if not publishers:
+        raise InputError(f"{source}: no <node> that runs {PUBLISHER}; give a file with one")
+    try:
+        found = [shlex.split(node.get("args", "")) for node in publishers]
+    except ValueError as error:
+        raise InputError(f"{source}: args cannot be split ({error}); correct the quotes") from None
+    name = "tf2-launch-xml" if publishers[0].get("exec") else "tf1-launch"
+    return _from_publishers(found, content.text, source=source, name=name)
+
+
+LAUNCH_XML = Reads(_recognizes_xml, _read_xml)
+
+TF2_LAUNCH_PY = replace(
+    TF2,
+    name="tf2-launch-py",
+    title="ROS 2 launch file, Python",
+    file_name="radar_camera.launch.py",
+    write=write_python,
+    reads=Reads(_recognizes_python, _read_python),
+)
