@@ -85,7 +85,7 @@ class MountingScatter:
     Attributes:
         vehicle_type: its name.
         common: the mounting that the coordinates are relative to.
-        effects: mean and scatter in the coordinates of `mounting_coordinates`: camera forward, left, up [m], roll, pitch, yaw
+        effects: mean and scatter in the `coordinates` of a mounting: camera forward, left, up [m], roll, pitch, yaw
             [rad].
         mountings: those that were counted.
         left_out: those that were not.
@@ -281,7 +281,7 @@ def _too_few(count: int, left_out: int) -> Unsolvable:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Measured:
-    """Mountings in the coordinates of `mounting_coordinates`.
+    """Mountings in the `coordinates` of a mounting.
 
     Attributes:
         vectors: (n, 6).
