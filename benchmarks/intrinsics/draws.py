@@ -5,13 +5,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.intrinsics.simulated_views import CornerErrors
 from calib_core.camera import Camera, CameraModel
 from calib_core.geometry import RigidTransform
 from calib_core.intrinsics import Board
 from calib_core.measurements import TimeNs
 from calib_core.synthetic import typical_camera
-from calib_core.synthetic.boards import BoardFilm, BoardShape, Waving, render_board, true_corners, waved_poses
+from calib_core.synthetic.boards import (
+    BoardFilm,
+    BoardShape,
+    CornerErrors,
+    Waving,
+    render_board,
+    true_corners,
+    waved_poses,
+)
 
 __all__ = ["BOARDS", "CHECKERBOARD", "FILMS", "LENSES", "Pictures", "Series", "drawn_camera", "drawn_series", "moved"]
 

@@ -3,11 +3,17 @@
 import numpy as np
 import pytest
 
-from benchmarks.intrinsics.simulated_views import CornerErrors, simulated_views
 from calib_core.geometry import rotation_angle_rad
 from calib_core.intrinsics import Board
 from calib_core.synthetic import typical_camera
-from calib_core.synthetic.boards import BoardFilm, Waving, true_corners, waved_poses
+from calib_core.synthetic.boards import (
+    BoardFilm,
+    CornerErrors,
+    Waving,
+    simulated_views,
+    true_corners,
+    waved_poses,
+)
 
 BOARD = Board("checkerboard", 9, 6, 0.02214)
 CAMERA = typical_camera()
