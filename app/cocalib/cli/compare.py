@@ -10,7 +10,6 @@ from calib_core.errors import InputError
 from cocalib.cli.flags import Switch, called
 from cocalib.cli.judging_flags import EvidenceFlags, Judging, JudgingFlags
 from cocalib.cli.output import progress_bar
-from cocalib.cli.recording_flags import Recordings
 from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
@@ -32,8 +31,6 @@ class Compare:
     """A calibration in any format that import reads."""
     b: Annotated[Path | None, tyro.conf.Positional, called("B")] = None
     """Another calibration of the same sensors."""
-    recording: Recordings = ()
-    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several are read as one recording."""
     json: Switch = False
     """Print one JSON object instead of text."""
     judging: Judging = field(default_factory=JudgingFlags)
@@ -44,12 +41,12 @@ class Compare:
 
         if self.a is None or self.b is None:
             raise InputError("compare needs two calibrations; see cocalib compare --help")
-        if not self.recording and self.judging.evidence != EvidenceFlags():
+        if not self.judging.recording and self.judging.evidence != EvidenceFlags():
             raise InputError("clicks and boxes are those of a recording; give it too: cocalib compare A B RECORDING")
         camera = self.judging.read_camera()
         found_a, found_b = (self.judging.frames.read([path])[0] for path in (self.a, self.b))
         compared = None
-        if self.recording:
+        if self.judging.recording:
             compared, camera = self._on_recording(self.a, self.b, camera)
         both = compare(found_a, found_b, camera=camera)
         figures = [(row.label, row.text) for row in both.figures]
@@ -66,20 +63,19 @@ class Compare:
 
     def _on_recording(self, a: Path, b: Path, camera: "Camera | None") -> "tuple[ComparedOnRecording, Camera]":
         """Judge both on the recording; also return the lens to compare their poses through."""
-        from calib_core.recordings import open_recording
         from cocalib.evaluation.comparing import compare_on_recording
         from cocalib.evaluation.recording_check import judged_calibration
 
         options = self.judging.evidence.options()
-        with open_recording(self.recording, self.judging.topics, require=("radar",)) as recording:
+        with self.judging.recorded.open(require=("radar",)) as recording:
             of_a, of_b = (
                 judged_calibration(self.judging.frames.read([one])[0], one, recording, camera=camera) for one in (a, b)
             )
-            clicks = self.judging.evidence.clicks_in(recording, self.recording, [of_a.found, of_b.found])
+            clicks = self.judging.evidence.clicks_in(recording, self.judging.recording, [of_a.found, of_b.found])
             boxes, labels = self.judging.evidence.boxes_in(recording)
             if not clicks and boxes is None:
                 raise InputError(
-                    f"{self.recording[0]}: nothing to judge the two by: no clicks (--clicks CLICKS.json) and no boxes "
+                    f"{self.judging.recording[0]}: nothing to judge the two by: no clicks (--clicks CLICKS.json) and no boxes "
                     "(--boxes FILE_OR_TOPIC)"
                 )
             with progress_bar("comparing") as progress:

@@ -11,7 +11,6 @@ from calib_core.errors import InputError
 from cocalib.cli.flags import Switch, called
 from cocalib.cli.judging_flags import Judging, JudgingFlags
 from cocalib.cli.output import progress_bar
-from cocalib.cli.recording_flags import Recordings
 from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
@@ -27,8 +26,6 @@ class Evaluate:
 
     calibration: Annotated[Path | None, tyro.conf.Positional, called("CALIBRATION")] = None
     """A calibration in any format that import reads."""
-    recording: Recordings = ()
-    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several are read as one recording."""
     no_held_out: Switch = False
     """Leave out the held-out figures, which take a solve per placement."""
     json: Switch = False
@@ -40,12 +37,12 @@ class Evaluate:
         from calib_core.evaluation import evaluation_json, evaluation_lines
         from cocalib.evaluation.evaluating import evaluation_exit_code
 
-        if self.calibration is None or not self.recording:
+        if self.calibration is None or not self.judging.recording:
             raise InputError("evaluate needs a calibration and a recording; see cocalib evaluate --help")
         evaluation = self._evaluation(self.calibration)
         code = evaluation_exit_code(evaluation)
         if self.json:
-            names = [path.name for path in self.recording]
+            names = [path.name for path in self.judging.recording]
             print_exactly(
                 evaluation_json(evaluation, calibration=self.calibration.name, recording=names, exit_code=code)
             )
@@ -54,20 +51,19 @@ class Evaluate:
         return code
 
     def _evaluation(self, path: Path) -> "Evaluation":
-        from calib_core.recordings import open_recording
         from cocalib.evaluation.evaluating import evaluate_recording
         from cocalib.evaluation.recording_check import judged_calibration
 
         options = self.judging.evidence.options()
         camera = self.judging.read_camera()
-        with open_recording(self.recording, self.judging.topics, require=("radar",)) as recording:
+        with self.judging.recorded.open(require=("radar",)) as recording:
             judged = judged_calibration(self.judging.frames.read([path])[0], path, recording, camera=camera)
-            clicks = self.judging.evidence.clicks_in(recording, self.recording, [judged.found])
+            clicks = self.judging.evidence.clicks_in(recording, self.judging.recording, [judged.found])
             boxes, labels = self.judging.evidence.boxes_in(recording)
             if not clicks and boxes is None:
                 raise InputError(
-                    f"{self.recording[0]}: nothing to judge {path.name} by: no clicks (--clicks CLICKS.json; click reflectors "
-                    "with cocalib open RECORDING --calibration FILE) and no boxes (--boxes FILE_OR_TOPIC)"
+                    f"{self.judging.recording[0]}: nothing to judge {path.name} by: no clicks (--clicks CLICKS.json; click "
+                    "reflectors with cocalib open RECORDING --calibration FILE) and no boxes (--boxes FILE_OR_TOPIC)"
                 )
             with progress_bar("evaluating") as progress:
                 evaluation = evaluate_recording(

@@ -10,7 +10,7 @@ import tyro
 from calib_core.errors import InputError
 from cocalib.cli.flags import File, called
 from cocalib.cli.output import progress_bar, told_clicks_at_frames
-from cocalib.cli.recording_flags import TopicFlags, Topics
+from cocalib.cli.recording_flags import Recorded, RecordedFlags, TopicFlags
 from cocalib.cli.tree_flags import FrameFlags, Frames
 from cocalib.platform.files import read_text
 
@@ -133,13 +133,18 @@ class JudgingFlags:
     evidence: Annotated[EvidenceFlags, tyro.conf.arg(name="")] = field(default_factory=EvidenceFlags)
     camera: File = None
     """Intrinsics to use if a calibration has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
-    topics: Topics = field(default_factory=TopicFlags)
+    recorded: Recorded = field(default_factory=RecordedFlags)
     frames: Frames = field(default_factory=FrameFlags)
+
+    @property
+    def recording(self) -> tuple[Path, ...]:
+        """The files of the recording; none if there is none."""
+        return self.recorded.recording
 
     @property
     def of_recording(self) -> bool:
         """Whether options are given that say nothing without a recording."""
-        return self.evidence != EvidenceFlags() or self.topics != TopicFlags()
+        return self.evidence != EvidenceFlags() or self.recorded.topics != TopicFlags()
 
     def read_camera(self) -> "Camera | None":
         """Read the intrinsics, if any are given.

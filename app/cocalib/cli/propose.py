@@ -14,9 +14,8 @@ from cocalib.cli.recording_flags import (
     GivenCamera,
     OptionFlags,
     Options,
-    Recordings,
-    TopicFlags,
-    Topics,
+    Recorded,
+    RecordedFlags,
     checked_reflector_m,
 )
 from cocalib.platform.terminal import print_exactly
@@ -37,8 +36,6 @@ class Propose:
     Exit code 1: the recording gives no proposal.
     """
 
-    recording: Recordings
-    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several are read as one recording."""
     clicks: File = None
     """Clicks that a person placed (cocalib/clicks-1 JSON): one shows what the reflector looks like."""
     camera: GivenCamera = field(default_factory=CameraFlags)
@@ -48,13 +45,12 @@ class Propose:
     """Print everything as JSON (cocalib/proposals-1)."""
     out: File = None
     """Write the same JSON to this file."""
-    topics: Topics = field(default_factory=TopicFlags)
+    recorded: Recorded = field(default_factory=RecordedFlags)
     options: Options = field(default_factory=OptionFlags)
 
     def run(self) -> int:
         """Find the proposals and print them; return the exit code."""
         from calib_core.measurements import Unsolvable
-        from calib_core.recordings import open_recording
         from cocalib.proposing import find_proposals
         from cocalib.solving.recorded_clicks import file_of_clicks, require_confirmed
         from cocalib.solving.solving import required_camera
@@ -64,7 +60,7 @@ class Propose:
         self._require_folder()
         camera_file = self.camera.read()
         clicks: tuple[ReflectorClick, ...] = () if self.clicks is None else file_of_clicks(self.clicks).clicks
-        with open_recording(self.recording, self.topics) as recording:
+        with self.recorded.open() as recording:
             require_confirmed(recording)
             if recording.radar_choice:
                 print(f"radar: {recording.radar_choice}", file=sys.stderr)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from calib_core.errors import InputError
 from cocalib.cli.flags import NewFile
 from cocalib.cli.output import progress_bar
-from cocalib.cli.recording_flags import Recordings, TopicFlags, Topics
+from cocalib.cli.recording_flags import Recorded, RecordedFlags
 from cocalib.cli.shown_recording import Shown, ShownFlags, shown_recording
 
 
@@ -13,12 +13,10 @@ from cocalib.cli.shown_recording import Shown, ShownFlags, shown_recording
 class RecordRrd:
     """Write a recording with its calibration to an .rrd file for the Rerun viewer."""
 
-    recording: Recordings
-    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several are read as one recording."""
     out: NewFile
     """Output file (.rrd); open it with `rerun FILE`, or drop it on a Rerun viewer."""
     shown: Shown = field(default_factory=ShownFlags)
-    topics: Topics = field(default_factory=TopicFlags)
+    recorded: Recorded = field(default_factory=RecordedFlags)
 
     def run(self) -> int:
         """Write the file; return the exit code."""
@@ -28,7 +26,7 @@ class RecordRrd:
         if self.out.suffix.lower() != ".rrd":
             raise InputError(f"{self.out}: the file for Rerun is an .rrd file; name it NAME.rrd")
         with (
-            shown_recording(self.recording, self.topics, self.shown) as view,
+            shown_recording(self.recorded, self.shown) as view,
             progress_bar("writing frames") as progress,
         ):
             written = write_view(view, self.out, progress=progress)

@@ -1,5 +1,6 @@
 """Flags of the commands that read a recording: which files and topics, and the options of a calibration."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeAlias
@@ -13,6 +14,8 @@ from cocalib.cli.flags import File, Switch, called, same
 
 if TYPE_CHECKING:
     from calib_core.interchange import CameraFile, VehicleNote
+    from calib_core.recordings import Recording
+    from calib_core.recordings.selection import Need
 
 Recordings: TypeAlias = Annotated[tuple[Path, ...], tyro.conf.Positional, called("RECORDING...")]
 
@@ -35,6 +38,31 @@ class TopicFlags(RecordingOptions):
 
 
 Topics: TypeAlias = Annotated[TopicFlags, tyro.conf.arg(name="")]
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedFlags:
+    """A recording, and how it is read."""
+
+    recording: Recordings = ()
+    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several are read as one recording."""
+    topics: Topics = field(default_factory=TopicFlags)
+
+    def open(self, require: "Sequence[Need]" = ("radar", "image")) -> "Recording":
+        """Open the recording.
+
+        Args:
+            require: what it must have.
+
+        Raises:
+            RecordingError: it cannot be opened.
+        """
+        from calib_core.recordings import open_recording
+
+        return open_recording(self.recording, self.topics, require=require)
+
+
+Recorded: TypeAlias = Annotated[RecordedFlags, tyro.conf.arg(name="")]
 
 
 @dataclass(frozen=True, slots=True)

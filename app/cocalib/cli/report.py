@@ -10,7 +10,6 @@ from calib_core.errors import InputError
 from cocalib.cli.flags import File, Switch, called
 from cocalib.cli.judging_flags import Judging, JudgingFlags
 from cocalib.cli.output import progress_bar, write_whole
-from cocalib.cli.recording_flags import Recordings
 
 if TYPE_CHECKING:
     from calib_core.camera import Camera
@@ -26,8 +25,6 @@ class Report:
 
     calibration: Annotated[Path | None, tyro.conf.Positional, called("CALIBRATION")] = None
     """A calibration in any format that import reads."""
-    recording: Recordings = ()
-    """Judge it on this recording as well: bags, folders of pictures, radar CSV, videos; several are read as one."""
     out: File = None
     """Output file (.html)."""
     pdf: Switch = False
@@ -62,7 +59,7 @@ class Report:
             raise InputError("report writes a file: give its name with --out FILE.html")
         if self.out.suffix.lower() not in (".html", ".htm"):  # such as that of the calibration itself
             raise InputError(f"{self.out}: the report is an .html file; name it NAME.html")
-        if not self.recording and self.judging.of_recording:
+        if not self.judging.recording and self.judging.of_recording:
             raise InputError(
                 "clicks, boxes, and the options of a recording apply with a RECORDING only; give it after the calibration"
             )
@@ -76,7 +73,7 @@ class Report:
         found, inputs = self.judging.frames.read([self.calibration])
         camera = self.judging.read_camera()
         other, others = self.judging.frames.read([self.against]) if self.against is not None else (None, ())
-        if self.recording:
+        if self.judging.recording:
             subject, better = self._on_recording(found, other, camera)
         else:
             subject, better = subject_of(found, known_calibration(found, name, camera=camera), name), ()
@@ -90,13 +87,12 @@ class Report:
         self, found: "ImportedCalibration", other: "ImportedCalibration | None", camera: "Camera | None"
     ) -> "tuple[ReportSubject, tuple[str, ...]]":
         """Return what is reported with what the recording says of it, and which of two calibrations is better on it."""
-        from calib_core.recordings import open_recording
         from cocalib.evaluation.recording_check import other_camera, require_size
         from cocalib.report import known_calibration, subject_of, watched
 
         assert self.calibration is not None
         name = self.calibration.name
-        with open_recording(self.recording, self.judging.topics, require=("radar",)) as recording:
+        with self.judging.recorded.open(require=("radar",)) as recording:
             recorded = recording.camera()
             calibration = known_calibration(found, name, camera=camera or recorded)
             if calibration is not None:
@@ -122,7 +118,7 @@ class Report:
         from cocalib.report import Judged, known_calibration
 
         options = self.judging.evidence.options()
-        clicks = self.judging.evidence.clicks_in(recording, self.recording, [subject.found])
+        clicks = self.judging.evidence.clicks_in(recording, self.judging.recording, [subject.found])
         boxes, labels = self.judging.evidence.boxes_in(recording)
         if not clicks and boxes is None:
             return subject, ()

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from cocalib.cli.flags import Switch, called
 from cocalib.cli.output import progress_bar
-from cocalib.cli.recording_flags import Recordings, TopicFlags, Topics
+from cocalib.cli.recording_flags import Recorded, RecordedFlags
 from cocalib.cli.shown_recording import Shown, ShownFlags, shown_recording
 
 
@@ -16,14 +16,12 @@ from cocalib.cli.shown_recording import Shown, ShownFlags, shown_recording
 class Rerun:
     """Show a recording with its calibration in the Rerun viewer."""
 
-    recording: Recordings
-    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several are read as one recording."""
     shown: Shown = field(default_factory=ShownFlags)
     web: Switch = False
     """Serve the viewer for a browser on this machine, instead of opening a window."""
     port: Annotated[int, called("PORT")] = 0
     """With --web: the port; 0 takes a free one."""
-    topics: Topics = field(default_factory=TopicFlags)
+    recorded: Recorded = field(default_factory=RecordedFlags)
 
     def run(self) -> int:
         """Show it until the window is closed or Ctrl+C; return the exit code."""
@@ -35,7 +33,7 @@ class Rerun:
         with tempfile.TemporaryDirectory(prefix="cocalib-") as folder:
             path = Path(folder) / "view.rrd"
             with (
-                shown_recording(self.recording, self.topics, self.shown) as view,
+                shown_recording(self.recorded, self.shown) as view,
                 progress_bar("writing frames") as progress,
             ):
                 write_view(view, path, progress=progress)

@@ -1,9 +1,8 @@
 """Shared by `video --overlay`, `record-rrd` and `rerun`: open a recording with what is to be drawn over it."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
 import tyro
@@ -11,7 +10,7 @@ import tyro
 from calib_core.errors import InputError
 from cocalib.cli.flags import File, called
 from cocalib.cli.output import progress_bar, told_clicks_at_frames
-from cocalib.cli.recording_flags import CameraFlags, GivenCamera, TopicFlags
+from cocalib.cli.recording_flags import CameraFlags, GivenCamera, RecordedFlags
 from cocalib.platform.files import read_text
 
 if TYPE_CHECKING:
@@ -39,12 +38,11 @@ Shown: TypeAlias = Annotated[ShownFlags, tyro.conf.arg(name="")]
 
 
 @contextmanager
-def shown_recording(paths: Sequence[Path], topics: TopicFlags, files: ShownFlags) -> "Iterator[RecordedView]":
+def shown_recording(recorded: RecordedFlags, files: ShownFlags) -> "Iterator[RecordedView]":
     """Open the recording and read everything that is to be drawn over it.
 
     Args:
-        paths: of the recording.
-        topics: of the recording.
+        recorded: the recording.
         files: what is drawn.
 
     Raises:
@@ -52,18 +50,17 @@ def shown_recording(paths: Sequence[Path], topics: TopicFlags, files: ShownFlags
         RecordingError: the recording cannot be opened.
     """
     from calib_core.interchange import read_any_file, read_clicks
-    from calib_core.recordings import open_recording
     from cocalib.evaluation.boxes import find_boxes
     from cocalib.evaluation.recording_check import calibration_of
     from cocalib.recorded_view import recorded_view
     from cocalib.solving.solving import camera_for
 
-    if not paths:
+    if not recorded.recording:
         raise InputError("RECORDING is missing; name one or more files or folders")
     if files.calibration is None:
         raise InputError("--calibration FILE is missing: the calibration that the returns are projected with")
     camera_file = files.camera.read()
-    with open_recording(tuple(paths), topics) as recording:
+    with recorded.open() as recording:
         camera = camera_for(recording, camera_file)
         calibration = calibration_of(read_any_file(files.calibration), str(files.calibration), camera)
         against = None

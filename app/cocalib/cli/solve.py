@@ -20,9 +20,9 @@ from cocalib.cli.recording_flags import (
     GivenCamera,
     OptionFlags,
     Options,
-    Recordings,
+    Recorded,
+    RecordedFlags,
     TopicFlags,
-    Topics,
     Vehicle,
     VehicleFlags,
     checked_reflector_m,
@@ -48,8 +48,6 @@ class Solve:
     Exit code 1: no calibration; 3: there is one, but nobody confirmed its clicks, and it is weak.
     """
 
-    recording: Recordings = ()
-    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several are read as one recording."""
     clicks: File = None
     """Clicks in this recording (cocalib/clicks-1 JSON)."""
     auto: Switch = False
@@ -66,14 +64,14 @@ class Solve:
     refine_intrinsics: Switch = False
     """Estimate focal length, principal point and k1 with the pose; their covariance or the refining options say how sure."""
     vehicle: Vehicle = field(default_factory=VehicleFlags)
-    topics: Topics = field(default_factory=TopicFlags)
+    recorded: Recorded = field(default_factory=RecordedFlags)
     options: Options = field(default_factory=OptionFlags)
     given: Annotated[Any, tyro.conf.Fixed, tyro.conf.Suppress] = None
     """The file of pairs (GivenPairs), once it has been read: a pipe can be read only once."""
 
     def file_defaults(self) -> Self | None:
         """Take the options of a calibration that is to be solved again; typed options replace them."""
-        if self.pairs is None or self.recording or self.clicks:
+        if self.pairs is None or self.recorded.recording or self.clicks:
             return None
         from cocalib.solving.solving import GivenPairs
 
@@ -84,18 +82,18 @@ class Solve:
 
     def run(self) -> int:
         """Solve, write the calibration, print its summary; return the exit code."""
-        if self.pairs is not None and (self.recording or self.clicks or self.auto):
+        if self.pairs is not None and (self.recorded.recording or self.clicks or self.auto):
             raise InputError("solve takes either a recording with --clicks or --auto, or --pairs, not both")
         vehicle = self.vehicle.note()
         if not self.auto and (self.clicks_out is not None or self.reflector_m != _REFLECTOR_M):
             raise InputError("--clicks-out and --reflector-m apply with --auto only; add it")
-        if self.pairs is not None and (self.camera.camera or self.topics != TopicFlags()):
+        if self.pairs is not None and (self.camera.camera or self.recorded.topics != TopicFlags()):
             raise InputError(
                 "--camera and the options of a recording do not apply to --pairs, which brings its own camera"
             )
         if self.pairs is not None:
             return self._solve_pairs(self.pairs, vehicle)
-        if not self.recording:
+        if not self.recorded.recording:
             raise InputError("solve needs a recording and --clicks CLICKS.json or --auto, or --pairs PAIRS.json")
         if self.clicks is None and not self.auto:
             raise InputError(
@@ -112,7 +110,6 @@ class Solve:
         return dataclasses.replace(options, refining=dataclasses.replace(options.refining, intrinsics=True))
 
     def _solve_recording(self, vehicle: "VehicleNote") -> int:
-        from calib_core.recordings import open_recording
         from cocalib.solving.automatic import solve_placed_clicks
         from cocalib.solving.recorded_clicks import require_confirmed
         from cocalib.solving.solving import calibration_text, required_camera
@@ -121,7 +118,7 @@ class Solve:
         camera_file = self.camera.read()
         options = self._all_options()
         file = self._clicks_file()
-        with open_recording(self.recording, self.topics) as recording:
+        with self.recorded.open() as recording:
             require_confirmed(recording)
             if recording.radar_choice:
                 print(f"radar: {recording.radar_choice}", file=sys.stderr)

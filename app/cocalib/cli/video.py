@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from calib_core.errors import InputError
 from cocalib.cli.flags import NewFile, Switch
 from cocalib.cli.output import progress_bar
-from cocalib.cli.recording_flags import Recordings, TopicFlags, Topics
+from cocalib.cli.recording_flags import Recorded, RecordedFlags
 from cocalib.cli.shown_recording import Shown, ShownFlags, shown_recording
 
 _TRAIL_SCANS, _MOST_TRAIL_SCANS = 5, 100
@@ -19,8 +19,6 @@ class Video:
     apply with it.
     """
 
-    recording: Recordings
-    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several are read as one recording."""
     out: NewFile
     """Output video: .mp4 or .mov (times to a microsecond), or .mkv (to a millisecond)."""
     overlay: Switch = False
@@ -28,7 +26,7 @@ class Video:
     shown: Shown = field(default_factory=ShownFlags)
     trail: int = _TRAIL_SCANS
     """With --overlay: number of earlier scans whose returns stay, smaller the older they are; 0 for none."""
-    topics: Topics = field(default_factory=TopicFlags)
+    recorded: Recorded = field(default_factory=RecordedFlags)
 
     def run(self) -> int:
         """Write the video; return the exit code."""
@@ -38,10 +36,10 @@ class Video:
             raise InputError(
                 "--calibration, --against, --camera, --clicks, --boxes, --trail and --colour apply with --overlay only; add it"
             )
-        from calib_core.recordings import open_recording, write_video
+        from calib_core.recordings import write_video
 
         with (
-            open_recording(self.recording, self.topics, require=("image",)) as recording,
+            self.recorded.open(require=("image",)) as recording,
             progress_bar("writing frames") as progress,
         ):
             written = write_video(recording, self.out, progress=progress)
@@ -67,7 +65,7 @@ class Video:
             name_text(path.name) for path in (self.shown.calibration, self.shown.against) if path is not None
         )
         with (
-            shown_recording(self.recording, self.topics, self.shown) as view,
+            shown_recording(self.recorded, self.shown) as view,
             progress_bar("drawing frames") as progress,
         ):
             written = write_overlay(view, self.out, OverlayOptions(titles, self.trail), progress=progress)
