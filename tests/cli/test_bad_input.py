@@ -143,13 +143,51 @@ def test_three_pairs_are_too_few(cocalib: Cocalib, pairs_file: Callable[..., Pat
         (["info", "a.bag", "--clock", "wall"], "--clock takes auto, header or receive, not 'wall'"),
         (["open", "a.bag", "--port", "http"], "--port takes a whole number, not 'http'"),
         (["solve", "a.bag", "--camera-position-m", "0", "1", "up"], "--camera-position-m takes X Y Z"),
+        (["session", "export", "a"], "needs the name of the new file: --out clicks.json"),
+        (["session", "export", "--out", "b"], "takes one session folder, or its recording; 0 given"),
+        (["session", "repair", "a", "b"], "takes one session folder, or its recording; 2 given"),
+        (["session", "list", "--yes"], "--yes applies to session repair only"),
+        (["session", "repair", "a", "--json"], "--json applies to session list only"),
+        (["session", "list", "--out", "b"], "--out applies to session export only"),
+        (["session", "repair", "absent"], "absent: no such folder"),
+        (["session", "mend"], "takes list, repair or export, not 'mend'"),
+        (["fleet", "status"], "fleet status takes OUT; 0 given"),
+        (["fleet", "history", "OUT"], "fleet history takes VEHICLE OUT; 1 given"),
+        (["fleet", "compare", "A", "OUT"], "fleet compare takes A B OUT; 2 given"),
+        (["fleet", "status", "/nowhere"], "/nowhere: no such folder"),
+        (["fleet", "export", "OUT"], "needs the name of the new file: --csv FILE"),
+        (["fleet", "export", "OUT", "--json"], "--json applies to fleet status, history, compare only"),
+        (["fleet", "walk", "OUT"], "not 'walk'"),
+        (["report"], "CALIBRATION is missing; see cocalib report --help"),
+        (["report", "{golden}"], "report writes a file: give its name with --out FILE.html"),
+        (
+            ["report", "{golden}", "--boxes", "b.json", "--out", "a.html"],
+            "apply with a RECORDING only; give it after the",
+        ),
+        (["report", "/nowhere.json", "--out", "a.html"], "/nowhere.json: "),
+        (["report", "{golden}", "--out", "/nowhere/report.html"], "/nowhere/report.html: cannot be written: "),
+        (["solve", "a.bag", "--vehicle", "a/b"], "--vehicle: 'a/b' cannot be a name; give one without slashes"),
+        (["solve", "a.bag", "--session-name", ".."], "--session-name: '..' cannot be a name"),
+        (["solve", "a.bag", "--vehicle-type", " "], "--vehicle-type is ' '; give 1 to 120 printable characters"),
+        (["solve", "a.bag", "--camera-serial", "x" * 121], "--camera-serial is 'xxxxxxxxxxxxxxxxxxxx…'; give 1 to 120"),
+        (["simulate", "--out", "absent", "--preset", "kind"], "not 'kind'"),
     ],
 )
-def test_wrong_usage_gets_a_clear_error(cocalib: Cocalib, arguments: list[str], expected: str) -> None:
-    answer = cocalib(*arguments)
+def test_wrong_usage_gets_a_clear_error(
+    cocalib: Cocalib,
+    project_root: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    expected: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    golden = project_root / "tests/golden/calibration-1.json"
+    answer = cocalib(*(word.format(golden=golden) for word in arguments))
     assert answer.code == 2
     (line,) = answer.err.splitlines()
     assert expected in line
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(

@@ -90,14 +90,6 @@ def test_solve_refines_the_intrinsics_and_solves_its_file_again(
     assert cocalib("check", again, "--of", out).code == 0
 
 
-def test_a_method_that_takes_the_intrinsics_as_they_are_refuses_to_refine_them(
-    cocalib: Cocalib, pairs_file: Callable[..., Path]
-) -> None:
-    answer = cocalib("solve", "--pairs", pairs_file(), "--method", "paper", "--refine-intrinsics")
-    assert answer.code == 2
-    assert "the method paper takes the intrinsics as they are" in answer.err
-
-
 def test_a_method_of_older_versions_is_no_choice(cocalib: Cocalib, pairs_file: Callable[..., Path]) -> None:
     answer = cocalib("solve", "--pairs", pairs_file(), "--method", "pmm")
     assert answer.code == 2
@@ -119,17 +111,6 @@ def test_a_calibration_by_a_method_of_older_versions_is_read_and_solved_again_by
     assert "choose default or paper" in answer.err
     assert cocalib("solve", "--pairs", old, "--out", again, "--method", "default").code == 0
     assert json.loads(again.read_text())["camera_from_radar"] == document["camera_from_radar"]
-
-
-def test_a_measured_camera_position_pulls_the_answer_to_it(
-    cocalib: Cocalib, pairs_file: Callable[..., Path], tmp_path: Path
-) -> None:
-    truth_m = Made().camera_from_radar.inverse().translation_m
-    out = tmp_path / "calibration.json"
-    flags = ["--camera-position-m", *truth_m, "--camera-position-sigma-m", 0.005]
-    assert cocalib("solve", "--pairs", pairs_file(), "--out", out, *flags).code == 0
-    sigma = json.loads(out.read_text())["sigma"]
-    assert max(sigma["x_m"], sigma["y_m"], sigma["z_m"]) < 0.01
 
 
 def test_solve_names_the_pairs_that_disagree(

@@ -63,28 +63,6 @@ def test_a_foreign_calibration_without_a_camera_takes_the_one_of_the_recording(
     assert "Residuals at the clicks in radar.bag + camera.bag" in html
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        ([], "CALIBRATION is missing; see cocalib report --help"),
-        (["GOLDEN"], "report writes a file: give its name with --out FILE.html"),
-        (
-            ["GOLDEN", "--boxes", "boxes.json", "--out", "OUT"],
-            "apply with a RECORDING only; give it after the calibration",
-        ),
-        (["/nowhere.json", "--out", "OUT"], "/nowhere.json: "),
-        (["GOLDEN", "--out", "/nowhere/report.html"], "/nowhere/report.html: cannot be written: "),
-    ],
-)
-def test_what_cannot_be_done_is_said(
-    arguments: list[str], said: str, golden: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    given = [{"GOLDEN": str(golden), "OUT": str(tmp_path / "out.html")}.get(one, one) for one in arguments]
-    assert run(["report", *given]) == 2
-    assert said in capsys.readouterr().err
-    assert not (tmp_path / "out.html").exists()
-
-
 def test_a_calibration_for_pictures_of_another_size_is_refused(
     golden: Path, sample: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

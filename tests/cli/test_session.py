@@ -221,26 +221,6 @@ def test_what_proves_nothing_is_not_exported(cocalib: Cocalib, home: Path, tmp_p
     assert not (tmp_path / "clicks.json").exists()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["export", "a"], "needs the name of the new file: --out clicks.json"),
-        (["export", "--out", "b"], "takes one session folder, or its recording; 0 given"),
-        (["repair", "a", "b"], "takes one session folder, or its recording; 2 given"),
-        (["list", "--yes"], "--yes applies to session repair only"),
-        (["repair", "a", "--json"], "--json applies to session list only"),
-        (["list", "--out", "b"], "--out applies to session export only"),
-        (["repair", "absent"], "absent: no such folder"),
-        (["mend"], "takes list, repair or export, not 'mend'"),
-    ],
-)
-def test_wrong_usage_is_one_line(cocalib: Cocalib, arguments: list[str], words: str) -> None:
-    answer = cocalib("session", *arguments)
-    assert answer.code == 2
-    assert words in answer.err
-    assert len(answer.err.splitlines()) == 1
-
-
 def test_a_folder_without_a_session_is_refused(cocalib: Cocalib, home: Path) -> None:
     assert "has no session next to it" in cocalib("session", "repair", home / "drive.bag").err
     (home / "empty.cocalib-session").mkdir()

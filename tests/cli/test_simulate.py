@@ -37,10 +37,3 @@ def test_groups_of_options_have_flags_of_their_own(cocalib: Cocalib, tmp_path: P
     off_px = np.array([c["pixel_px"] for c in clicks["clicks"]]) - pixels
     assert np.abs(off_px[:, 1] - 9.0).max() < 4.0
     assert [entry["faults"] for entry in truth["clicks"]] == [["low"]] * 3
-
-
-def test_an_unknown_preset_is_answered_with_the_known_ones(cocalib: Cocalib, tmp_path: Path) -> None:
-    answer = cocalib("simulate", "--out", tmp_path / "x", "--preset", "kind")
-    assert answer.code == 2
-    assert "two-reflectors" in answer.err
-    assert "not 'kind'" in answer.err

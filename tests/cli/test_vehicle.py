@@ -5,8 +5,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 Cocalib = Callable[..., Any]
 
 
@@ -48,20 +46,3 @@ def test_a_calibration_from_a_recording_differs_in_what_was_stated_alone(
     document = json.loads(stated.out)
     assert document.pop("vehicle") == {"name": "V017", "camera_serial": "C-2"}
     assert document == json.loads(plain.out)
-
-
-@pytest.mark.parametrize(
-    ("flags", "fault"),
-    [
-        (("--vehicle", "a/b"), "--vehicle: 'a/b' cannot be a name; give one without slashes"),
-        (("--session-name", ".."), "--session-name: '..' cannot be a name"),
-        (("--vehicle-type", " "), "--vehicle-type is ' '; give 1 to 120 printable characters"),
-        (("--camera-serial", "x" * 121), "--camera-serial is 'xxxxxxxxxxxxxxxxxxxx…'; give 1 to 120"),
-    ],
-)
-def test_a_flag_that_no_file_can_hold_is_refused_before_anything_is_read(
-    cocalib: Cocalib, tmp_path: Path, flags: tuple[str, str], fault: str
-) -> None:
-    answer = cocalib("solve", tmp_path / "absent.mcap", "--clicks", tmp_path / "absent.json", *flags)
-    assert answer.code == 2
-    assert fault in answer.err
