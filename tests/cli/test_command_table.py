@@ -95,8 +95,17 @@ def test_what_needs_no_command_imports_none(arguments: list[str]) -> None:
     assert imported & {command.where.partition(":")[0] for command in COMMANDS.values()} == set()
 
 
-@pytest.mark.parametrize("command", COMMANDS.values(), ids=lambda command: command.name)
-def test_a_command_imports_no_other_command(command: Command) -> None:
-    mine = command.where.partition(":")[0]
-    others = {other.where.partition(":")[0] for other in COMMANDS.values()} - {mine}
-    assert imported_after(command.name, "--help") & others == set()
+@pytest.mark.parametrize("names", [[*COMMANDS], [*reversed(COMMANDS)]], ids=["forwards", "backwards"])
+def test_a_command_imports_no_other_command(names: list[str]) -> None:
+    """In one of the two orders, whatever a command imports of another comes before the other's turn."""
+    code = (
+        "import sys\nfrom cocalib.cli.commands import COMMANDS\n"
+        f"for name in {names!r}:\n    COMMANDS[name].load()\n    print('imported', *sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = [set(line.split()[1:]) for line in done.stdout.splitlines() if line.startswith("imported ")]
+    assert len(loaded) == len(names)
+    for number, modules in enumerate(loaded):
+        own = {COMMANDS[name].where.partition(":")[0] for name in names[: number + 1]}
+        later = {COMMANDS[name].where.partition(":")[0] for name in names[number + 1 :]} - own
+        assert modules & later == set(), names[number]
