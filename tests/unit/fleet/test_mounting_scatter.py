@@ -159,7 +159,7 @@ def test_a_measured_position_that_several_vehicles_state_is_one_measurement() ->
     rng = np.random.default_rng(12)
     copied = CameraPositionPrior((0.0, 0.05, 0.12), 0.01)
     rows, inside, narrow = 20, 0, 0
-    for _ in range(40):
+    for _ in range(25):
         common = np.concatenate([rng.normal(0.0, 0.01, 3), np.zeros(3)])  # what the copied measurement is off by
         drawn = [pose_from_coordinates(common + rng.normal(0.0, [5e-4] * 3 + [5e-3] * 3), NOMINAL) for _ in range(rows)]
         sessions = [simulated_session(pose, Accuracy(0.01, 0.05), rng, vehicle=f"v{k}") for k, pose in enumerate(drawn)]
@@ -170,12 +170,12 @@ def test_a_measured_position_that_several_vehicles_state_is_one_measurement() ->
         following = simulated_mounting(NARROW, rng)
         inside += _probability(scatter, following) >= 0.05
     assert narrow == 0
-    assert inside >= 36
+    assert inside >= 23  # with a chance of 10 % if 80 % were inside, as 36 of 40 has 8 %
 
 
 def test_measured_positions_that_differ_less_than_their_sigma_are_one_measurement() -> None:
     """A drawing with a little jitter, or a tape that is held to the same wrong edge of every vehicle."""
-    for seed in range(5):
+    for seed in range(3):
         rng = np.random.default_rng(seed)
         sessions = [
             simulated_session(simulated_mounting(NARROW, rng), Accuracy(0.01, 0.05), rng, vehicle=f"v{k}")
