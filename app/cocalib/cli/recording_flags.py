@@ -102,16 +102,6 @@ def checked_reflector_m(reflector_m: float) -> float:
     return reflector_m
 
 
-@dataclass(frozen=True, slots=True)
-class MeasuredCamera:
-    """A tape-measured camera position; no other extra measurement helps as much."""
-
-    camera_position_m: Annotated[tuple[float, float, float] | None, called("X Y Z")] = None
-    """Measured position of the camera's lens in the radar frame: forward, left, up [m]."""
-    camera_position_sigma_m: float = 0.01
-    """Standard deviation of that position, per axis [m]."""
-
-
 # The camera position has its own flags; in the options it would become a subcommand.
 _Options: TypeAlias = Annotated[
     CalibrationOptions, tyro.conf.arg(name=""), tyro.conf.AvoidSubcommands, tyro.conf.FlagConversionOff
@@ -120,23 +110,28 @@ _Options: TypeAlias = Annotated[
 
 @dataclass(frozen=True, slots=True)
 class OptionFlags:
-    """The options of a calibration."""
+    """The options of a calibration, with a tape-measured camera position; no other extra measurement helps as much."""
 
-    measured: Annotated[MeasuredCamera, tyro.conf.arg(name="")] = field(default_factory=MeasuredCamera)
+    camera_position_m: Annotated[tuple[float, float, float] | None, called("X Y Z")] = None
+    """Measured position of the camera's lens in the radar frame: forward, left, up [m]."""
+    camera_position_sigma_m: float = 0.01
+    """Standard deviation of that position, per axis [m]."""
     options: _Options = field(default_factory=CalibrationOptions)
 
     @classmethod
     def of(cls, options: CalibrationOptions) -> "OptionFlags":
         """Return the flags that give these options."""
         position = options.solving.camera_position
-        measured = MeasuredCamera(position.position_m, position.sigma_m) if position else MeasuredCamera()
-        return cls(measured, replace(options, solving=replace(options.solving, camera_position=None)))
+        if position is None:
+            return cls(options=options)
+        free = replace(options, solving=replace(options.solving, camera_position=None))
+        return cls(position.position_m, position.sigma_m, free)
 
     def all(self) -> CalibrationOptions:
         """Return the options with the measured position, if there is one."""
-        if self.measured.camera_position_m is None:
+        if self.camera_position_m is None:
             return self.options
-        prior = CameraPositionPrior(self.measured.camera_position_m, self.measured.camera_position_sigma_m)
+        prior = CameraPositionPrior(self.camera_position_m, self.camera_position_sigma_m)
         return replace(self.options, solving=replace(self.options.solving, camera_position=prior))
 
 
