@@ -9,17 +9,13 @@ from hypothesis import strategies as st
 
 from calib_core.measurements import (
     NS_PER_S,
-    Candidate,
     Pair,
     RadarScan,
     RadarScans,
-    ReflectorClick,
     TimeNs,
     time_from_parts,
     time_parts,
 )
-
-NOW_NS = 1_700_000_000_123_456_789
 
 
 def scan_at(time_ns: int, *ranges_m: float) -> RadarScan:
@@ -37,16 +33,6 @@ def test_a_stamp_survives_being_split_into_seconds_and_nanoseconds(time_ns: int)
     sec, nanosec = time_parts(TimeNs(time_ns))
     assert 0 <= nanosec < NS_PER_S
     assert time_from_parts(sec, nanosec) == time_ns
-
-
-def test_a_present_stamp_keeps_its_last_nanosecond() -> None:
-    assert time_parts(TimeNs(NOW_NS)) == (1_700_000_000, 123_456_789)
-    assert time_from_parts(1_700_000_000, 123_456_789) == NOW_NS
-
-
-def test_clicks_sort_by_time_then_id() -> None:
-    late, early, same = (ReflectorClick(TimeNs(t), i, 0.0, 0.0) for t, i in ((5, "a"), (3, "c"), (3, "b")))
-    assert sorted([late, early, same]) == [same, early, late]
 
 
 def test_scans_are_stacked_in_order_of_time_with_their_returns() -> None:
@@ -134,10 +120,3 @@ def test_measurements_cannot_be_changed() -> None:
 def test_a_pair_without_a_radar_position_is_refused() -> None:
     with pytest.raises(ValueError, match="c1 has no radar position"):
         Pair("c1", np.array([1.0, 2.0]), ())
-
-
-def test_a_pair_keeps_its_candidates_in_order() -> None:
-    candidates = tuple(Candidate(np.array([x, 0.0, 0.0]), np.ones(3), np.eye(3)) for x in (5.0, 3.0))
-    pair = Pair("c1", np.array([1, 2]), candidates)
-    assert [candidate.position_radar_m[0] for candidate in pair.candidates] == [5.0, 3.0]
-    assert pair.pixel_px.dtype == np.float64

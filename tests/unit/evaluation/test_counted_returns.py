@@ -1,6 +1,7 @@
 """A frame's scan is the nearest by the recorded stamps, within half a scan period."""
 
 import numpy as np
+import pytest
 
 from calib_core.camera import Camera
 from calib_core.evaluation.counted_returns import Sightings, box_table, frame_scans, longest_gap_s, match_by_bearing
@@ -13,25 +14,22 @@ def frames(*milliseconds: float) -> np.ndarray:
     return np.array([round(time * 1e6) for time in milliseconds], dtype=np.int64)
 
 
-def test_the_nearest_scan_within_half_a_period_is_taken():
-    assert frame_scans(frames(0, 49, 51, 250, 349, 351), SCANS).tolist() == [0, 0, 1, 2, 3, -1]
-
-
-def test_of_two_equally_near_scans_the_earlier_one_is_taken():
-    assert frame_scans(frames(50, 150), SCANS).tolist() == [0, 1]
-
-
-def test_a_stated_limit_replaces_half_the_period():
-    assert frame_scans(frames(351, 520), SCANS, max_gap_s=0.2).tolist() == [3, 4]
-    assert frame_scans(frames(1), SCANS, max_gap_s=0.0).tolist() == [-1]
+@pytest.mark.parametrize(
+    ("times_ms", "scans", "limit", "taken"),
+    [
+        ((0, 49, 51, 250, 349, 351), SCANS, {}, [0, 0, 1, 2, 3, -1]),
+        ((50, 150), SCANS, {}, [0, 1]),  # of two equally near the earlier
+        ((351, 520), SCANS, {"max_gap_s": 0.2}, [3, 4]),
+        ((1,), SCANS, {"max_gap_s": 0.0}, [-1]),
+        ((1, 2), SCANS[:0], {}, [-1, -1]),
+    ],
+)
+def test_the_nearest_scan_within_half_a_period_or_a_stated_limit_is_taken(times_ms, scans, limit, taken):
+    assert frame_scans(frames(*times_ms), scans, **limit).tolist() == taken
 
 
 def test_the_period_is_the_median_so_gaps_do_not_widen_it():
     assert longest_gap_s(SCANS) == 0.05
-
-
-def test_without_scans_no_frame_has_one():
-    assert frame_scans(frames(1, 2), np.zeros(0, dtype=np.int64)).tolist() == [-1, -1]
 
 
 CAMERA = Camera("pinhole", 1000, 600, np.array([[800.0, 0.0, 499.5], [0.0, 800.0, 299.5], [0.0, 0.0, 1.0]]))
