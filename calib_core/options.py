@@ -15,6 +15,7 @@ from calib_core.errors import OptionError
 
 Method: TypeAlias = Literal["default", "paper"]
 """The names of `METHODS`, in `calib_core.calibration`."""
+
 RETIRED_METHODS = ("pmm", "ccm")
 """Methods of older versions. Calibrations that were made by them are still read, and cannot be solved again by them."""
 
@@ -270,6 +271,20 @@ class CalibrationOptions:
         return self.method == "default"
 
 
+@dataclass(frozen=True, slots=True)
+class IntrinsicsOptions:
+    """How a lens is calibrated."""
+
+    model: Literal["auto", "pinhole", "plumb_bob", "rational_polynomial", "equidistant"] = option(
+        "auto", "Lens model; auto takes the simplest that predicts views it has not seen as well as any."
+    )
+    board_shape: Literal["auto", "flat"] = option(
+        "auto", "Shape of the board; auto estimates bending and unequal sides of the squares where the views show them."
+    )
+    robust: bool = option(True, "Leave out views and corners that contradict the others.")
+    square_pixels: bool = option(False, "Estimate one focal length for rows and columns.")
+
+
 def without_systematic_errors(options: CalibrationOptions) -> CalibrationOptions:
     """Return the options of exact instruments: every prior of a systematic error 0, and no intrinsics to refine."""
     radar = RadarOptions(**{one.name: 0.0 for one in fields(RadarOptions)})
@@ -279,7 +294,6 @@ def without_systematic_errors(options: CalibrationOptions) -> CalibrationOptions
 
 
 OptionKind: TypeAlias = Literal["number", "integer", "yes-no", "choice", "camera-position"]
-
 UNITS = {"_mps": "m/s", "_px": "px", "_deg": "deg", "_rad": "rad", "_db": "dB", "_m": "m", "_s": "s"}
 
 

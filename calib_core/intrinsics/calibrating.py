@@ -35,8 +35,8 @@ from calib_core.intrinsics.model_choice import (
     picture_places,
     view_folds,
 )
-from calib_core.intrinsics.options import IntrinsicsOptions
 from calib_core.measurements import Unsolvable
+from calib_core.options import IntrinsicsOptions
 from calib_core.results import DataWarning
 
 _LEAST_VIEWS = 3

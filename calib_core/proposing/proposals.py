@@ -1,11 +1,29 @@
-"""Proposals: what the machine offers a person to confirm, and what it knows of the pose by then."""
+"""Proposals: what the machine offers a person to confirm, and what it knows of the pose by then; for programs as proposals-1."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+
+import msgspec
+import numpy as np
 
 from calib_core.arrays import Vector2, frozen_array
 from calib_core.association.placements import Placement
 from calib_core.geometry import RigidTransform
-from calib_core.measurements import TimeNs
+from calib_core.input_files import encodable
+from calib_core.interchange.own.documents import ClickDocument, TimeDocument
+from calib_core.interchange.own.proposal_documents import (
+    PROPOSALS_SCHEMA,
+    DwellDocument,
+    PictureCandidateDocument,
+    ProposalDocument,
+    ProposalsDocument,
+    RoughMountingDocument,
+    UnproposedDocument,
+)
+from calib_core.interchange.own.transform_document import finite_or_none
+from calib_core.interchange.syntax.strict_json import json_text
+from calib_core.measurements import TimeNs, time_parts
+from calib_core.proposing.dwell_views import DwellView
 from calib_core.proposing.picture_candidates import PictureCandidate
 
 
@@ -54,3 +72,120 @@ class Proposals:
     agreement: float = 0.0
     rival_agreement: float = 0.0
     trials: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class ProposalSource:
+    """What proposals were made from.
+
+    Attributes:
+        recording: names of its files.
+        image_topic: of the pictures.
+        radar_topics: of the radar.
+        reflector_m: the width that was looked for.
+        confirmed: ids of the clicks that a person confirmed before.
+    """
+
+    recording: tuple[str, ...]
+    image_topic: str | None
+    radar_topics: tuple[str, ...]
+    reflector_m: float
+    confirmed: tuple[str, ...] = ()
+
+
+def named_proposals(
+    proposals: Proposals, views: Sequence[DwellView], taken: Sequence[str] = ()
+) -> tuple[tuple[str, Proposal], ...]:
+    """Return the proposals as ranked, each with an id: the number of its placement, which confirmed clicks do not change.
+
+    Args:
+        proposals: of these views.
+        views: of all placements.
+        taken: ids of clicks that exist already.
+    """
+    number = {_key(view.placement): count for count, view in enumerate(views, start=1)}
+    named = []
+    for one in proposals.ranked:
+        name = f"p{number[_key(one.placement)]}"
+        while name in taken:
+            name += "-proposed"
+        named.append((name, one))
+    return tuple(named)
+
+
+def _key(placement: Placement) -> tuple[int, int, tuple[float, ...]]:
+    return int(placement.start), int(placement.end), tuple(placement.position_radar_m.tolist())
+
+
+def proposals_json(proposals: Proposals, views: Sequence[DwellView], source: ProposalSource) -> str:
+    """Write proposals-1 text; the same proposals give the same bytes.
+
+    Args:
+        proposals: of these views.
+        views: of all placements of a recording.
+        source: what they were made from.
+    """
+    document = ProposalsDocument(
+        schema=PROPOSALS_SCHEMA,
+        recording=list(source.recording),
+        image_topic=source.image_topic,
+        radar_topics=list(source.radar_topics),
+        reflector_m=source.reflector_m,
+        confirmed=list(source.confirmed),
+        proposals=[_proposal(name, one) for name, one in named_proposals(proposals, views, source.confirmed)],
+        unproposed=[UnproposedDocument(_dwell(placement), reason) for placement, reason in proposals.unproposed],
+        camera_from_radar=_mounting(proposals),
+    )
+    return json_text(encodable(msgspec.to_builtins(document)))
+
+
+def _proposal(name: str, proposal: Proposal) -> ProposalDocument:
+    click = ClickDocument(
+        name, _time(proposal.image_time), _pixel(proposal.pixel_px), sigma_px=proposal.sigma_px, mark="snapped"
+    )
+    return ProposalDocument(
+        name,
+        _dwell(proposal.placement),
+        proposal.confidence,
+        proposal.reason,
+        click,
+        [_candidate(one) for one in proposal.candidates],
+    )
+
+
+def _dwell(placement: Placement) -> DwellDocument:
+    x_m, y_m, z_m = placement.position_radar_m.tolist()
+    return DwellDocument(
+        _time(placement.start),
+        _time(placement.end),
+        (x_m, y_m, z_m),
+        float(np.linalg.norm(placement.position_radar_m)),
+        placement.score,
+        finite_or_none(placement.snr_db),
+    )
+
+
+def _candidate(candidate: PictureCandidate) -> PictureCandidateDocument:
+    return PictureCandidateDocument(
+        _pixel(candidate.pixel_px), candidate.sigma_px, candidate.strength, finite_or_none(candidate.likeness)
+    )
+
+
+def _mounting(proposals: Proposals) -> RoughMountingDocument | None:
+    pose = proposals.camera_from_radar
+    if pose is None:
+        return None
+    rows: Sequence[Sequence[float]] = pose.rotation.tolist()
+    one, two, three = ((a, b, c) for a, b, c in rows)
+    x_m, y_m, z_m = pose.translation_m.tolist()
+    return RoughMountingDocument(
+        (one, two, three), (x_m, y_m, z_m), proposals.agreement, proposals.rival_agreement, proposals.trials
+    )
+
+
+def _pixel(pixel_px: np.ndarray) -> tuple[float, float]:
+    return float(pixel_px[0]), float(pixel_px[1])
+
+
+def _time(time: TimeNs) -> TimeDocument:
+    return TimeDocument(*time_parts(time))

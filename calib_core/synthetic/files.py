@@ -17,7 +17,7 @@ from calib_core.boxes import boxes_text, labels_text
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
 from calib_core.interchange import camera_info_text, write_clicks
-from calib_core.lens_models.naming import written_lens
+from calib_core.lens_models.registry import written_lens
 from calib_core.measurements import RadarScan, RadarScans, TimeNs, time_parts
 from calib_core.radar import polar_from_cartesian
 from calib_core.recordings.containers.writing import (

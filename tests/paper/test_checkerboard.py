@@ -6,7 +6,7 @@ import pytest
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.measurements import Unsolvable
-from calib_core.paper.checkerboard import find_board, find_corners
+from calib_core.paper.other_methods import find_board, find_corners
 
 CAMERA = Camera(
     "plumb_bob",

@@ -11,7 +11,7 @@ import tyro
 
 from calib_core.errors import InputError
 from calib_core.input_files import name_text
-from calib_core.intrinsics.options import IntrinsicsOptions
+from calib_core.options import IntrinsicsOptions
 from calib_core.recordings import RecordingOptions
 from cocalib.cli.flags import File, Folder, Switch, called, same
 from cocalib.cli.output import explain_unsolvable, write_whole

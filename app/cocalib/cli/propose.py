@@ -109,7 +109,7 @@ class Propose:
     ) -> int:
         """Print the proposals, and write them to the file if one is given; return the exit code."""
         from calib_core.measurements import TimeNs
-        from calib_core.proposing.proposals_json import ProposalSource, proposals_json
+        from calib_core.proposing.proposals import ProposalSource, proposals_json
         from cocalib.cli.proposal_table import proposal_lines
         from cocalib.proposing import beside_the_reflector
 

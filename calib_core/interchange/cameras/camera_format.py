@@ -7,8 +7,7 @@ import numpy as np
 
 from calib_core.camera import Camera, CameraCovariance
 from calib_core.errors import InputError
-from calib_core.lens_models.naming import lenses_named, opencv_lens
-from calib_core.lens_models.registry import LENS_MODELS
+from calib_core.lens_models.registry import LENS_MODELS, lenses_named, opencv_lens
 
 
 @dataclass(frozen=True, slots=True)

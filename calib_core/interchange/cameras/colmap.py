@@ -9,7 +9,7 @@ from calib_core.interchange.cameras.camera_format import CameraFormat, FoundCame
 from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.own.camera_document import refuse_skew
 from calib_core.interchange.syntax.yaml_text import numbers_text
-from calib_core.lens_models.naming import lenses_named, names_in, written_lens
+from calib_core.lens_models.registry import lenses_named, names_in, written_lens
 
 HALF_PIXEL = 0.5
 _ONE_FOCAL = {"SIMPLE_PINHOLE": 0, "SIMPLE_RADIAL": 1, "RADIAL": 2, "SIMPLE_RADIAL_FISHEYE": 1, "RADIAL_FISHEYE": 2}

@@ -8,7 +8,7 @@ from calib_core.interchange.cameras.camera_format import CameraFormat, FoundCame
 from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.own.camera_document import refuse_skew
 from calib_core.interchange.syntax.yaml_text import numbers_text
-from calib_core.lens_models.naming import written_lens
+from calib_core.lens_models.registry import written_lens
 
 _KEY = re.compile(r"^(K|D|S|P_rect|S_rect|R_rect|R|T|P)_?(\d{1,2}):\s*(.*)$")
 

@@ -8,7 +8,7 @@ from calib_core.camera import Camera
 from calib_core.interchange.cameras.camera_format import CameraFormat
 from calib_core.interchange.own.camera_document import refuse_skew
 from calib_core.interchange.syntax.yaml_text import numbers_text, quoted
-from calib_core.lens_models.naming import WrittenLens, written_lens
+from calib_core.lens_models.registry import WrittenLens, written_lens
 
 
 def file_storage_matrix(key: str, matrix: np.ndarray) -> str:

@@ -9,8 +9,8 @@ from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import FrameNames
 from calib_core.interchange.cameras.fields import find_cameras, floats
 from calib_core.interchange.format import ImportedCalibration, Reads, WrittenPose, posed_between
+from calib_core.interchange.formats.pose_parts import Ends, choose_transform
 from calib_core.interchange.formats.statement import STATEMENT_KEY, stated_frames, with_statement
-from calib_core.interchange.formats.transform_choice import Ends, choose_transform
 from calib_core.interchange.syntax.content import Content, decoded
 from calib_core.interchange.syntax.mcap_file import McapFile
 from calib_core.interchange.syntax.strict_json import json_value

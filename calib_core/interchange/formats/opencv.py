@@ -16,7 +16,7 @@ from calib_core.interchange.own.calibration_json import calibration_sha256
 from calib_core.interchange.own.camera_document import refuse_skew
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import quoted
-from calib_core.lens_models.naming import written_lens
+from calib_core.lens_models.registry import written_lens
 
 _OF_SECOND_CAMERA = ("M2", "K2", "cameraMatrix2", "camera_matrix_2", "R2", "P2")
 _ROUNDING = 2e-3

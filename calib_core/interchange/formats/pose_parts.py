@@ -1,7 +1,9 @@
-"""What files of other tools have in common: numbers by name, 4x4 matrices, roles by frame name, a direction by facing."""
+"""What files of other tools have in common: numbers by name, 4x4 matrices, roles by frame name, the
+transform to choose among several, a direction by facing.
+"""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +12,7 @@ from numpy.typing import ArrayLike
 from calib_core.arrays import Matrix33
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
+from calib_core.interchange.calibration_file import FrameNames
 from calib_core.interchange.cameras.camera_format import FoundCamera
 from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.format import (
@@ -133,3 +136,41 @@ def with_camera(found: ImportedCalibration, camera: FoundCamera | None, *, sourc
 def pinhole_matrix(fx: float, fy: float, cx: float, cy: float) -> tuple[float, ...]:
     """Return the camera matrix, row by row, for focal lengths and principal point [px]."""
     return (fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Ends:
+    """The two frames of a transform."""
+
+    parent: str
+    child: str
+
+
+def choose_transform(transforms: Sequence[Ends], stated: FrameNames | None, *, source: str) -> int:
+    """Return the index of the transform between the radar and the camera; a single one is taken as it is.
+
+    Args:
+        transforms: the frames of each, at least one.
+        stated: the frames that the file states in a comment, if it does.
+        source: the name of the file in error messages.
+
+    Raises:
+        InputError: of several, none is between a radar and a camera by its frame names, or more than one is.
+    """
+    if len(transforms) == 1:
+        return 0
+    fitting = [index for index, ends in enumerate(transforms) if _fits(ends, stated)]
+    if len(fitting) == 1:
+        return fitting[0]
+    named = ", ".join(f"{ends.parent} to {ends.child}" for ends in transforms[:6])
+    raise InputError(
+        f"{source}: contains {len(transforms)} transforms ({named}), {len(fitting)} of them between a radar and a camera by "
+        "name; keep only the intended one"
+    )
+
+
+def _fits(ends: Ends, stated: FrameNames | None) -> bool:
+    names = {ends.parent.lstrip("/"), ends.child.lstrip("/")}
+    if stated is not None:
+        return stated.radar in names and bool({stated.camera, stated.camera_link} & names)
+    return any(map(looks_like_radar, names)) and any(map(looks_like_camera, names))

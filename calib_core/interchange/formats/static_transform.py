@@ -16,6 +16,7 @@ from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.format import Form, Format, ImportedCalibration, Reads, WrittenPose, posed_between
+from calib_core.interchange.formats.pose_parts import Ends, choose_transform
 from calib_core.interchange.formats.statement import (
     POSE_ONLY,
     hash_comment,
@@ -23,7 +24,6 @@ from calib_core.interchange.formats.statement import (
     stated_frames,
     statement,
 )
-from calib_core.interchange.formats.transform_choice import Ends, choose_transform
 from calib_core.interchange.rotations import quaternion_xyzw_from_matrix
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import number_text, numbers_text, quoted

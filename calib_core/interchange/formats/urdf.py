@@ -19,6 +19,7 @@ from calib_core.interchange.format import (
     looks_like_radar,
     posed_between,
 )
+from calib_core.interchange.formats.pose_parts import Ends, choose_transform
 from calib_core.interchange.formats.statement import (
     POSE_ONLY,
     stated_check_point,
@@ -27,7 +28,6 @@ from calib_core.interchange.formats.statement import (
     xml_comment,
 )
 from calib_core.interchange.formats.static_transform import ChildFrame, radar_from_child, second_parent_notes
-from calib_core.interchange.formats.transform_choice import Ends, choose_transform
 from calib_core.interchange.rotations import (
     LINK_FROM_OPTICAL,
     OPTICAL_RPY_RAD,

@@ -12,7 +12,7 @@ from calib_core.arrays import frozen_array
 from calib_core.camera import Camera
 from calib_core.errors import RecordingError
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
-from calib_core.lens_models.naming import written_lens
+from calib_core.lens_models.registry import written_lens
 from calib_core.measurements import TimeNs, time_parts
 from calib_core.radar import cartesian_from_polar
 from calib_core.recordings.containers.sources import ChannelNotes, StoredChannel

@@ -12,8 +12,7 @@ from calib_core.interchange import camera_info_text, read_camera
 from calib_core.interchange.own.documents import CameraDocument
 from calib_core.lens_models.brown_conrady import PLUMB_BOB
 from calib_core.lens_models.lens_model import Elsewhere, LensModel, TypicalLens
-from calib_core.lens_models.naming import lenses_named, names_in, opencv_lens, written_lens
-from calib_core.lens_models.registry import LENS_MODELS
+from calib_core.lens_models.registry import LENS_MODELS, lenses_named, names_in, opencv_lens, written_lens
 from calib_core.synthetic import SimulationOptions, typical_camera
 
 LENSES = list(LENS_MODELS.values())

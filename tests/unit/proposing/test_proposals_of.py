@@ -26,7 +26,7 @@ from calib_core.proposing import (
 from calib_core.proposing.candidate_rays import candidate_rays
 from calib_core.proposing.mounting_prior import mounting_prior
 from calib_core.proposing.pose_agreement import chance_scores, pose_agreement
-from calib_core.proposing.proposals_json import ProposalSource, named_proposals, proposals_json
+from calib_core.proposing.proposals import ProposalSource, named_proposals, proposals_json
 from calib_core.synthetic.rig import typical_camera
 from tests.drawn_views import Drawing, DrawnViews, draw_views, with_pictures_of
 
