@@ -191,7 +191,7 @@ def targets_at(stage: Stage, time_s: float) -> Targets:
 
 
 def _clutter_echo(stage: Stage) -> _Echo:
-    places = np.array([[thing.x_m, thing.y_m, thing.z_m] for thing in stage.clutter]).reshape(-1, 3)
+    places = np.array([thing.position_m for thing in stage.clutter]).reshape(-1, 3)
     return _Echo(places, places, tuple(thing.rcs_dbsm for thing in stage.clutter), 2.0, stage.clutter_bias)
 
 
@@ -199,7 +199,7 @@ def _flicker_echoes(stage: Stage, time_s: float) -> list[_Echo]:
     shown = [one.scatterer for one in stage.flickers if one.shows(time_s)]
     if not shown:
         return []
-    places = np.array([[one.x_m, one.y_m, one.z_m] for one in shown])
+    places = np.array([one.position_m for one in shown])
     return [_Echo(places, places, tuple(one.rcs_dbsm for one in shown), 2.0, np.zeros((len(shown), 3)))]
 
 
@@ -229,7 +229,7 @@ def _standing_echoes(stage: Stage, resting: Resting) -> list[_Echo]:
     echoes = [_Echo(place, place, (_REFLECTOR_DBSM + _larger_db(stage),), 1.0, bias)]
     ghost = stage.ghosts[resting.index]
     if ghost is not None:
-        mirrored = np.array([[ghost.x_m, ghost.y_m, ghost.z_m]])
+        mirrored = np.array([ghost.position_m])
         echoes.append(_Echo(mirrored, mirrored, (ghost.rcs_dbsm,), 4.0, bias))
     if stage.options.surroundings.companion:
         cart = cart_position(resting.position_m, stage.options.surroundings)[None]

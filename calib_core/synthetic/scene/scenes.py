@@ -62,9 +62,7 @@ def post(x_m: float, y_m: float, radius_m: float, height_m: float, material: Mat
 class Scatterer:
     """A static object that the radar sees, in the world [m], with its radar cross-section."""
 
-    x_m: float
-    y_m: float
-    z_m: float
+    position_m: tuple[float, float, float]
     rcs_dbsm: float
 
 
@@ -161,11 +159,11 @@ def open_rooftop() -> Scene:
         post(21.4, -6.2, 0.14, 1.2, "metal"),
     )
     scatterers = (
-        Scatterer(20.2, 6.3, 0.8, 6.0),
-        Scatterer(21.3, -6.2, 0.7, 2.0),
-        Scatterer(22.1, -0.4, 0.6, 12.0),
-        Scatterer(22.1, 4.9, 0.5, 5.0),
-        Scatterer(22.1, -9.2, 0.5, 5.0),
+        Scatterer((20.2, 6.3, 0.8), 6.0),
+        Scatterer((21.3, -6.2, 0.7), 2.0),
+        Scatterer((22.1, -0.4, 0.6), 12.0),
+        Scatterer((22.1, 4.9, 0.5), 5.0),
+        Scatterer((22.1, -9.2, 0.5), 5.0),
     )
     layout = PairsLayout(2.3, 16.5, 31.0, max_lateral_m=100.0, height_m=0.19, roughness_m=0.004, separation_m=0.9)
     return Scene("open-rooftop", "tiles", "city", (*parapets, *units), scatterers, layout)
@@ -183,7 +181,11 @@ def open_yard() -> Scene:
         post(6.7, 3.45, 0.04, 2.2, "wood"),
         post(6.7, 1.05, 0.04, 2.2, "wood"),
     )
-    scatterers = (Scatterer(25.8, 0.3, 1.1, 13.0), Scatterer(25.7, -6.9, 1.0, 6.0), Scatterer(25.8, 6.0, 1.0, 8.0))
+    scatterers = (
+        Scatterer((25.8, 0.3, 1.1), 13.0),
+        Scatterer((25.7, -6.9, 1.0), 6.0),
+        Scatterer((25.8, 6.0, 1.0), 8.0),
+    )
     layout = PairsLayout(2.3, 16.5, 31.0, height_m=0.19, roughness_m=0.004, separation_m=0.6)
     return Scene(
         "open-yard",
@@ -207,7 +209,7 @@ def road() -> Scene:
         Box(62.0, -20.0, 16.0, 9.0, 7.0, "brick"),
         Box(95.0, 17.0, 18.0, 9.0, 6.5, "brick"),
     )
-    scatterers = tuple(Scatterer(one.x_m, one.y_m, 1.0, 3.0) for one in (*lamps, signs[0]) if one.x_m < 50.0)
+    scatterers = tuple(Scatterer((one.x_m, one.y_m, 1.0), 3.0) for one in (*lamps, signs[0]) if one.x_m < 50.0)
     layout = PairsLayout(2.3, 16.5, 31.0, max_lateral_m=5.5, height_m=0.19, roughness_m=0.004, separation_m=0.9)
     return Scene("road", "road", "trees", (*lamps, *kerbs, *signs, *houses), scatterers, layout)
 
@@ -223,8 +225,8 @@ def _corners(box: Box, z_m: float, rcs_dbsm: float) -> list[Scatterer]:
     inner_m = box.y_m - np.sign(box.y_m) * box.width_m / 2
     outer_m = box.y_m + np.sign(box.y_m) * box.width_m / 2
     return [
-        Scatterer(near_m, float(inner_m), z_m, rcs_dbsm),
-        Scatterer(near_m, float(outer_m), z_m, rcs_dbsm - 5.0),
+        Scatterer((near_m, float(inner_m), z_m), rcs_dbsm),
+        Scatterer((near_m, float(outer_m), z_m), rcs_dbsm - 5.0),
     ]
 
 
@@ -259,15 +261,15 @@ def _rooftop() -> Scene:
     duct = (Box(17.2, 3.9, 0.45, 3.6, 0.4, "metal", base_m=0.35),)
     scatterers = [s for unit in units for s in _corners(unit, 0.8, 6.0)]
     scatterers += [
-        Scatterer(9.6, 5.6, 0.5, -4.0),
-        Scatterer(12.4, -6.4, 0.6, 0.0),
-        Scatterer(20.6, -2.6, 1.2, 3.0),
-        Scatterer(22.1, -0.4, 0.6, 12.0),
-        Scatterer(22.1, 5.9, 0.5, 5.0),
-        Scatterer(22.1, -8.2, 0.5, 5.0),
-        Scatterer(17.8, 8.2, 1.2, 8.0),
-        Scatterer(9.4, -8.0, 0.3, -2.0),
-        Scatterer(17.0, 3.9, 0.5, 2.0),
+        Scatterer((9.6, 5.6, 0.5), -4.0),
+        Scatterer((12.4, -6.4, 0.6), 0.0),
+        Scatterer((20.6, -2.6, 1.2), 3.0),
+        Scatterer((22.1, -0.4, 0.6), 12.0),
+        Scatterer((22.1, 5.9, 0.5), 5.0),
+        Scatterer((22.1, -8.2, 0.5), 5.0),
+        Scatterer((17.8, 8.2, 1.2), 8.0),
+        Scatterer((9.4, -8.0, 0.3), -2.0),
+        Scatterer((17.0, 3.9, 0.5), 2.0),
     ]
     layout = PairsLayout(2.3, 16.5, 31.0, max_lateral_m=100.0, height_m=0.19, roughness_m=0.004, separation_m=0.9)
     return Scene(
@@ -299,11 +301,11 @@ def _field() -> Scene:
     )
     sign = (post(16.5, -7.6, 0.04, 1.3, "metal"), Box(16.5, -7.6, 0.03, 1.3, 0.7, "blue", base_m=1.25))
     scatterers = [
-        Scatterer(19.0, -3.66, 1.0, 2.0),
-        Scatterer(19.0, 3.66, 1.0, 2.0),
-        Scatterer(14.0, 8.3, 0.4, -1.0),
-        Scatterer(16.5, -7.6, 0.9, 1.0),
-        *(Scatterer(27.0, float(y), 0.6, -3.0) for y in (-9, -3, 3, 9)),
+        Scatterer((19.0, -3.66, 1.0), 2.0),
+        Scatterer((19.0, 3.66, 1.0), 2.0),
+        Scatterer((14.0, 8.3, 0.4), -1.0),
+        Scatterer((16.5, -7.6, 0.9), 1.0),
+        *(Scatterer((27.0, float(y), 0.6), -3.0) for y in (-9, -3, 3, 9)),
     ]
     layout = PairsLayout(2.3, 17.5, 31.0, height_m=0.20, roughness_m=0.012, separation_m=0.9)
     return Scene("field", "grass", "trees", (*goal, *fence, *rails, *bench, *sign), tuple(scatterers), layout)
@@ -321,7 +323,7 @@ def _aisle() -> Scene:
             racks.append(Box(x_m, side * 1.86, 2.2, 0.06, 0.12, "yellow", base_m=1.02))
             racks.append(Box(x_m, side * 1.86, 2.2, 0.06, 0.12, "yellow", base_m=1.98))
             racks.append(Box(x_m, side * 2.4, 1.9, 0.9, 0.6, "cartons", base_m=2.1))
-            scatterers.append(Scatterer(x_m + 1.1, side * 1.82, 0.9, 1.0 + 3.0 * (bay % 3)))
+            scatterers.append(Scatterer((x_m + 1.1, side * 1.82, 0.9), 1.0 + 3.0 * (bay % 3)))
     cart = (
         Box(8.3, 1.12, 0.9, 0.6, 0.05, "blue", base_m=0.22),
         Box(8.3, 1.12, 0.75, 0.5, 0.42, "cartons", base_m=0.27),
@@ -331,7 +333,11 @@ def _aisle() -> Scene:
     wall = (Box(21.0, 0.0, 0.3, 14.0, 4.2, "plaster"), Box(20.83, 0.0, 0.06, 2.4, 2.6, "door"))
     sides = (Box(10.0, 4.6, 24.0, 0.3, 4.2, "plaster"), Box(10.0, -4.6, 24.0, 0.3, 4.2, "plaster"))
     lamps = tuple(Box(4.0 + 4.0 * i, 0.0, 1.5, 0.28, 0.06, "lamp", base_m=3.9) for i in range(4))
-    scatterers += [Scatterer(7.9, 1.0, 0.4, 6.0), Scatterer(12.5, -0.9, 0.3, 3.0), Scatterer(20.8, 0.2, 1.0, 14.0)]
+    scatterers += [
+        Scatterer((7.9, 1.0, 0.4), 6.0),
+        Scatterer((12.5, -0.9, 0.3), 3.0),
+        Scatterer((20.8, 0.2, 1.0), 14.0),
+    ]
     layout = PairsLayout(2.3, 16.0, 31.0, max_lateral_m=0.75, height_m=0.19, roughness_m=0.003, separation_m=0.5)
     return Scene(
         "aisle",
@@ -360,11 +366,11 @@ def _checkerboard() -> Scene:
         Box(11.24, -7.9, 0.08, 1.0, 2.1, "door"),
     )
     scatterers = (
-        Scatterer(11.3, 0.1, 1.1, 13.0),
-        Scatterer(10.7, 5.5, 0.5, 3.0),
-        Scatterer(10.5, -5.0, 0.5, 5.0),
-        Scatterer(11.2, -2.9, 1.2, 4.0),
-        Scatterer(11.3, 3.4, 1.0, 2.0),
+        Scatterer((11.3, 0.1, 1.1), 13.0),
+        Scatterer((10.7, 5.5, 0.5), 3.0),
+        Scatterer((10.5, -5.0, 0.5), 5.0),
+        Scatterer((11.2, -2.9, 1.2), 4.0),
+        Scatterer((11.3, 3.4, 1.0), 2.0),
     )
     layout = PairsLayout(2.3, 9.6, 31.0, height_m=0.19, roughness_m=0.004, separation_m=0.6)
     return Scene(

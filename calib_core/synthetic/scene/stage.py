@@ -277,9 +277,11 @@ def _clutter(rng: np.random.Generator, scene: Scene, options: SimulationOptions)
     reach = min(scene.layout.max_lateral_m + 0.4, 7.0)
     hidden = tuple(
         Scatterer(
-            float(rng.uniform(3.0, scene.layout.max_range_m)),
-            float(rng.uniform(-reach, reach)),
-            float(rng.uniform(0.05, 1.0)),
+            (
+                float(rng.uniform(3.0, scene.layout.max_range_m)),
+                float(rng.uniform(-reach, reach)),
+                float(rng.uniform(0.05, 1.0)),
+            ),
             float(rng.uniform(6.0, 18.0)),
         )
         for _ in range(8)
@@ -295,9 +297,7 @@ def _ghost(rng: np.random.Generator, position_m: Vector3, wanted_share: float) -
     range_m = float(np.linalg.norm(position_m[:2])) + extra_m
     azimuth_rad = float(np.arctan2(position_m[1], position_m[0])) + aside_rad
     return Scatterer(
-        float(range_m * np.cos(azimuth_rad)),
-        float(range_m * np.sin(azimuth_rad)),
-        float(-position_m[2]),
+        (float(range_m * np.cos(azimuth_rad)), float(range_m * np.sin(azimuth_rad)), float(-position_m[2])),
         float(rcs_dbsm),
     )
 

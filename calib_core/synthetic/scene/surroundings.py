@@ -43,7 +43,7 @@ def draw_flickers(rng: np.random.Generator, count: int, scene: Scene) -> tuple[F
         range_m, aside = rng.uniform(3.0, scene.layout.max_range_m + 2.0), rng.uniform(-1.0, 1.0)
         azimuth_rad = aside * min(np.deg2rad(scene.layout.max_azimuth_deg), scene.layout.max_lateral_m / range_m)
         x_m, y_m = float(range_m * np.cos(azimuth_rad)), float(range_m * np.sin(azimuth_rad))
-        scatterer = Scatterer(x_m, y_m, float(rng.uniform(0.2, 1.5)), float(rng.uniform(*_FLICKER_DBSM)))
+        scatterer = Scatterer((x_m, y_m, float(rng.uniform(0.2, 1.5))), float(rng.uniform(*_FLICKER_DBSM)))
         rhythm = (float(rng.uniform(*_FLICKER_S)), float(rng.uniform(*_FLICKER_SHARE)), float(rng.uniform()))
         found.append(Flicker(scatterer, *rhythm))
     return tuple(found)
@@ -65,7 +65,7 @@ def furnished(rng: np.random.Generator, scene: Scene, surroundings: Surroundings
     if surroundings.fence:
         side = 1.0 if rng.uniform() < 0.5 else -1.0
         solids += _fence(side)
-        scatterers += [Scatterer(one.x_m, one.y_m, 0.6, _POST_DBSM) for one in solids if one.is_round]
+        scatterers += [Scatterer((one.x_m, one.y_m, 0.6), _POST_DBSM) for one in solids if one.is_round]
     for _ in range(surroundings.parked_cars):
         parts, echoes = _car(rng, replace(scene, solids=(*scene.solids, *solids)))
         solids += parts
@@ -74,7 +74,7 @@ def furnished(rng: np.random.Generator, scene: Scene, surroundings: Surroundings
         x_m = float(rng.uniform(0.5, 0.8)) * scene.layout.max_range_m
         y_m = float(rng.choice([-1.0, 1.0])) * min(0.45 * x_m, scene.layout.max_lateral_m + 0.9)
         solids.append(post(x_m, y_m, 0.05, 1.6, "metal"))
-        scatterers.append(Scatterer(x_m, y_m, 0.8, surroundings.strong_target_dbsm))
+        scatterers.append(Scatterer((x_m, y_m, 0.8), surroundings.strong_target_dbsm))
     if not solids:
         return scene, replace(scene, solids=())
     whole = replace(scene, solids=(*scene.solids, *solids), scatterers=(*scene.scatterers, *scatterers))
@@ -108,7 +108,7 @@ def _car(rng: np.random.Generator, scene: Scene) -> tuple[list[Box], list[Scatte
     ]
     near_m, inner_m = x_m - 0.5 * length_m, y_m - side * 0.5 * width_m
     places = ((near_m, inner_m, 0.6), (x_m, inner_m, 0.7), (x_m + 0.35 * length_m, inner_m, 0.35))
-    echoes = [Scatterer(*place, rcs) for place, rcs in zip(places, _CAR_DBSM, strict=True)]
+    echoes = [Scatterer(place, rcs) for place, rcs in zip(places, _CAR_DBSM, strict=True)]
     return parts, echoes
 
 

@@ -84,7 +84,7 @@ def test_parked_cars_a_fence_and_a_target_of_29_dbsm_are_always_there_and_hide_n
     [car, *_] = [one for one in added.solids if one.length_m == 4.4]
     assert not in_sight(added, np.array([[1.5 * car.x_m, 1.5 * car.y_m, 0.2]])).any()
     strongest = max(scene.scatterers, key=lambda one: one.rcs_dbsm)
-    position = (session.stage.rig.radar_from_world @ np.array([[strongest.x_m, strongest.y_m, strongest.z_m]]))[0]
+    position = (session.stage.rig.radar_from_world @ np.array([strongest.position_m]))[0]
     assert strongest.rcs_dbsm == 29.0
     assert _seen(session.scans, position) > 0.95
     count = len(session.scans.points_radar_m) / len(session.scans)
@@ -97,7 +97,7 @@ def test_flickering_targets_are_seen_for_a_share_of_the_time_and_by_turns() -> N
     for one in session.stage.flickers:
         shown = np.array([one.shows(float(time_s)) for time_s in times_s])
         thing = one.scatterer
-        position = (session.stage.rig.radar_from_world @ np.array([[thing.x_m, thing.y_m, thing.z_m]]))[0]
+        position = (session.stage.rig.radar_from_world @ np.array([thing.position_m]))[0]
         assert 0.1 < shown.mean() < 0.75
         assert 2 <= np.abs(np.diff(shown.astype(int))).sum() < 20
         assert _seen(session.scans, position) == pytest.approx(shown.mean(), abs=0.15)
