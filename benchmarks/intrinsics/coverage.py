@@ -10,7 +10,7 @@ from benchmarks.intrinsics.rendered import scaled_errors
 from benchmarks.intrinsics.tables import Table
 from calib_core.camera import Camera, CameraModel
 from calib_core.intrinsics import BoardSearch, CalibratedLens, IntrinsicsOptions, calibrate_lens
-from calib_core.intrinsics.projection_uncertainty import far_point_slopes, found_pixels, grid_covariance
+from calib_core.intrinsics.picture_maps import far_point_slopes, found_pixels, grid_covariance
 from calib_core.synthetic.boards import BoardFilm, BoardShape, CornerErrors, simulated_views, waved_poses
 
 __all__ = ["CASES", "Case", "coverage", "drawn_search", "sigma_table"]

@@ -6,8 +6,13 @@ from calib_core.intrinsics.board_search import search_boards
 from calib_core.intrinsics.calibrated_lens import CalibratedLens, LensView, ModelTrial
 from calib_core.intrinsics.calibrating import calibrate_lens
 from calib_core.intrinsics.coverage import BoardSearch, Coverage, SearchProgress, view_coverage
-from calib_core.intrinsics.projection_uncertainty import MODEL_ERRORS_UNSEEN, PictureGrid, projection_uncertainty
-from calib_core.intrinsics.residual_field import ResidualField, residual_field
+from calib_core.intrinsics.picture_maps import (
+    MODEL_ERRORS_UNSEEN,
+    PictureGrid,
+    ResidualField,
+    projection_uncertainty,
+    residual_field,
+)
 from calib_core.intrinsics.split_difference import SplitDifference, split_difference
 from calib_core.options import IntrinsicsOptions
 

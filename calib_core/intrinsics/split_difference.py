@@ -10,7 +10,7 @@ from calib_core.geometry import rotation_exp
 from calib_core.intrinsics.adjustment import adjust, reduced, shared_covariance
 from calib_core.intrinsics.calibrated_lens import CalibratedLens
 from calib_core.intrinsics.linearization import Freedom, LensState, ViewStack, linearize, stack_views
-from calib_core.intrinsics.projection_uncertainty import far_point_slopes, found_pixels, grid_covariance, picture_grid
+from calib_core.intrinsics.picture_maps import far_point_slopes, found_pixels, grid_covariance, picture_grid
 from calib_core.measurements import Unsolvable
 
 _LEAST_VIEWS = 8

@@ -19,7 +19,7 @@ from calib_core.intrinsics import (
     split_difference,
     view_coverage,
 )
-from calib_core.intrinsics.projection_uncertainty import far_point_slopes
+from calib_core.intrinsics.picture_maps import far_point_slopes
 from calib_core.measurements import Unsolvable
 from calib_core.synthetic import typical_camera
 from tests.unit.intrinsics.corner_draws import BOARD, CAMERAS, SIZE_PX, drawn_views, search_of
