@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal, NoReturn, TypeAlias
+from typing import Annotated, Literal, NoReturn, TypeAlias
 
 import msgspec
 import numpy as np
@@ -10,18 +10,44 @@ from msgspec import Meta
 
 from calib_core.arrays import Indices, Matrix33, Points3, TimesNs, Values, Vector2, Vector3, frozen_array
 from calib_core.errors import UnsolvableError
-
-
-class TimeNs(int):
-    """Nanoseconds since the epoch. Never a float: a float64 of the present time is off by up to 128 ns."""
-
-    __slots__ = ()
-
+from calib_core.json_forms import Name, Position
 
 NS_PER_S = 1_000_000_000
 
 MIN_PAIRS = 4
 """The fewest pairs that determine a pose: three leave up to four solutions, the fourth selects one."""
+
+
+class Stamp(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A stamp as in ROS 2: whole seconds since the epoch, and nanoseconds within the second."""
+
+    sec: Annotated[int, Meta(ge=0, le=9_223_372_035)]
+    nanosec: Annotated[int, Meta(ge=0, le=999_999_999)]
+
+    @classmethod
+    def of(cls, time: "TimeNs") -> "Stamp":
+        """Split a time in nanoseconds."""
+        return cls(*time_parts(time))
+
+    @property
+    def time(self) -> "TimeNs":
+        """The same time in nanoseconds since the epoch."""
+        return time_from_parts(self.sec, self.nanosec)
+
+
+class TimeNs(int):
+    """Nanoseconds since the epoch. Never a float: a float64 of the present time is off by up to 128 ns.
+
+    JSON holds two integers, because a JavaScript number cannot hold present times in nanoseconds.
+    """
+
+    __slots__ = ()
+    json_form = Stamp
+
+    @staticmethod
+    def from_json(stamp: Stamp) -> "TimeNs":
+        """Return the time of a stamp."""
+        return stamp.time
 
 
 def time_from_parts(sec: int, nanosec: int) -> TimeNs:
@@ -34,66 +60,23 @@ def time_parts(time: TimeNs) -> tuple[int, int]:
     return divmod(int(time), NS_PER_S)
 
 
-class Stamp(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A time as stored in JSON: two integers, because a JavaScript number cannot hold present times in nanoseconds."""
-
-    sec: Annotated[int, Meta(ge=0, le=9_223_372_035)]
-    nanosec: Annotated[int, Meta(ge=0, le=999_999_999)]
-
-    @classmethod
-    def of(cls, time: TimeNs) -> "Stamp":
-        """Split a time in nanoseconds."""
-        return cls(*time_parts(time))
-
-    @property
-    def time(self) -> TimeNs:
-        """The same time in nanoseconds since the epoch."""
-        return time_from_parts(self.sec, self.nanosec)
-
-
-def time_to_json(value: Any) -> Any:
-    """Give msgspec the JSON form of a time, as its `enc_hook`.
-
-    Raises:
-        NotImplementedError: the value is no time.
-    """
-    if isinstance(value, TimeNs):
-        return Stamp.of(value)
-    raise NotImplementedError(f"{type(value).__name__} has no JSON form")
-
-
-def time_from_json(kind: type, value: Any) -> Any:
-    """Read a time from its JSON form for msgspec, as its `dec_hook`.
-
-    Raises:
-        NotImplementedError: it is not a time that is wanted.
-        ValueError: it is not the JSON form of a time.
-    """
-    if kind is not TimeNs:
-        raise NotImplementedError(f"{kind.__name__} has no JSON form")
-    try:
-        return msgspec.convert(value, Stamp).time
-    except msgspec.ValidationError as error:
-        raise ValueError(str(error).replace(" - at `$.", " in `")) from error  # msgspec adds the place
-
-
 Mark: TypeAlias = Literal["clicked", "moved", "snapped", "untouched"]
 """How a click came to its pixel: set or moved by a person, snapped to the reflector's apex in the picture, or left untouched
 where the radar expected it; the last is no measurement."""
 
 
-class ChosenReturn(msgspec.Struct, frozen=True, order=True, forbid_unknown_fields=True, omit_defaults=True):
-    """The radar return that a person chose for a click.
+class ChosenReturn(msgspec.Struct, frozen=True, order=True, omit_defaults=True):
+    """The radar return that a person chose for a click, at the position that the radar reports.
 
     Attributes:
-        position_m: (x, y, z) in the radar frame, as the radar reports it.
+        position_m: (x, y, z) in the radar frame.
         radar_time: stamp of the nearest scan; None if unknown.
         topic: of the radar; "" if unknown.
     """
 
-    position_m: tuple[float, float, float]
+    position_m: Position
     radar_time: TimeNs | None = None
-    topic: Annotated[str, Meta(max_length=500)] = ""
+    topic: str = ""
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -375,7 +358,7 @@ class Pair:
 
 @dataclass(frozen=True, slots=True)
 class Unpaired:
-    """A click without a radar position, and why.
+    """A click that found no radar position.
 
     Attributes:
         id: the click's id.
@@ -384,7 +367,7 @@ class Unpaired:
         hint: what to do about it.
     """
 
-    id: str
+    id: Name
     code: str
     reason: str
     hint: str
@@ -423,7 +406,7 @@ class Unsolvable:
 
 @dataclass(frozen=True, slots=True)
 class DataWarning:
-    """A problem in the data or the result that the user must decide on.
+    """Something to know before using the result.
 
     Attributes:
         code: identifier for programs, such as "mirrored-axes"; stable.
@@ -505,17 +488,16 @@ class Boxes:
         return tuple(sorted({box.label for frame in self.frames for box in frame.boxes}))
 
 
-@dataclass(frozen=True, slots=True)
-class LabelledScan:
-    """Which object each return of a scan comes from, as only a simulation knows.
+class LabelledScan(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Which object each return of a scan comes from, in the scan's order; "" for anything else.
 
     Attributes:
         radar_time: stamp of the scan.
-        tracks: of each return in the scan's order: the object, as in Box.track; "" for anything else.
+        tracks: the objects, as in Box.track.
     """
 
     radar_time: TimeNs
-    tracks: tuple[str, ...]
+    tracks: tuple[Annotated[str, Meta(max_length=200)], ...]
 
 
 @dataclass(frozen=True, slots=True)

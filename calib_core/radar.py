@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.arrays import Points3, Values, Vector3, frozen_array
+from calib_core.json_forms import Measured, Scale
 from calib_core.options import NoiseOptions
 
 _LEAST_SHARE_SQUARED = 0.25  # of the range that is left along the plane of the placements
@@ -87,7 +88,9 @@ def covariance_from_sigma_polar(points_radar_m: Points3, sigma_polar: Points3) -
 
 @dataclass(frozen=True, slots=True)
 class RadarErrors:
-    """What the radar gets wrong at every position alike, as estimated with the pose; all zero if nothing was estimated.
+    """What the radar gets wrong at every position alike, to be taken out of a reported position before the pose is applied.
+
+    range = range - range_bias_m, then sqrt(range^2 - squared_height_m2); azimuth / (1 + azimuth_scale); elevation likewise.
 
     Attributes:
         azimuth_scale: reported azimuth over the true one, minus 1.
@@ -96,10 +99,10 @@ class RadarErrors:
         squared_height_m2: squared height of the placements above or below a radar that measures no elevation [m^2].
     """
 
-    azimuth_scale: float = 0.0
-    elevation_scale: float = 0.0
-    range_bias_m: float = 0.0
-    squared_height_m2: float = 0.0
+    azimuth_scale: Scale = 0.0
+    elevation_scale: Scale = 0.0
+    range_bias_m: Measured = 0.0
+    squared_height_m2: Measured = 0.0
 
     @classmethod
     def named(cls, values: dict[str, float]) -> "RadarErrors":

@@ -31,7 +31,7 @@ with open_recording(path) as recording:
     matrix = np.array([[900.0, 0, picture.width_px / 2], [0, 900, picture.height_px / 2], [0, 0, 1]])
     camera = Camera("plumb_bob", picture.width_px, picture.height_px, matrix, np.array([-0.1, 0.02, 0.001, 0.0]))
     ahead = RigidTransform(np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]]), np.zeros(3))
-    calibration = Calibration(ahead, np.eye(6) * 1e-4, camera, Metrics(nan, nan, nan, 0), (), (), (), CalibrationOptions())
+    calibration = Calibration(ahead, np.eye(6) * 1e-4, camera, Metrics(), (), (), (), CalibrationOptions())
     view = recorded_view(recording, calibration, "range")
     if kind == "rrd":
         import rerun

@@ -1,9 +1,12 @@
 """A solved calibration with what is stored along with it: frames, check point, vehicle and serials, evidence, provenance."""
 
-from dataclasses import dataclass, field, fields, replace
-from typing import Literal, TypeAlias, get_args
+from dataclasses import dataclass, field
+from typing import Annotated, Literal, TypeAlias, get_args
 
+import msgspec
 import numpy as np
+from msgspec import Meta
+from msgspec.structs import asdict, replace
 
 from calib_core.errors import InputError
 from calib_core.results import Calibration, CheckPoint, InputFile, PairResult, UnconfirmedClicks
@@ -13,9 +16,12 @@ MOST_CHARACTERS = 120
 """The longest name or serial, in manifests, files and flags alike."""
 
 
-@dataclass(frozen=True, slots=True)
-class VehicleNote:
-    """What is stated of a vehicle and of one session with it; None where nothing is.
+Label = Annotated[str, Meta(extra_json_schema={"minLength": 1, "maxLength": MOST_CHARACTERS})]
+"""A vehicle, type, session or serial. For the schema only: VehicleNote refuses what is none, and says what to do."""
+
+
+class VehicleNote(msgspec.Struct, frozen=True, omit_defaults=True):
+    """Which vehicle the calibration is of, and the serials of its sensors.
 
     Attributes:
         name: of the vehicle.
@@ -28,21 +34,20 @@ class VehicleNote:
         InputError: a text is empty, too long or not printable, or a name has a slash; the message begins with the key.
     """
 
-    name: str | None = None
-    type: str | None = None
-    session: str | None = None
-    radar_serial: str | None = None
-    camera_serial: str | None = None
+    name: Label | None = None
+    type: Label | None = None
+    session: Label | None = None
+    radar_serial: Label | None = None
+    camera_serial: Label | None = None
 
     def __post_init__(self) -> None:
-        for one in fields(self):
-            if (text := getattr(self, one.name)) is not None:
-                (require_name if one.name in ("name", "session") else require_label)(text, f"vehicle.{one.name}")
+        for key, text in asdict(self).items():
+            if text is not None:
+                (require_name if key in ("name", "session") else require_label)(text, f"vehicle.{key}")
 
     def over(self, other: "VehicleNote") -> "VehicleNote":
         """Return another note with what this one states instead."""
-        stated = {field.name: getattr(self, field.name) for field in fields(self)}
-        return replace(other, **{name: value for name, value in stated.items() if value is not None})
+        return replace(other, **{key: text for key, text in asdict(self).items() if text is not None})
 
 
 def require_name(name: str, where: str) -> None:
@@ -148,7 +153,7 @@ def _checked_name(name: str, role: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class AssumptionNote:
-    """One unit, sign, order or meaning that the files do not state.
+    """A unit, sign, order or meaning that the files do not state.
 
     Attributes:
         text: what is assumed, with its topic.
@@ -156,7 +161,7 @@ class AssumptionNote:
     """
 
     text: str
-    confirmed: bool
+    confirmed: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -397,7 +397,7 @@ def _as_calibration(found: ImportedCalibration, source: str, *, camera: Camera) 
         camera_from_radar=found.camera_from_radar,
         covariance=_covariance(found),
         camera=camera,
-        metrics=Metrics(_UNKNOWN, _UNKNOWN, _UNKNOWN, 0),
+        metrics=Metrics(),
         pairs=(),
         unpaired=(),
         warnings=(*assumed, _imported_warning(found, source)),

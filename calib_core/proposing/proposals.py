@@ -3,14 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import msgspec
 import numpy as np
 
 from calib_core.arrays import Vector2, frozen_array
 from calib_core.association.placements import Placement
 from calib_core.geometry import RigidTransform
 from calib_core.input_files import encodable
-from calib_core.interchange.own.documents import ClickDocument, TimeDocument
+from calib_core.interchange.own.documents import ClickDocument
 from calib_core.interchange.own.proposal_documents import (
     PROPOSALS_SCHEMA,
     DwellDocument,
@@ -21,8 +20,8 @@ from calib_core.interchange.own.proposal_documents import (
     UnproposedDocument,
 )
 from calib_core.interchange.own.transform_document import finite_or_none
-from calib_core.interchange.syntax.strict_json import json_text
-from calib_core.measurements import TimeNs, time_parts
+from calib_core.interchange.syntax.strict_json import builtins_of, json_text
+from calib_core.measurements import TimeNs
 from calib_core.proposing.dwell_views import DwellView
 from calib_core.proposing.picture_candidates import PictureCandidate
 
@@ -136,12 +135,12 @@ def proposals_json(proposals: Proposals, views: Sequence[DwellView], source: Pro
         unproposed=[UnproposedDocument(_dwell(placement), reason) for placement, reason in proposals.unproposed],
         camera_from_radar=_mounting(proposals),
     )
-    return json_text(encodable(msgspec.to_builtins(document)))
+    return json_text(encodable(builtins_of(document)))
 
 
 def _proposal(name: str, proposal: Proposal) -> ProposalDocument:
     click = ClickDocument(
-        name, _time(proposal.image_time), _pixel(proposal.pixel_px), sigma_px=proposal.sigma_px, mark="snapped"
+        name, proposal.image_time, _pixel(proposal.pixel_px), sigma_px=proposal.sigma_px, mark="snapped"
     )
     return ProposalDocument(
         name,
@@ -156,8 +155,8 @@ def _proposal(name: str, proposal: Proposal) -> ProposalDocument:
 def _dwell(placement: Placement) -> DwellDocument:
     x_m, y_m, z_m = placement.position_radar_m.tolist()
     return DwellDocument(
-        _time(placement.start),
-        _time(placement.end),
+        placement.start,
+        placement.end,
         (x_m, y_m, z_m),
         float(np.linalg.norm(placement.position_radar_m)),
         placement.score,
@@ -185,7 +184,3 @@ def _mounting(proposals: Proposals) -> RoughMountingDocument | None:
 
 def _pixel(pixel_px: np.ndarray) -> tuple[float, float]:
     return float(pixel_px[0]), float(pixel_px[1])
-
-
-def _time(time: TimeNs) -> TimeDocument:
-    return TimeDocument(*time_parts(time))

@@ -1,14 +1,16 @@
 """The result of a calibration: the pose, its uncertainty, metrics, warnings, and each pair's residual."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 from typing import Self
 
+import msgspec
 import numpy as np
 
 from calib_core.arrays import Matrix66, Points2, Points3, Vector2, Vector3, frozen_array
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
+from calib_core.json_forms import Count, Figure, Name, Share
 from calib_core.measurements import DataWarning, Pair, TimeNs, Unpaired
 from calib_core.options import CalibrationOptions
 from calib_core.radar import AngleMap, RadarErrors
@@ -56,37 +58,36 @@ class CovarianceParts:
         return CovarianceParts(self.systematic / largest, self.camera_position / largest)
 
 
-@dataclass(frozen=True, slots=True)
-class UnconfirmedClicks:
-    """Clicks that were placed automatically and that nobody confirmed.
+class UnconfirmedClicks(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename={"ids": "clicks"}):
+    """The ids of clicks that were placed automatically and that nobody confirmed, and the confidence that they are right.
 
     Attributes:
         ids: of these clicks.
-        confidence: that they are right, 0 to 1, as it was judged when they were placed.
+        confidence: 0 to 1, as it was judged when they were placed.
     """
 
-    ids: tuple[str, ...]
-    confidence: float
+    ids: tuple[Name, ...]
+    confidence: Share
 
 
 @dataclass(frozen=True, slots=True)
 class InputFile:
-    """An input of a calibration, identified by its content: a file, or the files of a folder in order of their names.
+    """An input file.
 
     Attributes:
         name: without its folder.
         size_bytes: its length.
-        sha256: of its content, in hexadecimal.
+        sha256: of its content, or of that of the files of a folder in order of their names; in hexadecimal.
     """
 
     name: str
-    size_bytes: int
+    size_bytes: Count
     sha256: str
 
 
 @dataclass(frozen=True, slots=True)
 class Metrics:
-    """The paper's metrics over the inlier pairs, plus RMS, held-out AED and chi2.
+    """Figures over the inlier pairs; null if unknown.
 
     Attributes:
         aed_px: average Euclidean distance, divided by N (paper, AED).
@@ -100,15 +101,16 @@ class Metrics:
         degrees_of_freedom: of chi2.
     """
 
-    aed_px: float
-    cdsd_px: float
-    rms_px: float
-    n: int
-    held_out_aed_px: float = float("nan")
+    aed_px: Figure = float("nan")
+    cdsd_px: Figure = float("nan")
+    rms_px: Figure = float("nan")
+    _: KW_ONLY
+    held_out_aed_px: Figure = float("nan")
     acc: float | None = None
-    chi2: float = float("nan")
-    degrees_of_freedom: int = 0
-    picture_sigma_px: float = float("nan")
+    n: Count = 0
+    chi2: Figure = float("nan")
+    degrees_of_freedom: Count = 0
+    picture_sigma_px: Figure = float("nan")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -27,6 +27,7 @@ import numpy as np
 
 from calib_core.arrays import Matrix66, Values, Vector3, frozen_array
 from calib_core.camera import Camera, CameraCovariance
+from calib_core.json_forms import Name
 from calib_core.measurements import DataWarning, Unsolvable
 from calib_core.options import CalibrationOptions, RadarOptions
 from calib_core.radar import RadarErrors
@@ -634,7 +635,7 @@ _SHARES = (
 
 @dataclass(frozen=True, slots=True)
 class SystematicErrorResult:
-    """One error that all pairs share: what is known of it, and its part in the uncertainty of the pose.
+    """One error that all pairs share; value and sigmas have the unit in its name, the shares are of the pose's variance.
 
     Attributes:
         name: key in files, with its unit; scales and shares have none.
@@ -646,13 +647,13 @@ class SystematicErrorResult:
         rotation_share: the same of the rotation.
     """
 
-    name: str
+    name: Name
     value: float
     sigma: float
     prior_sigma: float
-    estimated: bool
-    position_share: float
-    rotation_share: float
+    estimated: bool = True
+    position_share: float = 0.0
+    rotation_share: float = 0.0
 
     @property
     def text(self) -> str:

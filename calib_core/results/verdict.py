@@ -149,7 +149,7 @@ _DEFAULT_METHOD = "Solve with the default method, which states the error of the 
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """How far a calibration can be trusted.
+    """How far to trust the result: a word, the stated error or what is wrong, and the one action that helps most.
 
     Attributes:
         level: "good" and "usable" state an error that holds with 95 %; "weak" is not to be relied on; "contradictory": the

@@ -12,6 +12,7 @@ import pytest
 
 from calib_core.geometry import rotation_angle_rad
 from calib_core.interchange.own.proposal_documents import ProposalsDocument
+from calib_core.json_forms import from_json
 from calib_core.recordings.containers.writing import write_ros2
 from cocalib.cli import run
 from tests.cli.conftest import DWELL_S, START, Made
@@ -55,7 +56,7 @@ def test_what_is_proposed_is_the_reflector_and_becomes_clicks_that_solve(
     assert "looking at the pictures: 11 of 11 placements" in answer.err
 
     document = json.loads(out.read_text())
-    msgspec.convert(document, ProposalsDocument)
+    msgspec.convert(document, ProposalsDocument, dec_hook=from_json)
     assert document["schema"] == "cocalib/proposals-1"
     assert [row.split()[0] for row in rows] == [one["id"] for one in document["proposals"]]
     confidences = [one["confidence"] for one in document["proposals"]]

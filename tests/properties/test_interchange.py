@@ -77,9 +77,7 @@ def frame_names(draw: st.DrawFn) -> FrameNames:
 
 
 def file_of(pose: RigidTransform, camera: Camera, frames: FrameNames | None = None) -> CalibrationFile:
-    nan = float("nan")
-    metrics = Metrics(nan, nan, nan, 0)
-    calibration = Calibration(pose, np.full((6, 6), np.nan), camera, metrics, (), (), (), CalibrationOptions())
+    calibration = Calibration(pose, np.full((6, 6), np.nan), camera, Metrics(), (), (), (), CalibrationOptions())
     return CalibrationFile(calibration, frames or FrameNames(), choose_check_point(calibration))
 
 
@@ -180,7 +178,7 @@ def test_whatever_a_calibration_contains_the_file_is_json_and_reads_back_the_sam
             influence=d,
         ),
     )
-    metrics = Metrics(a, b, c, 3, held_out_aed_px=d, acc=None, chi2=e, degrees_of_freedom=2)
+    metrics = Metrics(a, b, c, n=3, held_out_aed_px=d, acc=None, chi2=e, degrees_of_freedom=2)
     covariance = np.full((6, 6), f)
     calibration = Calibration(
         pose,

@@ -58,7 +58,7 @@ def any_pose(name: str) -> RigidTransform:
 
 
 def file_of(pose: RigidTransform) -> CalibrationFile:
-    unknown = Metrics(np.nan, np.nan, np.nan, 0)
+    unknown = Metrics()
     calibration = Calibration(pose, np.full((6, 6), np.nan), CAMERA, unknown, (), (), (), CalibrationOptions())
     return CalibrationFile(calibration, FrameNames(), choose_check_point(calibration))
 

@@ -30,7 +30,7 @@ def published_calibration(folder: Path) -> tuple[Calibration, np.ndarray]:
         camera=Camera(
             "plumb_bob", document["width"], document["height"], np.array(document["K"]), np.array(document["D"])
         ),
-        metrics=Metrics(aed_px=float("nan"), cdsd_px=float("nan"), rms_px=float("nan"), n=0),
+        metrics=Metrics(),
         pairs=(),
         unpaired=(),
         warnings=(),

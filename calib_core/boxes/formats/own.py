@@ -3,8 +3,6 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-import msgspec
-
 from calib_core.boxes.formats.box_format import BoxFile, BoxFormat, FileBoxes, FileFrame
 from calib_core.errors import InputError
 from calib_core.interchange.own.detection_documents import (
@@ -14,19 +12,14 @@ from calib_core.interchange.own.detection_documents import (
     BoxesDocument,
     FrameDocument,
     LabelsDocument,
-    ScanDocument,
 )
-from calib_core.interchange.own.documents import TimeDocument
-from calib_core.interchange.syntax.strict_json import checked, json_text, parse_document
+from calib_core.interchange.syntax.strict_json import checked, document_text, parse_document
 from calib_core.measurements import (
     Box,
     Boxes,
     FrameBoxes,
-    LabelledScan,
     ReturnLabels,
     TimeNs,
-    time_from_parts,
-    time_parts,
 )
 
 
@@ -47,8 +40,8 @@ OWN = BoxFormat("our boxes-1", _recognizes, _read)
 
 def boxes_text(boxes: Boxes) -> str:
     """Write boxes as boxes-1 text; the same boxes give the same bytes."""
-    frames = [FrameDocument(_time(frame.image_time), [_document(box) for box in frame.boxes]) for frame in boxes]
-    return json_text(msgspec.to_builtins(BoxesDocument(BOXES_SCHEMA, frames, boxes.image_size_px)))
+    frames = [FrameDocument(frame.image_time, [_document(box) for box in frame.boxes]) for frame in boxes]
+    return document_text(BoxesDocument(BOXES_SCHEMA, frames, boxes.image_size_px))
 
 
 def own_boxes(content: Mapping[str, Any], source: str = "boxes") -> Boxes:
@@ -69,7 +62,7 @@ def own_boxes(content: Mapping[str, Any], source: str = "boxes") -> Boxes:
     document = checked(content, BoxesDocument, source=source)
     frames = [
         FrameBoxes(
-            time_from_parts(frame.image_time.sec, frame.image_time.nanosec),
+            frame.image_time,
             tuple(_box(box, f"{source}: frames[{at}].boxes[{which}]") for which, box in enumerate(frame.boxes)),
         )
         for at, frame in enumerate(document.frames)
@@ -80,8 +73,7 @@ def own_boxes(content: Mapping[str, Any], source: str = "boxes") -> Boxes:
 
 def labels_text(labels: ReturnLabels) -> str:
     """Write the origin of returns as labels-1 text; the same labels give the same bytes."""
-    scans = [ScanDocument(_time(scan.radar_time), list(scan.tracks)) for scan in labels.scans]
-    return json_text(msgspec.to_builtins(LabelsDocument(LABELS_SCHEMA, scans)))
+    return document_text(LabelsDocument(LABELS_SCHEMA, list(labels.scans)))
 
 
 def read_labels(text: str, source: str = "labels") -> ReturnLabels:
@@ -95,15 +87,7 @@ def read_labels(text: str, source: str = "labels") -> ReturnLabels:
         InputError: invalid content; the message names the file, the place and what to do.
     """
     document = parse_document(text, LabelsDocument, source=source)
-    scans = [
-        LabelledScan(time_from_parts(scan.radar_time.sec, scan.radar_time.nanosec), tuple(scan.tracks))
-        for scan in document.scans
-    ]
-    return ReturnLabels(tuple(sorted(scans, key=lambda scan: scan.radar_time)), source)
-
-
-def _time(time: TimeNs) -> TimeDocument:
-    return TimeDocument(*time_parts(time))
+    return ReturnLabels(tuple(sorted(document.scans, key=lambda scan: scan.radar_time)), source)
 
 
 def _document(box: Box) -> BoxDocument:

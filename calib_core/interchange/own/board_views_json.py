@@ -16,7 +16,7 @@ from calib_core.interchange.own.lens_documents import (
     SourceDocument,
 )
 from calib_core.interchange.own.transform_document import finite_or_none, nan_if_none
-from calib_core.interchange.syntax.strict_json import json_text, parse_document
+from calib_core.interchange.syntax.strict_json import document_text, parse_document
 from calib_core.intrinsics import Board, BoardCorners, LeftOutPicture
 from calib_core.measurements import TimeNs
 
@@ -97,7 +97,7 @@ def write_board_views(found: BoardViews) -> str:
         list(found.searched),
         [_view_document(view) for view in found.views],
     )
-    return json_text(msgspec.to_builtins(document))
+    return document_text(document)
 
 
 def read_board_views(text: str, source: str = "views") -> BoardViews:

@@ -7,11 +7,9 @@ parts, the provenance.
 import dataclasses
 import hashlib
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict
 from pathlib import PurePath
 from typing import Any
 
-import msgspec
 import numpy as np
 from msgspec import UNSET, UnsetType
 
@@ -22,10 +20,8 @@ from calib_core.geometry import RigidTransform
 from calib_core.input_files import encodable
 from calib_core.interchange.calibration_file import (
     EQUATION,
-    AssumptionNote,
     CalibrationFile,
     FrameNames,
-    KeptResult,
     Provenance,
     VehicleNote,
     choose_check_point,
@@ -33,13 +29,10 @@ from calib_core.interchange.calibration_file import (
 from calib_core.interchange.format import Format, ImportedCalibration, Reads, WrittenPose, imported
 from calib_core.interchange.own import documents
 from calib_core.interchange.own.camera_document import camera_document, camera_of
-from calib_core.interchange.own.clicks_json import refuse_repeated_ids, unconfirmed_document, unconfirmed_of
+from calib_core.interchange.own.clicks_json import refuse_repeated_ids, unconfirmed_of
 from calib_core.interchange.own.documents import (
     AngleMapDocument,
     CovariancePartsDocument,
-    RadarErrorsDocument,
-    SystematicErrorDocument,
-    VehicleDocument,
 )
 from calib_core.interchange.own.documents import Matrix66 as StatedMatrix
 from calib_core.interchange.own.kept_results import kept_results, with_kept
@@ -53,14 +46,13 @@ from calib_core.interchange.own.transform_document import (
     transform_of,
 )
 from calib_core.interchange.syntax.content import Content, decoded
-from calib_core.interchange.syntax.strict_json import document_in, json_object, json_text
-from calib_core.measurements import ReflectorClick, Unpaired
+from calib_core.interchange.syntax.strict_json import builtins_of, document_in, json_object, json_text
+from calib_core.measurements import ReflectorClick
 from calib_core.radar import AngleMap, RadarErrors
-from calib_core.results import Calibration, CheckPoint, DataWarning, InputFile, Metrics
+from calib_core.results import Calibration, CheckPoint, DataWarning
 from calib_core.results.calibration import CovarianceParts
 from calib_core.results.confirmation import rests_on_fleet_prior
-from calib_core.results.systematic_errors import SystematicErrorResult
-from calib_core.results.verdict import Verdict, verdict_on
+from calib_core.results.verdict import verdict_on
 
 _ABOUT_PRIOR = ("fleet-prior-untested", "fleet-prior-decides", "far-from-its-kind")
 COVARIANCE_CONVENTION = (
@@ -138,25 +130,25 @@ def write_calibration(file: CalibrationFile) -> str:
         covariance_parts=covariance_parts_document(calibration.covariance_parts),
         sigma=documents.SigmaDocument(*map(finite_or_none, sigma)),
         check_point=documents.CheckPointDocument(nested(check.radar_m), nested(check.pixel_px)) if check else None,
-        metrics=_metrics_document(calibration.metrics),
+        metrics=calibration.metrics,
         noise_scale=documents.NoiseScaleDocument(*calibration.noise_scale),
-        radar_errors=radar_errors_document(calibration.radar_errors),
-        systematic_errors=[systematic_error_document(error) for error in calibration.systematic_errors],
+        radar_errors=calibration.radar_errors,
+        systematic_errors=list(calibration.systematic_errors),
         radar_angle_map=angle_map_document(calibration.angle_map),
         paper=documents.PaperDocument(finite_or_none(calibration.iterative_px), finite_or_none(calibration.sqpnp_px)),
-        verdict=_verdict_document(file.verdict),
+        verdict=file.verdict,
         evidence=file.evidence,
-        warnings=[documents.WarningDocument(c.code, c.message, c.hint) for c in calibration.warnings],
-        unpaired=[documents.UnpairedDocument(u.id, u.code, u.reason, u.hint) for u in calibration.unpaired],
+        warnings=list(calibration.warnings),
+        unpaired=list(calibration.unpaired),
         pairs=[solved_pair_document(pair) for pair in calibration.pairs],
         camera=camera_document(calibration.camera),
         given_camera=camera_document(calibration.given_camera) if calibration.given_camera is not None else None,
-        vehicle=vehicle_document(file.vehicle, file.kept),
+        vehicle=_stated_vehicle(file),
         options=documents.StatedOptions.of(calibration.options),
         provenance=provenance_document(file.provenance),
     )
-    content = msgspec.to_builtins(document)
-    if content["metrics"]["picture_sigma_px"] is None:
+    content = builtins_of(document)
+    if not np.isfinite(calibration.metrics.picture_sigma_px):
         del content["metrics"]["picture_sigma_px"]
     for pair in content["pairs"]:
         if not pair["candidates"]:
@@ -285,9 +277,9 @@ def _file(
         covariance=np.array(document.covariance or np.full((6, 6), np.nan)),
         camera=camera_of(document.camera, source=source),
         given_camera=_given_camera(document, source=source),
-        metrics=_metrics(document.metrics),
+        metrics=document.metrics,
         pairs=tuple(solved_pair_of(pair, source=source, place=f"pairs[{i}]") for i, pair in enumerate(document.pairs)),
-        unpaired=tuple(Unpaired(u.id, u.code, u.reason, u.hint) for u in document.unpaired),
+        unpaired=tuple(document.unpaired),
         warnings=_warnings(document),
         options=document.options.options(),
         noise_scale=(scale.click, scale.range, scale.azimuth, scale.elevation),
@@ -295,8 +287,8 @@ def _file(
         iterative_px=nan_if_none(document.paper.iterative_px),
         sqpnp_px=nan_if_none(document.paper.sqpnp_px),
         angle_map=angle_map_of(document.radar_angle_map, source=source),
-        radar_errors=radar_errors_of(document.radar_errors),
-        systematic_errors=tuple(map(systematic_error_of, document.systematic_errors)),
+        radar_errors=document.radar_errors,
+        systematic_errors=tuple(document.systematic_errors),
         covariance_parts=covariance_parts_of(document.covariance_parts, source=source),
     )
     rests_on_prior = document.fleet_prior is not None and document.fleet_prior.used
@@ -309,15 +301,15 @@ def _file(
         frames=frames,
         check_point=CheckPoint(np.array(check.radar_m), np.array(check.pixel_px)) if check else None,
         provenance=provenance_of(document.provenance),
-        verdict=verdict_on(calibration) if rests_on_prior else _verdict_of(document.verdict),
+        verdict=verdict_on(calibration) if rests_on_prior else document.verdict,
         evidence=document.evidence,
-        vehicle=vehicle_of(document.vehicle, source=source),
+        vehicle=document.vehicle or VehicleNote(),
     )
 
 
 def _warnings(document: documents.CalibrationDocument) -> tuple[DataWarning, ...]:
     """Return the warnings; of a pose that rests on a fleet's prior one says so, instead of those about the prior."""
-    warnings = tuple(DataWarning(c.code, c.message, c.hint) for c in document.warnings)
+    warnings = tuple(document.warnings)
     prior = document.fleet_prior
     if prior is None or not prior.used:
         return warnings
@@ -346,107 +338,10 @@ def _given_camera(document: documents.CalibrationDocument, *, source: str) -> Ca
     return None if given is None else camera_of(given, source=source, place="given_camera")
 
 
-def _verdict_document(verdict: Verdict | None) -> documents.VerdictDocument | None:
-    return documents.VerdictDocument(verdict.level, verdict.reason, verdict.action) if verdict else None
-
-
-def _verdict_of(document: documents.VerdictDocument | None) -> Verdict | None:
-    return Verdict(document.level, document.reason, document.action) if document else None
-
-
-def _metrics_document(metrics: Metrics) -> documents.MetricsDocument:
-    return documents.MetricsDocument(
-        aed_px=finite_or_none(metrics.aed_px),
-        cdsd_px=finite_or_none(metrics.cdsd_px),
-        rms_px=finite_or_none(metrics.rms_px),
-        held_out_aed_px=finite_or_none(metrics.held_out_aed_px),
-        acc=None if metrics.acc is None else finite_or_none(metrics.acc),
-        n=metrics.n,
-        chi2=finite_or_none(metrics.chi2),
-        degrees_of_freedom=metrics.degrees_of_freedom,
-        picture_sigma_px=finite_or_none(metrics.picture_sigma_px),
-    )
-
-
-def _metrics(document: documents.MetricsDocument) -> Metrics:
-    return Metrics(
-        aed_px=nan_if_none(document.aed_px),
-        cdsd_px=nan_if_none(document.cdsd_px),
-        rms_px=nan_if_none(document.rms_px),
-        n=document.n,
-        held_out_aed_px=nan_if_none(document.held_out_aed_px),
-        acc=document.acc,
-        chi2=nan_if_none(document.chi2),
-        degrees_of_freedom=document.degrees_of_freedom,
-        picture_sigma_px=nan_if_none(document.picture_sigma_px),
-    )
-
-
-def vehicle_document(note: VehicleNote, kept: tuple[KeptResult, ...] = ()) -> VehicleDocument | None:
-    """Return the document; None if nothing is stated.
-
-    Args:
-        note: what is stated.
-        kept: results that go back to their places, which may be in this document alone.
-    """
-    has_more = any(result.place[0] == "vehicle" for result in kept)
-    return VehicleDocument(**asdict(note)) if has_more or note != VehicleNote() else None
-
-
-def vehicle_of(document: VehicleDocument | None, *, source: str) -> VehicleNote:
-    """Return what a document states.
-
-    Raises:
-        InputError: a text is empty, too long or not printable, or a name has a slash; the message names the file and the key.
-    """
-    if document is None:
-        return VehicleNote()
-    try:
-        return VehicleNote(
-            document.name, document.type, document.session, document.radar_serial, document.camera_serial
-        )
-    except InputError as error:
-        raise InputError(f"{source}: {error}") from None
-
-
-def radar_errors_document(errors: RadarErrors) -> RadarErrorsDocument:
-    """Return the document of the radar's errors."""
-    return RadarErrorsDocument(
-        errors.azimuth_scale, errors.elevation_scale, errors.range_bias_m, errors.squared_height_m2
-    )
-
-
-def radar_errors_of(document: RadarErrorsDocument) -> RadarErrors:
-    """Return the radar's errors in a document."""
-    return RadarErrors(
-        document.azimuth_scale, document.elevation_scale, document.range_bias_m, document.squared_height_m2
-    )
-
-
-def systematic_error_document(error: SystematicErrorResult) -> SystematicErrorDocument:
-    """Return the document of one error; its text is left out, because its name says the same."""
-    return SystematicErrorDocument(
-        name=error.name,
-        value=error.value,
-        sigma=error.sigma,
-        prior_sigma=error.prior_sigma,
-        estimated=error.estimated,
-        position_share=finite_or_none(error.position_share) or 0.0,
-        rotation_share=finite_or_none(error.rotation_share) or 0.0,
-    )
-
-
-def systematic_error_of(document: SystematicErrorDocument) -> SystematicErrorResult:
-    """Return the error in a document."""
-    return SystematicErrorResult(
-        name=document.name,
-        value=document.value,
-        sigma=document.sigma,
-        prior_sigma=document.prior_sigma,
-        estimated=document.estimated,
-        position_share=document.position_share,
-        rotation_share=document.rotation_share,
-    )
+def _stated_vehicle(file: CalibrationFile) -> VehicleNote | None:
+    """Return what is stated; None if nothing is, and no result goes back into it."""
+    has_more = any(result.place[0] == "vehicle" for result in file.kept)
+    return file.vehicle if has_more or file.vehicle != VehicleNote() else None
 
 
 def angle_map_document(angle_map: AngleMap | None) -> AngleMapDocument | None:
@@ -524,7 +419,7 @@ def _part(rows: StatedMatrix, *, source: str, place: str) -> Matrix66:
 def provenance_document(provenance: Provenance) -> documents.ProvenanceDocument:
     """Return the document of a provenance."""
     return documents.ProvenanceDocument(
-        inputs=[documents.InputDocument(f.name, f.size_bytes, f.sha256) for f in provenance.inputs],
+        inputs=list(provenance.inputs),
         topics=documents.TopicsDocument(
             provenance.radar_topic,
             provenance.image_topic,
@@ -537,15 +432,15 @@ def provenance_document(provenance: Provenance) -> documents.ProvenanceDocument:
         video_start=provenance.video_start,
         version=provenance.version,
         column_map=list(provenance.column_map) or UNSET,
-        assumptions=[documents.AssumptionDocument(one.text, one.confirmed) for one in provenance.assumptions] or UNSET,
-        unconfirmed=unconfirmed_document(provenance.unconfirmed),
+        assumptions=list(provenance.assumptions) or UNSET,
+        unconfirmed=provenance.unconfirmed or UNSET,
     )
 
 
 def provenance_of(document: documents.ProvenanceDocument) -> Provenance:
     """Return the provenance in a document."""
     return Provenance(
-        inputs=tuple(InputFile(f.name, f.size_bytes, f.sha256) for f in document.inputs),
+        inputs=tuple(document.inputs),
         radar_topic=document.topics.radar,
         radar_topics=_radar_topics(document.topics),
         radar_choice=document.topics.radar_choice or "",
@@ -557,7 +452,7 @@ def provenance_of(document: documents.ProvenanceDocument) -> Provenance:
         video_start=document.video_start,
         version=document.version,
         column_map=tuple(document.column_map or ()),
-        assumptions=tuple(AssumptionNote(one.text, one.confirmed) for one in document.assumptions or ()),
+        assumptions=tuple(document.assumptions or ()),
         unconfirmed=unconfirmed_of(document.unconfirmed),
     )
 

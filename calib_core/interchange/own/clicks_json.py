@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-import msgspec
 from msgspec import UNSET, UnsetType
 
 from calib_core.errors import InputError
@@ -11,12 +10,9 @@ from calib_core.interchange.own.documents import (
     CLICKS_SCHEMA,
     ClickDocument,
     ClicksDocument,
-    ReturnDocument,
-    TimeDocument,
-    UnconfirmedDocument,
 )
-from calib_core.interchange.syntax.strict_json import json_text, parse_document
-from calib_core.measurements import ChosenReturn, ReflectorClick, time_from_parts, time_parts
+from calib_core.interchange.syntax.strict_json import document_text, parse_document
+from calib_core.measurements import ReflectorClick
 from calib_core.results import UnconfirmedClicks
 
 
@@ -75,26 +71,22 @@ def write_clicks(
         radar_topics: of the radar they were made with; written only if there are several, for whoever reads the file.
         unconfirmed: those that nobody confirmed.
     """
-    documents = [click_document(click) for click in sorted(clicks, key=lambda click: (click.image_time, click.id))]
+    stated = [click_document(click) for click in sorted(clicks, key=lambda click: (click.image_time, click.id))]
     topics = list(radar_topics) if len(radar_topics) > 1 else UNSET
-    return json_text(
-        msgspec.to_builtins(
-            ClicksDocument(CLICKS_SCHEMA, documents, radar_topics=topics, unconfirmed=unconfirmed_document(unconfirmed))
-        )
-    )
+    return document_text(ClicksDocument(CLICKS_SCHEMA, stated, radar_topics=topics, unconfirmed=unconfirmed or UNSET))
 
 
 def click_of(document: ClickDocument) -> ReflectorClick:
     """Return the click of a JSON object."""
     return ReflectorClick(
-        image_time=time_from_parts(document.image_time.sec, document.image_time.nanosec),
+        image_time=document.image_time,
         id=document.id,
         u_px=document.pixel_px[0],
         v_px=document.pixel_px[1],
         sigma_px=document.sigma_px,
         excluded=document.excluded,
         mark=document.mark,
-        chosen=None if document.chosen is None else chosen_of(document.chosen),
+        chosen=document.chosen,
     )
 
 
@@ -102,12 +94,12 @@ def click_document(click: ReflectorClick) -> ClickDocument:
     """Return the document of a click."""
     return ClickDocument(
         click.id,
-        TimeDocument(*time_parts(click.image_time)),
+        click.image_time,
         (click.u_px, click.v_px),
         sigma_px=click.sigma_px,
         excluded=click.excluded,
         mark=click.mark,
-        chosen=None if click.chosen is None else return_document(click.chosen),
+        chosen=click.chosen,
     )
 
 
@@ -125,35 +117,16 @@ def refuse_repeated_ids(ids: Sequence[str], *, source: str, place: str) -> None:
         first[name] = index
 
 
-def unconfirmed_document(unconfirmed: UnconfirmedClicks | None) -> UnconfirmedDocument | UnsetType:
-    """Return the document; unset if everything was confirmed."""
-    return UNSET if unconfirmed is None else UnconfirmedDocument(list(unconfirmed.ids), unconfirmed.confidence)
-
-
 def unconfirmed_of(
-    document: UnconfirmedDocument | UnsetType, present: Sequence[str] | None = None
+    stated: UnconfirmedClicks | UnsetType, present: Sequence[str] | None = None
 ) -> UnconfirmedClicks | None:
-    """Return what a document says; None if it says nothing.
+    """Return the unconfirmed clicks that a file states; None if there are none.
 
     Args:
-        document: of a file.
+        stated: in the file.
         present: ids of the file's clicks: others were taken out of it since; None keeps all.
     """
-    if isinstance(document, UnsetType):
+    if isinstance(stated, UnsetType):
         return None
-    ids = tuple(name for name in document.clicks if present is None or name in present)
-    return UnconfirmedClicks(ids, document.confidence) if ids else None
-
-
-def return_document(chosen: ChosenReturn) -> ReturnDocument:
-    """Return the document of a chosen return."""
-    time = None if chosen.radar_time is None else TimeDocument(*time_parts(chosen.radar_time))
-    return ReturnDocument(chosen.position_m, time, chosen.topic)
-
-
-def chosen_of(document: ReturnDocument) -> ChosenReturn:
-    """Return the chosen return of a JSON object."""
-    time = document.radar_time
-    return ChosenReturn(
-        document.position_m, None if time is None else time_from_parts(time.sec, time.nanosec), document.topic
-    )
+    ids = tuple(name for name in stated.ids if present is None or name in present)
+    return UnconfirmedClicks(ids, stated.confidence) if ids else None

@@ -5,7 +5,8 @@ from typing import Annotated, Final, Literal
 import msgspec
 from msgspec import Meta, Struct
 
-from calib_core.interchange.own.documents import Measured, TimeDocument
+from calib_core.json_forms import Measured
+from calib_core.measurements import LabelledScan, TimeNs
 
 BOXES_SCHEMA: Final = "cocalib/boxes-1"
 LABELS_SCHEMA: Final = "cocalib/labels-1"
@@ -29,7 +30,7 @@ class BoxDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults
 class FrameDocument(Struct, frozen=True, forbid_unknown_fields=True):
     """An annotated frame; no boxes say that nothing was seen in it."""
 
-    image_time: TimeDocument
+    image_time: TimeNs
     boxes: list[BoxDocument]
 
 
@@ -41,18 +42,11 @@ class BoxesDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_defaul
     image_size_px: tuple[PictureSide, PictureSide] | None = None
 
 
-class ScanDocument(Struct, frozen=True, forbid_unknown_fields=True):
-    """Which object each return of a scan comes from, in the scan's order; "" for anything else."""
-
-    radar_time: TimeDocument
-    tracks: list[Label]
-
-
 class LabelsDocument(Struct, frozen=True, forbid_unknown_fields=True):
     """The true origin of a simulated recording's returns."""
 
     schema: Literal["cocalib/labels-1"]
-    scans: list[ScanDocument]
+    scans: list[LabelledScan]
 
 
 for _document in (BoxesDocument, LabelsDocument):

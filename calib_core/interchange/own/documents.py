@@ -11,10 +11,14 @@ import msgspec
 from msgspec import UNSET, Meta, Struct, UnsetType, field
 
 from calib_core.camera import CameraModel
-from calib_core.interchange.calibration_file import MOST_CHARACTERS, Evidence
-from calib_core.measurements import Mark
+from calib_core.interchange.calibration_file import AssumptionNote, Evidence, VehicleNote
+from calib_core.json_forms import Count, Measured, Name, Pixel, Position, Positive, Share
+from calib_core.measurements import ChosenReturn, Mark, TimeNs, Unpaired
 from calib_core.options import RETIRED_METHODS, CalibrationOptions
-from calib_core.results.verdict import VerdictLevel
+from calib_core.radar import RadarErrors
+from calib_core.results import DataWarning, InputFile, Metrics, UnconfirmedClicks
+from calib_core.results.systematic_errors import SystematicErrorResult
+from calib_core.results.verdict import Verdict
 
 CLICKS_SCHEMA: Final = "cocalib/clicks-1"
 PAIRS_SCHEMA: Final = "cocalib/pairs-1"
@@ -30,39 +34,12 @@ def names_schema(text: str, schema: str) -> bool:
     return isinstance(content, dict) and content.get("schema") == schema
 
 
-Measured = Annotated[float, Meta(ge=-1e9, le=1e9)]
-"""The bound is far beyond any position, pixel or coefficient; it keeps what is computed from them finite."""
-Scale = Annotated[float, Meta(gt=-1.0, le=1e9)]
-"""A scale minus 1: -1 would be a scale of 0."""
-Pixel = tuple[Measured, Measured]
-Position = tuple[Measured, Measured, Measured]
 Vector2 = tuple[float, float]
 Vector4 = tuple[float, float, float, float]
 Vector6 = tuple[float, float, float, float, float, float]
 Matrix22 = tuple[Vector2, Vector2]
 Matrix33 = tuple[Position, Position, Position]
 Matrix66 = tuple[Vector6, Vector6, Vector6, Vector6, Vector6, Vector6]
-Name = Annotated[str, Meta(min_length=1, max_length=200)]
-Label = Annotated[str, Meta(extra_json_schema={"minLength": 1, "maxLength": MOST_CHARACTERS})]
-"""A vehicle, type, session or serial. For the schema only: VehicleNote refuses what is none, and says what to do."""
-Positive = Annotated[float, Meta(ge=1e-12, le=1e9)]
-"""A standard deviation; its square and the reciprocal of that are far from overflowing."""
-Count = Annotated[int, Meta(ge=0)]
-
-
-class TimeDocument(Struct, frozen=True, forbid_unknown_fields=True):
-    """A stamp as in ROS 2: whole seconds since the epoch, and nanoseconds within the second."""
-
-    sec: Annotated[int, Meta(ge=0, le=9_223_372_035)]
-    nanosec: Annotated[int, Meta(ge=0, le=999_999_999)]
-
-
-class ReturnDocument(Struct, frozen=True, omit_defaults=True):
-    """The radar return that a person chose for a click, at the position that the radar reports."""
-
-    position_m: Position
-    radar_time: TimeDocument | None = None
-    topic: str = ""
 
 
 class ClickDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, rename={"chosen": "return"}):
@@ -73,19 +50,12 @@ class ClickDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_defaul
     """
 
     id: Name
-    image_time: TimeDocument
+    image_time: TimeNs
     pixel_px: Pixel
     sigma_px: Positive | None = None
     excluded: bool = False
     mark: Mark = "clicked"
-    chosen: ReturnDocument | None = None
-
-
-class UnconfirmedDocument(Struct, frozen=True, forbid_unknown_fields=True):
-    """The ids of clicks that were placed automatically and that nobody confirmed, and the confidence that they are right."""
-
-    clicks: list[Name]
-    confidence: Annotated[float, Meta(ge=0.0, le=1.0)]
+    chosen: ChosenReturn | None = None
 
 
 class ClicksDocument(Struct, frozen=True, forbid_unknown_fields=True):
@@ -94,7 +64,7 @@ class ClicksDocument(Struct, frozen=True, forbid_unknown_fields=True):
     schema: Literal["cocalib/clicks-1"]
     clicks: list[ClickDocument]
     radar_topics: list[str] | UnsetType = UNSET
-    unconfirmed: UnconfirmedDocument | UnsetType = UNSET
+    unconfirmed: UnconfirmedClicks | UnsetType = UNSET
 
 
 class CameraCovarianceDocument(Struct, frozen=True, forbid_unknown_fields=True):
@@ -183,20 +153,6 @@ class CheckPointDocument(Struct, frozen=True):
     pixel_px: Pixel
 
 
-class MetricsDocument(Struct, frozen=True):
-    """Figures over the inlier pairs; null if unknown."""
-
-    aed_px: float | None = None
-    cdsd_px: float | None = None
-    rms_px: float | None = None
-    held_out_aed_px: float | None = None
-    acc: float | None = None
-    n: Count = 0
-    chi2: float | None = None
-    degrees_of_freedom: Count = 0
-    picture_sigma_px: float | None = None
-
-
 class CandidateDocument(Struct, frozen=True):
     """A radar position that may be the reflector.
 
@@ -206,7 +162,7 @@ class CandidateDocument(Struct, frozen=True):
 
     radar_m: Position
     sigma_polar: tuple[Positive, Positive, Positive] | None = None
-    score: Annotated[float, Meta(ge=0.0, le=1.0)] = 1.0
+    score: Share = 1.0
     returns: Count = 1
     scans: Count = 1
     snr_db: float | None = None
@@ -224,7 +180,7 @@ class SolvedPairDocument(Struct, frozen=True, rename={"chosen": "return"}):
     radar_m: Position
     pixel_px: Pixel
     inlier: bool
-    image_time: TimeDocument | None = None
+    image_time: TimeNs | None = None
     excluded: bool = False
     projected_px: Vector2 | None = None
     residual_px: Vector2 | None = None
@@ -234,43 +190,10 @@ class SolvedPairDocument(Struct, frozen=True, rename={"chosen": "return"}):
     candidate: Count = 0
     expected_covariance_px2: Matrix22 | None = None
     sigma_px: Positive | None = None
-    radar_time: TimeDocument | None = None
+    radar_time: TimeNs | None = None
     candidates: list[CandidateDocument] = []
     mark: Mark | UnsetType = UNSET
-    chosen: ReturnDocument | UnsetType = UNSET
-
-
-class UnpairedDocument(Struct, frozen=True):
-    """A click that found no radar position."""
-
-    id: Name
-    code: str
-    reason: str
-    hint: str
-
-
-class WarningDocument(Struct, frozen=True):
-    """Something to know before using the result."""
-
-    code: str
-    message: str
-    hint: str
-
-
-class VerdictDocument(Struct, frozen=True):
-    """How far to trust the result: a word, the stated error or what is wrong, and the one action that helps most."""
-
-    level: VerdictLevel
-    reason: str
-    action: str
-
-
-class InputDocument(Struct, frozen=True):
-    """An input file."""
-
-    name: str
-    size_bytes: Count
-    sha256: str
+    chosen: ChosenReturn | UnsetType = UNSET
 
 
 class TopicsDocument(Struct, frozen=True):
@@ -290,25 +213,18 @@ class ClocksDocument(Struct, frozen=True):
     image: str | None = None
 
 
-class AssumptionDocument(Struct, frozen=True):
-    """A unit, sign, order or meaning that the files do not state."""
-
-    text: str
-    confirmed: bool = False
-
-
 class ProvenanceDocument(Struct, frozen=True):
     """Where the result comes from."""
 
-    inputs: list[InputDocument] = []
+    inputs: list[InputFile] = []
     topics: TopicsDocument = field(default_factory=TopicsDocument)
     clocks: ClocksDocument = field(default_factory=ClocksDocument)
     radar_axes: str | None = None
     video_start: str | None = None
     version: str | None = None
     column_map: list[str] | UnsetType = UNSET
-    assumptions: list[AssumptionDocument] | UnsetType = UNSET
-    unconfirmed: UnconfirmedDocument | UnsetType = UNSET
+    assumptions: list[AssumptionNote] | UnsetType = UNSET
+    unconfirmed: UnconfirmedClicks | UnsetType = UNSET
 
 
 class NoiseScaleDocument(Struct, frozen=True):
@@ -327,30 +243,6 @@ class PaperDocument(Struct, frozen=True):
     sqpnp_px: float | None = None
 
 
-class RadarErrorsDocument(Struct, frozen=True):
-    """What the radar gets wrong at every position alike, to be taken out of a reported position before the pose is applied.
-
-    range = range - range_bias_m, then sqrt(range^2 - squared_height_m2); azimuth / (1 + azimuth_scale); elevation likewise.
-    """
-
-    azimuth_scale: Scale = 0.0
-    elevation_scale: Scale = 0.0
-    range_bias_m: Measured = 0.0
-    squared_height_m2: Measured = 0.0
-
-
-class SystematicErrorDocument(Struct, frozen=True):
-    """One error that all pairs share; value and sigmas have the unit in its name, the shares are of the pose's variance."""
-
-    name: Name
-    value: float
-    sigma: float
-    prior_sigma: float
-    estimated: bool = True
-    position_share: float = 0.0
-    rotation_share: float = 0.0
-
-
 class AngleMapDocument(Struct, frozen=True):
     """The radar's own smooth angle errors: what to add to a measured azimuth and elevation before applying the pose.
 
@@ -365,16 +257,6 @@ class AngleMapDocument(Struct, frozen=True):
     sigma_elevation_rad: list[list[float]]
     aed_px: float | None = None
     corrected_aed_px: float | None = None
-
-
-class VehicleDocument(Struct, frozen=True, omit_defaults=True):
-    """Which vehicle the calibration is of, and the serials of its sensors."""
-
-    name: Label | None = None
-    type: Label | None = None
-    session: Label | None = None
-    radar_serial: Label | None = None
-    camera_serial: Label | None = None
 
 
 class CovariancePartsDocument(Struct, frozen=True, omit_defaults=True):
@@ -442,20 +324,20 @@ class CalibrationDocument(Struct, frozen=True):
     covariance_parts: CovariancePartsDocument | None = None
     sigma: SigmaDocument = field(default_factory=SigmaDocument)
     check_point: CheckPointDocument | None = None
-    metrics: MetricsDocument = field(default_factory=MetricsDocument)
+    metrics: Metrics = field(default_factory=Metrics)
     noise_scale: NoiseScaleDocument = field(default_factory=NoiseScaleDocument)
-    radar_errors: RadarErrorsDocument = field(default_factory=RadarErrorsDocument)
-    systematic_errors: list[SystematicErrorDocument] = []
+    radar_errors: RadarErrors = field(default_factory=RadarErrors)
+    systematic_errors: list[SystematicErrorResult] = []
     radar_angle_map: AngleMapDocument | None = None
     paper: PaperDocument = field(default_factory=PaperDocument)
-    verdict: VerdictDocument | None = None
+    verdict: Verdict | None = None
     evidence: Evidence | None = None
-    warnings: list[WarningDocument] = []
-    unpaired: list[UnpairedDocument] = []
+    warnings: list[DataWarning] = []
+    unpaired: list[Unpaired] = []
     pairs: list[SolvedPairDocument] = []
     given_camera: CameraDocument | None = None
     fleet_prior: FleetPriorDocument | None = None
-    vehicle: VehicleDocument | None = None
+    vehicle: VehicleNote | None = None
     options: StatedOptions = field(default_factory=StatedOptions)
     provenance: ProvenanceDocument = field(default_factory=ProvenanceDocument)
 

@@ -1,6 +1,5 @@
 """Write intrinsics-1: a calibrated lens with all that is known about it, for programs."""
 
-import msgspec
 import numpy as np
 
 from calib_core.arrays import Values
@@ -12,7 +11,6 @@ from calib_core.interchange.own.board_views_json import (
     source_document,
 )
 from calib_core.interchange.own.camera_document import camera_document
-from calib_core.interchange.own.documents import WarningDocument
 from calib_core.interchange.own.lens_documents import (
     INTRINSICS_SCHEMA,
     CoverageDocument,
@@ -25,7 +23,7 @@ from calib_core.interchange.own.lens_documents import (
     UncertaintyDocument,
 )
 from calib_core.interchange.own.transform_document import finite_or_none
-from calib_core.interchange.syntax.strict_json import json_text
+from calib_core.interchange.syntax.strict_json import document_text
 from calib_core.intrinsics import (
     MODEL_ERRORS_UNSEEN,
     CalibratedLens,
@@ -74,10 +72,10 @@ def write_intrinsics(
         residual_field=_field(lens),
         coverage=None if coverage is None else _coverage(coverage),
         halves_apart=halves.reason if isinstance(halves, Unsolvable) else halves.sentence,
-        warnings=[WarningDocument(one.code, one.message, one.hint) for one in lens.warnings],
+        warnings=list(lens.warnings),
         board_shape_m=[(x, y, z) for x, y, z in lens.board_shape_m.tolist()],
     )
-    return json_text(msgspec.to_builtins(document))
+    return document_text(document)
 
 
 def _parameters(camera: Camera) -> list[LensParameterDocument]:

@@ -5,16 +5,10 @@ from typing import Annotated, Final, Literal
 import msgspec
 from msgspec import Meta, Struct
 
-from calib_core.interchange.own.documents import (
-    CameraDocument,
-    Count,
-    Measured,
-    Name,
-    Pixel,
-    Positive,
-    WarningDocument,
-)
+from calib_core.interchange.own.documents import CameraDocument
 from calib_core.intrinsics import BoardKind
+from calib_core.json_forms import Count, Measured, Name, Pixel, Positive
+from calib_core.results import DataWarning
 
 BOARD_VIEWS_SCHEMA: Final = "cocalib/board-views-1"
 INTRINSICS_SCHEMA: Final = "cocalib/intrinsics-1"
@@ -167,7 +161,7 @@ class IntrinsicsDocument(Struct, frozen=True):
     residual_field: ResidualFieldDocument
     coverage: CoverageDocument | None
     halves_apart: str
-    warnings: list[WarningDocument]
+    warnings: list[DataWarning]
     board_shape_m: list[tuple[Measured, Measured, Measured]]
 
 

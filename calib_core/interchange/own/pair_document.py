@@ -5,9 +5,8 @@ from msgspec import UNSET, UnsetType
 
 from calib_core.errors import InputError
 from calib_core.interchange.own import documents
-from calib_core.interchange.own.clicks_json import chosen_of, return_document
 from calib_core.interchange.own.transform_document import finite_or_none, nan_if_none, nested
-from calib_core.measurements import Candidate, Pair, TimeNs, time_from_parts, time_parts
+from calib_core.measurements import Candidate, Pair
 from calib_core.radar import covariance_from_sigma_polar
 from calib_core.results import PairResult
 
@@ -22,7 +21,7 @@ def solved_pair_document(pair: PairResult) -> documents.SolvedPairDocument:
     measured = pair.measured
     return documents.SolvedPairDocument(
         id=pair.id,
-        image_time=_time_document(pair.image_time),
+        image_time=pair.image_time,
         radar_m=nested(pair.point_radar_m),
         pixel_px=nested(pair.pixel_px),
         projected_px=nested(pair.projected_px),
@@ -35,10 +34,10 @@ def solved_pair_document(pair: PairResult) -> documents.SolvedPairDocument:
         candidate=int(pair.candidate),
         expected_covariance_px2=nested(pair.expected_covariance_px2),
         sigma_px=measured.sigma_px if measured else None,
-        radar_time=_time_document(measured.radar_time) if measured else None,
+        radar_time=measured.radar_time if measured else None,
         candidates=[_candidate_document(candidate) for candidate in measured.candidates] if measured else [],
         mark=measured.mark if measured and measured.mark != "clicked" else UNSET,
-        chosen=return_document(measured.chosen) if measured and measured.chosen else UNSET,
+        chosen=measured.chosen or UNSET if measured else UNSET,
     )
 
 
@@ -60,7 +59,7 @@ def solved_pair_of(document: documents.SolvedPairDocument, *, source: str, place
         influence=nan_if_none(document.influence),
         candidate=document.candidate,
         expected_covariance_px2=np.array(document.expected_covariance_px2 or [[np.nan] * 2] * 2),
-        image_time=_time_of(document.image_time),
+        image_time=document.image_time,
         measured=_measured(document) if document.candidates else None,
     )
 
@@ -71,10 +70,10 @@ def _measured(document: documents.SolvedPairDocument) -> Pair:
         pixel_px=np.array(document.pixel_px),
         candidates=tuple(_candidate(candidate) for candidate in document.candidates),
         sigma_px=document.sigma_px,
-        image_time=_time_of(document.image_time),
-        radar_time=_time_of(document.radar_time),
-        mark="clicked" if isinstance(document.mark, UnsetType) else document.mark,
-        chosen=None if isinstance(document.chosen, UnsetType) else chosen_of(document.chosen),
+        image_time=document.image_time,
+        radar_time=document.radar_time,
+        mark=document.mark or "clicked",
+        chosen=document.chosen or None,
     )
 
 
@@ -102,14 +101,6 @@ def _candidate(document: documents.CandidateDocument) -> Candidate:
         snr_db=nan_if_none(document.snr_db),
         alternative_of=-1 if isinstance(document.alternative_of, UnsetType) else document.alternative_of,
     )
-
-
-def _time_document(time: TimeNs | None) -> documents.TimeDocument | None:
-    return None if time is None else documents.TimeDocument(*time_parts(time))
-
-
-def _time_of(document: documents.TimeDocument | None) -> TimeNs | None:
-    return None if document is None else time_from_parts(document.sec, document.nanosec)
 
 
 def _check_candidates(document: documents.SolvedPairDocument, *, source: str, place: str) -> None:

@@ -4,7 +4,6 @@ import dataclasses
 import math
 from dataclasses import dataclass
 
-import msgspec
 import numpy as np
 
 from calib_core.arrays import Vector3
@@ -20,7 +19,7 @@ from calib_core.interchange.own.documents import (
     PositionDocument,
     RadarDocument,
 )
-from calib_core.interchange.syntax.strict_json import json_text, parse_document
+from calib_core.interchange.syntax.strict_json import document_text, parse_document
 from calib_core.measurements import Candidate, Pair
 from calib_core.options import CalibrationOptions, CameraPositionPrior, NoiseOptions
 from calib_core.radar import covariance_from_sigma_polar
@@ -101,7 +100,7 @@ def write_pairs(pairs_file: PairsFile) -> str:
         radar=None if sigmas == (None, None, None) else RadarDocument(*sigmas),
         camera_position_in_radar=PositionDocument(prior.position_m, prior.sigma_m) if prior else None,
     )
-    return json_text(msgspec.to_builtins(document))
+    return document_text(document)
 
 
 def _sigma_polar(radar: RadarDocument, noise: NoiseOptions) -> Vector3:

@@ -4,16 +4,9 @@ from typing import Annotated, Final, Literal
 
 from msgspec import Meta, Struct
 
-from calib_core.interchange.own.documents import (
-    ClickDocument,
-    Count,
-    Matrix33,
-    Measured,
-    Pixel,
-    Position,
-    Positive,
-    TimeDocument,
-)
+from calib_core.interchange.own.documents import ClickDocument, Matrix33
+from calib_core.json_forms import Count, Measured, Pixel, Position, Positive
+from calib_core.measurements import TimeNs
 
 PROPOSALS_SCHEMA: Final = "cocalib/proposals-1"
 
@@ -23,8 +16,8 @@ _Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 class DwellDocument(Struct, frozen=True):
     """A placement as the radar saw it; score and the mean SNR of its returns, null if the radar reports none."""
 
-    start: TimeDocument
-    end: TimeDocument
+    start: TimeNs
+    end: TimeNs
     position_radar_m: Position
     range_m: Measured
     score: _Share

@@ -22,7 +22,9 @@ from calib_core.interchange.own.lens_documents import (
     IntrinsicsDocument,
 )
 from calib_core.interchange.own.proposal_documents import PROPOSALS_SCHEMA, ProposalsDocument
-from calib_core.interchange.syntax.strict_json import json_text
+from calib_core.interchange.syntax.strict_json import is_setting, json_text
+from calib_core.json_forms import form_of
+from calib_core.measurements import Stamp
 
 _DOCUMENTS: dict[str, Any] = {
     CLICKS_SCHEMA: ClicksDocument,
@@ -34,6 +36,23 @@ _DOCUMENTS: dict[str, Any] = {
     INTRINSICS_SCHEMA: IntrinsicsDocument,
     PROPOSALS_SCHEMA: ProposalsDocument,
 }
+
+_NAMES = {
+    "AssumptionNote": "AssumptionDocument",
+    "ChosenReturn": "ReturnDocument",
+    "DataWarning": "WarningDocument",
+    "LabelledScan": "ScanDocument",
+    "InputFile": "InputDocument",
+    "Metrics": "MetricsDocument",
+    "RadarErrors": "RadarErrorsDocument",
+    "Stamp": "TimeDocument",
+    "SystematicErrorResult": "SystematicErrorDocument",
+    "Unpaired": "UnpairedDocument",
+    "UnconfirmedClicks": "UnconfirmedDocument",
+    "VehicleNote": "VehicleDocument",
+    "Verdict": "VerdictDocument",
+}
+"""The names under which definitions were published, where they differ from those of their types."""
 
 
 def schema_texts() -> dict[str, str]:
@@ -53,12 +72,12 @@ def schema_text(name: str, document: Any) -> str:
         name: of the schema, such as cocalib/clicks-1.
         document: the type of its content.
     """
+    (top,), components = msgspec.json.schema_components([document], schema_hook=_form_schema)
+    (_,), stamp = msgspec.json.schema_components([Stamp])
+    definitions: dict[str, Any] = {}
+    published = _published(top, components | stamp, definitions)
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": name}
-    schema = {**head, **msgspec.json.schema(document)}
-    for part, definition in schema["$defs"].items():
-        if part.endswith(("Options", "Prior")):  # settings: the reader refuses unknown keys
-            definition["additionalProperties"] = False
-    return json_text(_null_last(schema))
+    return json_text({**head, **published, "$defs": definitions})
 
 
 def write_schemas(folder: Path) -> None:
@@ -68,14 +87,36 @@ def write_schemas(folder: Path) -> None:
         (folder / name).write_text(text, encoding="utf-8")
 
 
-def _null_last(schema: Any) -> Any:
-    """Put null behind the other types of a choice: msgspec's order of them differs from version to version."""
-    if isinstance(schema, dict):
-        ordered = {key: _null_last(value) for key, value in schema.items()}
-        if "anyOf" in ordered:
-            ordered["anyOf"].sort(key=lambda choice: choice == {"type": "null"})
-        return ordered
-    return [_null_last(item) for item in schema] if isinstance(schema, list) else schema
+def _form_schema(kind: Any) -> dict[str, Any]:
+    """Return the schema of a type that JSON states in another form."""
+    form = form_of(kind)
+    return {"$ref": f"#/$defs/{Stamp.__name__}"} if form is Stamp else msgspec.json.schema(form)
+
+
+def _published(schema: Any, components: dict[str, Any], definitions: dict[str, Any]) -> Any:
+    """Return a schema with published names, and add the definitions that it refers to in the order in which it does.
+
+    Null is put behind the other types of a choice: msgspec's order of them differs from version to version.
+    """
+    if isinstance(schema, list):
+        return [_published(item, components, definitions) for item in schema]
+    if not isinstance(schema, dict):
+        return schema
+    shown = {key: _published(value, components, definitions) for key, value in schema.items() if key != "$ref"}
+    if "anyOf" in shown:
+        shown["anyOf"].sort(key=lambda choice: choice == {"type": "null"})
+    if "$ref" not in schema:
+        return shown
+    part = schema["$ref"].removeprefix("#/$defs/")
+    name = _NAMES.get(part, part)
+    if name not in definitions:
+        definitions[name] = {}
+        definition = components[part] | {"title": name}
+        definition["description"] = definition["description"].partition("\n\n    Attributes:")[0]
+        if is_setting(part):  # the reader refuses unknown keys
+            definition["additionalProperties"] = False
+        definitions[name] |= _published(definition, components, definitions)
+    return {"$ref": f"#/$defs/{name}", **shown}
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_
 import msgspec
 
 from calib_core.errors import InputError
+from calib_core.json_forms import form_of, from_json, to_json
 
 Document = TypeVar("Document")
 
@@ -65,10 +66,12 @@ def checked(content: Mapping[str, Any], document: type[Document], *, source: str
     for where, fault in _faults(content, document, place):
         raise InputError(f"{source}: {where or 'the file'}: {fault}")
     try:
-        return msgspec.convert(content, document)
+        return msgspec.convert(content, document, dec_hook=from_json)
     except UnicodeEncodeError as error:
         half = f"{error.object[error.start]!a}"
         raise InputError(f"{source}: {place or 'the file'}: contains half a character ({half}); remove it") from None
+    except InputError as error:  # a type's own words, which begin with the key
+        raise InputError(f"{source}: {error}") from None
     except (msgspec.ValidationError, OverflowError) as error:
         raise InputError(f"{source}: {_from_msgspec(str(error), place)}") from None
 
@@ -181,8 +184,8 @@ def _unknown_word(what: str, word: str, known: list[str], these: str) -> str:
 
 def _variants(annotation: Any) -> list[Any]:
     if get_origin(annotation) in (Union, types.UnionType):
-        return [part for part in get_args(annotation) if part is not type(None)]
-    return [annotation]
+        return [form_of(part) for part in get_args(annotation) if part is not type(None)]
+    return [form_of(annotation)]
 
 
 def fields_of(annotation: Any) -> Mapping[str, Any] | None:
@@ -206,10 +209,15 @@ def _fields_of_type(part: type) -> Mapping[str, Any] | None:
 def _refuses_unknown(annotation: Any) -> bool:
     """Return whether a type refuses unknown keys: inputs and settings do, results may grow."""
     return all(
-        part.__struct_config__.forbid_unknown_fields if issubclass(part, msgspec.Struct) else True
+        part.__struct_config__.forbid_unknown_fields if issubclass(part, msgspec.Struct) else is_setting(part.__name__)
         for part in _variants(annotation)
         if isinstance(part, type)
     )
+
+
+def is_setting(name: str) -> bool:
+    """Return whether a dataclass of this name holds settings, whose reader refuses unknown keys."""
+    return name.endswith(("Options", "Prior"))
 
 
 def item_type(annotation: Any) -> Any:
@@ -222,10 +230,10 @@ def item_type(annotation: Any) -> Any:
 
 
 def _from_msgspec(message: str, outer: str) -> str:
-    """Turn msgspec's "text - at `$.path`" into "path: text"."""
-    match = re.fullmatch(r"(.*?)(?: - at `\$\.?(.*?)`)?", message, flags=re.DOTALL)
-    text, inner = (match.group(1), match.group(2)) if match else (message, None)
-    place = ".".join(part for part in (outer, inner) if part)
+    """Turn msgspec's "text - at `$.path`" into "path: text", and the place within another form, "text in `key`", likewise."""
+    match = re.fullmatch(r"(.*?)(?: in `(.*?)`)?(?: - at `\$\.?(.*?)`)?", message, flags=re.DOTALL)
+    text, within, inner = match.groups() if match else (message, None, None)
+    place = ".".join(part for part in (outer, inner, within) if part)
     text = text.replace("`", "").replace("Expected", "expected", 1)
     missing = re.fullmatch(r"Object missing required field (\w+)", text)
     if missing:
@@ -236,6 +244,16 @@ def _from_msgspec(message: str, outer: str) -> str:
 
 _WIDTH = 118
 _INDENT = "  "
+
+
+def document_text(document: Any) -> str:
+    """Write a document as JSON; the same document gives the same bytes."""
+    return json_text(builtins_of(document))
+
+
+def builtins_of(document: Any) -> Any:
+    """Return a document as dicts, lists, strings and numbers."""
+    return msgspec.to_builtins(document, enc_hook=to_json)
 
 
 def json_text(content: Any) -> str:

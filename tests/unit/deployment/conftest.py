@@ -50,7 +50,7 @@ def calibration_file(
         camera_from_radar=CAMERA_FROM_RADAR,
         covariance=np.full((6, 6), nothing),
         camera=camera,
-        metrics=Metrics(nothing, nothing, nothing, 0),
+        metrics=Metrics(),
         pairs=(),
         unpaired=(),
         warnings=(),

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from calib_core.association.placements import Placement
 from calib_core.geometry import RigidTransform, rotation_angle_rad, rotation_exp
 from calib_core.interchange.own.proposal_documents import ProposalsDocument
+from calib_core.json_forms import from_json
 from calib_core.measurements import NS_PER_S, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions, MountingOptions
 from calib_core.proposing import (
@@ -241,7 +242,7 @@ def test_the_document_follows_its_schema_and_unknown_figures_are_null() -> None:
     text = proposals_json(proposals, VIEWS, SOURCE)
     assert text == proposals_json(proposals, VIEWS, SOURCE)
     document = json.loads(text)
-    msgspec.convert(document, ProposalsDocument)
+    msgspec.convert(document, ProposalsDocument, dec_hook=from_json)
     (one,) = document["proposals"]
     assert one["click"] == {
         "id": "p3",

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import msgspec
 
 from calib_core.errors import CalibrationError
-from calib_core.measurements import time_from_json, time_to_json
+from calib_core.json_forms import from_json, to_json
 from cocalib.option_changes import kept_options
 from cocalib.session import JournalStep, OptionsChanged, Step
 from cocalib.session.file.guarded_folder import GuardedFolder, SessionFileError
@@ -126,7 +126,7 @@ def _content(number: int, step: Step) -> bytes:
     """
     if not isinstance(step, JournalStep):
         raise TypeError(f"{type(step).__name__} is not journalled")
-    content = msgspec.json.encode(Line(number, step), enc_hook=time_to_json)
+    content = msgspec.json.encode(Line(number, step), enc_hook=to_json)
     _step(content, number)
     return content
 
@@ -451,7 +451,7 @@ def _step(content: bytes, number: int | None) -> Step:
         ValueError: it is none, or has another number.
     """
     try:
-        read = msgspec.json.decode(content, type=Line, dec_hook=time_from_json)
+        read = msgspec.json.decode(content, type=Line, dec_hook=from_json)
         step: Step = read.step
         if isinstance(step, OptionsChanged):
             step = OptionsChanged.of(kept_options(step.options))

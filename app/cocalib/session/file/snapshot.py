@@ -13,7 +13,8 @@ from msgspec import Meta
 
 from calib_core.errors import CalibrationError
 from calib_core.interchange.own.documents import ClickDocument
-from calib_core.measurements import TimeNs, time_from_json
+from calib_core.json_forms import from_json
+from calib_core.measurements import TimeNs
 from calib_core.options import CalibrationOptions
 from cocalib.option_changes import kept_options
 from cocalib.session import (
@@ -95,7 +96,7 @@ def read_snapshot(data: bytes, place: str) -> FoundSnapshot:
     if found.sum and (not found.follows("") or not data.endswith(b"\n")):
         raise _damaged(place, "its checksum is wrong")
     try:
-        snapshot = msgspec.json.decode(found.content, type=_Snapshot, dec_hook=time_from_json)
+        snapshot = msgspec.json.decode(found.content, type=_Snapshot, dec_hook=from_json)
         options = kept_options(snapshot.options)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError, CalibrationError) as error:
         raise _damaged(place, str(error)) from error

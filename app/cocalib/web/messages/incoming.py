@@ -9,7 +9,8 @@ from msgspec import Meta
 from msgspec.structs import replace
 
 from calib_core.errors import InputError
-from calib_core.measurements import TimeNs, time_from_json
+from calib_core.json_forms import from_json
+from calib_core.measurements import TimeNs
 from cocalib.option_changes import changes_from_tree
 from cocalib.session import AxesStated, ClickPlaced, ColumnsMapped, JournalStep, OptionsChanged
 from cocalib.session.events import Id
@@ -223,7 +224,7 @@ def parse(text: str | bytes) -> Incoming:
     kind = _kind(fields)
     request = None if kind == "frame" else fields.pop("request", None)
     try:
-        command = msgspec.convert(fields, _TYPES[kind], dec_hook=time_from_json)
+        command = msgspec.convert(fields, _TYPES[kind], dec_hook=from_json)
         return Incoming(_checked(command), msgspec.convert(request, RequestNumber | None))
     except msgspec.ValidationError as error:
         raise InputError(f"invalid message '{kind}': {error}") from error

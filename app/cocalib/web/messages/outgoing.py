@@ -7,10 +7,10 @@ from operator import attrgetter
 from typing import Any, Literal, TypeAlias
 
 import msgspec
-import numpy as np
 
 from calib_core.arrays import TimesNs
-from calib_core.measurements import NS_PER_S, Stamp, time_to_json
+from calib_core.json_forms import to_json
+from calib_core.measurements import NS_PER_S, Stamp
 from calib_core.results import DataWarning
 from cocalib.option_changes import OptionGroup, option_groups
 from cocalib.proposing import ProposingProgress
@@ -466,16 +466,11 @@ def encode(message: Outgoing) -> str:
     written as an escape (backslash, x or u, digits).
     """
     try:
-        body = msgspec.json.encode(message, enc_hook=_plain).decode()
+        body = msgspec.json.encode(message, enc_hook=to_json).decode()
     except UnicodeEncodeError:
-        body = msgspec.json.encode(_unicode(msgspec.to_builtins(message, enc_hook=_plain))).decode()
+        body = msgspec.json.encode(_unicode(msgspec.to_builtins(message, enc_hook=to_json))).decode()
     separator = "," if len(body) > 2 else ""
     return f'{{"type":"{TYPES[type(message)]}"{separator}{body[1:]}'
-
-
-def _plain(value: Any) -> Any:
-    """Give msgspec the JSON form of an array, row by row, or of a time, as its `enc_hook`."""
-    return value.tolist() if isinstance(value, np.ndarray) else time_to_json(value)
 
 
 def _unicode(tree: object) -> object:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 import msgspec
 import numpy as np
 
-from calib_core.measurements import Stamp, TimeNs
+from calib_core.json_forms import form_of
 from cocalib.web.messages.incoming import Message
 from cocalib.web.messages.outgoing import TYPES, FrameHeader, Outgoing
 
@@ -95,8 +95,8 @@ def _type(hint: Any, known: dict[str, str]) -> str:
     origin, arguments = get_origin(hint), get_args(hint)
     if hint in _PLAIN:
         return _PLAIN[hint]
-    if hint is TimeNs:
-        return _type(Stamp, known)
+    if form_of(hint) is not hint:
+        return _type(form_of(hint), known)
     if origin is Annotated:
         is_array = arguments[0] is np.ndarray
         return "number" + "[]" * len(arguments[1].split()) if is_array else _type(arguments[0], known)

@@ -14,7 +14,8 @@ import msgspec
 import numpy as np
 import pytest
 
-from calib_core.measurements import ChosenReturn, ReflectorClick, Unsolvable, time_from_json, time_to_json
+from calib_core.json_forms import from_json, to_json
+from calib_core.measurements import ChosenReturn, ReflectorClick, Unsolvable
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 from cocalib.session import (
     Cleared,
@@ -74,8 +75,8 @@ STEPS = (
 
 @pytest.mark.parametrize("step", STEPS, ids=lambda step: type(step).__name__)
 def test_a_step_comes_back_from_its_json_form_bit_for_bit(step) -> None:
-    text = msgspec.json.encode(Line(1, step), enc_hook=time_to_json)
-    assert msgspec.json.decode(text, type=Line, dec_hook=time_from_json).step == step
+    text = msgspec.json.encode(Line(1, step), enc_hook=to_json)
+    assert msgspec.json.decode(text, type=Line, dec_hook=from_json).step == step
 
 
 def test_answers_are_not_journalled(tmp_path: Path) -> None:

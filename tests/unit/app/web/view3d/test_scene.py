@@ -49,7 +49,7 @@ def calibration(*, off_px: float = 0.0) -> Calibration:
         PairResult(f"c{place + 1}", np.add(pixel, (off_px, 0.0)), pixel, point, inlier=True)
         for place, (pixel, point) in enumerate(zip(pixels, points, strict=True))
     )
-    metrics = Metrics(off_px, 0.0, off_px, len(pairs))
+    metrics = Metrics(off_px, 0.0, off_px, n=len(pairs))
     return Calibration(camera_from_radar, np.full((6, 6), np.nan), CAMERA, metrics, pairs, (), (), CalibrationOptions())
 
 
