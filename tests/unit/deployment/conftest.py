@@ -21,7 +21,10 @@ from calib_core.options import CalibrationOptions
 from calib_core.radar import RadarErrors
 from calib_core.recordings import RecordingOptions, open_recording
 from calib_core.results import Calibration, Metrics
-from tests.unit.recordings.conftest import Ros, plain_rows, write_rows
+from tests.unit.recordings.conftest import Ros, jpeg, plain_rows, ros, write
+
+_BORROWED = (jpeg, ros, write)
+"""Fixtures of the recordings' tests."""
 
 START_NS = 1_700_000_000 * NS_PER_S
 CAMERA_FROM_RADAR = RigidTransform(
@@ -124,19 +127,6 @@ def without_info(rows: list[Any]) -> list[Any]:
     return [row for row in rows if row[0] != "/camera/camera_info"]
 
 
-@pytest.fixture(params=[1, 2], ids=["ros1", "ros2"])
-def ros(request: pytest.FixtureRequest) -> Ros:
-    return Ros(request.param)
-
-
-@pytest.fixture(scope="session")
-def jpeg() -> bytes:
-    import cv2
-
-    pixels = np.random.default_rng(3).integers(0, 255, (48, 64, 3), dtype=np.uint8)
-    return bytes(cv2.imencode(".jpg", cv2.GaussianBlur(pixels, (5, 5), 0))[1].tobytes())
-
-
 @pytest.fixture
 def rows(jpeg: bytes) -> Callable[..., list[Any]]:
     """Return the function that builds an ordinary recording."""
@@ -145,15 +135,3 @@ def rows(jpeg: bytes) -> Callable[..., list[Any]]:
         return plain_rows(ros, jpeg, **changes)
 
     return build
-
-
-@pytest.fixture
-def write(tmp_path: Path) -> Callable[..., Path]:
-    """Return the function that writes rows to a file in the first container of that generation, or another."""
-
-    def to_file(ros: Ros, rows: list[Any], container: str = "", name: str = "made") -> Path:
-        container = container or ("bag" if ros.generation == 1 else "mcap")
-        suffix = "bag" if container.startswith("bag") else container
-        return write_rows(tmp_path / f"{name}.{suffix}", ros, rows, container)
-
-    return to_file
