@@ -305,6 +305,13 @@ _CSV = (
     b"time_ns,x_m,y_m,z_m,doppler_mps,snr_db\n1700000000000000000,1,2,3,0.1,20\n1700000000100000000,1,2,3,,20\n",
     b"timestamp [s];range [m];azimuth [deg]\n1700000000,5;3,2;10\n",
     b"2024/05/17/09:42:31.20,x\n",
+    b'date,time,x [cm],y [mm],v [km/h]\n2024-05-17,09:42:31.25,"[1, 2]","[3, 4]","[0, 1]"\n2024-05-17,09:42:31.35,[1],[2],[3]\n',
+)
+_JSON_LINES = (
+    b'{"time_ns":1700000000000000000,"x_m":1,"y_m":2,"z_m":3,"doppler_mps":0.5,"id":null}\n' * 3,
+    b'{"header":{"stamp":{"sec":1700000000,"nanosec":5}},"detections":[{"position":{"x":1,"y":2,"z":3},"snr_db":9}]}\n'
+    * 2,
+    b'[{"timestamp_us":1700000000000000,"x_m":[1,2],"y_m":[3,4],"z_m":[0,0]}]',
 )
 _CLICK = b'{"type":"click_placed","image_time":{"sec":1700000000,"nanosec":%d},"pixel_px":[1.5,2.5],"request":3}'
 _MESSAGES = (
@@ -323,10 +330,12 @@ _MESSAGES = (
 )
 
 TARGETS: tuple[Target, ...] = (
-    _file_target("bag", ".bag", _containers("bag", "bag-lz4", cases="bag_"), b"#ROSBAG V2.0\n", b"conn=", b"chunk_pos="),
+    _file_target("bag", ".bag", _containers("bag", "bag-lz4", "bag-bz2", cases="bag_"),
+                 b"#ROSBAG V2.0\n", b"conn=", b"chunk_pos="),
     _file_target("mcap", ".mcap", _containers("mcap", "mcap-zstd", cases="mcap_"), b"\x89MCAP0\r\n", b"zstd", b"lz4"),
-    _file_target("db3", ".db3", _containers("db3", cases="db3_"), b"SQLite format 3\0", b"messages", b"topics"),
+    _file_target("db3", ".db3", _containers("db3", "db3-zstd", cases="db3_"), b"SQLite format 3\0", b"messages", b"topics"),
     _file_target("csv", ".csv", _fixed(*_CSV), b"time_ns", b"x_m", b"y_m", b"range_m", b"azimuth_deg", b",", b";", b"\t"),
+    _file_target("json-lines", ".jsonl", _fixed(*_JSON_LINES), b'"points"', b'"x_m"', b"null", b"[[", b"1e999", b"NaN"),
     _folder_target("pcd", ".pcd", _pcd, b"FIELDS", b"DATA ascii\n", b"WIDTH", b"COUNT", b"rgb"),
     _folder_target("bin", ".bin", _fixed(np.arange(14, dtype="<f4").tobytes(), bytes(28))),
     _folder_target("jpeg", ".jpg", _fixed(_jpeg(), _jpeg(8, 8)), b"\xff\xd8", b"\xff\xe1", b"\xff\xd9", b"\xff\xc0"),
