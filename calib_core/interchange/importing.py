@@ -1,6 +1,6 @@
 """Read a calibration in any known format, and make a calibration-1 file of it with what it rests on."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
 
@@ -25,7 +25,7 @@ from calib_core.interchange.formats.statement import stated_origin
 from calib_core.interchange.syntax.content import Content, readings
 from calib_core.interchange.trees.frame_choice import WantedFrames
 from calib_core.interchange.trees.posed_in_tree import calibration_in_tree, chained_calibration
-from calib_core.interchange.trees.reading import TreeFile, files_of_trees, read_tree
+from calib_core.interchange.trees.reading import TreeFile, read_tree
 from calib_core.options import CalibrationOptions
 from calib_core.radar import RadarErrors
 from calib_core.results import Calibration, DataWarning, Metrics
@@ -40,6 +40,17 @@ _KNOWN = (
 )
 
 _OF_FOLDERS = ("calib_velo_to_cam.txt", "images.txt")  # of KITTI and COLMAP, read with the file beside it
+_OF_TREES = (
+    "*.urdf",
+    "*.xacro",
+    "*calibration.yaml",
+    "*extrinsics*.yaml",
+    "*intrinsics*.yaml",
+    "sensor.json",
+    "calibrated_sensor.json",
+)
+_DEPTH = 4
+_MOST_FILES = 300
 _OTHERS = "; a pose that states nothing: cocalib import FILE lists what its numbers may mean"
 
 
@@ -96,14 +107,33 @@ def tree_files(paths: Sequence[Path]) -> tuple[TreeFile, ...]:
 
 
 def _files_at(path: Path) -> tuple[Path, ...]:
-    """Return the files of a folder to read, or the file itself.
+    """Return the files of a folder to read, those that may contain joints by their names, or the file itself.
 
     Raises:
         InputError: the folder contains none, or very many.
     """
-    whole = (path / name for name in _OF_FOLDERS if path.is_dir())
-    first = next((file for file in whole if file.is_file()), None)
-    return files_of_trees(path) if first is None else (first,)
+    if not path.is_dir():
+        return (path,)
+    for name in _OF_FOLDERS:
+        if (path / name).is_file():
+            return (path / name,)
+    found = sorted(_named_in(path, _DEPTH))
+    if not found:
+        raise InputError(
+            f"{path}: no file of frames in this folder (looked for {', '.join(_OF_TREES)}); give the files themselves"
+        )
+    if len(found) > _MOST_FILES:
+        raise InputError(f"{path}: {len(found)} files that may contain frames; give the folder of one vehicle")
+    return tuple(found)
+
+
+def _named_in(folder: Path, depth: int) -> Iterator[Path]:
+    for path in sorted(folder.iterdir()):
+        if path.is_dir():
+            if depth > 1 and not path.name.startswith("."):
+                yield from _named_in(path, depth - 1)
+        elif any(path.match(pattern) for pattern in _OF_TREES):
+            yield path
 
 
 def files_beside(path: str | Path) -> Mapping[str, bytes]:

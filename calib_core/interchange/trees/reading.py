@@ -15,11 +15,6 @@ from calib_core.interchange.trees.publishers import PUBLISHER, read_publishers, 
 from calib_core.interchange.trees.stamped import read_stamped, recognizes_stamped
 from calib_core.interchange.trees.urdf import read_urdf, recognizes_urdf
 
-_PATTERNS = ("*.urdf", "*.xacro", "*calibration.yaml", "*extrinsics*.yaml", "*intrinsics*.yaml", "sensor.json")
-_POSES = "calibrated_sensor.json"
-_DEPTH = 4
-_MOST_FILES = 300
-
 
 @dataclass(frozen=True, slots=True)
 class TreeFile:
@@ -41,33 +36,6 @@ class TreeFile:
             InputError: it is not text.
         """
         return decoded(self.data, source=self.source)
-
-
-def files_of_trees(path: Path) -> tuple[Path, ...]:
-    """Return the files of a folder that may contain joints, by their names; a file is returned as it is.
-
-    Raises:
-        InputError: the folder contains none, or very many.
-    """
-    if not path.is_dir():
-        return (path,)
-    found = sorted(_named_in(path, _DEPTH))
-    if not found:
-        raise InputError(
-            f"{path}: no file of frames in this folder (looked for {', '.join((*_PATTERNS, _POSES))}); give the files themselves"
-        )
-    if len(found) > _MOST_FILES:
-        raise InputError(f"{path}: {len(found)} files that may contain frames; give the folder of one vehicle")
-    return tuple(found)
-
-
-def _named_in(folder: Path, depth: int) -> Iterator[Path]:
-    for path in sorted(folder.iterdir()):
-        if path.is_dir():
-            if depth > 1 and not path.name.startswith("."):
-                yield from _named_in(path, depth - 1)
-        elif any(path.match(pattern) for pattern in (*_PATTERNS, _POSES)):
-            yield path
 
 
 def tree_in(content: Content, text: str, source: str) -> TreePart | None:
