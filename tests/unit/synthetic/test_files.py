@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -18,7 +19,15 @@ from calib_core.errors import RecordingError
 from calib_core.measurements import RadarScan, TimeNs
 from calib_core.radar import polar_from_cartesian
 from calib_core.recordings.containers.writing import RadarReturnMessage, RecordedMessage, write_ros1_bag
-from calib_core.synthetic import SimulatedFrame, SimulatedRecording, SimulationOptions, simulate, write_recording
+from calib_core.synthetic import (
+    PRESETS,
+    PresetName,
+    SimulatedFrame,
+    SimulatedRecording,
+    SimulationOptions,
+    simulate,
+    write_recording,
+)
 
 OPTIONS = SimulationOptions(placements=2, dwell_s=4.0, width_px=128, height_px=80, camera_rate_hz=2.0, seed=5)
 
@@ -188,3 +197,25 @@ def test_a_vendors_packets_hold_the_same_returns(scans, container, tmp_path) -> 
         assert _stamp(message) == scan.time
         found = [(one.f_pos_x, one.f_pos_y, one.f_pos_z) for one in message.s_detections]
         np.testing.assert_allclose(np.array(found).reshape(-1, 3), scan.points_radar_m, rtol=1e-5, atol=1e-6)
+
+
+# Presets: each can be simulated, differs from the default, and gives way to what is asked for.
+
+
+SMALL = {"placements": 4, "dwell_s": 3.5, "radar_rate_hz": 2.0, "camera_rate_hz": 4.0}
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_every_preset_is_a_recording_of_its_own(name: PresetName) -> None:
+    options = PRESETS[name]
+    assert (options == SimulationOptions()) == (name == "default")
+    small = replace(options, **SMALL)  # type: ignore[arg-type]
+    recording = simulate(small)
+    assert len(recording.placements) == small.standing_places
+    assert len(recording.clicks) >= 4
+    assert len(next(recording.scans())) > 0
+
+
+def test_the_page_describes_every_preset_and_no_other(project_root: Path) -> None:
+    page = (project_root / "docs" / "simulation.md").read_text()
+    assert re.findall(r"^\| `([a-z0-9-]+)` \|", page, flags=re.MULTILINE) == list(PRESETS)
