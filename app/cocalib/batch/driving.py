@@ -63,6 +63,7 @@ def drive(
 
     Raises:
         InputError: the engine cannot be used, or a result cannot be written.
+        CalibrationError: a result has something else than regular files; it was neither read nor changed.
     """
     results.remove_leftovers()
     times = Counter(job.digest for job in jobs)

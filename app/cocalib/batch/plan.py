@@ -5,7 +5,7 @@ sessions have no result yet, and which results belong to a name that was mistype
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final, Literal
@@ -13,9 +13,8 @@ from typing import Final, Literal
 import msgspec
 from msgspec import Struct
 
-from calib_core.errors import CalibrationError
 from cocalib.batch.job import Job
-from cocalib.batch.results_folder import ResultsFolder
+from cocalib.batch.results_folder import ResultsFolder, UnreadResult
 
 PLANS: Final = "manifests"
 _SCHEMA: Final = "cocalib/batch-plan-1"
@@ -58,12 +57,12 @@ class Plan:
     Attributes:
         sessions: by vehicle and session; of one that several manifests name, as the latest batch wants it.
         manifests: their names, in order.
-        unread: files that cannot be read, by their places below the folder of the results, and why.
+        unread: records of manifests that cannot be read.
     """
 
     sessions: Mapping[tuple[str, str], Wanted]
     manifests: tuple[str, ...] = ()
-    unread: Mapping[str, str] = field(default_factory=dict)
+    unread: tuple[UnreadResult, ...] = ()
 
 
 def write_plan(folder: Path, manifest: Path, jobs: Sequence[Job]) -> None:
@@ -90,19 +89,16 @@ def read_plans(folder: Path) -> Plan:
     Args:
         folder: of the results.
     """
-    found, unread = [], {}
+    read, hint = msgspec.json.Decoder(PlanDocument).decode, "run the batch of its manifest again"
+    found, unread = [], []
     for path in sorted((folder / PLANS).glob("*.json")):
-        try:
-            content = ResultsFolder(folder).read(PLANS, path.name) or b""
-            found.append((msgspec.json.decode(content, type=PlanDocument), path.name.removesuffix(".json")))
-        except CalibrationError as error:
-            unread[f"{PLANS}/{path.name}"] = str(error).rpartition(f"{path.name}: ")[2]
-        except OSError as error:
-            unread[f"{PLANS}/{path.name}"] = f"{error.strerror or error}; check its permissions"
-        except msgspec.DecodeError as error:
-            unread[f"{PLANS}/{path.name}"] = f"is no {_SCHEMA}: {error}; run the batch of its manifest again"
+        document = ResultsFolder(folder).read_as(read, PLANS, path.name, schema=_SCHEMA, hint=hint)
+        if isinstance(document, UnreadResult):
+            unread.append(document)
+        elif document is not None:
+            found.append((document, path.name.removesuffix(".json")))
     sessions: dict[tuple[str, str], Wanted] = {}
     for document, _ in sorted(found, key=lambda one: one[0].started):
         for place, one in enumerate(document.sessions):
             sessions[(one.vehicle, one.session)] = Wanted(place, one.digest)
-    return Plan(sessions, tuple(name for _, name in found), unread)
+    return Plan(sessions, tuple(name for _, name in found), tuple(unread))

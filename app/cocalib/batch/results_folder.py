@@ -7,13 +7,13 @@ import re
 import secrets
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from functools import cache
 from io import BufferedReader
 from pathlib import Path
-from typing import Self
+from typing import Self, TypeVar
 
 import msgspec
 
@@ -21,10 +21,12 @@ from calib_core.errors import CalibrationError
 from cocalib.batch.outcome import Outcome, OutcomeFile, read_outcome
 from cocalib.session.file.guarded_folder import GuardedFolder
 
+_Content = TypeVar("_Content")
+
 OUTCOME_FILE = "outcome.json"
 LOG_FILE = "log.txt"
 """What only a developer needs; it differs from run to run, so the outcome does not list it."""
-_RESULTS = "results"
+RESULTS = "results"
 _OCCUPIED = frozenset({errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR})
 _ATTEMPTS = 50
 _ADVICE = "name another folder of results"
@@ -33,6 +35,21 @@ _UNFINISHED = re.compile(
 )
 _PATIENCE_S = 3600.0
 """A result is written in seconds, once everything in it is computed."""
+
+
+@dataclass(frozen=True, slots=True)
+class UnreadResult:
+    """The outcome of a job, or a manifest's record, that cannot be read.
+
+    Attributes:
+        place: relative to the folder that holds results/.
+        reason: what was found, and what to do.
+        session: vehicle and session that it is of, as the manifests say; None if they do not.
+    """
+
+    place: str
+    reason: str
+    session: tuple[str, str] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +70,7 @@ class ResultsFolder:
 
     def folder_of(self, digest: str) -> Path:
         """Return where the result of a job lies, or will lie."""
-        return self.path / _RESULTS / digest
+        return self.path / RESULTS / digest
 
     def digests(self) -> tuple[str, ...]:
         """Return the names of the results in order; what a job is still writing has a hidden name."""
@@ -62,14 +79,44 @@ class ResultsFolder:
         return tuple(one for one in names if one[0] != "." and os.path.lexists(folder / one / OUTCOME_FILE))
 
     def outcome(self, digest: str) -> Outcome | None:
-        """Return what came of a job; None if it is to be run: it is not finished, damaged, or may go well another time."""
+        """Return what came of a job; None if it is to be run: it is not finished, damaged, or may go well another time.
+
+        Raises:
+            CalibrationError: one of its files is no regular file, or a folder above it is a link; nothing was changed.
+        """
         try:
-            found = read_outcome((self.read(_RESULTS, digest, OUTCOME_FILE) or b"").decode())
+            found = read_outcome((self.read(RESULTS, digest, OUTCOME_FILE) or b"").decode())
             if found.digest != digest or not found.is_final:
                 return None
             return found if all(self._sha256(digest, file.name) == file.sha256 for file in found.files) else None
-        except (OSError, ValueError, msgspec.DecodeError, CalibrationError):
+        except (OSError, ValueError, msgspec.DecodeError):
             return None
+
+    def read_as(
+        self, parse: Callable[[str], _Content], *names: str, schema: str, hint: str
+    ) -> _Content | UnreadResult | None:
+        """Return what a file states, or why it cannot be read; None if there is none.
+
+        Args:
+            parse: reads its text, or raises msgspec.DecodeError.
+            names: of the folders below this one, and its own.
+            schema: that it should have.
+            hint: what to do about a file that is something else.
+        """
+        place = "/".join(names)
+        try:
+            content = self.read(*names)
+            return None if content is None else parse(content.decode())
+        except CalibrationError as error:
+            above = ["/".join(names[:count]) for count in range(1, len(names) + 1)]
+            for refused in above:
+                if str(error).startswith(head := f"{self.path.resolve() / refused}: "):
+                    return UnreadResult(refused, str(error).removeprefix(head))
+            return UnreadResult(place, str(error))
+        except OSError as error:
+            return UnreadResult(place, f"{error.strerror or error}; check its permissions")
+        except (UnicodeDecodeError, msgspec.DecodeError) as error:
+            return UnreadResult(place, f"is no {schema}: {error}; {hint}")
 
     def result_file(self, digest: str, name: str) -> bytes | None:
         """Return the content of a file of a result; None if there is none.
@@ -82,7 +129,7 @@ class ResultsFolder:
             CalibrationError: it is not a regular file, or a folder above it is a link; it was not read.
             OSError: it cannot be read.
         """
-        return self.read(_RESULTS, digest, *name.split("/"))
+        return self.read(RESULTS, digest, *name.split("/"))
 
     def read(self, *names: str) -> bytes | None:
         """Return the content of a file, by the names of the folders below this one and its own; None if there is none.
@@ -134,7 +181,7 @@ class ResultsFolder:
             OSError: it cannot be written.
         """
         writer = Writer.this()
-        with self._opened(_RESULTS, create=True):
+        with self._opened(RESULTS, create=True):
             parent = self.folder_of(digest).parent
         unfinished = parent / writer.folder_name(digest)
         unfinished.mkdir()
@@ -153,7 +200,7 @@ class ResultsFolder:
         parent = self.folder_of("")
         if not parent.is_dir():
             return 0
-        with self._opened(_RESULTS):
+        with self._opened(RESULTS):
             left = [
                 one for one in parent.iterdir() if one.name.startswith(".") and _is_folder(one) and is_abandoned(one)
             ]
@@ -187,7 +234,7 @@ class ResultsFolder:
     def _sha256(self, digest: str, name: str) -> str:
         *folders, last = name.split("/")
         with (
-            self._opened(_RESULTS, digest, *folders) as folder,
+            self._opened(RESULTS, digest, *folders) as folder,
             os.fdopen(folder.open(last, os.O_RDONLY), "rb") as file,
         ):
             return _sha256(file)

@@ -121,6 +121,9 @@ class Fleet:
             _print_json(history_document(vehicle, superseded))
         else:
             print("\n".join(history_lines(vehicle, superseded)))
+            for one in fleet.unread:
+                if one.session is not None and one.session[0] == name:
+                    print(f"session {one.session[1]}: {one.place} {one.reason}")
         return 0
 
     def _compare(self, fleet: "FleetRecord", a: str, b: str) -> int:

@@ -35,11 +35,14 @@ def vehicle_named(fleet: FleetRecord, name: str) -> VehicleRecord:
     """Return the vehicle with a name.
 
     Raises:
-        InputError: there is none.
+        InputError: there is none, or none of its results can be read.
     """
     for vehicle in fleet.vehicles:
         if vehicle.name == name:
             return vehicle
+    for one in fleet.unread:
+        if one.session is not None and one.session[0] == name:
+            raise InputError(f"vehicle {name!r}: session {one.session[1]!r}: {one.place}: {one.reason}")
     near = get_close_matches(name, [one.name for one in fleet.vehicles], n=3)
     raise InputError(
         f"no vehicle {name!r} among {len(fleet.vehicles)}; "

@@ -6,9 +6,10 @@ from typing import Any, Final
 
 from calib_core.fleet import MountingScatter, OffKind, SessionPose, Transition
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
+from cocalib.batch.results_folder import UnreadResult
 from cocalib.fleet.choosing import ComparedSessions
 from cocalib.fleet.kinds import Kind, NotCounted
-from cocalib.fleet.records import FleetRecord, SessionRecord, UnreadResult, VehicleRecord
+from cocalib.fleet.records import FleetRecord, SessionRecord, VehicleRecord
 from cocalib.fleet.standing import VehicleStanding, age_days
 
 STATUS_SCHEMA: Final = "cocalib/fleet-status-1"

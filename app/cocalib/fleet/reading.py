@@ -8,16 +8,14 @@ from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
-import msgspec
-
 from calib_core.errors import CalibrationError, InputError
 from calib_core.fleet import SessionPose, session_pose, transition
 from calib_core.interchange import read_calibration
 from calib_core.measurements import TimeNs
 from cocalib.batch.outcome import OUTCOME_SCHEMA, Outcome, read_outcome
 from cocalib.batch.plan import Plan, read_plans
-from cocalib.batch.results_folder import OUTCOME_FILE, ResultsFolder
-from cocalib.fleet.records import FleetRecord, SessionRecord, UnreadResult, VehicleRecord
+from cocalib.batch.results_folder import OUTCOME_FILE, RESULTS, ResultsFolder, UnreadResult
+from cocalib.fleet.records import FleetRecord, SessionRecord, VehicleRecord
 
 _CALIBRATION = "calibration.json"
 _MOST = 2**63
@@ -34,14 +32,13 @@ def read_fleet(folder: Path) -> FleetRecord:
     """
     plan = read_plans(folder)
     results = ResultsFolder(folder)
+    named = {one.digest: name for name, one in plan.sessions.items()}
     by_vehicle: dict[str, list[SessionRecord]] = {}
     unread = []
     for digest in results.digests():
         outcome = _outcome(results, digest)
-        if isinstance(outcome, str):
-            unread.append(
-                UnreadResult(results.folder_of(digest).relative_to(folder).joinpath(OUTCOME_FILE).as_posix(), outcome)
-            )
+        if isinstance(outcome, UnreadResult):
+            unread.append(replace(outcome, session=named.get(digest)))
         elif outcome is not None:
             by_vehicle.setdefault(outcome.vehicle, []).append(_record(results, outcome, plan))
     if not by_vehicle and not unread:
@@ -49,7 +46,7 @@ def read_fleet(folder: Path) -> FleetRecord:
     if not by_vehicle:
         more = f" ({len(unread)} such results)" if len(unread) > 1 else ""
         raise InputError(f"{folder}: no result can be read: {unread[0].place}: {unread[0].reason}{more}")
-    wanted = {one.digest for one in plan.sessions.values() if one.digest is not None}
+    wanted = {digest for digest in named if digest is not None}
     vehicles, superseded = [], []
     for name in sorted(by_vehicle):
         current, others = current_and_superseded(by_vehicle[name], wanted)
@@ -59,7 +56,7 @@ def read_fleet(folder: Path) -> FleetRecord:
     return FleetRecord(
         vehicles=tuple(vehicles),
         superseded=tuple(superseded),
-        unread=(*unread, *(UnreadResult(place, reason) for place, reason in plan.unread.items())),
+        unread=(*unread, *plan.unread),
         missing=tuple(name for name in plan.sessions if name not in found_names),
         unlisted=tuple(sorted(name for name in found_names if name not in plan.sessions)) if plan.sessions else (),
         manifests=plan.manifests,
@@ -112,26 +109,19 @@ def _run(record: SessionRecord) -> tuple[str, str]:
     return outcome.run.started if outcome.run is not None else "", outcome.digest
 
 
-def _outcome(results: ResultsFolder, digest: str) -> Outcome | str | None:
+def _outcome(results: ResultsFolder, digest: str) -> Outcome | UnreadResult | None:
     """Return the outcome of a job, or why it cannot be read; None if there is none."""
-    try:
-        content = results.result_file(digest, OUTCOME_FILE)
-        if content is None:
-            return None
-        found = read_outcome(content.decode())
-    except CalibrationError as error:
-        return str(error).rpartition(f"{digest}/{OUTCOME_FILE}: ")[2]
-    except OSError as error:
-        return f"{error.strerror or error}; check its permissions"
-    except (UnicodeDecodeError, msgspec.DecodeError) as error:
-        return (
-            f"is no {OUTCOME_SCHEMA}: {error}; if another version wrote it, read it with that one, or delete its folder and run "
-            "the batch again"
-        )
+    place = (RESULTS, digest, OUTCOME_FILE)
+    hint = "if another version wrote it, read it with that one, or delete its folder and run the batch again"
+    found = results.read_as(read_outcome, *place, schema=OUTCOME_SCHEMA, hint=hint)
+    if not isinstance(found, Outcome):
+        return found
     if not -_MOST <= (found.recorded_ns or 0) < _MOST or found.pairs >= _MOST:
-        return "states a time or a number of pairs that no recording has; run the batch again"
+        reason = "states a time or a number of pairs that no recording has; run the batch again"
+        return UnreadResult("/".join(place), reason)
     if found.digest != digest:
-        return f"belongs to the job {found.digest}; move it back to its folder, or delete this one"
+        reason = f"belongs to the job {found.digest}; move it back to its folder, or delete this one"
+        return UnreadResult("/".join(place), reason)
     return found
 
 

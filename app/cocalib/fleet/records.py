@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from calib_core.fleet import SessionPose, Transition
 from cocalib.batch.outcome import Outcome
+from cocalib.batch.results_folder import UnreadResult
 
 _MOST_NAMED = 5
 _NO_POSE_OF = frozenset({"contradictory", "nothing"})
@@ -84,19 +85,6 @@ class VehicleRecord:
     def transition_to(self, session: str) -> Transition | None:
         """Return the change that ends at a session; None if there is none."""
         return next((one for one in self.transitions if one.after.session == session), None)
-
-
-@dataclass(frozen=True, slots=True)
-class UnreadResult:
-    """A folder of results, or a manifest's record, that cannot be read.
-
-    Attributes:
-        place: relative to the folder that holds results/.
-        reason: what was found, and what to do.
-    """
-
-    place: str
-    reason: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Final
 
 from calib_core.fleet import MountingScatter, Transition, transition
-from cocalib.batch.results_folder import ResultsFolder
+from cocalib.batch.results_folder import ResultsFolder, UnreadResult
 from cocalib.fleet.kinds import Kind, kinds_of
-from cocalib.fleet.records import FleetRecord, SessionRecord, UnreadResult, VehicleRecord
+from cocalib.fleet.records import FleetRecord, SessionRecord, VehicleRecord
 from cocalib.fleet.standing import VehicleStanding, recorded_text, standings_of
 from cocalib.platform.resources import version
 from cocalib.report.markup import Child, Markup, html_file, joined, scrolled, tag

@@ -45,14 +45,38 @@ def put(kind: str, place: Path) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", [OUTCOME_FILE, "calibration.json", "export/tf2.sh"])
-def test_a_result_with_something_else_than_files_is_none_and_is_replaced(kind: str, name: str, tmp_path: Path) -> None:
+def test_a_result_with_something_else_than_files_is_refused_and_stays(kind: str, name: str, tmp_path: Path) -> None:
     folder = ResultsFolder(tmp_path)
     write(folder)
-    put(kind, folder.folder_of(DIGEST) / name)
-    assert folder.outcome(DIGEST) is None
-    write(folder)
-    assert folder.outcome(DIGEST) is not None
+    put(kind, place := folder.folder_of(DIGEST) / name)
+    before = os.lstat(place)
+    for refused in (lambda: folder.outcome(DIGEST), lambda: write(folder)):
+        with pytest.raises(CalibrationError, match=f"{name}: is .*, not a file; it was neither read nor changed"):
+            refused()
+    assert os.lstat(place) == before
     assert not list(folder.folder_of("").glob(".*"))
+
+
+def test_a_batch_refuses_a_result_that_status_refuses(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out, jobs = tmp_path / "out", quick_jobs(tmp_path, 1)
+    drive(jobs, InProcess(), ResultsFolder(out))
+    put("link to a file", place := ResultsFolder(out).folder_of(jobs[0].digest) / OUTCOME_FILE)
+    assert run(["fleet", "status", str(out)]) == 2
+    words = capsys.readouterr().err.partition("outcome.json: ")[2].strip()
+    with pytest.raises(CalibrationError) as refused:
+        drive(jobs, InProcess(), ResultsFolder(out))
+    assert words
+    assert str(refused.value) == f"{place}: {words}"
+    assert place.is_symlink()
+
+
+def test_a_linked_folder_of_results_is_named_by_one_path(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = ResultsFolder(tmp_path / "out")
+    write(folder)
+    folder.folder_of(DIGEST).rename(tmp_path / "theirs")
+    folder.folder_of(DIGEST).symlink_to(tmp_path / "theirs")
+    assert run(["fleet", "status", str(tmp_path / "out")]) == 2
+    assert f"no result can be read: results/{DIGEST}: is a symbolic link" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -80,10 +104,10 @@ def test_a_folder_of_a_result_that_is_a_link_is_not_followed(below: str, tmp_pat
     place = folder.folder_of(DIGEST) / below
     place.rename(tmp_path / "theirs")
     place.symlink_to(tmp_path / "theirs")
-    assert folder.outcome(DIGEST) is None
-    write(folder)
-    assert folder.outcome(DIGEST) is not None
-    assert not folder.folder_of(DIGEST).is_symlink()
+    for refused in (lambda: folder.outcome(DIGEST), lambda: write(folder)):
+        with pytest.raises(CalibrationError, match="is a symbolic link, which is not followed"):
+            refused()
+    assert place.is_symlink()
     assert not list(folder.folder_of("").glob(".*"))
     assert list((tmp_path / "theirs").iterdir())
 
@@ -128,7 +152,9 @@ def test_what_a_manifest_wants_is_never_read_or_written_through_something_else(k
     put(kind, tmp_path / "out" / "manifests" / "fleet.toml.json")
     plan = read_plans(tmp_path / "out")
     assert (plan.sessions, plan.manifests) == ({}, ())
-    assert "neither read nor changed" in plan.unread["manifests/fleet.toml.json"]
+    (unread,) = plan.unread
+    assert unread.place == "manifests/fleet.toml.json"
+    assert "neither read nor changed" in unread.reason
     with pytest.raises(
         CalibrationError, match=r"fleet\.toml\.json: is .*, not a file; it was neither read nor changed"
     ):

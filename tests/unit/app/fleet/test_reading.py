@@ -17,6 +17,7 @@ from cocalib.batch.manifest import ManifestRow
 from cocalib.batch.outcome import OUTCOME_SCHEMA, Outcome, OutcomeRun
 from cocalib.batch.plan import write_plan
 from cocalib.batch.results_folder import ResultsFolder
+from cocalib.cli import run
 from cocalib.fleet.reading import current_and_superseded, in_order, read_fleet
 from cocalib.fleet.records import SessionRecord
 from tests.unit.app.fleet.made_results import DAY_NS, FIRST_NS, digest_of, make_fleet, make_result
@@ -92,6 +93,22 @@ def test_a_manifests_record_that_cannot_be_read_is_named(folder: Path) -> None:
     (unread,) = read_fleet(folder).unread
     assert unread.place == "manifests/spoilt.json"
     assert unread.reason.startswith("is no cocalib/batch-plan-1: ")
+
+
+def test_the_history_of_a_vehicle_whose_outcome_cannot_be_read_names_the_file(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    make_result(folder, "V9", "s0")
+    names = [("V000", "s0"), ("V9", "s0")]
+    for name in names:
+        (ResultsFolder(folder).folder_of(digest_of(*name)) / "outcome.json").write_text("garbage")
+    _write_plan(folder, *names, digests={name: digest_of(*name) for name in names})
+    assert run(["fleet", "history", "V000", str(folder)]) == 0
+    assert (
+        f"session s0: results/{digest_of('V000', 's0')}/outcome.json is no cocalib/outcome-1" in capsys.readouterr().out
+    )
+    assert run(["fleet", "history", "V9", str(folder)]) == 2
+    assert f"'V9': session 's0': results/{digest_of('V9', 's0')}/outcome.json: " in capsys.readouterr().err
 
 
 def test_results_of_another_version_are_left_out_and_named(folder: Path) -> None:
