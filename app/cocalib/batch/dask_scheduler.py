@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from urllib.parse import urlsplit
 
 from calib_core.errors import InputError
-from cocalib.batch.engine import workers_died
+from cocalib.batch.engine import Call, workers_died
 from cocalib.platform.loopback import is_loopback
 from cocalib.platform.resources import version
 
@@ -59,9 +59,7 @@ class DaskScheduler:
         """
         if not arguments:
             return
-        calls = [
-            _Call(number, _call_in_worker, (version(), function, *given)) for number, given in enumerate(arguments)
-        ]
+        calls = [Call(number, (version(), function, *given)) for number, given in enumerate(arguments)]
         with _connected(self.address) as connection:
             for number, found in _finished_calls(connection, calls):
                 yield number, if_died(number) if found is _Died.AGAIN else found
@@ -162,22 +160,7 @@ class _Died(enum.Enum):
     AGAIN = "its workers died, also when it ran alone"
 
 
-@dataclass(frozen=True, slots=True)
-class _Call:
-    """A function and its arguments.
-
-    Attributes:
-        number: of the call.
-        function: that every worker can import.
-        arguments: that can be pickled.
-    """
-
-    number: int
-    function: Callable[..., Any]
-    arguments: tuple[Any, ...]
-
-
-def _finished_calls(cluster: _Connection, calls: Sequence[_Call]) -> Iterator[tuple[int, Any]]:
+def _finished_calls(cluster: _Connection, calls: Sequence[Call]) -> Iterator[tuple[int, Any]]:
     """Yield the number and the result of each call as it finishes; what it raises is raised here.
 
     A worker may be killed for reasons that no call is to blame for. So a call whose workers died as often as the scheduler
@@ -187,7 +170,7 @@ def _finished_calls(cluster: _Connection, calls: Sequence[_Call]) -> Iterator[tu
     Raises:
         InputError: the scheduler is gone.
     """
-    aside: list[_Call] = []
+    aside: list[Call] = []
     for call, found in _round(cluster, calls, cluster.threads):
         if found is _Died.AGAIN:
             aside.append(call)
@@ -197,7 +180,7 @@ def _finished_calls(cluster: _Connection, calls: Sequence[_Call]) -> Iterator[tu
         yield call.number, found
 
 
-def _round(cluster: _Connection, calls: Sequence[_Call], room: Callable[[], int]) -> Iterator[tuple[_Call, Any]]:
+def _round(cluster: _Connection, calls: Sequence[Call], room: Callable[[], int]) -> Iterator[tuple[Call, Any]]:
     """Run calls, as many at a time as there is room for, and yield them as they finish.
 
     More than one per thread would make jobs of seconds no faster, but the scheduler counts a worker's death against
@@ -220,19 +203,19 @@ class _Running:
         from distributed import as_completed
 
         self._cluster = cluster
-        self._calls: dict[str, _Call] = {}
+        self._calls: dict[str, Call] = {}
         self._finished = as_completed(loop=cluster.client.loop)
         self._prefix = f"cocalib-{secrets.token_hex(4)}"  # a scheduler remembers calls by their keys
 
     def __len__(self) -> int:
         return len(self._calls)
 
-    def begin(self, call: _Call) -> None:
+    def begin(self, call: Call) -> None:
         key = f"{self._prefix}-{call.number}"
         self._calls[key] = call
-        self._finished.add(self._cluster.client.submit(call.function, *call.arguments, key=key, pure=False))
+        self._finished.add(self._cluster.client.submit(_call_in_worker, *call.arguments, key=key, pure=False))
 
-    def next(self) -> tuple[_Call, Any]:
+    def next(self) -> tuple[Call, Any]:
         """Wait for a call to finish and return it with its result."""
         from distributed import KilledWorker
 

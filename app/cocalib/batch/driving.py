@@ -91,13 +91,20 @@ def _died(job: Job, results: Path) -> Outcome:
     return failed_outcome(job, results, reason=_DIED, hint=_DIED_HINT)
 
 
-def chosen_engine(count: int, *, workers: int | None = None, scheduler: str | None = None) -> Engine:
+def chosen_engine(
+    count: int,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    tell: Callable[[str], None] = lambda _: None,
+) -> Engine:
     """Return what runs the jobs.
 
     Args:
         count: of the jobs.
         workers: processes on this machine; 1 for this process; None for one per processor, if there are many jobs.
         scheduler: address of a scheduler of Dask; None to use this machine.
+        tell: called, once, if worker processes of this machine died.
 
     Raises:
         InputError: the flags do not go together.
@@ -112,7 +119,7 @@ def chosen_engine(count: int, *, workers: int | None = None, scheduler: str | No
     if workers is not None and workers < 1:
         raise OptionError(f"--workers {workers}: there must be at least 1")
     chosen = workers or ((os.cpu_count() or 1) if count >= _SMALL else 1)
-    return WorkerProcesses(chosen) if chosen > 1 else InProcess()
+    return WorkerProcesses(chosen, tell) if chosen > 1 else InProcess()
 
 
 def _left_s(passed_s: float, finished: int, left: int) -> float | None:

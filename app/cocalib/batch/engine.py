@@ -4,6 +4,7 @@ import shutil
 import tempfile
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
@@ -21,6 +22,19 @@ def workers_died(number: int) -> Any:
         InputError: always.
     """
     raise InputError(f"call {number}: every worker that ran it died or was killed; use fewer workers")
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """The arguments of one call of a function that every worker can import.
+
+    Attributes:
+        number: of the call.
+        arguments: that can be pickled.
+    """
+
+    number: int
+    arguments: tuple[Any, ...]
 
 
 class Engine(Protocol):

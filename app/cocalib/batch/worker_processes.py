@@ -9,12 +9,12 @@ import threading
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from typing import Any, TypeVar
 
 from calib_core.errors import InputError
-from cocalib.batch.engine import own_temporary_folder, workers_died
+from cocalib.batch.engine import Call, own_temporary_folder, workers_died
 
 _Found = TypeVar("_Found")
 _PROCESSES = multiprocessing.get_context("spawn")  # a forked child would share locks of our threads
@@ -34,9 +34,11 @@ class WorkerProcesses:
 
     Attributes:
         count: of the processes.
+        tell: called at the end, once, if workers died.
     """
 
     count: int
+    tell: Callable[[str], None] = field(default=lambda _: None, compare=False)
 
     def run_all(
         self,
@@ -49,20 +51,19 @@ class WorkerProcesses:
         Raises:
             InputError: no worker process starts.
         """
-        calls = [_Call(number, given) for number, given in enumerate(arguments)]
+        calls = [Call(number, given) for number, given in enumerate(arguments)]
         with own_temporary_folder(), _Workers(function) as workers:
+            again: set[int] = set()
             for room in (self.count, self.count, 1):
-                died: list[_Call] = []
+                died: list[Call] = []
                 yield from workers.run(calls, room, died)
                 calls = died
+                again |= {call.number for call in died}
+        if again:
+            jobs = "1 job was" if len(again) == 1 else f"{len(again)} jobs were"
+            self.tell(f"worker processes died or were killed, often for memory; {jobs} run again")
         for call in calls:
             yield call.number, if_died(call.number)
-
-
-@dataclass(frozen=True, slots=True)
-class _Call:
-    number: int
-    arguments: tuple[Any, ...]
 
 
 class _Ready:
@@ -88,9 +89,9 @@ class _Worker:
             self.process.start()
         theirs.close()
         self.is_ready = False
-        self.call: _Call | None = None
+        self.call: Call | None = None
 
-    def begin(self, call: _Call) -> None:
+    def begin(self, call: Call) -> None:
         self.call = call
         with suppress(OSError):  # it has just died: its pipe says so next
             self.pipe.send(call.arguments)
@@ -116,7 +117,7 @@ class _Workers:
         for worker in self._workers.values():
             worker.end()
 
-    def run(self, calls: Sequence[_Call], room: int, died: list[_Call]) -> Iterator[tuple[int, Any]]:
+    def run(self, calls: Sequence[Call], room: int, died: list[Call]) -> Iterator[tuple[int, Any]]:
         """Run calls, at most `room` at once, and yield the number and the result of each as it finishes.
 
         Args:
@@ -152,7 +153,7 @@ class _Workers:
     def _busy(self) -> int:
         return sum(worker.call is not None for worker in self._workers.values())
 
-    def _fill(self, waiting: deque[_Call], room: int) -> None:
+    def _fill(self, waiting: deque[Call], room: int) -> None:
         """Give workers calls, and start those that are missing."""
         for worker in self._workers.values():
             if waiting and worker.is_ready and worker.call is None and self._busy() < room:

@@ -1,5 +1,6 @@
 """`cocalib batch`: calibrate the sessions of a manifest."""
 
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -71,9 +72,12 @@ class Batch:
             with progress_bar("reading recordings") as progress_bytes:
                 jobs = jobs_of(manifest.rows, results.path, progress_bytes)
             write_plan(results.path, manifest.source, jobs)
-            engine = chosen_engine(len(jobs), workers=self.workers, scheduler=self.scheduler)
+            warnings: list[str] = []
+            engine = chosen_engine(len(jobs), workers=self.workers, scheduler=self.scheduler, tell=warnings.append)
             with shown_batch(len(jobs)) as show:
                 outcomes = drive(jobs, engine, results, show)
+            for warning in warnings:
+                print(f"warning: {warning}", file=sys.stderr)
             if results.digests():
                 write_summary(results.path, read_fleet(results.path))
         except OSError as error:

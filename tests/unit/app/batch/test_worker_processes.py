@@ -107,8 +107,11 @@ def test_a_job_that_kills_its_workers_fails_and_the_others_do_not(
 
 def test_one_death_costs_its_own_call_one_more_run(tmp_path: Path) -> None:
     calls = [(str(tmp_path), name, int(name == "b")) for name in "abcd"]
-    assert sorted(WorkerProcesses(2).run_all(dying, calls)) == list(enumerate("abcd"))
+    told: list[str] = []
+    assert sorted(WorkerProcesses(2, told.append).run_all(dying, calls)) == list(enumerate("abcd"))
     assert [attempts(tmp_path, name) for name in "abcd"] == [1, 2, 1, 1]
+    assert len(told) == 1
+    assert "1 job was run again" in told[0]
 
 
 def test_what_workers_that_are_killed_had_in_temporary_files_is_removed(tmp_path: Path, temporary: Path) -> None:
