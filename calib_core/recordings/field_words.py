@@ -181,31 +181,38 @@ AMBIGUOUS: tuple[Spelling, ...] = _spellings(_AMBIGUOUS_TABLE)
 """Spellings of which each reader decides: a message's comments and values tell the angles apart, and its type tells that it
 describes returns; in a table dx may be the size of an object, and altitude a place on Earth."""
 
+TABLE_ANGLES = (Spelling("theta", "azimuth", 4), Spelling("angle", "azimuth", 5), Spelling("phi", "elevation", 4))
+"""The ambiguous angles as tables use them."""
 
-def _words(text: str) -> frozenset[str]:
+
+def words_in(text: str) -> frozenset[str]:
+    """Return the words of a text."""
     return frozenset(text.split())
 
 
-TYPE_PREFIXES = _words("f s m u i b n g p fl dbl flt ui my us ul si sl af mf mu ms a l k e t st str")
+TYPE_PREFIXES = words_in("f s m u i b n g p fl dbl flt ui my us ul si sl af mf mu ms a l k e t st str")
 """Letters at the start of a name that encode its type or scope."""
 
-SUBJECTS = _words(
+TABLE_TYPE_PREFIXES = words_in("f s n d i u b m fl ui dbl flt p str")
+"""Fewer than in messages: t_x is a translation."""
+
+SUBJECTS = words_in(
     "radar radarpoint target targets tgt detection detections det dets point points pt pts return returns object objects obj "
     "objs reflection reflections refl cluster clusters hit hits plot plots echo echoes peak peaks track tracks data list frames "
     "scans samples messages msg header field value val values cartesian polar raw meas measured measurement"
 )
 """Words for what a name belongs to, such as a return: they may precede any name."""
 
-FILLERS = SUBJECTS | _words(
+FILLERS = SUBJECTS | words_in(
     "report sensor can tx rx detect est estimated rel relative cart spherical sph coord coords coordinate coordinates pose loc "
     "location filtered reflector current cur info general kinematic kinematics the of to from in"
 )
 """Words that may stand anywhere in a name without changing its meaning."""
 
-STATISTICS = _words("std stddev stdev sigma rms dev deviation")
+STATISTICS = words_in("std stddev stdev sigma rms dev deviation")
 """Words that make a quantity its standard deviation."""
 
-BLOCKERS = _words(
+BLOCKERS = words_in(
     "var variance cov covariance err error unc uncertainty accuracy acc conf confidence quality valid invalid flag flags "
     "min max maximum minimum res resolution bin idx index id ids count cnt num number offset bias scale limit accel "
     "acceleration origin ref reference prev previous pred predicted ambiguous ambig ambiguity gate width length size "
@@ -215,7 +222,7 @@ BLOCKERS = _words(
 )
 """Words that make a name mean something else."""
 
-SECOND = _words("2 3 second secondary alt alternative alternate hyp2 amb other")
+SECOND = words_in("2 3 second secondary alt alternative alternate hyp2 amb other")
 """Words that make a quantity a second hypothesis."""
 
 NUMBERS = frozenset(("1", "0", "first", "primary", "hyp", "hypothesis"))
@@ -232,7 +239,7 @@ _CHUNK = re.compile(r"[A-Z]+(?![a-zµμ])|[A-Z]?[a-zµμ]+|\d+|°")
 _DECIBEL = re.compile(r"d[Bb](sm|m2|m)?(?![a-z])")
 _SHORTEST = 3
 _LETTERS = frozenset("xyzvr")
-_PLACES = _words("coord coords coordinate coordinates")
+_PLACES = words_in("coord coords coordinate coordinates")
 _QUANTITY_WORDS = (
     frozenset(word for one in (*SPELLINGS, *AMBIGUOUS) for word in one.words.split() if len(word) > 1)
     | frozenset(_SYNONYMS)
@@ -283,39 +290,44 @@ def _split(word: str) -> list[str]:
     return [word]
 
 
-_QUANTITIES = {"longitudinal": "x", "lateral": "y", "radial": "doppler", "vague": "azimuth"}
+_QUANTITIES = {
+    "longitudinal": "x", "lateral": "y", "radial": "doppler", "vague": "azimuth",
+    **dict.fromkeys(("snr", "intensity", "rcs", "power"), "amplitude"),
+}  # fmt: skip
 _MOST_WORDS_OF_A_UNIT = 3
+_ON_EARTH = words_in("latitude longitude altitude lon lng gps gnss")
+_BARE = words_in("lat long")
+_WITH_SIGMA = ("range", "azimuth", "elevation")
+_ACCURACY = re.compile("accuracy", re.IGNORECASE)
+_PLAIN_WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
 
 
 @dataclass(frozen=True, slots=True)
-class NamedQuantity:
+class Meaning:
     """What a name states.
 
     Attributes:
-        spelling: of the quantity.
-        words: of the name, without type prefixes, fillers and unit.
+        kind: of its spelling.
+        rank: of its spelling.
         unit: None if the name states none.
         sigma: it is the quantity's standard deviation.
         second: it is a second hypothesis, such as azimuth2.
         numbered: it is the first or a further hypothesis, such as azimuth1.
+        bare: it is a single word, without prefixes and unit.
     """
 
-    spelling: Spelling
-    words: tuple[str, ...]
+    kind: str
+    rank: int
     unit: Unit | None = None
     sigma: bool = False
     second: bool = False
     numbered: bool = False
+    bare: bool = False
 
     @property
     def quantity(self) -> str:
-        """One of x, y, z, range, azimuth, elevation, doppler, vx, vy, vz, snr, intensity, rcs, power and amplitude."""
-        return quantity_of(self.spelling)
-
-
-def quantity_of(spelling: Spelling) -> str:
-    """Return the quantity of a spelling: x for longitudinal, doppler for radial."""
-    return _QUANTITIES.get(spelling.kind, spelling.kind)
+        """One of x, y, z, range, azimuth, elevation, doppler, vx, vy, vz and amplitude."""
+        return _QUANTITIES.get(self.kind, self.kind)
 
 
 def spelt(spellings: Iterable[Spelling]) -> Mapping[frozenset[str], Spelling]:
@@ -329,21 +341,45 @@ def spelt(spellings: Iterable[Spelling]) -> Mapping[frozenset[str], Spelling]:
 
 SPELT: Mapping[frozenset[str], Spelling] = spelt(SPELLINGS)
 """The shared spellings."""
+_SPELT_IN_MESSAGES = spelt((*SPELLINGS, *AMBIGUOUS))
+_SPELT_IN_TABLES = spelt((*SPELLINGS, *TABLE_ANGLES))
 
 
-def named_quantity(
-    words: tuple[str, ...],
-    known: Mapping[frozenset[str], Spelling] = SPELT,
-    *,
-    type_prefixes: Set[str] = TYPE_PREFIXES,
-) -> NamedQuantity | None:
-    """Return what the words of a name state; None if they name none of the known quantities.
+@cache
+def meaning_of(name: str) -> Meaning | None:
+    """Return what the dotted name of a message's field means; None if it is none of the quantities in use."""
+    return _meaning(words_of(name), _SPELT_IN_MESSAGES, TYPE_PREFIXES)
 
-    Args:
-        words: of the name; see words_of.
-        known: the reader's spellings.
-        type_prefixes: that the reader drops.
+
+@cache
+def column_meaning(name: str) -> Meaning | None:
+    """Return what the name of a table's column means, without a unit in brackets; None if nothing or a place on Earth.
+
+    A table may be about anything: dx may be the size of an object, and a second azimuth or a bare lat no radar's.
     """
+    plain, words = {word.lower() for word in _PLAIN_WORD.findall(name)}, words_of(_ACCURACY.sub("_sigma_", name))
+    found = _meaning(words, _SPELT_IN_TABLES, TABLE_TYPE_PREFIXES)
+    if found is None or found.numbered or (found.sigma and found.quantity not in _WITH_SIGMA):
+        return None
+    on_earth = not plain.isdisjoint(_ON_EARTH) or (found.bare and not plain.isdisjoint(_BARE))
+    return None if on_earth else found
+
+
+def is_plain(name: str, meaning: Meaning) -> bool:
+    """Return whether a name is that of the documentation: the quantity itself, after words for a return and before a unit."""
+    words = [word.lower() for word in _PLAIN_WORD.findall(name)]
+    while len(words) > 1 and words[0] in TABLE_TYPE_PREFIXES | SUBJECTS:
+        words.pop(0)
+    quantity = meaning.kind if meaning.quantity == "amplitude" else meaning.quantity
+    own = ["sigma"] * meaning.sigma + [quantity]
+    rest = tuple(words[len(own) :])
+    return words[: len(own)] == own and (not rest or unit_of_words(rest) is not None)
+
+
+def _meaning(
+    words: tuple[str, ...], known: Mapping[frozenset[str], Spelling], type_prefixes: Set[str]
+) -> Meaning | None:
+    """Return what the words of a name state: after as many type prefixes as need be, and before a unit."""
     if not BLOCKERS.isdisjoint(words):
         return None
     for start in range(_prefixes(words, type_prefixes) + 1):
@@ -361,7 +397,7 @@ def _prefixes(words: tuple[str, ...], type_prefixes: Set[str]) -> int:
     return count
 
 
-def _with_unit(words: tuple[str, ...], known: Mapping[frozenset[str], Spelling]) -> NamedQuantity | None:
+def _with_unit(words: tuple[str, ...], known: Mapping[frozenset[str], Spelling]) -> Meaning | None:
     for size in range(min(_MOST_WORDS_OF_A_UNIT, len(words) - 1), 0, -1):
         unit = unit_of_words(words[-size:])
         found = _plain(words[:-size], known) if unit else None
@@ -370,18 +406,140 @@ def _with_unit(words: tuple[str, ...], known: Mapping[frozenset[str], Spelling])
     return _plain(words, known)
 
 
-def _plain(words: tuple[str, ...], known: Mapping[frozenset[str], Spelling]) -> NamedQuantity | None:
+def _plain(words: tuple[str, ...], known: Mapping[frozenset[str], Spelling]) -> Meaning | None:
     numbering = SECOND | NUMBERS
     spelling = known.get(frozenset(words) - STATISTICS - numbering)
     if spelling is None:
         return None
-    return NamedQuantity(
-        spelling,
-        words,
+    return Meaning(
+        spelling.kind,
+        spelling.rank,
         sigma=not STATISTICS.isdisjoint(words),
         second=not SECOND.isdisjoint(words),
         numbered=not numbering.isdisjoint(words),
+        bare=len(words) == 1,
     )
+
+
+Direction: TypeAlias = Literal["forward", "backward", "left", "right", "up", "down"]
+_SIDES: Mapping[str, Direction] = {
+    "forward": "forward", "forwards": "forward", "ahead": "forward", "front": "forward", "longitudinal": "forward",
+    "boresight": "forward", "backward": "backward", "backwards": "backward", "behind": "backward",
+    "left": "left", "right": "right", "up": "up", "upward": "up", "upwards": "up", "down": "down", "downward": "down",
+    "downwards": "down",
+}  # fmt: skip
+OPPOSITE: Mapping[Direction, Direction] = {
+    "forward": "backward", "backward": "forward", "left": "right", "right": "left", "up": "down", "down": "up"
+}  # fmt: skip
+_ANY = "|".join(sorted(_SIDES, key=len, reverse=True))
+_BETWEEN = (
+    r"(?:\W+(?:is|are|values?|means?|points?|pointing|axis|direction|side|to|towards|the|of|in|on|sensor|angles?))*\W*"
+)
+_POSITIVE_SIDE = re.compile(rf"(?P<sign>positive|pos\.|negative|neg\.|\+){_BETWEEN}\b(?P<side>{_ANY})\b", re.IGNORECASE)
+_SIDE_POSITIVE = re.compile(rf"\b(?P<side>{_ANY})\b{_BETWEEN}(?P<sign>positive|negative|\+)", re.IGNORECASE)
+_LEADS_TO = r"(?:\s*(?:is|points?|pointing|=|:|->|to|towards|the|,|-|\(|\+)\s*)*\s*"
+_AXIS = re.compile(rf"(?<![\w.])(?P<axis>[xyz])(?:[ -]?axis)?{_LEADS_TO}\b(?P<side>{_ANY})\b", re.IGNORECASE)
+_LEFTWARD = re.compile(r"counter-?\s?clockwise|anti-?\s?clockwise|\bccw\b", re.IGNORECASE)
+_RIGHTWARD = re.compile(r"(?<!counter)(?<!counter[- ])(?<!anti)(?<!anti[- ])clockwise|\bcw\b", re.IGNORECASE)
+_BY_WORD = {word: unit for word, unit in UNITS_BY_SPELLING.items() if unit.dimension != "time"}
+_UNIT_WORDS = "|".join(sorted((re.escape(word) for word in _BY_WORD), key=len, reverse=True))
+_FACTOR = r"(?:(?P<number>\d+\s*/\s*\d+|\d*\.?\d+(?:e-?\d+)?)\s*\*?\s*)?"
+_ALONE = re.compile(rf"{_FACTOR}(?P<unit>{_UNIT_WORDS})", re.IGNORECASE)
+_BRACKETS = re.compile(rf"[\[(<{{]\s*(?:in\s+|unit:?\s*)?{_FACTOR}(?P<unit>{_UNIT_WORDS})\s*[\])>}},;]", re.IGNORECASE)
+_SAID = re.compile(
+    rf"\b(?:in|units?|lsb|scale|factor|resolution|of|per bit)\b\s*(?:is|of|in|:|=)*\s*{_FACTOR}(?P<unit>{_UNIT_WORDS})(?![\w/])",
+    re.IGNORECASE,
+)
+_SCALE = re.compile(
+    r"\b(?:lsb|scale|factor|resolution|mult[a-z]+)\D{0,12}(?P<number>\d*\.\d+(?:e-?\d+)?)", re.IGNORECASE
+)
+_LONG_WORDS = "|".join(sorted((re.escape(word) for word in _BY_WORD if len(word) > 2), key=len, reverse=True))
+_LONG_WORD = re.compile(rf"(?<![\w/])(?P<unit>{_LONG_WORDS})(?![\w/])", re.IGNORECASE)
+_LIMITS = r"\b(?:max\w*|min\w*|up to|accuracy|precision|limited to{})\b[^,;\])]*"
+_OF_FLOATS, _OF_INTEGERS = (re.compile(_LIMITS.format(more), re.IGNORECASE) for more in ("|resolution|step", ""))
+
+
+def positive_side(comment: str) -> Direction | None:
+    """Return the direction in which the values of a field grow, as its comment states it; None if it does not.
+
+    Args:
+        comment: such as "azimuth, positive to the left" or "clockwise".
+    """
+    match = _POSITIVE_SIDE.search(comment) or _SIDE_POSITIVE.search(comment)
+    if match:
+        side = _SIDES[match["side"].lower()]
+        return OPPOSITE[side] if match["sign"].lower().startswith("neg") else side
+    if _LEFTWARD.search(comment):
+        return "left"
+    return "right" if _RIGHTWARD.search(comment) else None
+
+
+def axis_side(comment: str) -> Direction | None:
+    """Return the direction of an axis that its own comment names alone, such as "forward" or "[m] to the right"."""
+    stated = positive_side(comment)
+    if stated:
+        return stated
+    found = {_SIDES[word.lower()] for word in re.findall(rf"\b({_ANY})\b", comment, re.IGNORECASE)}
+    return found.pop() if len(found) == 1 else None
+
+
+def axes_in(remarks: str) -> Mapping[str, Direction]:
+    """Return the directions of x, y and z that comments state, such as "x right, y forward, z up".
+
+    Args:
+        remarks: the comments of a message or of its elements.
+    """
+    found: dict[str, Direction] = {}
+    for match in _AXIS.finditer(remarks):
+        found.setdefault(match["axis"].lower(), _SIDES[match["side"].lower()])
+    return found
+
+
+def angle_in(comment: str) -> Literal["azimuth", "elevation"] | None:
+    """Return which angle a comment names; None if none or both."""
+    azimuth = re.search(r"azimuth|horizontal|\bbearing\b", comment, re.IGNORECASE)
+    elevation = re.search(r"elevation|vertical", comment, re.IGNORECASE)
+    if bool(azimuth) == bool(elevation):
+        return None
+    return "azimuth" if azimuth else "elevation"
+
+
+def unit_in(comment: str, dimension: Dimension, *, integer: bool = False) -> Unit | None:
+    """Return the unit of a dimension that a comment states; None if it states none.
+
+    Understood are the unit alone ("m", "0.01 deg"), in brackets ("range [cm]"), after words such as "in" or "unit:", and long
+    words such as "degrees" anywhere. A number counts as a factor only where it cannot be a limit or an accuracy.
+
+    Args:
+        comment: of the field.
+        dimension: what the unit must measure.
+        integer: the field is an integer, whose resolution is its unit.
+    """
+    text = (_OF_INTEGERS if integer else _OF_FLOATS).sub("", comment).strip(" .,;")
+    pieces = [_ALONE.fullmatch(piece.strip()) for piece in re.split("[,;]", text)]
+    matches = [*pieces, *_BRACKETS.finditer(text), *_SAID.finditer(text)]
+    for match in matches:
+        unit = _BY_WORD[match["unit"].casefold()] if match else None
+        if match and unit and unit.dimension == dimension:
+            return _with_scale(unit.times(_number(match["number"])), text)
+    for match in _LONG_WORD.finditer(text):
+        unit = _BY_WORD[match["unit"].casefold()]
+        if unit.dimension == dimension:
+            return _with_scale(unit, text)
+    return None
+
+
+def _with_scale(unit: Unit, text: str) -> Unit:
+    """Apply a factor that the comment states apart from the unit, such as "[m], scale 0.1"."""
+    factor = _SCALE.search(text)
+    return unit.times(float(factor["number"])) if factor and not unit.name[0].isdigit() else unit
+
+
+def _number(text: str | None) -> float:
+    if not text:
+        return 1.0
+    above, _, below = text.partition("/")
+    return float(above) / float(below) if below and float(below) else float(above)
 
 
 QUANTITIES: tuple[str, ...] = (

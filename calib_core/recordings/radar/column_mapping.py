@@ -75,6 +75,10 @@ class StatedReading:
                 )
 
 
+NOTHING_STATED = StatedReading()
+"""The user states nothing."""
+
+
 def map_columns(plan: ColumnPlan | None, column_map: Sequence[MappedColumn]) -> ColumnPlan:
     """Return the plan with the user's columns, units and signs in place of its own.
 

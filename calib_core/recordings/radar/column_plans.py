@@ -8,11 +8,17 @@ from typing import get_args
 
 from calib_core.plugins import load_plugins, warn_skipped
 from calib_core.recordings.assumptions import Assumption
+from calib_core.recordings.radar.column_guess import (
+    FARTHEST_M,
+    DescribedColumn,
+    Rules,
+    farthest,
+    fill_in,
+    guess_columns,
+)
 from calib_core.recordings.radar.column_plan import ColumnAssumption, ColumnPlan, ColumnReading
 from calib_core.recordings.radar.columns import plan_columns
-from calib_core.recordings.radar.described_columns import DescribedColumn, farthest
 from calib_core.recordings.radar.registry import DECODERS, Decoder, MessageKind
-from calib_core.recordings.radar.self_describing import FARTHEST_M, describe_columns, fill_in
 
 _CLOUDS = ("cloud", "channels")
 GROUP = "cocalib.radar_layouts"
@@ -93,13 +99,14 @@ def plan_described(
     names, arrays = [column.name for column in columns], tuple(arrays)
     exact = plan_columns(names)
     if kind in _CLOUDS and exact is not None and not exact.polar and _is_too_far(exact, columns):
-        return describe_columns(columns, remarks, in_ros_frame=True, known=True)
+        return guess_columns(columns, remarks, rules="ros", known=True)
     if find_decoder(kind, (*names, *arrays)):
         return plan_for(kind, names, arrays)
     if kind in _CLOUDS and exact is not None and {"x", "y"} <= {name.lower() for name in exact.position}:
         return fill_in(exact, columns)
     known = exact is not None and exact.looks_like_radar
-    return describe_columns(columns, remarks, in_ros_frame=kind in _CLOUDS, known=known or kind in _CLOUDS)
+    rules: Rules = "ros" if kind in _CLOUDS else "message"
+    return guess_columns(columns, remarks, rules=rules, known=known or kind in _CLOUDS)
 
 
 def _is_too_far(plan: ColumnPlan, columns: Sequence[DescribedColumn]) -> bool:

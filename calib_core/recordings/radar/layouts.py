@@ -8,7 +8,7 @@ import numpy as np
 
 from calib_core.errors import MessageError
 from calib_core.recordings.messages.definitions import Definition
-from calib_core.recordings.radar.column_mapping import StatedReading
+from calib_core.recordings.radar.column_mapping import NOTHING_STATED, StatedReading
 from calib_core.recordings.radar.message_layouts.list_messages import ArrayLayout, ListLayout, struct_lists
 from calib_core.recordings.radar.message_layouts.point_clouds import (
     ChannelCloudLayout,
@@ -20,9 +20,6 @@ from calib_core.recordings.radar.message_layouts.point_clouds import (
 from calib_core.recordings.radar.message_layouts.samples import Samples, leaf_names
 from calib_core.recordings.radar.message_layouts.single_returns import PointLayout
 
-_NOTHING = StatedReading()
-
-
 ScanLayout: TypeAlias = CloudLayout | ChannelCloudLayout | ListLayout | ArrayLayout
 """Every message is a whole scan."""
 
@@ -33,7 +30,7 @@ def recognise(
     definition: Definition,
     payload: bytes,
     more: Callable[[int], Sequence[bytes]] | None = None,
-    stated: StatedReading = _NOTHING,
+    stated: StatedReading = NOTHING_STATED,
 ) -> RadarLayout | None:
     """Return the reader of a message's layout, None if it is not a radar's.
 

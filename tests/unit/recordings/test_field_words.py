@@ -15,33 +15,38 @@ from calib_core.recordings.field_words import (
     MappedColumn,
     Spelling,
     Unit,
+    column_meaning,
+    is_plain,
+    meaning_of,
     parse_column_map,
-    quantity_of,
     spelt,
+    unit_in,
     unit_of_word,
 )
-from calib_core.recordings.plain_files.tables.columns import read_column_name
-from calib_core.recordings.radar.described_columns import meaning_of, unit_in
+from calib_core.recordings.plain_files.tables.times import time_name
+from calib_core.recordings.radar.column_guess import table_meaning
 
-LEVELS = ("snr", "intensity", "rcs", "power", "amplitude")
 MEASURED = {"length": "range", "angle": "azimuth", "speed": "doppler", "level": "snr", "time": "time"}
 
 
 @pytest.mark.parametrize("spelling", SPELLINGS, ids=lambda one: one.words)
 def test_a_spelling_means_the_same_as_a_column_and_as_a_field(spelling: Spelling) -> None:
-    quantity = quantity_of(spelling)
     for name in ("_".join(spelling.words.split()), "target." + ".".join(spelling.words.split())):
-        column, field = read_column_name(name), meaning_of(name)
-        assert column.quantity == quantity
-        assert field.quantity == ("amplitude" if quantity in LEVELS else quantity)
-        assert (field.rank, field.sigma, field.second, field.vague) == (spelling.rank, False, False, False)
+        column, field = column_meaning(name), meaning_of(name)
+        assert column is not None
+        assert field is not None
+        assert column.kind == field.kind == spelling.kind
+        assert (field.rank, field.sigma, field.second) == (spelling.rank, False, False)
 
 
 @pytest.mark.parametrize("subject", sorted(SUBJECTS))
 def test_the_word_for_a_return_may_precede_columns_and_fields(subject: str) -> None:
-    column, field = read_column_name(f"{subject}.pos.x"), meaning_of(f"{subject}.pos.x")
+    column, field = column_meaning(f"{subject}.pos.x"), meaning_of(f"{subject}.pos.x")
+    assert column is not None
+    assert field is not None
     assert column.quantity == field.quantity == "x"
-    time = read_column_name(f"{subject}.timestamp")
+    time = time_name(f"{subject}.timestamp")
+    assert time is not None
     assert time.quantity == "time"
 
 
@@ -61,9 +66,15 @@ def test_an_ambiguous_spelling_is_not_shared(spelling: Spelling) -> None:
 @pytest.mark.parametrize(("word", "unit"), UNITS_BY_SPELLING.items())
 def test_a_unit_means_the_same_everywhere(word: str, unit: Unit) -> None:
     quantity = MEASURED[unit.dimension]
-    column = read_column_name(f"{quantity} [{word}]")
-    assert (column.quantity, column.unit) == (quantity, unit.flag)
-    assert column.unit_is_known
+    written = f"{quantity} [{word}]"
+    if quantity == "time":
+        time = time_name(written)
+        assert time is not None
+        assert (time.quantity, time.unit) == (quantity, unit.flag)
+    else:
+        column = table_meaning(written)
+        assert column is not None
+        assert (column.kind, column.unit) == ("radial" if quantity == "doppler" else quantity, unit)
     assert unit_of_word(word) == unit
     if unit.dimension != "time":
         assert unit_in(f"[{word}]", unit.dimension) == unit
@@ -80,8 +91,12 @@ def test_a_unit_means_the_same_everywhere(word: str, unit: Unit) -> None:
     ],
 )  # fmt: skip
 def test_a_unit_at_the_end_of_a_name_is_the_same_in_tables_and_messages(name: str, flag: str) -> None:
-    column, field = read_column_name(name), meaning_of(name)
-    assert column.unit == field.unit.flag == flag
+    column, field = table_meaning(name), meaning_of(name)
+    assert column is not None
+    assert field is not None
+    assert column.unit == field.unit
+    assert field.unit is not None
+    assert field.unit.flag == flag
 
 
 @pytest.mark.parametrize(
@@ -90,7 +105,7 @@ def test_a_unit_at_the_end_of_a_name_is_the_same_in_tables_and_messages(name: st
      "azimuth2", "ego_x", "they", "latest"],
 )  # fmt: skip
 def test_names_of_other_things_are_no_columns_of_returns(name: str) -> None:
-    assert read_column_name(name) is None
+    assert table_meaning(name) is None
 
 
 @pytest.mark.parametrize(
@@ -102,19 +117,16 @@ def test_messages_keep_their_ambiguous_names(name: str, quantity: str, rank: int
     assert (meaning.quantity, meaning.rank) == (quantity, rank)
 
 
-def test_only_the_documented_spelling_has_rank_zero() -> None:
-    ranks = {
-        name: column.rank
-        for name in ("range_m", "f_Range_m", "target.range", "sigma_range_m", "rng_m", "range_filtered", "range_std_m")
-        if (column := read_column_name(name)) is not None
-    }
-    assert [name for name, rank in ranks.items() if rank == 0] == [
+def test_only_the_documented_spelling_is_plain() -> None:
+    names = ("range_m", "f_Range_m", "target.range", "sigma_range_m", "rng_m", "range_filtered", "range_std_m")
+    found = {name: meaning for name in names if (meaning := column_meaning(name)) is not None}
+    assert [name for name, meaning in found.items() if is_plain(name, meaning)] == [
         "range_m",
         "f_Range_m",
         "target.range",
         "sigma_range_m",
     ]
-    assert len(ranks) == 7
+    assert len(found) == 7
 
 
 def test_a_unit_with_a_long_s_in_a_comment_is_read_as_any_other() -> None:

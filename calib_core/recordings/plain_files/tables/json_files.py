@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from calib_core.errors import RecordingError
-from calib_core.recordings.plain_files.tables.columns import TableColumns
 from calib_core.recordings.plain_files.tables.text_tables import TableRows
 from calib_core.recordings.plain_files.tables.times import TimeReader
 
@@ -63,7 +62,7 @@ def open_json_table(path: Path) -> JsonTable:
     return JsonTable(path, names, tuple(tuple(row.get(name, "") for name in names) for _, row in first))
 
 
-def read_json_rows(table: JsonTable, columns: TableColumns, times: TimeReader | None) -> TableRows:
+def read_json_rows(table: JsonTable, places: Sequence[int], times: TimeReader | None) -> TableRows:
     """Read the rows; a last line that is cut off is left out.
 
     Raises:
@@ -73,12 +72,12 @@ def read_json_rows(table: JsonTable, columns: TableColumns, times: TimeReader | 
     for line, row in _rows(table.path):
         cells = [row.get(name, "") for name in table.names]
         try:
-            numbers = [_number(cells[column.place]) for column in columns.values]
+            numbers = [_number(cells[place]) for place in places]
             stamps.append(times.read(times.key(cells)) if times else 0)
         except (ValueError, OverflowError, RecordingError) as error:
             raise RecordingError(f"{table.path}: line {line}: {error}; fix or remove the line") from error
         values.extend(numbers)
-    numbers_of_rows = np.array(values, dtype=np.float64).reshape(-1, len(columns.values))
+    numbers_of_rows = np.array(values, dtype=np.float64).reshape(-1, len(places))
     return TableRows(np.array(stamps, dtype=np.int64), numbers_of_rows, _is_cut_off(table.path))
 
 

@@ -1,7 +1,8 @@
 """Open tables of radar returns, CSV or JSON: one file with all scans, or a folder with one file per scan."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import TypeAlias
 
@@ -10,11 +11,10 @@ import numpy as np
 from calib_core.arrays import TimesNs
 from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import TimeNs
-from calib_core.radar import cartesian_from_polar
 from calib_core.recordings.assumptions import Assumption
+from calib_core.recordings.field_words import MappedColumn, is_plain
 from calib_core.recordings.plain_files.file_stamps import StampedFiles, stamp_files
 from calib_core.recordings.plain_files.source import PlainOptions, PlainSource, cloud_channel, cloud_message, topic_of
-from calib_core.recordings.plain_files.tables.columns import TABLE_EXAMPLE, TableColumns, choose_columns
 from calib_core.recordings.plain_files.tables.json_files import JsonTable, open_json_table, read_json_rows
 from calib_core.recordings.plain_files.tables.text_tables import (
     TableRows,
@@ -24,8 +24,25 @@ from calib_core.recordings.plain_files.tables.text_tables import (
     read_rows,
     require_header,
 )
-from calib_core.recordings.plain_files.tables.times import TimeReader, time_reader
-from calib_core.recordings.plain_files.tables.units import TableUnits, settle_units
+from calib_core.recordings.plain_files.tables.times import (
+    TABLE_EXAMPLE,
+    TimeColumns,
+    TimeReader,
+    choose_times,
+    time_reader,
+    unknown_unit_error,
+)
+from calib_core.recordings.radar.axes import RadarAxes
+from calib_core.recordings.radar.column_guess import (
+    DescribedColumn,
+    guess_columns,
+    split_unit,
+    table_meaning,
+    unknown_unit,
+)
+from calib_core.recordings.radar.column_mapping import StatedReading
+from calib_core.recordings.radar.column_plan import ColumnPlan
+from calib_core.recordings.radar.columns import returns_from
 from calib_core.results import DataWarning
 
 JSON_SUFFIXES = (".json", ".jsonl", ".ndjson")
@@ -34,6 +51,39 @@ _SAMPLED_FILES = 12
 Table: TypeAlias = TextTable | JsonTable
 RADAR_FRAME = "radar"
 _MOST_NAMES = 8
+_SAMPLED_ROWS = 20_000
+_POLAR = ("range", "azimuth", "elevation")
+_POSITION = ("x", "y", "z", *_POLAR)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Columns:
+    """The columns of a table.
+
+    Attributes:
+        names: of all columns, as written.
+        units: from a line of units under the header, "" where it has none.
+        stated: what the user states; its columns are spelled as in names.
+        times: the columns of times.
+        wanted: places of the columns that may hold returns.
+        plan: which of these are read; made without values until they are known.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    stated: StatedReading
+    times: TimeColumns
+    wanted: tuple[int, ...]
+    plan: ColumnPlan
+
+    def with_values(self, path: Path, values: np.ndarray) -> "_Columns":
+        """Return the same with the plan that the values show."""
+        return replace(self, plan=_plan(path, self.names, self.units, self.wanted, self.stated, values))
+
+    @property
+    def shown(self) -> ColumnPlan:
+        """The plan with what is claimed, to find contradictions where positions are not made of it."""
+        return replace(self.plan, claiming=not self.plan.polar)
 
 
 def open_radar_table(path: Path, options: PlainOptions) -> PlainSource:
@@ -42,9 +92,9 @@ def open_radar_table(path: Path, options: PlainOptions) -> PlainSource:
     Raises:
         RecordingError: a position or the time is missing, a unit is unknown, or a row is damaged.
     """
-    table = _open(path, options)
+    table, topic = _open(path, options), topic_of(path, "radar")
     columns = _columns(table, options)
-    times = _times(table, columns, topic_of(path, "radar"), options)
+    times = _times(table, columns, topic, options)
     if times is None:
         shown = ", ".join(name.strip() for name in table.names[:12])
         raise RecordingError(
@@ -54,9 +104,26 @@ def open_radar_table(path: Path, options: PlainOptions) -> PlainSource:
     rows = _read(table, columns, times)
     if not len(rows.times_ns):
         raise RecordingError(f"{path}: the file has a header but no rows")
+    columns = columns.with_values(path, rows.values)
+    order = np.argsort(rows.times_ns, kind="stable")
+    stamps, first = np.unique(rows.times_ns[order], return_index=True)
+    edges = np.append(first, len(order))
+    points = _points(columns, rows.values[order])
     what = "radar JSON" if isinstance(table, JsonTable) else "radar CSV"
-    read = ReturnTable(columns, rows, times.zoneless, times.counted, times.assumptions, times.remarks)
-    return source_of(path, what, read, options)
+    return PlainSource(
+        path,
+        path.stat().st_size,
+        f"{what}{_table_words(columns, times.remarks)}",
+        cloud_channel(topic),
+        stamps,
+        _message(stamps, edges, points),
+        (*([_counted(path)] if times.counted else ()), *([_cut_off(path)] if rows.is_cut_off else ())),
+        assumptions=(*times.assumptions, *_assumptions(columns, topic)),
+        zoneless=times.zoneless,
+        counted=times.counted,
+        mapped=bool(options.mapped),
+        computed=_computed_words(columns.plan),
+    )
 
 
 def table_fault(path: Path, options: PlainOptions) -> str:
@@ -103,8 +170,8 @@ def open_table_folder(
     if not tables:
         raise RecordingError(f"{folder}: {len(files)} tables without a row in the {len(sample)} that were looked at")
     columns = _columns(tables[0], options)
-    values = [_read(table, _same_columns(table, columns, options), None).values for table in tables]
-    units = settle_units(columns, np.concatenate(values), topic, options)
+    values = [_values(table, columns, options) for table in tables]
+    columns = columns.with_values(folder, np.concatenate(values))
     times = _times(tables[0], columns, topic, options)
     inside = times is not None and not times.counted
     stamped = (
@@ -113,23 +180,27 @@ def open_table_folder(
 
     def message(row: int) -> bytes:
         return cloud_message(
-            TimeNs(int(stamped.times_ns[row])), RADAR_FRAME, _points(stamped.files[row], columns, units, options)
+            TimeNs(int(stamped.times_ns[row])), RADAR_FRAME, _points_of_file(stamped.files[row], columns, options)
         )
 
-    remarks = (*units.remarks, *(times.remarks if times and inside else ()))
+    remarks = times.remarks if times and inside else ()
     return PlainSource(
         folder,
         sum(file.stat().st_size for file in stamped.files),
-        f"folder of radar {files[0].suffix}, {len(stamped.files)} files{table_words(columns, remarks)}",
+        f"folder of radar {files[0].suffix}, {len(stamped.files)} files{_table_words(columns, remarks)}",
         cloud_channel(topic),
         stamped.times_ns,
         message,
         stamped.warnings,
-        assumptions=(*stamped.assumptions(topic), *(times.assumptions if times and inside else ()), *units.assumptions),
+        assumptions=(
+            *stamped.assumptions(topic),
+            *(times.assumptions if times and inside else ()),
+            *_assumptions(columns, topic),
+        ),
         zoneless=stamped.zoneless,
         counted=stamped.counted,
-        mapped=any(column.mapped for column in (*columns.values, *columns.time)),
-        computed=computed_words(columns),
+        mapped=bool(options.mapped),
+        computed=_computed_words(columns.plan),
     )
 
 
@@ -141,42 +212,136 @@ def _open(path: Path, options: PlainOptions) -> Table:
     return table
 
 
-def _columns(table: Table, options: PlainOptions) -> TableColumns:
-    units = table.units if isinstance(table, TextTable) else ()
-    return choose_columns(table.path, table.names, units, table.first_row, options.mapped)
-
-
-def _same_columns(table: Table, columns: TableColumns, options: PlainOptions) -> TableColumns:
-    """Return the columns of one file of a folder.
+def _columns(table: Table, options: PlainOptions) -> _Columns:
+    """Choose the columns by their names.
 
     Raises:
-        MessageError: they are not those of the first.
+        RecordingError: a mapped column does not exist, a position is missing, or a unit is unknown.
+    """
+    names, path = tuple(name.strip() for name in table.names), table.path
+    below = tuple(word.strip("[]() -") for word in (table.units if isinstance(table, TextTable) else ()))
+    units = (*below, *("" for _ in names))[: len(names)]
+    mapped = [replace(one, column=_spelt(path, names, one)) for one in options.mapped]
+    time = next((one for one in mapped if one.quantity == "time"), None)
+    unit = None if not options.angle_unit else options.angle_unit == "deg"
+    stated = StatedReading(
+        tuple(one for one in mapped if one is not time), RadarAxes(degrees=unit, directed=options.axes_given)
+    )
+    taken = {one.column for one in stated.column_map}
+    wanted = tuple(
+        place
+        for place, name in enumerate(names)
+        if name in taken or ((time is None or name != time.column) and table_meaning(name, units[place]) is not None)
+    )
+    try:
+        times = choose_times(names, units, table.first_row, time, taken)
+    except RecordingError as error:
+        raise RecordingError(f"{path}: {error}") from error
+    plan = _plan(path, names, units, wanted, stated, np.zeros((0, len(wanted))))
+    return _Columns(names, units, stated, times, wanted, plan)
+
+
+def _spelt(path: Path, names: Sequence[str], one: MappedColumn) -> str:
+    """Return a mapped column as the table spells it.
+
+    Raises:
+        RecordingError: there is none of this name.
+    """
+    bare = [name.strip("#% ") for name in names]
+    for wanted, known in ((one.column, bare), (one.column.lower(), [name.lower() for name in bare])):
+        if wanted in known:
+            return names[known.index(wanted)]
+    near = get_close_matches(one.column, bare, 1, 0.0)
+    hint = f"; did you mean '{near[0]}'? " if near else "; "
+    raise RecordingError(f"{path}: --map {one.words}: no column '{one.column}'{hint}The columns are {_listed(bare)}")
+
+
+def _plan(
+    path: Path,
+    names: Sequence[str],
+    units: Sequence[str],
+    wanted: Sequence[int],
+    stated: StatedReading,
+    values: np.ndarray,
+) -> ColumnPlan:
+    """Decide what the columns are.
+
+    Raises:
+        RecordingError: there is no position, or its unit is unknown or ambiguous; the message has the --map that states it.
+    """
+    step = max(1, len(values) // _SAMPLED_ROWS)
+    columns = [
+        DescribedColumn(names[place], False, units[place], values[::step, number])
+        for number, place in enumerate(wanted)
+    ]
+    try:
+        with np.errstate(all="ignore"):
+            plan = guess_columns(columns, rules="table", known=True, stated=stated)
+        if plan is None:
+            foreign = {
+                name: found for name, below in zip(names, units, strict=True) if (found := unknown_unit(name, below))
+            }
+            whole = {quantity for quantity, _ in foreign.values()} | {
+                meaning.quantity for place in wanted if (meaning := table_meaning(names[place], units[place]))
+            }
+            for name, (quantity, unit) in foreign.items():
+                if quantity in _POSITION and ({"x", "y"} <= whole or {"range", "azimuth"} <= whole):
+                    raise unknown_unit_error(name, quantity, unit)
+    except RecordingError as error:
+        raise RecordingError(f"{path}: {error}") from error
+    if plan is None:
+        raise RecordingError(
+            f"{path}: no position columns; x_m and y_m, or range_m and azimuth_deg, are required, such as {TABLE_EXAMPLE}; "
+            f"the columns are {_listed(names)}: say which is which with --map x=NAME:m --map y=NAME:m"
+        )
+    return plan
+
+
+def _listed(names: Sequence[str]) -> str:
+    shown = ", ".join(names[:12])
+    return f"{shown} and {len(names) - 12} more" if len(names) > 12 else shown or "none"
+
+
+def _assumptions(columns: _Columns, topic: str) -> tuple[Assumption, ...]:
+    return tuple(replace(one.assumption, topic=topic) for one in columns.plan.assumptions)
+
+
+def _values(table: Table, columns: _Columns, options: PlainOptions) -> np.ndarray:
+    """Return the values of one file of a folder, in the order of columns.wanted.
+
+    Raises:
+        MessageError: its columns are not those of the first.
     """
     own = _columns(table, options)
-    if [(c.quantity, c.unit) for c in own.values] != [(c.quantity, c.unit) for c in columns.values]:
+    places = {name: place for place, name in reversed(list(enumerate(own.names)))}
+    wanted = [columns.names[place] for place in columns.wanted]
+    same = all(
+        name in places and own.units[places[name]] == columns.units[place]
+        for name, place in zip(wanted, columns.wanted, strict=True)
+    )
+    if not same:
         raise MessageError(f"{table.path.name} has other columns than the other files: {', '.join(table.names[:12])}")
-    return own
+    return _read(table, replace(own, wanted=tuple(places[name] for name in wanted)), None).values
 
 
 def _rows(table: Table) -> Sequence[Sequence[str]]:
     return table.sample if isinstance(table, JsonTable) else first_rows(table)
 
 
-def _times(table: Table, columns: TableColumns, topic: str, options: PlainOptions) -> TimeReader | None:
+def _times(table: Table, columns: _Columns, topic: str, options: PlainOptions) -> TimeReader | None:
     comma = isinstance(table, TextTable) and table.decimal_comma
-    return time_reader(columns, _rows(table), topic, zone_s=options.zone_s, decimal_comma=comma)
+    return time_reader(columns.times, _rows(table), topic, zone_s=options.zone_s, decimal_comma=comma)
 
 
-def _read(table: Table, columns: TableColumns, times: TimeReader | None) -> TableRows:
-    return read_json_rows(table, columns, times) if isinstance(table, JsonTable) else read_rows(table, columns, times)
+def _read(table: Table, columns: _Columns, times: TimeReader | None) -> TableRows:
+    read = columns.wanted
+    return read_json_rows(table, read, times) if isinstance(table, JsonTable) else read_rows(table, read, times)
 
 
-def _points(file: Path, columns: TableColumns, units: TableUnits, options: PlainOptions) -> np.ndarray:
+def _points_of_file(file: Path, columns: _Columns, options: PlainOptions) -> np.ndarray:
     table = _open(file, options)
-    if not table.first_row:
-        return points_of(columns, np.zeros((0, len(columns.values))), units)
-    own = _same_columns(table, columns, options)
-    return points_of(own, _read(table, own, None).values, units)
+    values = _values(table, columns, options) if table.first_row else np.zeros((0, len(columns.wanted)))
+    return _points(columns, values)
 
 
 def _stamped_inside(files: Sequence[Path], times: TimeReader, options: PlainOptions) -> StampedFiles:
@@ -192,52 +357,6 @@ def _stamped_inside(files: Sequence[Path], times: TimeReader, options: PlainOpti
     ordered = sorted(found, key=lambda file: (found[file], file))
     times_ns = np.array([found[file] for file in ordered], dtype=np.int64)
     return StampedFiles(tuple(ordered), times_ns, zoneless=times.zoneless)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ReturnTable:
-    """A table as read.
-
-    Attributes:
-        columns: which columns were read.
-        rows: their times and values.
-        zoneless: whether the times are dates without a zone.
-        counted: whether the times are numbers of scans.
-        assumptions: about the times.
-        remarks: about the times.
-    """
-
-    columns: TableColumns
-    rows: TableRows
-    zoneless: bool = False
-    counted: bool = False
-    assumptions: tuple[Assumption, ...] = ()
-    remarks: tuple[str, ...] = ()
-
-
-def source_of(path: Path, what: str, table: ReturnTable, options: PlainOptions) -> PlainSource:
-    """Return the scans of a table as a recording's topic."""
-    topic = topic_of(path, "radar")
-    units = settle_units(table.columns, table.rows.values, topic, options)
-    order = np.argsort(table.rows.times_ns, kind="stable")
-    stamps, first = np.unique(table.rows.times_ns[order], return_index=True)
-    edges = np.append(first, len(order))
-    points = points_of(table.columns, table.rows.values[order], units)
-    warnings = (*([_counted(path)] if table.counted else ()), *([_cut_off(path)] if table.rows.is_cut_off else ()))
-    return PlainSource(
-        path,
-        path.stat().st_size,
-        f"{what}{table_words(table.columns, (*units.remarks, *table.remarks))}",
-        cloud_channel(topic),
-        stamps,
-        _message(stamps, edges, points),
-        warnings,
-        assumptions=(*table.assumptions, *units.assumptions),
-        zoneless=table.zoneless,
-        counted=table.counted,
-        mapped=any(column.mapped for column in (*table.columns.values, *table.columns.time)),
-        computed=computed_words(table.columns),
-    )
 
 
 def _counted(path: Path) -> DataWarning:
@@ -256,51 +375,64 @@ def _cut_off(path: Path) -> DataWarning:
     )
 
 
-def points_of(columns: TableColumns, values: np.ndarray, units: TableUnits) -> np.ndarray:
-    """Return returns in SI units as a structured array, one field per quantity."""
-    names = [column.quantity for column in columns.values]
-    scaled = np.ascontiguousarray(values * units.scales)
-    if units.x_is_right:
-        x, y = names.index("x"), names.index("y")
-        scaled[:, [x, y]] = scaled[:, [y, x]] * (1.0, -1.0)
-        if "vx" in names and "vy" in names:
-            x, y = names.index("vx"), names.index("vy")
-            scaled[:, [x, y]] = scaled[:, [y, x]] * (1.0, -1.0)
-    if "x" not in names or "y" not in names:
-        names, scaled = _with_positions(names, scaled)
-    return scaled.view(np.dtype([(name, "<f8") for name in names]))[:, 0]
+def _points(columns: _Columns, values: np.ndarray) -> np.ndarray:
+    """Return returns in SI units and the radar's axes as a structured array, one field per quantity."""
+    places = {columns.names[place]: number for number, place in reversed(list(enumerate(columns.wanted)))}
+    plan = columns.shown
+    found = returns_from(plan, lambda name: values[:, places[name]])
+    height = plan.polar or len(plan.position) == 3
+    fields = dict(zip("xyz" if height else "xy", found.points_radar_m.T, strict=False))
+    if found.claimed_polar is not None:
+        fields |= {n: c for n, c, own in zip(_POLAR, found.claimed_polar.T, plan.claimed, strict=True) if own}
+    if plan.doppler or plan.velocity:
+        fields["doppler"] = found.doppler_mps
+    if plan.amplitude:
+        meaning = table_meaning(plan.amplitude)
+        fields[meaning.kind if meaning and meaning.quantity == "amplitude" else "amplitude"] = found.snr_db
+    fields |= {f"sigma_{n}": c for n, c, own in zip(_POLAR, found.sigma_polar.T, plan.sigma, strict=True) if own}
+    points = np.empty(len(values), dtype=[(name, "<f8") for name in fields])
+    for name, column in fields.items():
+        points[name] = column
+    return points
 
 
-def _with_positions(names: Sequence[str], values: np.ndarray) -> tuple[list[str], np.ndarray]:
-    """Put x, y, z before range and angles, so that what was settled about these is not asked again of the message."""
-    polar = np.zeros((len(values), 3))
-    for place, name in enumerate(("range", "azimuth", "elevation")):
-        if name in names:
-            polar[:, place] = values[:, names.index(name)]
-    kept = [place for place, name in enumerate(names) if name not in ("x", "y", "z")]
-    with np.errstate(invalid="ignore"):  # an angle may be infinite
-        positions = np.column_stack([cartesian_from_polar(polar), values[:, kept]])
-    return ["x", "y", "z", *(names[place] for place in kept)], np.ascontiguousarray(positions)
-
-
-def computed_words(columns: TableColumns) -> str:
+def _computed_words(plan: ColumnPlan) -> str:
     """Say which columns x, y and z were computed from; "" if the table has positions of its own."""
-    if columns.of("x") and columns.of("y"):
-        return ""
-    polar = (columns.of(quantity) for quantity in ("range", "azimuth", "elevation"))
-    return f"x, y, z computed from {', '.join(column.written for column in polar if column)}"
+    return f"x, y, z computed from {', '.join(plan.position)}" if plan.polar else ""
 
 
-def table_words(columns: TableColumns, remarks: tuple[str, ...]) -> str:
+def _is_documented(written: str) -> bool:
+    meaning = table_meaning(written)
+    return meaning is not None and is_plain(split_unit(written)[0], meaning)
+
+
+def _table_words(columns: _Columns, remarks: tuple[str, ...]) -> str:
     """Describe what was read and what was not, for the list of files."""
-    renamed = [f"{c.quantity} from {c.written}" for c in columns.values if c.rank or c.mapped]
-    words = [", ".join(renamed), "; ".join(remarks)]
-    if columns.unused:
-        more = len(columns.unused) - _MOST_NAMES
-        words.append(
-            f"without {', '.join(columns.unused[:_MOST_NAMES])}" + (f" and {more} more columns" if more > 0 else "")
-        )
-    text = "; ".join(filter(None, words))
+    plan = columns.plan
+    renamed = [
+        f"{one.quantity} from {one.column}"
+        for one in plan.readings
+        if one.why.startswith("--map") or not _is_documented(one.column)
+    ]
+    shown = {why: [r for r in plan.readings if r.why == why] for why in dict.fromkeys(r.why for r in plan.readings)}
+    by_values = [
+        f"{', '.join(one.column for one in rows)} in {rows[0].unit}: {why.removeprefix('unit: ').partition(';')[0]}"
+        for why, rows in shown.items()
+        if why.startswith("unit: ") and not why.startswith(("unit: name", "unit: assumed", "unit: --map"))
+    ]
+    used = {*plan.columns, *(name for name in plan.claimed if name)}
+    unused = [
+        name
+        for place, name in enumerate(columns.names)
+        if name and name not in used and place not in columns.times.places
+    ]
+    more = len(unused) - _MOST_NAMES
+    left = (
+        f"without {', '.join(unused[:_MOST_NAMES])}" + (f" and {more} more columns" if more > 0 else "")
+        if unused
+        else ""
+    )
+    text = "; ".join(filter(None, (", ".join(renamed), "; ".join((*by_values, *remarks)), left)))
     return f", {text}" if text else ""
 
 

@@ -4,7 +4,7 @@ import csv
 import math
 import re
 from array import array
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
@@ -17,16 +17,10 @@ import numpy as np
 
 from calib_core.arrays import TimesNs
 from calib_core.errors import RecordingError
+from calib_core.recordings.field_words import SPELLINGS, TABLE_ANGLES, unit_of_word, units_for
 from calib_core.recordings.plain_files.source import PlainOptions
-from calib_core.recordings.plain_files.tables.columns import (
-    COLUMN_SPELLINGS,
-    TABLE_EXAMPLE,
-    TIME_QUANTITIES,
-    TableColumns,
-    read_column_name,
-    units_of,
-)
-from calib_core.recordings.plain_files.tables.times import TimeReader
+from calib_core.recordings.plain_files.tables.times import TABLE_EXAMPLE, TIME_SPELLINGS, TimeReader, time_name
+from calib_core.recordings.radar.column_guess import table_meaning, unknown_unit
 
 _SEPARATORS = (",", ";", "\t", "|", " ")
 _HEAD_BYTES = 1 << 16
@@ -171,7 +165,7 @@ def _header_place(lines: Sequence[str]) -> tuple[int | None, str]:
         for separator in _SEPARATORS:
             if separator not in bare:
                 continue
-            known = sum(1 for cell in _cells(bare, separator) if cell and read_column_name(cell) is not None)
+            known = sum(1 for cell in _cells(bare, separator) if cell and is_known(cell))
             if known > best[0]:
                 best = known, place, separator
     if best[1] is not None:
@@ -206,14 +200,17 @@ def _are_units(cells: Sequence[str]) -> bool:
     words = [cell.strip("[]() ") for cell in cells]
     return any(words) and not any(re.search(r"\d", word) and not word.startswith("m") for word in words) and all(
         len(word) <= 12 for word in words
-    ) and any(read_column_name(f"x [{word}]") and _known_unit(word) for word in words if word)  # fmt: skip
+    ) and any(_known_unit(word) for word in words if word)  # fmt: skip
+
+
+def is_known(cell: str) -> bool:
+    """Return whether a cell is the name of a quantity or of a time."""
+    return time_name(cell) is not None or table_meaning(cell) is not None or unknown_unit(cell) is not None
 
 
 def _known_unit(word: str) -> bool:
-    return any(
-        (found := read_column_name(f"{name} [{word}]")) and found.unit_is_known
-        for name in ("x", "azimuth", "doppler", "time")
-    )
+    unit = unit_of_word(word)
+    return unit is not None and unit.dimension != "level"
 
 
 def _uses_commas(rows: Sequence[tuple[int, Sequence[str]]]) -> bool:
@@ -225,11 +222,19 @@ def _uses_commas(rows: Sequence[tuple[int, Sequence[str]]]) -> bool:
 
 def csv_columns() -> tuple[str, ...]:
     """Return the table rows of columns and units for the documentation."""
+    known: dict[str, list[str]] = {}
+    for one in (*SPELLINGS, *TABLE_ANGLES):
+        known.setdefault({"longitudinal": "x", "lateral": "y", "radial": "doppler"}.get(one.kind, one.kind), []).append(
+            one.words
+        )
+    sigma = {f"sigma_{q}": [f"sigma {q}", f"{q} std", f"{q} accuracy"] for q in ("range", "azimuth", "elevation")}
+    order = ("x", "y", "z", "range", "azimuth", "elevation", "doppler", "vx", "vy", "vz", "snr", "rcs", "power", "amplitude",
+             "intensity")  # fmt: skip
     rows = []
-    for quantity, spellings in COLUMN_SPELLINGS.items():
+    for quantity, spellings in {**TIME_SPELLINGS, **{name: known[name] for name in order}, **sigma}.items():
         units = {"time": "ns, us, ms, s, or dates"}.get(quantity, "")
-        if not units and quantity not in TIME_QUANTITIES:
-            units = ", ".join(units_of(quantity))
+        if not units and quantity not in TIME_SPELLINGS:
+            units = ", ".join(unit.flag for unit in units_for(quantity))
         names = ", ".join(f"`{spelling}`" for spelling in spellings[:_SHOWN_SPELLINGS])
         rows.append(f"| {quantity} | {names} | {units} |")
     return tuple(rows)
@@ -258,22 +263,22 @@ def _is_data(row: Sequence[str]) -> bool:
     return bool(row) and any(map(str.strip, row)) and not row[0].lstrip().startswith(_COMMENTS)
 
 
-def read_rows(table: TextTable, columns: TableColumns, times: TimeReader | None) -> TableRows:
+def read_rows(table: TextTable, places: Sequence[int], times: TimeReader | None) -> TableRows:
     """Read the rows; a last one that is cut off is left out.
 
     Raises:
         RecordingError: a row is damaged; the message names its line.
     """
-    listed = any(_is_list(table.first_row[c.place]) for c in columns.values if c.place < len(table.first_row))
+    listed = any(_is_list(table.first_row[place]) for place in places if place < len(table.first_row))
     with table.rows() as rows:
-        return _read_lists(table, columns, times, rows) if listed else _read_numbers(table, columns, times, rows)
+        return _read_lists(table, places, times, rows) if listed else _read_numbers(table, places, times, rows)
 
 
 def _read_numbers(
-    table: TextTable, columns: TableColumns, times: TimeReader | None, rows: Iterator[list[str]]
+    table: TextTable, places: Sequence[int], times: TimeReader | None, rows: Iterator[list[str]]
 ) -> TableRows:
     stamps, values = array("q"), array("d")  # eight bytes per number; a Python list would take forty
-    cells, comma = _cells_of(columns), table.decimal_comma
+    cells, comma = itemgetter(*places), table.decimal_comma
     key = times.key if times else _no_time
     known, time = None, 0
     for number, row in enumerate(rows, start=table.skipped_lines + 1):
@@ -289,18 +294,16 @@ def _read_numbers(
                 numbers = [_number(cell.replace(",", ".") if comma else cell) for cell in written]
         except (ValueError, IndexError, OverflowError, RecordingError) as error:
             if _is_end(table, rows):
-                return _rows(stamps, values, columns, is_cut_off=True)
+                return _rows(stamps, values, len(places), is_cut_off=True)
             raise _damaged(table, number, error) from error
         stamps.append(time)
         values.extend(numbers)
-    return _rows(stamps, values, columns)
+    return _rows(stamps, values, len(places))
 
 
-def _rows(
-    stamps: "array[int]", values: "array[float]", columns: TableColumns, *, is_cut_off: bool = False
-) -> TableRows:
+def _rows(stamps: "array[int]", values: "array[float]", width: int, *, is_cut_off: bool = False) -> TableRows:
     times_ns = np.array(stamps, dtype=np.int64)
-    return TableRows(times_ns, np.array(values, dtype=np.float64).reshape(-1, len(columns.values)), is_cut_off)
+    return TableRows(times_ns, np.array(values, dtype=np.float64).reshape(-1, width), is_cut_off)
 
 
 def _is_end(table: TextTable, rows: Iterator[list[str]]) -> bool:
@@ -314,11 +317,6 @@ def _is_end(table: TextTable, rows: Iterator[list[str]]) -> bool:
 
 def _no_time(_: Sequence[str]) -> object:
     return None
-
-
-def _cells_of(columns: TableColumns) -> Callable[[Sequence[str]], Sequence[str]]:
-    places = [column.place for column in columns.values]
-    return itemgetter(*places)
 
 
 def _damaged(table: TextTable, number: int, error: Exception) -> RecordingError:
@@ -343,11 +341,11 @@ def _is_list(cell: str) -> bool:
 
 
 def _read_lists(
-    table: TextTable, columns: TableColumns, times: TimeReader | None, rows: Iterator[list[str]]
+    table: TextTable, places: Sequence[int], times: TimeReader | None, rows: Iterator[list[str]]
 ) -> TableRows:
     """Read rows that hold a scan each: every column is a list of as many numbers, or one number for all returns."""
     stamps, values = array("q"), array("d")
-    cells = _cells_of(columns)
+    cells = itemgetter(*places)
     for number, split in enumerate(rows, start=table.skipped_lines + 1):
         if not _is_data(split):
             continue
@@ -360,12 +358,12 @@ def _read_lists(
             time = times.read(times.key(row)) if times else 0
         except (ValueError, IndexError, OverflowError, RecordingError) as error:
             if _is_end(table, rows):
-                return _rows(stamps, values, columns, is_cut_off=True)
+                return _rows(stamps, values, len(places), is_cut_off=True)
             raise _damaged(table, number, error) from error
         full = [one * count if len(one) == 1 else one for one in lists]
         stamps.extend([time] * count)
         values.extend(value for one in zip(*full, strict=True) for value in one)
-    return _rows(stamps, values, columns)
+    return _rows(stamps, values, len(places))
 
 
 def _joined(row: Sequence[str], separator: str) -> list[str]:

@@ -1,7 +1,8 @@
 """Read the times of a table's rows: numbers in any unit, dates, seconds with nanoseconds, date and time of day in two columns."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+import re
+from collections.abc import Callable, Mapping, Sequence, Set
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import inf, log
 from operator import itemgetter
@@ -9,9 +10,29 @@ from operator import itemgetter
 from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.recordings.assumptions import Assumption
-from calib_core.recordings.plain_files.tables.columns import TableColumn, TableColumns
+from calib_core.recordings.field_words import (
+    SUBJECTS,
+    TABLE_TYPE_PREFIXES,
+    MappedColumn,
+    unit_of_word,
+    unit_of_words,
+    units_for,
+)
+from calib_core.recordings.radar.column_guess import split_unit
 from calib_core.recordings.time.written_times import TimeUnit, date_text, read_time, unit_of_epoch
 
+_TIMES: Mapping[str, str] = {
+    "time": "time timestamp stamp t epoch unixtime unixtimestamp headerstamp datetime utc utctime timeutc timeofmeasurement "
+    "measurementtime rostime ts gpstime timegps",
+    "sec": "sec secs seconds stampsec stampsecs timesec timesecs headerstampsec headerstampsecs timestampsec timestampsecs "
+    "epochsec tvsec",
+    "nanosec": "nanosec nanosecs nsec nsecs nanoseconds stampnanosec stampnsec stampnsecs timensec timenanosec "
+    "headerstampnanosec headerstampnsec headerstampnsecs timestampnsec timestampnanosec tvnsec",
+    "date": "date day",
+    "frame": "frame frameid framenumber framenr frameno frameindex frameidx scan scanid scannumber scanindex cycle cyclecounter",
+}
+TIME_SPELLINGS: Mapping[str, tuple[str, ...]] = {quantity: tuple(words.split()) for quantity, words in _TIMES.items()}
+"""Spellings of what a column of times may hold, without prefixes and units."""
 _SCALES: dict[TimeUnit, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _USUAL_STEP_S = 0.07
 _GPS_EPOCH_S = 315_964_800
@@ -41,8 +62,177 @@ class TimeReader:
     remarks: tuple[str, ...] = ()
 
 
+TABLE_EXAMPLE = "time_ns,x_m,y_m,z_m,doppler_mps,snr_db"
+_PREFIXES = TABLE_TYPE_PREFIXES | SUBJECTS
+_TIME_OF = {
+    spelling: (quantity, rank) for quantity, words in TIME_SPELLINGS.items() for rank, spelling in enumerate(words)
+}
+_CLOCK = re.compile(r"\d{1,2}:\d\d(?::\d\d(?:[.,]\d+)?)?")
+
+
+@dataclass(frozen=True, slots=True)
+class TimeName:
+    """What the name of a column of times says: the quantity, its unit as --map spells it, the place of its spelling."""
+
+    quantity: str
+    unit: str
+    rank: int
+
+
+@dataclass(frozen=True, slots=True)
+class TimeColumn:
+    """One column of times in use.
+
+    Attributes:
+        place: its index in a row.
+        written: its name in the file.
+        quantity: a key of TIME_SPELLINGS.
+        unit: s, ms, us or ns; "" if the file does not state it.
+        rank: 0 if the name is the documented one.
+        mapped: whether --map chose it.
+    """
+
+    place: int
+    written: str
+    quantity: str
+    unit: str = ""
+    rank: int = 0
+    mapped: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class TimeColumns:
+    """The columns of times in use.
+
+    Attributes:
+        time: one column (a number or a date), two (seconds and nanoseconds, or date and time of day), or none.
+        frame: the column that numbers the scans, if there is one and no time.
+    """
+
+    time: tuple[TimeColumn, ...] = ()
+    frame: TimeColumn | None = None
+
+    @property
+    def places(self) -> set[int]:
+        """Their indices in a row."""
+        return {column.place for column in (*self.time, *((self.frame,) if self.frame else ()))}
+
+
+def choose_times(
+    names: Sequence[str], units: Sequence[str], first_row: Sequence[str], mapped: MappedColumn | None, taken: Set[str]
+) -> TimeColumns:
+    """Choose the columns that hold the times.
+
+    Args:
+        names: of all columns, as written.
+        units: of all columns, from a line under the header; () if there is none.
+        first_row: cells of the first row.
+        mapped: the --map of the time, if there is one, of a column that exists.
+        taken: columns that --map uses for something else.
+
+    Raises:
+        RecordingError: the unit of the only time is unknown.
+    """
+    if mapped is not None:
+        return TimeColumns((TimeColumn(names.index(mapped.column), mapped.column, "time", mapped.unit, 0, True),))
+    claims: dict[str, list[TimeColumn]] = {}
+    foreign: list[tuple[str, str]] = []
+    for place, written in enumerate(names):
+        found = None if written in taken else time_name(written)
+        if found is None:
+            continue
+        below = units[place].strip("[]() -") if place < len(units) else ""
+        unit = unit_of_word(found.unit or below)
+        if unit is None and found.quantity == "time" and (found.unit or below):
+            foreign.append((written, found.unit or below))
+            continue
+        flag = unit.flag if unit and unit.dimension == "time" and found.quantity == "time" else ""
+        claims.setdefault(found.quantity, []).append(
+            TimeColumn(place, written.strip(), found.quantity, flag, found.rank)
+        )
+    time = _time_columns(claims, first_row)
+    if not time and foreign:
+        raise unknown_unit_error(foreign[0][0], "time", foreign[0][1])
+    return TimeColumns(time, None if time else next(iter(claims.get("frame", ())), None))
+
+
+def unknown_unit_error(written: str, quantity: str, unit: str) -> RecordingError:
+    """Return the refusal of a column whose unit is unknown, with the --map that states it."""
+    known = [one.flag for one in units_for(quantity)]
+    return RecordingError(
+        f"column '{written.strip()}' has the unknown unit '{unit}'; known units: {', '.join(known)}; "
+        f"if it is one of these, say so with --map {quantity}={written.strip()}:{known[0]}"
+    )
+
+
+def time_name(written: str) -> TimeName | None:
+    """Recognise a column of times such as time_ns, header.stamp.sec or "Time [ms]"; None for any other."""
+    text, unit = split_unit(written)
+    words = _words(text)
+    found = _time(words) if unit else _with_time(words) or _time(words)
+    if found is None and not unit and len(words) == 2 and (found := _time(words[:1])) and found.quantity == "time":
+        unit = "" if found.rank else words[1]
+        found = found if unit else None
+    stated = unit_of_word(unit)
+    return replace(found, unit=stated.flag if stated else unit.lower()) if found and unit else found
+
+
+def _words(text: str) -> tuple[str, ...]:
+    """Split a name at separators and capitals only: headerStampSec -> header, stamp, sec."""
+    spaced = re.sub(r"([a-z0-9])([A-Z])", r"\1 \2", text.replace("dB", "db"))
+    words = tuple(word.lower() for word in re.split(r"[^A-Za-z0-9µμ]+", spaced) if word)
+    return words[:-1] if len(words) > 1 and words[-1] in ("value", "val") else words
+
+
+def _time(words: tuple[str, ...]) -> TimeName | None:
+    """Return the time that words name; prefixes are dropped one at a time."""
+    for start in range(len(words)):
+        found = _TIME_OF.get("".join(words[start:]))
+        if found:
+            return TimeName(found[0], "", found[1])
+        if words[start] not in _PREFIXES:
+            return None
+    return None
+
+
+def _with_time(words: tuple[str, ...]) -> TimeName | None:
+    """Return the time, with its unit, that words name; seconds and nanoseconds may be a time's unit."""
+    whole = _time(words)
+    if whole and whole.quantity not in ("sec", "nanosec"):
+        return whole
+    unit = unit_of_words(words[-1:]) if len(words) > 1 else None
+    found = _time(words[:-1]) if unit and unit.dimension == "time" else None
+    return TimeName("time", unit.flag, found.rank) if unit and found and found.quantity == "time" else None
+
+
+def _time_columns(claims: dict[str, list[TimeColumn]], first_row: Sequence[str]) -> tuple[TimeColumn, ...]:
+    """Choose the columns of time: date and time of day, seconds and nanoseconds, or a single one."""
+
+    def cell(column: TimeColumn) -> str:
+        return first_row[column.place].strip() if column.place < len(first_row) else ""
+
+    times = sorted(
+        claims.get("time", ()), key=lambda c: (cell(c) in ("0", "0.0", ""), "stamp" not in c.written.lower(), not c.unit, c.rank)
+    )  # fmt: skip
+    dates = claims.get("date", [])
+    clock = next((column for column in times if _CLOCK.fullmatch(cell(column))), None)
+    if dates and clock is not None:
+        return dates[0], clock
+    whole = [*claims.get("sec", ()), *(column for column in times if column.unit == "s")]
+    parts = [*claims.get("nanosec", ()), *(column for column in times if column.unit == "ns")]
+    for seconds in whole:
+        for nanoseconds in parts:
+            if cell(seconds).isdigit() and cell(nanoseconds).isdigit() and len(cell(nanoseconds)) <= 9:
+                return seconds, nanoseconds
+    if times:
+        return (times[0],)
+    if claims.get("sec"):
+        return (replace(claims["sec"][0], unit="s"),)
+    return tuple(dates[:1])
+
+
 def time_reader(
-    columns: TableColumns, rows: Sequence[Sequence[str]], topic: str, *, zone_s: int | None, decimal_comma: bool = False
+    columns: TimeColumns, rows: Sequence[Sequence[str]], topic: str, *, zone_s: int | None, decimal_comma: bool = False
 ) -> TimeReader | None:
     """Decide how to read the times; None if the table has none.
 
@@ -81,7 +271,7 @@ def time_reader(
     )
 
 
-def _by_frame(frame: TableColumn | None) -> TimeReader | None:
+def _by_frame(frame: TimeColumn | None) -> TimeReader | None:
     if frame is None:
         return None
 
@@ -94,7 +284,7 @@ def _by_frame(frame: TableColumn | None) -> TimeReader | None:
     return TimeReader(itemgetter(frame.place), read, counted=True)
 
 
-def _of_two(columns: Sequence[TableColumn], rows: Sequence[Sequence[str]], zone_s: int | None) -> TimeReader:
+def _of_two(columns: Sequence[TimeColumn], rows: Sequence[Sequence[str]], zone_s: int | None) -> TimeReader:
     first, second = columns
     key = itemgetter(first.place, second.place)
     if first.quantity == "date":
@@ -130,7 +320,7 @@ def _float(text: str) -> float | None:
 
 
 def _of_gps(
-    column: TableColumn, numbers: Sequence[float], topic: str, plain: Callable[[object], str]
+    column: TimeColumn, numbers: Sequence[float], topic: str, plain: Callable[[object], str]
 ) -> TimeReader | None:
     """Read GPS time in seconds, which counts from 1980 and has no leap seconds; None for other numbers."""
     if column.unit not in ("", "s") or not _GPS_SINCE_2017_S <= numbers[0] < 2 * _GPS_SINCE_2017_S or column.mapped:
@@ -144,7 +334,7 @@ def _of_gps(
 
 
 def _unit(
-    column: TableColumn, numbers: Sequence[float], topic: str
+    column: TimeColumn, numbers: Sequence[float], topic: str
 ) -> tuple[TimeUnit, tuple[Assumption, ...], tuple[str, ...]]:
     """Return the unit of a column of numbers: as stated, as their size states, or as assumed from their steps."""
     units: dict[str, TimeUnit] = {"s": "s", "ms": "ms", "us": "us", "ns": "ns"}

@@ -10,16 +10,15 @@ from calib_core.recordings.assumptions import CONFIRM_ALL, Assumption
 from calib_core.recordings.field_words import has_word, words_of
 from calib_core.recordings.messages.decoding import Message, decode
 from calib_core.recordings.messages.definitions import PRIMITIVES, Definition
-from calib_core.recordings.radar.column_mapping import StatedReading
+from calib_core.recordings.radar.column_guess import DescribedColumn
+from calib_core.recordings.radar.column_mapping import NOTHING_STATED, StatedReading
 from calib_core.recordings.radar.column_plan import ColumnAssumption, ColumnPlan
 from calib_core.recordings.radar.column_plans import find_decoder, plan_described, plan_for
 from calib_core.recordings.radar.columns import Returns, no_returns, returns_from
-from calib_core.recordings.radar.described_columns import DescribedColumn
 from calib_core.recordings.radar.message_layouts.samples import Samples, described, leaf_names
 
 _DEEPEST = 5
 _COUNTS = ("count", "cnt", "num", "number", "n", "nr", "nof", "size", "len", "length", "total", "valid")
-_NOTHING = StatedReading()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,7 +42,7 @@ class ArrayLayout:
 
     @classmethod
     def recognise(
-        cls, definition: Definition, samples: Samples | None = None, stated: StatedReading = _NOTHING
+        cls, definition: Definition, samples: Samples | None = None, stated: StatedReading = NOTHING_STATED
     ) -> "ArrayLayout | None":
         """Recognise a message by its arrays: by the registry, or by what they say about themselves."""
         names = [field.name for field in definition.fields if field.count and field.type in PRIMITIVES]
@@ -261,7 +260,7 @@ class ListLayout:
 
     @classmethod
     def recognise(
-        cls, definition: Definition, samples: Samples | None = None, stated: StatedReading = _NOTHING
+        cls, definition: Definition, samples: Samples | None = None, stated: StatedReading = NOTHING_STATED
     ) -> "ListLayout | None":
         """Find the list that looks most like a radar's returns, or that has the columns the user maps.
 

@@ -11,11 +11,11 @@ from numpy.lib.stride_tricks import as_strided
 from calib_core.errors import MessageError
 from calib_core.recordings.messages.decoding import Message, decode, payload_byte_order
 from calib_core.recordings.messages.definitions import Definition
-from calib_core.recordings.radar.column_mapping import StatedReading
+from calib_core.recordings.radar.column_guess import DescribedColumn
+from calib_core.recordings.radar.column_mapping import NOTHING_STATED, StatedReading
 from calib_core.recordings.radar.column_plan import ColumnPlan
 from calib_core.recordings.radar.column_plans import plan_described, plan_for, plan_like
 from calib_core.recordings.radar.columns import Returns, names_a_speed, no_returns, returns_from
-from calib_core.recordings.radar.described_columns import DescribedColumn
 from calib_core.recordings.radar.message_layouts.samples import Samples
 
 _CLOUD_NAMES = frozenset({"height", "width", "fields", "is_bigendian", "point_step", "row_step", "data"})
@@ -29,9 +29,6 @@ _MAX_POINT_STEP = 1 << 16
 
 _LIDAR_POINTS = 5000
 """A cloud of more points is a lidar's."""
-
-
-_NOTHING = StatedReading()
 
 
 def is_cloud(definition: Definition) -> bool:
@@ -63,7 +60,7 @@ class CloudLayout:
     one_per_message = False
 
     @classmethod
-    def recognise(cls, samples: Samples, stated: StatedReading = _NOTHING) -> "CloudLayout | None":
+    def recognise(cls, samples: Samples, stated: StatedReading = NOTHING_STATED) -> "CloudLayout | None":
         """Recognise the layout from a first message; None if it contains no positions."""
         definition, payload = samples.definition, samples.payload
         message = decode(definition, payload)
@@ -286,7 +283,7 @@ class ChannelCloudLayout:
     one_per_message = False
 
     @classmethod
-    def recognise(cls, samples: Samples, stated: StatedReading = _NOTHING) -> "ChannelCloudLayout | None":
+    def recognise(cls, samples: Samples, stated: StatedReading = NOTHING_STATED) -> "ChannelCloudLayout | None":
         """Recognise the layout from a first message."""
         definition = samples.definition
         columns = _channel_columns(decode(definition, samples.payload))

@@ -8,7 +8,7 @@ import numpy as np
 from calib_core.errors import MessageError
 from calib_core.recordings.messages.decoding import Message, decode
 from calib_core.recordings.messages.definitions import PRIMITIVES, Definition
-from calib_core.recordings.radar.described_columns import DescribedColumn
+from calib_core.recordings.radar.column_guess import DescribedColumn
 
 _SCANS = 9
 _STANDARD = "geometry_msgs/"

@@ -9,7 +9,7 @@ import numpy as np
 from calib_core.arrays import TimesNs
 from calib_core.recordings.messages.decoding import Message, Pin, decode, fixed_part
 from calib_core.recordings.messages.definitions import Definition
-from calib_core.recordings.radar.column_mapping import StatedReading
+from calib_core.recordings.radar.column_mapping import NOTHING_STATED, StatedReading
 from calib_core.recordings.radar.column_plan import ColumnPlan
 from calib_core.recordings.radar.column_plans import find_decoder, plan_described, plan_for
 from calib_core.recordings.radar.columns import Returns, returns_from
@@ -19,7 +19,6 @@ _FRAME_NUMBERS = ("radar_frame_idx", "frame_idx", "frame_number", "frame_id_numb
 _POINT_NUMBERS = ("point_id", "detection_id", "target_id", "index")
 _SHORTEST_CYCLE_NS = 5e6
 _SAMPLED_RETURNS = 60
-_NOTHING = StatedReading()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,7 +43,7 @@ class PointLayout:
 
     @classmethod
     def recognise(
-        cls, definition: Definition, samples: Samples, stated: StatedReading = _NOTHING
+        cls, definition: Definition, samples: Samples, stated: StatedReading = NOTHING_STATED
     ) -> "PointLayout | None":
         """Recognise a radar return by its fields of fixed size: a position and a speed."""
         dtype, pins = fixed_part(definition, samples.payload)

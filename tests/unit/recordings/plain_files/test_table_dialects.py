@@ -354,8 +354,8 @@ def test_what_was_taken_for_what_and_what_was_left_out_is_shown(tmp_path) -> Non
         assert "x from f_PosX [m], y from f_PosY [m]" in describe(recording)
     with open_recording(written(tmp_path, "polar and Cartesian"), require=("radar",)) as recording:
         text = describe(recording)
-    assert "x, y, z in millimetres, since the range agrees" in text
-    assert "azimuth in radians, since it agrees with the positions" in text
+    assert "x, y, z in mm: their length equals range_m" in text
+    assert "azimuth in rad: it agrees with the positions" in text
     assert "computed" not in text
     (tmp_path / "polar.csv").write_text("Timestamp,Range [m],Azimuth (deg)\n2024/05/17 09:42:31.2,5,10\n")
     with open_recording(tmp_path / "polar.csv", require=("radar",)) as recording:

@@ -19,7 +19,7 @@ from calib_core.recordings.radar.axes import parse_radar_axes
 from calib_core.recordings.radar.column_plans import GROUP, all_decoders
 from calib_core.recordings.radar.layouts import recognise
 from calib_core.recordings.radar.registry import DECODERS, Decoder
-from calib_core.recordings.radar.registry_table import radar_formats
+from calib_core.recordings.registry_table import radar_formats
 from calib_core.recordings.topics import join_topics
 from tests.fake_distribution import install
 from tests.unit.recordings.radar.radar_samples import CLOUDS, OTHERS, START_NS, sample
@@ -269,7 +269,7 @@ def test_an_invalid_option_is_refused_before_anything_is_read(ros1, write, plain
 def test_the_page_of_radar_formats_is_the_one_the_registry_writes() -> None:
     page = Path(__file__).parents[4] / "docs" / "radar-formats.md"
     assert page.read_text(encoding="utf-8") == radar_formats(), (
-        "python -m calib_core.recordings.radar.registry_table docs/radar-formats.md"
+        "python -m calib_core.recordings.registry_table docs/radar-formats.md"
     )
     assert all(f"| {name} |" in radar_formats() for name in NAMES)
 

@@ -1,13 +1,13 @@
 """The page docs/radar-formats.md, generated from the registry of radar layouts.
 
-python -m calib_core.recordings.radar.registry_table docs/radar-formats.md
+python -m calib_core.recordings.registry_table docs/radar-formats.md
 """
 
 import sys
 from pathlib import Path
 
-from calib_core.recordings.plain_files.tables.columns import TABLE_EXAMPLE
 from calib_core.recordings.plain_files.tables.text_tables import csv_columns
+from calib_core.recordings.plain_files.tables.times import TABLE_EXAMPLE
 from calib_core.recordings.radar.column_plans import plan_for
 from calib_core.recordings.radar.registry import DECODERS, Decoder, MessageKind
 from calib_core.recordings.time.written_times import DATE_SPELLINGS
@@ -23,7 +23,7 @@ _INTRODUCTION = """\
 # Radar formats
 
 This page is generated from the registry that the decoder uses:
-`python -m calib_core.recordings.radar.registry_table docs/radar-formats.md`. Each row is tested with messages built from the
+`python -m calib_core.recordings.registry_table docs/radar-formats.md`. Each row is tested with messages built from the
 definition that the drivers publish (`tests/unit/recordings/radar/radar_samples.py`).
 
 A layout is recognised by its **field names** as declared in the recording, never by the name of the type or its package. The
@@ -203,6 +203,8 @@ above 2 pi are degrees; a number that is a time between 1990 and 2060 in one uni
 | `field-meaning` | two columns have the name of one quantity | `--map range=range_m:m` |
 | `time-scale` | a column named GPS: 18 s ahead of UTC | |
 | `time-zone`, `frame-interval`, `name-times` | see the times of files | `--time-zone`, a table of times |
+
+Where the values fit two units alike, such as angles up to 2.5, the table is refused with the `--map` to type.
 
 A column that `--map` names and that does not exist is an error with the nearest name. A file without a header needs one, or `--map` with
 numbers of columns: `--map time=1:s --map x=2:m --map y=3:m`.

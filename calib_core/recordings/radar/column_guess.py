@@ -1,0 +1,979 @@
+"""Decide which column of a radar is which quantity in which unit, or refuse with the --map to type.
+
+The one place for it: messages that no registry knows, clouds with unusual fields, tables of CSV and JSON. Names, comments and
+--map state what columns are, values show it. What nothing states is an assumption; where a table's values fit two units alike,
+it is refused.
+"""
+
+import math
+import re
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal, TypeAlias, TypeVar
+
+import numpy as np
+
+from calib_core.arrays import Values
+from calib_core.errors import RecordingError
+from calib_core.recordings.assumptions import CONFIRM_ALL, Assumption
+from calib_core.recordings.field_words import (
+    OPPOSITE,
+    Direction,
+    MappedColumn,
+    Meaning,
+    Unit,
+    angle_in,
+    axes_in,
+    axis_side,
+    column_meaning,
+    dimension_of,
+    has_word,
+    is_plain,
+    meaning_of,
+    positive_side,
+    unit_in,
+    unit_of_word,
+    units_for,
+    words_in,
+    words_of,
+)
+from calib_core.recordings.radar.axes import RadarAxes
+from calib_core.recordings.radar.column_mapping import NOTHING_STATED, StatedReading
+from calib_core.recordings.radar.column_plan import ColumnAssumption, ColumnPlan, ColumnReading
+
+_T = TypeVar("_T")
+Rules: TypeAlias = Literal["message", "ros", "table"]
+"""Who defines units and axes that no column states: nobody, ROS (REP 103), or nobody and the names are those of a table."""
+FARTHEST_M = 1000.0
+"""No radar returns lie farther away."""
+_SIZES = ("width", "length")
+_NOT_RADARS = ("curvature", "steering", "steer", "lane", "jerk", "effort", "joint", "wheel", "throttle", "brake")
+_MOST_OF_THEM = 0.6
+_NEAREST_M, _FARTHEST_M = 4.0, 500.0
+"""No recording of a radar ends nearer than the first, and no automotive radar sees farther than the second [m]."""
+_USUAL_M = 300.0
+"""Of several units that fit, the one is likelier in which nothing lies farther away than this."""
+_NEAREST_METRES = 1.0
+"""Values in metres are believed to be metres from here on: in cm or mm they would all lie within a finger's width."""
+_FASTEST_MPS = 150.0
+_FEW = 5
+_ENOUGH = 20
+_WIDEST_RAD = math.pi / 2 + 0.1
+_WIDE_RAD = 1.75
+"""Larger angles are in radians only if the radar sees more than a hemisphere, and may be a few degrees [rad]."""
+_ALIKE_RAD = 0.02
+_MOST_SENSORS = 8
+_AXIS_WORDS = words_in("x y z long lat vertical height altitude dx dy dz px py pz dlong dlat vx vy vz vlong vlat")
+_AXES = {"x": "y", "y": "x"}
+_PLANES = {"forward": 0, "backward": 0, "left": 1, "right": 1, "up": 2, "down": 2}
+_AS_MAPPED = {
+    "forward": ("x", ""), "backward": ("x", "-"), "left": ("y", ""), "right": ("y", "-"), "up": ("z", ""), "down": ("z", "-"),
+}  # fmt: skip
+_POLAR = ("range", "azimuth", "elevation")
+_INVALID_POSITION = ("invalid_distance", "invalid_range", "invalid_azimuth", "invalid_elevation")
+_INVALID_DOPPLER = ("invalid_range_rate", "invalid_doppler", "invalid_velocity")
+_LONGEST_NAME = 500
+"""No name of a column is longer; the patterns take the cube of the length of what is none."""
+_IN_BRACKETS = re.compile(r"(?P<name>.*?)\s*[\[(<]\s*(?P<unit>[^\])>]*?)\s*[\])>]\s*")
+_ROS = "ROS defines it (REP 103)"
+_COMMENT = "comment in the definition"
+_NOUNS: Mapping[Rules, str] = {"message": "message", "ros": "message", "table": "file"}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DescribedColumn:
+    """One number of a return, as the message or table describes it.
+
+    Attributes:
+        name: dotted, or as the table writes it.
+        integer: whether its values are integers.
+        comment: of the definition; in a table its unit in brackets, if it has one.
+        values: (n,) in a sample of messages, in the same order for all columns; empty if there is none.
+        standard: it belongs to a position or vector of geometry_msgs, whose unit and axes ROS defines.
+    """
+
+    name: str
+    integer: bool
+    comment: str
+    values: Values
+    standard: bool = False
+
+    @property
+    def filled(self) -> bool:
+        """Whether any value is not zero; also without values."""
+        return not len(self.values) or bool(np.any(np.isfinite(self.values) & (self.values != 0)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Picked:
+    """A column and what it means.
+
+    Attributes:
+        column: the column.
+        meaning: of its name.
+        unit: that its name or comment states; None if neither does.
+        why: where the unit is stated; "" if it is not.
+        plain: a table's column with the name of the documentation, whose axes are those of the documentation.
+        mapped: the --map that chose it; None if its name did.
+    """
+
+    column: DescribedColumn
+    meaning: Meaning
+    unit: Unit | None
+    why: str
+    plain: bool = False
+    mapped: MappedColumn | None = None
+
+    @property
+    def sign(self) -> int:
+        """-1 where --map turns its sign; its values are turned already."""
+        return self.mapped.sign if self.mapped else 1
+
+    @property
+    def name(self) -> str:
+        """The column's name."""
+        return self.column.name
+
+    @property
+    def quantity(self) -> str:
+        """What it measures."""
+        return self.meaning.quantity
+
+    @property
+    def order(self) -> tuple[int, bool, int, int, str]:
+        """The order of preference: plain names first; it does not depend on the order of the fields."""
+        return self.meaning.rank, not self.column.filled, len(words_of(self.name)), len(self.name), self.name
+
+    @property
+    def stem(self) -> tuple[str, ...]:
+        """The words of the name other than the axis, which x, y and z of one position share."""
+        return tuple(word for word in words_of(self.name) if word not in _AXIS_WORDS)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Chosen:
+    """The columns in use by quantity.
+
+    Attributes:
+        picked: by quantity.
+        sigma: standard deviations by quantity.
+        vague: angles whose names fit azimuth and elevation alike, if they had to be told apart.
+        other_azimuths: columns with further hypotheses.
+        unused_heights: columns that may hold the elevation or height of a polar position, if none is sure to.
+        rivals: of quantities of a position, other columns with as plain a name.
+    """
+
+    picked: dict[str, Picked]
+    sigma: dict[str, Picked]
+    vague: tuple[Picked, ...] = ()
+    other_azimuths: tuple[str, ...] = ()
+    unused_heights: tuple[str, ...] = ()
+    rivals: Mapping[str, str] = field(default_factory=dict)
+
+
+def guess_columns(
+    columns: Sequence[DescribedColumn],
+    remarks: str = "",
+    *,
+    rules: Rules = "message",
+    known: bool = False,
+    stated: StatedReading = NOTHING_STATED,
+) -> ColumnPlan | None:
+    """Plan the columns of a radar by names, comments and values; None if they do not look like a radar's.
+
+    Args:
+        columns: the numbers of one return.
+        remarks: comments of the definition that belong to no field.
+        rules: what defines the units and axes that the columns do not state.
+        known: it is a radar's, or anything with positions will do.
+        stated: what the user states about a table; of messages it is applied to the plan.
+
+    Raises:
+        RecordingError: the values of a table fit two units alike; the message has the --map that says which.
+    """
+    chosen = choose(columns, rules, stated)
+    picked = chosen.picked
+    if not known and not _looks_like_radar(picked):
+        return None
+    cartesian, polar = {"x", "y"} <= picked.keys(), {"range", "azimuth"} <= picked.keys()
+    unfilled = cartesian and not (picked["x"].column.filled or picked["y"].column.filled)
+    guess = _Guess(chosen, remarks, rules, stated)
+    if cartesian and not (polar and unfilled):
+        plan = guess.cartesian()
+    elif polar:
+        plan = guess.polar()
+    else:
+        return None
+    return guess.flags(guess.amplitude(guess.speed(guess.noise(plan))), columns)
+
+
+def _looks_like_radar(picked: Mapping[str, Picked]) -> bool:
+    """Return whether there is a position, and something that only radars measure."""
+    if {"range", "azimuth"} <= picked.keys():
+        return True
+    amplitude = "amplitude" in picked and picked["amplitude"].meaning.rank != 1
+    radial = "doppler" in picked and picked["doppler"].meaning.kind == "radial"
+    return {"x", "y"} <= picked.keys() and (amplitude or radial or {"vx", "vy"} <= picked.keys())
+
+
+def fill_in(plan: ColumnPlan, columns: Sequence[DescribedColumn]) -> ColumnPlan:
+    """Add the speed and the amplitude that a plan made by plain names lacks, and a second hypothesis of the azimuth."""
+    chosen = choose(columns)
+    speed, level = chosen.picked.get("doppler"), chosen.picked.get("amplitude")
+    if plan.doppler is None and not plan.velocity and speed is not None and speed.meaning.kind == "radial":
+        plan = replace(plan, doppler=speed.name, doppler_scale=speed.unit.scale if speed.unit else 1.0)
+    if plan.amplitude is None and level is not None:
+        plan = replace(plan, amplitude=level.name, amplitude_scale=level.unit.scale if level.unit else 1.0)
+    return replace(plan, other_azimuths=chosen.other_azimuths)
+
+
+def choose(
+    columns: Sequence[DescribedColumn], rules: Rules = "message", stated: StatedReading = NOTHING_STATED
+) -> Chosen:
+    """Choose a column for each quantity."""
+    found = _picked_of_table(columns, stated) if rules == "table" else _picked_of_message(columns)
+    found.sort(key=lambda one: one.order)
+    picked: dict[str, Picked] = {}
+    sigma: dict[str, Picked] = {}
+    for one in found:
+        if one.meaning.sigma:
+            sigma.setdefault(one.quantity, one)
+        elif not one.meaning.second and one.meaning.kind != "vague":
+            picked.setdefault(one.quantity, one)
+    first = [one for one in found if not one.meaning.sigma and not one.meaning.second]
+    picked |= _together(first, ("x", "y", "z")) | _together(first, ("vx", "vy", "vz"))
+    second = (one for one in found if one.meaning.second and one.quantity == "azimuth" and not one.meaning.sigma)
+    others = tuple(one.name for one in second) if "azimuth" in picked else ()
+    vague = [one for one in first if one.meaning.kind == "vague"]
+    told_apart = _told_apart(vague, picked)
+    used = [one.name for one in picked.values()]
+    unused = tuple(one.name for one in vague if one.name not in used)
+    heights = tuple(one.name for one in first if one.quantity == "z" and one.column.filled)
+    rivals: dict[str, str] = {}
+    for one in first if rules == "table" else ():
+        own = picked[one.quantity]
+        if one is not own and one.quantity in ("x", "y", "z", *_POLAR) and (one.unit is None) == (own.unit is None):
+            rivals[one.quantity] = ", ".join(filter(None, (rivals.get(one.quantity), one.name)))
+    return Chosen(picked, sigma, told_apart, others, () if "elevation" in picked else (*unused, *heights), rivals)
+
+
+def _picked_of_message(columns: Sequence[DescribedColumn]) -> list[Picked]:
+    """Return the columns that mean something; none if one of them is not a radar's."""
+    if any(has_word(column.name, *_NOT_RADARS) for column in columns):
+        return []
+    found = [one for one in (_picked(column, name) for column, name in _stripped(columns)) if one is not None]
+    if any(has_word(column.name, *_SIZES) for column in columns):
+        found = [one for one in found if not has_word(one.name, "height")]  # of an object
+    return found
+
+
+def _stripped(columns: Sequence[DescribedColumn]) -> list[tuple[DescribedColumn, str]]:
+    """Return the columns with their names without a first word that most of them share."""
+    firsts = Counter(words_of(column.name)[:1] for column in columns)
+    (common, count), *_ = firsts.most_common(1) or [((), 0)]
+    shared = len(columns) > 2 and count >= _MOST_OF_THEM * len(columns) and common and meaning_of(common[0]) is None
+    return [
+        (c, "_".join(words_of(c.name)[1:]) if shared and words_of(c.name)[:1] == common else c.name) for c in columns
+    ]
+
+
+def _picked(column: DescribedColumn, name: str) -> Picked | None:
+    meaning = meaning_of(name) or meaning_of(column.name)
+    if meaning is None:
+        return None
+    if meaning.kind == "vague" and (angle := angle_in(column.comment)):
+        meaning = replace(meaning, kind=angle)
+    if meaning.unit is not None:
+        return Picked(column, meaning, meaning.unit, "name")
+    unit = unit_in(column.comment, dimension_of(meaning.quantity), integer=column.integer)
+    return Picked(column, meaning, unit, _COMMENT if unit else "")
+
+
+def _picked_of_table(columns: Sequence[DescribedColumn], stated: StatedReading) -> list[Picked]:
+    """Return the columns that --map chooses, and of the other quantities those whose names mean something."""
+    given = {one.column: one for one in stated.column_map}
+    taken = {one.quantity for one in given.values()}
+    if not taken.isdisjoint(_POLAR[:2]) and taken.isdisjoint("xy"):
+        taken |= set("xyz")  # the user says what to use
+    found = []
+    for column in columns:
+        one, meaning = given.get(column.name), table_meaning(column.name, column.comment)
+        if one:
+            quantity = one.quantity.removeprefix("sigma_")
+            same = meaning is not None and meaning.quantity == quantity
+            unit = _unit(one.unit) if one.unit else meaning.unit if meaning and same else None
+            meaning = Meaning(quantity, -1, unit, sigma=quantity != one.quantity)
+            column = replace(column, values=one.sign * column.values)
+        if meaning is None or (not one and f"{'sigma_' * meaning.sigma}{meaning.quantity}" in taken):
+            continue
+        unit = meaning.unit
+        if (
+            unit is None
+            and stated.axes
+            and stated.axes.degrees is not None
+            and not meaning.sigma
+            and (meaning.quantity in _POLAR[1:])
+        ):
+            unit = _unit("deg" if stated.axes.degrees else "rad")
+        plain = one is not None or is_plain(split_unit(column.name)[0], meaning)
+        rank = meaning.rank + (not plain) + 10 * (unit is None)  # a stated unit is preferred to a plainer name
+        why = f"--map {one.words}" if one else "name"
+        found.append(Picked(column, replace(meaning, rank=rank), unit, why if unit else "", plain, one))
+    return found
+
+
+def table_meaning(written: str, unit_below: str = "") -> Meaning | None:
+    """Return what a column of a table means, with its unit; None if nothing, or if its unit is not one of the quantity's.
+
+    Args:
+        written: its name, with or without a unit in brackets.
+        unit_below: from a line of units under the header.
+    """
+    name, stated = split_unit(written)
+    found, stated = column_meaning(name), stated or unit_below
+    if found is None or not stated or found.unit:
+        return found
+    unit = unit_of_word(stated)
+    return replace(found, unit=unit) if unit and unit.dimension == dimension_of(found.quantity) else None
+
+
+def unknown_unit(written: str, unit_below: str = "") -> tuple[str, str] | None:
+    """Return the quantity and the unit of a column such as x_ft or "x [ft]" whose unit is unknown; None for any other."""
+    name, stated = split_unit(written)
+    stated, words = stated or unit_below, re.split(r"[^A-Za-z0-9]+", name)
+    if not stated and len(words) == 2 and column_meaning(name) is None:
+        name, stated = words
+    found = column_meaning(name) if stated else None
+    if found and not is_plain(name, found) and name != split_unit(written)[0]:
+        return None
+    known = found is None or (not stated.isdigit() and table_meaning(name, stated) is not None)
+    return None if found is None or known else (found.quantity, stated.lower())
+
+
+def split_unit(written: str) -> tuple[str, str]:
+    """Return the name of a table's column without its marks, and its unit in brackets, "" without one."""
+    text = written[:_LONGEST_NAME].strip().strip("#%\"'\ufeff ").strip()
+    bracketed = _IN_BRACKETS.fullmatch(text)
+    return (bracketed["name"], bracketed["unit"].strip()) if bracketed else (text, "")
+
+
+def _together(found: Sequence[Picked], axes: tuple[str, str, str]) -> dict[str, Picked]:
+    """Choose x and y (and z) of one position, not of two."""
+    stems: dict[tuple[str, ...], dict[str, Picked]] = {}
+    for one in found:
+        if one.quantity in axes:
+            stems.setdefault(one.stem, {}).setdefault(one.quantity, one)
+    whole = [group for group in stems.values() if axes[0] in group and axes[1] in group]
+    return min(whole, key=lambda group: (not group[axes[0]].column.filled, group[axes[0]].order), default={})
+
+
+def _told_apart(vague: Sequence[Picked], picked: dict[str, Picked]) -> tuple[Picked, ...]:
+    """Take phi, theta, angle and the like for azimuth and elevation; return them if there was more than one."""
+    if not vague or "azimuth" in picked:
+        return ()
+    if len(vague) == 1 or "elevation" in picked:
+        picked["azimuth"] = vague[0]
+        return ()
+    first, second = vague[:2]
+    if _span(second) > 1.5 * _span(first):
+        first, second = second, first  # radars see wider than high
+    picked["azimuth"], picked["elevation"] = first, second
+    return first, second
+
+
+def _span(one: Picked) -> float:
+    values = one.column.values[np.isfinite(one.column.values)]
+    return float(np.ptp(values)) if len(values) else 0.0
+
+
+class _Guess:
+    """The units, directions and assumptions of chosen columns."""
+
+    def __init__(self, chosen: Chosen, remarks: str, rules: Rules, stated: StatedReading) -> None:
+        self.picked, self.chosen, self.remarks = chosen.picked, chosen, remarks
+        self.directed = stated.axes is not None and stated.axes.directed
+        self.rules, self.of_table, self.noun = rules, rules == "table", _NOUNS[rules]
+        self.agreed = _agreement(chosen.picked)
+
+    def cartesian(self) -> ColumnPlan:
+        """Plan a position from x, y and perhaps z."""
+        group = tuple(self.picked[axis] for axis in "xyz" if axis in self.picked)
+        standard = self.rules == "ros" or all(one.column.standard for one in group)
+        directions, reasons, about_axes = self._directions(group, standard=standard)
+        sides = () if self.of_table else directions
+        units, why, about = self._lengths(group, standard=standard, proven=self._by_range(), sides=sides)
+        readings = [
+            ColumnReading(one.quantity, one.name, unit.name, direction, f"unit: {why}; direction: {reason}")
+            for one, unit, direction, reason in zip(group, units, directions, reasons, strict=False)
+        ]
+        scales = _three([one.sign * unit.scale for one, unit in zip(group, units, strict=True)], 1.0)
+        claimed = [self.picked.get(name) for name in (_POLAR if self.of_table else _POLAR[:2])]
+        angle = self._claimed_angle(readings)
+        usual = (units[0], angle, claimed[1].unit if claimed[1] and claimed[1].unit else angle)
+        return ColumnPlan(
+            position=tuple(one.name for one in group),
+            polar=False,
+            scales=scales,
+            directions=directions,
+            claimed=_three([one.name if one else None for one in claimed], None),
+            claimed_scales=_three(
+                [((one and one.unit) or unit).scale for one, unit in zip(claimed, usual, strict=False)], 1.0
+            ),
+            other_azimuths=self.chosen.other_azimuths,
+            readings=tuple(readings),
+            assumptions=(*_present(about, about_axes), *self._about_rivals(group, units)),
+        )
+
+    def _claimed_angle(self, readings: list[ColumnReading]) -> Unit:
+        """Return the unit of an azimuth beside x and y that states none; say of a table's what shows it."""
+        azimuth = self.picked.get("azimuth")
+        if self.agreed is None:
+            by_size = self.of_table and azimuth is not None
+            return _angle_unit(azimuth.column.values, integer=False).unit if by_size and azimuth else _unit("rad")
+        if self.of_table and azimuth and azimuth.unit is None:
+            why = "unit: it agrees with the positions"
+            readings.append(ColumnReading("azimuth", azimuth.name, self.agreed.angle.name, "", why))
+        return self.agreed.angle
+
+    def polar(self) -> ColumnPlan:
+        """Plan a position from range, azimuth and perhaps elevation."""
+        distance, azimuth, elevation = self.picked["range"], self.picked["azimuth"], self.picked.get("elevation")
+        (unit,), why, about = self._lengths((distance,), standard=False)
+        angles = tuple(_present(azimuth, elevation))
+        angle, why_angle, about_angle = self._angle(angles)
+        sign, why_sign, about_sign = self._azimuth_sign(azimuth, angle)
+        units = [one.unit or angle for one in angles]
+        degrees = "deg" in angle.name
+        base = _unit("deg" if degrees else "rad").scale
+        scales = [one.sign * (unit.scale / base) for one, unit in zip(angles, units, strict=True)]
+        down = elevation is not None and positive_side(elevation.column.comment) == "down"
+        if down:
+            scales[-1] = -scales[-1]
+        side = f"to the {'left' if sign > 0 else 'right'}"
+        why_azimuth = f"unit: {why_angle}; sign: {why_sign}"
+        readings = [
+            ColumnReading("range", distance.name, unit.name, "", f"unit: {why}"),
+            ColumnReading("azimuth", azimuth.name, units[0].name, side, why_azimuth),
+        ]
+        if elevation is not None:
+            side, why = ("downwards", _COMMENT) if down else ("upwards", "as usual")
+            why = f"unit: {why_angle}; sign: {why}"
+            readings.append(ColumnReading("elevation", elevation.name, units[-1].name, side, why))
+        vague, unused = self._about_vague(), self._about_unused()
+        return ColumnPlan(
+            position=tuple(one.name for one in (distance, *angles)),
+            polar=True,
+            degrees=degrees,
+            azimuth_sign=float(sign),
+            scales=_three([distance.sign * unit.scale, *scales], 1.0),
+            claimed=(distance.name, azimuth.name, elevation.name if elevation else None),
+            claimed_scales=(unit.scale, scales[0], scales[-1]),
+            other_azimuths=self.chosen.other_azimuths,
+            readings=tuple(readings),
+            assumptions=(
+                *_present(about, about_angle, about_sign, vague, unused),
+                *self._about_rivals((distance, *angles), (unit, *units)),
+            ),
+        )
+
+    def _lengths(
+        self, group: tuple[Picked, ...], *, standard: bool, proven: "Finding | None" = None, sides: tuple[str, ...] = ()
+    ) -> tuple[list[Unit], str, ColumnAssumption | None]:
+        """Return the unit of each column of a position or range, what states it, and what is assumed."""
+        stated = next((one for one in group if one.unit), None)
+        usual = stated.unit if stated and stated.unit else _unit("m")
+        units = [one.unit or usual for one in group]
+        largest = farthest(*(one.column.values * unit.scale for one, unit in zip(group, units, strict=True)))
+        names = ", ".join(one.name for one in group)
+        if stated or (standard and largest <= FARTHEST_M):
+            why = stated.why if stated else _ROS
+            if largest <= FARTHEST_M or self.of_table:
+                return units, why, None
+            what = f"{names} would reach {largest:.4g} m in {usual.name} ({why})"
+            text = f"{what}, which is too far; the unit is taken all the same"
+            return units, why, self._about_units("length-unit", text, group, usual, sides)
+        largest = farthest(*(one.column.values for one in group))
+        found = proven or _length_unit(largest, integer=any(one.column.integer for one in group))
+        units = [found.unit] * len(group)
+        if found is proven or (found.certain and not self.of_table):
+            return units, found.why, None
+        self._refuse_either(group, found)
+        text = f"{_are(names)} taken as {found.unit.name} ({found.why}); the {self.noun} does not state the unit"
+        return units, "assumed", self._about_units("length-unit", text, group, found.unit, sides)
+
+    def _refuse_either(self, group: Sequence[Picked], found: "Finding") -> None:
+        """Refuse a table whose values fit two units alike."""
+        if self.of_table and found.rival is not None:
+            maps = (" ".join(_map(one, unit) for one in group) for unit in (found.unit, found.rival))
+            names, why = ", ".join(one.name for one in group), found.why.removesuffix(" cannot be radians")
+            raise RecordingError(
+                f"the unit of {names} is not stated, and {why} may be {found.unit.name} or {found.rival.name}: "
+                f"say which with {' or '.join(maps)}"
+            )
+
+    def _about_units(
+        self, key: str, text: str, group: Sequence[Picked], unit: Unit, sides: tuple[str, ...] = ()
+    ) -> ColumnAssumption:
+        """Return the assumption of a unit; of a position that has directions, confirmed in the radar's own axes."""
+        targets = [_AS_MAPPED[side] for side in sides[: len(group)]] if sides else [(one.quantity, "") for one in group]
+        maps = " ".join(_map(one, unit, *target) for one, target in zip(group, targets, strict=True))
+        quantities = tuple(one.quantity for one in group)
+        return _assume(key, text, maps if unit.flag else CONFIRM_ALL, quantities, angle_unit=key == "angle-unit")
+
+    def _by_range(self) -> "Finding | None":
+        """Find the unit of x, y and z by a range whose unit is stated."""
+        distance = self.picked.get("range")
+        if distance is None or distance.unit is None or not (self.of_table or self.agreed):
+            return None
+        lengths = np.sqrt(sum(np.square(self.picked[axis].column.values) for axis in "xyz" if axis in self.picked))
+        with np.errstate(all="ignore"):
+            ratio = distance.column.values * distance.unit.scale / lengths
+        ratio = ratio[np.isfinite(ratio) & (ratio > 0)]
+        for unit in units_for("range") if len(ratio) >= _FEW else ():
+            if np.median(np.abs(ratio / unit.scale - 1.0)) < 0.05:
+                return Finding(unit, True, f"their length equals {distance.name}")
+        return None
+
+    def _directions(
+        self, group: tuple[Picked, ...], *, standard: bool
+    ) -> tuple[tuple[str, str, str], list[str], ColumnAssumption | None]:
+        """Return where x, y and z point, what states each, and what is assumed."""
+        if self.of_table:
+            return self._as_documented(group)
+        said = dict(axes_in(self.remarks)) | {
+            one.quantity: side for one in group if (side := axis_side(one.column.comment)) is not None
+        }
+        whole = _whole(said)
+        if whole:
+            return whole, [_COMMENT, _COMMENT, _COMMENT if "z" in said else "as usual"], _about_up(group, said, whole)
+        if standard:
+            return ("forward", "left", "up"), [_ROS] * 3, None
+        forward, why = self._forward(group, said)
+        lateral = _AXES[forward]
+        side, why_side = self._side(lateral, forward, said)
+        sides: dict[str, Direction] = {forward: said.get(forward, "forward"), lateral: side}
+        reasons = {forward: why, lateral: why_side or "assumed"}
+        directions = (sides["x"], sides["y"], "up")
+        if why != "assumed" and why_side:
+            return directions, [reasons["x"], reasons["y"], "as usual"], _about_up(group, said, directions)
+        x, y = (one.name for one in group[:2])
+        known = f" (forward: {why})" if why != "assumed" else ""
+        text = (
+            f"{x} is taken as {directions[0]} and {y} as {directions[1]}{known}; the message does not state whether "
+            f"{(x, y)[lateral == 'y']} grows to the left or to the right"
+        )
+        about = _assume("axes", text, f"--radar-axes {','.join(directions)}", ("x", "y"), axes=True)
+        return directions, [reasons["x"], reasons["y"], "as usual"], about
+
+    def _as_documented(
+        self, group: tuple[Picked, ...]
+    ) -> tuple[tuple[str, str, str], list[str], ColumnAssumption | None]:
+        """Return the axes of the documentation, unless the values of a table show that x points to the right."""
+        x, y = group[:2]
+        directions, why = ("forward", "left", "up"), ["as documented"] * 3
+        if self.directed:
+            return directions, why, None
+        if forward_axis(x.column.values, y.column.values) == "y":
+            directions = ("right", "forward", "up")
+            text = f"{y.name} is never negative and {x.name} has both signs; read as {x.name} to the right, {y.name} forward"
+            return directions, ["assumed"] * 3, _assume("axes", text, "--radar-axes right,forward,up", (), axes=True)
+        other = tuple(one.quantity for one in (x, y) if not one.plain)
+        if not other:
+            return directions, why, None
+        text = f"the directions of {x.name} and {y.name} are not stated; taken as forward and to the left"
+        return directions, ["assumed"] * 3, _assume("axes", text, "--radar-axes forward,left,up", other, axes=True)
+
+    def _forward(self, group: tuple[Picked, ...], said: Mapping[str, Direction]) -> tuple[str, str]:
+        """Return the forward axis, and what states it."""
+        for axis in ("x", "y"):
+            if said.get(axis) in ("forward", "backward"):
+                return axis, _COMMENT
+            if said.get(axis) in ("left", "right"):
+                return _AXES[axis], _COMMENT
+        if group[0].meaning.kind in ("longitudinal", "lateral"):
+            return "x", "name"
+        if self.agreed is not None:
+            return self.agreed.forward, "its azimuth is 0 there"
+        axis = forward_axis(group[0].column.values, group[1].column.values)
+        return (axis, "its values are never negative") if axis else ("x", "assumed")
+
+    def _side(self, lateral: str, forward: str, said: Mapping[str, Direction]) -> tuple[Direction, str]:
+        """Return where the lateral axis points, and what states it; "" if nothing does."""
+        if said.get(lateral) in ("left", "right"):
+            return said[lateral], _COMMENT
+        azimuth = self.picked.get("azimuth")
+        turn = positive_side(azimuth.column.comment) if azimuth else None
+        if self.agreed is not None and azimuth and turn in ("left", "right"):
+            return (turn if self.agreed.toward > 0 else OPPOSITE[turn]), f"{azimuth.name} grows to the {turn}"
+        return ("left" if forward == "x" else "right"), ""
+
+    def _angle(self, angles: tuple[Picked, ...]) -> tuple[Unit, str, ColumnAssumption | None]:
+        """Return the unit of angles, what states it, and what is assumed."""
+        stated = next((one for one in angles if one.unit), None)
+        names = ", ".join(one.name for one in angles)
+        found = _angle_unit(angles[0].column.values, integer=angles[0].column.integer)
+        if stated and stated.unit:
+            unit = stated.unit
+            unstated = [one for one in angles if one.unit is None]
+            if unstated and unit.name not in ("rad", "deg"):
+                self._refuse_either(unstated, Finding(unit, False, f"values beside {stated.name}", _unit("deg")))
+            if self.of_table or not _implausible(angles[0], unit, found):
+                return unit, stated.why, None
+            but = f"although the values look like {found.unit.name}: {found.why}"
+            text = f"{_are(names)} taken as {unit.name} ({stated.why}), {but}"
+            return unit, stated.why, self._about_units("angle-unit", text, angles, unit)
+        if found.certain and not (self.of_table and found.unit.name == "rad"):
+            return found.unit, found.why, None
+        self._refuse_either(angles, found)
+        text = f"{_are(names)} taken as {found.unit.name} ({found.why}); the {self.noun} does not state the unit"
+        return found.unit, "assumed", self._about_units("angle-unit", text, angles, found.unit)
+
+    def _azimuth_sign(self, azimuth: Picked, angle: Unit) -> tuple[int, str, ColumnAssumption | None]:
+        side = positive_side(azimuth.column.comment)
+        if side not in ("left", "right") and "azimuth" in self.remarks.lower():
+            line = next(line for line in self.remarks.splitlines() if "azimuth" in line.lower())
+            side = positive_side(line)
+        if side in ("left", "right"):
+            return (1 if side == "left" else -1), _COMMENT, None
+        name = azimuth.name
+        if self.of_table and (self.directed or azimuth.mapped):
+            return 1, "--radar-axes" if self.directed else azimuth.why, None
+        if self.of_table and azimuth.unit and name == f"azimuth_{azimuth.unit.flag}":
+            return 1, "as documented", None
+        text = f"{name} is taken as growing to the left; the {self.noun} does not state it"
+        confirm = _map(azimuth, angle)
+        confirm += "" if self.of_table else f" (azimuth=-{name}{_flag(angle)} if it grows to the right)"
+        return 1, "assumed", _assume("azimuth-sign", text, confirm, ("azimuth",), axes=True)
+
+    def _about_unused(self) -> ColumnAssumption | None:
+        if not self.chosen.unused_heights:
+            return None
+        names = ", ".join(self.chosen.unused_heights)
+        text = f"the returns are taken as level with the radar; {names} may hold their elevation or height, and is not used"
+        return _assume("field-meaning", text, CONFIRM_ALL, ("elevation",))
+
+    def _about_vague(self) -> ColumnAssumption | None:
+        if not self.chosen.vague:
+            return None
+        first, second = (one.name for one in self.chosen.vague)
+        text = (
+            f"{first} is taken as the azimuth and {second} as the elevation; the message does not state which is which"
+        )
+        return _assume(
+            "field-meaning", text, f"--map azimuth={first} --map elevation={second}", ("azimuth", "elevation")
+        )
+
+    def _about_rivals(self, group: Sequence[Picked], units: Sequence[Unit]) -> list[ColumnAssumption]:
+        """State which of two columns of a table with the same meaning is used."""
+        return [
+            _assume(
+                "field-meaning",
+                f"{one.name} is read as the {one.quantity}, not {rivals}",
+                _map(one, unit),
+                (one.quantity,),
+            )
+            for one, unit in zip(group, units, strict=True)
+            if (rivals := self.chosen.rivals.get(one.quantity))
+        ]
+
+    def noise(self, plan: ColumnPlan) -> ColumnPlan:
+        """Add the standard deviations of range and angles."""
+        found = [self.chosen.sigma.get(name) for name in _POLAR]
+        if not any(found) or not (plan.polar or self.of_table):
+            return plan
+        base = _unit("deg" if plan.degrees else "rad").scale
+        usual = (
+            (plan.scales[0], abs(plan.scales[1]) * base, abs(plan.scales[2]) * base)
+            if plan.polar
+            else plan.claimed_scales
+        )
+        own = [(one.unit.scale if one and one.unit else scale) for one, scale in zip(found, usual, strict=True)]
+        assumed = []
+        for name, one, scale in zip(_POLAR, found, own, strict=True):
+            if one and not one.unit and self.of_table:
+                unit = next((unit for unit in units_for(name) if math.isclose(unit.scale, scale)), units_for(name)[0])
+                text = f"{one.name} is taken as {unit.name}; the file does not state the unit"
+                assumed.append(_assume("noise-unit", text, _map(one, unit, f"sigma_{name}"), (f"sigma_{name}",)))
+        return replace(
+            plan,
+            sigma=_three([one.name if one else None for one in found], None),
+            sigma_scales=(own[0], own[1] / base, own[2] / base),
+            assumptions=(*plan.assumptions, *assumed),
+        )
+
+    def speed(self, plan: ColumnPlan) -> ColumnPlan:
+        """Add the speed."""
+        doppler = self.picked.get("doppler")
+        group = (
+            (doppler,) if doppler else tuple(self.picked[name] for name in ("vx", "vy", "vz") if name in self.picked)
+        )
+        if doppler is None and ((plan.polar and not self.of_table) or not {"vx", "vy"} <= self.picked.keys()):
+            return plan
+        names = tuple(one.name for one in group)
+        in_ros_frame = self.rules == "ros" and plan.scales[0] == 1.0
+        others = ("vx", "vy", "vz") if self.of_table else ()
+        speeds = (*group, *(self.picked[name] for name in others if name in self.picked))
+        stated = next((one for one in speeds if one.unit), None)
+        assumptions = plan.assumptions
+        if stated and stated.unit:
+            unit, why = stated.unit, stated.why
+        elif in_ros_frame or all(one.column.standard for one in group):
+            unit, why = _unit("mps"), _ROS
+        else:
+            found = _speed_unit(group[0].column.values, integer=group[0].column.integer)
+            unit, why = found.unit, "assumed"
+            confirm = _map(group[0], unit) if doppler and unit.flag else CONFIRM_ALL
+            text = (
+                f"{_are(', '.join(names))} taken as {unit.name} ({found.why}); the {self.noun} does not state the unit"
+            )
+            assumptions = (*assumptions, _assume("speed-unit", text, confirm, ("doppler",)))
+        quantity, sign = ("doppler", "either: only its size matters") if doppler else ("velocity", "as the position's")
+        return replace(
+            plan,
+            doppler=names[0] if doppler else None,
+            velocity=() if doppler else names[: len(plan.position)],
+            doppler_scale=group[0].sign * unit.scale,
+            readings=(*plan.readings, ColumnReading(quantity, ", ".join(names), unit.name, sign, f"unit: {why}")),
+            assumptions=assumptions,
+        )
+
+    def amplitude(self, plan: ColumnPlan) -> ColumnPlan:
+        """Add the amplitude."""
+        one = self.picked.get("amplitude")
+        if one is None:
+            return plan
+        unit = one.unit.name if one.unit else "not stated"
+        why = one.why if one.unit else "only differences between returns matter; they are taken as dB"
+        return replace(
+            plan,
+            amplitude=one.name,
+            amplitude_scale=one.sign * (one.unit.scale if one.unit else 1.0),
+            readings=(*plan.readings, ColumnReading("amplitude", one.name, unit, "", why)),
+        )
+
+    def flags(self, plan: ColumnPlan, columns: Sequence[DescribedColumn]) -> ColumnPlan:
+        """Use the flags of invalid values, and mention several sensors and second hypotheses."""
+        names = {column.name.lower(): column for column in columns}
+        flags = [
+            column for column in columns if column.name.lower().rpartition(".")[2] in ("valid", "is_valid", "b_valid")
+        ]
+        needed = [flag for flag in flags if len(flag.values) and set(flag.values.tolist()) in ({0.0, 1.0}, {1.0})]
+        readings = [ColumnReading("valid", flag.name, "", "", "returns where it is 0 are skipped") for flag in needed]
+        readings += [ColumnReading("other azimuth", name, "", "", "alternative") for name in plan.other_azimuths]
+        return replace(
+            plan,
+            needed=tuple(flag.name for flag in needed),
+            spoils_position=tuple(names[name].name for name in _INVALID_POSITION if name in names),
+            spoils_doppler=tuple(names[name].name for name in _INVALID_DOPPLER if name in names),
+            readings=(*plan.readings, *readings),
+            assumptions=(*plan.assumptions, *_about_sensors(columns)),
+            described=True,
+        )
+
+
+def _about_sensors(columns: Sequence[DescribedColumn]) -> list[ColumnAssumption]:
+    found = []
+    for column in columns:
+        words, values = set(words_of(column.name)), sorted(set(column.values.tolist()))
+        numbered = words & {"sensor", "radar"} and words & {"id", "idx", "index", "number"}
+        if numbered and 1 < len(values) <= _MOST_SENSORS:
+            ids = ", ".join(f"{value:g}" for value in values)
+            text = (
+                f"'{column.name}' has the values {ids}, and all their returns are taken as one sensor's, in one frame"
+            )
+            found.append(_assume("field-meaning", text, CONFIRM_ALL, ()))
+    return found
+
+
+def _whole(said: Mapping[str, Direction]) -> tuple[str, str, str] | None:
+    """Return the directions of x, y and z if comments state those of x and y; z is up if nothing else is said."""
+    if "x" not in said or "y" not in said:
+        return None
+    found = (said["x"], said["y"], said.get("z", "up"))
+    return found if len({_PLANES[side] for side in found}) == 3 else None
+
+
+def _about_up(
+    group: tuple[Picked, ...], said: Mapping[str, Direction], directions: tuple[str, str, str]
+) -> ColumnAssumption | None:
+    """Return the assumption that z points up, unless a comment says so or x and y make it so in a right-handed frame."""
+    if len(group) < 3 or "z" in said or np.linalg.det(RadarAxes(directions).matrix) > 0:
+        return None
+    text = (
+        f"{group[2].name} is taken as up; in a right-handed frame with x {directions[0]} and y {directions[1]} it would point "
+        "down, and the message does not state it"
+    )
+    return _assume("axes", text, f"--radar-axes {','.join(directions)}", ("x", "y", "z"), axes=True)
+
+
+def _assume(
+    key: str, text: str, confirm: str, quantities: tuple[str, ...], *, axes: bool = False, angle_unit: bool = False
+) -> ColumnAssumption:
+    """Return an assumption whose topic is not known yet."""
+    return ColumnAssumption(Assumption(key, "", text, confirm), quantities, axes, angle_unit)
+
+
+def _map(one: Picked, unit: Unit, quantity: str = "", minus: str = "") -> str:
+    """Return the --map that states what a column is, for a shell."""
+    minus = "-" if one.sign < 0 else minus
+    return f"--map {_shell(f'{quantity or one.quantity}={minus}{one.name}{_flag(unit)}')}"
+
+
+def _flag(unit: Unit) -> str:
+    """Return how --map spells a unit; "" if it has no name there."""
+    return f":{unit.flag}" if unit.flag else ""
+
+
+def _shell(text: str) -> str:
+    return text if all(letter.isalnum() or letter in "=:_-.+/" for letter in text) else f"'{text}'"
+
+
+def _are(names: str) -> str:
+    """Return the names with the verb that fits their number."""
+    return f"{names} {'are' if ',' in names else 'is'}"
+
+
+def _present(*found: _T | None) -> list[_T]:
+    return [one for one in found if one is not None]
+
+
+def _three(found: Sequence[_T], rest: _T) -> tuple[_T, _T, _T]:
+    """Return three values for range, azimuth and elevation."""
+    first, second, third = (*found, rest, rest, rest)[:3]
+    return first, second, third
+
+
+def _unit(word: str) -> Unit:
+    unit = unit_of_word(word)
+    assert unit is not None
+    return unit
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A unit found by values.
+
+    Attributes:
+        unit: the most plausible one.
+        certain: whether no other one is plausible.
+        why: in a few words.
+        rival: one that fits as well; None if there is none.
+    """
+
+    unit: Unit
+    certain: bool
+    why: str
+    rival: Unit | None = None
+
+
+def farthest(*columns: Values) -> float:
+    """Return the length below which 99 % of the positions or ranges lie; 0 without values."""
+    lengths = np.sqrt(sum(np.square(column) for column in columns)) if columns else np.zeros(0)
+    lengths = lengths[np.isfinite(lengths) & (lengths > 0)]
+    return float(np.quantile(lengths, 0.99)) if len(lengths) else 0.0
+
+
+def _length_unit(largest: float, *, integer: bool) -> Finding:
+    """Find the unit of lengths by the largest.
+
+    Args:
+        largest: see farthest.
+        integer: an integer in any unit may have a factor that nothing states, so it is never certain.
+    """
+    fitting = [
+        _unit(word)
+        for word, nearest in (("m", _NEAREST_METRES), ("cm", _NEAREST_M), ("mm", _NEAREST_M))
+        if nearest <= largest * _unit(word).scale <= _FARTHEST_M
+    ]
+    if not fitting:
+        rival = _unit("mm") if largest > _FARTHEST_M else None
+        return Finding(
+            _unit("m"), False, "no value tells the unit" if rival is None else f"values up to {largest:.4g}", rival
+        )
+    usual = next((unit for unit in fitting if largest * unit.scale <= _USUAL_M), fitting[0])
+    rival = fitting[0] if fitting[0] is not usual else None
+    return Finding(usual, len(fitting) == 1 and not integer, f"values up to {largest:.4g}", rival)
+
+
+def _angle_unit(angles: Values, *, integer: bool) -> Finding:
+    """Find the unit of angles by the largest one."""
+    angles = np.abs(angles[np.isfinite(angles)])
+    angles = angles[angles > 0]
+    largest = float(angles.max(initial=0.0))
+    why = f"angles up to {largest:.4g}"
+    if integer:
+        factor = 1.0 if largest <= 180 else 0.1 if largest <= 1800 else 0.01
+        return Finding(_unit("deg").times(factor), False, why)
+    if largest > 2 * math.pi:
+        unit, rival = (_unit("deg"), None) if largest <= 360 else (_unit("cdeg"), _unit("deg"))
+        return Finding(unit, rival is None, f"{why} cannot be radians", rival)
+    if len(angles) >= _ENOUGH and largest <= _WIDEST_RAD:
+        return Finding(_unit("rad"), True, f"no angle above {largest:.2f} in {len(angles)} returns")
+    if largest <= math.pi:
+        return Finding(_unit("rad"), False, f"only {why}", _unit("deg") if largest > _WIDE_RAD else None)
+    return Finding(_unit("deg"), False, f"only {why}")
+
+
+def _implausible(angle: Picked, unit: Unit, found: Finding) -> bool:
+    """Return whether an angle's values contradict its stated unit."""
+    values = angle.column.values[np.isfinite(angle.column.values)]
+    too_wide = float(np.abs(values).max(initial=0.0)) * unit.scale > 2 * np.pi + 0.01
+    return too_wide or (found.certain and unit.name in ("rad", "deg") and unit.name != found.unit.name)
+
+
+def _speed_unit(speeds: Values, *, integer: bool) -> Finding:
+    """Find the unit of speeds; values alone never make it certain."""
+    speeds = np.abs(speeds[np.isfinite(speeds)])
+    largest = float(np.quantile(speeds, 0.99)) if len(speeds) else 0.0
+    word = "cm/s" if integer and largest > _FASTEST_MPS else "m/s"
+    return Finding(_unit(word), False, f"values up to {largest:.4g}")
+
+
+def forward_axis(x: Values, y: Values) -> str:
+    """Return "x" or "y" if only its values are never negative while the other's have both signs; else ""."""
+    sound = np.isfinite(x) & np.isfinite(y) & ((x != 0) | (y != 0))
+    x, y = x[sound], y[sound]
+    if len(x) < _ENOUGH:
+        return ""
+    behind, sideways = np.mean(x < 0), np.mean(y < 0)
+    if behind <= 0.01 and 0.1 <= sideways <= 0.9:
+        return "x"
+    return "y" if sideways <= 0.01 and 0.1 <= behind <= 0.9 else ""
+
+
+@dataclass(frozen=True, slots=True)
+class PolarAgreement:
+    """How polar columns agree with Cartesian ones.
+
+    Attributes:
+        angle: the angle's unit.
+        forward: the axis at angle 0, "x" or "y".
+        toward: 1 if the angle grows towards the positive other axis, -1 if away from it.
+    """
+
+    angle: Unit
+    forward: str
+    toward: int
+
+
+def _agreement(picked: Mapping[str, Picked]) -> PolarAgreement | None:
+    """Find the unit, sign and axis order in which an azimuth matches x and y; None if none matches clearly."""
+    if not {"x", "y", "azimuth"} <= picked.keys():
+        return None
+    angle, x, y = (picked[name].column.values for name in ("azimuth", "x", "y"))
+    telling = np.isfinite(angle) & np.isfinite(x) & np.isfinite(y) & (np.abs(angle) > 0) & ((x != 0) | (y != 0))
+    if np.count_nonzero(telling) < _ENOUGH // 2:
+        return None
+    angle, a, b = angle[telling], x[telling], y[telling]
+    fits: list[tuple[float, Unit, str, int]] = []
+    for word in ("rad", "deg", "mrad", "cdeg"):
+        for forward, own in (("x", np.arctan2(b, a)), ("y", np.arctan2(a, b))):
+            for toward in (1, -1):
+                apart = np.angle(np.exp(1j * (toward * _unit(word).scale * angle - own)))
+                fits.append((float(np.median(np.abs(apart))), _unit(word), forward, toward))
+    fits.sort(key=lambda fit: fit[0])
+    best, second = fits[0], fits[1]
+    if best[0] > _ALIKE_RAD or second[0] < 3 * max(best[0], 1e-3):
+        return None
+    return PolarAgreement(best[1], best[2], best[3])
