@@ -1,14 +1,15 @@
 """A calibration board: where its corners are in its own plane."""
 
 import re
-from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
+from msgspec import Meta, Struct
 
 from calib_core.arrays import Indices, Points3
 from calib_core.errors import InputError
+from calib_core.json_forms import Positive
 
 BoardKind: TypeAlias = Literal["checkerboard", "charuco", "aprilgrid"]
 _MOST = 100
@@ -23,9 +24,8 @@ _COUNTED = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Board:
-    """A calibration board.
+class Board(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """A calibration board: columns and rows as on the command line, lengths in metres.
 
     Attributes:
         kind: a checkerboard, a ChArUco board (a checkerboard with markers in its white squares), or Kalibr's AprilGrid.
@@ -37,11 +37,11 @@ class Board:
     """
 
     kind: BoardKind
-    columns: int
-    rows: int
-    square_m: float
-    marker_m: float = 0.0
-    dictionary: str = ""
+    columns: Annotated[int, Meta(ge=1, le=1000)]
+    rows: Annotated[int, Meta(ge=1, le=1000)]
+    square_m: Positive
+    marker_m: Annotated[float, Meta(ge=0.0, le=1e9)] = 0.0
+    dictionary: Annotated[str, Meta(max_length=200)] = ""
 
     @property
     def corners_m(self) -> Points3:

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -15,7 +16,9 @@ VIEWS = drawn_views(CAMERAS["plumb_bob"], 9, 31)
 def calibrated(
     views: tuple[BoardCorners, ...], *, square_m: float = BOARD.square_m, size_px: tuple[int, int] = SIZE_PX
 ) -> CalibratedLens:
-    lens = calibrate_lens(BoardSearch(replace(BOARD, square_m=square_m), size_px, views, (), len(views)), OPTIONS)
+    lens = calibrate_lens(
+        BoardSearch(msgspec.structs.replace(BOARD, square_m=square_m), size_px, views, (), len(views)), OPTIONS
+    )
     assert isinstance(lens, CalibratedLens), lens
     return lens
 

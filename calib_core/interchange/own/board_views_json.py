@@ -3,13 +3,11 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-import msgspec
 import numpy as np
 
 from calib_core.errors import InputError
 from calib_core.interchange.own.lens_documents import (
     BOARD_VIEWS_SCHEMA,
-    BoardDocument,
     BoardViewDocument,
     BoardViewsDocument,
     LeftOutDocument,
@@ -91,7 +89,7 @@ def write_board_views(found: BoardViews) -> str:
     """Write board-views-1 text; the same views give the same bytes."""
     document = BoardViewsDocument(
         BOARD_VIEWS_SCHEMA,
-        board_document(found.board),
+        found.board,
         source_document(found.source),
         found.complete,
         list(found.searched),
@@ -111,7 +109,7 @@ def read_board_views(text: str, source: str = "views") -> BoardViews:
         InputError: invalid content; the message names the file, the place and what to do.
     """
     document = parse_document(text, BoardViewsDocument, source=source)
-    board = Board(**msgspec.structs.asdict(document.board))
+    board = document.board
     pictures = document.source.pictures
     for place, (first, last) in enumerate(document.searched):
         if not first <= last < pictures:
@@ -129,11 +127,6 @@ def read_board_views(text: str, source: str = "views") -> BoardViews:
         tuple(document.searched),
         document.complete,
     )
-
-
-def board_document(board: Board) -> BoardDocument:
-    """Return the document of a board."""
-    return BoardDocument(board.kind, board.columns, board.rows, board.square_m, board.marker_m, board.dictionary)
 
 
 def source_document(source: PictureSource) -> SourceDocument:

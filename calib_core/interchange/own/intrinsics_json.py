@@ -6,7 +6,6 @@ from calib_core.arrays import Values
 from calib_core.camera import Camera
 from calib_core.interchange.own.board_views_json import (
     PictureSource,
-    board_document,
     left_out_documents,
     source_document,
 )
@@ -57,7 +56,7 @@ def write_intrinsics(
     document = IntrinsicsDocument(
         schema=INTRINSICS_SCHEMA,
         camera=camera_document(lens.camera),
-        board=board_document(lens.board),
+        board=lens.board,
         source=source_document(source),
         parameters=_parameters(lens.camera),
         field_of_view_deg=(finite_or_none(field_of_view_deg[0]), finite_or_none(field_of_view_deg[1])),

@@ -6,8 +6,8 @@ import msgspec
 from msgspec import Meta, Struct
 
 from calib_core.interchange.own.documents import CameraDocument
-from calib_core.intrinsics import BoardKind
-from calib_core.json_forms import Count, Measured, Name, Pixel, Positive
+from calib_core.intrinsics import Board
+from calib_core.json_forms import Count, Measured, Name, Pixel
 from calib_core.results import DataWarning
 
 BOARD_VIEWS_SCHEMA: Final = "cocalib/board-views-1"
@@ -16,17 +16,6 @@ INTRINSICS_SCHEMA: Final = "cocalib/intrinsics-1"
 _Side = Annotated[int, Meta(ge=1, le=1_000_000)]
 _Number = Annotated[int, Meta(ge=0, le=1_000_000_000)]
 _Text = Annotated[str, Meta(max_length=10_000)]
-
-
-class BoardDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """A calibration board: columns and rows as on the command line, lengths in metres."""
-
-    kind: BoardKind
-    columns: Annotated[int, Meta(ge=1, le=1000)]
-    rows: Annotated[int, Meta(ge=1, le=1000)]
-    square_m: Positive
-    marker_m: Annotated[float, Meta(ge=0.0, le=1e9)] = 0.0
-    dictionary: Annotated[str, Meta(max_length=200)] = ""
 
 
 class SourceDocument(Struct, frozen=True, forbid_unknown_fields=True):
@@ -64,7 +53,7 @@ class BoardViewsDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_d
     """
 
     schema: Literal["cocalib/board-views-1"]
-    board: BoardDocument
+    board: Board
     source: SourceDocument
     complete: bool
     searched: list[tuple[_Number, _Number]]
@@ -146,7 +135,7 @@ class IntrinsicsDocument(Struct, frozen=True):
 
     schema: Literal["cocalib/intrinsics-1"]
     camera: CameraDocument
-    board: BoardDocument
+    board: Board
     source: SourceDocument
     parameters: list[LensParameterDocument]
     field_of_view_deg: tuple[float | None, float | None]

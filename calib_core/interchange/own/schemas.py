@@ -39,6 +39,7 @@ _DOCUMENTS: dict[str, Any] = {
 
 _NAMES = {
     "AssumptionNote": "AssumptionDocument",
+    "Board": "BoardDocument",
     "ChosenReturn": "ReturnDocument",
     "DataWarning": "WarningDocument",
     "LabelledScan": "ScanDocument",

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import cv2
+import msgspec
 import numpy as np
 import pytest
 
@@ -313,8 +314,8 @@ def test_a_large_picture_is_searched_small_and_refined_large() -> None:
 def test_a_part_of_a_larger_board_is_not_the_board() -> None:
     picture, _ = next(views(CHECKERBOARD, FILM, 1))
     for columns, rows in ((8, 6), (10, 7)):
-        assert find_board(picture, replace(CHECKERBOARD, columns=columns, rows=rows)) is None
-    assert board_in(picture, replace(CHECKERBOARD, columns=10, rows=7)) == (9, 6)
+        assert find_board(picture, msgspec.structs.replace(CHECKERBOARD, columns=columns, rows=rows)) is None
+    assert board_in(picture, msgspec.structs.replace(CHECKERBOARD, columns=10, rows=7)) == (9, 6)
     assert board_in(picture, CHECKERBOARD) is None
 
 
