@@ -1,12 +1,17 @@
 """calibration-1, the file of a solved calibration: written, read, and as a format of the registry.
 
 Below are the parts that differ from their types: what is said of the vehicle, the radar's errors and angle map, the covariance's
-parts, the provenance.
+parts, the provenance, and the solved pairs with the data to solve them again.
+
+Some results stay as they were read when a file is written again: those of a later version are unknown to this one, and those that
+follow from others are computed with the last digit that this processor gives, which need not be the one in the file.
 """
 
 import dataclasses
 import hashlib
-from collections.abc import Iterable, Mapping
+import json
+import math
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import PurePath
 from typing import Any
 
@@ -22,6 +27,7 @@ from calib_core.interchange.calibration_file import (
     EQUATION,
     CalibrationFile,
     FrameNames,
+    KeptResult,
     Provenance,
     VehicleNote,
     choose_check_point,
@@ -35,8 +41,6 @@ from calib_core.interchange.own.documents import (
     CovariancePartsDocument,
 )
 from calib_core.interchange.own.documents import Matrix66 as StatedMatrix
-from calib_core.interchange.own.kept_results import kept_results, with_kept
-from calib_core.interchange.own.pair_document import SOLVED_FROM_KEYS, solved_pair_document, solved_pair_of
 from calib_core.interchange.own.transform_document import (
     are_inverse,
     finite_or_none,
@@ -46,10 +50,17 @@ from calib_core.interchange.own.transform_document import (
     transform_of,
 )
 from calib_core.interchange.syntax.content import Content, decoded
-from calib_core.interchange.syntax.strict_json import builtins_of, document_in, json_object, json_text
-from calib_core.measurements import ReflectorClick
-from calib_core.radar import AngleMap, RadarErrors
-from calib_core.results import Calibration, CheckPoint, DataWarning
+from calib_core.interchange.syntax.strict_json import (
+    builtins_of,
+    document_in,
+    fields_of,
+    item_type,
+    json_object,
+    json_text,
+)
+from calib_core.measurements import Candidate, Pair, ReflectorClick
+from calib_core.radar import AngleMap, RadarErrors, covariance_from_sigma_polar
+from calib_core.results import Calibration, CheckPoint, DataWarning, PairResult
 from calib_core.results.calibration import CovarianceParts
 from calib_core.results.confirmation import rests_on_fleet_prior
 from calib_core.results.verdict import verdict_on
@@ -152,7 +163,7 @@ def write_calibration(file: CalibrationFile) -> str:
         del content["metrics"]["picture_sigma_px"]
     for pair in content["pairs"]:
         if not pair["candidates"]:
-            for key in SOLVED_FROM_KEYS:
+            for key in _SOLVED_FROM_KEYS:
                 del pair[key]
     unset = documents.StatedOptions()
     for group in ("mounting", "board", "refining"):
@@ -461,3 +472,182 @@ def _radar_topics(topics: documents.TopicsDocument) -> tuple[str, ...]:
     if not isinstance(topics.radar_all, UnsetType):
         return tuple(topics.radar_all)
     return () if topics.radar is None else (topics.radar,)
+
+
+_DERIVED = (
+    ("camera_from_radar", "quaternion_wxyz"),
+    ("radar_from_camera",),
+    ("sigma",),
+    ("pairs", "residual_px"),
+    ("pairs", "distance_px"),
+)
+"""The keys of what follows from other results, without the indices of lists."""
+_ROUNDING = 1e-9
+"""How far rounding moves a derived number of 1 or less, at most; a larger difference means that what it follows from changed."""
+
+
+def kept_results(content: Any, document: Any) -> tuple[KeptResult, ...]:
+    """Return every key of parsed JSON that a document type does not have, at any depth, and every derived number.
+
+    Args:
+        content: parsed JSON that the type has accepted.
+        document: the type to compare with.
+    """
+    return tuple(_kept(content, document, ()))
+
+
+def with_kept(content: dict[str, Any], kept: tuple[KeptResult, ...]) -> dict[str, Any]:
+    """Put results back in their places; those whose place is gone or whose number has changed are dropped."""
+    for result in kept:
+        owner: Any = content
+        for step in result.place[:-1]:
+            owner = _inside(owner, step)
+        if isinstance(owner, dict):
+            key, value = result.place[-1], json.loads(result.json_text)
+            if key not in owner or _is_rounding(owner[key], value):
+                owner[key] = value
+    return content
+
+
+def _kept(value: Any, annotation: Any, place: tuple[str | int, ...]) -> Iterator[KeptResult]:
+    if isinstance(value, list):
+        for index, item in enumerate(value):
+            yield from _kept(item, item_type(annotation), (*place, index))
+    fields = fields_of(annotation)
+    if not isinstance(value, dict) or fields is None:
+        return
+    for key, item in value.items():
+        inner = (*place, key)
+        if key not in fields or (not isinstance(item, dict) and _is_derived(inner)):
+            yield KeptResult(inner, json.dumps(item))
+        else:
+            yield from _kept(item, fields[key], inner)
+
+
+def _is_derived(place: tuple[str | int, ...]) -> bool:
+    keys = tuple(step for step in place if isinstance(step, str))
+    return any(keys[: len(one)] == one for one in _DERIVED)
+
+
+def _is_rounding(computed: Any, stated: Any) -> bool:
+    """Return whether two values are the same numbers but for rounding."""
+    if isinstance(computed, list | tuple) and isinstance(stated, list):
+        return len(computed) == len(stated) and all(map(_is_rounding, computed, stated))
+    both = isinstance(computed, float) and isinstance(stated, int | float)
+    return both and math.isclose(computed, stated, rel_tol=_ROUNDING, abs_tol=_ROUNDING)
+
+
+def _inside(owner: Any, step: str | int) -> Any:
+    if isinstance(owner, dict):
+        return owner.get(step)
+    within = isinstance(owner, list) and isinstance(step, int) and step < len(owner)
+    return owner[step] if within else None
+
+
+_AGREEMENT_M = 1e-6
+
+_SOLVED_FROM_KEYS = ("sigma_px", "radar_time", "candidates")
+"""The data a pair was solved from; omitted if unknown, as in files from other tools."""
+
+
+def solved_pair_document(pair: PairResult) -> documents.SolvedPairDocument:
+    """Return the document of a solved pair."""
+    measured = pair.measured
+    return documents.SolvedPairDocument(
+        id=pair.id,
+        image_time=pair.image_time,
+        radar_m=nested(pair.point_radar_m),
+        pixel_px=nested(pair.pixel_px),
+        projected_px=nested(pair.projected_px),
+        residual_px=nested(pair.residual_px),
+        distance_px=finite_or_none(pair.distance_px),
+        inlier=bool(pair.inlier),
+        excluded=bool(pair.excluded),
+        outlier_probability=finite_or_none(pair.outlier_probability),
+        influence=finite_or_none(pair.influence),
+        candidate=int(pair.candidate),
+        expected_covariance_px2=nested(pair.expected_covariance_px2),
+        sigma_px=measured.sigma_px if measured else None,
+        radar_time=measured.radar_time if measured else None,
+        candidates=[_candidate_document(candidate) for candidate in measured.candidates] if measured else [],
+        mark=measured.mark if measured and measured.mark != "clicked" else UNSET,
+        chosen=measured.chosen or UNSET if measured else UNSET,
+    )
+
+
+def solved_pair_of(document: documents.SolvedPairDocument, *, source: str, place: str) -> PairResult:
+    """Return the solved pair of a JSON object.
+
+    Raises:
+        InputError: a candidate is at the radar's origin, or radar_m is not the position of the chosen candidate.
+    """
+    _check_candidates(document, source=source, place=place)
+    return PairResult(
+        id=document.id,
+        pixel_px=np.array(document.pixel_px),
+        projected_px=np.array(document.projected_px or (np.nan, np.nan)),
+        point_radar_m=np.array(document.radar_m),
+        inlier=document.inlier,
+        excluded=document.excluded,
+        outlier_probability=nan_if_none(document.outlier_probability),
+        influence=nan_if_none(document.influence),
+        candidate=document.candidate,
+        expected_covariance_px2=np.array(document.expected_covariance_px2 or [[np.nan] * 2] * 2),
+        image_time=document.image_time,
+        measured=_measured(document) if document.candidates else None,
+    )
+
+
+def _measured(document: documents.SolvedPairDocument) -> Pair:
+    return Pair(
+        id=document.id,
+        pixel_px=np.array(document.pixel_px),
+        candidates=tuple(_candidate(candidate) for candidate in document.candidates),
+        sigma_px=document.sigma_px,
+        image_time=document.image_time,
+        radar_time=document.radar_time,
+        mark=document.mark or "clicked",
+        chosen=document.chosen or None,
+    )
+
+
+def _candidate_document(candidate: Candidate) -> documents.CandidateDocument:
+    return documents.CandidateDocument(
+        radar_m=nested(candidate.position_radar_m),
+        sigma_polar=nested(candidate.sigma_polar),
+        score=candidate.score,
+        returns=candidate.returns,
+        scans=candidate.scans,
+        snr_db=finite_or_none(candidate.snr_db),
+        alternative_of=candidate.alternative_of if candidate.alternative_of >= 0 else UNSET,
+    )
+
+
+def _candidate(document: documents.CandidateDocument) -> Candidate:
+    position, sigma_polar = np.array(document.radar_m), np.array(document.sigma_polar or (np.nan,) * 3)
+    return Candidate(
+        position_radar_m=position,
+        sigma_polar=sigma_polar,
+        covariance_m2=covariance_from_sigma_polar(position, sigma_polar),
+        score=document.score,
+        returns=document.returns,
+        scans=document.scans,
+        snr_db=nan_if_none(document.snr_db),
+        alternative_of=-1 if isinstance(document.alternative_of, UnsetType) else document.alternative_of,
+    )
+
+
+def _check_candidates(document: documents.SolvedPairDocument, *, source: str, place: str) -> None:
+    for i, candidate in enumerate(document.candidates):
+        if not any(candidate.radar_m):
+            raise InputError(
+                f"{source}: {place}.candidates[{i}].radar_m: is at the radar's origin; remove the candidate"
+            )
+    if not document.candidates:
+        return
+    chosen = document.candidates[document.candidate] if document.candidate < len(document.candidates) else None
+    if chosen is None or max(abs(a - b) for a, b in zip(chosen.radar_m, document.radar_m, strict=True)) > _AGREEMENT_M:
+        raise InputError(
+            f"{source}: {place}.radar_m: is not the position of candidate {document.candidate}; correct one of the two, "
+            "or remove the candidates"
+        )
