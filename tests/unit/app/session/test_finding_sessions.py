@@ -8,15 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calib_core.measurements import TimeNs
-from cocalib.session import ClickPlaced, RecordingFacts, advance
+from cocalib.session import RecordingFacts
 from cocalib.session.file import SessionFileError, find_session_folder, open_session_file
+from cocalib.session.file.journal import COPY, JOURNAL
+from tests.unit.app.session.drive import FACTS as DRIVE
+from tests.unit.app.session.drive import START_NS, clicks_in, kept, place, refused
 
-START_NS = 1_700_000_000_123_456_789
-IMAGE_TIMES = START_NS + 100_000_000 * np.arange(50)
 RADAR_TIMES = START_NS + 50_000_000 * np.arange(90)
 NO_TIMES = np.zeros(0, dtype=np.int64)
-FACTS = RecordingFacts("drive.bag", IMAGE_TIMES, 640, 480, radar_times=RADAR_TIMES)
+IMAGE_TIMES = DRIVE.image_times
+FACTS = replace(DRIVE, name="drive.bag", radar_times=RADAR_TIMES)
 
 
 @pytest.fixture(autouse=True)
@@ -36,12 +37,9 @@ def home(tmp_path: Path) -> Path:
 
 def clicked(folder: Path, facts: RecordingFacts = FACTS, *, changed_at_s: float | None = None) -> Path:
     """Make a session with one click."""
-    session_file = open_session_file(folder, facts)
-    step = ClickPlaced(TimeNs(int(facts.image_times[3])), (1.0, 2.0), "clicked")
-    session_file.append(step, advance(session_file.restored.history, step, facts))
-    session_file.close()
+    kept(folder, place(3, facts), facts=facts)
     if changed_at_s is not None:
-        for name in ("journal.jsonl", "journal-copy.jsonl"):
+        for name in (JOURNAL, COPY):
             os.utime(folder / name, (changed_at_s, changed_at_s))
     return folder
 
@@ -116,24 +114,18 @@ def test_a_new_recording_of_an_old_name_finds_its_own_session_elsewhere(home: Pa
 def test_a_recording_that_has_grown_keeps_its_session(home: Path) -> None:
     clicked(home / "drive.bag.cocalib-session", replace(FACTS, image_times=IMAGE_TIMES[:10]))
     assert find_session_folder([home / "renamed.bag"], FACTS).warnings
-    session_file = open_session_file(home / "drive.bag.cocalib-session", FACTS)
-    step = ClickPlaced(TimeNs(int(IMAGE_TIMES[40])), (1.0, 2.0), "clicked")
-    session_file.append(step, advance(session_file.restored.history, step, FACTS))
-    session_file.close()
-    again = open_session_file(home / "drive.bag.cocalib-session", FACTS)
-    assert len(again.restored.history.present.clicks) == 2
-    again.close()
+    kept(home / "drive.bag.cocalib-session", place(40), facts=FACTS)
+    assert clicks_in(home / "drive.bag.cocalib-session", FACTS) == [3.0, 40.0]
 
 
 def test_a_recording_without_pictures_is_known_by_its_scans(home: Path) -> None:
     facts = RecordingFacts("radar.bag", NO_TIMES, 0, 0, radar_times=RADAR_TIMES[:30])
-    open_session_file(home / "radar.bag.cocalib-session", facts).close()
+    kept(home / "radar.bag.cocalib-session", facts=facts)
     grown = replace(facts, radar_times=RADAR_TIMES)
-    open_session_file(home / "radar.bag.cocalib-session", grown).close()
+    kept(home / "radar.bag.cocalib-session", facts=grown)
     assert find_session_folder([home / "renamed.bag"], grown).path == home / "radar.bag.cocalib-session"
     for other in (replace(facts, radar_times=RADAR_TIMES + 1), replace(facts, radar_times=NO_TIMES)):
-        with pytest.raises(SessionFileError, match=r"'radar.bag' \(30 radar scans, no frames from"):
-            open_session_file(home / "radar.bag.cocalib-session", other)
+        refused(home / "radar.bag.cocalib-session", r"'radar.bag' \(30 radar scans, no frames from", other)
 
 
 def test_stamps_that_count_from_zero_prove_nothing_and_the_session_is_only_named(home: Path) -> None:
@@ -150,7 +142,6 @@ def test_a_session_that_cannot_be_written_is_named_with_the_way_to_its_clicks(
     home: Path, state_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = clicked(home / "drive.bag.cocalib-session")
-    monkeypatch.setattr("cocalib.session.file.finding.is_writable", lambda place: state_folder in (place, place.parent))
     monkeypatch.setattr("cocalib.session.file.finding.is_writable", lambda place: False)
     found = find_session_folder([home / "drive.bag"], FACTS)
     assert found.path.parent == state_folder

@@ -10,30 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.reliability.sessions import (
-    FACTS as MADE_FACTS,
-)
-from benchmarks.reliability.sessions import (
-    Made,
-    every_bit,
-    every_kill,
-    every_length,
-    made_session,
-    sampled_bits,
-)
+from benchmarks.reliability.sessions import Made, every_bit, every_kill, every_length, made_session
 from calib_core.options import CalibrationOptions
-from cocalib.session import ClickPlaced, History, OptionsChanged, advance
-from cocalib.session.file import (
-    SessionFile,
-    SessionFileError,
-    inspect_session,
-    open_session_file,
-    repair_session,
-    set_aside,
-)
+from cocalib.session import OptionsChanged, advance
+from cocalib.session.file import SessionFileError, inspect_session, open_session_file, repair_session, set_aside
 from cocalib.session.file.guarded_folder import GuardedFolder
 from cocalib.session.file.journal import COPY, JOURNAL, bytes_of, sealed, taken_apart
-from tests.unit.app.session.drive import FACTS, TIMES, keep
+from tests.unit.app.session.drive import FACTS, clicks_in, files, keep, kept, lines_of, place, refused, restored
 
 POSIX = pytest.mark.skipif(os.name == "nt", reason="Windows needs a right to make links, and has no pipes in folders")
 
@@ -44,20 +27,9 @@ def own_state_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "state" / "cocalib" / "sessions"
 
 
-def clicked(session_file: SessionFile, *frames: int) -> History:
-    return keep(session_file, *(ClickPlaced(TIMES[frame], (float(frame), 1.0), "clicked") for frame in frames))
-
-
-def closed_session(folder: Path, *frames: int) -> None:
-    session_file = open_session_file(folder, FACTS)
-    clicked(session_file, *frames)
-    assert session_file.close().note.startswith("all clicks are saved in ")
-
-
-def clicks_in(folder: Path) -> list[float]:
-    session_file = open_session_file(folder, FACTS)
-    session_file.close()
-    return [click.u_px for click in session_file.restored.history.present.clicks]
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return tmp_path / "s"
 
 
 @pytest.fixture(scope="module")
@@ -66,44 +38,24 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> Made:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "with_other"),
-    [(JOURNAL, True), (JOURNAL, False), (COPY, True), (COPY, False)],
-)
-def test_no_single_bit_changes_a_session_silently(short: Made, tmp_path: Path, name: str, with_other: bool) -> None:
-    counts = every_bit(short, tmp_path / "s", name=name, with_other=with_other)
-    assert counts["silently changed"] == 0
-    assert counts["continued"] == 0
+@pytest.mark.parametrize(("name", "with_other"), [(JOURNAL, True), (JOURNAL, False), (COPY, True)])
+def test_no_single_bit_changes_a_session_silently(short: Made, folder: Path, name: str, with_other: bool) -> None:
+    counts = every_bit(short, folder, name=name, with_other=with_other)
+    assert counts["silently changed"] == counts["continued"] == 0
     assert counts.total() == 8 * len(short.journal)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("with_other", [True, False])
-def test_no_sampled_bit_of_a_longer_journal_changes_it_silently(tmp_path: Path, with_other: bool) -> None:
-    made = made_session(60, tmp_path / "made")
-    counts = sampled_bits(made, tmp_path / "s", 300, seed=3, with_other=with_other)
-    assert counts["silently changed"] == counts["continued"] == 0
-
-
-def test_a_kill_at_any_byte_of_a_step_loses_nothing_that_was_confirmed(tmp_path: Path) -> None:
-    made = made_session(12, tmp_path / "made")
-    counts = every_kill(made, tmp_path / "s")
+def test_a_kill_at_any_byte_of_a_step_loses_nothing_that_was_confirmed(tmp_path: Path, folder: Path) -> None:
+    counts = every_kill(made_session(12, tmp_path / "made"), folder)
     assert counts == {"continued": counts.total()}
     assert counts.total() > 2000
 
 
-def test_a_journal_cut_anywhere_is_told_and_continued_from_its_copy(short: Made, tmp_path: Path) -> None:
-    counts = every_length(short, tmp_path / "s", name=JOURNAL)
+def test_a_journal_cut_anywhere_is_told_and_a_copy_cut_anywhere_changes_nothing(short: Made, folder: Path) -> None:
+    counts = every_length(short, folder, name=JOURNAL)
     assert counts == {"continued and told": counts.total()}
-
-
-def test_a_copy_cut_anywhere_changes_nothing(short: Made, tmp_path: Path) -> None:
-    counts = every_length(short, tmp_path / "s", name=COPY)
+    counts = every_length(short, folder, name=COPY)
     assert counts["silently changed"] == counts["refused"] == 0
-
-
-def lines_of(folder: Path) -> list[bytes]:
-    return (folder / JOURNAL).read_bytes().split(b"\n")[:-1]
 
 
 @pytest.mark.parametrize(
@@ -119,115 +71,93 @@ def lines_of(folder: Path) -> list[bytes]:
 )
 @pytest.mark.parametrize("with_copy", [True, False])
 def test_lines_that_were_moved_are_noticed(
-    tmp_path: Path, change: Callable[[list[bytes]], list[bytes]], with_copy: bool
+    folder: Path, change: Callable[[list[bytes]], list[bytes]], with_copy: bool
 ) -> None:
-    folder = tmp_path / "s"
-    closed_session(folder, 1, 2, 3, 4, 5)
+    kept(folder, *map(place, range(1, 6)))
     (folder / JOURNAL).write_bytes(b"".join(line + b"\n" for line in change(lines_of(folder))))
     if not with_copy:
         (folder / COPY).unlink()
     if not with_copy and len(lines_of(folder)) == 5:
-        with pytest.raises(SessionFileError, match="the session is damaged: line"):
-            open_session_file(folder, FACTS)
+        refused(folder, "the session is damaged: line")
         return
-    session_file = open_session_file(folder, FACTS)
-    assert session_file.restored.warnings[0].code == "session-damaged"
-    session_file.close()
+    assert restored(folder).warnings[0].code == "session-damaged"
     assert clicks_in(folder) == [1.0, 2.0, 3.0, 4.0, 5.0]
 
 
 @POSIX
 @pytest.mark.parametrize("name", ["lock", JOURNAL, COPY])
-@pytest.mark.parametrize("existing", [True, False], ids=["in a session", "in an empty folder"])
-def test_a_link_in_the_folder_is_refused_and_its_target_untouched(tmp_path: Path, name: str, existing: bool) -> None:
-    folder, target = tmp_path / "s", tmp_path / "target"
-    if existing:
-        closed_session(folder, 1)
-        (folder / name).unlink()
-    else:
+@pytest.mark.parametrize("kind", ["link", "link in an empty folder", "pipe", "folder", "hard link", "dangling link"])
+def test_what_is_no_plain_file_is_refused_without_waiting_and_what_it_leads_to_is_untouched(
+    tmp_path: Path, folder: Path, name: str, kind: str
+) -> None:
+    other = tmp_path / "other"
+    if kind == "link in an empty folder":
         folder.mkdir()
-    target.write_bytes(b"precious\n")
-    (folder / name).symlink_to(target)
-    with pytest.raises(SessionFileError, match=rf"{name}: is a symbolic link.*Move it out of the folder"):
-        open_session_file(folder, FACTS)
-    assert target.read_bytes() == b"precious\n"
-    with pytest.raises(SessionFileError):
-        repair_session(folder)
-    assert target.read_bytes() == b"precious\n"
-
-
-@POSIX
-@pytest.mark.parametrize("name", ["lock", JOURNAL, COPY])
-@pytest.mark.parametrize("kind", ["pipe", "folder", "hard link", "dangling link"])
-def test_what_is_no_plain_file_is_refused_without_waiting(tmp_path: Path, name: str, kind: str) -> None:
-    folder, other = tmp_path / "s", tmp_path / "other"
-    closed_session(folder, 1)
-    (folder / name).unlink()
+    else:
+        kept(folder, place(1))
+        (folder / name).unlink()
+    if "dangling" not in kind:
+        other.write_bytes(b"precious\n")
     match kind:
         case "pipe":
             os.mkfifo(folder / name)
         case "folder":
             (folder / name).mkdir()
         case "hard link":
-            other.write_bytes(b"precious\n")
             (folder / name).hardlink_to(other)
         case _:
             (folder / name).symlink_to(other)
-    with pytest.raises(SessionFileError, match=rf"{name}: (is a|has 2 names)"):
-        open_session_file(folder, FACTS)
-    assert (other.read_bytes() == b"precious\n") if kind == "hard link" else not other.exists()
+    reason = refused(folder, rf"{name}: (is a|has 2 names)")
+    if "link" in kind and kind != "hard link":
+        assert re.search("is a symbolic link.*Move it out of the folder", reason)
+        with pytest.raises(SessionFileError):
+            repair_session(folder)
+    assert not other.exists() if kind == "dangling link" else other.read_bytes() == b"precious\n"
 
 
 @POSIX
-def test_a_session_folder_that_is_a_link_is_refused(tmp_path: Path) -> None:
-    closed_session(tmp_path / "real", 1)
-    before = {path.name: path.read_bytes() for path in (tmp_path / "real").iterdir()}
-    (tmp_path / "s").symlink_to(tmp_path / "real")
-    for attempt in (lambda: open_session_file(tmp_path / "s", FACTS), lambda: set_aside(tmp_path / "s")):
+def test_a_session_folder_that_is_a_link_is_refused(tmp_path: Path, folder: Path) -> None:
+    kept(tmp_path / "real", place(1))
+    before = files(tmp_path / "real")
+    folder.symlink_to(tmp_path / "real")
+    for attempt in (lambda: open_session_file(folder, FACTS), lambda: set_aside(folder)):
         with pytest.raises(SessionFileError, match="is a symbolic link, which is not followed"):
             attempt()
-    assert {path.name: path.read_bytes() for path in (tmp_path / "real").iterdir()} == before
-
-
-@POSIX
-def test_a_dangling_link_as_session_folder_makes_no_folder(tmp_path: Path) -> None:
-    (tmp_path / "s").symlink_to(tmp_path / "nowhere")
-    with pytest.raises(SessionFileError, match="is a symbolic link"):
-        open_session_file(tmp_path / "s", FACTS)
+    assert files(tmp_path / "real") == before
+    folder.unlink()
+    folder.symlink_to(tmp_path / "nowhere")
+    refused(folder, "is a symbolic link")
     assert not (tmp_path / "nowhere").exists()
 
 
 @POSIX
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root can give a file to another user")
 @pytest.mark.parametrize("name", ["", "lock", JOURNAL, COPY])
-def test_what_belongs_to_another_user_is_refused(tmp_path: Path, name: str) -> None:
-    folder = tmp_path / "s"
-    closed_session(folder, 1)
+def test_what_belongs_to_another_user_is_refused(folder: Path, name: str) -> None:
+    kept(folder, place(1))
     os.chown(folder / name, 12345, -1)
-    with pytest.raises(SessionFileError, match=r"belongs to user 12345, not to you \(user 0\)"):
-        open_session_file(folder, FACTS)
+    refused(folder, r"belongs to user 12345, not to you \(user 0\)")
 
 
 @POSIX
-def test_a_link_put_in_place_of_the_copy_while_the_session_is_open_is_not_followed(tmp_path: Path) -> None:
-    folder, target = tmp_path / "s", tmp_path / "target"
+def test_a_link_put_in_place_of_the_copy_while_the_session_is_open_is_not_followed(
+    tmp_path: Path, folder: Path
+) -> None:
+    target = tmp_path / "target"
     session_file = open_session_file(folder, FACTS)
-    clicked(session_file, *range(10))
+    history = keep(session_file, *map(place, range(10)))
     target.write_bytes(b"precious\n")
     (folder / COPY).unlink()
     (folder / COPY).symlink_to(target)
-    session_file.append(
-        step := ClickPlaced(TIMES[20], (1.0, 1.0), "clicked"), advance(session_file.restored.history, step, FACTS)
-    )
+    session_file.append(place(20), advance(history, place(20), FACTS))
     assert session_file.close().note.startswith("all clicks are saved in ")
     assert target.read_bytes() == b"precious\n"
 
 
 @pytest.mark.parametrize("change", ["cut", "longer", "replaced"])
-def test_a_step_is_refused_when_another_program_changed_the_journal(tmp_path: Path, change: str) -> None:
-    folder = tmp_path / "s"
+def test_a_step_is_refused_when_another_program_changed_the_journal(folder: Path, change: str) -> None:
     session_file = open_session_file(folder, FACTS)
-    history = clicked(session_file, 1, 2, 3)
+    history = keep(session_file, *map(place, (1, 2, 3)))
     journal = folder / JOURNAL
     if change == "replaced":
         shutil.copy(journal, folder / "copy")
@@ -236,10 +166,9 @@ def test_a_step_is_refused_when_another_program_changed_the_journal(tmp_path: Pa
         with journal.open("r+b") as file:
             file.truncate(journal.stat().st_size + (1 if change == "longer" else -5))
     before = journal.read_bytes()
-    step = ClickPlaced(TIMES[4], (4.0, 1.0), "clicked")
     words = "deleted, moved or replaced" if change == "replaced" else "another program changed its length"
     with pytest.raises(SessionFileError, match=rf"was not made: .*{words}"):
-        session_file.append(step, advance(history, step, FACTS))
+        session_file.append(place(4), advance(history, place(4), FACTS))
     assert journal.read_bytes() == before
     left = session_file.close()
     assert "All clicks (3) are saved in" in left.note
@@ -247,10 +176,9 @@ def test_a_step_is_refused_when_another_program_changed_the_journal(tmp_path: Pa
     assert clicks_in(folder) == [1.0, 2.0, 3.0]
 
 
-def test_a_journal_changed_in_place_is_noticed_at_the_end(tmp_path: Path) -> None:
-    folder = tmp_path / "s"
+def test_a_journal_changed_in_place_is_noticed_at_the_end(folder: Path) -> None:
     session_file = open_session_file(folder, FACTS)
-    clicked(session_file, 1, 2, 3)
+    keep(session_file, *map(place, (1, 2, 3)))
     with (folder / JOURNAL).open("r+b") as file:
         file.seek(-40, os.SEEK_END)
         file.write(b"X")
@@ -263,20 +191,18 @@ def test_a_journal_changed_in_place_is_noticed_at_the_end(tmp_path: Path) -> Non
 @POSIX
 @pytest.mark.parametrize("how", ["deleted", "moved", "replaced"])
 def test_a_folder_that_went_away_is_written_to_the_users_folder_and_found_again(
-    tmp_path: Path, own_state_folder: Path, how: str
+    tmp_path: Path, folder: Path, own_state_folder: Path, how: str
 ) -> None:
-    folder = tmp_path / "s"
     session_file = open_session_file(folder, FACTS)
-    history = clicked(session_file, 1, 2, 3)
+    history = keep(session_file, *map(place, (1, 2, 3)))
     if how == "deleted":
         shutil.rmtree(folder)
     else:
         folder.rename(tmp_path / "moved")
     if how == "replaced":
         folder.mkdir()
-    step = ClickPlaced(TIMES[4], (4.0, 1.0), "clicked")
     with pytest.raises(SessionFileError, match="was not made"):
-        session_file.append(step, advance(history, step, FACTS))
+        session_file.append(place(4), advance(history, place(4), FACTS))
     left = session_file.close()
     assert left is session_file.close()
     assert left.kept_in == own_state_folder / "drive-rescued-1.cocalib-session"
@@ -285,36 +211,53 @@ def test_a_folder_that_went_away_is_written_to_the_users_folder_and_found_again(
     assert how == "replaced" or not folder.exists()
 
 
+def refuse(monkeypatch: pytest.MonkeyPatch, error: OSError, *names: str) -> None:
+    """Let calls of the system fail from now on."""
+
+    def fail(*_: object, **__: object) -> None:
+        raise error
+
+    for name in names:
+        monkeypatch.setattr(os, name, fail)
+
+
+FULL = OSError(errno.ENOSPC, "No space left on device")
+
+
 @POSIX
 def test_without_any_place_to_write_the_end_says_that_the_clicks_are_lost(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    session_file = open_session_file(tmp_path / "s", FACTS)
-    clicked(session_file, 1, 2)
-    shutil.rmtree(tmp_path / "s")
-
-    def full(*_: object, **__: object) -> None:
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    monkeypatch.setattr(os, "write", full)
+    session_file = open_session_file(folder, FACTS)
+    keep(session_file, place(1), place(2))
+    shutil.rmtree(folder)
+    refuse(monkeypatch, FULL, "write")
     left = session_file.close()
     assert left.kept_in is None
     assert left.note.startswith("the clicks (2) could not be saved: ")
     assert "No space left on device" in left.note
 
 
-def test_a_full_disk_at_the_end_costs_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    session_file = open_session_file(tmp_path / "s", FACTS)
-    clicked(session_file, 1, 2)
-
-    def full(*_: object, **__: object) -> None:
-        raise OSError(errno.ENOSPC, "No space left on device")
-
+def test_a_full_disk_at_the_end_costs_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    session_file = open_session_file(folder, FACTS)
+    keep(session_file, place(1), place(2))
     with monkeypatch.context() as patch:
-        patch.setattr(os, "write", full)
+        refuse(patch, FULL, "write")
         assert session_file.close().note.startswith("all clicks are saved in ")
-    assert [path.name for path in (tmp_path / "s").iterdir() if path.name.startswith(".")] == []
-    assert clicks_in(tmp_path / "s") == [1.0, 2.0]
+    assert set(files(folder)) == {JOURNAL, COPY}
+    assert clicks_in(folder) == [1.0, 2.0]
+
+
+def test_a_disk_that_cannot_even_truncate_stops_the_session(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    session_file = open_session_file(folder, FACTS)
+    history = keep(session_file, place(1))
+    with monkeypatch.context() as patch:
+        refuse(patch, OSError(errno.EIO, "Input/output error"), "fsync", "ftruncate")
+        with pytest.raises(SessionFileError, match="Input/output error"):
+            session_file.append(place(2), history)
+    with pytest.raises(SessionFileError, match="the session is closed"):
+        session_file.append(place(2), history)
+    session_file.close()
 
 
 DEEP = b"[" * 100_000 + b"]" * 100_000
@@ -325,14 +268,9 @@ DEEP = b"[" * 100_000 + b"]" * 100_000
 )
 @pytest.mark.parametrize("key", [b'"options":', b'"name":', b'"steps":', b'"pixel_px":', b'"recording":', b'"sec":'])
 def test_odd_content_with_right_checksums_is_refused_or_read_but_never_crashes(
-    tmp_path: Path, key: bytes, value: bytes
+    folder: Path, key: bytes, value: bytes
 ) -> None:
-    folder = tmp_path / "s"
-    session_file = open_session_file(folder, FACTS)
-    history = clicked(session_file, 1)
-    step = OptionsChanged.of(CalibrationOptions(method="paper"))
-    session_file.append(step, advance(history, step, FACTS))
-    session_file.close()
+    kept(folder, place(1), OptionsChanged.of(CalibrationOptions(method="paper")))
     with_value = re.compile(re.escape(key) + rb"[^,\]}]*")
     lines, previous = [], ""
     for line in lines_of(folder):
@@ -340,14 +278,12 @@ def test_odd_content_with_right_checksums_is_refused_or_read_but_never_crashes(
         previous = lines[-1].sum
     for name in (JOURNAL, COPY):
         (folder / name).write_bytes(bytes_of(lines))
-        before = {path.name: path.read_bytes() for path in folder.iterdir()}
+        before = files(folder)
         try:
             inspect_session(folder)
-            open_session_file(folder, FACTS).close()
+            restored(folder)
         except SessionFileError:
-            assert {
-                path.name: path.read_bytes() for path in folder.iterdir() if path.name != "lock"
-            }.items() <= before.items()
+            assert files(folder) == before
 
 
 class Killed(BaseException):
@@ -357,11 +293,10 @@ class Killed(BaseException):
 @pytest.mark.parametrize("survived", range(4))
 @pytest.mark.parametrize("kind", ["cut", "session-1"])
 def test_a_kill_between_the_writes_of_a_repair_loses_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, project_root: Path, kind: str, survived: int
+    folder: Path, monkeypatch: pytest.MonkeyPatch, project_root: Path, kind: str, survived: int
 ) -> None:
-    folder = tmp_path / "s"
     if kind == "cut":
-        closed_session(folder, 1, 2, 3)
+        kept(folder, *map(place, (1, 2, 3)))
         (folder / JOURNAL).write_bytes(lines_of(folder)[0] + b"\n")
         expected = [1.0, 2.0, 3.0]
     else:
@@ -383,21 +318,14 @@ def test_a_kill_between_the_writes_of_a_repair_loses_nothing(
 
 
 @POSIX
-def test_session_files_are_as_open_to_others_as_the_user_wants(tmp_path: Path) -> None:
+def test_session_files_are_as_open_to_others_as_the_user_wants(folder: Path) -> None:
     before = os.umask(0o077)
     try:
-        closed_session(tmp_path / "s", *range(10))
+        kept(folder, *map(place, range(10)))
     finally:
         os.umask(before)
-    modes = {path.name: stat.S_IMODE(path.stat().st_mode) for path in (tmp_path / "s").iterdir()}
+    modes = {path.name: stat.S_IMODE(path.stat().st_mode) for path in folder.iterdir()}
     assert modes == {"lock": 0o600, JOURNAL: 0o600, COPY: 0o600}
-
-
-def test_a_long_made_session_opens_as_it_was(tmp_path: Path) -> None:
-    made = made_session(40, tmp_path / "s")
-    session_file = open_session_file(tmp_path / "s", MADE_FACTS)
-    assert session_file.restored.history == made.histories[-1]
-    session_file.close()
 
 
 @pytest.mark.parametrize(
@@ -406,26 +334,19 @@ def test_a_long_made_session_opens_as_it_was(tmp_path: Path) -> None:
 )
 def test_a_journal_without_a_line_is_described_as_it_is(tmp_path: Path, content: bytes, why: str) -> None:
     (tmp_path / JOURNAL).write_bytes(content)
-    with pytest.raises(SessionFileError, match=re.escape(f"line 1 is damaged ({why})")):
-        open_session_file(tmp_path, FACTS)
-    assert (tmp_path / JOURNAL).read_bytes() == content
+    refused(tmp_path, re.escape(f"line 1 is damaged ({why})"))
 
 
 @POSIX
 def test_a_journal_that_can_no_longer_be_written_is_not_called_closed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    session_file = open_session_file(tmp_path, FACTS)
-    clicked(session_file, 1, 2)
-
-    def refused(*_: object) -> int:
-        raise PermissionError(errno.EPERM, "Operation not permitted")
-
+    session_file = open_session_file(folder, FACTS)
+    history = keep(session_file, place(1), place(2))
     with monkeypatch.context() as patch:
-        patch.setattr(os, "write", refused)
-        patch.setattr(os, "ftruncate", refused)
+        refuse(patch, PermissionError(errno.EPERM, "Operation not permitted"), "write", "ftruncate")
         with pytest.raises(SessionFileError, match="make the file writable again"):
-            clicked(session_file, 3)
+            session_file.append(place(3), advance(history, place(3), FACTS))
     closed = session_file.close()
     assert closed.clicks == 2
     assert closed.fault.endswith("it could no longer be written")
