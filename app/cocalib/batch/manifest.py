@@ -95,7 +95,7 @@ class SharedDocument(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     camera_position_sigma_m: float | None = None
     exports: tuple[str, ...] = ()
     topics: RecordingOptions = msgspec.field(default_factory=RecordingOptions)
-    options: dict[str, object] = msgspec.field(default_factory=dict)
+    options: dict[str, Any] = msgspec.field(default_factory=dict)
 
 
 class SessionDocument(SharedDocument, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -111,7 +111,7 @@ class SessionDocument(SharedDocument, frozen=True, forbid_unknown_fields=True, k
 class ManifestDocument(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A manifest: its sessions, each a SessionDocument, and what they share unless they say otherwise."""
 
-    session: tuple[dict[str, object], ...]
+    session: tuple[dict[str, Any], ...]
     defaults: SharedDocument = msgspec.field(default_factory=SharedDocument)
 
 
