@@ -1,5 +1,6 @@
 """Read a calibration in any known format, and make a calibration-1 file of it with what it rests on."""
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
@@ -20,7 +21,7 @@ from calib_core.interchange.calibration_file import (
 from calib_core.interchange.check.pair_residuals import CheckPairs
 from calib_core.interchange.check.report import CheckReport, check
 from calib_core.interchange.format import TRUTH_FORMAT, ImportedCalibration
-from calib_core.interchange.formats.registry import is_ours, reader_of, readers
+from calib_core.interchange.formats.registry import FORMATS, is_ours, reader_of, readers
 from calib_core.interchange.formats.statement import stated_origin
 from calib_core.interchange.syntax.content import Content, readings
 from calib_core.interchange.trees.frame_choice import WantedFrames
@@ -32,12 +33,12 @@ from calib_core.results import Calibration, DataWarning, Metrics
 
 _MAX_BYTES = 256 * 1024 * 1024
 _MAX_BESIDE_BYTES = 1024 * 1024
-_KNOWN = (
-    "known: calibration-1, static_transform_publisher in a command or launch file, URDF, Autoware, Apollo and "
-    "stamped transforms, tf_echo, Kalibr with T_cam_radar, OpenCV with R and T, KITTI, nuScenes, DriveWorks, Foxglove, "
-    "PJLab, direct_visual_lidar_calibration, easy_handeye, OpenLABEL, Scale, Segments.ai, Autoware.AI, TUM, COLMAP, mat, "
-    "npz, matrix"
+_ONLY_READ = (
+    "tf_echo, Foxglove, direct_visual_lidar_calibration, easy_handeye, OpenLABEL, "
+    "Scale, Segments.ai, Autoware.AI, TUM, npz"
 )
+_TITLES = ", ".join(re.split("[:,]", known.title)[0] for known in FORMATS if known.reads is not None)
+_KNOWN = f"known: {_TITLES}, {_ONLY_READ}"
 
 _OF_FOLDERS = ("calib_velo_to_cam.txt", "images.txt")  # of KITTI and COLMAP, read with the file beside it
 _OF_TREES = (
