@@ -226,7 +226,11 @@ def counted_returns(
         found_targets=len(np.unique(sightings.targets[wanted])),
         matched_targets=len(boxed),
         bearings=matches.bearings,
-        rule=_rule(isinstance(found, ReturnLabels), longest_gap_s(scans.times_ns) if max_gap_s is None else max_gap_s),
+        rule=_rule(
+            isinstance(found, ReturnLabels),
+            longest_gap_s(scans.times_ns) if max_gap_s is None else max_gap_s,
+            float(np.isnan(sides[of_return]).any(axis=1).mean()) if len(of_return) else 0.0,
+        ),
         source=boxes.source,
     )
 
@@ -253,7 +257,7 @@ def renamed_classes(boxes: Boxes, names: dict[str, str]) -> Boxes:
     return replace(boxes, frames=frames)
 
 
-def _rule(labelled: bool, gap_s: float) -> str:
+def _rule(labelled: bool, gap_s: float, boxless: float) -> str:
     in_time = (
         f"each annotated frame with the scan nearest to it by the recorded stamps, at most {1000.0 * gap_s:.3g} ms away"
     )
@@ -262,7 +266,9 @@ def _rule(labelled: bool, gap_s: float) -> str:
     return (
         f"{in_time}; returns of moving targets that the radar followed over three scans or more; each target has one box "
         "track over its life, chosen by bearing and time without the calibration; returns of targets in view without a box "
-        "count as outside"
+        f"count as outside, here {100.0 * boxless:.1f} % of the returns. Acc by the radar's own targets reads lower than by the "
+        "true origin of each return (simulated: three people 85 instead of 97 %, cars 94 instead of 96 %), here by up to these "
+        f"{100.0 * boxless:.1f} points, and by more where two objects were followed as one"
     )
 
 

@@ -162,6 +162,18 @@ def test_an_independent_script_finds_the_same_acc(angle_deg):
     assert abs(100.0 * ours.acc - theirs) < 0.1
 
 
+def test_own_targets_say_how_far_acc_may_read_lower_and_labels_do_not(crowd):
+    fewer = dataclasses.replace(
+        crowd.boxes, frames=tuple(dataclasses.replace(frame, boxes=frame.boxes[:1]) for frame in crowd.boxes)
+    )
+    figures = box_figures(TRUE_POSE, CAMERA, crowd.scans, fewer)
+    assert figures.returns is not None
+    boxless = np.isnan(figures.returns.boxes_px).any(axis=1).mean()
+    assert boxless > 0.1
+    assert figures.rule.count(f"{100.0 * boxless:.1f} ") == 2
+    assert "%" not in box_figures(AHEAD, PINHOLE, *by_hand()[:2], labels=by_hand()[2]).rule
+
+
 def test_which_returns_count_and_their_boxes_do_not_depend_on_the_calibration(crowd):
     targets = moving_targets(crowd.scans)
     figures = [
