@@ -1,127 +1,333 @@
 """Write docs/paper-experiments.md."""
+# ruff: noqa: E501 - a row of a Markdown table is one line
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
 
+import msgspec
 import numpy as np
 
-from benchmarks.paper.fit import AZIMUTHS_DEG, ELEVATIONS_DEG, Fitted
-from benchmarks.paper.limits import PAPER, Paper, figures_of, median_of, missed, order_kept, verdict_of
-from benchmarks.paper.measured import AccRow, Measured
-from benchmarks.paper.rows import Figures, Seed
-from benchmarks.paper.settings import BOARD_CORNERS, FIT_SEEDS, Settings
-from benchmarks.paper.text import TEXT
+from benchmarks.paper.fit import AZIMUTHS_DEG, CORNERS, ELEVATIONS_DEG, FITTED_ROWS, GROSS_M, Fit, Place
+from benchmarks.paper.judgement import CHOSEN_ROW, PAPER, Judged, agreeing, judged, verdict
+from benchmarks.paper.moving import ACC_OF_PAPER, MOVING, Acc, Assumption
+from benchmarks.paper.rows import MOST_GROSS, Gross, Seed
+from benchmarks.paper.settings import FIT_SEEDS, SEED_SETS, Settings, session
 
-__all__ = ["page"]
-
-_ENORMOUS = 1e6
-_NOT_AVAILABLE = "not available to us"
-_RANGE = ("PPM+D1", "PPM+D3", "PMM+D1", "R_PPM+T_m+D1", "R_I+T_c+D1")
+_FILE = Path(__file__).with_name("measured.json")
+_SHOWN = ("PPM+D1", "PMM+D1", "CCM+D2", "PPM+D2", "CCM+D1", "PPM+D1+T_m", "PMM+D1+T_c", "PPM+D3")
+_PLACES = 8
+_SINGULAR = 1e12
 
 
-def page(measured: Measured, settings: Settings, places: Sequence[Fitted], *, command: str) -> str:
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """What a run measured.
+
+    Attributes:
+        date: of the run.
+        sets: the rows of both sets of seeds.
+        others: what was changed, and the rows of a few seeds.
+        accs: of what moves, by preset.
+        assumptions: about cars, per seed.
+    """
+
+    date: str
+    sets: tuple[tuple[Seed, ...], tuple[Seed, ...]]
+    others: dict[str, tuple[Seed, ...]]
+    accs: dict[str, tuple[Acc, ...]]
+    assumptions: tuple[tuple[Assumption, ...], ...]
+
+
+def write_measured(measured: Measured, path: Path = _FILE) -> None:
+    """Write the figures of a run, a seed to a line, so that the page can be written again without measuring again."""
+    path.write_bytes(msgspec.json.encode(measured).replace(b'{"rows"', b'\n{"rows"') + b"\n")
+
+
+def read_measured(path: Path = _FILE) -> Measured:
+    """Read the figures of the last run."""
+    return msgspec.json.decode(path.read_bytes(), type=Measured)
+
+
+def table(measured: Measured) -> str:
+    """Return Table I: the paper's figures, ours of both sets of seeds, and the judgement of both."""
+    rows = [_table_row(name, measured.sets) for name in PAPER]
+    return "\n".join(["| row | paper: AED / CDSD | our AED | our CDSD | judgement |", "|---|---|---|---|---|", *rows])
+
+
+def page(measured: Measured, settings: Settings, fit: Fit, *, command: str) -> str:
     """Return the page in Markdown.
 
     Args:
         measured: the figures.
         settings: that they were made with.
-        places: of the fit, the best first.
+        fit: that the settings come from.
         command: that writes the page.
     """
-    seeds = measured.seeds
-    others = [name for name in seeds[0].rows if name not in PAPER]
-    return TEXT.format(
+    seeds = [seed for some in measured.sets for seed in some]
+    conditions = np.array([seed.conditions for seed in seeds if seed.conditions is not None])
+    outside = np.array([seed.rows["CCM+D1"].outside for seed in seeds if "CCM+D1" in seed.rows])
+    accs = measured.accs["cars-far"]
+    return _TEXT.format(
         date=measured.date,
         command=command,
-        count=len(seeds),
-        table="\n".join(_row(name, seeds) for name in PAPER),
-        order=order_kept(seeds),
-        missed=missed(seeds),
-        further="\n".join(_further_row(name, seeds) for name in others),
-        fitted=_fit_table(places),
-        best=_best(places),
-        highest_ratio=max(one.ratio_d2 for one in places),
-        fit_seeds=f"{FIT_SEEDS[0]} to {FIT_SEEDS[-1]}",
-        azimuths=", ".join(f"{one:g}" for one in AZIMUTHS_DEG),
-        elevations=", ".join(f"{one:g}" for one in ELEVATIONS_DEG),
+        count=len(measured.sets[0]),
+        first=_named(SEED_SETS[0]),
+        second=_named(SEED_SETS[1]),
+        table=table(measured),
+        same=agreeing(*measured.sets)[0],
+        same_range=agreeing(*measured.sets)[1],
+        problem=f"{np.median(conditions[:, 0]):,.0f}",
+        singular=_singular(conditions[:, 1]),
+        outside=f"{100 * np.median(outside):.0f} % ({100 * outside.min():.0f} to {100 * outside.max():.0f})",
+        gross=_gross_table(seeds),
         settings=settings,
-        board_corners=BOARD_CORNERS,
-        range_names=" | ".join(_RANGE),
-        range_dashes="---|" * (len(_RANGE) + 1),
-        ranges="\n".join(_range_row(what, some) for what, some in measured.ranges),
-        range_count=len(measured.ranges[0][1]),
-        acc_count=len(measured.accs[0].kept),
-        acc="\n".join(_acc_row(row) for row in measured.accs),
+        board_px=_board_px(settings),
         height_px=settings.width_px * 9 // 16,
-        not_available=_NOT_AVAILABLE,
+        fit_seeds=_named(FIT_SEEDS),
+        azimuths=_listed(AZIMUTHS_DEG),
+        elevations=_listed(ELEVATIONS_DEG),
+        corners=_listed(CORNERS),
+        distances=_listed(GROSS_M),
+        most_gross=MOST_GROSS,
+        fitted=_fit_table(fit.places, ("azimuth [deg]", "elevation [deg]", "corners"), FITTED_ROWS),
+        chosen=_fit_table(fit.gross, ("wrong pairs", "by [m]"), (CHOSEN_ROW,)),
+        places=len(fit.places),
+        other_names=" | ".join(_SHOWN),
+        other_dashes="---|" * (len(_SHOWN) + 1),
+        others="\n".join(_other_row(what, some) for what, some in measured.others.items()),
+        other_count=len(measured.others["nothing"]),
+        acc_count=len(accs),
+        acc="\n".join(_acc_row(name, what, measured.accs[name]) for name, what in MOVING.items()),
+        assumptions="\n".join(_assumption_rows(measured.assumptions)),
+        base=_percent([seed[0].before for seed in measured.assumptions]),
+        explained=_explained(measured.assumptions),
     )
 
 
-def _row(name: str, seeds: Sequence[Seed]) -> str:
-    figures = figures_of(name, seeds)
-    aed, cdsd = median_of(figures, "aed_px"), median_of(figures, "cdsd_px")
-    ours = [_spread(figures, "aed_px"), _spread(figures, "cdsd_px"), f"{aed / cdsd:.2f}"]
-    return f"| {name} | {_stated(PAPER[name])} | {' | '.join(ours)} | {verdict_of(name, figures)} |"
+def _board_px(settings: Settings) -> float:
+    stage = session("d2", SEED_SETS[0][0], settings).stage
+    pixels = stage.rig.camera.project(stage.rig.camera_from_world @ stage.scene.board_corners_m)
+    return float(np.linalg.norm(pixels[7] - pixels[0]))
 
 
-def _stated(stated: Paper) -> str:
-    if stated.ratio is not None:
-        return f"AED / CDSD {stated.ratio:.2f}; the two {_NOT_AVAILABLE}"
-    if stated.aed_px is None:
-        return _NOT_AVAILABLE
-    cdsd = _NOT_AVAILABLE if stated.cdsd_px is None else f"{stated.cdsd_px:.2f}"
-    return f"{stated.aed_px:.2f} / {cdsd}"
+def _table_row(name: str, sets: Sequence[Sequence[Seed]]) -> str:
+    aed, cdsd = PAPER[name]
+    both = [judged(name, seeds) for seeds in sets]
+    ours = ["<br>".join(_spread(one[i]) for one in both) for i in range(2)]
+    return f"| {name} | {aed:.2f} / {cdsd:.2f} | {ours[0]} | {ours[1]} | {verdict(name, sets)} |"
 
 
-def _further_row(name: str, seeds: Sequence[Seed]) -> str:
-    figures = figures_of(name, seeds)
-    outside = f"{100 * median_of(figures, 'outside'):.0f} %"
-    cells = [_spread(figures, "aed_px"), _spread(figures, "cdsd_px"), outside]
-    return f"| {name} | {' | '.join(cells)} |"
+def _spread(one: Judged) -> str:
+    return f"{_px(one.median_px)} ({_px(one.low_px)} to {_px(one.high_px)}), {one.judgement}"
 
 
-def _range_row(what: str, seeds: Sequence[Seed]) -> str:
-    medians = [median_of(figures_of(name, seeds), "aed_px") for name in _RANGE]
-    return f"| {what} | {' | '.join(f'{one:.1f}' if np.isfinite(one) else '-' for one in medians)} |"
+def _px(value: float) -> str:
+    return f"{value:,.0f}" if value >= 1000.0 else f"{value:.1f}"
 
 
-def _acc_row(row: AccRow) -> str:
-    cells = (_percent(values) for values in (row.kept, row.dropped, row.labelled, row.turned))
-    return f"| {row.what} | {row.paper} | {' | '.join(cells)} |"
+def _singular(conditions: np.ndarray) -> str:
+    share = float((conditions > _SINGULAR).mean())
+    return "in every seed" if share == 1.0 else f"in {100 * share:.0f} % of the seeds"
 
 
-def _fit_table(places: Sequence[Fitted]) -> str:
-    names = "azimuth [deg] | elevation [deg] | AED of D1 [px] | CDSD of D1 [px] | AED / CDSD of D2 | mismatch"
+def _gross_table(seeds: Sequence[Seed]) -> str:
     rows = [
-        f"| {one.constant_azimuth_deg:g} | {one.constant_elevation_deg:g} | {one.aed_d1_px:.2f} | "
-        f"{one.cdsd_d1_px:.2f} | {one.ratio_d2:.2f} | {one.mismatch:.3f} |"
-        for one in places
+        "| wrong pairs | paper's: AED / CDSD [px] | pose off | default's: AED / CDSD [px] | pose off | pairs that it rejects |",
+        "|---|---|---|---|---|---|",
     ]
-    return "\n".join([f"| {names} |\n{'|---' * 6}|", *rows])
+    for count in range(MOST_GROSS + 1):
+        paper, default = (
+            [one for seed in seeds for one in seed.gross if (one.count, one.method) == (count, method)]
+            for method in ("paper", "default")
+        )
+        rejected = np.median([one.pairs - one.agreeing for one in default])
+        pairs = int(np.median([one.pairs for one in default]))
+        cells = [*_gross_cells(paper), *_gross_cells(default), f"{rejected:.0f}"]
+        rows.append(f"| {count} of {pairs} | {' | '.join(cells)} |")
+    return "\n".join(rows)
 
 
-def _best(places: Sequence[Fitted]) -> str:
-    """Name the best place, and say where in the grid it is."""
-    best = places[0]
-    inside = (
-        AZIMUTHS_DEG[0] < best.constant_azimuth_deg < AZIMUTHS_DEG[-1]
-        and ELEVATIONS_DEG[0] < best.constant_elevation_deg < ELEVATIONS_DEG[-1]
+def _gross_cells(found: Sequence[Gross]) -> tuple[str, str]:
+    aed, cdsd, rotation, position = np.median(
+        [(one.figures.aed_px, one.figures.cdsd_px, one.rotation_deg, one.position_m) for one in found], axis=0
     )
-    place = f"azimuth {best.constant_azimuth_deg:g} deg, elevation {best.constant_elevation_deg:g} deg"
-    return f"{place}, which is {'inside' if inside else 'at the edge of'} the grid"
+    return f"{aed:.1f} / {cdsd:.1f}", f"{rotation:.1f} deg, {position:.2f} m"
 
 
-def _spread(figures: Sequence[Figures], name: str) -> str:
-    values = np.array([getattr(one, name) for one in figures])
-    values = values[np.isfinite(values)]
-    if not len(values):
-        return "-"
-    middle, low, high = (
-        f"{one:.1f}" if one < _ENORMOUS else f"above {_ENORMOUS:.0f}"
-        for one in (np.median(values), values.min(), values.max())
+def _fit_table(places: Sequence[Place], names: Sequence[str], rows: Sequence[str]) -> str:
+    head = [*names, *(f"{row}: AED / CDSD" for row in rows), "mismatch"]
+    lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
+    for place in places[:_PLACES]:
+        figures = [f"{place.rows[row][0]:.2f} / {place.rows[row][1]:.2f}" for row in rows]
+        lines.append(f"| {' | '.join([*(f'{one:g}' for one in place.settings), *figures, f'{place.mismatch:.3f}'])} |")
+    return "\n".join(lines)
+
+
+def _other_row(what: str, seeds: Sequence[Seed]) -> str:
+    cells = []
+    for name in _SHOWN:
+        values = [seed.rows[name].aed_px for seed in seeds if name in seed.rows]
+        cells.append(_px(float(np.median(values))) if values else "-")
+    return f"| {what} | {' | '.join(cells)} |"
+
+
+def _acc_row(name: str, what: str, seeds: Sequence[Acc]) -> str:
+    columns = ("dropped", "ppm", "labelled", "pmm", "turned")
+    cells = [_percent([getattr(one, column) for one in seeds]) for column in columns]
+    return f"| {what} | {ACC_OF_PAPER.get(name, '')} | {' | '.join(cells)} |"
+
+
+def _assumption_rows(seeds: Sequence[Sequence[Assumption]]) -> list[str]:
+    rows = []
+    for one in zip(*seeds, strict=True):
+        change = float(np.median([100 * (seed.after - seed.before) for seed in one]))
+        rows.append(f"| {one[0].what} | {_percent([seed.after for seed in one])} | {change:+.0f} |")
+    return rows
+
+
+def _explained(seeds: Sequence[Sequence[Assumption]]) -> str:
+    medians = {one[0].what: float(np.median([seed.after for seed in one])) for one in zip(*seeds, strict=True)}
+    enough = [what.split(":")[0] for what, value in medians.items() if value <= 0.66]
+    if not enough:
+        return "None of the six alone brings Acc down to the paper's 66 %: it stays unexplained."
+    return (
+        f"Alone, {' and '.join(enough)} would bring Acc down to the paper's 66 % or below; which of them held there, the paper "
+        "does not say, so its figure stays unexplained."
     )
-    return f"{middle} ({low} to {high})"
 
 
 def _percent(values: Sequence[float]) -> str:
     good = [100.0 * one for one in values if np.isfinite(one)]
     return f"{np.median(good):.0f} % ({min(good):.0f} to {max(good):.0f})" if good else "-"
+
+
+def _named(seeds: Sequence[int]) -> str:
+    return f"{seeds[0]} to {seeds[-1]}"
+
+
+def _listed(values: Sequence[float]) -> str:
+    return ", ".join(f"{one:g}" for one in values)
+
+
+_TEXT = """# The paper's experiments
+
+Written by `{command}`, measured on {date}; do not edit. Everything is simulated: the authors' recordings are not published. Each row is a
+session of scans and clicks that went through the whole path: windows around the clicks, radar positions, pose. `tests/paper/test_experiments.py`
+shows that recordings with pictures, read back from bags and solved by `cocalib solve`, give the same, and an independent script in
+`tests/paper/test_independent.py` computes AED, CDSD and CCM from the paper's formulas alone.
+
+PPM is the paper's method ([line by line](paper.md), `--method paper`), PMM the mounting, CCM the checkerboard (both in
+`calib_core/paper/other_methods.py`). T_m is the measured translation, T_c that of PPM. D1 is a rooftop, D2 a checkerboard with the reflector
+on its corners, D3 an aisle with a larger reflector. DR+D3 is the same recording and radar with a second camera on another rig.
+
+## Table I
+
+Two sets of {count} seeds, {first} and {second}, each seed another rig: median and the range that holds 90 % of the seeds, the first set above the second. AED and
+CDSD in px.
+
+{table}
+
+A figure is *reproduced* if the paper's value lies in our range and our median is within 25 % of it; *compatible* if it lies in our range, but that range is
+wider than a factor of 2; *order of magnitude* if it is wider than a factor of 10. The two sets give the same judgement of {same} of 18 figures, and
+agree in {same_range} of 18 on whether our range holds the paper's value: where they differ, a figure is near a limit of the rule.
+
+PPM+D1, PPM+D2 and CCM+D2 were fitted, so that they agree is no evidence. PMM+D1 and PMM+D1+T_c follow from an assumed mounting error, drawn for each seed; that
+is why they are ranges. PPM+DR+D3 follows from gross errors that were chosen for it. The predictions are PPM+D1+T_m, CCM+D1 and PPM+D3.
+
+CDSD of PPM+D3 is too small: distances of errors that are Gaussian, independent and the same in all directions have an AED of 1.91 times their
+CDSD. The paper's rows have 1.63 (PPM+D1), 1.35 (PPM+D3) and 2.65 (PPM+D2). The smaller ratios suggest rare large errors, the larger one an error that the points share; our simulation has
+neither.
+
+### CCM
+The camera knows where the corners of the board are, so CCM solves P_c = [R | t] P_r for twelve numbers by linear least squares; no rotation is taken. The
+condition number of that problem is {problem} (median). The corners lie in a plane, so the matrix maps all of space into that plane: its three by three part is singular
+but for rounding (condition number above 1e12 {singular}). On the board that does not show. On D1 it puts {outside} of the points outside the picture;
+in the paper all are.
+
+### The other rig
+The paper says that several projected points are far off. What went wrong there it does not say; gross errors are our assumption: some radar positions are {settings.gross_m:g} m off,
+in a random horizontal direction. Medians over both sets, AED and CDSD over all pairs, the wrong ones included:
+
+{gross}
+
+The row of the table has {settings.gross_pairs} wrong pairs. The default method is solved on the same clicks. Its AED and CDSD count the
+wrong pairs too, and are large because its pose is not moved by them.
+
+## The fit
+
+Three numbers were fitted, on PPM+D1, PPM+D2 and CCM+D2 alone: the standard deviations of the constant errors of azimuth and
+elevation, which a placement keeps as long as the reflector stands there, and the number of corners of the board that the reflector was put on.
+`python -m benchmarks.paper --fit` searches the grid of azimuth {azimuths} deg, elevation {elevations} deg and {corners} corners on seeds {fit_seeds}, which the
+table does not use, and writes `benchmarks/paper/fit.json`. The mismatch is the sum of squared logarithms of our AED and CDSD over the paper's. The best of {places} places:
+
+{fitted}
+
+With the best of them, 1 to {most_gross} wrong pairs and errors of {distances} m were then tried for PPM+DR+D3. This is no fit of a setting, but the choice of an assumption for one row:
+
+{chosen}
+
+## What the paper does not say
+
+These are assumptions, the same for all rows:
+
+| assumption | value | reason | what depends on it |
+|---|---|---|---|
+| constant errors | azimuth {settings.constant_azimuth_deg:g} deg, elevation {settings.constant_elevation_deg:g} deg | fitted, see above | PPM, CCM |
+| board | {settings.board_corners} of 8 x 5 corners 0.30 m apart, 6.5 m away: {board_px:.0f} px between the outermost columns | the number was fitted; size and range are the preset's. The paper does not say which board was used; that of its intrinsics, 9 x 6 squares of 22.14 mm, is 0.2 m wide | CCM, PPM+D2 |
+| picture | {settings.width_px} x {height_px} px, 75 deg wide | that of our other studies. The intrinsics in the authors' published script (554 px, centre at 299, 265) are of a picture of about 640 x 480 | PMM; not PPM, where errors in px are what is fitted |
+| mounting error | {settings.mounting_error_deg:g} deg per axis, and 1 cm per axis off the tape | that of our other studies | PMM |
+| placements | {settings.placements} on the ground | none: chosen instead of 20 after a first look at the rows of an earlier version | PPM+D1+T_m |
+| `outshone_share` | {settings.outshone_share:g} of the constant errors' variance | the middle of 0 to 1: this share is taken to come from clutter below the reflector, which a larger one outshines. Chosen after a first look at D3 in an earlier version | PPM+D3 |
+| larger reflector | edges of 0.30 m instead of 0.16 m | the preset's | PPM+D3 |
+| other rig | the camera 0.9 m to the left of the radar, 0.4 m behind and 0.25 m above it | the preset's | PPM+DR+D3 |
+| gross errors | none but in DR+D3: {settings.gross_pairs} of {settings.placements} pairs, {settings.gross_m:g} m | chosen for the row | PPM+DR+D3 |
+| RANSAC threshold | {settings.ransac_threshold_px:g} px | OpenCV's default; the paper prints none | PPM |
+| clicks | {settings.click_sigma_px:g} px, one per placement | the preset's | little |
+
+Azimuths are interpolated. There is nobody in the scene, and nothing echoes but the reflector, except in the aisle. What
+other choices give, median AED in px over the first {other_count} seeds, without fitting again; compare with the first line, not with
+Table I:
+
+| changed | {other_names} |
+|{other_dashes}
+{others}
+
+## Moving people and cars
+
+PPM+D1's calibration, for the robot PPM+DR+D3's, judged by the boxes of what moves, with the same rig, on one minute each, by the rule of `cocalib
+evaluate`. The boxes are true. Which returns belong to a target is decided by the radar's own targets, as on a real
+recording, or by the simulation's labels. The paper's authors drop frames of 0 %, so their figure compares with the first of our columns. Median and range
+over {acc_count} seeds.
+
+| what moves | paper | Acc, frames of 0 % dropped | kept | by labels | PMM, kept | PPM turned by 10 deg |
+|---|---|---|---|---|---|---|
+{acc}
+
+The paper's 66 % for cars is below ours. Six assumptions, one changed at a time, of cars at 20 to 60 m; Acc by labels, frames of 0 % kept, {base} before the change:
+
+| changed | Acc | points |
+|---|---|---|
+{assumptions}
+
+{explained}
+Our boxes are true, the paper's come from a detector.
+
+Acc is not accuracy: it hardly notices an error that keeps the returns inside their boxes. Cars at 5 to 20 m cover so much
+of the picture that even a calibration turned by 10 deg keeps a good part of the returns inside.
+
+## Figures
+
+All panels of the paper's Figs. 2 to 6, of the first seed of the table, simulated. Fig. 5 shows the frame with the most
+returns by labels, (D) of those beyond 40 m; Fig. 6 goes by the radar's own targets.
+
+![Fig. 2, simulated: D1 by PPM and by PMM](pictures/paper/fig-2.svg)
+
+![Fig. 3, simulated: D2 by PPM and by CCM](pictures/paper/fig-3.svg)
+
+![Fig. 4, simulated: the aisle with the camera on the same and on another rig](pictures/paper/fig-4.svg)
+
+![Fig. 5, simulated: people, robot car, cars and a far car, by PPM and by PMM](pictures/paper/fig-5.svg)
+
+![Fig. 6, simulated: histograms of Acc](pictures/paper/fig-6.svg)
+"""

@@ -1,21 +1,23 @@
-"""The eight rows of Table I for one seed."""
+"""The nine rows of Table I for one seed."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.paper.settings import Dataset, Settings, pmm_options, ppm_options, session
+from benchmarks.paper.settings import Dataset, Settings, ppm_options, session
+from calib_core.arrays import Points2, Points3
 from calib_core.association.pairing import pair_clicks
-from calib_core.calibration import calibrate
-from calib_core.measurements import Unsolvable
-from calib_core.paper.other_methods import calibrate_by_mounting, judged_again, swapped
+from calib_core.calibration import calibrate, calibrate_pairs
+from calib_core.geometry import RigidTransform, rotation_log
+from calib_core.measurements import Pair, Unsolvable
+from calib_core.options import CalibrationOptions, CameraPositionPrior, MountingOptions, SolvingOptions
+from calib_core.paper.other_methods import CheckerboardMatrix, calibrate_by_mounting, register_on_checkerboard, swapped
 from calib_core.results import Calibration
+from calib_core.results.metrics import aed, cdsd, distances
 from calib_core.synthetic import SimulatedScans
 
-__all__ = ["DATASETS", "Figures", "Seed", "by_mounting", "calibrated", "measure"]
-
-DATASETS: tuple[Dataset, ...] = ("d1", "d2", "d3", "dr-a", "dr-b")
+MOST_GROSS = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +25,7 @@ class Figures:
     """One row for one seed.
 
     Attributes:
-        aed_px: NaN if there is no pose, or none of the points is before the camera.
+        aed_px: over all pairs.
         cdsd_px: likewise.
         outside: share of the clicked radar positions that the pose puts outside the picture.
     """
@@ -34,46 +36,189 @@ class Figures:
 
 
 @dataclass(frozen=True, slots=True)
+class Gross:
+    """DR+D3 with some grossly wrong radar positions, by one method.
+
+    Attributes:
+        count: of wrong pairs.
+        method: "paper" or "default".
+        figures: over all pairs, the wrong ones included.
+        rotation_deg: of the pose from the true one.
+        position_m: of the camera from its true position.
+        agreeing: pairs that the method counts as inliers.
+        pairs: all of them.
+    """
+
+    count: int
+    method: str
+    figures: Figures
+    rotation_deg: float
+    position_m: float
+    agreeing: int
+    pairs: int
+
+
+@dataclass(frozen=True, slots=True)
 class Seed:
-    """All rows for one seed: by name, and D1's pose judged on D2 and D3."""
+    """All that one seed gives.
 
-    rows: Mapping[str, Figures]
+    Attributes:
+        rows: by the names of the paper's table; without a row where its method found no pose.
+        conditions: of CCM: of its least-squares problem, and of the three by three numbers that stand for the rotation.
+        gross: DR+D3 without wrong pairs and with 1 to 4, by both methods.
+    """
 
-
-def calibrated(dataset: Dataset, seed: int, settings: Settings) -> tuple[SimulatedScans, Calibration | Unsolvable]:
-    """Simulate a data set and calibrate it by the paper's method."""
-    simulated = session(dataset, seed, settings)
-    return simulated, calibrate(simulated.clicks, simulated.scans, simulated.camera, ppm_options(settings))
-
-
-def by_mounting(simulated: SimulatedScans) -> Calibration:
-    """Return the pose of the mounting (PMM), judged on the clicks of a simulated data set."""
-    options = pmm_options(simulated)
-    pairing = pair_clicks(simulated.clicks, simulated.scans, options)
-    return calibrate_by_mounting(pairing.pairs, simulated.camera, options, unpaired=pairing.unpaired)
+    rows: dict[str, Figures]
+    conditions: tuple[float, float] | None = None
+    gross: tuple[Gross, ...] = ()
 
 
-def measure(seed: int, settings: Settings, datasets: Sequence[Dataset] = DATASETS) -> Seed:
-    """Simulate data sets, D1 among them, and compute the rows that they give: of all of them, the eight and some more."""
-    found = {dataset: calibrated(dataset, seed, settings) for dataset in datasets}
-    rows = {f"PPM+{dataset.upper()}": _figures(outcome) for dataset, (_, outcome) in found.items()}
-    first, by_points = found["d1"]
-    mounted = by_mounting(first)
-    rows["PMM+D1"] = _figures(mounted)
-    if isinstance(by_points, Calibration):
-        rows["R_PPM+T_m+D1"] = _figures(swapped(by_points, mounted))
-        rows["R_I+T_c+D1"] = _figures(swapped(mounted, by_points))
-        for dataset in ("d2", "d3"):
-            _, other = found.get(dataset, (None, None))
-            if isinstance(other, Calibration):
-                again = judged_again(other, by_points.camera_from_radar)
-                rows[f"D1's pose on {dataset.upper()}"] = _figures(again)
-    return Seed(rows)
+def calibrated(simulated: SimulatedScans, settings: Settings) -> Calibration | Unsolvable:
+    """Calibrate a simulated data set by the paper's method."""
+    return calibrate(simulated.clicks, simulated.scans, simulated.camera, ppm_options(settings))
 
 
-def _figures(outcome: Calibration | Unsolvable) -> Figures:
-    if isinstance(outcome, Unsolvable):
-        return Figures(float("nan"), float("nan"), float("nan"))
-    used = np.array([pair.projected_px for pair in outcome.pairs if not pair.excluded])
-    outside = 1.0 - float(outcome.camera.in_image(used).mean())
-    return Figures(outcome.metrics.aed_px, outcome.metrics.cdsd_px, outside)
+def by_mounting(simulated: SimulatedScans, pairs: Sequence[Pair] = ()) -> Calibration:
+    """Return the pose of the mounting (PMM): nominal rotation and measured offset, judged on pairs."""
+    return _mounted(simulated, pairs, simulated.stage.options.rig.camera_offset_m)
+
+
+def by_mounting_of_other(other: SimulatedScans) -> Calibration:
+    """Return what a tape measure and a protractor say of the camera on the other rig."""
+    nominal = other.stage.options.other_camera
+    return _mounted(other, (), nominal.offset_m, nominal.yaw_deg)
+
+
+def _mounted(
+    simulated: SimulatedScans, pairs: Sequence[Pair], offset_m: tuple[float, float, float], yaw_deg: float = 0.0
+) -> Calibration:
+    options = CalibrationOptions(
+        method="paper",
+        mounting=MountingOptions(yaw_deg=yaw_deg),
+        solving=SolvingOptions(camera_position=CameraPositionPrior(offset_m)),
+    )
+    return calibrate_by_mounting(pairs, simulated.camera, options)
+
+
+def by_checkerboard(simulated: SimulatedScans, pairs: Sequence[Pair]) -> CheckerboardMatrix:
+    """Return CCM's matrix from D2: of each pair, the corner nearest to the click, which the camera knows exactly."""
+    board = simulated.stage.scene.board
+    assert board is not None, "D2 has a checkerboard"
+    corners_m = simulated.stage.rig.camera_from_world @ board.corners_m
+    corners_px = simulated.camera.project(corners_m)
+    _, pixels_px = points_and_pixels(pairs)
+    nearest = np.linalg.norm(corners_px[None] - pixels_px[:, None], axis=2).argmin(axis=1)
+    return register_on_checkerboard(points_and_pixels(pairs)[0], corners_m[nearest])
+
+
+def measured_pairs(calibration: Calibration) -> list[Pair]:
+    """Return the pairs that a calibration was made of."""
+    return [one.measured for one in calibration.pairs if one.measured is not None]
+
+
+def points_and_pixels(pairs: Sequence[Pair]) -> tuple[Points3, Points2]:
+    """Return the most plausible radar position and the click of each pair."""
+    points = np.array([pair.candidates[0].position_radar_m for pair in pairs])
+    return points, np.array([pair.pixel_px for pair in pairs])
+
+
+def measure(seed: int, settings: Settings, datasets: Sequence[Dataset] = ("d1", "d2", "d3")) -> Seed:
+    """Simulate data sets, D1 among them, and compute the rows that they give."""
+    found = {dataset: session(dataset, seed, settings) for dataset in datasets}
+    solved = {dataset: calibrated(simulated, settings) for dataset, simulated in found.items()}
+    rows = {
+        f"PPM+{dataset.upper()}": figures_of(one) for dataset, one in solved.items() if isinstance(one, Calibration)
+    }
+    conditions, first, second = None, solved["d1"], solved.get("d2")
+    if isinstance(first, Calibration):
+        mounted = by_mounting(found["d1"], measured_pairs(first))
+        rows["PMM+D1"] = figures_of(mounted)
+        rows["PPM+D1+T_m"] = figures_of(swapped(first, mounted))
+        rows["PMM+D1+T_c"] = figures_of(swapped(mounted, first))
+        if isinstance(second, Calibration):
+            matrix = by_checkerboard(found["d2"], measured_pairs(second))
+            conditions = matrix.problem_condition, matrix.condition
+            rows["CCM+D2"] = matrix_figures(matrix, second)
+            rows["CCM+D1"] = matrix_figures(matrix, first)
+    gross: tuple[Gross, ...] = ()
+    if settings.gross_pairs and "d3" in found:
+        gross = gross_errors(found["d3"], settings)
+        for one in gross:
+            if (one.count, one.method) == (settings.gross_pairs, "paper"):
+                rows["PPM+DR+D3"] = one.figures
+    return Seed(rows, conditions, gross)
+
+
+def gross_errors(simulated: SimulatedScans, settings: Settings) -> tuple[Gross, ...]:
+    """Solve DR+D3, the clicks in the second camera's pictures, with 0 to 4 grossly wrong radar positions, by both methods."""
+    other = simulated.other_camera
+    assert other is not None, "D3 has a second camera"
+    found = []
+    for options in (ppm_options(settings), CalibrationOptions()):
+        for count in range(MOST_GROSS + 1):
+            outcome = with_gross_errors(other, settings, count, options)
+            if isinstance(outcome, Calibration):
+                found.append(_gross(outcome, other, count))
+    return tuple(found)
+
+
+def with_gross_errors(
+    other: SimulatedScans, settings: Settings, count: int, options: CalibrationOptions
+) -> Calibration | Unsolvable:
+    """Calibrate with some radar positions displaced by a fixed distance in random horizontal directions."""
+    if options.method == "paper":
+        pairs = measured_pairs(calibrate(other.clicks, other.scans, other.camera, options).unwrap())
+    else:
+        pairs = list(pair_clicks(other.clicks, other.scans, options).pairs)
+    return calibrate_pairs(displaced(pairs, count, settings.gross_m, other.stage.options.seed), other.camera, options)
+
+
+def displaced(pairs: Sequence[Pair], count: int, by_m: float, seed: int) -> list[Pair]:
+    """Displace the radar positions of some pairs; the same clicks and directions whatever the method made of the scans."""
+    rng = np.random.default_rng([seed, 28])
+    order = sorted((pair.id for pair in pairs), key=lambda name: (len(name), name))
+    wrong = [order[i] for i in rng.permutation(len(order))[:count]]
+    turns = dict(zip(wrong, rng.uniform(0.0, 2.0 * np.pi, MOST_GROSS), strict=False))
+    return [pair if pair.id not in turns else _moved(pair, by_m, turns[pair.id]) for pair in pairs]
+
+
+def _moved(pair: Pair, by_m: float, turn_rad: float) -> Pair:
+    shift = by_m * np.array([abs(np.cos(turn_rad)), np.sin(turn_rad), 0.0])  # never behind the radar
+    candidates = tuple(replace(one, position_radar_m=one.position_radar_m + shift) for one in pair.candidates)
+    return replace(pair, candidates=candidates)
+
+
+def _gross(outcome: Calibration, other: SimulatedScans, count: int) -> Gross:
+    true = other.camera_from_radar
+    off = outcome.camera_from_radar @ true.inverse()
+    return Gross(
+        count,
+        outcome.options.method,
+        figures_of(outcome),
+        float(np.rad2deg(np.linalg.norm(rotation_log(off.rotation)))),
+        float(np.linalg.norm(_centre(outcome.camera_from_radar) - _centre(true))),
+        sum(pair.inlier for pair in outcome.pairs),
+        len(outcome.pairs),
+    )
+
+
+def _centre(camera_from_radar: RigidTransform) -> np.ndarray:
+    return camera_from_radar.inverse().translation_m
+
+
+def figures_of(outcome: Calibration) -> Figures:
+    """Return AED and CDSD over all pairs, and the share outside the picture."""
+    projected = np.array([pair.projected_px for pair in outcome.pairs])
+    return _figures(projected, np.array([pair.pixel_px for pair in outcome.pairs]), outcome)
+
+
+def matrix_figures(matrix: CheckerboardMatrix, judged_on: Calibration) -> Figures:
+    """Return the figures of CCM's matrix on the pairs of a calibration."""
+    points, pixels = points_and_pixels(measured_pairs(judged_on))
+    return _figures(matrix.project(points, judged_on.camera), pixels, judged_on)
+
+
+def _figures(projected_px: Points2, pixels_px: Points2, of: Calibration) -> Figures:
+    lengths = distances(projected_px, pixels_px)
+    lengths = lengths[np.isfinite(lengths)]
+    return Figures(aed(lengths), cdsd(lengths), 1.0 - float(of.camera.in_image(projected_px).mean()))

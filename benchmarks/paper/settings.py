@@ -4,61 +4,53 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
-from calib_core.options import CalibrationOptions, CameraPositionPrior, PaperOptions, SolvingOptions
+from calib_core.options import CalibrationOptions, PaperOptions
 from calib_core.synthetic import PRESETS, PresetName, SimulatedScans, SimulationOptions, simulate_scans
 
-__all__ = [
-    "FITTED",
-    "FIT_SEEDS",
-    "SEEDS",
-    "Dataset",
-    "Settings",
-    "pmm_options",
-    "ppm_options",
-    "session",
-]
-
-Dataset: TypeAlias = Literal["d1", "d2", "d3", "dr-a", "dr-b"]
-SEEDS: Sequence[int] = range(1, 21)
-FIT_SEEDS: Sequence[int] = range(101, 105)
-"""Of the fit; none of the table's."""
-
-BOARD_CORNERS = 20
-"""Placements of D2."""
+Dataset: TypeAlias = Literal["d1", "d2", "d3"]
+SEED_SETS: Sequence[Sequence[int]] = (range(301, 321), range(321, 341))
+"""Of the table: two sets that nothing was fitted on, and that were not looked at before the settings were final."""
+FIT_SEEDS: Sequence[int] = range(101, 107)
 _USUAL_EDGE_M = SimulationOptions().reflector_edge_m
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What the paper does not say, or is not available to us.
+    """What the paper does not say.
 
     Attributes:
         constant_azimuth_deg: standard deviation of the azimuth error that a placement keeps [deg]; fitted.
         constant_elevation_deg: the same for the elevation [deg]; fitted.
+        board_corners: placements of D2, each at another corner of the checkerboard; fitted.
+        gross_pairs: pairs of DR+D3 whose radar position is grossly wrong; chosen for that row.
+        gross_m: by how much, in a random horizontal direction [m]; chosen for that row.
         width_px: of the pictures, which are 16 to 9.
         mounting_error_deg: standard deviation of the true rotation about the nominal one, per axis [deg].
-        placements: of the reflector on the ground, in each data set.
+        placements: of the reflector on the ground, in D1 and D3.
         outshone_share: share of those errors' variance that comes from clutter below the reflector: a larger reflector,
             whose echo grows with the fourth power of its edge, outshines it. The rest is multipath, which grows with it.
+        click_sigma_px: standard deviation of a click, per axis [px].
         ransac_threshold_px: of Algorithm 1.
     """
 
     constant_azimuth_deg: float
     constant_elevation_deg: float
+    board_corners: int
+    gross_pairs: int = 0
+    gross_m: float = 0.0
     width_px: int = 1920
     mounting_error_deg: float = 3.0
     placements: int = 40
     outshone_share: float = 0.5
+    click_sigma_px: float = 0.7
     ransac_threshold_px: float = 8.0
 
 
-FITTED = Settings(constant_azimuth_deg=0.6, constant_elevation_deg=0.4)
-"""The best place of the grid that `python -m benchmarks.paper --fit` searches, on PPM+D1 and PPM+D2 alone: see fit.json."""
+FITTED = Settings(constant_azimuth_deg=0.7, constant_elevation_deg=0.4, board_corners=12, gross_pairs=3, gross_m=4.0)
+"""What `python -m benchmarks.paper --fit` finds best: see fit.json."""
 
 
-def options_of(
-    dataset: Dataset, seed: int, settings: Settings, board_corners: int = BOARD_CORNERS
-) -> SimulationOptions:
+def options_of(dataset: Dataset, seed: int, settings: Settings) -> SimulationOptions:
     """Return what to simulate: the preset of the data set under the settings, with nobody in the scene.
 
     Azimuths are interpolated. The rig depends on the seed and the preset's mounting only, so D1, D2 and D3 share it. In D2 the
@@ -68,12 +60,25 @@ def options_of(
     options = PRESETS[preset]
     weaker = (_USUAL_EDGE_M / options.reflector_edge_m) ** 4
     share = (1.0 - settings.outshone_share + settings.outshone_share * weaker) ** 0.5
+    on_board = dataset == "d2"
+    return replace(
+        under(options, seed, settings, share),
+        placements=0 if on_board else settings.placements,
+        board_corners=settings.board_corners if on_board else 0,
+        person=False,
+        person_leaves=False,
+        dwell_s=4.0,
+        radar_rate_hz=5.0,
+    )
+
+
+def under(options: SimulationOptions, seed: int, settings: Settings, share: float = 1.0) -> SimulationOptions:
+    """Return options with the sensors of the settings; `share` scales the constant errors."""
     defects = replace(
         options.defects,
         constant_azimuth_deg=share * settings.constant_azimuth_deg,
         constant_elevation_deg=share * settings.constant_elevation_deg,
     )
-    on_board = board_corners if dataset == "d2" else 0
     return replace(
         options,
         seed=seed,
@@ -82,26 +87,15 @@ def options_of(
         angle_bins=False,
         width_px=settings.width_px,
         height_px=settings.width_px * 9 // 16,
-        placements=0 if dataset == "d2" else settings.placements,
-        board_corners=on_board,
-        person=False,
-        person_leaves=False,
-        dwell_s=4.0,
-        radar_rate_hz=5.0,
+        click_sigma_px=settings.click_sigma_px,
     )
 
 
-def session(dataset: Dataset, seed: int, settings: Settings, board_corners: int = BOARD_CORNERS) -> SimulatedScans:
+def session(dataset: Dataset, seed: int, settings: Settings) -> SimulatedScans:
     """Simulate scans and clicks of a data set."""
-    return simulate_scans(options_of(dataset, seed, settings, board_corners))
+    return simulate_scans(options_of(dataset, seed, settings))
 
 
 def ppm_options(settings: Settings) -> CalibrationOptions:
     """Return the options of the paper's method."""
     return CalibrationOptions(method="paper", paper=PaperOptions(ransac_threshold_px=settings.ransac_threshold_px))
-
-
-def pmm_options(simulated: SimulatedScans) -> CalibrationOptions:
-    """Return the options of the mounting: the nominal rotation, and the camera where the drawing of the mast has it."""
-    tape = CameraPositionPrior(simulated.stage.options.rig.camera_offset_m)
-    return CalibrationOptions(method="paper", solving=SolvingOptions(camera_position=tape))

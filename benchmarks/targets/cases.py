@@ -3,13 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
-from calib_core.synthetic import PRESETS, SimulationOptions
+from calib_core.synthetic import PRESETS, RigOptions, SimulationOptions
 from calib_core.synthetic.options import Surroundings
 
 __all__ = ["CASES"]
 
 _PEOPLE, _ROBOT, _NEAR, _FAR = (PRESETS[name] for name in ("people", "robot", "cars-near", "cars-far"))
-_OTHER_RIG = PRESETS["paper-dr-b"].rig
+_OTHER_RIG = RigOptions(radar_height_m=1.6, radar_tilt_deg=13.0, camera_offset_m=(-0.05, -0.15, 0.12))
 
 
 def _with(base: SimulationOptions, **traffic: float) -> SimulationOptions:

@@ -1,24 +1,22 @@
-"""The paper's other methods, for its experiments: the mounting (PMM), and the exchange of translations.
+"""The paper's other methods, for its experiments: the mounting (PMM), the checkerboard (CCM), and exchanged translations.
 
-PMM takes rotation and offset as designed or measured, and no data at all. An exchange combines the rotation of one
-calibration with the translation of another, to see which of the two matters. Neither states an uncertainty; both are judged
-on pairs that they were not fitted to. The checkerboard of a further method (CCM) is found in the frames of a recording: where
-its inner corners are.
+PMM takes rotation and offset as designed or measured, and no data at all. CCM registers the radar positions of a reflector
+on the corners of a checkerboard with those corners. An exchange combines the rotation of one calibration with the
+translation of another, to see which of the two matters. None states an uncertainty.
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import astuple, replace
-from typing import Protocol, runtime_checkable
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 
-from calib_core.arrays import Flags, Points2, TimesNs
+from calib_core.arrays import Flags, Points2, Points3, frozen_array
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.estimation.measurement_model import linearize
 from calib_core.estimation.plausibility import implausible_input
 from calib_core.geometry import RigidTransform, mounting_rotation
-from calib_core.measurements import Pair, Unpaired, Unsolvable
+from calib_core.measurements import Pair, Unpaired
 from calib_core.options import CalibrationOptions
 from calib_core.radar import polar_from_cartesian, sigma_polar_of
 from calib_core.results import Calibration, DataWarning, PairResult
@@ -56,6 +54,49 @@ def calibrate_by_mounting(
     rotation = mounting_rotation(*astuple(options.mounting))
     pose = RigidTransform(rotation, -rotation @ np.array(measured.position_m))
     return judged(pose, pairs, unpaired, excluded, camera, options)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CheckerboardMatrix:
+    """CCM's matrix: twelve numbers in the place of [R | t], of which nothing says that R is a rotation.
+
+    Attributes:
+        numbers: (3, 4).
+        problem_condition: condition number of the least-squares problem.
+    """
+
+    numbers: np.ndarray
+    problem_condition: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "numbers", frozen_array(self.numbers, (3, 4)))
+
+    @property
+    def condition(self) -> float:
+        """The condition number of the three by three numbers in the place of R; 1 for a rotation."""
+        return float(np.linalg.cond(self.numbers[:, :3]))
+
+    def project(self, points_radar_m: Points3, camera: Camera) -> Points2:
+        """Return the pixels (n, 2) of radar positions (n, 3): s p = K [R | t] P, with distortion (paper, equation 2)."""
+        return camera.project(_homogeneous(points_radar_m) @ self.numbers.T)
+
+
+def register_on_checkerboard(points_radar_m: Points3, corners_camera_m: Points3) -> CheckerboardMatrix:
+    """Solve P_c = [R | t] P_r (paper, equation 1) for its twelve numbers by linear least squares (CCM).
+
+    The corners lie in a plane, so the matrix maps every radar position into that plane: it is singular but for rounding.
+
+    Args:
+        points_radar_m: (n, 3) of the reflector.
+        corners_camera_m: (n, 3) the corners that it was put on, in the camera frame.
+    """
+    rows = _homogeneous(points_radar_m)
+    solution = np.linalg.lstsq(rows, corners_camera_m, rcond=None)[0]
+    return CheckerboardMatrix(solution.T, float(np.linalg.cond(rows)))
+
+
+def _homogeneous(points_m: Points3) -> np.ndarray:
+    return np.hstack([points_m, np.ones((len(points_m), 1))])
 
 
 def swapped(rotation_of: Calibration, translation_of: Calibration) -> Calibration:
@@ -214,91 +255,3 @@ def _outside(calibration: Calibration) -> list[DataWarning]:
             "do not use this pose; use the default method",
         )
     ]
-
-
-_MOST_FRAMES = 40
-_STRIDE = 17
-"""Coprime to the number of frames: frames far apart are searched first."""
-_ENOUGH_VIEWS = 3
-_STILL_PX = 3.0
-
-
-@runtime_checkable
-class PictureSource(Protocol):
-    """The part of a Recording that shows the board."""
-
-    image_times: TimesNs
-
-    def image(self, index: int, /) -> np.ndarray:
-        """Return a frame's pixels: uint8 (h, w, 3), blue first."""
-
-
-def find_board(source: object, columns: int, rows: int) -> Points2 | Unsolvable:
-    """Find a checkerboard that stands still: its inner corners (rows * columns, 2) [px], row by row.
-
-    Up to 40 frames all over the recording are searched, until three show the whole board.
-
-    Args:
-        source: a recording; one without pictures shows no board.
-        columns: inner corners along the longer side of the board.
-        rows: inner corners along its shorter side.
-
-    Raises:
-        CalibrationError: a frame cannot be read.
-    """
-    searched = 0
-    views: list[Points2] = []
-    for picture in _frames(source):
-        searched += 1
-        corners = find_corners(picture, columns, rows)
-        if corners is not None:
-            views.append(corners if not views else _in_the_order_of(views[0], corners))
-        if len(views) == _ENOUGH_VIEWS:
-            break
-    if not views:
-        return Unsolvable(
-            "no-board",
-            f"none of {searched} frames all over the recording shows a checkerboard of {columns} x {rows} inner "
-            "corners as a whole",
-            "record some seconds in which nothing hides the board, near enough that its squares are 10 px wide, and state its "
-            "inner corners, which are one fewer than its squares",
-        )
-    moved_px = max(float(np.linalg.norm(view - views[0], axis=1).max()) for view in views)
-    if moved_px > _STILL_PX:
-        return Unsolvable(
-            "board-moved",
-            f"the checkerboard moves by {moved_px:.0f} px in the course of the recording",
-            "leave board and sensors where they are while the reflector is put on its corners",
-        )
-    return np.asarray(np.mean(views, axis=0))
-
-
-def find_corners(picture: np.ndarray, columns: int, rows: int) -> Points2 | None:
-    """Find all inner corners of a checkerboard: (rows * columns, 2) [px], row by row; None if one of them is hidden.
-
-    Args:
-        picture: uint8 (h, w, 3), blue first.
-        columns: inner corners in a row.
-        rows: number of rows.
-    """
-    import cv2
-
-    grey = cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
-    found, corners = cv2.findChessboardCornersSB(grey, (columns, rows), flags=cv2.CALIB_CB_NORMALIZE_IMAGE)
-    return np.asarray(corners, dtype=np.float64).reshape(-1, 2) if found else None
-
-
-def _frames(source: object) -> Iterator[np.ndarray]:
-    if not isinstance(source, PictureSource) or not len(source.image_times):
-        return
-    places = np.linspace(0, len(source.image_times) - 1, _MOST_FRAMES).round().astype(int)
-    order = places[_STRIDE * np.arange(_MOST_FRAMES) % _MOST_FRAMES]
-    for index in dict.fromkeys(order.tolist()):
-        yield source.image(index)
-
-
-def _in_the_order_of(first_px: Points2, corners_px: Points2) -> Points2:
-    """Count the corners from the same end of the board as in another view; a board looks the same from both."""
-    turned = corners_px[::-1]
-    apart, turned_apart = (np.linalg.norm(view - first_px, axis=1).sum() for view in (corners_px, turned))
-    return turned if turned_apart < apart else corners_px

@@ -15,6 +15,7 @@ import numpy as np
 
 from calib_core.boxes import boxes_text, labels_text
 from calib_core.camera import Camera
+from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange import camera_info_text, write_clicks
 from calib_core.lens_models.registry import written_lens
@@ -49,7 +50,7 @@ def write_recording(
     *,
     progress: Progress = lambda done, total: None,
 ) -> tuple[Path, ...]:
-    """Write recording, truth.json and clicks.json, and return the data files.
+    """Write recording, truth.json and clicks.json, and return the data files; of a second camera truth_2.json and so on.
 
     If people, robots or cars move that are worth judging, boxes.json and labels.json are written too.
 
@@ -63,9 +64,11 @@ def write_recording(
 
     Raises:
         RecordingError: a file already exists.
-        InputError: ROS has no name for the camera's lens model.
+        InputError: ROS has no name for the camera's lens model, or a container has no room for a second camera.
     """
-    camera = recording.camera
+    camera, other = recording.camera, recording.other_camera
+    if other is not None and not set(containers).isdisjoint({"csv", "jsonl"}):
+        raise InputError("a folder of pictures holds one camera; write a recording of two cameras as ros1, mcap or db3")
     written_lens(camera.lens, camera.distortion, "camera_info")  # refused before anything is written
     folder.mkdir(parents=True, exist_ok=True)
     written: list[Path] = []
@@ -76,17 +79,24 @@ def write_recording(
             written.extend(write_plain_files(recording, folder / f"recording_{container}", container, frames))
         elif container == "ros1":
             written.append(write_ros1_bag(folder / "radar.bag", radar_messages(recording, 1)))
-            written.append(write_ros1_bag(folder / "camera.bag", camera_messages(recording, frames)))
+            written.append(write_ros1_bag(folder / "camera.bag", _pictures(recording, frames)))
         else:
             name = folder / f"recording_{container}"
             messages = all_messages(recording, 2, frames)
             written.append(write_ros2(name, messages, container="mcap" if container == "mcap" else "sqlite3"))
-    (folder / "truth.json").write_text(truth_text(recording), encoding="utf-8")
-    (folder / "clicks.json").write_text(clicks_text(recording), encoding="utf-8")
-    if is_annotated(recording):
-        (folder / "boxes.json").write_text(boxes_text(true_boxes(recording)), encoding="utf-8")
-        (folder / "labels.json").write_text(labels_text(true_labels(recording)), encoding="utf-8")
+    _write_truth(recording, folder)
+    if other is not None:
+        _write_truth(other, folder, "_2")
     return tuple(written)
+
+
+def _write_truth(recording: SimulatedRecording, folder: Path, suffix: str = "") -> None:
+    (folder / f"truth{suffix}.json").write_text(truth_text(recording), encoding="utf-8")
+    (folder / f"clicks{suffix}.json").write_text(clicks_text(recording), encoding="utf-8")
+    if is_annotated(recording):
+        (folder / f"boxes{suffix}.json").write_text(boxes_text(true_boxes(recording)), encoding="utf-8")
+        if not suffix:
+            (folder / "labels.json").write_text(labels_text(true_labels(recording)), encoding="utf-8")
 
 
 def _counted(recording: SimulatedRecording, progress: Progress, *, before: int, total: int) -> Iterator[SimulatedFrame]:
@@ -261,27 +271,38 @@ _PARSE_NS = 6_000
 
 
 def camera_messages(
-    recording: SimulatedRecording, frames: Iterable[SimulatedFrame] | None = None
+    recording: SimulatedRecording, frames: Iterable[SimulatedFrame] | None = None, *, name: str = "camera"
 ) -> Iterator[RecordedMessage]:
     """Convert frames to image and camera-info messages, in order of arrival.
 
     Args:
         recording: the recording.
         frames: to use instead of all frames of the recording.
+        name: of the camera, in topics and frame.
     """
-    options = recording.options
+    options, frame_id = recording.options, CAMERA_FRAME.replace("camera", name)
+    image, raw_image, camera_info = (
+        topic.replace("/camera/", f"/{name}/") for topic in (IMAGE_TOPIC, RAW_IMAGE_TOPIC, CAMERA_INFO_TOPIC)
+    )
     for frame in recording.frames() if frames is None else frames:
         if options.intrinsics.published:
-            info = CameraInfoMessage(frame.time, CAMERA_FRAME, recording.stage.published_camera)
-            yield RecordedMessage(CAMERA_INFO_TOPIC, frame.receive_time, info)
+            info = CameraInfoMessage(frame.time, frame_id, recording.stage.published_camera)
+            yield RecordedMessage(camera_info, frame.receive_time, info)
         if options.raw_images:
-            raw = ImageMessage(frame.time, CAMERA_FRAME, frame.pixels)
-            yield RecordedMessage(RAW_IMAGE_TOPIC, frame.receive_time, raw)
+            raw = ImageMessage(frame.time, frame_id, frame.pixels)
+            yield RecordedMessage(raw_image, frame.receive_time, raw)
         else:
             jpeg = CompressedImageMessage(
-                frame.time, CAMERA_FRAME, frame.jpeg(options.jpeg_quality), "bgr8; jpeg compressed bgr8"
+                frame.time, frame_id, frame.jpeg(options.jpeg_quality), "bgr8; jpeg compressed bgr8"
             )
-            yield RecordedMessage(IMAGE_TOPIC, frame.receive_time, jpeg)
+            yield RecordedMessage(image, frame.receive_time, jpeg)
+
+
+def _pictures(recording: SimulatedRecording, frames: Iterable[SimulatedFrame] | None) -> Iterator[RecordedMessage]:
+    streams = [camera_messages(recording, frames)]
+    if recording.other_camera is not None:
+        streams.append(camera_messages(recording.other_camera, name="camera_2"))
+    return heapq.merge(*streams, key=lambda message: message.receive_time)
 
 
 def radar_messages(recording: SimulatedRecording, generation: Literal[1, 2]) -> Iterator[RecordedMessage]:
@@ -348,7 +369,7 @@ def all_messages(
         frames: to use instead of all frames of the recording.
     """
     return heapq.merge(
-        camera_messages(recording, frames),
+        _pictures(recording, frames),
         radar_messages(recording, generation),
         key=lambda message: message.receive_time,
     )

@@ -164,6 +164,19 @@ class WavedBoard:
 
 
 @dataclass(frozen=True, slots=True)
+class OtherCamera:
+    """A second camera, on a rig of its own, that sees the same placements."""
+
+    present: bool = option(False, "Record a second camera in /camera_2; clicks_2.json and truth_2.json are its files.")
+    offset_m: tuple[float, float, float] = option(
+        (-0.4, 0.9, 0.25), "Its nominal centre in the radar frame: forward, left, up [m]."
+    )
+    yaw_deg: float = option(
+        -5.0, "How far to the left it nominally looks of where the radar looks [deg].", low=-180.0, high=180.0
+    )
+
+
+@dataclass(frozen=True, slots=True)
 class Clicking:
     """How the example clicks are made."""
 
@@ -226,6 +239,7 @@ class SimulationOptions:
     )
     islands: bool = option(False, "Record only 2 to 15 s around each dwell, with gaps of 1 to 5 minutes between.")
     rig: RigOptions = option(RigOptions(), "How the sensors are mounted.")
+    other_camera: OtherCamera = option(OtherCamera(), "A second camera, on another rig.")
     defects: RadarDefects = option(RadarDefects(), "How the radar differs from a perfect one.")
     surroundings: Surroundings = option(Surroundings(), "What stands and walks in the scene besides the reflector.")
     intrinsics: IntrinsicsErrors = option(

@@ -77,6 +77,12 @@ class SimulatedRecording:
         """The true pose."""
         return self.stage.rig.camera_from_radar
 
+    @property
+    def other_camera(self) -> "SimulatedRecording | None":
+        """The same recording as the second camera sees it; None if there is none."""
+        stage = self.stage.of_other_camera
+        return None if stage is None else _recorded(stage)
+
     def scans(self) -> Iterator[RadarScan]:
         """Yield the scans of all antennas in order of header stamps; the same scans every time."""
         return radar_scans(self.stage)
@@ -111,7 +117,10 @@ def simulate(options: SimulationOptions | None = None) -> SimulatedRecording:
     Args:
         options: what to simulate; None takes the defaults.
     """
-    stage = set_stage(options or SimulationOptions())
+    return _recorded(set_stage(options or SimulationOptions()))
+
+
+def _recorded(stage: Stage) -> SimulatedRecording:
     placements = placements_of(stage)
     return SimulatedRecording(stage, placements, clicks_of(stage, placements))
 

@@ -67,6 +67,15 @@ class SimulatedScans:
         return self.stage.rig.camera_from_radar
 
     @property
+    def other_camera(self) -> "SimulatedScans | None":
+        """The same scans with the clicks in the pictures of the second camera; None if there is none."""
+        stage = self.stage.of_other_camera
+        if stage is None:
+            return None
+        placements = placements_of(stage)
+        return SimulatedScans(stage, self.scans, clicks_of(stage, placements), placements)
+
+    @property
     def points_radar_m(self) -> Points3:
         """The true position of each placement: (n, 3)."""
         return np.array([placement.position_radar_m for placement in self.placements]).reshape(-1, 3)

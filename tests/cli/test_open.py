@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from calib_core.recordings import Recording
-from calib_core.synthetic import SimulationOptions, simulate, write_recording
+from calib_core.synthetic import OtherCamera, SimulationOptions, simulate, write_recording
 from cocalib.cli import run
 from cocalib.workspace import Workspace
 
@@ -75,6 +75,27 @@ def test_intrinsics_next_to_the_recording_are_named(tmp_path: Path, capsys: pyte
     clicks = tmp_path / "clicks.json"
     assert run(["solve", str(tmp_path / "recording_csv"), "--clicks", str(clicks), "--confirm-assumptions"]) == 2
     assert f"such as --camera {tmp_path / 'recording_csv' / 'camera.yaml'}" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("camera", "clicks"), [("camera", "clicks.json"), ("camera_2", "clicks_2.json")])
+def test_each_of_two_cameras_in_one_recording_is_opened_by_its_topic(
+    camera: str, clicks: str, served: list[Workspace], tmp_path: Path
+) -> None:
+    options = SimulationOptions(
+        placements=4,
+        dwell_s=4.0,
+        width_px=128,
+        height_px=80,
+        camera_rate_hz=1.0,
+        other_camera=OtherCamera(present=True),
+    )
+    write_recording(simulate(options), tmp_path)
+    bags = [str(tmp_path / name) for name in ("radar.bag", "camera.bag")]
+    topic = f"/{camera}/image_raw/compressed"
+    given = ["--image-topic", topic, "--clicks", str(tmp_path / clicks), "--no-browser"]
+    assert run(["open", *bags, *given]) == 0
+    expected = json.loads((tmp_path / clicks).read_text())["clicks"]
+    assert len(served[0].session.clicks) == len(expected) == 4
 
 
 def test_clicks_that_nobody_confirmed_are_opened_with_a_note(

@@ -7,6 +7,8 @@ import calib_core.geometry
 import calib_core.paper.algorithm_1
 import calib_core.radar
 import calib_core.results.metrics
+from benchmarks.paper.judgement import PAPER, verdict
+from benchmarks.paper.page import read_measured
 from calib_core.results import Calibration
 
 _ROW = re.compile(r"\| `(\w+)` \| `(test_\w+)` \|$", re.MULTILINE)
@@ -25,6 +27,14 @@ def test_every_function_and_test_in_the_table_exists(project_root: Path) -> None
     assert len(rows) == 10 + 6
     assert [function for function, _ in rows if not any(hasattr(home, function) for home in homes)] == []
     assert [test for _, test in rows if f"def {test}(" not in tests] == []
+
+
+def test_the_judgements_of_the_experiments_are_those_of_the_table(project_root: Path) -> None:
+    text = (project_root / "docs" / "paper.md").read_text(encoding="utf-8")
+    sets = read_measured().sets
+    for name in PAPER:
+        (said,) = re.findall(rf"\| row `{re.escape(name)}`[^|]*\| ([^|]*) \|$", text, re.MULTILINE)
+        assert said == verdict(name, sets)
 
 
 def test_every_line_of_algorithm_1_cites_itself() -> None:

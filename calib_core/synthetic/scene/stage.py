@@ -95,6 +95,15 @@ class Stage:
         return replace(camera, matrix_px=matrix)
 
     @property
+    def of_other_camera(self) -> "Stage | None":
+        """The same story and radar with the camera on the other rig; None if there is none."""
+        rig = _other_rig(self.rig, self.options)
+        if rig is None:
+            return None
+        times = _frame_times(child_rng(self.options, 24), self.story, self.islands, self.options)
+        return replace(self, rig=rig, frame_times=times, waving=None)
+
+    @property
     def camera_from_reported(self) -> RigidTransform:
         """The pose that maps what the radar reports to the camera, without scales: what an overlay needs."""
         return self.rig.camera_from_radar @ radar_from_reported(self.options.defects)
@@ -128,7 +137,7 @@ def set_stage(options: SimulationOptions) -> Stage:
     story = _story(positions, scene, options)
     islands = _islands(story, options)
     profile = profile_with(options.radar, options.defects)
-    frame_times = _frame_times(story, islands, options)
+    frame_times = _frame_times(child_rng(options, 3), story, islands, options)
     antennas = antennas_of(
         options, profile, (child_rng(options, 4), child_rng(options, 14)), duration_s=story.duration_s, islands=islands
     )
@@ -192,9 +201,20 @@ def _waving(camera: Camera, options: SimulationOptions) -> "BoardWaving | None":
     return draw_waving(child_rng(options, 21), camera, options.waved_board)
 
 
-def _frame_times(story: Story, islands: Islands | None, options: SimulationOptions) -> SensorTimes:
+def _other_rig(rig: Rig, options: SimulationOptions) -> Rig | None:
+    """Draw the rig of the same radar and the second camera, of the same make as the first."""
+    other = options.other_camera
+    if not other.present:
+        return None
+    nominal = replace(options.rig, camera_offset_m=other.offset_m, camera_angles_deg=(0.0, other.yaw_deg, 0.0))
+    return random_rig(child_rng(options, 23), camera=rig.camera, options=nominal)
+
+
+def _frame_times(
+    rng: np.random.Generator, story: Story, islands: Islands | None, options: SimulationOptions
+) -> SensorTimes:
     return draw_times(
-        child_rng(options, 3),
+        rng,
         duration_s=story.duration_s,
         rate_hz=options.camera_rate_hz,
         jitter_s=options.stamp_jitter_s,
@@ -218,14 +238,15 @@ def _positions(rng: np.random.Generator, scene: Scene, added: Scene, rig: Rig, o
     if not options.placements:
         return _board_places(rng, scene, rig, options)
     layout = _layout(scene, options)
+    rigs = [one for one in (rig, _other_rig(rig, options)) if one is not None]
     world_from_radar = rig.radar_from_world.inverse()
     found: list[np.ndarray] = []
     for _ in range(400):
         batch = world_from_radar @ draw_positions(rng, count=min(options.placements, 8), rig=rig, layout=layout)
-        whole = rig.camera.in_image(
-            rig.camera.project(rig.camera_from_world @ batch), margin_px=-_RIM_SHARE * options.width_px
-        )
-        whole &= in_sight(added, batch)
+        whole = in_sight(added, batch)
+        for one in rigs:
+            seen_px = one.camera.project(one.camera_from_world @ batch)
+            whole &= one.camera.in_image(seen_px, margin_px=-_RIM_SHARE * options.width_px)
         if scene.board is not None:
             whole &= ~scene.board.hides(batch)
         for position in batch[whole]:

@@ -15,12 +15,13 @@ import pytest
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
-from calib_core.errors import RecordingError
+from calib_core.errors import InputError, RecordingError
 from calib_core.measurements import RadarScan, TimeNs
 from calib_core.radar import polar_from_cartesian
 from calib_core.recordings.containers.writing import RadarReturnMessage, RecordedMessage, write_ros1_bag
 from calib_core.synthetic import (
     PRESETS,
+    OtherCamera,
     PresetName,
     SimulatedFrame,
     SimulatedRecording,
@@ -197,6 +198,42 @@ def test_a_vendors_packets_hold_the_same_returns(scans, container, tmp_path) -> 
         assert _stamp(message) == scan.time
         found = [(one.f_pos_x, one.f_pos_y, one.f_pos_z) for one in message.s_detections]
         np.testing.assert_allclose(np.array(found).reshape(-1, 3), scan.points_radar_m, rtol=1e-5, atol=1e-6)
+
+
+def test_a_second_camera_is_written_into_the_same_recording(tmp_path: Path) -> None:
+    recording = simulate(replace(OPTIONS, camera_rate_hz=1.0, other_camera=OtherCamera(present=True)))
+    other = recording.other_camera
+    assert other is not None
+    write_recording(recording, tmp_path)
+    for name, one in (("camera", recording), ("camera_2", other)):
+        times = [
+            _stamp(message) for _, message in _messages([tmp_path / "camera.bag"], f"/{name}/image_raw/compressed")
+        ]
+        assert times == one.stage.frame_times.header_ns.tolist()
+    truth = json.loads((tmp_path / "truth_2.json").read_text())
+    assert truth["camera_from_radar"]["translation_m"] == other.camera_from_radar.translation_m.tolist()
+    clicks = json.loads((tmp_path / "clicks_2.json").read_text())
+    assert len(clicks["clicks"]) == len(other.clicks) == OPTIONS.placements
+
+
+def test_the_second_camera_sees_the_same_placements_from_its_own_rig() -> None:
+    options = replace(OPTIONS, placements=8, other_camera=OtherCamera(present=True))
+    recording = simulate(options)
+    other = recording.other_camera
+    assert other is not None
+    assert np.linalg.norm(other.stage.rig.camera_position_radar_m - options.other_camera.offset_m) < 0.06
+    assert len(other.placements) == 8
+    for here, there in zip(recording.placements, other.placements, strict=True):
+        assert np.array_equal(here.position_radar_m, there.position_radar_m)
+        assert other.camera.in_image(there.pixel_px[None])[0]
+    assert simulate(OPTIONS).other_camera is None
+
+
+def test_a_folder_of_pictures_has_no_room_for_a_second_camera(tmp_path: Path) -> None:
+    recording = simulate(replace(OPTIONS, other_camera=OtherCamera(present=True)))
+    with pytest.raises(InputError, match="write a recording of two cameras as ros1, mcap or db3"):
+        write_recording(recording, tmp_path / "new", ("csv",))
+    assert not (tmp_path / "new").exists()
 
 
 # Presets: each can be simulated, differs from the default, and gives way to what is asked for.
