@@ -21,6 +21,7 @@ def served(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Workspace]:
         workspaces.append(workspace)
 
     monkeypatch.setattr("cocalib.web.port.serving.Service.serve", serve)
+    monkeypatch.setattr("cocalib.opening.serving._SOON_S", 3600.0)  # on a busy machine the page would appear before
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     return workspaces
 
