@@ -7,14 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange import read_clicks
-from calib_core.measurements import RadarScans, TimeNs, Unsolvable
+from calib_core.measurements import NS_PER_S, RadarScans, TimeNs, Unsolvable
 from cocalib.session import (
+    ChosenIntrinsics,
     ClickPlaced,
     ClickRemoved,
     EventError,
     History,
+    IntrinsicsChosen,
     OptionsChanged,
     RecordingFacts,
     Solved,
@@ -53,7 +56,7 @@ class HeldSolver:
 
     def request(self, revision: int, clicks, options, when_done: Callable[[Solved], None], camera=None) -> None:
         self.revisions.append(revision)
-        self.when_done = when_done
+        self.when_done, self.camera = when_done, camera
 
     def close(self) -> None:
         self.closed = True
@@ -138,6 +141,16 @@ def test_the_solver_is_asked_for_every_revision_with_clicks_and_only_for_those(
     workspace.dispatch(ClickPlaced(TIMES[4], (1.0, 2.0), "clicked"))
     workspace.undo()
     assert solver.revisions == [2, 3]
+
+
+def test_the_camera_chosen_last_is_solved_with(workspace: Workspace, solver: HeldSolver) -> None:
+    workspace.dispatch(ClickPlaced(TIMES[3], (1.0, 2.0), "clicked"))
+    for focal_px in (500.0, 600.0):
+        camera = Camera(
+            "pinhole", 640, 480, np.array([[focal_px, 0.0, 320.0], [0.0, focal_px, 240.0], [0.0, 0.0, 1.0]])
+        )
+        workspace.dispatch(IntrinsicsChosen(ChosenIntrinsics.of(camera, "a file")))
+        assert solver.camera.matrix_px[0, 0] == workspace.camera.matrix_px[0, 0] == focal_px
 
 
 def test_a_restored_session_is_solved_at_once(journal: ListJournal, solver: HeldSolver) -> None:
@@ -307,11 +320,12 @@ def test_clicks_are_solved_again_when_scans_of_their_windows_come(
     workspace: Workspace, solver: HeldSolver, journal: ListJournal
 ) -> None:
     workspace.dispatch(ClickPlaced(TIMES[3], (1.0, 2.0), "clicked"))
-    second_ns = 1_000_000_000
-    workspace.extend(FACTS.image_times, TimeNs(TIMES[3] + 10 * second_ns))
+    locating = workspace.session.options.locating
+    last = TimeNs(TIMES[3] + round((locating.window_s / 2 + locating.max_time_gap_s) * NS_PER_S))
+    workspace.extend(FACTS.image_times, TimeNs(last + 1))
     workspace.extend(FACTS.image_times, None)
     assert solver.revisions == [1]
-    workspace.extend(FACTS.image_times, TimeNs(TIMES[3] + second_ns))
+    workspace.extend(FACTS.image_times, last)
     assert solver.revisions == [1, 2]
     assert [type(step).__name__ for step in journal.steps] == ["ClickPlaced"]
     workspace.undo()

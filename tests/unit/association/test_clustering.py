@@ -52,6 +52,13 @@ def test_a_cluster_counts_the_scans_it_was_seen_in() -> None:
     assert cluster.snr_db == pytest.approx(30.0, abs=1.0)
 
 
+def test_windows_that_differ_in_snr_alone_have_clusters_of_their_own() -> None:
+    weak, strong = window({REFLECTOR: 20.0}), window({REFLECTOR: 30.0})
+    assert np.array_equal(weak.points_radar_m, strong.points_radar_m)
+    (first,), (second,) = clusters_of(weak, most=6), clusters_of(strong, most=6)
+    assert second.snr_db - first.snr_db == pytest.approx(10.0)
+
+
 def test_an_empty_window_has_no_cluster() -> None:
     assert clusters_of(RadarScans(), most=6) == ()
 

@@ -80,6 +80,12 @@ def test_a_pair_carries_the_stamp_of_the_nearest_scan() -> None:
     assert pair.candidates[0].scans == 3
 
 
+def test_clicks_of_one_placement_share_every_scan_of_their_windows() -> None:
+    scans = scans_at([0.1 * k for k in range(100)])
+    pairs = pair_clicks([click("a", 4.0), click("b", 5.0)], scans, CalibrationOptions()).pairs
+    assert [pair.candidates[0].scans for pair in pairs] == [41, 41]  # 2.5 to 6.5 s
+
+
 OPTIONS = CalibrationOptions()
 SEED = 20261122
 

@@ -250,6 +250,24 @@ def test_smooth_errors_raise_a_warning_and_independent_ones_do_not() -> None:
     assert "smooth-angle-errors" not in {warning.code for warning in plain.warnings}
 
 
+def test_under_smooth_errors_the_stated_uncertainty_turns_with_the_camera() -> None:
+    upright = with_smooth_errors(1, 60)
+    centre_px = upright.camera.matrix_px[:2, 2]
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # a quarter about the optical axis
+    matrix_px = upright.camera.matrix_px.copy()
+    matrix_px[:2, 2] = centre_px[::-1]
+    camera = Camera("plumb_bob", 1080, 1920, matrix_px, upright.camera.distortion)
+    pairs = tuple(
+        replace(pair, pixel_px=turn[:2, :2] @ (pair.pixel_px - centre_px) + centre_px[::-1]) for pair in upright.pairs
+    )
+    before, after = solved(upright, EXACT), calibrate_pairs(pairs, camera, EXACT).unwrap()
+    np.testing.assert_allclose(after.camera_from_radar.rotation, turn @ before.camera_from_radar.rotation, atol=1e-6)
+    of_both = np.kron(np.eye(2), turn)
+    scale = np.sqrt(np.diag(after.covariance))
+    turned = of_both @ before.covariance @ of_both.T
+    np.testing.assert_allclose(turned / np.outer(scale, scale), after.covariance / np.outer(scale, scale), atol=1e-3)
+
+
 def test_more_pairs_do_not_average_smooth_errors_out() -> None:
     few, many = (np.trace(solved_with_tape(with_smooth_errors(2, count)).covariance[3:, 3:]) for count in (40, 160))
     assert many > 0.4 * few

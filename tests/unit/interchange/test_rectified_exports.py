@@ -21,6 +21,7 @@ from calib_core.interchange import (
     imported,
     read_any,
 )
+from calib_core.interchange.cameras.rectification import rectified_camera
 from calib_core.interchange.own.calibration_json import calibration_sha256
 from cocalib.web.channel.export_preview import export_preview, exported
 from cocalib.web.exports import format_rows
@@ -93,6 +94,11 @@ def test_the_maps_are_opencv_s_for_that_matrix_and_leave_no_border_empty(file, m
     # and no larger picture is: a border of the picture as taken is used on each side
     edges = (map_x[:, 0].min(), map_y[0].min(), 639 - map_x[:, -1].max(), 479 - map_y[-1].max())
     assert max(edges) < 1.0
+
+
+def test_a_camera_without_distortion_is_its_own_rectified_camera(file):
+    camera = through(file, "plumb_bob", [0.0] * 5).calibration.camera
+    np.testing.assert_allclose(rectified_camera(camera).matrix_px, camera.matrix_px, rtol=0, atol=1e-6)
 
 
 def test_the_matrix_is_that_of_opencv_s_alpha_0(file):

@@ -12,6 +12,7 @@ from calib_core.errors import CalibrationError, OptionError
 from calib_core.measurements import ChosenReturn, ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions, NoiseOptions
 from cocalib.session import (
+    BoxDrawn,
     ChosenIntrinsics,
     Cleared,
     ClickExcluded,
@@ -137,6 +138,11 @@ def test_acknowledged_warnings_stay_so_when_clicks_are_undone() -> None:
 )
 def test_an_id_is_not_given_again(steps, expected: list[str]) -> None:
     assert ids(history_of(*steps).present) == expected
+
+
+def test_the_id_of_a_box_that_was_undone_is_not_given_again() -> None:
+    drawn = BoxDrawn(TIMES[3], (1.0, 1.0, 20.0, 30.0), "car")
+    assert [box.id for box in history_of(drawn, Undo(), drawn).present.boxes] == ["b2"]
 
 
 def test_clearing_removes_the_clicks_and_the_answer_and_keeps_the_options() -> None:

@@ -129,6 +129,16 @@ def test_every_shape_of_the_format_gives_every_message(shape, ros2, plain, jpeg,
         assert recording.warnings == ()
 
 
+def test_a_file_without_chunks_that_ends_with_a_message_gives_this_one_too(ros2, plain, jpeg, tmp_path):
+    rows = sorted(plain(ros2, jpeg, n=40), key=lambda row: row[0])
+    data, last = mcap(ros2, rows, chunked=False, summary=False), ros2.serialise(rows[-1][2])
+    path = tmp_path / "made.mcap"
+    path.write_bytes(data[: data.rindex(last) + len(last)])
+    with open_recording(path) as recording:
+        assert rows[-1][0] == recording.radar_topic
+        assert len(recording.radar_times) == 40
+
+
 def test_an_encoding_that_is_not_of_ros_is_a_problem_of_its_topic(ros2, plain, jpeg, tmp_path):
     path = tmp_path / "made.mcap"
     path.write_bytes(mcap(ros2, plain(ros2, jpeg), encoding="protobuf"))
