@@ -109,7 +109,7 @@ def _connected(address: str) -> Iterator[_Connection]:
         import dask
         from distributed import Client
     except ImportError:
-        raise InputError("Dask is not installed; install cocalib[fleet], or leave out --scheduler") from None
+        raise InputError("Dask is not installed; install cocalib[cluster], or leave out --scheduler") from None
     with _quiet(), dask.config.set(_SETTINGS):
         try:
             asyncio.run(_greet(address))
@@ -325,7 +325,7 @@ def version_trouble(here: str, found: Mapping[str, Any]) -> str:
         if isinstance(there, BaseException):
             return (
                 f"the worker at {address} has no cocalib ({type(there).__name__}: {there}); "
-                f"install cocalib[fleet] {here} where it runs"
+                f"install cocalib[cluster] {here} where it runs"
             )
         if there != here:
             return (

@@ -31,7 +31,7 @@ class Batch:
     workers: Annotated[int | None, called("N")] = None
     """Worker processes on this machine; 1: this process does the work; one per processor for many sessions, unless given."""
     scheduler: Annotated[str | None, called("ADDRESS")] = None
-    """Address of your own Dask scheduler, such as tls://host:8786 (needs cocalib[fleet]); who reaches it can run code."""
+    """Address of your own Dask scheduler, such as tls://host:8786 (needs cocalib[cluster]); who reaches it can run code."""
 
     def run(self) -> int:
         """Calibrate, print a table of what came of it; return the exit code."""

@@ -24,7 +24,7 @@ def require_sdk() -> None:
     """
     if find_spec("rerun") is None:
         raise InputError(
-            "this command needs rerun-sdk, which is not installed (there is none for Intel Macs): pip install rerun-sdk; "
+            "this command needs rerun-sdk, which is not installed (there is none for Intel Macs): pip install 'cocalib[rerun]'; "
             "cocalib export --to mcap does without it. A video of the overlay needs none either: cocalib video --overlay"
         )
 

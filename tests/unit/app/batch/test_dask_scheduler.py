@@ -167,7 +167,7 @@ def test_a_worker_without_cocalib_is_named() -> None:
     )
     assert found == (
         "the worker at tcp://127.0.0.1:2 has no cocalib (ModuleNotFoundError: No module named 'app'); "
-        "install cocalib[fleet] 0.1.0 where it runs"
+        "install cocalib[cluster] 0.1.0 where it runs"
     )
 
 

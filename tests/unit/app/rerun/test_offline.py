@@ -60,7 +60,7 @@ def test_commands_that_need_rerun_say_how_to_install_it(command: str, tmp_path: 
     answer = without_rerun(command, tmp_path / "a.bag", "--calibration", tmp_path / "c.json", *more)
     assert answer.returncode == 2
     assert "needs rerun-sdk, which is not installed" in answer.stderr
-    assert "pip install rerun-sdk" in answer.stderr
+    assert "pip install 'cocalib[rerun]'" in answer.stderr
     assert "Traceback" not in answer.stderr
 
 
