@@ -314,6 +314,7 @@ _LEAST_SCANS = 4  # of each window
 _LEAST_DIFFERENCES = 30
 _MEDIAN_OF_DIFFERENCE = 0.954  # of two normal values, in their standard deviation
 _ROUNDING = 0.01  # steps
+_LEAST_SPREAD = 0.05  # steps: a radar without elevation shows no scatter there, but rounding
 _LEAST_UNCHANGED = 0.2  # share of the differences, for values on a lattice
 _LEAST_CHANGES = 10
 
@@ -347,7 +348,7 @@ def report_spread(scans: RadarScans) -> Vector3 | None:
         return None
     scatter = np.median(differences, axis=0) / _MEDIAN_OF_DIFFERENCE
     bins = np.array([_bin_width(axis) for axis in differences.T])
-    return np.asarray(CLUSTER_SCALE * np.maximum(2.0 * _STEPS_PER_SIGMA * scatter, bins))
+    return np.asarray(CLUSTER_SCALE * np.maximum(np.maximum(2.0 * _STEPS_PER_SIGMA * scatter, bins), _LEAST_SPREAD))
 
 
 def _differences(static: RadarScans, most: int) -> Points3:

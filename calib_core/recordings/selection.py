@@ -539,6 +539,8 @@ def _described(sensor: RadarSensor) -> str:
     own = [name for place, name in enumerate(sensor.topics) if sensor.repeats[place] == place]
     second = [name for place, name in enumerate(sensor.topics) if sensor.repeats[place] != place]
     what = " + ".join(own)
+    if len(own) > 1:
+        what += " as one radar"
     if second:
         what += f" with other azimuths in {' + '.join(second)}"
     if sensor.copies:

@@ -1,7 +1,8 @@
 """Radar sensors: which topics of a recording are one radar, judged by their returns, frames and times.
 
 Near and far scans agree where their ranges overlap. Two azimuths of each return agree in range and speed, and differ in
-azimuth. Radars at other places agree in neither: each is a sensor of its own.
+azimuth. Radars at other places agree in neither: each is a sensor of its own. Topics of one frame whose scans alternate in time
+are one radar that switches between two antennas, unless they show the same ranges in other directions.
 """
 
 from collections.abc import Sequence
@@ -11,6 +12,7 @@ from typing import Literal
 
 import numpy as np
 
+from calib_core.arrays import TimesNs
 from calib_core.measurements import RadarScans
 from calib_core.radar import direction_cosines, polar_from_cartesian
 from calib_core.recordings.radar.merging import Spread, aligned, matches, measured_spread, moments_of
@@ -28,6 +30,9 @@ _MOST_BY_CHANCE = 0.5
 _SHIFT = 7.0  # spreads in range, to see how many returns match by chance
 _TIGHT = 0.1  # spreads: the azimuths of one detection share its range
 _AGREE, _CONTRADICT = 0.25, 0.1  # share of the returns in the common region, beyond chance
+_CHANCE = 0.03
+_FEWEST_SCANS = 10  # of each of two topics that alternate
+_IN_TURN, _CLEAR = 0.9, 0.2  # share of the scans; part of a cycle between a scan of the one and the next of the other
 _FARTHER = 1.5  # times: near and far scans differ in how far they reach
 _STATIC_MPS = 0.1
 _LEAST_SPREAD = 0.02  # of the sines of azimuths in a scene
@@ -213,13 +218,16 @@ def relation(one: Examined, other: Examined) -> Relation:
     elsewhere = _words(one.name, _PLACE_WORDS) != _words(other.name, _PLACE_WORDS)
     if one.frame != other.frame or elsewhere or not (one.returns and other.returns):
         return "apart"
+    alternating = alternate(one.stream.times_ns, other.stream.times_ns)
     both = _common_moments(one.stream, other.stream)
     if both is None:
-        return "apart"
+        return "ranges" if alternating else "apart"
     spreads = one.spread, other.spread
     spread = Spread(np.hypot(spreads[0].step, spreads[1].step), max(spread.doppler_mps for spread in spreads))
     first, second = both
     fewer = min(_count(first), _count(second))
+    if alternating:
+        return "apart" if _turned(one, other, first, second, spread) else "ranges"
     if fewer < _FEWEST:
         return "apart"
     if len(matches(first, second, spread)[0]) >= _SAME_SHARE * fewer:
@@ -227,6 +235,23 @@ def relation(one: Examined, other: Examined) -> Relation:
     if _are_alternatives(first, second, spread, fewer):
         return "alternatives"
     return "ranges" if _are_ranges(one, other, first, second, spread) else "apart"
+
+
+def alternate(times: TimesNs, others: TimesNs) -> bool:
+    """Return whether the scans of two topics follow each other in turn, clear of each other in time.
+
+    Args:
+        times: (n,) stamps, ascending.
+        others: (m,) of the other topic.
+    """
+    if min(len(times), len(others)) < _FEWEST_SCANS:
+        return False
+    both = np.concatenate([times, others])
+    order = np.argsort(both, kind="stable")
+    in_turn = np.diff(order < len(times))
+    between = np.diff(both[order])[in_turn]
+    cycle_ns = max(float(np.median(np.diff(times))), float(np.median(np.diff(others))))
+    return float(in_turn.mean()) >= _IN_TURN and float(np.quantile(between, 0.1)) >= _CLEAR * cycle_ns
 
 
 def other_azimuths(stream: RadarStream) -> tuple[RadarStream, ...]:
@@ -291,12 +316,24 @@ def _are_ranges(one: Examined, other: Examined, first: RadarScans, second: Radar
     if not (named or complementary):
         return False
     common = [_in_common(scans, one.figures, other.figures) for scans in (first, second)]
-    fewer = min(map(_count, common))
-    if fewer < _FEWEST:
+    if min(map(_count, common)) < _FEWEST:
         return named and complementary
-    by_chance = len(matches(common[0], _shifted(common[1], spread), spread)[0])
-    agree = (len(matches(common[0], common[1], spread)[0]) - by_chance) / fewer
+    agree = _agreement(common[0], common[1], spread)
     return agree >= _AGREE or (agree > _CONTRADICT and named and complementary)
+
+
+def _turned(one: Examined, other: Examined, first: RadarScans, second: RadarScans, spread: Spread) -> bool:
+    """Return whether two topics show the same ranges in other directions, as radars of two mountings do."""
+    near, far = (_in_common(scans, one.figures, other.figures) for scans in (first, second))
+    if min(_count(near), _count(far)) < _FEWEST:
+        return False
+    return _agreement(near, far, spread) < _CHANCE and _agreement(near, far, spread, azimuth=False) >= _AGREE
+
+
+def _agreement(one: RadarScans, other: RadarScans, spread: Spread, *, azimuth: bool = True) -> float:
+    """Return the share of the returns that two topics report alike, beyond chance."""
+    by_chance = len(matches(one, _shifted(other, spread), spread, azimuth=azimuth)[0])
+    return (len(matches(one, other, spread, azimuth=azimuth)[0]) - by_chance) / min(_count(one), _count(other))
 
 
 def _reach_differs(one: Figures, other: Figures) -> bool:

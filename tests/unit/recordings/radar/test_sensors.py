@@ -113,6 +113,47 @@ def test_corner_radars_stay_apart_even_where_they_agree(tmp_path: Path) -> None:
         assert len(recording.radar_topics) == 1
 
 
+def in_turn(streams: Sequence[Iterable[RecordedMessage]]) -> list[list[RecordedMessage]]:
+    """Move the second topic's scans to the middle between those of the first, all of 20 Hz."""
+    half = NS_PER_S // 40
+    first, second = (list(stream) for stream in streams)
+    moved = []
+    for one in second:
+        assert isinstance(one.body, CloudMessage)
+        body = replace(one.body, stamp=TimeNs(one.body.stamp + half))
+        moved.append(replace(one, receive_time=TimeNs(one.receive_time + half), body=body))
+    return [first, moved]
+
+
+def flat(message: RecordedMessage) -> RecordedMessage:
+    """Report every return at the radar's height, as a radar without elevation does."""
+    assert isinstance(message.body, CloudMessage)
+    return replace(message, body=replace(message.body, values=message.body.values * [1.0, 1.0, 0.0, 1.0, 1.0]))
+
+
+def test_topics_of_one_frame_that_alternate_in_time_are_one_radar(tmp_path: Path) -> None:
+    near, far = targets(7, 20), targets(17, 6)
+    streams = in_turn([clouds("/radar/scan0", near, seed=1), clouds("/radar/scan1", far, seed=2)])
+    with opened(bag(tmp_path, *streams)) as recording:
+        assert set(recording.radar_topics) == {"/radar/scan0", "/radar/scan1"}
+        assert "/radar/scan0 + /radar/scan1 as one radar" in recording.radar_choice
+        assert recording.warnings == ()
+
+
+def test_topics_that_alternate_but_show_the_same_ranges_elsewhere_are_two_radars(tmp_path: Path) -> None:
+    everything = targets(8, 30)
+    streams = in_turn([clouds("/a", everything, seed=1), clouds("/b", everything, seed=2, turned_rad=0.5)])
+    with opened(bag(tmp_path, *streams)) as recording:
+        assert len(recording.radar_sensors) == 2
+
+
+def test_near_and_far_scans_without_elevation_are_one_radar(tmp_path: Path) -> None:
+    streams = [[flat(message) for message in stream] for stream in near_and_far(targets(7, 60))]
+    with opened(bag(tmp_path, *streams)) as recording:
+        assert set(recording.radar_topics) == {"/radar/near", "/radar/far"}
+        assert np.median(np.diff(recording.radar_scans().first_return)) == pytest.approx(60, abs=2)
+
+
 def test_other_frames_are_other_radars_unless_the_user_joins_them(tmp_path: Path) -> None:
     near, far = near_and_far(targets(7, 60))
     moved = [replace(message, body=replace(message.body, frame_id="corner")) for message in near]
