@@ -10,7 +10,7 @@ import numpy as np
 from calib_core.arrays import TimesNs
 from calib_core.camera import Camera
 from calib_core.errors import RecordingError
-from calib_core.measurements import Stamp, TimeNs
+from calib_core.measurements import DataWarning, Stamp, TimeNs
 from calib_core.recordings.assumptions import Assumption, about_assumptions
 from calib_core.recordings.camera.image_stream import ImageStream, about_video, frames_of_one_size, image_stream
 from calib_core.recordings.camera.images import ImageLayout
@@ -49,7 +49,6 @@ from calib_core.recordings.selection import (
 from calib_core.recordings.time.clock_choice import ClockChoice, Stamps, choose_clock, choose_clocks
 from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis, about_clocks, diagnose
 from calib_core.recordings.topics import BOX_LAYOUT, Rhythm, StampedTopic, Topic, TopicSummary, join_topics, read_stamps
-from calib_core.results import DataWarning
 
 
 @dataclass(frozen=True, slots=True, eq=False)

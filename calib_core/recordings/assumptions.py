@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from calib_core.results import DataWarning
+from calib_core.measurements import DataWarning
 
 CONFIRM_ALL = "--confirm-assumptions"
 """The option that confirms every assumption, and the only one for some."""

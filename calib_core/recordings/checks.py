@@ -6,7 +6,7 @@ import numpy as np
 
 from calib_core.arrays import TimesNs
 from calib_core.errors import MessageError, RecordingError
-from calib_core.measurements import NS_PER_S, TimeNs
+from calib_core.measurements import NS_PER_S, DataWarning, TimeNs
 from calib_core.radar import polar_from_cartesian
 from calib_core.recordings.assumptions import Assumption
 from calib_core.recordings.camera.image_stream import ImageStream
@@ -16,7 +16,6 @@ from calib_core.recordings.radar.merging import MergedStream
 from calib_core.recordings.radar.scan_stream import RadarStream
 from calib_core.recordings.time.written_times import utc
 from calib_core.recordings.topics import StampedTopic
-from calib_core.results import DataWarning
 
 _FEW = 5
 _MIN_ANGLE_RAD = 0.02

@@ -12,13 +12,12 @@ import numpy as np
 
 from calib_core.camera import Camera
 from calib_core.errors import RecordingError
-from calib_core.measurements import NS_PER_S
+from calib_core.measurements import NS_PER_S, DataWarning
 from calib_core.recordings.assembly import Assembly, assemble
 from calib_core.recordings.camera.image_stream import ImageStream
 from calib_core.recordings.containers.following import FollowedFiles
 from calib_core.recordings.recording import Recording
 from calib_core.recordings.selection import RecordingOptions
-from calib_core.results import DataWarning
 
 _ENOUGH_MESSAGES, _ENOUGH_S = 20, 3.0
 """With so many messages of each sensor, or messages over so many seconds, the clocks can be chosen."""

@@ -14,7 +14,7 @@ from calib_core.arrays import TimesNs
 from calib_core.camera import Camera
 from calib_core.errors import InputError, RecordingError
 from calib_core.input_files import name_text, special_kind
-from calib_core.measurements import Boxes, RadarScans, TimeNs
+from calib_core.measurements import Boxes, DataWarning, RadarScans, TimeNs
 from calib_core.recordings.assembly import Assembly, assemble
 from calib_core.recordings.assumptions import Assumption, StatedAssumption
 from calib_core.recordings.box_topics import boxes_in_topic
@@ -35,7 +35,7 @@ from calib_core.recordings.radar.sensors import RadarSensor, figures_of
 from calib_core.recordings.selection import Need, RecordingOptions
 from calib_core.recordings.time.written_times import parse_zone
 from calib_core.recordings.topics import TopicSummary, join_topics, read_stamps
-from calib_core.results import DataWarning, InputFile
+from calib_core.results import InputFile
 
 _HASH_BYTES = 1 << 22
 _STAMP_BYTES = 12

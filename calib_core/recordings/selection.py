@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from calib_core.errors import MessageError, RecordingError
+from calib_core.measurements import DataWarning
 from calib_core.options import option
 from calib_core.recordings.box_topics import BoxLayout, box_layout
 from calib_core.recordings.camera.images import ImageLayout, is_picture
@@ -22,7 +23,6 @@ from calib_core.recordings.radar.scan_stream import RadarStream
 from calib_core.recordings.radar.sensors import Examined, Figures, RadarSensor, sensors_of
 from calib_core.recordings.time.clock_choice import HALF_DISTINCT, RETURNS_DISTINCT, Clock
 from calib_core.recordings.topics import Topic, TopicKind
-from calib_core.results import DataWarning
 
 _RAW = (
     "raw sensor packets, which only the sensor's driver can decode; play the recording to the driver and record "

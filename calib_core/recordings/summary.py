@@ -9,7 +9,7 @@ import numpy as np
 from calib_core.arrays import TimesNs
 from calib_core.errors import RecordingError
 from calib_core.input_files import name_text
-from calib_core.measurements import NS_PER_S, Stamp, TimeNs
+from calib_core.measurements import NS_PER_S, DataWarning, Stamp, TimeNs
 from calib_core.recordings.assumptions import StatedAssumption
 from calib_core.recordings.radar.column_plan import ColumnReading
 from calib_core.recordings.radar.message_layouts.single_returns import PointLayout, first_of_scans
@@ -20,7 +20,6 @@ from calib_core.recordings.time.clock_choice import choose_clock
 from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis, diagnose
 from calib_core.recordings.time.written_times import span_text, utc
 from calib_core.recordings.topics import Rhythm, StampedTopic, TopicSummary, join_topics, read_stamps
-from calib_core.results import DataWarning
 
 _GAP_PERIODS = 5.0
 _STRETCH_GAP_NS = NS_PER_S

@@ -7,13 +7,12 @@ from typing import Literal
 import numpy as np
 
 from calib_core.arrays import Indices, TimesNs
-from calib_core.measurements import NS_PER_S, Stamp
+from calib_core.measurements import NS_PER_S, DataWarning, Stamp
 from calib_core.recordings.containers.sources import Channel, Heads, MessageIndex, Source
 from calib_core.recordings.messages.decoding import Message, decode
 from calib_core.recordings.messages.definitions import Definition, definition_of
 from calib_core.recordings.time.clock_choice import Stamps
 from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis, between_islands
-from calib_core.results import DataWarning
 
 TopicKind = Literal["radar", "image", "camera-info", "other"]
 BOX_LAYOUT = "boxes around objects"

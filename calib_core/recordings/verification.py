@@ -13,6 +13,7 @@ import msgspec
 import numpy as np
 
 from calib_core.errors import MessageError, RecordingError
+from calib_core.measurements import DataWarning
 from calib_core.recordings.camera.images import ImageLayout, is_picture
 from calib_core.recordings.camera.jpeg import JPEG_MAGIC, has_end
 from calib_core.recordings.containers.chunks import ChunkedSource
@@ -22,7 +23,6 @@ from calib_core.recordings.messages.definitions import Definition, definition_of
 from calib_core.recordings.plain_files.source import PlainSource
 from calib_core.recordings.recording import Recording
 from calib_core.recordings.summary import FileSummary, files_of
-from calib_core.results import DataWarning
 
 _LOSSES = frozenset({
     "checksum", "damaged-file", "definitions-damaged", "file-left-out", "messages-missing", "missing-file", "not-closed",

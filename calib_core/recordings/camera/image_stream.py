@@ -9,12 +9,11 @@ import numpy as np
 
 from calib_core.arrays import Indices, TimesNs, frozen_array
 from calib_core.errors import MessageError, RecordingError
-from calib_core.measurements import TimeNs
+from calib_core.measurements import DataWarning, TimeNs
 from calib_core.recordings.camera.images import EncodedImage, ImageLayout, encoded_pixels
 from calib_core.recordings.camera.video_packets import Packet, PacketDecoder
 from calib_core.recordings.time.written_times import utc
 from calib_core.recordings.topics import Topic
-from calib_core.results import DataWarning
 
 _HEAD_BYTES = 4096
 _SOUGHT_MESSAGES = 2000

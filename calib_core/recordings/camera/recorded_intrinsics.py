@@ -10,11 +10,11 @@ import numpy as np
 from calib_core.camera import Camera, CameraModel
 from calib_core.errors import RecordingError
 from calib_core.lens_models.registry import LENS_MODELS, lenses_of_opencv, names_in, opencv_lens
+from calib_core.measurements import DataWarning
 from calib_core.recordings.camera.image_stream import ImageStream
 from calib_core.recordings.messages.decoding import Message
 from calib_core.recordings.messages.definitions import Definition
 from calib_core.recordings.topics import Topic
-from calib_core.results import DataWarning
 
 
 @dataclass(frozen=True, slots=True, eq=False)

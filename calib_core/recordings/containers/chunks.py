@@ -19,6 +19,7 @@ import numpy as np
 
 from calib_core.arrays import Indices
 from calib_core.errors import RecordingError
+from calib_core.measurements import DataWarning
 from calib_core.recordings.assumptions import Assumption
 from calib_core.recordings.containers.compression import refuse_bomb, unpack, unpack_what_is_there
 from calib_core.recordings.containers.index_cache import (
@@ -31,7 +32,6 @@ from calib_core.recordings.containers.index_cache import (
 )
 from calib_core.recordings.containers.positioned_reads import FileBytes
 from calib_core.recordings.containers.sources import Channel, Heads, MessageIndex, Progress
-from calib_core.results import DataWarning
 
 ChannelFilter: TypeAlias = Callable[[Channel], bool]
 CACHE_BYTES = 24 * 2**20

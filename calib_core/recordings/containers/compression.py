@@ -11,8 +11,8 @@ from tempfile import TemporaryDirectory
 from typing import Any, Protocol
 
 from calib_core.errors import RecordingError
+from calib_core.measurements import DataWarning
 from calib_core.recordings.containers.positioned_reads import FileBytes
-from calib_core.results import DataWarning
 
 MAX_CHUNK_BYTES = 1 << 28
 """Recorders write chunks of about 1 MB; a compressed one that declares more than 256 MiB is damaged or malicious."""

@@ -18,6 +18,7 @@ from typing import TypeAlias
 import numpy as np
 
 from calib_core.errors import RecordingError
+from calib_core.measurements import DataWarning
 from calib_core.recordings.containers.chunks import ChannelFilter, Chunk
 from calib_core.recordings.containers.compression import packing_of
 from calib_core.recordings.containers.mcap.reader import McapSource
@@ -30,7 +31,6 @@ from calib_core.recordings.containers.sources import GrowingSource, Heads, Messa
 from calib_core.recordings.containers.sqlite.reader import MAGIC as SQLITE_MAGIC
 from calib_core.recordings.containers.sqlite.reader import SqliteSource
 from calib_core.recordings.containers.sqlite.recovery import open_database, rows_after
-from calib_core.results import DataWarning
 
 _SUFFIXES = (".bag", ".mcap", ".db3", ".active")
 _METADATA = "metadata.yaml"

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from calib_core.errors import RecordingError
+from calib_core.measurements import DataWarning
 from calib_core.recordings.containers.chunks import ChannelFilter
 from calib_core.recordings.containers.compression import packing_of, unpacked_file
 from calib_core.recordings.containers.mcap import reader as mcap
@@ -15,7 +16,6 @@ from calib_core.recordings.containers.positioned_reads import FileBytes
 from calib_core.recordings.containers.rosbag1.reader import Rosbag1Source
 from calib_core.recordings.containers.sources import Source
 from calib_core.recordings.containers.sqlite import reader as sqlite_bag
-from calib_core.results import DataWarning
 
 _SUFFIXES = (".bag", ".mcap", ".db3")
 _MORE_SUFFIXES = (".active", ".zstd", ".zst", ".gz", ".bz2", ".lz4")

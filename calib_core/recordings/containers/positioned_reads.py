@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 from typing import Protocol
 
 from calib_core.errors import RecordingError
-from calib_core.results import DataWarning
+from calib_core.measurements import DataWarning
 
 _BUFFER_BYTES = 1 << 20
 _OVERLAP_BYTES = 64

@@ -8,8 +8,8 @@ from typing import Literal, Protocol, TypeAlias
 import numpy as np
 
 from calib_core.arrays import Indices, TimesNs
+from calib_core.measurements import DataWarning
 from calib_core.recordings.assumptions import Assumption
-from calib_core.results import DataWarning
 
 Encoding = Literal["ros1", "cdr"]
 Progress: TypeAlias = Callable[[int, int], None]

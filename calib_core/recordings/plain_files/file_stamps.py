@@ -10,7 +10,7 @@ import numpy as np
 
 from calib_core.arrays import TimesNs
 from calib_core.errors import RecordingError
-from calib_core.measurements import NS_PER_S, TimeNs
+from calib_core.measurements import NS_PER_S, DataWarning, TimeNs
 from calib_core.recordings.assumptions import Assumption
 from calib_core.recordings.plain_files.source import PlainOptions
 from calib_core.recordings.time.written_times import (
@@ -21,7 +21,6 @@ from calib_core.recordings.time.written_times import (
     moments_in,
     read_time,
 )
-from calib_core.results import DataWarning
 
 _FRACTIONS = (3, 6, 9)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from calib_core.errors import RecordingError
-from calib_core.measurements import TimeNs
+from calib_core.measurements import DataWarning, TimeNs
 from calib_core.recordings.assumptions import Assumption
 from calib_core.recordings.plain_files.pictures import PICTURE_SUFFIXES, open_picture_folder
 from calib_core.recordings.plain_files.radar_scans import is_lidar_bin, open_bin_folder, open_pcd_folder
@@ -19,7 +19,6 @@ from calib_core.recordings.plain_files.tables.opening import (
     table_fault,
 )
 from calib_core.recordings.plain_files.video import VIDEO_SUFFIXES, open_video
-from calib_core.results import DataWarning
 
 _Opener = Callable[[Path, Sequence[Path], PlainOptions, Mapping[int, TimeNs]], PlainSource]
 _FOLDERS: Mapping[str, _Opener] = {

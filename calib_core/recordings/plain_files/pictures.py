@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from calib_core.errors import MessageError, RecordingError
-from calib_core.measurements import TimeNs
+from calib_core.measurements import DataWarning, TimeNs
 from calib_core.recordings.camera.jpeg import JPEG_MAGIC, PNG_MAGIC, picture_fault, picture_size_px
 from calib_core.recordings.plain_files.file_stamps import stamp_files
 from calib_core.recordings.plain_files.folder_cameras import FolderCamera, camera_beside
@@ -17,7 +17,6 @@ from calib_core.recordings.plain_files.source import (
     picture_message,
     topic_of,
 )
-from calib_core.results import DataWarning
 
 PICTURE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".ppm", ".pgm", ".tif", ".tiff", ".webp")
 _FRAME = "camera"

@@ -9,12 +9,11 @@ import numpy as np
 
 from calib_core.arrays import TimesNs
 from calib_core.errors import RecordingError
-from calib_core.measurements import NS_PER_S, TimeNs
+from calib_core.measurements import NS_PER_S, DataWarning, TimeNs
 from calib_core.recordings.assumptions import Assumption
 from calib_core.recordings.containers.sources import Channel, Heads, MessageIndex
 from calib_core.recordings.field_words import MappedColumn
 from calib_core.recordings.plain_files.folder_cameras import FolderCamera
-from calib_core.results import DataWarning
 
 _HEADER_BYTES = 16
 _CODES = {"i1": 1, "u1": 2, "i2": 3, "u2": 4, "i4": 5, "u4": 6, "f4": 7, "f8": 8}

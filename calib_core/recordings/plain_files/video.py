@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calib_core.errors import MessageError, RecordingError
-from calib_core.measurements import TimeNs
+from calib_core.measurements import DataWarning, TimeNs
 from calib_core.recordings.plain_files.source import PlainSource, picture_channel, picture_message, topic_of
 from calib_core.recordings.time.written_times import read_time
-from calib_core.results import DataWarning
 
 if TYPE_CHECKING:
     pass

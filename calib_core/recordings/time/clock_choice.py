@@ -11,9 +11,8 @@ from typing import Literal
 import numpy as np
 
 from calib_core.arrays import Indices, TimesNs
-from calib_core.measurements import NS_PER_S
+from calib_core.measurements import NS_PER_S, DataWarning
 from calib_core.recordings.time.written_times import span_text
-from calib_core.results import DataWarning
 
 YEAR_2000_NS = 946_684_800 * NS_PER_S
 _YEAR_2100_NS = 4_102_444_800 * NS_PER_S

@@ -7,10 +7,9 @@ from typing import Literal
 import numpy as np
 
 from calib_core.arrays import TimesNs, Values
-from calib_core.measurements import NS_PER_S
+from calib_core.measurements import NS_PER_S, DataWarning
 from calib_core.recordings.time.clock_choice import YEAR_2000_NS, Clock, Stamps, header_fault, receive_fault
 from calib_core.recordings.time.written_times import span_text
-from calib_core.results import DataWarning
 
 _GAP_PERIODS = 5.0
 _ISLAND_S = 10.0

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calib_core.errors import RecordingError
+from calib_core.measurements import DataWarning
 from calib_core.recordings.containers.chunks import FIRST_CHUNKS, ChannelFilter, Chunk, ChunkedSource, about_recovery
 from calib_core.recordings.containers.mcap.records import (
     BETWEEN_CHUNKS,
@@ -31,7 +32,6 @@ from calib_core.recordings.containers.mcap.records import (
 from calib_core.recordings.containers.mcap.recovery import scan_mcap
 from calib_core.recordings.containers.positioned_reads import FileStretch, MemoryStretch
 from calib_core.recordings.containers.sources import MessageIndex
-from calib_core.results import DataWarning
 
 if TYPE_CHECKING:
     from calib_core.recordings.containers.positioned_reads import FileBytes

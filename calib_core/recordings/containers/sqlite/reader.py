@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from calib_core.errors import RecordingError
+from calib_core.measurements import DataWarning
 from calib_core.recordings.assumptions import Assumption
 from calib_core.recordings.containers.compression import unpack_message
 from calib_core.recordings.containers.index_cache import cache_of, heads_from, keep_heads
@@ -22,7 +23,6 @@ from calib_core.recordings.containers.sqlite.recovery import (
     first_rows,
     scan_rows,
 )
-from calib_core.results import DataWarning
 
 if TYPE_CHECKING:
     from calib_core.recordings.containers.positioned_reads import FileBytes

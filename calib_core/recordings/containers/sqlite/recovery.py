@@ -13,8 +13,8 @@ from urllib.parse import quote
 import numpy as np
 
 from calib_core.errors import RecordingError
+from calib_core.measurements import DataWarning
 from calib_core.recordings.containers.positioned_reads import FileBytes
-from calib_core.results import DataWarning
 
 _MAX_VALUE_BYTES = 1 << 28
 _BATCH_ROWS = 20_000

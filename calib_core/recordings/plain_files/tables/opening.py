@@ -10,7 +10,7 @@ import numpy as np
 
 from calib_core.arrays import TimesNs
 from calib_core.errors import MessageError, RecordingError
-from calib_core.measurements import TimeNs
+from calib_core.measurements import DataWarning, TimeNs
 from calib_core.recordings.assumptions import Assumption
 from calib_core.recordings.field_words import MappedColumn, is_plain
 from calib_core.recordings.plain_files.file_stamps import StampedFiles, stamp_files
@@ -43,7 +43,6 @@ from calib_core.recordings.radar.column_guess import (
 from calib_core.recordings.radar.column_mapping import StatedReading
 from calib_core.recordings.radar.column_plan import ColumnPlan
 from calib_core.recordings.radar.columns import returns_from
-from calib_core.results import DataWarning
 
 JSON_SUFFIXES = (".json", ".jsonl", ".ndjson")
 TABLE_SUFFIXES = (".csv", ".tsv", ".txt", *JSON_SUFFIXES)
