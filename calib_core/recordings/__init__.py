@@ -1,13 +1,12 @@
 """Read recordings: ROS 1 and ROS 2 files in; radar scans, images and intrinsics out. No other package knows containers."""
 
-from calib_core.recordings.assumptions import about_assumptions, assumption_hint
 from calib_core.recordings.camera.images import EncodedImage
 from calib_core.recordings.containers.opening import holds_recording
-from calib_core.recordings.first_picture import first_picture
+from calib_core.recordings.containers.sources import about_assumptions, assumption_hint
 from calib_core.recordings.following import AwaitedRecording, FollowedRecording, Growth
 from calib_core.recordings.frame_transforms import FrameTransform, frame_transforms
 from calib_core.recordings.plain_files.folder_cameras import size_of_pictures_beside
-from calib_core.recordings.recording import Recording, inspect_recording, open_recording, require_files
+from calib_core.recordings.recording import Recording, first_picture, inspect_recording, open_recording, require_files
 from calib_core.recordings.selection import RecordingOptions, figures_text
 from calib_core.recordings.summary import RecordingSummary, clock_lines, describe, recording_summary
 from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis

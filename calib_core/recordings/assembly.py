@@ -11,7 +11,6 @@ from calib_core.arrays import TimesNs
 from calib_core.camera import Camera
 from calib_core.errors import RecordingError
 from calib_core.measurements import DataWarning, Stamp, TimeNs
-from calib_core.recordings.assumptions import Assumption, about_assumptions
 from calib_core.recordings.camera.image_stream import ImageStream, about_video, frames_of_one_size, image_stream
 from calib_core.recordings.camera.images import ImageLayout
 from calib_core.recordings.camera.recorded_intrinsics import published_camera, recorded_camera
@@ -23,13 +22,12 @@ from calib_core.recordings.checks import (
     check_overlap,
     without_certain_zone,
 )
-from calib_core.recordings.containers.sources import Source
+from calib_core.recordings.containers.sources import Assumption, Source, about_assumptions
 from calib_core.recordings.field_words import parse_column_map
 from calib_core.recordings.messages.decoding import Message
 from calib_core.recordings.plain_files.folder_cameras import FolderCamera
 from calib_core.recordings.plain_files.source import PlainSource
-from calib_core.recordings.radar.axes import parse_radar_axes
-from calib_core.recordings.radar.column_mapping import StatedReading
+from calib_core.recordings.radar.column_plan import StatedReading, parse_radar_axes
 from calib_core.recordings.radar.layouts import layouts_of_parts
 from calib_core.recordings.radar.merging import MergedStream
 from calib_core.recordings.radar.message_layouts.single_returns import PointLayout

@@ -8,8 +8,8 @@ from calib_core.arrays import TimesNs
 from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import NS_PER_S, DataWarning, TimeNs
 from calib_core.radar import polar_from_cartesian
-from calib_core.recordings.assumptions import Assumption
 from calib_core.recordings.camera.image_stream import ImageStream
+from calib_core.recordings.containers.sources import Assumption
 from calib_core.recordings.radar.column_plan import ColumnPlan
 from calib_core.recordings.radar.columns import Returns
 from calib_core.recordings.radar.merging import MergedStream

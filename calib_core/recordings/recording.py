@@ -2,7 +2,7 @@
 
 import hashlib
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -16,25 +16,24 @@ from calib_core.errors import InputError, RecordingError
 from calib_core.input_files import name_text, special_kind
 from calib_core.measurements import Boxes, DataWarning, RadarScans, TimeNs
 from calib_core.recordings.assembly import Assembly, assemble
-from calib_core.recordings.assumptions import Assumption, StatedAssumption
 from calib_core.recordings.box_topics import boxes_in_topic
 from calib_core.recordings.camera.image_stream import ImageStream
-from calib_core.recordings.camera.images import EncodedImage
-from calib_core.recordings.containers.opening import open_sources
-from calib_core.recordings.containers.sources import Source
+from calib_core.recordings.camera.images import EncodedImage, is_picture
+from calib_core.recordings.camera.recorded_intrinsics import is_camera_info
+from calib_core.recordings.containers.opening import open_beginnings, open_sources
+from calib_core.recordings.containers.sources import Assumption, Channel, Source, StatedAssumption
 from calib_core.recordings.field_words import parse_column_map
+from calib_core.recordings.messages.definitions import definition_of
 from calib_core.recordings.plain_files.opening import files_behind, open_plain_sources
 from calib_core.recordings.plain_files.source import PlainOptions
 from calib_core.recordings.plain_files.ti_uart import open_uart_streams
 from calib_core.recordings.plain_files.video import VIDEO_SUFFIXES
-from calib_core.recordings.radar.axes import parse_radar_axes
-from calib_core.recordings.radar.column_plan import ColumnReading
-from calib_core.recordings.radar.column_plans import column_readings
+from calib_core.recordings.radar.column_plan import ColumnReading, column_readings, parse_radar_axes
 from calib_core.recordings.radar.merging import MergedStream
 from calib_core.recordings.radar.sensors import RadarSensor, figures_of
-from calib_core.recordings.selection import Need, RecordingOptions
+from calib_core.recordings.selection import Inventory, Need, RecordingOptions, Usage, select_image, usage_of
 from calib_core.recordings.time.written_times import parse_zone
-from calib_core.recordings.topics import TopicSummary, join_topics, read_stamps
+from calib_core.recordings.topics import Topic, TopicSummary, join_topics, read_stamps
 from calib_core.results import InputFile
 
 _HASH_BYTES = 1 << 22
@@ -420,3 +419,66 @@ def require_files(paths: Sequence[Path]) -> tuple[Path, ...]:
                 f"{path}: is {kind}; a recording must be a regular file or a folder: save it to a file first"
             )
     return tuple(paths)
+
+
+def first_picture(paths: Sequence[Path], options: RecordingOptions | None = None) -> EncodedImage | None:
+    """Return a picture from the beginning of a recording, reading very little of it.
+
+    It comes from the camera that opening the recording will most likely choose, and is not always the first frame of the
+    timeline.
+
+    Args:
+        paths: as for open_recording.
+        options: as for open_recording.
+
+    Returns:
+        None if the whole recording must be read first: it is damaged, compressed, a video, or not a recording.
+    """
+    options = options or RecordingOptions()
+    try:
+        for source in open_beginnings(paths, _is_picture):
+            try:
+                picture = _picture(source, options)
+            finally:
+                source.close()
+            if picture is not None:
+                return picture
+    except (RecordingError, OSError):
+        return None  # opening the recording reports what is wrong
+    return None
+
+
+def _is_picture(channel: Channel) -> bool:
+    try:
+        return is_picture(definition_of(channel))
+    except RecordingError:
+        return False
+
+
+def _picture(source: Source, options: RecordingOptions) -> EncodedImage | None:
+    topics, _ = join_topics((source,))
+    inventory = Inventory(source.path.name, topics, {topic.name: _usage(topic) for topic in topics}, _counts(source))
+    topic = select_image(inventory, options.image_topic if options.image_topic in inventory.usages else None)
+    layout = inventory.usages[topic.name].image if topic is not None else None
+    if topic is None or layout is None:
+        return None
+    payload = topic.payload(0)
+    return None if layout.packet(payload) is not None else layout.encoded(payload)
+
+
+def _usage(topic: Topic) -> Usage:
+    """Inspect the messages of image topics; of other topics, only the declaration."""
+    channel = topic.parts[0][1]
+    if _is_picture(channel):
+        return usage_of(topic)
+    try:
+        return Usage("camera-info" if is_camera_info(definition_of(channel)) else "other")
+    except RecordingError:
+        return Usage("other")
+
+
+def _counts(source: Source) -> Mapping[str, int]:
+    found: dict[str, int] = {}
+    for channel in source.channels:
+        found[channel.topic] = found.get(channel.topic, 0) + source.counts.get(channel.id, 0)
+    return found

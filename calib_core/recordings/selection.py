@@ -14,7 +14,7 @@ from calib_core.recordings.box_topics import BoxLayout, box_layout
 from calib_core.recordings.camera.images import ImageLayout, is_picture
 from calib_core.recordings.camera.recorded_intrinsics import is_camera_info
 from calib_core.recordings.messages.definitions import PRIMITIVES, Definition
-from calib_core.recordings.radar.column_mapping import StatedReading
+from calib_core.recordings.radar.column_plan import StatedReading
 from calib_core.recordings.radar.layouts import RadarLayout, recognise
 from calib_core.recordings.radar.message_layouts.list_messages import struct_lists
 from calib_core.recordings.radar.message_layouts.samples import leaf_names

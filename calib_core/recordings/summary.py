@@ -10,7 +10,7 @@ from calib_core.arrays import TimesNs
 from calib_core.errors import RecordingError
 from calib_core.input_files import name_text
 from calib_core.measurements import NS_PER_S, DataWarning, Stamp, TimeNs
-from calib_core.recordings.assumptions import StatedAssumption
+from calib_core.recordings.containers.sources import StatedAssumption
 from calib_core.recordings.radar.column_plan import ColumnReading
 from calib_core.recordings.radar.message_layouts.single_returns import PointLayout, first_of_scans
 from calib_core.recordings.radar.sensors import RadarSensor

@@ -29,7 +29,7 @@ from calib_core.recordings.containers.copying import Losses, copied_file
 from calib_core.recordings.field_words import parse_column_map
 from calib_core.recordings.messages.decoding import decode
 from calib_core.recordings.messages.definitions import parse_definition
-from calib_core.recordings.radar.axes import parse_radar_axes
+from calib_core.recordings.radar.column_plan import parse_radar_axes
 from calib_core.recordings.radar.layouts import recognise
 from calib_core.recordings.time.written_times import read_time, time_from_name
 from cocalib.session import ClickExcluded, ClickPlaced, ClicksImported, History, RecordingFacts, Undo, advance, settled

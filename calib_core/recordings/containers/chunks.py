@@ -20,7 +20,6 @@ import numpy as np
 from calib_core.arrays import Indices
 from calib_core.errors import RecordingError
 from calib_core.measurements import DataWarning
-from calib_core.recordings.assumptions import Assumption
 from calib_core.recordings.containers.compression import refuse_bomb, unpack, unpack_what_is_there
 from calib_core.recordings.containers.index_cache import (
     KeptIndex,
@@ -31,7 +30,7 @@ from calib_core.recordings.containers.index_cache import (
     keep_index,
 )
 from calib_core.recordings.containers.positioned_reads import FileBytes
-from calib_core.recordings.containers.sources import Channel, Heads, MessageIndex, Progress
+from calib_core.recordings.containers.sources import Assumption, Channel, Heads, MessageIndex, Progress
 
 ChannelFilter: TypeAlias = Callable[[Channel], bool]
 CACHE_BYTES = 24 * 2**20

@@ -33,7 +33,7 @@ from calib_core.recordings.containers.rosbag1.index import CONNECTION, fields_of
 from calib_core.recordings.containers.rosbag1.reader import Rosbag1Source
 from calib_core.recordings.containers.rosbag1.recovery import scan_bag
 from calib_core.recordings.containers.sources import MessageIndex, Source, StoredChannel
-from calib_core.recordings.containers.sqlite.reader import SqliteSource
+from calib_core.recordings.containers.sqlite import SqliteSource
 
 _PIECE_BYTES = 1 << 20
 

@@ -28,9 +28,8 @@ from calib_core.recordings.containers.positioned_reads import FileBytes
 from calib_core.recordings.containers.rosbag1.reader import Rosbag1Source, channels_of
 from calib_core.recordings.containers.rosbag1.recovery import FoundInBag, scan_bag_further
 from calib_core.recordings.containers.sources import GrowingSource, Heads, MessageIndex, Source
-from calib_core.recordings.containers.sqlite.reader import MAGIC as SQLITE_MAGIC
-from calib_core.recordings.containers.sqlite.reader import SqliteSource
-from calib_core.recordings.containers.sqlite.recovery import open_database, rows_after
+from calib_core.recordings.containers.sqlite import MAGIC as SQLITE_MAGIC
+from calib_core.recordings.containers.sqlite import SqliteSource, open_database, rows_after
 
 _SUFFIXES = (".bag", ".mcap", ".db3", ".active")
 _METADATA = "metadata.yaml"

@@ -8,6 +8,7 @@ from typing import TypeAlias
 
 from calib_core.errors import RecordingError
 from calib_core.measurements import DataWarning
+from calib_core.recordings.containers import sqlite as sqlite
 from calib_core.recordings.containers.chunks import ChannelFilter
 from calib_core.recordings.containers.compression import packing_of, unpacked_file
 from calib_core.recordings.containers.mcap import reader as mcap
@@ -15,7 +16,6 @@ from calib_core.recordings.containers.mcap import records as mcap_records
 from calib_core.recordings.containers.positioned_reads import FileBytes
 from calib_core.recordings.containers.rosbag1.reader import Rosbag1Source
 from calib_core.recordings.containers.sources import Source
-from calib_core.recordings.containers.sqlite import reader as sqlite_bag
 
 _SUFFIXES = (".bag", ".mcap", ".db3")
 _MORE_SUFFIXES = (".active", ".zstd", ".zst", ".gz", ".bz2", ".lz4")
@@ -51,7 +51,7 @@ class _Found:
     warnings: tuple[DataWarning, ...] = ()
 
 
-_AnySource: TypeAlias = Rosbag1Source | mcap.McapSource | sqlite_bag.SqliteSource
+_AnySource: TypeAlias = Rosbag1Source | mcap.McapSource | sqlite.SqliteSource
 
 
 def holds_recording(path: Path) -> bool:
@@ -124,8 +124,8 @@ def _beginning(file: FileBytes, first_of: ChannelFilter, *, packed: bool) -> "_A
         return Rosbag1Source(file, first_of=first_of)
     if head.startswith(mcap_records.MAGIC):
         return mcap.McapSource(file, first_of=first_of)
-    if head == sqlite_bag.MAGIC:
-        return sqlite_bag.SqliteSource(file, packed=packed, first_rows=_FIRST_ROWS)
+    if head == sqlite.MAGIC:
+        return sqlite.SqliteSource(file, packed=packed, first_rows=_FIRST_ROWS)
     return None
 
 
@@ -263,8 +263,8 @@ def _source(file: FileBytes, head: bytes, *, packed: bool) -> "_AnySource":
         return Rosbag1Source(file)
     if head.startswith(mcap_records.MAGIC):
         return mcap.McapSource(file)
-    if head == sqlite_bag.MAGIC:
-        return sqlite_bag.SqliteSource(file, packed=packed)
+    if head == sqlite.MAGIC:
+        return sqlite.SqliteSource(file, packed=packed)
     raise RecordingError(f"{file.path}: {_what_is_it(head)}")
 
 

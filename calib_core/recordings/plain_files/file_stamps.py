@@ -11,7 +11,7 @@ import numpy as np
 from calib_core.arrays import TimesNs
 from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S, DataWarning, TimeNs
-from calib_core.recordings.assumptions import Assumption
+from calib_core.recordings.containers.sources import Assumption
 from calib_core.recordings.plain_files.source import PlainOptions
 from calib_core.recordings.time.written_times import (
     TimeUnit,

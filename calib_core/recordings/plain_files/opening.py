@@ -7,7 +7,7 @@ from pathlib import Path
 
 from calib_core.errors import RecordingError
 from calib_core.measurements import DataWarning, TimeNs
-from calib_core.recordings.assumptions import Assumption
+from calib_core.recordings.containers.sources import Assumption
 from calib_core.recordings.plain_files.pictures import PICTURE_SUFFIXES, open_picture_folder
 from calib_core.recordings.plain_files.radar_scans import is_lidar_bin, open_bin_folder, open_pcd_folder
 from calib_core.recordings.plain_files.source import PlainOptions, PlainSource

@@ -10,8 +10,7 @@ import numpy as np
 from calib_core.arrays import TimesNs
 from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S, DataWarning, TimeNs
-from calib_core.recordings.assumptions import Assumption
-from calib_core.recordings.containers.sources import Channel, Heads, MessageIndex
+from calib_core.recordings.containers.sources import Assumption, Channel, Heads, MessageIndex
 from calib_core.recordings.field_words import MappedColumn
 from calib_core.recordings.plain_files.folder_cameras import FolderCamera
 

@@ -13,8 +13,8 @@ import numpy as np
 from calib_core.arrays import Indices, TimesNs
 from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import NS_PER_S, DataWarning, TimeNs
-from calib_core.recordings.assumptions import Assumption
 from calib_core.recordings.containers.positioned_reads import FileBytes, FileStretch
+from calib_core.recordings.containers.sources import Assumption
 from calib_core.recordings.plain_files.source import PlainSource, cloud_channel, cloud_message, topic_of
 from calib_core.recordings.time.written_times import read_time
 

@@ -8,7 +8,7 @@ it is refused.
 import math
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, TypeAlias, TypeVar
 
@@ -16,7 +16,7 @@ import numpy as np
 
 from calib_core.arrays import Values
 from calib_core.errors import RecordingError
-from calib_core.recordings.assumptions import CONFIRM_ALL, Assumption
+from calib_core.recordings.containers.sources import CONFIRM_ALL, Assumption
 from calib_core.recordings.field_words import (
     OPPOSITE,
     Direction,
@@ -38,15 +38,23 @@ from calib_core.recordings.field_words import (
     words_in,
     words_of,
 )
-from calib_core.recordings.radar.axes import RadarAxes
-from calib_core.recordings.radar.column_mapping import NOTHING_STATED, StatedReading
-from calib_core.recordings.radar.column_plan import ColumnAssumption, ColumnPlan, ColumnReading
+from calib_core.recordings.radar.column_plan import (
+    NOTHING_STATED,
+    ColumnAssumption,
+    ColumnPlan,
+    ColumnReading,
+    RadarAxes,
+    StatedReading,
+)
+from calib_core.recordings.radar.columns import plan_columns
+from calib_core.recordings.radar.registry import MessageKind, find_decoder, plan_for
 
 _T = TypeVar("_T")
 Rules: TypeAlias = Literal["message", "ros", "table"]
 """Who defines units and axes that no column states: nobody, ROS (REP 103), or nobody and the names are those of a table."""
 FARTHEST_M = 1000.0
 """No radar returns lie farther away."""
+_CLOUD_KINDS: tuple[MessageKind, ...] = ("cloud", "channels")
 _SIZES = ("width", "length")
 _NOT_RADARS = ("curvature", "steering", "steer", "lane", "jerk", "effort", "joint", "wheel", "throttle", "brake")
 _MOST_OF_THEM = 0.6
@@ -977,3 +985,32 @@ def _agreement(picked: Mapping[str, Picked]) -> PolarAgreement | None:
     if best[0] > _ALIKE_RAD or second[0] < 3 * max(best[0], 1e-3):
         return None
     return PolarAgreement(best[1], best[2], best[3])
+
+
+def plan_described(
+    kind: MessageKind, columns: Sequence[DescribedColumn], arrays: Iterable[str] = (), remarks: str = ""
+) -> ColumnPlan | None:
+    """Plan the columns of a message by the registry, by the names that ROS defines, or by its own description.
+
+    Args:
+        kind: what the fields are fields of.
+        columns: the numbers of a return, with their values in a sample.
+        arrays: names of fixed arrays of numbers, and of strings.
+        remarks: comments of the definition that belong to no field.
+    """
+    names, arrays = [column.name for column in columns], tuple(arrays)
+    exact = plan_columns(names)
+    if kind in _CLOUD_KINDS and exact is not None and not exact.polar and _is_too_far(exact, columns):
+        return guess_columns(columns, remarks, rules="ros", known=True)
+    if find_decoder(kind, (*names, *arrays)):
+        return plan_for(kind, names, arrays)
+    if kind in _CLOUD_KINDS and exact is not None and {"x", "y"} <= {name.lower() for name in exact.position}:
+        return fill_in(exact, columns)
+    known = exact is not None and exact.looks_like_radar
+    rules: Rules = "ros" if kind in _CLOUD_KINDS else "message"
+    return guess_columns(columns, remarks, rules=rules, known=known or kind in _CLOUD_KINDS)
+
+
+def _is_too_far(plan: ColumnPlan, columns: Sequence[DescribedColumn]) -> bool:
+    """Return whether positions would be farther away than any radar sees if they were metres."""
+    return farthest(*(column.values for column in columns if column.name in plan.position)) > FARTHEST_M

@@ -8,7 +8,7 @@ import numpy as np
 
 from calib_core.errors import MessageError
 from calib_core.recordings.messages.definitions import Definition
-from calib_core.recordings.radar.column_mapping import NOTHING_STATED, StatedReading
+from calib_core.recordings.radar.column_plan import NOTHING_STATED, StatedReading
 from calib_core.recordings.radar.message_layouts.list_messages import ArrayLayout, ListLayout, struct_lists
 from calib_core.recordings.radar.message_layouts.point_clouds import (
     ChannelCloudLayout,

@@ -5,8 +5,16 @@ package: three packages are called radar_msgs. If several match, the one with th
 that matches none is read by its column names alone (columns.py).
 """
 
-from dataclasses import dataclass
-from typing import Literal
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Literal, get_args
+
+from calib_core.plugins import load_plugins, warn_skipped
+from calib_core.recordings.containers.sources import Assumption
+from calib_core.recordings.radar.column_plan import ColumnAssumption, ColumnPlan
+from calib_core.recordings.radar.columns import plan_columns
 
 MessageKind = Literal["cloud", "channels", "list", "arrays", "point"]
 """sensor_msgs/PointCloud2, sensor_msgs/PointCloud, a header with one list, arrays side by side, or one return each."""
@@ -258,3 +266,110 @@ _ARRAYS = (
 
 DECODERS: tuple[Decoder, ...] = (*_CLOUDS, *_CHANNELS, *_LISTS, *_ARRAYS, *_POINTS)
 """Every layout that is known by name."""
+
+
+GROUP = "cocalib.radar_layouts"
+
+
+def find_decoder(kind: MessageKind, names: Iterable[str]) -> Decoder | None:
+    """Return the layout that requires the most of these fields; None if none matches.
+
+    Args:
+        kind: what the fields are fields of.
+        names: as the message spells them; nested ones dotted, arrays included.
+    """
+    have = {name.lower() for name in names}
+    fitting = [d for d in all_decoders() if d.kind == kind and have.issuperset(field.lower() for field in d.fields)]
+    return max(fitting, key=lambda decoder: len(decoder.fields), default=None)
+
+
+def plan_for(kind: MessageKind, names: Iterable[str], arrays: Iterable[str] = ()) -> ColumnPlan | None:
+    """Plan the columns of a message by the registry or by their names alone; None if there is no position.
+
+    Args:
+        kind: what the fields are fields of.
+        names: of single numbers, as the message spells them; nested ones dotted.
+        arrays: names of fixed arrays of numbers, and of strings.
+    """
+    names, arrays = tuple(names), tuple(arrays)
+    decoder = find_decoder(kind, (*names, *arrays))
+    plan = plan_columns(names)
+    if decoder is None:
+        return plan
+    spelt = {name.lower(): name for name in (*arrays, *names)}
+    if plan is None:
+        plan = ColumnPlan(position=(), polar=True)
+    if decoder.polar:
+        polar = tuple(spelt[name.lower()] for name in decoder.polar)
+        claimed = (polar[0], polar[1], polar[2] if len(polar) == 3 else None)
+        plan = replace(plan, position=polar, polar=True, claimed=claimed)
+    return replace(
+        plan,
+        degrees=decoder.degrees or plan.degrees,
+        azimuth_sign=float(decoder.azimuth_sign),
+        doppler=spelt[decoder.doppler.lower()] if decoder.doppler else plan.doppler,
+        velocity=() if decoder.doppler else plan.velocity,
+        amplitude=spelt[decoder.amplitude_field.lower()] if decoder.amplitude_field else plan.amplitude,
+        amplitude_scale=decoder.amplitude_scale,
+        covariance=spelt[decoder.covariance.lower()] if decoder.covariance else None,
+        needed=tuple(spelt[name.lower()] for name in decoder.needed),
+        decoder=decoder.name,
+        assumptions=_assumptions(decoder, polar=bool(plan.polar)),
+        shared_with_lidars=decoder.shared_with_lidars,
+    )
+
+
+def _assumptions(decoder: Decoder, *, polar: bool) -> tuple[ColumnAssumption, ...]:
+    """Return what the layout's documentation leaves open."""
+    if not decoder.assumed:
+        return ()
+    mapped = tuple(re.findall(r"--map (\w+)=", decoder.confirm))
+    key = "field-meaning" if mapped else "azimuth-sign" if polar else "axes"
+    quantities = mapped or (("azimuth",) if polar else ("x", "y"))
+    axes = "--radar-axes" in decoder.confirm
+    unit = "degrees" in decoder.confirm or "radians" in decoder.confirm
+    about = Assumption(key, "", f"{decoder.name}: {decoder.assumed}", decoder.confirm)
+    return (ColumnAssumption(about, quantities, axes, unit),)
+
+
+def plan_like(first: ColumnPlan, kind: MessageKind, names: Iterable[str]) -> ColumnPlan | None:
+    """Plan a later message of a topic: its own columns, with the user's axes of the first plan."""
+    names = tuple(names)
+    if first.described or first.mapped:
+        return first if set(first.columns) <= set(names) else None
+    plan = plan_for(kind, names)
+    if plan is None:
+        return None
+    plan = replace(plan, claiming=first.claiming, azimuth_from=first.azimuth_from)
+    return plan.read_as(first.axes) if first.axes else plan
+
+
+@cache
+def all_decoders() -> tuple[Decoder, ...]:
+    """Return every layout: ours, then those of installed packages, which are loaded once, on first use."""
+    known = list(DECODERS)
+    for plugin in load_plugins(GROUP, Decoder):
+        fault = _fault(plugin.value, known)
+        if fault:
+            warn_skipped(plugin.distribution, f"the radar layout {plugin.value.name!r} {fault}")
+        else:
+            known.append(plugin.value)
+    return tuple(known)
+
+
+def _fault(added: Decoder, known: Iterable[Decoder]) -> str:
+    """Return why a layout cannot be used, "" if it can."""
+    if added.kind not in get_args(MessageKind):
+        return f"has the unknown kind {added.kind!r}; known: {', '.join(get_args(MessageKind))}"
+    if not added.polar and plan_columns(added.fields) is None:
+        return "has no position: its fields have neither x, y, z nor a range and an azimuth, and it has no polar"
+    for one in known:
+        if one.name == added.name:
+            return "has the same name as another layout"
+        if one.kind == added.kind and _folded(one.fields) == _folded(added.fields):
+            return f"is recognised by the same fields as {one.name!r}; it needs one more field to differ"
+    return ""
+
+
+def _folded(names: Iterable[str]) -> set[str]:
+    return {name.lower() for name in names}

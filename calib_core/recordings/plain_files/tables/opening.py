@@ -11,7 +11,7 @@ import numpy as np
 from calib_core.arrays import TimesNs
 from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import DataWarning, TimeNs
-from calib_core.recordings.assumptions import Assumption
+from calib_core.recordings.containers.sources import Assumption
 from calib_core.recordings.field_words import MappedColumn, is_plain
 from calib_core.recordings.plain_files.file_stamps import StampedFiles, stamp_files
 from calib_core.recordings.plain_files.source import PlainOptions, PlainSource, cloud_channel, cloud_message, topic_of
@@ -32,7 +32,6 @@ from calib_core.recordings.plain_files.tables.times import (
     time_reader,
     unknown_unit_error,
 )
-from calib_core.recordings.radar.axes import RadarAxes
 from calib_core.recordings.radar.column_guess import (
     DescribedColumn,
     guess_columns,
@@ -40,8 +39,7 @@ from calib_core.recordings.radar.column_guess import (
     table_meaning,
     unknown_unit,
 )
-from calib_core.recordings.radar.column_mapping import StatedReading
-from calib_core.recordings.radar.column_plan import ColumnPlan
+from calib_core.recordings.radar.column_plan import ColumnPlan, RadarAxes, StatedReading
 from calib_core.recordings.radar.columns import returns_from
 
 JSON_SUFFIXES = (".json", ".jsonl", ".ndjson")

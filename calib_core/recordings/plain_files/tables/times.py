@@ -9,7 +9,7 @@ from operator import itemgetter
 
 from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S, TimeNs
-from calib_core.recordings.assumptions import Assumption
+from calib_core.recordings.containers.sources import Assumption
 from calib_core.recordings.field_words import (
     SUBJECTS,
     TABLE_TYPE_PREFIXES,

@@ -6,16 +6,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib_core.errors import MessageError
-from calib_core.recordings.assumptions import CONFIRM_ALL, Assumption
+from calib_core.recordings.containers.sources import CONFIRM_ALL, Assumption
 from calib_core.recordings.field_words import has_word, words_of
 from calib_core.recordings.messages.decoding import Message, decode
 from calib_core.recordings.messages.definitions import PRIMITIVES, Definition
-from calib_core.recordings.radar.column_guess import DescribedColumn
-from calib_core.recordings.radar.column_mapping import NOTHING_STATED, StatedReading
-from calib_core.recordings.radar.column_plan import ColumnAssumption, ColumnPlan
-from calib_core.recordings.radar.column_plans import find_decoder, plan_described, plan_for
+from calib_core.recordings.radar.column_guess import DescribedColumn, plan_described
+from calib_core.recordings.radar.column_plan import NOTHING_STATED, ColumnAssumption, ColumnPlan, StatedReading
 from calib_core.recordings.radar.columns import Returns, no_returns, returns_from
 from calib_core.recordings.radar.message_layouts.samples import Samples, described, leaf_names
+from calib_core.recordings.radar.registry import find_decoder, plan_for
 
 _DEEPEST = 5
 _COUNTS = ("count", "cnt", "num", "number", "n", "nr", "nof", "size", "len", "length", "total", "valid")

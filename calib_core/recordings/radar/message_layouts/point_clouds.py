@@ -11,12 +11,11 @@ from numpy.lib.stride_tricks import as_strided
 from calib_core.errors import MessageError
 from calib_core.recordings.messages.decoding import Message, decode, payload_byte_order
 from calib_core.recordings.messages.definitions import Definition
-from calib_core.recordings.radar.column_guess import DescribedColumn
-from calib_core.recordings.radar.column_mapping import NOTHING_STATED, StatedReading
-from calib_core.recordings.radar.column_plan import ColumnPlan
-from calib_core.recordings.radar.column_plans import plan_described, plan_for, plan_like
+from calib_core.recordings.radar.column_guess import DescribedColumn, plan_described
+from calib_core.recordings.radar.column_plan import NOTHING_STATED, ColumnPlan, StatedReading
 from calib_core.recordings.radar.columns import Returns, names_a_speed, no_returns, returns_from
 from calib_core.recordings.radar.message_layouts.samples import Samples
+from calib_core.recordings.radar.registry import plan_for, plan_like
 
 _CLOUD_NAMES = frozenset({"height", "width", "fields", "is_bigendian", "point_step", "row_step", "data"})
 

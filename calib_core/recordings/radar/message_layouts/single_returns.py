@@ -9,11 +9,11 @@ import numpy as np
 from calib_core.arrays import TimesNs
 from calib_core.recordings.messages.decoding import Message, Pin, decode, fixed_part
 from calib_core.recordings.messages.definitions import Definition
-from calib_core.recordings.radar.column_mapping import NOTHING_STATED, StatedReading
-from calib_core.recordings.radar.column_plan import ColumnPlan
-from calib_core.recordings.radar.column_plans import find_decoder, plan_described, plan_for
+from calib_core.recordings.radar.column_guess import plan_described
+from calib_core.recordings.radar.column_plan import NOTHING_STATED, ColumnPlan, StatedReading
 from calib_core.recordings.radar.columns import Returns, returns_from
 from calib_core.recordings.radar.message_layouts.samples import Samples, described
+from calib_core.recordings.radar.registry import find_decoder, plan_for
 
 _FRAME_NUMBERS = ("radar_frame_idx", "frame_idx", "frame_number", "frame_id_number", "frame_counter")
 _POINT_NUMBERS = ("point_id", "detection_id", "target_id", "index")

@@ -13,7 +13,7 @@ from calib_core.measurements import NS_PER_S
 from calib_core.recordings import open_recording
 from calib_core.recordings.containers import chunks, index_cache
 from calib_core.recordings.containers.index_cache import FileCache, cache_folder
-from calib_core.recordings.containers.sqlite.reader import SqliteSource
+from calib_core.recordings.containers.sqlite import SqliteSource
 from tests.unit.recordings.conftest import Ros, plain_rows, write_rows
 from tests.unit.recordings.containers.malformed import Kit, without_index
 
@@ -70,7 +70,7 @@ def test_reopening_gives_the_same_and_reads_neither_index_nor_stamps_again(path,
 
     monkeypatch.setattr("calib_core.recordings.containers.rosbag1.reader.Rosbag1Source._read_tail", never)
     monkeypatch.setattr("calib_core.recordings.containers.mcap.reader.McapSource._open", never)
-    monkeypatch.setattr("calib_core.recordings.containers.sqlite.reader.scan_rows", never)
+    monkeypatch.setattr("calib_core.recordings.containers.sqlite.scan_rows", never)
     gather, read = chunks.gather_heads, SqliteSource._read_heads
     few = lambda index: index if len(index) < 500 else never()  # noqa: E731
     monkeypatch.setattr(chunks, "gather_heads", lambda source, index, size: gather(source, few(index), size))

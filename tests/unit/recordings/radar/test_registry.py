@@ -2,6 +2,7 @@
 
 import contextlib
 import random
+import runpy
 import sqlite3
 import sys
 from collections.abc import Callable, Iterator
@@ -15,11 +16,9 @@ from calib_core.errors import MessageError, OptionError
 from calib_core.radar import cartesian_from_polar
 from calib_core.recordings import RecordingOptions, describe, open_recording
 from calib_core.recordings.containers.opening import open_sources
-from calib_core.recordings.radar.axes import parse_radar_axes
-from calib_core.recordings.radar.column_plans import GROUP, all_decoders
+from calib_core.recordings.radar.column_plan import parse_radar_axes
 from calib_core.recordings.radar.layouts import recognise
-from calib_core.recordings.radar.registry import DECODERS, Decoder
-from calib_core.recordings.registry_table import radar_formats
+from calib_core.recordings.radar.registry import DECODERS, GROUP, Decoder, all_decoders
 from calib_core.recordings.topics import join_topics
 from tests.fake_distribution import install
 from tests.unit.recordings.radar.radar_samples import CLOUDS, OTHERS, START_NS, sample
@@ -266,12 +265,12 @@ def test_an_invalid_option_is_refused_before_anything_is_read(ros1, write, plain
         open_recording(write(ros1, plain(ros1, jpeg)), RecordingOptions(radar_axes="sideways"))
 
 
-def test_the_page_of_radar_formats_is_the_one_the_registry_writes() -> None:
-    page = Path(__file__).parents[4] / "docs" / "radar-formats.md"
-    assert page.read_text(encoding="utf-8") == radar_formats(), (
-        "python -m calib_core.recordings.registry_table docs/radar-formats.md"
-    )
-    assert all(f"| {name} |" in radar_formats() for name in NAMES)
+def test_the_page_of_radar_formats_has_the_tables_of_the_registry() -> None:
+    docs = Path(__file__).parents[4] / "docs"
+    page = (docs / "radar-formats.md").read_text(encoding="utf-8")
+    made = runpy.run_path(str(docs / "make_radar_formats.py"))["with_tables"](page)
+    assert page == made, "run: python docs/make_radar_formats.py"
+    assert all(f"| {name} |" in page for name in NAMES)
 
 
 # Radar layouts of other installed packages: they decode messages; and are left out in one line where they are broken.

@@ -241,7 +241,7 @@ def two_lists(first: str, second: str) -> Layout:
 
 def cloud(text: str, *assumed: str, **more: Any) -> Layout:
     """Return a PointCloud2 with unusual field names."""
-    from calib_core.recordings.messages.known_definitions import KNOWN_DEFINITIONS
+    from calib_core.recordings.messages.definitions import KNOWN_DEFINITIONS
     from calib_core.recordings.plain_files.source import cloud_message
 
     rows = fields(text)

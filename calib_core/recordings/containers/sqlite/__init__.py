@@ -1,1 +1,0 @@
-"""ROS 2 bags in SQLite."""

@@ -1,0 +1,64 @@
+"""Write the tables of docs/radar-formats.md from the registry of radar layouts: `python docs/make_radar_formats.py`."""
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+from calib_core.recordings.plain_files.tables.text_tables import csv_columns
+from calib_core.recordings.plain_files.tables.times import TABLE_EXAMPLE
+from calib_core.recordings.radar.registry import DECODERS, Decoder, MessageKind, plan_for
+from calib_core.recordings.time.written_times import DATE_SPELLINGS
+
+PAGE = Path(__file__).parent / "radar-formats.md"
+_KINDS: dict[MessageKind, str] = {
+    "cloud": "Clouds: sensor_msgs/PointCloud2",
+    "channels": "Clouds: sensor_msgs/PointCloud",
+    "list": "A header and one list per message",
+    "arrays": "Arrays side by side",
+    "point": "One return per message",
+}
+
+
+def with_tables(page: str) -> str:
+    """Return the page with the layouts, notes, dates and columns as the registry and the readers have them."""
+    for kind, title in _KINDS.items():
+        rows = _table([decoder for decoder in DECODERS if decoder.kind == kind])
+        page = _replaced(page, f"## {title}\n\n", r"(?:(?!## ).*\n)*", [*rows, ""])
+    notes = [
+        f"* **{d.name}**: {'; '.join(filter(None, (d.note, d.assumed)))}." for d in DECODERS if d.note or d.assumed
+    ]
+    page = _replaced(page, "## Notes\n\n", r"(?:\*.*\n)*", notes)
+    page = _replaced(page, "These are one moment:\n\n", r"(?:\*.*\n)*", [f"* `{date}`" for date in DATE_SPELLINGS])
+    page = _replaced(page, "| quantity | spellings | units |\n|---|---|---|\n", r"(?:\|.*\n)*", csv_columns())
+    return _replaced(page, "of a CSV names columns and units: ", r".*\n", [f"`{TABLE_EXAMPLE}` |"])
+
+
+def _replaced(page: str, before: str, old: str, lines: Iterable[str]) -> str:
+    """Return the page with other lines after a text that it holds once."""
+    assert page.count(before) == 1, before
+    new = "".join(f"{line}\n" for line in lines)
+    return re.sub(re.escape(before) + old, lambda _: before + new, page)
+
+
+def _table(decoders: list[Decoder]) -> list[str]:
+    rows = [
+        "| layout | used by | position [m; angles as listed] | axes | angles | speed [m/s] | amplitude | noise |",
+        "|" + "---|" * 8,
+    ]
+    rows += ["| " + " | ".join(_cells(decoder)) + " |" for decoder in decoders]
+    return [*rows, "", "Recognised by:", "", *(f"* {d.name}: `{' '.join(d.fields)}`" for d in decoders)]
+
+
+def _cells(decoder: Decoder) -> tuple[str, ...]:
+    plan = plan_for(decoder.kind, decoder.fields)
+    assert plan is not None, f"{decoder.name} has no position"
+    speed = ", ".join(filter(None, (plan.doppler, decoder.speed)))
+    amplitude = ", ".join(filter(None, (plan.amplitude, decoder.amplitude)))
+    return (
+        decoder.name, decoder.source, ", ".join(plan.position), decoder.axes,
+        decoder.angles, speed, amplitude, decoder.noise,
+    )  # fmt: skip
+
+
+if __name__ == "__main__":
+    PAGE.write_text(with_tables(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
