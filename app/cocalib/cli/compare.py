@@ -71,13 +71,9 @@ class Compare:
             of_a, of_b = (
                 judged_calibration(self.judging.frames.read([one])[0], one, recording, camera=camera) for one in (a, b)
             )
-            clicks = self.judging.evidence.clicks_in(recording, self.judging.recording, [of_a.found, of_b.found])
-            boxes, labels = self.judging.evidence.boxes_in(recording)
-            if not clicks and boxes is None:
-                raise InputError(
-                    f"{self.judging.recording[0]}: nothing to judge the two by: no clicks (--clicks CLICKS.json) and no boxes "
-                    "(--boxes FILE_OR_TOPIC)"
-                )
+            clicks, boxes, labels = self.judging.evidence.found_in(
+                recording, self.judging.recording, [of_a.found, of_b.found], "the two"
+            )
             with progress_bar("comparing") as progress:
                 compared = compare_on_recording(
                     (of_a.calibration, of_b.calibration),

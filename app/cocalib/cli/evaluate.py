@@ -58,13 +58,9 @@ class Evaluate:
         camera = self.judging.read_camera()
         with self.judging.recorded.open(require=("radar",)) as recording:
             judged = judged_calibration(self.judging.frames.read([path])[0], path, recording, camera=camera)
-            clicks = self.judging.evidence.clicks_in(recording, self.judging.recording, [judged.found])
-            boxes, labels = self.judging.evidence.boxes_in(recording)
-            if not clicks and boxes is None:
-                raise InputError(
-                    f"{self.judging.recording[0]}: nothing to judge {path.name} by: no clicks (--clicks CLICKS.json; click "
-                    "reflectors with cocalib open RECORDING --calibration FILE) and no boxes (--boxes FILE_OR_TOPIC)"
-                )
+            clicks, boxes, labels = self.judging.evidence.found_in(
+                recording, self.judging.recording, [judged.found], path.name
+            )
             with progress_bar("evaluating") as progress:
                 evaluation = evaluate_recording(
                     judged.calibration,

@@ -60,6 +60,29 @@ class EvidenceFlags:
         targets = TargetOptions(min_speed_mps=self.min_speed_mps, sensors=self.sensors)
         return EvidenceOptions(classes=names, max_gap_s=self.max_time_gap_s, targets=targets)
 
+    def found_in(
+        self, recording: "Recording", paths: Sequence[Path], calibrations: "Sequence[ImportedCalibration]", judged: str
+    ) -> "tuple[tuple[ReflectorClick, ...], Boxes | None, ReturnLabels | None]":
+        """Return the clicks, boxes and labels to judge calibrations by.
+
+        Args:
+            recording: that they are in.
+            paths: of it.
+            calibrations: that are judged.
+            judged: what they are called.
+
+        Raises:
+            InputError: they cannot be read, or there are neither clicks nor boxes.
+        """
+        clicks = self.clicks_in(recording, paths, calibrations)
+        boxes, labels = self.boxes_in(recording)
+        if not clicks and boxes is None:
+            raise InputError(
+                f"{paths[0]}: nothing to judge {judged} by: no clicks (--clicks CLICKS.json; click reflectors with "
+                "cocalib open RECORDING --calibration FILE) and no boxes (--boxes FILE_OR_TOPIC)"
+            )
+        return clicks, boxes, labels
+
     def boxes_in(self, recording: "Recording") -> "tuple[Boxes | None, ReturnLabels | None]":
         """Return the boxes and labels that were asked for.
 
