@@ -107,7 +107,9 @@ def test_a_scheduler_that_ends_in_the_middle_is_told_and_what_is_done_is_kept(tm
 
 def test_dask_that_is_not_installed_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(InputError, match=r"Dask is not installed; install cocalib\[fleet\], or leave out --scheduler"):
+    with pytest.raises(
+        InputError, match=r"Dask is not installed; install cocalib\[cluster\], or leave out --scheduler"
+    ):
         list(DaskScheduler("tcp://127.0.0.1:9").run_all(squared, [(1,)]))
 
 
