@@ -37,7 +37,6 @@ _SUMS = re.compile(
     r"_\d+_?(?:frames|scans|sweeps)$", re.I
 )  # View-of-Delft: radar_3frames and radar_5frames beside radar
 _ROS_SUFFIXES = (".bag", ".mcap", ".db3")
-_SAMPLED_FILES = 50
 
 
 def open_plain_sources(
@@ -340,9 +339,7 @@ def _add_leaf(folder: Path, kinds: dict[str, list[Path]], contents: Contents) ->
     except RecordingError as error:
         contents.refused.append((folder, str(error).removeprefix(f"{folder}: ")))
         return
-    lidar = files[0].name.endswith(".pcd.bin") or (
-        files[0].suffix.lower() == ".bin" and is_lidar_bin(files[:_SAMPLED_FILES])
-    )
+    lidar = files[0].name.endswith(".pcd.bin") or (files[0].suffix.lower() == ".bin" and is_lidar_bin(files))
     if lidar:
         contents.refused.append((folder, f"{len(files)} {_LIDAR}"))
     else:

@@ -1,6 +1,8 @@
-"""Read radar returns from one file per scan: nuScenes .pcd and View-of-Delft .bin."""
+"""Read radar returns from one file per scan: .pcd as nuScenes has them, and the .bin files of data sets."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +16,62 @@ _FRAME = "radar"
 _MAX_BYTES = 1 << 28
 _HEAD_BYTES = 1 << 16
 _MAX_POINT_BYTES = 1 << 16
-_DELFT = np.dtype([(name, "<f4") for name in ("x", "y", "z", "rcs", "v_r", "v_r_compensated", "time")])
 _KINDS = {"F": "f", "I": "i", "U": "u"}
+_FARTHEST_M, _FASTEST_MPS, _LOUDEST_DB = 500.0, 150.0, 200.0
+_SAMPLED_FILES, _SAMPLED_BYTES = 20, 7 * 8 * 4 * 256  # whole returns of every layout
+_ENOUGH = 0.95
+
+
+@dataclass(frozen=True, slots=True)
+class BinLayout:
+    """The columns of a return in files of bare numbers.
+
+    Attributes:
+        name: of the data set.
+        columns: float32 each.
+        fits: which returns (n,) of a table of columns can be a radar's.
+    """
+
+    name: str
+    columns: tuple[str, ...]
+    fits: Callable[[np.ndarray], np.ndarray]
+
+    @property
+    def dtype(self) -> "np.dtype[np.void]":
+        """Of a return."""
+        return np.dtype([(name, "<f4") for name in self.columns])
+
+    @property
+    def words(self) -> str:
+        """Describe it."""
+        return f"{self.name} ({len(self.columns)} float32 a return: {' '.join(self.columns)})"
+
+
+def _is_ahead(points: np.ndarray, *, amplitude: str) -> np.ndarray:
+    """Return which returns lie ahead within a radar's reach, and have a speed and an amplitude that it can measure."""
+    range_m = np.sqrt(sum(points[axis].astype(np.float64) ** 2 for axis in "xyz"))
+    sound = (points["x"] >= 0) & (range_m <= _FARTHEST_M) & (np.abs(points["v_r"]) <= _FASTEST_MPS)
+    return np.asarray(sound & (np.abs(points[amplitude]) <= _LOUDEST_DB))
+
+
+def _is_delft(points: np.ndarray) -> np.ndarray:
+    """Return which returns can be View-of-Delft's: the time counts scans back from 0."""
+    ages = -points["time"]
+    whole = (ages >= 0) & (ages <= 100) & (ages == np.round(ages)) & (np.abs(points["v_r_compensated"]) <= _FASTEST_MPS)
+    return _is_ahead(points, amplitude="rcs") & whole
+
+
+def _is_tj4d(points: np.ndarray) -> np.ndarray:
+    """Return which returns can be TJ4DRadSet's: the range is the length of the position, the angles are angles."""
+    range_m = np.sqrt(sum(points[axis].astype(np.float64) ** 2 for axis in "xyz"))
+    angles = (np.abs(points["alpha"]) <= 180) & (np.abs(points["beta"]) <= 90)
+    return _is_ahead(points, amplitude="power") & angles & (np.abs(points["range"] - range_m) <= 0.1 + 0.01 * range_m)
+
+
+BIN_LAYOUTS = (
+    BinLayout("View-of-Delft", ("x", "y", "z", "rcs", "v_r", "v_r_compensated", "time"), _is_delft),
+    BinLayout("TJ4DRadSet", ("x", "y", "z", "v_r", "range", "power", "alpha", "beta"), _is_tj4d),
+)
 
 
 def open_pcd_folder(
@@ -32,12 +88,45 @@ def open_pcd_folder(
 def open_bin_folder(
     folder: Path, files: Sequence[Path], options: PlainOptions, numbered: Mapping[int, TimeNs]
 ) -> PlainSource:
-    """Open a folder of View-of-Delft .bin files, one scan each.
+    """Open a folder of .bin files of a data set, one scan each.
 
     Raises:
-        RecordingError: the files have no times.
+        RecordingError: the files fit no layout, or have no times.
     """
-    return _open(folder, stamp_files(folder, files, options, numbered), "folder of View-of-Delft .bin", points_of_bin)
+    layout, faults = bin_layout(files)
+    if layout is None:
+        raise RecordingError(
+            f"{folder}: its {len(files)} .bin files fit no layout of radar returns: {'; '.join(faults)}; write them as one CSV "
+            "per scan and say which column is which: --map x=1:m --map y=2:m --map z=3:m --map doppler=4:mps"
+        )
+    points = partial(points_of_bin, layout=layout)
+    return _open(folder, stamp_files(folder, files, options, numbered), f"folder of {layout.name} .bin", points)
+
+
+def bin_layout(files: Sequence[Path]) -> tuple[BinLayout | None, list[str]]:
+    """Return the layout that the sizes of all files and the values of a sample fit, or why none does."""
+    sizes = [file.stat().st_size for file in files]
+    faults = []
+    for layout in BIN_LAYOUTS:
+        others = sum(size % layout.dtype.itemsize > 0 for size in sizes)
+        if others:
+            faults.append(f"{layout.words}: {others} of {len(files)} files have another size")
+            continue
+        points = _sampled(files, layout.dtype)
+        fitting = float(np.mean(layout.fits(points))) if len(points) else 0.0
+        if fitting >= _ENOUGH:
+            return layout, []
+        why = f"only {100 * fitting:.0f} % of the returns could be a radar's" if len(points) else "the files are empty"
+        faults.append(f"{layout.words}: {why}")
+    return None, faults
+
+
+def _sampled(files: Sequence[Path], dtype: "np.dtype[np.void]") -> np.ndarray:
+    """Return the first returns of some files spread over a folder."""
+    filled = [file for file in files if file.stat().st_size]
+    places = np.unique(np.linspace(0, len(filled) - 1, min(len(filled), _SAMPLED_FILES)).astype(np.int64))
+    parts = [np.frombuffer(_content(filled[place], _SAMPLED_BYTES), dtype=dtype) for place in places.tolist()]
+    return np.concatenate([np.zeros(0, dtype=dtype), *parts])
 
 
 def _open(folder: Path, stamped: StampedFiles, what: str, points: Callable[[Path], np.ndarray]) -> PlainSource:
@@ -61,33 +150,36 @@ def _open(folder: Path, stamped: StampedFiles, what: str, points: Callable[[Path
 
 
 def is_lidar_bin(files: Sequence[Path]) -> bool:
-    """Return whether .bin files are a lidar's: four floats a point as KITTI has them, not seven as View-of-Delft's radar."""
-    sizes = [file.stat().st_size for file in files]
-    return all(size % 16 == 0 for size in sizes) and any(size % _DELFT.itemsize for size in sizes)
+    """Return whether .bin files are a lidar's: four floats a point as KITTI has them, and of no radar's layout."""
+    if any(file.stat().st_size % 16 for file in files) or bin_layout(files)[0] is not None:
+        return False
+    points = _sampled(files, np.dtype([(name, "<f4") for name in ("x", "y", "z", "intensity")]))
+    near = [np.abs(points[axis]) <= _FARTHEST_M for axis in "xyz"]
+    return bool(np.mean(np.logical_and.reduce(near)) >= _ENOUGH) if len(points) else False
 
 
-def _content(path: Path) -> bytes:
+def _content(path: Path, size: int = -1) -> bytes:
     try:
         if path.stat().st_size > _MAX_BYTES:
             raise MessageError(f"{path.name} has {path.stat().st_size} bytes, which is too large for a radar scan")
-        return path.read_bytes()
+        with path.open("rb") as file:
+            return file.read(size)
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror}; is it still there?") from error
 
 
-def points_of_bin(path: Path) -> np.ndarray:
-    """Read a View-of-Delft scan: 7 float32 per return.
+def points_of_bin(path: Path, layout: BinLayout) -> np.ndarray:
+    """Read a scan of bare numbers.
 
     Raises:
-        MessageError: the size does not fit.
+        MessageError: the size does not fit: the file has changed.
     """
     data = _content(path)
-    if len(data) % _DELFT.itemsize:
+    if len(data) % layout.dtype.itemsize:
         raise MessageError(
-            f"{path.name} has {len(data)} bytes, not a multiple of {_DELFT.itemsize}: not a View-of-Delft radar file "
-            "(7 float32 per return: x y z RCS v_r v_r_compensated time)"
+            f"{path.name} has {len(data)} bytes, not a multiple of {layout.dtype.itemsize}: {layout.words}"
         )
-    return np.frombuffer(data, dtype=_DELFT)
+    return np.frombuffer(data, dtype=layout.dtype)
 
 
 def points_of_pcd(path: Path) -> np.ndarray:

@@ -154,6 +154,10 @@ _CLOUDS = (
         "View-of-Delft radar", "View-of-Delft radar/*.bin (7 float32 each)", "cloud",
         _f("x y z rcs v_r v_r_compensated time"), amplitude="dBsm", note="files are numbered, not stamped",
     ),
+    Decoder(
+        "TJ4DRadSet radar", "TJ4DRadSet velodyne/*.bin (8 float32 each)", "cloud",
+        _f("x y z v_r range power alpha beta"), angles=f"alpha and beta, {_UNUSED}", note="files are numbered, not stamped",
+    ),
 )  # fmt: skip
 
 _CHANNELS = (

@@ -2,6 +2,7 @@
 
 import json
 import struct
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
@@ -215,20 +216,54 @@ def test_an_ascii_pcd_is_read_and_a_compressed_one_is_explained(tmp_path) -> Non
     assert "'binary_compressed' data, but only binary and ascii are supported" in warning.message
 
 
-def delft(folder: Path, count: int = 3) -> np.ndarray:
-    folder.mkdir()
-    rows = np.random.default_rng(4).uniform(1, 9, (count, 5, 7)).astype(np.float32)
-    for number in range(count):
-        (folder / f"{number:05}.bin").write_bytes(rows[number].tobytes())
-    return rows.astype(np.float64)
+def bin_rows(layout: str, count: int, seed: int = 4) -> np.ndarray:
+    """Return (count, k) float32 returns ahead of a radar as View-of-Delft or TJ4DRadSet store them."""
+    rng = np.random.default_rng(seed)
+    points = np.column_stack([rng.uniform(4, 60, count), rng.uniform(-20, 20, count), rng.uniform(-1, 3, count)])
+    speed, power = rng.normal(0, 4, count), rng.uniform(-20, 30, count)
+    if layout == "delft":
+        return np.column_stack([points, power, speed, speed / 2, np.zeros(count)]).astype(np.float32)
+    range_m, across = np.linalg.norm(points, axis=1), np.hypot(points[:, 0], points[:, 1])
+    angles = np.degrees([np.arctan2(points[:, 1], points[:, 0]), np.arctan2(points[:, 2], across)])
+    return np.column_stack([points, speed, range_m, power, *angles]).astype(np.float32)
 
 
-def test_a_bin_file_of_another_kind_is_explained(tmp_path) -> None:
-    delft(tmp_path / "radar", 1)
-    (tmp_path / "radar" / "00000.bin").write_bytes(bytes(30))
-    with inspect_recording(tmp_path / "radar") as recording:
-        assert recording.radar_topic is None
-        assert "not a multiple of 28: not a View-of-Delft radar file" in str(recording.topics[0].problem)
+def bin_folder(folder: Path, scans: Sequence[np.ndarray]) -> Path:
+    folder.mkdir(parents=True)
+    for number, rows in enumerate(scans):
+        (folder / f"{number:06}.bin").write_bytes(rows.tobytes())
+    return folder
+
+
+@pytest.mark.parametrize("above", [False, True], ids=["the folder", "the data set"])
+@pytest.mark.parametrize(("layout", "name", "speed"), [("delft", "View-of-Delft", 4), ("tj4d", "TJ4DRadSet", 3)])
+def test_bin_files_are_read_by_the_layout_that_fits_all_of_them(tmp_path, layout, name, speed, above) -> None:
+    scans = [bin_rows(layout, 28 + 4 * number, number) for number in range(9)]
+    folder = bin_folder(tmp_path / "training" / "velodyne", scans)
+    with open_recording(tmp_path if above else folder, require=("radar",)) as recording:
+        found = recording.radar_scans()
+        assert f"folder of {name} .bin" in describe(recording)
+    assert np.diff(found.first_return).tolist() == [len(rows) for rows in scans]
+    np.testing.assert_array_equal(found.points_radar_m, np.concatenate(scans)[:, :3])
+    np.testing.assert_array_equal(found.doppler_mps, np.concatenate(scans)[:, speed])
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (lambda scans: [*scans, np.zeros((5, 5), np.float32)], "1 of 5 files have another size"),
+        (lambda scans: [rows[:, [1, 0, 2, 3, 4, 5, 6, 7]] for rows in scans], "of the returns could be a radar's"),
+        (lambda scans: [1000 * rows for rows in scans], "only 0 % of the returns could be a radar's"),
+        (lambda scans: [rows[:0] for rows in scans], "the files are empty"),
+    ],
+    ids=["another size", "beside the radar", "millimetres", "empty"],
+)
+def test_bin_files_that_fit_no_layout_are_refused_with_the_way_out(tmp_path, change, reason) -> None:
+    folder = bin_folder(tmp_path / "radar", change([bin_rows("tj4d", 21, number) for number in range(4)]))
+    with pytest.raises(RecordingError, match="fit no layout of radar returns") as caught:
+        inspect_recording(folder)
+    assert reason in str(caught.value)
+    assert "--map x=1:m" in str(caught.value)
 
 
 # -- radar CSV
@@ -408,7 +443,8 @@ def calib_text(matrix_px: np.ndarray = K) -> str:
 
 def floats_bin(path: Path, count: int, columns: int) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(np.random.default_rng(count).uniform(1, 9, (count, columns)).astype(np.float32).tobytes())
+    rows = np.random.default_rng(count).uniform(1, 9, (count, columns)).astype(np.float32)
+    path.write_bytes((bin_rows("delft", count) if columns == 7 else rows).tobytes())
 
 
 def view_of_delft(root: Path, count: int = 3) -> Path:

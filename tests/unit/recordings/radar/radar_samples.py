@@ -100,6 +100,9 @@ CLOUDS: Mapping[str, CloudSpec] = {
         amplitude="rcs", along=("vx", "vy"), warnings=("flat-radar",), change=flat,
     ),
     "View-of-Delft radar": CloudSpec("x:f4 y:f4 z:f4 rcs:f4 v_r:f4 v_r_compensated:f4 time:f4", (), 0, "v_r", "rcs"),
+    "TJ4DRadSet radar": CloudSpec(
+        "x:f4 y:f4 z:f4 v_r:f4 range:f4 power:f4 alpha:f4 beta:f4", (), 0, "v_r", "power", change=true_angles,
+    ),
 }  # fmt: skip
 
 
