@@ -392,6 +392,7 @@ def recording_facts(recording: Recording, name: str) -> RecordingFacts:
         recording.radar_times,
         recording.radar_topics,
         tuple(AssumedReading(one.words, assumption_hint(one.confirm)) for one in recording.assumptions),
+        recording.image_names,
     )
 
 
@@ -458,4 +459,9 @@ def read_sent_boxes(data: bytes, name: str, facts: RecordingFacts) -> Boxes:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / plain
         path.write_bytes(data)
-        return read_boxes(path, image_times=facts.image_times, image_size_px=(facts.width_px, facts.height_px))
+        return read_boxes(
+            path,
+            image_times=facts.image_times,
+            image_size_px=(facts.width_px, facts.height_px),
+            image_names=facts.image_names,
+        )

@@ -1,7 +1,8 @@
 """Read boxes from a file, folder or zip archive of any known format, and match them to recorded frames.
 
-The rule, which docs/boxes.md states: a stamp, or a time in a picture's name, is the recorded frame within 1 ms of it; a
-number counts the recorded frames from 0 or 1. A file whose stamps, count or pictures differ is of another recording.
+The rule, which docs/boxes.md states: equal names of files are one frame; else a stamp, or a time in a picture's name, is the
+recorded frame within 1 ms of it; else a number counts the recorded frames from 0 or 1. A file whose stamps, count or pictures
+differ is of another recording.
 
 The formats are asked in the order of `BOX_FORMATS`. To add one: write its module in `formats/`, and add it there.
 """
@@ -35,13 +36,20 @@ from calib_core.recordings.plain_files.file_stamps import times_in_names
 BOX_FORMATS: tuple[BoxFormat, ...] = (OWN, OPENLABEL, COCO, CVAT, KITTI_TRACKS, KITTI_OBJECTS, YOLO)
 
 
-def read_boxes(path: str | Path, *, image_times: TimesNs, image_size_px: tuple[int, int] | None) -> Boxes:
+def read_boxes(
+    path: str | Path,
+    *,
+    image_times: TimesNs,
+    image_size_px: tuple[int, int] | None,
+    image_names: Sequence[str] = (),
+) -> Boxes:
     """Read boxes of any known format, recognised by content, and give them the stamps of recorded frames.
 
     Args:
         path: of the file, of a folder with one file per frame, or of a zip archive of either.
         image_times: (m,) stamps of the recorded frames, ascending.
         image_size_px: width and height of the recorded pictures; None if unknown.
+        image_names: (m,) of the frames' files without suffix; none if they are not files.
 
     Raises:
         InputError: it cannot be read, is of no known format, or belongs to another recording.
@@ -50,7 +58,9 @@ def read_boxes(path: str | Path, *, image_times: TimesNs, image_size_px: tuple[i
     for known in BOX_FORMATS:
         if known.recognizes(file):
             found = known.read(file)
-            return matched_boxes(found, file.source, image_times=image_times, image_size_px=image_size_px)
+            return matched_boxes(
+                found, file.source, image_times=image_times, image_size_px=image_size_px, image_names=image_names
+            )
     names = ", ".join(known.name for known in BOX_FORMATS)
     raise InputError(f"{name_text(Path(path))}: is no known file of boxes; known: {names}")
 
@@ -173,7 +183,12 @@ _OTHER = "is it of another recording?"
 
 
 def matched_boxes(
-    found: FileBoxes, source: str, *, image_times: TimesNs, image_size_px: tuple[int, int] | None
+    found: FileBoxes,
+    source: str,
+    *,
+    image_times: TimesNs,
+    image_size_px: tuple[int, int] | None,
+    image_names: Sequence[str] = (),
 ) -> Boxes:
     """Give the frames of a file the stamps of recorded frames.
 
@@ -182,6 +197,7 @@ def matched_boxes(
         source: its name, for messages.
         image_times: (m,) stamps of the recorded frames, ascending.
         image_size_px: width and height of the recorded pictures; None if unknown.
+        image_names: (m,) of the frames' files without suffix; none if they are not files.
 
     Raises:
         InputError: the file does not belong to the recording.
@@ -193,8 +209,11 @@ def matched_boxes(
     if not found.frames:
         raise InputError(f"{source}: has no annotated frame; export it again with its frames")
     _refuse_other_pictures(found, source, image_size_px)
-    stamps = _stamps_of(found.frames)
-    if stamps is not None:
+    by_name = _by_name(found.frames, image_names)
+    stamps = _stamps_of(found.frames) if by_name is None else None
+    if by_name is not None:
+        places, notes = by_name
+    elif stamps is not None:
         places, notes = frames_of_stamps(stamps, source, image_times)
     else:
         places, notes = _by_number(found, source, len(image_times))
@@ -229,6 +248,18 @@ def _refuse_other_pictures(found: FileBoxes, source: str, image_size_px: tuple[i
 def _touches(box: Box, width_px: int, height_px: int) -> bool:
     centre_u_px, centre_v_px = (box.left_px + box.right_px) / 2, (box.top_px + box.bottom_px) / 2
     return -0.5 <= centre_u_px <= width_px - 0.5 and -0.5 <= centre_v_px <= height_px - 0.5
+
+
+def _by_name(frames: Sequence[FileFrame], image_names: Sequence[str]) -> tuple[Indices, tuple[str, ...]] | None:
+    """Return the recorded frame of each frame by the name of its picture, -1 for none, and notes; None if no name is equal."""
+    place_of = {name: place for place, name in enumerate(image_names)}
+    places = np.array([place_of.get(frame.name, -1) for frame in frames], dtype=np.int64)
+    matched = int(np.count_nonzero(places >= 0))
+    if not matched:
+        return None
+    left_out = len(places) - matched
+    others = f"; {left_out} others are not among the recorded pictures, and are left out" if left_out else ""
+    return places, (f"{matched} annotated frames have the names of recorded pictures, and are matched by them{others}",)
 
 
 def _stamps_of(frames: Sequence[FileFrame]) -> TimesNs | None:

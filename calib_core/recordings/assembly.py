@@ -25,6 +25,7 @@ from calib_core.recordings.checks import (
 from calib_core.recordings.containers.sources import Assumption, Source, about_assumptions
 from calib_core.recordings.field_words import parse_column_map
 from calib_core.recordings.messages.decoding import Message
+from calib_core.recordings.plain_files.file_stamps import COUNTED
 from calib_core.recordings.plain_files.folder_cameras import FolderCamera
 from calib_core.recordings.plain_files.source import PlainSource
 from calib_core.recordings.radar.column_plan import StatedReading, parse_radar_axes
@@ -283,6 +284,7 @@ def _diagnoses(
                 chosen=clocks[name],
                 requested=options.clock,
                 one_per_return=isinstance(stream, RadarStream) and isinstance(stream.layout, PointLayout),
+                times_from=_times_from(stream.topic),
             )
     return found
 
@@ -348,6 +350,11 @@ def _frame(topic: Topic | None) -> str:
     return str(frame).lstrip("/")
 
 
+def _times_from(topic: Topic) -> str:
+    source = topic.parts[0][0]
+    return source.times_from if isinstance(source, PlainSource) else ""
+
+
 def _computed(topic: Topic) -> str:
     source = topic.parts[0][0]
     return source.computed if isinstance(source, PlainSource) else ""
@@ -368,7 +375,7 @@ def _summary(
 ) -> TopicSummary:
     usage = inventory.usages[topic.name]
     times = stamps.get(topic.name, topic.receive_ns)
-    rhythm = Rhythm.of(times)
+    rhythm = Rhythm() if _times_from(topic) == COUNTED else Rhythm.of(times)
     return TopicSummary(
         name=topic.name,
         type=topic.type,

@@ -25,7 +25,7 @@ from calib_core.recordings.containers.sources import Assumption, Channel, Source
 from calib_core.recordings.field_words import parse_column_map
 from calib_core.recordings.messages.definitions import definition_of
 from calib_core.recordings.plain_files.opening import files_behind, open_plain_sources
-from calib_core.recordings.plain_files.source import PlainOptions
+from calib_core.recordings.plain_files.source import PlainOptions, PlainSource
 from calib_core.recordings.plain_files.ti_uart import open_uart_streams
 from calib_core.recordings.plain_files.video import VIDEO_SUFFIXES
 from calib_core.recordings.radar.column_plan import ColumnReading, column_readings, parse_radar_axes
@@ -249,6 +249,15 @@ class Recording:
     def _check_open(self) -> None:
         if self._closed.is_set():
             raise RecordingError(f"{self.name}: the recording is closed")
+
+    @property
+    def image_names(self) -> tuple[str, ...]:
+        """The names (m,) of the frames' files, without suffix; empty if the frames are not the files of a folder."""
+        images = self._assembly.images
+        source = images.topic.parts[0][0] if images is not None else None
+        if images is None or len(images.topic.parts) > 1 or not isinstance(source, PlainSource):
+            return ()
+        return tuple(source.names[row] for row in images.topic.chunk[images.row].tolist()) if source.names else ()
 
     def camera(self) -> Camera | None:
         """Return the recorded intrinsics; None if there are no usable ones (see warnings)."""

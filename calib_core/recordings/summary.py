@@ -26,6 +26,8 @@ _STRETCH_GAP_NS = NS_PER_S
 _SAMPLED_SCANS = 200
 _STAMP_BYTES = 12
 _KINDS = ("radar", "image")
+_SLOWEST_HZ = 0.1
+"""What is slower is no film."""
 _CLOCKS = {"header": "stamps", "receive": "receive times"}
 _USE = {"radar": "radar", "image": "camera", "camera-info": "intrinsics"}
 
@@ -188,7 +190,7 @@ def _shared(recording: Recording) -> SharedTime | None:
 
 
 def _radar(recording: Recording) -> RadarSummary | None:
-    topic = next((topic for topic in recording.topics if topic.name == recording.radar_topic), None)
+    topic = _topic(recording, recording.radar_topic)
     times = recording.radar_times
     if topic is None or not len(times):
         return None
@@ -196,7 +198,7 @@ def _radar(recording: Recording) -> RadarSummary | None:
     stamps = np.unique(times[places])
     scans = [recording.radar_scans(TimeNs(int(stamp)), TimeNs(int(stamp))) for stamp in stamps]
     counts = np.concatenate([np.diff(scan.first_return) for scan in scans])
-    rhythm = Rhythm.of(times)
+    rhythm = Rhythm() if topic.rate_hz is None else Rhythm.of(times)
     return RadarSummary(
         topic=topic.name,
         frame=recording.radar_frame,
@@ -215,15 +217,20 @@ def _radar(recording: Recording) -> RadarSummary | None:
     )
 
 
+def _topic(recording: Recording, name: str | None) -> TopicSummary | None:
+    return next((topic for topic in recording.topics if topic.name == name), None)
+
+
 def _camera(recording: Recording) -> CameraSummary | None:
-    if recording.image_topic is None or not len(recording.image_times):
+    topic = _topic(recording, recording.image_topic)
+    if recording.image_topic is None or topic is None or not len(recording.image_times):
         return None
     try:
         image, kind = recording.image_bytes(0), recording.recorded_format(0)
     except RecordingError:
         image, kind = None, None
     camera = recording.camera()
-    rhythm = Rhythm.of(recording.image_times)
+    rhythm = Rhythm() if topic.rate_hz is None else Rhythm.of(recording.image_times)
     return CameraSummary(
         topic=recording.image_topic,
         frame=recording.camera_frame,
@@ -392,10 +399,10 @@ def _topic_table(topics: Sequence[TopicSummary]) -> list[str]:
                 topic.name,
                 topic.type,
                 str(topic.count),
-                "" if topic.rate_hz is None else f"{topic.rate_hz:.1f} Hz",
+                _rate_text(topic.rate_hz).removeprefix(" at "),
                 "" if topic.longest_gap_s is None else f"{topic.longest_gap_s:.3f} s",
                 "" if topic.jitter_s is None else f"{topic.jitter_s * 1e3:.1f} ms",
-                _CLOCKS[topic.clock] if topic.chosen and topic.clocks is not None else "",
+                _times_used(topic),
             )
         )
     lines = list(_columns(rows, right={3, 4, 5, 6}))
@@ -405,6 +412,20 @@ def _topic_table(topics: Sequence[TopicSummary]) -> list[str]:
         if topic.problem and topic.problem != "no messages"
     ]
     return [*lines, *(line for problem in problems for line in ("", *_labelled("problem", [problem])))]
+
+
+def _rate_text(rate_hz: float | None) -> str:
+    """Describe a rate; of stills, the time between them."""
+    if rate_hz is None:
+        return ""
+    return f" at {rate_hz:.1f} Hz" if rate_hz >= _SLOWEST_HZ else f" {1.0 / rate_hz:.0f} s apart"
+
+
+def _times_used(topic: TopicSummary) -> str:
+    if not topic.chosen or topic.clocks is None:
+        return ""
+    from_files = topic.clocks.times_from
+    return _CLOCKS[topic.clock] if not from_files else "assumed" if from_files.startswith("assumed") else "of the files"
 
 
 def _clocks(topics: Sequence[TopicSummary]) -> list[str]:
@@ -420,6 +441,8 @@ def _clocks(topics: Sequence[TopicSummary]) -> list[str]:
 
 def clock_lines(found: ClockDiagnosis) -> tuple[str, ...]:
     """Describe which clock a topic uses and why, and in a second line, if needed, what is known about both clocks."""
+    if found.times_from:
+        return (f"times are {found.times_from}", *(["; ".join(found.remarks)] if found.remarks else []))
     used = {"header": "header stamps", "receive": "the recorder's receive times"}[found.chosen]
     about = []
     if found.delay_s == 0 and found.delay_jitter_s == 0:
@@ -441,7 +464,7 @@ def _radar_lines(radar: RadarSummary | None) -> list[str]:
     if radar is None:
         return ["no readable topic"]
     low, middle, high = radar.returns_per_scan
-    rate = "" if radar.rate_hz is None else f" at {radar.rate_hz:.1f} Hz"
+    rate = _rate_text(radar.rate_hz)
     gap = "" if radar.longest_gap_s is None else f", longest gap {radar.longest_gap_s:.3f} s"
     sample = "" if radar.sampled_scans >= radar.scans else f", from {radar.sampled_scans} scans"
     twice = ", each at every azimuth reported for it" if radar.other_azimuths else ""
@@ -495,7 +518,7 @@ def _readings(radar: RadarSummary) -> list[str]:
 def _camera_lines(camera: CameraSummary | None) -> list[str]:
     if camera is None:
         return ["no readable topic"]
-    rate = "" if camera.rate_hz is None else f" at {camera.rate_hz:.1f} Hz"
+    rate = _rate_text(camera.rate_hz)
     gap = "" if camera.longest_gap_s is None else f", longest gap {camera.longest_gap_s:.3f} s"
     size = "the first image cannot be read"
     if camera.width_px is not None:

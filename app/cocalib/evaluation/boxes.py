@@ -28,7 +28,12 @@ def find_boxes(
     """
     path = Path(file_or_topic)
     if _exists(path):
-        return read_boxes(path, image_times=recording.image_times, image_size_px=_image_size_px(recording))
+        return read_boxes(
+            path,
+            image_times=recording.image_times,
+            image_size_px=_image_size_px(recording),
+            image_names=recording.image_names,
+        )
     if any(topic.name == file_or_topic for topic in recording.topics):
         return recording.boxes(file_or_topic)
     if file_or_topic == MOVING:

@@ -132,6 +132,7 @@ class RecordingFacts:
         radar_times: (k,) stamps of the radar's scans [ns], ascending; they identify a recording without frames.
         radar_topics: all topics of the radar.
         assumptions: what its files do not state and the user has not confirmed on opening it.
+        image_names: (m,) of the frames' files without suffix; none if the frames are not files.
     """
 
     name: str
@@ -142,6 +143,7 @@ class RecordingFacts:
     radar_times: TimesNs = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     radar_topics: tuple[str, ...] = ()
     assumptions: tuple[AssumedReading, ...] = ()
+    image_names: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("image_times", "radar_times"):

@@ -3,7 +3,7 @@
 import csv
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +12,7 @@ from calib_core.arrays import TimesNs
 from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S, DataWarning, TimeNs
 from calib_core.recordings.containers.sources import Assumption
-from calib_core.recordings.plain_files.source import PlainOptions
+from calib_core.recordings.plain_files.source import PlainOptions, PlainSource
 from calib_core.recordings.time.written_times import (
     TimeUnit,
     WrittenMoment,
@@ -46,8 +46,13 @@ _ENOUGH = 0.8
 _HEADER_ROWS = 10
 
 
-def _no_numbers() -> dict[int, TimeNs]:
-    return {}
+COUNTED = "assumed: the files or scans are numbered and have no times, and are taken as 0.1 s apart"
+
+
+_NUMBERED_LINE = re.compile(
+    r"(?:frame|id|image|file)\s*[:=]\s*(\S+?)[,;]?\s+(?:time|timestamp|stamp)\s*[:=]\s*(\S+)", re.I
+)
+"""Such as RADIATE's "Frame: 000001 Time: 1574859772.427742418"."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,7 +85,7 @@ class StampedFiles:
         zoneless: whether the times are dates without a zone.
         counted: whether they come from the numbers of the files.
         assumed: what the digits in the names were taken for, if they do not say it.
-        numbers: times by the numbers in the file names; empty if the times themselves come from those numbers.
+        times_from: where the times come from, as a clause.
     """
 
     files: tuple[Path, ...]
@@ -89,7 +94,12 @@ class StampedFiles:
     zoneless: bool = False
     counted: bool = False
     assumed: str = ""
-    numbers: Mapping[int, TimeNs] = field(default_factory=_no_numbers)
+    times_from: str = ""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the files, without suffix."""
+        return tuple(file.stem for file in self.files)
 
     def assumptions(self, topic: str) -> tuple[Assumption, ...]:
         """Return what was assumed about the times, for the topic that the files become."""
@@ -102,19 +112,19 @@ def stamp_files(
     folder: Path,
     files: Sequence[Path],
     options: PlainOptions | None = None,
-    numbered: Mapping[int, TimeNs] | None = None,
+    known: PlainSource | None = None,
 ) -> StampedFiles:
     """Assign a time to every file; files without one are skipped, with a warning.
 
-    Sources, in this order: a CSV with a column of file names and one of times; a text file with one time per line and as
-    many lines as files; times in the file names; numbers in all file names, which have the time of the picture with the same
-    number, or else are taken as 0.1 s apart.
+    Sources, in this order: a table of times in or beside the folder, which names the files, numbers them, or has as many lines
+    as there are files; times in the file names; the times of another folder's files of equal names, then of equal numbers;
+    otherwise numbered files are taken as 0.1 s apart.
 
     Args:
         folder: of the files.
         files: without the tables of times.
         options: the user's.
-        numbered: times of pictures by their number.
+        known: another folder, whose files have times.
 
     Raises:
         RecordingError: no file has a time.
@@ -126,17 +136,20 @@ def stamp_files(
     for table in [*tables, *(path for path in beside if path.is_file() and path not in own)]:
         times, zoneless = _from_table(table, files, options.zone_s)
         if times:
-            return _stamped(folder, files, times, zoneless=zoneless)
+            return _stamped(folder, files, times, zoneless=zoneless, times_from=f"those in {table.name}")
     named = times_in_names([file.stem for file in files], options.zone_s)
     if named is not None:
         return _by_name(folder, files, named)
+    matched = _like_files_of(known, folder, files) if known is not None else None
+    if matched is not None:
+        return matched
     numbers = {file: number for file in files if (number := _number(file)) is not None}
     if len(numbers) < len(files) or len(set(numbers.values())) < len(files):
         raise RecordingError(
             f"{folder}: no times in the file names ({files[0].name}); name the files by their time since 1970 "
             "(19 digits for ns, 16 us, 13 ms, 10 s), or add a CSV with the columns file,time_ns to the folder"
         )
-    return _counted(folder, files, numbers, numbered or {})
+    return _counted(folder, files, numbers)
 
 
 def _by_name(folder: Path, files: Sequence[Path], named: NamedTimes) -> StampedFiles:
@@ -151,22 +164,35 @@ def _by_name(folder: Path, files: Sequence[Path], named: NamedTimes) -> StampedF
                 "check a few names; the times are used: add a CSV with the columns file,time_ns if they are wrong",
             ),
         )
-    return _stamped(folder, files, times, *warnings, zoneless=named.zoneless, assumed=named.assumed)
+    told = (
+        f"they stand in the file names; assumed: {named.assumed}" if named.assumed else "they stand in the file names"
+    )
+    return _stamped(folder, files, times, *warnings, zoneless=named.zoneless, assumed=named.assumed, times_from=told)
 
 
-def _counted(
-    folder: Path, files: Sequence[Path], numbers: Mapping[Path, int], numbered: Mapping[int, TimeNs]
-) -> StampedFiles:
-    """Stamp numbered files: like the pictures with the same numbers, or 0.1 s apart."""
-    paired = {file: numbered[number] for file, number in numbers.items() if number in numbered}
-    if len(paired) >= max(1, _ENOUGH * len(files)):
-        warning = DataWarning(
-            "numbered-files",
-            f"{folder.name}: the files are numbered and have no times; they have the times of the pictures with their numbers",
-            "correct only if radar and camera files with the same number belong together; otherwise add a CSV with the columns "
-            "file,time_ns to the folder",
-        )
-        return _stamped(folder, files, paired, warning)
+def _like_files_of(known: PlainSource, folder: Path, files: Sequence[Path]) -> StampedFiles | None:
+    """Stamp files like those of another folder with the same names, or else the same numbers; None if most have neither."""
+    by_name = {name: TimeNs(int(time)) for name, time in zip(known.names, known.times_ns, strict=True)}
+    by_number = {number: by_name[name] for number, name in _numbers(known.names).items()}
+    numbers = {file: _number(file) for file in files}
+    for what, times in (
+        ("names", {file: by_name[file.stem] for file in files if file.stem in by_name}),
+        ("numbers", {file: by_number[number] for file, number in numbers.items() if number in by_number}),
+    ):
+        if len(times) >= max(1, _ENOUGH * len(files)):
+            warning = DataWarning(
+                "numbered-files",
+                f"{folder.name}: the files have no times; they have those of the files of {known.path.name} with the same {what}",
+                f"correct only if files with the same {what} belong together; otherwise add a CSV with the columns "
+                "file,time_ns to the folder",
+            )
+            told = f"those of the files of {known.path.name} with the same {what}"
+            return _stamped(folder, files, times, warning, zoneless=known.zoneless, times_from=told)
+    return None
+
+
+def _counted(folder: Path, files: Sequence[Path], numbers: Mapping[Path, int]) -> StampedFiles:
+    """Stamp numbered files 0.1 s apart."""
     counted = {file: TimeNs((number + 10) * _STEP_NS) for file, number in numbers.items()}
     warning = DataWarning(
         "numbered-files",
@@ -174,7 +200,7 @@ def _counted(
         "correct only if radar and camera files with the same number belong together; otherwise add a CSV with the columns "
         "file,time_ns to the folder",
     )
-    return _stamped(folder, files, counted, warning, counted=True)
+    return _stamped(folder, files, counted, warning, counted=True, times_from=COUNTED)
 
 
 def _number(file: Path) -> int | None:
@@ -190,6 +216,7 @@ def _stamped(
     zoneless: bool = False,
     assumed: str = "",
     counted: bool = False,
+    times_from: str = "",
 ) -> StampedFiles:
     ordered = sorted(times, key=lambda file: (times[file], file))
     left_out = [file for file in files if file not in times]
@@ -201,16 +228,13 @@ def _stamped(
             DataWarning("unstamped-files", what, "name them by their time, or list them in the folder's CSV"),
         )
     times_ns = np.array([times[file] for file in ordered], dtype=np.int64)
-    numbers = {} if counted else _numbers(times)
-    return StampedFiles(tuple(ordered), times_ns, tuple(warnings), zoneless, counted, assumed, numbers)
+    return StampedFiles(tuple(ordered), times_ns, tuple(warnings), zoneless, counted, assumed, times_from)
 
 
-def _numbers(times: Mapping[Path, TimeNs]) -> dict[int, TimeNs]:
-    """Return times by the first number of at most nine digits in the names, if it tells all files apart."""
-    found = {
-        int(match[0]): time for file, time in times.items() if (match := re.search(r"(?<!\d)\d{1,9}(?!\d)", file.stem))
-    }
-    return found if len(found) == len(times) else {}
+def _numbers(names: Sequence[str]) -> dict[int, str]:
+    """Return names by their first number of at most nine digits, if it tells all of them apart."""
+    found = {int(match[0]): name for name in names if (match := re.search(r"(?<!\d)\d{1,9}(?!\d)", name))}
+    return found if len(found) == len(names) else {}
 
 
 def _from_table(table: Path, files: Sequence[Path], zone_s: int | None) -> tuple[dict[Path, TimeNs], bool]:
@@ -222,7 +246,7 @@ def _from_table(table: Path, files: Sequence[Path], zone_s: int | None) -> tuple
     if table.stat().st_size > _MAX_TABLE_BYTES:
         return {}, False
     text = table.read_text(encoding="utf-8-sig", errors="replace")
-    by_name = {name: file for file in files for name in (file.name, file.stem)}
+    by_name = {name: file for file in files for name in (file.stem.lstrip("0"), file.stem, file.name) if name}
     rows = [row for row in map(_cells, text.splitlines()) if any(cell.strip() for cell in row)]
     first, time_place, file_place, unit = _places(rows, by_name)
     if time_place < 0:
@@ -254,6 +278,9 @@ def _places(rows: Sequence[Sequence[str]], by_name: Mapping[str, Path]) -> tuple
 
 def _cells(line: str) -> list[str]:
     """Split a line at commas or semicolons; without any, at spaces if the second word is a file, as in "1305.27 rgb/a.png"."""
+    labelled = _NUMBERED_LINE.fullmatch(line.strip())
+    if labelled is not None:
+        return [labelled[1], labelled[2]]
     if "," in line or ";" in line:
         return next(csv.reader([line], delimiter="," if line.count(",") >= line.count(";") else ";"), [])
     words = line.strip().lstrip("# ").split()
@@ -269,13 +296,21 @@ def _zoneless(text: str) -> bool:
 def _one_per_line(
     table: Path, rows: Sequence[Sequence[str]], files: Sequence[Path], zone_s: int | None
 ) -> tuple[dict[Path, TimeNs], bool]:
-    if table.suffix != ".txt" or len(rows) != len(files):
-        return {}, False
+    lines = _lines_of(table, len(rows), files) if table.suffix == ".txt" else ()
     times = {
-        file: _time(table, number, row[0], None, zone_s)
-        for number, (file, row) in enumerate(zip(files, rows, strict=True), 1)
+        file: _time(table, line + 1, rows[line][0], None, zone_s)
+        for file, line in zip(files, lines, strict=bool(lines))
     }
-    return times, zone_s is None and any(_zoneless(row[0]) for row in rows)
+    return times, zone_s is None and any(_zoneless(rows[line][0]) for line in lines)
+
+
+def _lines_of(table: Path, count: int, files: Sequence[Path]) -> Sequence[int]:
+    """Return the line of each file, from 0: the next one, or that of its number in a part of a raw KITTI drive; () if unknown."""
+    if count == len(files):
+        return range(count)
+    numbers = [number for file in files if (number := _number(file)) is not None]
+    is_kitti = table == files[0].parent.parent / "timestamps.txt" and files[0].parent.name == "data"
+    return numbers if is_kitti and len(numbers) == len(files) and max(numbers) < count else ()
 
 
 def _time(table: Path, number: int, text: str, unit: str | None, zone_s: int | None) -> TimeNs:

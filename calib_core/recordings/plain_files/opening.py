@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from calib_core.errors import RecordingError
-from calib_core.measurements import DataWarning, TimeNs
+from calib_core.measurements import DataWarning
 from calib_core.recordings.containers.sources import Assumption
 from calib_core.recordings.plain_files.pictures import PICTURE_SUFFIXES, open_picture_folder
 from calib_core.recordings.plain_files.radar_scans import is_lidar_bin, open_bin_folder, open_pcd_folder
@@ -20,7 +20,7 @@ from calib_core.recordings.plain_files.tables.opening import (
 )
 from calib_core.recordings.plain_files.video import VIDEO_SUFFIXES, open_video
 
-_Opener = Callable[[Path, Sequence[Path], PlainOptions, Mapping[int, TimeNs]], PlainSource]
+_Opener = Callable[[Path, Sequence[Path], PlainOptions, PlainSource | None], PlainSource]
 _FOLDERS: Mapping[str, _Opener] = {
     **dict.fromkeys(PICTURE_SUFFIXES, open_picture_folder),
     ".pcd": open_pcd_folder,
@@ -103,20 +103,23 @@ class _Opening:
             self.left.append(path)
 
     def finish(self) -> tuple[tuple[PlainSource, ...], tuple[Path, ...]]:
-        """Open everything, pictures first, since numbered files have the times of the pictures with their numbers.
+        """Open everything, pictures first, since files without times have those of the files of their names or numbers.
 
         Raises:
             RecordingError: what the user named, or all that was found, cannot be used.
         """
-        numbered: dict[int, TimeNs] = {}
+        known: PlainSource | None = None
         opened: dict[int, PlainSource] = {}
         for place in sorted(range(len(self.found)), key=lambda place: not _has_pictures(self.found[place][1])):
             path, files, inside = self.found[place]
-            source = self._open(path, files, numbered, inside=inside)
+            source = self._open(path, files, known, inside=inside)
             if source is not None:
                 opened[place] = source
                 self.sources.append(source)
-                numbered = numbered or (dict(source.numbers) if _has_pictures(files) else {})
+                known = known or (source if source.names and not source.counted else None)
+        for place, source in opened.items() if known is not None else ():
+            if source.counted and source.names:
+                opened[place] = self._opened(*self.found[place][:2], known) or source
         if not (opened or self.left or self.streams):
             raise RecordingError(f"{self.found[0][0].parent}: nothing in it can be used: {_reasons(self.refused)}")
         named = list(self.streams)
@@ -125,7 +128,7 @@ class _Opening:
         return self._with_refusals(_with_open_times(named, ros=bool(self.left))), tuple(self.left)
 
     def _open(
-        self, path: Path, files: Sequence[Path], numbered: Mapping[int, TimeNs], *, inside: bool
+        self, path: Path, files: Sequence[Path], known: PlainSource | None, *, inside: bool
     ) -> PlainSource | None:
         """Open one file or folder; what was found inside a folder and cannot be used is only remembered.
 
@@ -133,7 +136,7 @@ class _Opening:
             RecordingError: the user named it, and it cannot be used.
         """
         try:
-            source = self._opened(path, files, numbered)
+            source = self._opened(path, files, known)
         except RecordingError as error:
             if not inside:
                 raise
@@ -143,12 +146,12 @@ class _Opening:
             self.left.append(path)
         return source
 
-    def _opened(self, path: Path, files: Sequence[Path], numbered: Mapping[int, TimeNs]) -> PlainSource | None:
+    def _opened(self, path: Path, files: Sequence[Path], known: PlainSource | None) -> PlainSource | None:
         suffix = path.suffix.lower()
         if files:
             if files[0].suffix.lower() in TABLE_SUFFIXES:
-                return open_table_folder(path, files, self.options, numbered)
-            return _FOLDERS[files[0].suffix.lower()](path, files, self.options, numbered)
+                return open_table_folder(path, files, self.options, known)
+            return _FOLDERS[files[0].suffix.lower()](path, files, self.options, known)
         if suffix in TABLE_SUFFIXES:
             return open_radar_table(path, self.options)
         if suffix in VIDEO_SUFFIXES:

@@ -24,7 +24,7 @@ _MAX_BYTES = 1 << 30
 
 
 def open_picture_folder(
-    folder: Path, files: Sequence[Path], options: PlainOptions, numbered: Mapping[int, TimeNs]
+    folder: Path, files: Sequence[Path], options: PlainOptions, known: PlainSource | None = None
 ) -> PlainSource:
     """Open a folder of pictures; files that cannot be pictures are left out, with a warning.
 
@@ -32,7 +32,7 @@ def open_picture_folder(
         folder: of the pictures.
         files: the pictures.
         options: the user's.
-        numbered: times of other pictures by their number.
+        known: another folder, whose files have times.
 
     Raises:
         RecordingError: the files have no times, or none can be read.
@@ -42,7 +42,7 @@ def open_picture_folder(
     if not sound:
         file, fault = next(iter(faults.items()))
         raise RecordingError(f"{folder}: none of its {len(files)} pictures can be read: {file.name} {fault}")
-    stamped = stamp_files(folder, sound, options, numbered)
+    stamped = stamp_files(folder, sound, options, known)
     topic = topic_of(folder, "image")
     camera = camera_beside(folder, stamped.files, picture_size_px(stamped.files[0]))
 
@@ -60,7 +60,8 @@ def open_picture_folder(
         assumptions=stamped.assumptions(topic),
         zoneless=stamped.zoneless,
         counted=stamped.counted,
-        numbers=stamped.numbers,
+        names=stamped.names,
+        times_from=stamped.times_from,
         camera=camera,
         unreadable=faults,
     )

@@ -1,6 +1,6 @@
 """Read radar returns from one file per scan: .pcd as nuScenes has them, and the .bin files of data sets."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -75,18 +75,18 @@ BIN_LAYOUTS = (
 
 
 def open_pcd_folder(
-    folder: Path, files: Sequence[Path], options: PlainOptions, numbered: Mapping[int, TimeNs]
+    folder: Path, files: Sequence[Path], options: PlainOptions, known: PlainSource | None = None
 ) -> PlainSource:
     """Open a folder of .pcd files, one scan each.
 
     Raises:
         RecordingError: the files have no times.
     """
-    return _open(folder, stamp_files(folder, files, options, numbered), "folder of .pcd", points_of_pcd)
+    return _open(folder, stamp_files(folder, files, options, known), "folder of .pcd", points_of_pcd)
 
 
 def open_bin_folder(
-    folder: Path, files: Sequence[Path], options: PlainOptions, numbered: Mapping[int, TimeNs]
+    folder: Path, files: Sequence[Path], options: PlainOptions, known: PlainSource | None = None
 ) -> PlainSource:
     """Open a folder of .bin files of a data set, one scan each.
 
@@ -100,7 +100,7 @@ def open_bin_folder(
             "per scan and say which column is which: --map x=1:m --map y=2:m --map z=3:m --map doppler=4:mps"
         )
     points = partial(points_of_bin, layout=layout)
-    return _open(folder, stamp_files(folder, files, options, numbered), f"folder of {layout.name} .bin", points)
+    return _open(folder, stamp_files(folder, files, options, known), f"folder of {layout.name} .bin", points)
 
 
 def bin_layout(files: Sequence[Path]) -> tuple[BinLayout | None, list[str]]:
@@ -146,6 +146,8 @@ def _open(folder: Path, stamped: StampedFiles, what: str, points: Callable[[Path
         assumptions=stamped.assumptions(topic),
         zoneless=stamped.zoneless,
         counted=stamped.counted,
+        names=stamped.names,
+        times_from=stamped.times_from,
     )
 
 

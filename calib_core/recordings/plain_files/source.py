@@ -22,10 +22,6 @@ def _no_faults() -> dict[Path, str]:
     return {}
 
 
-def _no_numbers() -> dict[int, TimeNs]:
-    return {}
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class PlainSource:
     """One folder or file with one topic; implements Source.
@@ -43,7 +39,8 @@ class PlainSource:
         zoneless: whether its times come from dates without a time zone.
         counted: whether its times come from the numbers of files or scans.
         mapped: whether --map was applied to it.
-        numbers: times of its files by their numbers, for files of other folders that are only numbered.
+        names: (n,) of the files of its rows, without suffix; empty if a row is no file.
+        times_from: where its times come from, as a clause; "" if they stand in its messages.
         camera: the intrinsics that its data set publishes; None if there are none.
         unreadable: files of the folder that were skipped on opening, and why.
         computed: what the fields of its messages were computed from, where they are not the file's own; "" if they are.
@@ -61,7 +58,8 @@ class PlainSource:
     zoneless: bool = False
     counted: bool = False
     mapped: bool = False
-    numbers: Mapping[int, TimeNs] = field(default_factory=_no_numbers)
+    names: tuple[str, ...] = ()
+    times_from: str = ""
     camera: FolderCamera | None = None
     unreadable: Mapping[Path, str] = field(default_factory=_no_faults)
     computed: str = ""

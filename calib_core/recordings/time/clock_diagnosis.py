@@ -45,6 +45,7 @@ class ClockDiagnosis:
         islands: number of stretches of data separated by pauses of more than ten seconds.
         covered_s: total length of those stretches [s].
         one_per_return: every message is a single radar return with its own stamp.
+        times_from: where the times of files come from, after "times are"; "" if messages state them.
     """
 
     topic: str
@@ -69,6 +70,7 @@ class ClockDiagnosis:
     islands: int = 0
     covered_s: float = 0.0
     one_per_return: bool = False
+    times_from: str = ""
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -111,6 +113,7 @@ def diagnose(
     chosen: Literal["header", "receive"],
     requested: Clock,
     one_per_return: bool = False,
+    times_from: str = "",
 ) -> ClockDiagnosis:
     """Diagnose both clocks of a topic.
 
@@ -120,6 +123,7 @@ def diagnose(
         chosen: the clock of those times.
         requested: the clock the user asked for.
         one_per_return: every message is a single radar return.
+        times_from: where the times of files come from; "" for messages.
     """
     found = ClockDiagnosis(
         stamps.topic,
@@ -128,6 +132,7 @@ def diagnose(
         len(stamps.receive_ns),
         stamps.header_ns is not None,
         one_per_return=one_per_return,
+        times_from=times_from,
     )
     found = _with_rhythm(found, times_ns)
     if stamps.header_ns is None or not len(stamps.header_ns):
@@ -241,13 +246,18 @@ def about_clocks(found: Sequence[ClockDiagnosis]) -> list[DataWarning]:
                     "synchronize the clocks of both sensors (PTP or NTP), or use --clock receive",
                 )
             )
-        if one.islands > 1:
-            warnings.append(
-                DataWarning(
-                    "islands",
-                    f"{one.topic} has {one.islands} stretches of data separated by up to {span_text(one.longest_gap_s)}: "
-                    f"{span_text(one.covered_s)} of data in total",
-                    "click only where both sensors have data; if there should be no gaps, files may be missing",
-                )
+    apart = [one for one in found if one.islands > 1]
+    if apart:
+        listed = "; ".join(
+            f"{one.topic} has {one.islands} stretches of data separated by up to {span_text(one.longest_gap_s)}: "
+            f"{span_text(one.covered_s)} of data in total"
+            for one in apart
+        )
+        if len(apart) > 1 and len({one.islands for one in apart}) == 1:
+            listed = (
+                f"{' and '.join(one.topic for one in apart)} have {apart[0].islands} stretches of data each, separated by up to "
+                f"{span_text(max(one.longest_gap_s for one in apart))}"
             )
+        hint = "click only where both sensors have data; if there should be no gaps, files may be missing"
+        warnings.append(DataWarning("islands", listed, hint))
     return warnings

@@ -258,7 +258,7 @@ class BareRecording:
     radar_axes: str | None = None
     radar_topics, radar_choice = (), ""
     video_start = None
-    assumptions = stated_assumptions = column_map = ()
+    assumptions = stated_assumptions = column_map = image_names = ()
     radar_frame, camera_frame = "radar", "camera"
     image_times = FACTS.image_times
     radar_times = FACTS.image_times + 7

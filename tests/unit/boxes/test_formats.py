@@ -66,6 +66,24 @@ def test_coco_pictures_are_found_by_stamp_or_number(tmp_path, names, frames):
     assert found[frames[1]] == ()
 
 
+NAMED = [f"{number:06}" for number in (549, 600, 877, 1201, 1202, 1203, 1204, 1205, 1206, 1207)]
+
+
+@pytest.mark.parametrize("kind", ["coco", "yolo"])
+def test_boxes_with_the_names_of_the_pictures_belong_to_them(tmp_path, kind):
+    """A subset of a data set: its numbers do not count the recorded frames; labels of other pictures are left out."""
+    names = [NAMED[2], NAMED[0], "004711"]
+    if kind == "coco":
+        path = write(tmp_path, "boxes.json", coco([f"image_2/{name}.png" for name in names]))
+    else:
+        path = tmp_path / "labels"
+        for name in names:
+            write(path, f"{name}.txt", "0 0.1875 0.2083 0.0625 0.2083")
+    boxes = read_boxes(path, image_times=TIMES, image_size_px=SIZE, image_names=NAMED)
+    assert [frame.image_time for frame in boxes] == [TIMES[0], TIMES[2]]
+    assert any("2 annotated frames have the names" in note and "1 others are not" in note for note in boxes.notes)
+
+
 def test_coco_detections_are_found_by_number_and_keep_scores(tmp_path):
     detections = [
         {"image_id": 0, "category_id": 1, "bbox": [100, 50, 40, 100], "score": 0.25},

@@ -302,6 +302,17 @@ def test_islands_and_gaps_of_data_are_counted():
     assert dropped.remarks == ("1 gap, the longest 2.100 s",)
 
 
+def test_stretches_that_both_sensors_have_are_one_warning():
+    times = START_NS + np.concatenate([np.arange(20) * 10**8, 10**11 + np.arange(20) * 10**8])
+    both = [
+        diagnose(stamps(times, times, topic), times_ns=times, chosen="header", requested="auto")
+        for topic in ("/radar", "/camera")
+    ]
+    (warning,) = about_clocks(both)
+    assert warning.code == "islands"
+    assert warning.message.startswith("/radar and /camera have 2 stretches of data each")
+
+
 def test_the_reason_for_the_clock_is_given():
     assert look(np.zeros(2000), chosen="receive").reason == "it has only zero stamps (2000 messages)"
     assert look(None, chosen="receive", times_ns=LONG_RECEIVE_NS).reason == "it has no stamps"

@@ -1,6 +1,6 @@
 """Open tables of radar returns, CSV or JSON: one file with all scans, or a folder with one file per scan."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -13,7 +13,7 @@ from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import DataWarning, TimeNs
 from calib_core.recordings.containers.sources import Assumption
 from calib_core.recordings.field_words import MappedColumn, is_plain
-from calib_core.recordings.plain_files.file_stamps import StampedFiles, stamp_files
+from calib_core.recordings.plain_files.file_stamps import COUNTED, StampedFiles, stamp_files
 from calib_core.recordings.plain_files.source import PlainOptions, PlainSource, cloud_channel, cloud_message, topic_of
 from calib_core.recordings.plain_files.tables.json_files import JsonTable, open_json_table, read_json_rows
 from calib_core.recordings.plain_files.tables.text_tables import (
@@ -118,6 +118,7 @@ def open_radar_table(path: Path, options: PlainOptions) -> PlainSource:
         assumptions=(*times.assumptions, *_assumptions(columns, topic)),
         zoneless=times.zoneless,
         counted=times.counted,
+        times_from=COUNTED if times.counted else "",
         mapped=bool(options.mapped),
         computed=_computed_words(columns.plan),
     )
@@ -146,7 +147,7 @@ def is_one_scan_each(files: Sequence[Path], options: PlainOptions) -> bool:
 
 
 def open_table_folder(
-    folder: Path, files: Sequence[Path], options: PlainOptions, numbered: Mapping[int, TimeNs]
+    folder: Path, files: Sequence[Path], options: PlainOptions, known: PlainSource | None = None
 ) -> PlainSource:
     """Open a folder of tables with one scan each; their times stand in them, or come from their names.
 
@@ -154,7 +155,7 @@ def open_table_folder(
         folder: of the files.
         files: the tables.
         options: the user's.
-        numbered: times of pictures by their number.
+        known: another folder, whose files have times.
 
     Raises:
         RecordingError: they have no times or no positions, or different columns.
@@ -171,9 +172,7 @@ def open_table_folder(
     columns = columns.with_values(folder, np.concatenate(values))
     times = _times(tables[0], columns, topic, options)
     inside = times is not None and not times.counted
-    stamped = (
-        _stamped_inside(files, times, options) if times and inside else stamp_files(folder, files, options, numbered)
-    )
+    stamped = _stamped_inside(files, times, options) if times and inside else stamp_files(folder, files, options, known)
 
     def message(row: int) -> bytes:
         return cloud_message(
@@ -196,6 +195,8 @@ def open_table_folder(
         ),
         zoneless=stamped.zoneless,
         counted=stamped.counted,
+        names=stamped.names,
+        times_from=stamped.times_from,
         mapped=bool(options.mapped),
         computed=_computed_words(columns.plan),
     )

@@ -119,6 +119,8 @@ def test_the_fingerprint_of_a_folder_follows_its_contents(tmp_path) -> None:
         ("front.csv", "name,time_s\nimages/a,1700000000.0\nimages/b,1700000001.000000000\n"),
         ("timestamps.txt", "2023-11-14 22:13:20\n2023-11-14 22:13:21.000000000\n"),
         ("front/times.txt", "1700000000.0\n1700000001.0\n"),
+        ("front.txt", "Frame: a Time: 1700000000.000000000\nFrame: b Time: 1700000001.000000000\n"),
+        ("front.txt", "# color images\n# timestamp filename\n1700000000.0 front/a.png\n1700000001.0 front/b.png\n"),
     ],
 )  # fmt: skip
 def test_a_table_next_to_the_files_gives_the_times(tmp_path, table, text) -> None:
@@ -127,6 +129,63 @@ def test_a_table_next_to_the_files_gives_the_times(tmp_path, table, text) -> Non
     with open_recording(folder, require=("image",)) as recording:
         assert recording.image_times.tolist() == [START_NS, START_NS + NS_PER_S]
         np.testing.assert_array_equal(recording.image(1), pixels(0))
+
+
+def test_the_times_beside_numbered_stills_are_found_and_told(tmp_path) -> None:
+    """As in RADIATE: five stills minutes apart, and their times beside the folder."""
+    folder = pictures(tmp_path / "zed_left", [f"{number:06}.png" for number in (1, 40, 92, 137, 201)])
+    seconds = {number: 1_574_859_772 + 19 * number for number in range(1, 205)}
+    lines = [f"Frame: {number:06} Time: {second}.427742418\n" for number, second in seconds.items()]
+    (tmp_path / "zed_left.txt").write_text("".join(lines))
+    with open_recording(folder, require=("image",)) as recording:
+        text = describe(recording)
+        wanted = [seconds[number] * NS_PER_S + 427_742_418 for number in (1, 40, 92, 137, 201)]
+        assert recording.image_times.tolist() == wanted
+        assert recording.warnings == ()
+    assert "times are those in zed_left.txt" in text
+    assert "5 images 950 s apart" in text
+    assert "Hz" not in text
+    assert "sound" not in text
+
+
+def test_an_assumed_time_is_never_called_sound_and_has_no_rate(tmp_path) -> None:
+    folder = pictures(tmp_path / "zed_left", [f"{number:06}.png" for number in (1, 15, 29, 43, 57)])
+    with open_recording(folder, require=("image",)) as recording:
+        text = describe(recording)
+        (topic,) = recording.topics
+    assert (topic.rate_hz, topic.jitter_s) == (None, None)
+    assert "times are assumed" in text
+    assert "Hz" not in text
+    assert "sound" not in text
+
+
+def test_part_of_a_kitti_drive_has_the_lines_of_its_numbers(tmp_path) -> None:
+    folder = pictures(tmp_path / "image_02" / "data", ["0000000003.png", "0000000007.png"])
+    (tmp_path / "image_02" / "timestamps.txt").write_text(
+        "".join(f"2011-09-26 13:02:{second:02}.964389445\n" for second in range(9))
+    )
+    with open_recording(folder, require=("image",)) as recording:
+        assert (recording.image_times % (60 * NS_PER_S)).tolist() == [3_964_389_445, 7_964_389_445]
+
+
+@pytest.mark.parametrize("stamped", ["pictures", "radar"])
+@pytest.mark.parametrize(("spelling", "what"), [("{:06}", "names"), ("frame{:03}", "numbers")])
+def test_files_without_times_have_those_of_the_other_sensor(tmp_path, stamped, spelling, what) -> None:
+    pictures(tmp_path / "image_2", [f"{number:06}.png" for number in (4, 5, 9)])
+    radar = bin_folder(tmp_path / "radar", [bin_rows("delft", 5) for _ in range(3)])
+    for path, number in zip(sorted(radar.iterdir()), (4, 5, 9), strict=True):
+        path.rename(radar / f"{spelling.format(number)}.new")
+    for path in radar.iterdir():
+        path.rename(path.with_suffix(".bin"))
+    names = {"pictures": "{:06}", "radar": spelling}[stamped]
+    folder = {"pictures": tmp_path / "image_2", "radar": radar}[stamped]
+    rows = "".join(f"{names.format(number)},{START_NS + number * 10**9}\n" for number in (4, 5, 9))
+    folder.with_suffix(".csv").write_text(f"file,time_ns\n{rows}")
+    with open_recording(tmp_path) as recording:
+        warning = next(one for one in recording.warnings if one.code == "numbered-files")
+        wanted = [START_NS + number * 10**9 for number in (4, 5, 9)]
+        assert recording.image_times.tolist() == recording.radar_times.tolist() == wanted
+    assert f"with the same {what}" in warning.message
 
 
 def test_pictures_without_a_time_are_skipped_with_a_warning(tmp_path) -> None:

@@ -402,7 +402,7 @@ def test_numbered_scans_have_the_times_of_the_pictures_with_their_numbers(tmp_pa
         np.testing.assert_array_equal(recording.radar_times, np.unique(T.times_ns))
         np.testing.assert_array_equal(recording.image_times, recording.radar_times)
         (warning,) = recording.warnings
-    assert "they have the times of the pictures with their numbers" in warning.message
+    assert "those of the files of camera with the same numbers" in warning.message
 
 
 @pytest.mark.parametrize("word", ["objects", "clusters", "hits", "dets"])
