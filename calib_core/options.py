@@ -330,6 +330,7 @@ def checked_options(options: CalibrationOptions) -> CalibrationOptions:
             if not (math.isfinite(number) and low <= number <= high):
                 raise OptionError(
                     f"option {name}: {number:g} is out of range; allowed: {low:g} to {high:g}{_unit_after(name)}"
+                    + (f". In centimetres? Then give {number / 100:g}" if _may_be_centimetres(name, number) else "")
                 )
         _check_type(leaf, value)
     if options.gating.min_range_m >= options.gating.max_range_m:
@@ -445,6 +446,12 @@ def unit_of_name(name: str) -> str:
 def _unit_after(path: str) -> str:
     unit = unit_of_name(path)
     return f" {unit}" if unit else ""
+
+
+def _may_be_centimetres(path: str, number: float) -> bool:
+    """Return whether a length that is out of range is within it if it was given in centimetres."""
+    low, high = RANGES[path]
+    return unit_of_name(path) == "m" and number > high and low <= number / 100 <= high
 
 
 RANGES: Mapping[str, tuple[float, float]] = dict(_ranges())

@@ -93,10 +93,8 @@ CELLS: tuple[tuple[str, str], ...] = (
     ),
     (
         "code",
-        "from pathlib import Path\n\nfrom cocalib.platform.resources import sample_folder\n\n"
-        'folder = sample_folder() / "rooftop"\n'
-        'clicks = cc.read_clicks(folder / "clicks.json")\n'
-        'with cc.open_recording([folder / "radar.bag", folder / "camera.bag"]) as recording:\n'
+        "with cc.sample_recording() as recording:\n"
+        '    clicks = cc.read_clicks(recording.paths[0].with_name("clicks.json"))\n'
         "    print(recording.radar_topic, len(recording.radar_times), recording.image_topic, len(recording.image_times))\n"
         "    camera = recording.camera()\n"
         "    scans = recording.radar_scans()\n"
@@ -118,7 +116,7 @@ CELLS: tuple[tuple[str, str], ...] = (
     ),
     (
         "code",
-        'exported = cc.export(rooftop, "tf2")\nprint(exported.file_name)\n'
+        'from pathlib import Path\n\nexported = cc.export(rooftop, "tf2")\nprint(exported.file_name)\n'
         "Path(exported.file_name).write_bytes(exported.data)\n"
         "print(cc.check(exported.file_name, against=rooftop).verdict)",
     ),

@@ -6,8 +6,18 @@ import calib_core
 
 if TYPE_CHECKING:
     from calib_core import *  # noqa: F403  (for type checkers and editors)
+    from calib_core.recordings import Recording
 
-__all__ = calib_core.__all__
+__all__ = sorted([*calib_core.__all__, "sample_recording"])
+
+
+def sample_recording() -> "Recording":
+    """Open the simulated recording that comes with cocalib; its clicks are in `clicks.json` beside its files."""
+    from calib_core.recordings import open_recording
+    from cocalib.platform.resources import sample_folder
+
+    folder = sample_folder() / "rooftop"
+    return open_recording([folder / "radar.bag", folder / "camera.bag"])
 
 
 def __getattr__(name: str) -> Any:

@@ -63,7 +63,7 @@ from calib_core.interchange.own.calibration_json import (
 )
 from calib_core.interchange.own.clicks_json import read_clicks, write_clicks
 from calib_core.interchange.own.documents import CALIBRATION_SCHEMA, names_schema
-from calib_core.interchange.own.pairs_json import PairsFile, read_pairs, write_pairs
+from calib_core.interchange.own.pairs_files import PairsFile, read_pairs, read_pairs_table, write_pairs
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.trees.frame_choice import WantedFrames
 from calib_core.interchange.trees.frame_tree import FrameTree, Joint, Place
@@ -146,6 +146,7 @@ __all__ = [
     "read_check_pairs_file",
     "read_clicks",
     "read_pairs",
+    "read_pairs_table",
     "read_together",
     "tree_files",
     "write_calibration",

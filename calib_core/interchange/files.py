@@ -15,7 +15,7 @@ from calib_core.interchange.exporting import Export
 from calib_core.interchange.exporting import export as export_file
 from calib_core.interchange.format import ImportedCalibration, imported
 from calib_core.interchange.importing import read_any_file
-from calib_core.interchange.own import calibration_json, clicks_json, pairs_json
+from calib_core.interchange.own import calibration_json, clicks_json, pairs_files
 from calib_core.measurements import ReflectorClick
 from calib_core.options import NoiseOptions
 from calib_core.results import Calibration
@@ -38,26 +38,31 @@ def read_camera(path: PathLike, *, image_size_px: tuple[int, int] | None = None)
     return read_camera_file(path, image_size_px=image_size_px)
 
 
-def read_pairs(path: PathLike, *, noise: NoiseOptions | None = None) -> pairs_json.PairsFile:
-    """Read a pairs-1 file: pairs, camera and, if stated, noise and camera position.
+def read_pairs(
+    path: PathLike, camera: Camera | None = None, *, noise: NoiseOptions | None = None
+) -> pairs_files.PairsFile:
+    """Read a pairs-1 file (pairs, camera and, if stated, noise and camera position), or a table of pairs (CSV).
 
     Args:
         path: of the file.
+        camera: the camera that the pixels of a table are of; None for pairs-1, which brings its own.
         noise: used where the file states none; None uses the defaults.
 
     Raises:
         InputError: invalid content; the message names the file, the place and what to do.
     """
-    return pairs_json.read_pairs(_text(path), str(path), noise=noise)
+    if camera is not None:
+        return pairs_files.read_pairs_table(_text(path), camera, str(path), noise=noise)
+    return pairs_files.read_pairs(_text(path), str(path), noise=noise)
 
 
-def write_pairs(path: PathLike, pairs_file: pairs_json.PairsFile) -> None:
+def write_pairs(path: PathLike, pairs_file: pairs_files.PairsFile) -> None:
     """Write a pairs-1 file.
 
     Raises:
         InputError: the file cannot be written.
     """
-    _write(path, pairs_json.write_pairs(pairs_file))
+    _write(path, pairs_files.write_pairs(pairs_file))
 
 
 def read_clicks(path: PathLike) -> tuple[ReflectorClick, ...]:

@@ -388,13 +388,31 @@ def test_pairs_are_read_once_so_a_pipe_works(
     writer.join(60)
 
 
+def test_a_table_of_pairs_is_solved_with_a_camera(
+    cocalib: Callable[..., Any], pairs_file: Callable[..., Path], tmp_path: Path
+) -> None:
+    pairs, table = pairs_file(), tmp_path / "pairs.csv"
+    rows = [(*pair["radar_m"], *pair["pixel_px"]) for pair in json.loads(pairs.read_text())["pairs"]]
+    table.write_text("x_m,y_m,z_m,u_px,v_px\n" + "".join(f"{','.join(map(str, row))}\n" for row in rows))
+    refused = cocalib("solve", "--pairs", table)
+    assert refused.code == 2
+    assert "add --camera FILE" in refused.err
+    assert cocalib("solve", "--pairs", table, "--camera", pairs, "--out", tmp_path / "a.json").code == 0
+    names = [one["name"] for one in json.loads((tmp_path / "a.json").read_text())["provenance"]["inputs"]]
+    assert names == ["pairs.csv", pairs.name]
+
+
 def test_options_of_a_recording_are_refused_for_pairs(
     cocalib: Callable[..., Any], pairs_file: Callable[..., Path], tmp_path: Path
 ) -> None:
-    for option in (("--camera", "nowhere.yaml"), ("--radar-axes", "up,up,up")):
-        refused = cocalib("solve", "--pairs", pairs_file(), *option)
+    pairs = pairs_file()
+    for option, words in (
+        (("--camera", pairs), "brings its own camera"),
+        (("--radar-axes", "up,up,up"), "do not apply to --pairs"),
+    ):
+        refused = cocalib("solve", "--pairs", pairs, *option)
         assert (refused.code, refused.out) == (2, "")
-        assert "do not apply to --pairs" in refused.err
+        assert words in refused.err
     assert cocalib("solve", "--pairs", pairs_file(), "--out", tmp_path / "a.json").code == 0
     refused = cocalib("solve", "--pairs", tmp_path / "a.json", "--gating.max-range-m", "8")
     assert refused.code == 2

@@ -243,6 +243,13 @@ class Import:
             raise InputError(
                 "import takes a calibration, or the files of one: cocalib import FILE... --out calibration.json"
             )
+        inputs = (*self.calibration, *(one for one in (self.camera, self.pairs, self.against) if one is not None))
+        if (
+            self.out is not None
+            and self.out.exists()
+            and any(one.exists() and self.out.samefile(one) for one in inputs)
+        ):
+            raise InputError(f"{self.out}: is also an input, which is never changed; choose another name for --out")
         path, source = self.calibration[0], ", ".join(map(str, self.calibration))
         given = read_camera_file(self.camera) if self.camera else None
         against = read_any_file(self.against) if self.against else None
@@ -250,12 +257,12 @@ class Import:
         files = self.frames.files(self.calibration)
         unstated = self.meaning.unstated(files, source)
         if unstated is None or files is None:
-            found, inputs = self.frames.read(self.calibration, files)
+            found, sources = self.frames.read(self.calibration, files)
         else:
             chosen = self.meaning.chosen(unstated, camera=given, pairs=pairs, against=against)
             if chosen is None:
                 return 3
-            found, inputs = chosen, (input_file(files[0]),)
+            found, sources = chosen, (input_file(files[0]),)
         if self.out is None:
             raise InputError(f"{source}: give the output file with --out FILE")
         camera = given or _sized_camera(found, path, self.image_size)
@@ -263,7 +270,7 @@ class Import:
             found,
             source,
             camera=camera,
-            provenance=Provenance(inputs=inputs),
+            provenance=Provenance(inputs=sources),
             against=against,
             pairs=pairs,
             replace_camera=self.replace_camera,

@@ -57,7 +57,8 @@ class Solve:
     reflector_m: float = _REFLECTOR_M
     """With --auto: width of the reflector as the camera sees it [m]."""
     pairs: File = None
-    """Instead of a recording: radar positions and pixels (cocalib/pairs-1 JSON), or a calibration to solve again."""
+    """Instead of a recording: radar positions and pixels (cocalib/pairs-1 JSON, or with --camera a CSV of x, y, z, u, v), or a
+    calibration to solve again."""
     camera: GivenCamera = field(default_factory=CameraFlags)
     out: File = None
     """Output file (cocalib/calibration-1 JSON); stdout if omitted."""
@@ -75,7 +76,7 @@ class Solve:
             return None
         from cocalib.solving.solving import GivenPairs
 
-        given = GivenPairs.read(read_text(self.pairs), str(self.pairs))
+        given = GivenPairs.read(read_text(self.pairs), str(self.pairs), self.camera.read())
         if given.file is None:
             return type(self)(given=given)
         return type(self)(options=OptionFlags.of(given.file.calibration.options), given=given)
@@ -87,10 +88,8 @@ class Solve:
         vehicle = self.vehicle.note()
         if not self.auto and (self.clicks_out is not None or self.reflector_m != _REFLECTOR_M):
             raise InputError("--clicks-out and --reflector-m apply with --auto only; add it")
-        if self.pairs is not None and (self.camera.camera or self.recorded.topics != TopicFlags()):
-            raise InputError(
-                "--camera and the options of a recording do not apply to --pairs, which brings its own camera"
-            )
+        if self.pairs is not None and self.recorded.topics != TopicFlags():
+            raise InputError("the options of a recording do not apply to --pairs")
         if self.pairs is not None:
             return self._solve_pairs(self.pairs, vehicle)
         if not self.recorded.recording:
@@ -192,7 +191,7 @@ class Solve:
     def _solve_pairs(self, path: Path, vehicle: "VehicleNote") -> int:
         from cocalib.solving.solving import GivenPairs, calibration_text_of_pairs, solve_pairs
 
-        given = GivenPairs.read(read_text(path), str(path)) if self.given is None else self.given
+        given = GivenPairs.read(read_text(path), str(path), self.camera.read()) if self.given is None else self.given
         outcome = solve_pairs(given, self._all_options())
         if isinstance(outcome, Unsolvable):
             return explain_unsolvable(outcome)

@@ -26,6 +26,7 @@ from calib_core.interchange import (
     names_schema,
     read_calibration,
     read_pairs,
+    read_pairs_table,
 )
 from calib_core.interchange import calibration_text as interchange_text
 from calib_core.measurements import Candidate, Pair, ReflectorClick, Unsolvable
@@ -159,24 +160,32 @@ class GivenPairs:
         text: its content.
         source: its path, for error messages.
         file: what it says, if it is a calibration.
+        camera_file: the intrinsics for a table of pairs (CSV); None for the others, which bring their own.
     """
 
     text: str
     source: str
     file: CalibrationFile | None
+    camera_file: CameraFile | None = None
 
     @classmethod
-    def read(cls, text: str, source: str) -> "GivenPairs":
+    def read(cls, text: str, source: str, camera_file: CameraFile | None = None) -> "GivenPairs":
         """Read a calibration; a file of pairs is read when the options are known.
 
         Raises:
-            InputError: the calibration is not valid.
+            InputError: the calibration is not valid, or a camera is given for a file that brings one, or none for a table.
         """
-        return cls(text, source, read_calibration(text, source) if names_schema(text, CALIBRATION_SCHEMA) else None)
+        is_table = not text.lstrip("\ufeff \t\r\n").startswith(("{", "["))
+        if is_table and camera_file is None:
+            raise InputError(f"{source}: not JSON; if it is a table of pairs (x, y, z, u, v), add --camera FILE")
+        if not is_table and camera_file is not None:
+            raise InputError(f"{source}: brings its own camera; leave out --camera")
+        file = read_calibration(text, source) if names_schema(text, CALIBRATION_SCHEMA) else None
+        return cls(text, source, file, camera_file)
 
 
 def solve_pairs(given: GivenPairs, options: CalibrationOptions | None = None) -> Outcome:
-    """Solve for camera_from_radar from a pairs-1 file, or again from a calibration-1 file.
+    """Solve for camera_from_radar from a pairs-1 file or a table of pairs, or again from a calibration-1 file.
 
     Args:
         given: the file.
@@ -196,7 +205,10 @@ def solve_pairs(given: GivenPairs, options: CalibrationOptions | None = None) ->
         except InputError as error:
             raise InputError(f"{given.source}: {error}") from None
     options = checked_options(options or CalibrationOptions())
-    pairs_file = read_pairs(given.text, given.source, noise=options.noise)
+    if given.camera_file is None:
+        pairs_file = read_pairs(given.text, given.source, noise=options.noise)
+    else:
+        pairs_file = read_pairs_table(given.text, given.camera_file.camera(), given.source, noise=options.noise)
     return calibrate_pairs(pairs_file.pairs, pairs_file.camera, pairs_file.options(options))
 
 
@@ -314,7 +326,11 @@ def calibration_text_of_pairs(calibration: Calibration, given: GivenPairs, vehic
         vehicle: which vehicle it is of; what it leaves out is taken from a calibration-1 file.
     """
     vehicle = vehicle or VehicleNote()
-    inputs = (_input_file(given.source, given.text.encode()),)
+    camera_file = given.camera_file
+    inputs = (
+        _input_file(given.source, given.text.encode()),
+        *([] if camera_file is None else [_input_file(camera_file.source, camera_file.data)]),
+    )
     if (file := given.file) is not None:
         provenance = dataclasses.replace(file.provenance, inputs=inputs, version=version())
         kept = tuple(warning for warning in file.calibration.warnings if warning.code in _KEPT_WARNINGS)

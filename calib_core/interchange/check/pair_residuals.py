@@ -16,7 +16,7 @@ from calib_core.interchange.check.slips import CheckResult, explain, explained, 
 from calib_core.interchange.format import ImportedCalibration, WrittenPose
 from calib_core.interchange.own.calibration_json import read_calibration
 from calib_core.interchange.own.documents import CALIBRATION_SCHEMA
-from calib_core.interchange.own.pairs_json import read_pairs
+from calib_core.interchange.own.pairs_files import read_pairs
 from calib_core.interchange.syntax.strict_json import json_object
 from calib_core.measurements import MIN_PAIRS
 from calib_core.radar import RadarErrors

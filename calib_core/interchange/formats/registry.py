@@ -120,6 +120,8 @@ _GONE = {
     "openlabel": "tf2 or urdf",
 }
 """Formats that are not written any more, each with what replaces it."""
+_OTHER_NAMES = {"ros": "tf2", "ros1": "tf2", "ros2": "tf2", "tf": "tf2"}
+"""What people call a format, and its name."""
 
 
 def format_named(name: str) -> Format:
@@ -134,7 +136,7 @@ def format_named(name: str) -> Format:
     if name in _GONE:
         raise InputError(f"format {name!r} went in 0.1: use {_GONE[name]}; its files are still read")
     names = [known.name for known in written_formats()]
-    near = get_close_matches(name, names, n=1)
+    near = [_OTHER_NAMES[name]] if name in _OTHER_NAMES else get_close_matches(name, names, n=1)
     raise InputError(
         f"unknown format {name!r}; did you mean {near[0]}?"
         if near

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import math
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -20,6 +21,7 @@ from calib_core.interchange import (
     read_calibration,
     read_clicks,
     read_pairs,
+    read_pairs_table,
     write_calibration,
     write_clicks,
     write_pairs,
@@ -444,3 +446,43 @@ def test_views_of_another_board_or_of_other_pictures_are_refused() -> None:
         kept().require_same(board_of_size("8x6", 22.14), SOURCE, file="views.json")
     with pytest.raises(InputError, match="give the same pictures"):
         kept().require_same(BOARD, PictureSource("board.mp4", 9, 64 * "b"), file="views.json")
+
+
+PINHOLE = read_pairs(pairs_text({"id": "p1", "radar_m": [5, 1, 0], "pixel_px": [1, 2]})).camera
+TABLE = ((5.0, 1.0, -0.5, 212.9, 239.4), (7.1, 0.2, -0.4, 340.0, 251.5))
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t", " "])
+@pytest.mark.parametrize("head", ["", "x_m y_m z_m u_px v_px", "X Y Z U V"])
+def test_a_table_of_pairs_is_read_whatever_stands_between_its_columns(delimiter, head):
+    rows = [head.replace(" ", delimiter)] if head else []
+    text = "\n".join([*rows, *(delimiter.join(map(str, row)) for row in TABLE), ""])
+
+    pairs = read_pairs_table(text, PINHOLE, "p.csv").pairs
+
+    assert [(*pair.candidates[0].position_radar_m, *pair.pixel_px) for pair in pairs] == list(TABLE)
+    assert [pair.id for pair in pairs] == ["pair-1", "pair-2"]
+
+
+def test_the_columns_of_a_table_may_have_any_order_and_ids():
+    (pair,) = read_pairs_table("v_px,u_px,id,z_m,y_m,x_m,note\n239.4,212.9,p7,-0.5,1,5,far\n", PINHOLE).pairs
+
+    assert (pair.id, *pair.candidates[0].position_radar_m, *pair.pixel_px) == ("p7", *TABLE[0])
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "has no rows"),
+        ("x_m,y_m,z_m,u_px,v_px\n", "has no rows"),
+        ("a,b\n1,2\n", "does not name x and y and z and u and v once"),
+        ("5,1,-0.5,212.9,239.4\n5,1,-0.5,212.9\n", "line 2: '5,1,-0.5,212.9' is not a pair"),
+        ("5,1,-0.5,212.9,239.4\n5,1,nan,212.9,239.4\n", "line 2"),
+        ("5,1,-0.5,212.9,239.4,p1,6\n", "line 1"),
+        ("0,0,0,212.9,239.4\n", "at the radar's origin"),
+    ],
+)
+def test_a_table_that_is_not_one_of_pairs_is_refused(text, words):
+    with pytest.raises(InputError, match=re.escape(words)) as refusal:
+        read_pairs_table(text, PINHOLE, "p.csv")
+    assert str(refusal.value).startswith("p.csv: ")

@@ -43,6 +43,14 @@ class JsonTable:
         return self.sample[0] if self.sample else ()
 
 
+_USES = {
+    "calibration-1": "; give it beside the recording: cocalib open RECORDING --calibration FILE",
+    "clicks-1": "; give it beside the recording: cocalib open RECORDING --clicks FILE",
+    "pairs-1": "; solve it without a recording: cocalib solve --pairs FILE",
+}
+"""What our own files are for, by their schema."""
+
+
 def open_json_table(path: Path) -> JsonTable:
     """Find the fields of a JSON file's returns.
 
@@ -52,7 +60,7 @@ def open_json_table(path: Path) -> JsonTable:
     first = list(islice(_rows(path), _SAMPLED_ROWS))
     schema = first[0][1].get("schema", "") if first else ""
     if schema.startswith("cocalib/"):
-        raise RecordingError(f"{path}: a {schema} file, no recording")
+        raise RecordingError(f"{path}: a {schema} file, no recording{_USES.get(schema.partition('/')[2], '')}")
     names = tuple(dict.fromkeys(name for _, row in first for name in row))
     if not names:
         raise RecordingError(

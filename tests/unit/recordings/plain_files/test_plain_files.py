@@ -694,7 +694,7 @@ def test_what_a_folder_holds_and_nobody_reads_is_named(tmp_path) -> None:
         "thumbnails (no times in the file names",
         "imu.csv (no position columns",
         "objects.json (no position columns",
-        "clicks.json (a cocalib/clicks-1 file, no recording)",
+        "clicks.json (a cocalib/clicks-1 file, no recording; ",
         "mixed (the folder contains",
         "bag (a ROS recording; open it by its own path)",
     ):
