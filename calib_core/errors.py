@@ -4,6 +4,7 @@ CalibrationError
  ├── RecordingError       a recording cannot be opened or read
  │    └── MessageError    one message, or one topic, cannot be decoded
  ├── InputError           one of our files (clicks, pairs, camera, calibration) is malformed
+ │    └── NoAnswerError   everything was read, and holds nothing to answer from
  ├── OptionError          an option is misspelt or out of range
  └── UnsolvableError      a calibration was requested that the data cannot give
 """
@@ -23,6 +24,10 @@ class MessageError(RecordingError):
 
 class InputError(CalibrationError):
     """A file of clicks, pairs, camera or calibration that is malformed."""
+
+
+class NoAnswerError(InputError):
+    """Input that was read and holds nothing to answer from; the exit code is 1, not 2."""
 
 
 class OptionError(CalibrationError):

@@ -13,6 +13,8 @@ OPTICAL_FROM_LINK = frozen_array(np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [
 
 _SMALL_ANGLE_RAD = 1e-6
 _ROTATION_TOLERANCE = 1e-6
+_ROUNDED = 1e-12
+"""A rotation farther from orthonormal was written with few digits: its inverse or a product could leave the tolerance."""
 
 
 def skew(vector: Vector3) -> Matrix33:
@@ -135,6 +137,11 @@ def _determinant(x: list[float], y: list[float], z: list[float]) -> float:
     return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
 
 
+def _nearly_nearest(rotation: Matrix33) -> Matrix33:
+    """Take one Newton step from a rotation up to rounding towards the nearest rotation, which squares the error."""
+    return np.asarray(1.5 * rotation - 0.5 * rotation @ (rotation.T @ rotation))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class RigidTransform:
     """A rotation and a translation: p_target = rotation @ p_source + translation_m.
@@ -142,7 +149,7 @@ class RigidTransform:
     Name a value target_from_source. `@` composes transforms and moves points.
 
     Attributes:
-        rotation: (3, 3) orthonormal, determinant +1.
+        rotation: (3, 3) orthonormal, determinant +1; one that was rounded is made orthonormal.
         translation_m: (3,) the source's origin in the target frame.
     """
 
@@ -156,10 +163,13 @@ class RigidTransform:
         if not all(map(math.isfinite, (*x, *y, *z, *self.translation_m.tolist()))):
             raise ValueError("a transform must be finite")
         off = (_dot(x, x) - 1.0, _dot(y, y) - 1.0, _dot(z, z) - 1.0, _dot(x, y), _dot(x, z), _dot(y, z))
-        if max(map(abs, off)) > _ROTATION_TOLERANCE:
+        most = max(map(abs, off))
+        if most > _ROTATION_TOLERANCE:
             raise ValueError("the rotation is not orthonormal")
         if _determinant(x, y, z) < 0:
             raise ValueError("the rotation is left-handed (determinant -1): an axis is mirrored")
+        if most > _ROUNDED:
+            object.__setattr__(self, "rotation", frozen_array(_nearly_nearest(self.rotation), (3, 3)))
 
     @classmethod
     def identity(cls) -> "RigidTransform":
@@ -193,9 +203,7 @@ class RigidTransform:
 
     def perturbed(self, error: np.ndarray) -> "RigidTransform":
         """Apply an error (dt, dtheta) [m, rad]: t = t_hat + dt, R = Exp(dtheta) R_hat; the result is re-orthonormalised."""
-        rotation = rotation_exp(np.asarray(error[3:6])) @ self.rotation
-        # a rotation up to rounding: one Newton step towards the nearest rotation squares the error
-        rotation = 1.5 * rotation - 0.5 * rotation @ (rotation.T @ rotation)
+        rotation = _nearly_nearest(rotation_exp(np.asarray(error[3:6])) @ self.rotation)
         return RigidTransform(rotation, self.translation_m + np.asarray(error[:3]))
 
     def error_from(self, estimate: "RigidTransform") -> np.ndarray:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib_core.arrays import TimesNs
-from calib_core.errors import InputError, MessageError
+from calib_core.errors import InputError, MessageError, NoAnswerError
 from calib_core.measurements import Box, Boxes, FrameBoxes, TimeNs
 
 MOVING = "moving"
@@ -99,7 +99,7 @@ def changed_boxes(
         first_track += len({box.track for boxes in tracks for box in boxes})
         named.extend(FrameBoxes(time, boxes) for (time, _), boxes in zip(found, tracks, strict=True))
     if not any(frame.boxes for frame in named):
-        raise InputError(f"{source}: nothing moves in {len(named)} frames looked at; give a file or topic of boxes")
+        raise NoAnswerError(f"{source}: nothing moves in {len(named)} frames looked at; give a file or topic of boxes")
     note = f"boxes are around whatever changes in the picture; {len(named)} of {len(image_times)} frames were looked at"
     return Boxes(tuple(named), source, size, (note,))
 

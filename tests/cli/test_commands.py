@@ -220,7 +220,7 @@ def test_import_takes_the_image_size_for_a_lens_without_one_and_the_file_beside_
             refused = cocalib("import", folder / file.file_name, "--out", out)
             assert "give it with --image-size WIDTH HEIGHT" in refused.err
         size = [] if has_size else ["--image-size", *map(str, SIZE)]
-        assert cocalib("import", folder / file.file_name, "--out", out, *size).code == 0
+        assert cocalib("import", folder / file.file_name, "--out", out, *size).code == 3
         written = read_calibration(out.read_text(encoding="utf-8")).calibration
         np.testing.assert_allclose(written.camera_from_radar.as_matrix(), CAMERA_FROM_RADAR, atol=1e-6)
         assert (written.camera.width_px, written.camera.height_px) == SIZE
@@ -315,7 +315,7 @@ def test_a_bare_matrix_that_looks_wrong_has_its_own_exit_code_until_pairs_prove_
     assert doubtful.code == 3
     assert "DOUBTFUL" in doubtful.out
     unproven = cocalib("check", tmp_path / "right.txt")
-    assert unproven.code == 0
+    assert unproven.code == 3
     assert "not proven" in unproven.out
     proven = cocalib("check", tmp_path / "inverse.txt", "--pairs", calibration)
     assert proven.code == 1

@@ -71,7 +71,7 @@ def test_import_names_the_flags_and_chains_what_they_choose(car, project_root, t
 
     assert run(arguments) == 2
     assert "choose with --radar-frame NAME and --camera-frame NAME" in capsys.readouterr().err
-    assert run([*arguments, "--radar-frame", "radar_front", "--camera-frame", "camera_front_link"]) == 0
+    assert run([*arguments, "--radar-frame", "radar_front", "--camera-frame", "camera_front_link"]) == 3
     file = read_calibration(out.read_text(encoding="utf-8"))
     assert (file.frames.radar, file.frames.camera) == ("radar_front", "camera_front_optical_frame")
     assert [one.name for one in file.provenance.inputs] == ["car.urdf"]
@@ -117,7 +117,7 @@ def test_into_respects_the_drivers_chain_of_a_recording(calibration, recording, 
     expected = read_calibration(calibration.read_text(encoding="utf-8")).calibration.camera_from_radar
     frames[-1] = "camera_color_optical_frame"
     out = tmp_path / "again.json"
-    assert run(["import", str(cart), str(recording), *frames, "--camera", str(calibration), "--out", str(out)]) == 0
+    assert run(["import", str(cart), str(recording), *frames, "--camera", str(calibration), "--out", str(out)]) == 3
     again = read_calibration(out.read_text(encoding="utf-8")).calibration.camera_from_radar
     np.testing.assert_allclose(again.as_matrix(), expected.as_matrix(), rtol=0, atol=1e-6)
 

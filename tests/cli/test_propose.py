@@ -159,14 +159,15 @@ def test_a_pose_that_unconfirmed_clicks_contradict_is_refused(
     assert not out.exists()
 
 
-def test_a_weak_calibration_that_nobody_confirmed_ends_with_3(
+def test_a_weak_calibration_that_nobody_confirmed_fails_where_a_usable_one_is_required(
     cocalib: Cocalib, recording: Path, solved: Solved, tmp_path: Path
 ) -> None:
     document = json.loads(solved.clicks.read_text())
     document["clicks"] = document["clicks"][::2]
     few, out = tmp_path / "few.json", tmp_path / "pose.json"
     few.write_text(json.dumps(document))
-    answer = cocalib("solve", recording, "--clicks", few, "--out", out)
+    assert cocalib("solve", recording, "--clicks", few, "--out", out).code == 0
+    answer = cocalib("solve", recording, "--clicks", few, "--out", out, "--require", "usable")
     assert answer.code == 3, answer.err
     written = json.loads(out.read_text())
     assert written["verdict"]["level"] == "weak"

@@ -44,6 +44,16 @@ def test_an_invalid_transform_is_refused(rotation: np.ndarray, translation: np.n
         RigidTransform(rotation, translation)
 
 
+def test_a_rotation_rounded_to_six_decimals_can_be_inverted_and_composed() -> None:
+    for seed in range(60):  # of seven of these, the rows are orthonormal within the tolerance and the columns are not
+        rotation = rotation_exp(np.random.default_rng(seed).normal(0.0, 1.5, 3)).round(6)
+        if np.abs(rotation @ rotation.T - np.eye(3)).max() <= 1e-6:
+            transform = RigidTransform(rotation, np.ones(3))
+            assert transform.rotation == pytest.approx(rotation, abs=2e-6)
+            together = (transform @ transform.inverse()).as_matrix()
+            assert together == pytest.approx(np.eye(4), abs=1e-11)
+
+
 def test_a_transform_cannot_be_changed_and_does_not_share_its_arrays() -> None:
     rotation = np.eye(3)
     camera_from_radar = RigidTransform(rotation, np.zeros(3))

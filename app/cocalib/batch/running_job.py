@@ -420,7 +420,7 @@ def _of_calibration(job: Job, solved: SolvedSession) -> Outcome:
     calibration, verdict = solved.calibration, verdict_on(solved.calibration)
     assert solved.found.file is not None
     sigma_deg, sigma_cm = _largest_sigma(calibration.covariance)
-    doubtful = solved.is_weak or verdict.level not in ("good", "usable")
+    doubtful = verdict.level not in ("good", "usable")
     return replace(
         _outcome(job, "weak" if doubtful else "solved"),
         reason=verdict.reason if doubtful else "",

@@ -13,7 +13,7 @@ from calib_core.results import Calibration
 from cocalib.batch.manifest import ManifestRow
 from cocalib.solving.automatic import PlacedClicks, place_clicks, solve_placed_clicks
 from cocalib.solving.recorded_clicks import clicks_in_recording, file_of_clicks, require_confirmed
-from cocalib.solving.solving import calibration_text, is_doubtful, required_camera
+from cocalib.solving.solving import calibration_text, required_camera
 
 CALIBRATION_FILE = "calibration.json"
 CLICKS_FILE = "clicks.json"
@@ -38,7 +38,6 @@ class SolvedSession:
 
     Attributes:
         calibration: as it was solved.
-        is_weak: nobody confirmed its clicks, and it is doubtful.
         found: the calibration as it is read from its file.
         clicks: that it was solved from, at the frames of the recording.
         files: calibration.json, and clicks.json if some were placed automatically.
@@ -46,7 +45,6 @@ class SolvedSession:
     """
 
     calibration: Calibration
-    is_weak: bool
     found: ImportedCalibration
     clicks: tuple[ReflectorClick, ...]
     files: dict[str, bytes]
@@ -100,7 +98,7 @@ def solve_session(row: ManifestRow, given: GivenFiles, recording: Recording) -> 
             read_clicks_file(clicks_text, CLICKS_FILE).clicks, recording, camera, source=Path(CLICKS_FILE)
         ).clicks
     found = imported(read_calibration(text, CALIBRATION_FILE))
-    return SolvedSession(outcome, is_doubtful(outcome), found, clicks, files, tuple(notes))
+    return SolvedSession(outcome, found, clicks, files, tuple(notes))
 
 
 def _placed(

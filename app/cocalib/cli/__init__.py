@@ -1,8 +1,6 @@
 """The command line: parses the arguments, runs the command, and turns each error into one line and an exit code.
 
-Exit codes: 0 done, also when a signal ends `open` or `demo` after the page was served; 1 no calibration possible from the
-data; 2 wrong usage or unreadable input; 70 an internal error, with a report; 129 stopped by SIGHUP, 130 by Ctrl+C, 143 by
-SIGTERM before there was a result.
+`exit_codes` has the law. A signal that ends `open` or `demo` after the page was served is no failure: 0.
 A command imports only what it needs: `--version` and `--help` need neither NumPy nor tyro.
 """
 
@@ -13,8 +11,9 @@ import sys
 from collections.abc import Sequence
 from difflib import get_close_matches
 
-from calib_core.errors import CalibrationError, InputError
+from calib_core.errors import CalibrationError, InputError, NoAnswerError
 from cocalib.cli.commands import COMMANDS, PROGRAM, overview
+from cocalib.cli.exit_codes import NO_ANSWER
 from cocalib.platform.error_boundary import INTERNAL_ERROR, error_boundary
 from cocalib.platform.terminal import escaped_output
 
@@ -41,6 +40,9 @@ def _ended(arguments: Sequence[str]) -> int:
     """Run one command; turn its expected errors and its end by a signal into an exit code."""
     try:
         return _run(*arguments)
+    except NoAnswerError as error:
+        refuse(str(error))
+        return NO_ANSWER
     except CalibrationError as error:
         return refuse(str(error))
     except BrokenPipeError:  # the reader of our output has closed the pipe

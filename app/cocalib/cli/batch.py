@@ -8,19 +8,18 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from calib_core.errors import InputError
-from cocalib.cli.flags import Folder, called
+from cocalib.cli.exit_codes import batch_exit_code
+from cocalib.cli.flags import Folder, Require, called
 from cocalib.cli.output import progress_bar, write_whole
 
 if TYPE_CHECKING:
     from cocalib.batch.manifest import Manifest
+    from cocalib.batch.outcome import Outcome
 
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """Calibrate many sessions: solve, evaluate, report and export each; what is done already is not done again.
-
-    Exit code 0: all are solved; 3: some only weakly; 11 to 99: 10 and how many have no calibration, at most 89 counted.
-    """
+    """Calibrate many sessions: solve, evaluate, report and export each; what is done already is not done again."""
 
     manifest: Annotated[Path | None, tyro.conf.Positional, called("MANIFEST")] = None
     """Sessions to calibrate (.toml): vehicle, session, recording, clicks or auto, camera, options."""
@@ -30,6 +29,8 @@ class Batch:
     """Write the manifest from the recordings in this folder, for you to complete, and calibrate nothing."""
     workers: Annotated[int | None, called("N")] = None
     """Worker processes on this machine; 1: this process does the work; one per processor for many sessions, unless given."""
+    require: Require = None
+    """Count sessions below this verdict as failed in the exit code."""
     scheduler: Annotated[str | None, called("ADDRESS")] = None
     """Address of your own Dask scheduler, such as tls://host:8786 (needs cocalib[cluster]); who reaches it can run code."""
 
@@ -63,7 +64,7 @@ class Batch:
         from cocalib.batch.job import jobs_of
         from cocalib.batch.plan import write_plan
         from cocalib.batch.results_folder import ResultsFolder
-        from cocalib.cli.batch_text import batch_lines, exit_code, shown_batch
+        from cocalib.cli.batch_text import batch_lines, shown_batch
         from cocalib.fleet.reading import read_fleet
         from cocalib.fleet.summary_page import write_summary
 
@@ -83,7 +84,12 @@ class Batch:
         except OSError as error:
             raise InputError(f"{results.path}: cannot be written: {error.strerror or error}") from error
         print("\n".join([*batch_lines(outcomes), "", _next_line(results.path)]))
-        return exit_code(outcomes)
+        return batch_exit_code([_level(one) for one in outcomes], self.require)
+
+
+def _level(outcome: "Outcome") -> str | None:
+    """Return the level of the verdict on a session's calibration; None without one."""
+    return (outcome.verdict or "nothing") if outcome.status in ("solved", "weak") else None
 
 
 def _next_line(results: Path) -> str:

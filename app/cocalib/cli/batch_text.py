@@ -1,4 +1,4 @@
-"""What `cocalib batch` prints: progress while it runs, a table of what came of it, and its exit code."""
+"""What `cocalib batch` prints: progress while it runs, and a table of what came of it."""
 
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -11,8 +11,6 @@ if TYPE_CHECKING:
     from cocalib.batch.driving import BatchProgress
     from cocalib.batch.outcome import Outcome
 
-_WEAK_CODE, _FAILED_FROM, _MOST_CODE = 3, 10, 99
-_WITHOUT = ("refused", "failed")
 _KEYS_OF = {
     "--map": "map under [session.topics]",
     "--confirm-assumptions": "confirm_assumptions = true under [session.topics]",
@@ -23,14 +21,6 @@ _KEYS_OF = {
     "--camera-position-m": "camera_position_m",
 }
 """The keys for flags that advice of the commands names."""
-
-
-def exit_code(outcomes: "Sequence[Outcome]") -> int:
-    """Return 0 if all are solved, 3 if some are weak, 10 and the number of those without a calibration, at most 99."""
-    without = sum(one.status in _WITHOUT for one in outcomes)
-    if without:
-        return min(_FAILED_FROM + without, _MOST_CODE)
-    return _WEAK_CODE if any(one.status == "weak" for one in outcomes) else 0
 
 
 def batch_lines(outcomes: "Sequence[Outcome]") -> list[str]:

@@ -26,10 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """Check calibration files for errors, or compare them. Exit code 1: wrong; 3: looks wrong, not proven.
-
-    Exit codes: 0 nothing is wrong; 1 a file is wrong, or differs; 2 a file cannot be read; 3 a file is doubtful.
-    """
+    """Check calibration files for errors, or compare them."""
 
     calibration: Annotated[tuple[Path, ...], tyro.conf.Positional, called("CALIBRATION...")] = ()
     """Calibrations in any format that export writes; of several, each gets one line."""

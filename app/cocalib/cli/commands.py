@@ -9,6 +9,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Protocol, Self, cast, runtime_checkable
 
+from cocalib.cli.exit_codes import exit_codes
+
 PROGRAM = "cocalib"
 _DESCRIPTION = "Radar-camera calibration: click the corner reflector, get camera_from_radar and its uncertainty."
 _WIDTH = 80
@@ -84,7 +86,7 @@ COMMANDS: Mapping[str, Command] = {
         Command(
             "check",
             "cocalib.cli.check:Check",
-            "Check calibration files for errors, or compare them. Exit code 1: wrong; 3: looks wrong, not proven.",
+            "Check calibration files for errors, or compare them.",
         ),
         Command(
             "evaluate",
@@ -159,6 +161,8 @@ def overview() -> str:
         *_columns(
             {"-h, --help": "Show this help; after a command, show its options.", "--version": "Print the version."}
         ),
+        "",
+        *textwrap.wrap(exit_codes(), _WIDTH),
     ]
     return "\n".join(lines)
 

@@ -22,10 +22,7 @@ COMPARISON_SCHEMA = "cocalib/comparison-1"
 
 @dataclass(frozen=True, slots=True)
 class Compare:
-    """Compare two calibrations; with a recording, say which is better there, and whether that is more than noise.
-
-    Exit codes: 0 compared; 2 a file cannot be read, or there is nothing to judge the two by.
-    """
+    """Compare two calibrations; with a recording, say which is better there, and whether that is more than noise."""
 
     a: Annotated[Path | None, tyro.conf.Positional, called("A")] = None
     """A calibration in any format that import reads."""

@@ -8,21 +8,20 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from calib_core.errors import InputError
-from cocalib.cli.flags import Switch, called
+from cocalib.cli.exit_codes import exit_code
+from cocalib.cli.flags import Require, Switch, called
 from cocalib.cli.judging_flags import Judging, JudgingFlags
 from cocalib.cli.output import progress_bar
 from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
     from calib_core.evaluation import Evaluation
+    from calib_core.interchange import ImportedCalibration
 
 
 @dataclass(frozen=True, slots=True)
 class Evaluate:
-    """Judge a calibration on a recording: residuals at clicks (AED, CDSD), radar returns in boxes (Acc).
-
-    Exit codes: 0 judged; 1 the recording has nothing to judge it by; 2 a file cannot be read; 3 judged, with doubts.
-    """
+    """Judge a calibration on a recording: residuals at clicks (AED, CDSD), radar returns in boxes (Acc)."""
 
     calibration: Annotated[Path | None, tyro.conf.Positional, called("CALIBRATION")] = None
     """A calibration in any format that import reads."""
@@ -30,6 +29,8 @@ class Evaluate:
     """Leave out the held-out figures, which take a solve per placement."""
     json: Switch = False
     """Print one JSON object instead of text."""
+    require: Require = None
+    """Exit code 3 for a calibration whose verdict is below this."""
     judging: Judging = field(default_factory=JudgingFlags)
 
     def run(self) -> int:
@@ -39,8 +40,9 @@ class Evaluate:
 
         if self.calibration is None or not self.judging.recording:
             raise InputError("evaluate needs a calibration and a recording; see cocalib evaluate --help")
-        evaluation = self._evaluation(self.calibration)
-        code = evaluation_exit_code(evaluation)
+        found, evaluation = self._evaluation(self.calibration)
+        verdict = found.file.verdict if found.file is not None else None
+        code = evaluation_exit_code(evaluation) or exit_code(verdict, found.evidence, self.require)
         if self.json:
             names = [path.name for path in self.judging.recording]
             print_exactly(
@@ -48,9 +50,11 @@ class Evaluate:
             )
         else:
             print("\n".join(evaluation_lines(evaluation)))
+            if verdict is not None:
+                print(f"verdict when it was solved: {verdict.line}")
         return code
 
-    def _evaluation(self, path: Path) -> "Evaluation":
+    def _evaluation(self, path: Path) -> "tuple[ImportedCalibration, Evaluation]":
         from cocalib.evaluation.evaluating import evaluate_recording
         from cocalib.evaluation.recording_check import judged_calibration
 
@@ -74,4 +78,4 @@ class Evaluate:
                 )
             if recording.radar_choice:
                 print(f"radar: {recording.radar_choice}", file=sys.stderr)
-            return replace(evaluation, warnings=(*judged.warnings, *evaluation.warnings))
+            return judged.found, replace(evaluation, warnings=(*judged.warnings, *evaluation.warnings))

@@ -156,6 +156,8 @@ def _write_all(
 
 
 def _print_warnings(file: "CalibrationFile") -> None:
+    if file.verdict is not None:
+        print(f"verdict: {file.verdict.line}", file=sys.stderr)
     if file.rests_on == "imported_assumed":
         print(
             "warning: what this calibration's numbers mean was assumed when it was imported (imported_assumed); "

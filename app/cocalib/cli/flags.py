@@ -6,6 +6,8 @@ from typing import Annotated, Any, TypeAlias
 
 import tyro
 
+from cocalib.cli.exit_codes import Required
+
 
 def called(metavar: str | None = None) -> object:
     """Name a value in the help, and omit its default: None or False would say nothing."""
@@ -22,3 +24,4 @@ File: TypeAlias = Annotated[Path | None, called("FILE")]
 NewFile: TypeAlias = Annotated[Path, tyro.conf.arg(metavar="FILE")]
 Folder: TypeAlias = Annotated[Path | None, called("FOLDER")]
 Switch: TypeAlias = Annotated[bool, called()]
+Require: TypeAlias = Annotated[Required | None, called("{good,usable}")]

@@ -38,9 +38,6 @@ class Fleet:
     OUT is the folder that batch wrote to. `status OUT`: where each vehicle stands. `history VEHICLE OUT`: its sessions and what
     changed in between. `compare A B OUT`: two sessions VEHICLE/SESSION, or two vehicles of one type. `export OUT`: all
     sessions as a table. `summary OUT`: write OUT/summary.html.
-
-    Exit codes: 0 done, and nothing to look at; 2 nothing can be read; 3 something needs a look:
-    a vehicle without a calibration to rely on, remounted, or off its kind; or two that differ.
     """
 
     action: Annotated[_Action, tyro.conf.Positional, called("ACTION")]

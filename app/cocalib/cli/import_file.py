@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from calib_core.errors import InputError
-from cocalib.cli.flags import File, Switch, called
+from cocalib.cli.exit_codes import NO_ANSWER, exit_code
+from cocalib.cli.flags import File, Require, Switch, called
 from cocalib.cli.output import write_whole
 from cocalib.cli.recording_flags import TopicFlags, Topics
 from cocalib.cli.tree_flags import FrameFlags, Frames, input_file
@@ -221,15 +222,13 @@ class Import:
     """A calibration of the same sensors that proves what the file means."""
     replace_camera: Switch = False
     """Take --camera although the file states another camera."""
+    require: Require = None
+    """Exit code 3 for a verdict below this."""
     frames: Frames = field(default_factory=FrameFlags)
     meaning: Annotated[MeaningFlags, tyro.conf.arg(name="")] = field(default_factory=MeaningFlags)
 
     def run(self) -> int:
-        """Write the calibration; return the exit code.
-
-        It is 3 if it was converted but looks wrong, and nothing proves it; or if its numbers may mean several things, and
-        nothing was written.
-        """
+        """Write the calibration; return the exit code, as of no answer if its numbers may mean several things."""
         from calib_core.interchange import (
             Provenance,
             adoption,
@@ -261,7 +260,7 @@ class Import:
         else:
             chosen = self.meaning.chosen(unstated, camera=given, pairs=pairs, against=against)
             if chosen is None:
-                return 3
+                return NO_ANSWER
             found, sources = chosen, (input_file(files[0]),)
         if self.out is None:
             raise InputError(f"{source}: give the output file with --out FILE")
@@ -280,7 +279,7 @@ class Import:
         write_whole(self.out, write(file))
         print("\n".join(line for line in report.lines()[1:] if not line.startswith("ok: ")), file=sys.stderr)
         print(f"{names} read as {found.format}, {_RESTS_ON[file.rests_on]}; written to {self.out}")
-        return 3 if report.verdict == "doubtful" else 0
+        return exit_code(file.verdict, file.rests_on, self.require)
 
 
 _RESTS_ON = {

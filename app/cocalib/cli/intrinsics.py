@@ -75,10 +75,7 @@ BoardUsed: TypeAlias = Annotated[BoardFlags, tyro.conf.arg(name="")]
 
 @dataclass(frozen=True, slots=True)
 class Intrinsics:
-    """Calibrate a camera's lens from pictures of a board, or convert a file with intrinsics.
-
-    Exit code 1: the pictures cannot give a calibration; 3: there is one, but a warning says that it is doubtful.
-    """
+    """Calibrate a camera's lens from pictures of a board, or convert a file with intrinsics."""
 
     source: Annotated[tuple[Path, ...], tyro.conf.Positional, called("SOURCE...")] = ()
     """A recording, a video, a folder of pictures or picture files of one camera; or a file with intrinsics."""

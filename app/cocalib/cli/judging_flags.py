@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
 import tyro
 
-from calib_core.errors import InputError
+from calib_core.errors import InputError, NoAnswerError
 from cocalib.cli.flags import File, called
 from cocalib.cli.output import progress_bar, told_clicks_at_frames
 from cocalib.cli.recording_flags import Recorded, RecordedFlags, TopicFlags
@@ -72,12 +72,13 @@ class EvidenceFlags:
             judged: what they are called.
 
         Raises:
-            InputError: they cannot be read, or there are neither clicks nor boxes.
+            InputError: they cannot be read.
+            NoAnswerError: there are neither clicks nor boxes.
         """
         clicks = self.clicks_in(recording, paths, calibrations)
         boxes, labels = self.boxes_in(recording)
         if not clicks and boxes is None:
-            raise InputError(
+            raise NoAnswerError(
                 f"{paths[0]}: nothing to judge {judged} by: no clicks (--clicks CLICKS.json; click reflectors with "
                 "cocalib open RECORDING --calibration FILE) and no boxes (--boxes FILE_OR_TOPIC)"
             )

@@ -33,7 +33,6 @@ class Propose:
     """Find where the reflector probably stands in the pictures, for a person or a script to confirm.
 
     Nothing is accepted by that; the page shows the same proposals to confirm with a key.
-    Exit code 1: the recording gives no proposal.
     """
 
     clicks: File = None

@@ -18,10 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """List the sessions of recordings, repair a damaged one, or export its clicks.
-
-    Exit codes: 0 done; 1 repair found damage and has changed nothing; 2 nothing can be read; 3 exported, but not all is proven.
-    """
+    """List the sessions of recordings, repair a damaged one, or export its clicks."""
 
     action: Annotated[Literal["list", "repair", "export"], tyro.conf.Positional, called("ACTION")]
     """What to do: list, repair or export."""

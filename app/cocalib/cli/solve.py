@@ -13,7 +13,9 @@ from calib_core.errors import InputError
 from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
-from cocalib.cli.flags import File, Switch
+from calib_core.results.verdict import verdict_on
+from cocalib.cli.exit_codes import exit_code
+from cocalib.cli.flags import File, Require, Switch
 from cocalib.cli.output import explain_unsolvable, recorded_clicks, shown_progress, write_whole
 from cocalib.cli.recording_flags import (
     CameraFlags,
@@ -45,7 +47,6 @@ class Solve:
     """Compute a calibration from a recording and its clicks, or from a file of pairs.
 
     The same clicks give the same file as the page's download, byte for byte.
-    Exit code 1: no calibration; 3: there is one, but nobody confirmed its clicks, and it is weak.
     """
 
     clicks: File = None
@@ -64,6 +65,8 @@ class Solve:
     """Output file (cocalib/calibration-1 JSON); stdout if omitted."""
     refine_intrinsics: Switch = False
     """Estimate focal length, principal point and k1 with the pose; their covariance or the refining options say how sure."""
+    require: Require = None
+    """Exit code 3 for a verdict below this."""
     vehicle: Vehicle = field(default_factory=VehicleFlags)
     recorded: Recorded = field(default_factory=RecordedFlags)
     options: Options = field(default_factory=OptionFlags)
@@ -198,9 +201,7 @@ class Solve:
         return self._deliver(outcome, calibration_text_of_pairs(outcome, given, vehicle))
 
     def _deliver(self, calibration: Calibration, text: str) -> int:
-        from cocalib.solving.solving import is_doubtful
-
-        code = 3 if is_doubtful(calibration) else 0
+        code = exit_code(verdict_on(calibration), None, self.require)
         if self.out is None:
             print_exactly(text)
             return code

@@ -33,7 +33,6 @@ from calib_core.measurements import Candidate, Pair, ReflectorClick, Unsolvable
 from calib_core.options import CalibrationOptions, checked_options
 from calib_core.recordings import Recording, about_assumptions
 from calib_core.results import Calibration, InputFile, PairResult, UnconfirmedClicks
-from calib_core.results.verdict import verdict_on
 from cocalib.platform.resources import version
 from cocalib.session import Outcome
 
@@ -337,12 +336,6 @@ def calibration_text_of_pairs(calibration: Calibration, given: GivenPairs, vehic
         calibration = dataclasses.replace(calibration, warnings=(*calibration.warnings, *kept))
         return interchange_text(calibration, file.frames, provenance, vehicle=vehicle.over(file.vehicle))
     return interchange_text(calibration, provenance=Provenance(inputs=inputs, version=version()), vehicle=vehicle)
-
-
-def is_doubtful(calibration: Calibration) -> bool:
-    """Return whether a calibration from clicks that nobody confirmed is not to be relied on as it is."""
-    unconfirmed = any(warning.code == "nobody-confirmed" for warning in calibration.warnings)
-    return unconfirmed and verdict_on(calibration).level not in ("good", "usable")
 
 
 def required_camera(recording: Recording, camera_file: CameraFile | None) -> Camera:

@@ -57,7 +57,8 @@ _WORD_OF_ANOTHER = {"against": frozenset({"agrees"}), "of": frozenset({"same-pos
 _DIFFERENCES = frozenset({"disagrees"})
 _ANY_SIZE_PX = (1000, 1000)
 _ASSUMED_REFERENCE = "assumed-reference"
-_IMPLAUSIBLE = frozenset({"far-apart", "looks-elsewhere", "on-its-side", "placeholder"})
+_CONTRADICTORY = "contradictory"
+_IMPLAUSIBLE = frozenset({"far-apart", "looks-elsewhere", "on-its-side", "placeholder", _CONTRADICTORY})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,6 +108,9 @@ class CheckReport:
         rows = [f"read as {self.imported.format}{named}"]
         rows += [f"assumed: {assumption.removeprefix('assumed ')}" for assumption in self.imported.assumptions]
         rows += [f"note: {note}" for note in self.imported.notes]
+        stated = self.imported.file.verdict if self.imported.file is not None else None
+        if stated is not None and stated.level != "contradictory":  # which is a result
+            rows.append(f"verdict when it was solved: {stated.line}")
         for result in self.results:
             rows.append(f"{_label(result)}: {result.message}" + (f"; {result.hint}" if result.hint else ""))
         if self.comparison is not None:
@@ -165,8 +169,9 @@ def check(
         results += by_pairs(imported, pairs.under(imported.file.calibration) if imported.file else pairs)
     results += by_own_pairs(imported)
     no_proof = _no_proof(imported, against=against, of=of)
+    results += _by_own_verdict(imported)
     results += _assumed_references(against=against, of=of)
-    untested = {"contradiction", CHECK_POINT_UNUSED, _ASSUMED_REFERENCE, *no_proof}
+    untested = {"contradiction", CHECK_POINT_UNUSED, _ASSUMED_REFERENCE, _CONTRADICTORY, *no_proof}
     tested = [result for result in results if result.code not in untested]
     if not tested or (against is None and not any(result.level == "error" for result in tested)):
         results += by_plausibility(imported.pose, verified=bool(tested))
@@ -190,8 +195,18 @@ def _own_camera(imported: ImportedCalibration) -> Camera | None:
 
 def _no_proof(imported: ImportedCalibration, **others: ImportedCalibration | None) -> frozenset[str]:
     """Return the codes of the results that prove nothing, because what they rest on was assumed."""
-    codes = _OWN_WORD if imported.evidence == "imported_assumed" else frozenset()
+    codes = _OWN_WORD if imported.evidence == "imported_assumed" or _by_own_verdict(imported) else frozenset()
     return codes.union(*(_WORD_OF_ANOTHER[option] for option, other in others.items() if _is_assumed(other)))
+
+
+def _by_own_verdict(imported: ImportedCalibration) -> list[CheckResult]:
+    """Pass on that the pose was contradictory when it was solved: then its own check point and pairs prove nothing."""
+    verdict = imported.file.verdict if imported.file is not None else None
+    if verdict is None or verdict.level != "contradictory":
+        return []
+    return [
+        CheckResult("warning", _CONTRADICTORY, f"contradictory when it was solved: {verdict.reason}", verdict.action)
+    ]
 
 
 def _assumed_references(**others: ImportedCalibration | None) -> list[CheckResult]:
@@ -475,7 +490,7 @@ def _stale(imported: ImportedCalibration, origin: ImportedCalibration, *, same_p
 
 
 CHECK_SCHEMA = "cocalib/check-1"
-_CODES = {"right": 0, "unproven": 0, "doubtful": 3, "wrong": 1}
+_CODES = {"right": 0, "unproven": 3, "doubtful": 3, "wrong": 1}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -508,7 +523,7 @@ class CheckedFile:
 
 
 def exit_code(files: Sequence[CheckedFile]) -> int:
-    """Return the exit code of a check: 1 if a file is wrong, else 2 if one cannot be read, else 3 if one is doubtful, else 0."""
+    """Return the exit code of a check: 1 if a file is wrong, else 2 if one cannot be read, else 3 if one is not decided."""
     codes = {_CODES.get(file.verdict, 2) for file in files}
     return next((code for code in (1, 2, 3) if code in codes), 0)
 
@@ -523,12 +538,13 @@ def _document(file: CheckedFile) -> dict[str, Any]:
     report = file.report
     document: dict[str, Any] = {"file": file.name, "verdict": file.verdict, "error": file.unreadable or None}
     if report is None:
-        unknown = dict.fromkeys(("format", "evidence", "calibration_sha256", "frames", "comparison"))
+        unknown = dict.fromkeys(("format", "evidence", "stated_verdict", "calibration_sha256", "frames", "comparison"))
         return document | unknown | {"assumptions": [], "notes": [], "results": []}
     found = report.imported
     return document | {
         "format": found.format,
         "evidence": found.evidence,
+        "stated_verdict": msgspec.to_builtins(found.file.verdict) if found.file is not None else None,
         "calibration_sha256": found.calibration_sha256,
         "frames": msgspec.to_builtins(found.frames),
         "assumptions": list(found.assumptions),

@@ -1,0 +1,64 @@
+"""The law of exit codes: its words, for help and README, and what counts as in doubt."""
+
+from typing import TYPE_CHECKING, Final, Literal
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from calib_core.interchange.calibration_file import Evidence
+    from calib_core.results.verdict import Verdict
+
+DONE, NO_ANSWER, IN_DOUBT = 0, 1, 3
+_FAILED_FROM, _MOST = 10, 99
+
+Required = Literal["good", "usable"]
+"""What `--require` asks of a verdict."""
+
+_ENOUGH: Final[dict[str | None, tuple[str, ...]]] = {"usable": ("good", "usable"), "good": ("good",)}
+
+_LAW: Final = (
+    (
+        "solve, import and evaluate",
+        "0 done; 1 no answer (evaluate: nothing to judge by); 3 in doubt: contradictory or unproven, or below --require "
+        "good|usable",
+    ),
+    ("check", "0 agrees or sound; 1 differs or wrong; 2 unreadable; 3 cannot be decided"),
+    (
+        "batch",
+        "0 done; 10 + the number of failed sessions, at most 99; a session in doubt fails only with --require",
+    ),
+    ("the others", "0 done; 1 nothing found, or damage found; 3 needs a look"),
+    (
+        "all",
+        "2 wrong usage or unreadable input; 70 an internal error, with a report in a file; 128 + the signal that stopped it",
+    ),
+)
+
+
+def exit_codes() -> str:
+    """Return the law as one paragraph."""
+    return "Exit codes. " + " ".join(f"{commands}: {words}." for commands, words in _LAW)
+
+
+def exit_code(verdict: "Verdict | None", evidence: "Evidence | None", require: Required | None) -> int:
+    """Return 3 if an answer is in doubt, else 0.
+
+    Args:
+        verdict: on the calibration; None if nobody judged it.
+        evidence: what its pose rests on; None if that is not stated.
+        require: the least level that is asked for; None asks for none.
+    """
+    level = "nothing" if verdict is None else verdict.level
+    in_doubt = level == "contradictory" or evidence == "imported_assumed"
+    return IN_DOUBT if in_doubt or level not in _ENOUGH.get(require, (level,)) else DONE
+
+
+def batch_exit_code(levels: "Sequence[str | None]", require: Required | None) -> int:
+    """Return the exit code of a batch.
+
+    Args:
+        levels: of the verdicts on its sessions; None for one without a calibration.
+        require: the least level that is asked for.
+    """
+    failed = sum(level is None or level not in _ENOUGH.get(require, (level,)) for level in levels)
+    return min(_FAILED_FROM + failed, _MOST) if failed else DONE
