@@ -21,9 +21,9 @@ EMPTY_3D_VIEW = """document.addEventListener("readystatechange", () => {
 """The page loads viser only where its frame is empty."""
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def playwright_driver() -> Iterator[Playwright]:
-    """Start Playwright per module: it keeps an event loop running in this thread, which would disturb other modules."""
+    """Start Playwright for this folder only: it keeps an event loop running in this thread, which would disturb others."""
     with sync_playwright() as driver:
         yield driver
 
@@ -33,7 +33,7 @@ def browser_path() -> Path:
     return find_browser()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def launch(playwright_driver: Playwright, browser_path: Path) -> Iterator[Callable[..., Browser]]:
     """Start browsers with extra flags; all are closed at the end."""
     running: list[Browser] = []
@@ -48,7 +48,7 @@ def launch(playwright_driver: Playwright, browser_path: Path) -> Iterator[Callab
         browser.close()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def chromium(launch: Callable[..., Browser]) -> Browser:
     return launch()
 
