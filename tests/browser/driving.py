@@ -1,5 +1,6 @@
 """Drive the page: wait for a condition, click an image point, read the state."""
 
+import json
 import math
 import re
 import time
@@ -136,6 +137,20 @@ class Driver:
             self.go_to(self.frame_at(placement["best_image_time"]))
             self.page.mouse.click(*self.place_of(*placement["pixel_px"]))
             self.until("__cocalib.unconfirmed() === 0")
+        self.settle()
+
+    def load_sample(self, truth: dict[str, Any], count: int | None = None) -> None:
+        """Load the same clicks as from a file: one step and one solve, where it does not matter how they came."""
+        placements = truth["placements"][:count]
+        clicks = [
+            {"id": f"c{number}", "image_time": placement["best_image_time"], "pixel_px": placement["pixel_px"]}
+            for number, placement in enumerate(placements, 1)
+        ]
+        self.page.evaluate(
+            "text => import('./shell/socket.js').then(({ send }) => send({ type: 'import_clicks', text, name: 'clicks.json' }))",
+            json.dumps({"schema": "cocalib/clicks-1", "clicks": clicks}),
+        )
+        self.go_to(self.frame_at(placements[-1]["best_image_time"]))
         self.settle()
 
     def text(self, selector: str) -> str:

@@ -32,9 +32,9 @@ def test_axe_finds_nothing_in_any_state_of_the_page(page: Driver, truth: Any) ->
         found[state] = violations(page)
 
     look("no click")
-    page.click_sample(truth, 1)
+    page.load_sample(truth, 1)
     look("one click")
-    page.click_sample(truth, 5)
+    page.load_sample(truth, 5)
     look("solved")
     u, v = truth["placements"][4]["pixel_px"]
     page.drag((u, v), (u + 150, v - 90))
@@ -107,7 +107,7 @@ def test_axe_finds_nothing_without_pictures_and_keys_reach_each_placement(
 
 @pytest.mark.no_3d_view
 def test_the_picture_and_its_marks_are_told_in_words(page: Driver, truth: Any) -> None:
-    page.click_sample(truth, 5)
+    page.load_sample(truth, 5)
     words = page.page.locator("#picture-words")
     expect(words).to_contain_text("Placement 5 of 20")
     expect(words).to_contain_text("c5 at column")
@@ -131,7 +131,7 @@ def test_the_picture_and_its_marks_are_told_in_words(page: Driver, truth: Any) -
 
 
 def test_tab_reaches_every_control_in_order_and_is_never_caught(page: Driver, truth: Any) -> None:
-    page.click_sample(truth, 5)
+    page.load_sample(truth, 5)
     user = page.page
     page.value(
         "(window.reached = [], document.addEventListener('focusin', (event) => window.reached.push(event.target)), 0)"
@@ -160,7 +160,7 @@ def test_tab_reaches_every_control_in_order_and_is_never_caught(page: Driver, tr
 
 @pytest.mark.no_3d_view
 def test_arrows_go_through_the_pairs_and_the_figures(page: Driver, truth: Any) -> None:
-    page.click_sample(truth, 5)
+    page.load_sample(truth, 5)
     user = page.page
     rows = user.locator("#page-pairs tr.row")
     expect(rows).to_have_count(5)

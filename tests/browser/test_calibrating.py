@@ -66,7 +66,7 @@ def test_undo_and_redo_go_through_everything(page: Driver, truth: Any) -> None:
 
 
 def test_excluding_a_pair_solves_again_and_greys_its_row(page: Driver, truth: Any) -> None:
-    page.click_sample(truth, 7)
+    page.load_sample(truth, 7)
     before = page.view
     page.press("j")
     worst = max(before["clicks"], key=lambda row: row["residual_px"] or 0)
@@ -81,7 +81,7 @@ def test_excluding_a_pair_solves_again_and_greys_its_row(page: Driver, truth: An
 
 
 def test_a_mark_can_be_dragged_nudged_and_removed(page: Driver, truth: Any) -> None:
-    page.click_sample(truth, 1)
+    page.load_sample(truth, 1)
     [placed] = page.view["clicks"]
     u, v = placed["u_px"], placed["v_px"]
     page.zoom_to(u, v, 4)
@@ -141,7 +141,7 @@ def test_playing_shows_frame_after_frame_and_space_stops_it(page: Driver) -> Non
 
 
 def test_the_method_and_its_options_can_be_changed_and_reset(page: Driver, truth: Any) -> None:
-    page.click_sample(truth, 8)
+    page.load_sample(truth, 8)
     robust = page.view["metrics"]
     page.page.click("#tab-options")
     page.page.click('[data-method="paper"]')
@@ -162,7 +162,7 @@ def test_the_method_and_its_options_can_be_changed_and_reset(page: Driver, truth
 
 
 def test_a_camera_position_is_used_only_once_it_is_entered(page: Driver, truth: Any) -> None:
-    page.click_sample(truth, 6)
+    page.load_sample(truth, 6)
     without = page.view
     page.page.click("#tab-options")
     page.page.get_by_label("Measured camera position").check()
@@ -190,7 +190,7 @@ def test_two_tabs_see_the_same(
     page: Driver, open_page: Callable[..., Driver], server: RunningServer, truth: Any
 ) -> None:
     other = open_page(server.url)
-    page.click_sample(truth, 2)
+    page.load_sample(truth, 2)
     other.until("__cocalib.state.view.clicks.length === 2")
     other.go_to(page.value("__cocalib.state.cursor"))
     other.press("Delete")
@@ -201,7 +201,7 @@ def test_two_tabs_see_the_same(
 
 
 def test_a_reloaded_page_shows_the_same_frame(page: Driver, truth: Any) -> None:
-    page.click_sample(truth, 4)
+    page.load_sample(truth, 4)
     before, frame = page.view, page.value("__cocalib.state.cursor")
     page.page.reload()
     page.until("__cocalib.state.shown && __cocalib.state.view")

@@ -22,7 +22,7 @@ def overlap(page: Driver, one: str, other: str) -> bool:
 
 
 def test_explanations_show_on_hover_and_focus_beside_what_they_explain(page: Driver, truth: Any) -> None:
-    page.click_sample(truth, 5)
+    page.load_sample(truth, 5)
     user = page.page
     tip = user.locator("#tip")
     for selector, words in (
@@ -61,7 +61,7 @@ def test_explanations_show_on_hover_and_focus_beside_what_they_explain(page: Dri
 
 
 def test_a_notice_covers_neither_the_field_nor_the_mark(page: Driver, truth: Any) -> None:
-    page.click_sample(truth, 2)
+    page.load_sample(truth, 2)
     user = page.page
     user.click("#tab-options")
     user.click("#page-options summary")
@@ -82,7 +82,7 @@ def test_a_notice_covers_neither_the_field_nor_the_mark(page: Driver, truth: Any
 
 
 def test_a_short_drag_on_a_mark_does_nothing(page: Driver, truth: Any) -> None:
-    page.click_sample(truth, 1)
+    page.load_sample(truth, 1)
     before = page.view
     x, y = page.place_of(*truth["placements"][0]["pixel_px"])
     for dx, dy in ((3, 0), (0, -3), (2, 2)):

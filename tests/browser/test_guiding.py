@@ -11,7 +11,7 @@ pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
 def test_a_wrong_click_is_named_and_found_by_j(page: Driver, truth: Any) -> None:
     page.until("__cocalib.state.placementsKnown")
-    page.click_sample(truth, 9)
+    page.load_sample(truth, 9)
     wrong = truth["placements"][9]
     page.go_to(page.frame_at(wrong["best_image_time"]))
     u, v = wrong["pixel_px"]
@@ -27,11 +27,11 @@ def test_a_wrong_click_is_named_and_found_by_j(page: Driver, truth: Any) -> None
 
 def test_a_jump_shows_the_reflector_also_when_zoomed_in(page: Driver, truth: Any) -> None:
     page.until("__cocalib.state.placementsKnown")
-    page.click_sample(truth, 2)
+    page.load_sample(truth, 2)
     page.zoom_to(*truth["placements"][1]["pixel_px"], 4)
     page.press("n")
     page.until("__cocalib.viewport.fitted")
-    page.click_sample(truth, 8)
+    page.load_sample(truth, 8)
     page.zoom_to(*truth["placements"][7]["pixel_px"], 4)
     page.press("n")
     page.until("__cocalib.state.shown.index === __cocalib.state.placements[8].frame")
@@ -60,7 +60,7 @@ def test_a_placement_can_be_marked_without_a_mouse(page: Driver, truth: Any) -> 
     [moved] = page.view["clicks"]
     assert moved["u_px"] == pytest.approx(first["u_px"] + 1)
     page.press("Delete")
-    page.click_sample(truth, 8)
+    page.load_sample(truth, 8)
     page.press("n")
     page.until("__cocalib.state.shown.index === __cocalib.state.placements[8].frame")
     page.until("__cocalib.state.overlay.index === __cocalib.state.shown.index")
@@ -73,7 +73,7 @@ def test_a_placement_can_be_marked_without_a_mouse(page: Driver, truth: Any) -> 
 
 
 def test_a_failure_of_the_papers_method_is_shown_in_the_warning_box(page: Driver, truth: Any) -> None:
-    page.click_sample(truth, 9)
+    page.load_sample(truth, 9)
     page.page.click("#tab-options")
     assert page.page.locator('[data-path="paper.ransac_threshold_px"]').is_hidden()
     page.page.click('[data-method="paper"]')
@@ -95,7 +95,7 @@ def test_a_failure_of_the_papers_method_is_shown_in_the_warning_box(page: Driver
 def test_the_pose_tab_lists_the_errors_that_all_pairs_share(page: Driver, truth: Any) -> None:
     page.page.click("#tab-pose")
     assert page.page.locator(".systematic").is_hidden()
-    page.click_sample(truth)
+    page.load_sample(truth)
     errors = page.view["systematic_errors"]
     rows = page.page.locator(".systematic tbody tr")
     assert rows.count() == len(errors["rows"]) > 0

@@ -30,7 +30,7 @@ def test_the_verdict_is_in_sight_from_nothing_to_done(page: Driver, truth: Any) 
     page.until("__cocalib.state.placementsKnown && __cocalib.state.view.verdict.key === 'N'")
     assert page.text("#verdict").startswith("nothing yet")
     assert in_sight(page)
-    page.click_sample(truth, 5)
+    page.load_sample(truth, 5)
     verdict = page.view["verdict"]
     assert (verdict["level"], verdict["action"]) == ("weak", "Click the 15 placements that are left.")
     assert page.text("#verdict .line") == verdict["line"]
@@ -55,7 +55,7 @@ def test_the_verdict_is_in_sight_from_nothing_to_done(page: Driver, truth: Any) 
     assert shown.first.get_attribute("data-code") == codes[1]
     assert page.view["verdict"] == verdict, "what was read still counts"
 
-    page.click_sample(truth)
+    page.load_sample(truth)
     done = page.view["verdict"]
     assert (done["done"], done["key"]) == (True, "E")
     assert done["action"].startswith("Done")

@@ -21,7 +21,7 @@ def _await_status(user: Page, address: str, status: int) -> None:
 
 
 def test_the_export_says_that_the_server_is_gone_and_tries_again(page: Driver, truth: Any) -> None:
-    page.click_sample(truth, 4)
+    page.load_sample(truth, 4)
     user = page.page
     save = user.locator(f"{DIALOG} .first")
     user.route(re.compile(r"/api/"), lambda route: route.abort("connectionrefused"))
@@ -50,7 +50,7 @@ def test_the_export_says_that_the_server_is_gone_and_tries_again(page: Driver, t
 
 
 def test_an_answer_that_is_an_error_is_shown_in_words(page: Driver, truth: Any) -> None:
-    page.click_sample(truth, 4)
+    page.load_sample(truth, 4)
     user = page.page
 
     def fail(route: Route) -> None:

@@ -53,7 +53,7 @@ def test_the_palette_finds_actions_by_their_words_other_words_and_with_a_slip(pa
 
 
 def test_the_palette_goes_to_placements_pairs_frames_times_and_options(page: Driver, truth: Any) -> None:
-    page.click_sample(truth, 2)
+    page.load_sample(truth, 2)
     for query, arrived in (
         ("placement 7", "__cocalib.state.shown.index === __cocalib.state.placements[6].frame"),
         ("pair c2", "__cocalib.state.selected === 'c2'"),

@@ -38,11 +38,11 @@ def test_a_calibration_is_shown_checked_and_compared(
         page.until("__cocalib.state.overlay.returns.length > 0")
         page.page.click("#tab-pose")
         assert "From factory.txt" in page.text("#page-pose")
-        page.click_sample(truth, 1)
+        page.load_sample(truth, 1)
         (first,) = page.view["clicks"]
         assert first["residual_px"] < 30
         assert "residual of 1 click" in page.text("#status-text")
-        page.click_sample(truth)
+        page.load_sample(truth)
         figures = {figure["key"]: figure for figure in page.view["comparison"]}
         assert float(figures["rotation_apart"]["value"].split()[0]) < 1.0
         assert "Difference from factory.txt" in page.text("#page-pose")
