@@ -42,6 +42,7 @@ from calib_core.recordings.selection import (
     Selection,
     Usage,
     choose_radar,
+    image_choice,
     select,
     usage_of,
 )
@@ -58,6 +59,7 @@ class Assembly:
     radar_topics: tuple[str, ...]
     radar_sensors: tuple[RadarSensor, ...]
     radar_choice: str
+    image_choice: str
     image_topic: str | None
     camera_info_topic: str | None
     radar_frame: str
@@ -143,6 +145,7 @@ def assemble(
         radar_topics=tuple(topic.name for topic in used.radars),
         radar_sensors=choice.sensors,
         radar_choice=choice.reason,
+        image_choice=image_choice(inventory, selection.image, options.image_topic),
         image_topic=used.image.name if used.image else None,
         camera_info_topic=used.camera_info.name if used.camera_info else str(beside.file) if beside else None,
         radar_frame=_frame(used.radars[0]) if used.radars else "",

@@ -53,6 +53,7 @@ class Recording:
         radar_topic: the radar topic in use, if any; of several the one with the most returns.
         radar_topics: all topics of the radar in use.
         radar_choice: which radar is used and why, if there was a choice or it has several topics; else "".
+        image_choice: which image topic is used and why, if there are several; else "".
         image_topic: the image topic in use, if any.
         camera_info_topic: the camera-info topic in use, if any.
         radar_frame: frame_id of the radar, without a leading slash; "" if unknown.
@@ -74,6 +75,7 @@ class Recording:
         self.radar_topics = assembly.radar_topics
         self.radar_topic = assembly.radar_topics[0] if assembly.radar_topics else None
         self.radar_choice = assembly.radar_choice
+        self.image_choice = assembly.image_choice
         self.image_topic = assembly.image_topic
         self.camera_info_topic = assembly.camera_info_topic
         self.radar_frame = assembly.radar_frame
@@ -198,6 +200,19 @@ class Recording:
             return self._assembly.radar_sensors
         name = radar.topic.name
         return (RadarSensor(name, (name,), (0,), (), self.radar_frame, figures_of(radar.parts[0])),)
+
+    def other_image_times(self) -> Mapping[str, TimesNs]:
+        """Return the stamps of the frames of each image topic that is not in use (m,), ascending; they are read here."""
+        spare = {
+            one.name for one in self.topics if one.kind == "image" and not one.chosen and not one.problem and one.count
+        }
+        topics = join_topics(self.sources, spare)[0]
+        stamped = {both.topic.name: both for both in read_stamps([(topic, 12) for topic in topics]) if len(both.topic)}
+        by_receive = self.image_clock == "receive"
+        return {
+            name: np.unique(both.topic.receive_ns if by_receive or both.header_ns is None else both.header_ns)
+            for name, both in stamped.items()
+        }
 
     def image_bytes(self, index: int) -> EncodedImage:
         """Return a frame as an image file: the recorded JPEG or PNG, or raw pixels encoded as JPEG.

@@ -327,6 +327,22 @@ def select_image(inventory: Inventory, requested: str | None) -> Topic | None:
     return _chosen(inventory, "image", requested) or _best(inventory.of_kind("image"), inventory, _image_rank)
 
 
+def image_choice(inventory: Inventory, image: Topic | None, requested: str | None) -> str:
+    """Say which image topic is used and why, as a sentence without its final period; "" if there is no other."""
+    others = [topic for topic in inventory.of_kind("image") if topic is not image]
+    if image is None or not others:
+        return ""
+    rest = f"not used: {', '.join(topic.name for topic in others)}"
+    if requested is not None:
+        return f"{image.name}, as requested; {rest}"
+    second = max(others, key=lambda topic: _image_rank(topic, inventory))
+    frames = f"it has the most frames ({inventory.count(image)} against {inventory.count(second)})"
+    reasons = ("it shows no depth or mask", "it has intrinsics", "its name says front", frames, "it is compressed")
+    both = zip(reasons, _image_rank(image, inventory), _image_rank(second, inventory), strict=True)
+    why = next((reason for reason, mine, theirs in both if mine != theirs), "its name comes first")
+    return f"{image.name}, used because {why}; {rest}; choose another with --image-topic"
+
+
 def _chosen(inventory: Inventory, kind: TopicKind, name: str | None) -> Topic | None:
     """Return the topic the user named."""
     if name is None:

@@ -84,6 +84,7 @@ class CameraSummary:
 
     Attributes:
         topic: its image topic.
+        choice: why it is used; "" if there is no other.
         frame: frame_id of the images.
         frames: number of images.
         rate_hz: images per second; None with fewer than two.
@@ -98,6 +99,7 @@ class CameraSummary:
     """
 
     topic: str
+    choice: str
     frame: str
     frames: int
     rate_hz: float | None
@@ -233,6 +235,7 @@ def _camera(recording: Recording) -> CameraSummary | None:
     rhythm = Rhythm() if topic.rate_hz is None else Rhythm.of(recording.image_times)
     return CameraSummary(
         topic=recording.image_topic,
+        choice=recording.image_choice,
         frame=recording.camera_frame,
         frames=len(recording.image_times),
         rate_hz=rhythm.rate_hz,
@@ -527,6 +530,7 @@ def _camera_lines(camera: CameraSummary | None) -> list[str]:
         f"{camera.topic}, frame '{camera.frame}': {_counted(camera.frames, 'image')}{rate}{gap}",
         size,
         _intrinsics(camera),
+        *([camera.choice] if camera.choice else []),
     ]
 
 

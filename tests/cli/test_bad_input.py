@@ -51,7 +51,7 @@ STRAY = [{"id": "stray", "image_time": {"sec": 1_600_000_000, "nanosec": 5}, "pi
 @pytest.mark.parametrize(
     ("change", "code", "words"),
     [
-        (lambda clicks: STRAY, 2, ("stray", "1600000000.000000005", "outside the recording")),
+        (lambda clicks: STRAY, 2, ("stray", "1600000000.000000005", "no frame")),
         (lambda clicks: [*clicks[:2], {**clicks[2], "pixel_px": [320.0, 5.0]}], 2, ("c2", "320 x 240")),
         (lambda clicks: clicks[:3], 1, ("3 of", "4")),
         (lambda clicks: "none", 2, ("other.json", "clicks")),

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -49,11 +50,24 @@ def test_bags_clicks_and_the_command_give_what_the_scans_alone_give(dataset: Dat
     agrees(tmp_path, recorded(dataset, tmp_path))
 
 
-def test_both_cameras_of_the_aisle_are_solved_from_one_recording(tmp_path: Path) -> None:
+def test_both_cameras_of_the_aisle_are_solved_from_one_recording(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     simulated = recorded("d3", tmp_path)
     assert simulated.other_camera is not None
     agrees(tmp_path, simulated)
     agrees(tmp_path, simulated.other_camera, "camera_2")
+    bags = [str(tmp_path / "radar.bag"), str(tmp_path / "camera.bag")]
+    capsys.readouterr()
+    assert cocalib(["info", *bags]) == 0
+    (choice,) = re.findall(
+        r"(/camera\S*), used because .*; not used: (/camera\S*); .*--image-topic", capsys.readouterr().out
+    )
+    mine, other = ("clicks_2.json", "clicks.json") if "camera_2" in choice[0] else ("clicks.json", "clicks_2.json")
+    out = str(tmp_path / "calibration.json")
+    assert cocalib(["solve", *bags, "--clicks", str(tmp_path / mine), "--out", out]) == 0
+    assert cocalib(["solve", *bags, "--clicks", str(tmp_path / other), "--out", out]) == 2
+    assert f"--image-topic {choice[1]}" in capsys.readouterr().err.splitlines()[-1]
 
 
 def test_the_tables_settings_are_the_best_of_the_committed_fit() -> None:

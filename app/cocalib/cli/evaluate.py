@@ -1,6 +1,5 @@
 """`cocalib evaluate`: judge a calibration on a recording."""
 
-import sys
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,7 +10,7 @@ from calib_core.errors import InputError
 from cocalib.cli.exit_codes import exit_code
 from cocalib.cli.flags import Require, Switch, called
 from cocalib.cli.judging_flags import Judging, JudgingFlags
-from cocalib.cli.output import progress_bar
+from cocalib.cli.output import progress_bar, tell_choices
 from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
@@ -76,6 +75,5 @@ class Evaluate:
                     progress=progress,
                     options=options,
                 )
-            if recording.radar_choice:
-                print(f"radar: {recording.radar_choice}", file=sys.stderr)
+            tell_choices(recording)
             return judged.found, replace(evaluation, warnings=(*judged.warnings, *evaluation.warnings))

@@ -73,7 +73,7 @@ def told_clicks_at_frames(
     """
     from cocalib.session.click_stamps import clicks_at_frames
 
-    found = clicks_at_frames(clicks, recording.image_times, source=source)
+    found = clicks_at_frames(clicks, recording.image_times, source=source, others=recording.other_image_times)
     _tell_notes(found.moved)
     return found.clicks
 
@@ -91,6 +91,13 @@ def recorded_clicks(
     found = clicks_in_recording(clicks, recording, camera, source=source)
     _tell_notes(found.moved)
     return found.clicks
+
+
+def tell_choices(recording: "Recording") -> None:
+    """Print to stderr which radar and which camera are used and why, where there are several."""
+    for what, choice in (("radar", recording.radar_choice), ("camera", recording.image_choice)):
+        if choice:
+            print(f"{what}: {choice}", file=sys.stderr)
 
 
 def _tell_notes(notes: Sequence[str]) -> None:

@@ -8,7 +8,7 @@ from calib_core.errors import InputError
 from calib_core.input_files import name_text
 from calib_core.options import checked_options
 from cocalib.cli.flags import File, Switch
-from cocalib.cli.output import explain_unsolvable, recorded_clicks, shown_progress, write_whole
+from cocalib.cli.output import explain_unsolvable, recorded_clicks, shown_progress, tell_choices, write_whole
 from cocalib.cli.recording_flags import (
     CameraFlags,
     GivenCamera,
@@ -61,8 +61,7 @@ class Propose:
         clicks: tuple[ReflectorClick, ...] = () if self.clicks is None else file_of_clicks(self.clicks).clicks
         with self.recorded.open() as recording:
             require_confirmed(recording)
-            if recording.radar_choice:
-                print(f"radar: {recording.radar_choice}", file=sys.stderr)
+            tell_choices(recording)
             camera = required_camera(recording, camera_file)
             if self.clicks is not None:
                 clicks = recorded_clicks(clicks, recording, camera, source=self.clicks)

@@ -16,7 +16,7 @@ from calib_core.results import Calibration
 from calib_core.results.verdict import verdict_on
 from cocalib.cli.exit_codes import exit_code
 from cocalib.cli.flags import File, Require, Switch
-from cocalib.cli.output import explain_unsolvable, recorded_clicks, shown_progress, write_whole
+from cocalib.cli.output import explain_unsolvable, recorded_clicks, shown_progress, tell_choices, write_whole
 from cocalib.cli.recording_flags import (
     CameraFlags,
     GivenCamera,
@@ -122,8 +122,7 @@ class Solve:
         file = self._clicks_file()
         with self.recorded.open() as recording:
             require_confirmed(recording)
-            if recording.radar_choice:
-                print(f"radar: {recording.radar_choice}", file=sys.stderr)
+            tell_choices(recording)
             camera = required_camera(recording, camera_file)
             placed = self._placed(file, recording, camera, options)
             if isinstance(placed, Unsolvable):

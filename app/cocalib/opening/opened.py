@@ -220,7 +220,7 @@ def _clicks_at_frames(recording: Recording, given: GivenClicks | None) -> Clicks
     if given is None:
         return None
     clicks = read_clicks_file(given.text, source=given.source).clicks
-    return clicks_at_frames(clicks, recording.image_times, source=given.source)
+    return clicks_at_frames(clicks, recording.image_times, source=given.source, others=recording.other_image_times)
 
 
 def _import_clicks(workspace: Workspace, given: GivenClicks, found: ClicksAtFrames) -> None:

@@ -1,6 +1,6 @@
 """Clicks from a file, moved to the frames they were made in: another program may have rounded their stamps."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,17 +26,25 @@ class ClicksAtFrames:
     moved: tuple[str, ...]
 
 
-def clicks_at_frames(clicks: Sequence[ReflectorClick], image_times: TimesNs, *, source: str) -> ClicksAtFrames:
+def clicks_at_frames(
+    clicks: Sequence[ReflectorClick],
+    image_times: TimesNs,
+    *,
+    source: str,
+    others: Callable[[], Mapping[str, TimesNs]] = dict,
+) -> ClicksAtFrames:
     """Move each click to the nearest frame if that is at most half a frame interval away.
 
     Args:
         clicks: as read from a file.
         image_times: (m,) stamps of the frames [ns], ascending; at least one.
         source: name of the file, for messages.
+        others: gives the stamps of the frames of the image topics that are not in use.
 
     Raises:
-        InputError: a click is farther from every frame; the first one is named.
+        InputError: a click is farther from every frame, and the first one is named; or the stamps are those of another topic.
     """
+    _require_own_topic(clicks, image_times, source, others)
     half_ns = half_interval_ns(image_times)
     at_frames, moved = [], []
     for click in clicks:
@@ -56,6 +64,24 @@ def clicks_at_frames(clicks: Sequence[ReflectorClick], image_times: TimesNs, *, 
         if abs(frame - click.image_time) >= _ROUNDED_NS:
             moved.append(f"{what} {where}, and is used")
     return ClicksAtFrames(tuple(sorted(at_frames)), tuple(moved))
+
+
+def _require_own_topic(
+    clicks: Sequence[ReflectorClick], image_times: TimesNs, source: str, others: Callable[[], Mapping[str, TimesNs]]
+) -> None:
+    if _all_at(clicks, image_times):
+        return
+    for topic, times in others().items():
+        if _all_at(clicks, times):
+            raise InputError(
+                f"{source}: its clicks have the stamps of the frames of {topic}, which is not in use; choose these pictures with "
+                f"--image-topic {topic}, or give clicks in the pictures in use"
+            )
+
+
+def _all_at(clicks: Sequence[ReflectorClick], image_times: TimesNs) -> bool:
+    nearest = (int(image_times[nearest_frame(image_times, click.image_time)]) - click.image_time for click in clicks)
+    return all(abs(off_ns) < _ROUNDED_NS for off_ns in nearest)
 
 
 def half_interval_ns(image_times: TimesNs) -> int:

@@ -11,7 +11,7 @@ from calib_core.interchange.own.clicks_json import ClicksFile, read_clicks_file
 from calib_core.measurements import ReflectorClick, TimeNs, time_parts
 from calib_core.recordings import Recording
 from cocalib.platform.files import read_text
-from cocalib.session.click_stamps import ClicksAtFrames, clicks_at_frames, half_interval_ns
+from cocalib.session.click_stamps import ClicksAtFrames, clicks_at_frames
 
 
 def file_of_clicks(path: Path) -> ClicksFile:
@@ -31,8 +31,9 @@ def clicks_in_recording(
     Raises:
         InputError: a click is not of this recording.
     """
-    _require_inside(clicks, recording, camera, source=source)
-    return clicks_at_frames(clicks, recording.image_times, source=str(source))
+    found = clicks_at_frames(clicks, recording.image_times, source=str(source), others=recording.other_image_times)
+    _require_inside(clicks, camera, source=source)
+    return found
 
 
 def require_confirmed(recording: Recording) -> None:
@@ -49,21 +50,9 @@ def require_confirmed(recording: Recording) -> None:
         )
 
 
-def _require_inside(clicks: Sequence[ReflectorClick], recording: Recording, camera: Camera, *, source: Path) -> None:
-    """Refuse clicks that cannot belong to this recording.
-
-    Raises:
-        InputError: a click is outside the recording or the image; the first one is named.
-    """
-    first, last = int(recording.image_times[0]), int(recording.image_times[-1])
-    half_ns = half_interval_ns(recording.image_times)
+def _require_inside(clicks: Sequence[ReflectorClick], camera: Camera, *, source: Path) -> None:
+    """Refuse clicks outside the image; the first one is named."""
     for click in clicks:
-        if not first - half_ns <= click.image_time <= last + half_ns:
-            raise InputError(
-                f"{source}: click {click.id} at {seconds_text(click.image_time)} is outside the recording, "
-                f"whose frames run from {seconds_text(TimeNs(first))} to {seconds_text(TimeNs(last))}; "
-                "give the clicks of this recording"
-            )
         if not camera.in_image(np.array([[click.u_px, click.v_px]]))[0]:
             raise InputError(
                 f"{source}: click {click.id} at ({click.u_px:g}, {click.v_px:g}) px is outside the image of "

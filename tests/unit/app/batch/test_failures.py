@@ -95,7 +95,7 @@ def test_clicks_of_another_recording_are_refused_as_the_command_does(row: Manife
     (tmp_path / "clicks.json").write_text(json.dumps(document))
     outcome = outcome_of(row, tmp_path / "results")
     assert outcome.status == "failed"
-    assert "outside the recording" in outcome.reason
+    assert "has the stamp of no frame" in outcome.reason
 
 
 def test_nothing_was_clicked(row: ManifestRow, tmp_path: Path) -> None:
