@@ -64,6 +64,8 @@ class FoundCamera:
             )
         model, distortion = self.lens(source=source)
         matrix = np.reshape(self.matrix_px, (3, 3))
+        if self.size_px is None:
+            _refuse_another_size(matrix, size, f"{source}: {self.name}")
         try:
             camera = Camera(model, *size, matrix, np.array(distortion), self.covariance)
             if self.window is None:
@@ -94,6 +96,27 @@ class FoundCamera:
                 "(thin prism and tilt are not supported); calibrate the camera with that model"
             )
         return lens.name, distortion
+
+
+_OFF_CENTRE = 0.1
+"""How far off its middle, as a share of the picture, a principal point shows that the picture had another size."""
+_ALIKE = 0.06
+
+
+def _refuse_another_size(matrix_px: np.ndarray, size_px: tuple[int, int], where: str) -> None:
+    """Refuse a matrix whose principal point is as far off the middle along the columns as along the rows.
+
+    Raises:
+        InputError: it is, so the lens was calibrated in pictures of another size.
+    """
+    across, down = (matrix_px[:2, 2] + 0.5) / size_px
+    if min(abs(across - 0.5), abs(down - 0.5)) > _OFF_CENTRE and abs(across - down) < _ALIKE:
+        scale = across + down
+        raise InputError(
+            f"{where}: the principal point ({matrix_px[0, 2]:.0f}, {matrix_px[1, 2]:.0f}) is that of pictures of about "
+            f"{scale * size_px[0]:.0f} x {scale * size_px[1]:.0f} px, but these have {size_px[0]} x {size_px[1]} px; state in "
+            "the file which size it was calibrated for (image_width, image_height)"
+        )
 
 
 def found_or_refused(name: str, read: Callable[[], FoundCamera]) -> FoundCamera:

@@ -175,6 +175,10 @@ def test_a_missing_image_size_is_taken_from_the_recording():
     text = ROS.replace("image_width: 640\n", "")
 
     assert read_camera(text, image_size_px=(640, 480)).width_px == 640
+    with pytest.raises(
+        InputError, match=r"principal point \(\d+, \d+\) is that of pictures of about 6\d\d x \d+ px, but these"
+    ):
+        read_camera(text, image_size_px=(960, 720))
 
 
 def test_what_opencv_writes_is_read(tmp_path):
