@@ -59,7 +59,7 @@ class PoseCovariance:
     @property
     def pose_information(self) -> Matrix66:
         """The information about the pose alone (6, 6): the systematic errors are eliminated."""
-        return np.asarray(np.linalg.inv(_symmetric_inverse(self.information)[:6, :6]))
+        return np.asarray(np.linalg.inv(symmetric_inverse(self.information)[:6, :6]))
 
 
 def pose_covariance(
@@ -83,7 +83,7 @@ def pose_covariance(
     information = _floored(plain, lost)
     priors = prior_rows(refined.measurements, refined.camera_from_radar)[1]
     prior_information = priors.T @ priors
-    independent = _symmetric_inverse(information)
+    independent = symmetric_inverse(information)
     spread = pose_spread(refined, plain) if smooth else None
     covariance = independent if spread is None else _widened(independent, plain, spread)
     growth = float(np.sqrt(np.trace(covariance[3:6, 3:6]) / np.trace(independent[3:6, 3:6])))
@@ -124,7 +124,7 @@ def _shared_errors(refined: ErrorsInVariablesFit, plain: np.ndarray, covariance:
 
     An estimated error's part of the variance is what knowing it exactly would save: with C the covariance, C_pe C_ee^-1 C_ep.
     """
-    measurements, errors = refined.measurements, refined.measurements.errors
+    errors = refined.measurements.errors
     variances = np.diag(covariance)[6:]
     found = [
         SystematicErrorResult(
@@ -140,10 +140,7 @@ def _shared_errors(refined: ErrorsInVariablesFit, plain: np.ndarray, covariance:
     ]
     if not errors.widening:
         return _with_refined_lens(_Shared(np.zeros((6, 6)), found), errors, covariance, np.zeros((len(plain), 0)))
-    planes = measurements.measured(refined.rows)
-    columns = planes.columns(measurements.camera, refined.camera_from_radar, errors.widening, refined.polar)
-    columns = np.where(np.isfinite(columns), columns, 0.0)  # of a position that the camera does not see
-    whitened = refined.model.whitening @ columns.transpose(2, 1, 0)  # (n, 2, e)
+    whitened = widening_rows(refined)
     jacobian, weights = refined.model.jacobian, refined.weights[:, None, None]
     mixed = (np.swapaxes(jacobian, 1, 2) @ (weights * whitened)).sum(axis=0)
     sigma = np.array([one.sigma for one in errors.widening])
@@ -162,6 +159,14 @@ def _shared_errors(refined: ErrorsInVariablesFit, plain: np.ndarray, covariance:
     return _with_refined_lens(_Shared(np.asarray(moves @ moves.T), found), errors, covariance, solved * sigma)
 
 
+def widening_rows(refined: ErrorsInVariablesFit) -> np.ndarray:
+    """Return W d pixel / d error (n, 2, e) of the errors that only widen the covariance."""
+    planes, errors = refined.measurements.measured(refined.rows), refined.measurements.errors.widening
+    columns = planes.columns(refined.measurements.camera, refined.camera_from_radar, errors, refined.polar)
+    columns = np.where(np.isfinite(columns), columns, 0.0)  # of a position that the camera does not see
+    return np.asarray(refined.model.whitening @ columns.transpose(2, 1, 0))
+
+
 def _parts(refined: ErrorsInVariablesFit, plain: np.ndarray, assumed: Matrix66) -> CovarianceParts:
     """Return what of the covariance rests on stated standard deviations.
 
@@ -173,7 +178,7 @@ def _parts(refined: ErrorsInVariablesFit, plain: np.ndarray, assumed: Matrix66) 
         plain: H, (6 + k, 6 + k).
         assumed: (6, 6) of the errors that are not estimated.
     """
-    to_pose = _symmetric_inverse(plain)[:6]
+    to_pose = symmetric_inverse(plain)[:6]
     of_errors = to_pose[:, 6:] / refined.measurements.errors.sigma
     prior = refined.measurements.prior
     of_position = to_pose[:, :6] @ prior.rows(refined.camera_from_radar)[1].T * float(prior.measured)
@@ -284,7 +289,8 @@ def _widened(covariance: np.ndarray, plain: np.ndarray, spread: np.ndarray) -> n
     return np.asarray((widened + widened.T) / 2.0)
 
 
-def _symmetric_inverse(matrix: np.ndarray) -> np.ndarray:
+def symmetric_inverse(matrix: np.ndarray) -> np.ndarray:
+    """Return the inverse of a positive definite matrix whose unknowns have different units, symmetric to the last bit."""
     scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     inverse = np.linalg.inv(matrix * np.outer(scale, scale)) * np.outer(scale, scale)
     return np.asarray((inverse + inverse.T) / 2.0)

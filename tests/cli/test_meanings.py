@@ -103,6 +103,21 @@ def test_a_clear_meaning_is_taken_and_told(cocalib: Cocalib, camera_file: Path, 
     assert read_calibration(out.read_text()).evidence == "imported_assumed"
 
 
+@pytest.mark.parametrize("inverse", [False, True])
+def test_check_reads_a_bare_matrix_as_import_reads_it(
+    cocalib: Cocalib, camera_file: Path, pairs_file: Callable[..., Path], tmp_path: Path, inverse: bool
+) -> None:
+    bare, out = tmp_path / "bare.txt", tmp_path / "out.json"
+    np.savetxt(bare, (POSE.inverse() if inverse else POSE).as_matrix())
+    meaning = "radar_from_camera,optical,m" if inverse else "camera_from_radar,optical,m"
+
+    for evidence in ((), ("--pairs", pairs_file())):
+        assert f"taken as {meaning}" in cocalib("import", bare, "--out", out, "--camera", camera_file, *evidence).err
+        checked = cocalib("check", bare, *evidence)
+        assert checked.code == 0
+        assert f"({meaning})" in checked.out
+
+
 def test_one_of_several_poses_is_chosen_by_its_place(cocalib: Cocalib, camera_file: Path, tmp_path: Path) -> None:
     several, out = tmp_path / "rig.json", tmp_path / "out.json"
     other = RigidTransform(POSE.rotation, [0.5, 0.5, 0.5]).as_matrix().tolist()

@@ -1,9 +1,7 @@
 """`cocalib check`: check calibration files, compare them, and hold them against a recording."""
 
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -19,7 +17,7 @@ from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
     from calib_core.camera import Camera
-    from calib_core.interchange import CheckedFile, CheckReport, ImportedCalibration
+    from calib_core.interchange import CheckedFile, CheckPairs, CheckReport, ImportedCalibration
     from calib_core.measurements import ReflectorClick
     from calib_core.recordings import Recording
 
@@ -42,6 +40,10 @@ class Check:
     """Largest distance in the picture that is agreement: rms at each of 5, 20 and 60 m, and by the lens alone."""
     max_sigma: Annotated[float | None, called("SIGMA")] = None
     """Largest difference under the covariances that is agreement, in standard deviations (p = 5 % is 1.96)."""
+    same_sensors: Switch = False
+    """With --against: radar and camera are the same, although serials, topics or intrinsics are not."""
+    same_person: Switch = False
+    """With --against: the same person clicked the same reflector in both, so what those get wrong cancels, too."""
     camera: File = None
     """Intrinsics to use if the file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
     pairs: File = None
@@ -59,12 +61,11 @@ class Check:
 
     def run(self) -> int:
         """Print the results; return the exit code."""
-        from calib_core.interchange import check_json, check_junit, exit_code, read_camera_file
+        from calib_core.interchange import check_json, check_junit, exit_code
 
         self._require_fitting()
-        camera = read_camera_file(self.camera) if self.camera else None
-        judge = self._judge(camera)
-        checked = [self._checked(path, judge, camera) for path in self.calibration]
+        evidence = self._evidence()
+        checked = [self._checked(path, evidence) for path in self.calibration]
         if self.junit is not None:
             write_whole(self.junit, check_junit(checked))
         if self.json:
@@ -84,6 +85,8 @@ class Check:
         limited = any(limit is not None for limit in (self.max_deg, self.max_cm, self.max_px, self.max_sigma))
         if limited and self.against is None:
             raise InputError("--max-deg, --max-cm, --max-px and --max-sigma are limits for --against FILE; give it too")
+        if (self.same_sensors or self.same_person) and self.against is None:
+            raise InputError("--same-sensors and --same-person are about --against FILE; give it too")
         if self.clicks is not None and not self.recording:
             raise InputError("--clicks are those of a recording; give it with --recording RECORDING")
         if self.topics != TopicFlags() and not self.recording:
@@ -91,30 +94,49 @@ class Check:
                 "the options of a recording apply with --recording RECORDING only; see cocalib check --help"
             )
 
-    def _judge(self, camera: "Camera | None") -> "Callable[[ImportedCalibration], CheckReport]":
-        """Return the check of one file; what all files are compared with is read once."""
-        from calib_core.interchange import AgreementLimits, check, read_any_file, read_check_pairs_file
+    def _evidence(self) -> "_Evidence":
+        """Read what all files are checked with, once."""
+        from calib_core.interchange import read_any_file, read_camera_file, read_check_pairs_file
 
-        return partial(
-            check,
+        return _Evidence(
             of=read_any_file(self.of) if self.of else None,
             against=read_any_file(self.against) if self.against else None,
-            limits=AgreementLimits(self.max_deg, self.max_cm, self.max_px, self.max_sigma),
-            camera=camera,
+            camera=read_camera_file(self.camera) if self.camera else None,
             pairs=read_check_pairs_file(self.pairs) if self.pairs else None,
         )
 
-    def _checked(
-        self, path: Path, judge: "Callable[[ImportedCalibration], CheckReport]", camera: "Camera | None"
-    ) -> "CheckedFile":
+    def _checked(self, path: Path, evidence: "_Evidence") -> "CheckedFile":
         """Check one file; if it cannot be read, say so instead."""
-        from calib_core.interchange import CheckedFile
+        from calib_core.interchange import AgreementLimits, CheckedFile, check
 
         try:
-            report = judge(self.frames.read([path])[0])
-            return CheckedFile(str(path), self._on_recording(report, path, camera) if self.recording else report)
+            report = check(
+                self._read(path, evidence),
+                of=evidence.of,
+                against=evidence.against,
+                limits=AgreementLimits(self.max_deg, self.max_cm, self.max_px, self.max_sigma),
+                camera=evidence.camera,
+                pairs=evidence.pairs,
+                same_sensors=self.same_sensors,
+                same_person=self.same_person,
+            )
+            if self.recording:
+                report = self._on_recording(report, path, evidence.camera)
+            return CheckedFile(str(path), report)
         except CalibrationError as error:
             return CheckedFile(str(path), unreadable=str(error))
+
+    def _read(self, path: Path, evidence: "_Evidence") -> "ImportedCalibration":
+        """Read one file; numbers that do not say what they mean are taken as `cocalib import` takes them."""
+        from calib_core.interchange.hypotheses.reading import clear_meaning
+
+        files = self.frames.files([path])
+        if files is not None and len(files) == 1:
+            known = evidence.against or evidence.of
+            clear = clear_meaning(files[0].data, files[0].source, pairs=evidence.pairs, against=known)
+            if clear is not None:
+                return clear
+        return self.frames.read([path], files)[0]
 
     def _on_recording(self, report: "CheckReport", path: Path, camera: "Camera | None") -> "CheckReport":
         from calib_core.recordings import open_recording
@@ -150,6 +172,16 @@ class Check:
                 "click reflectors with cocalib open RECORDING --calibration FILE, or give --clicks CLICKS.json"
             )
         return kept
+
+
+@dataclass(frozen=True, slots=True)
+class _Evidence:
+    """What files are checked with, besides what they say themselves."""
+
+    of: "ImportedCalibration | None"
+    against: "ImportedCalibration | None"
+    camera: "Camera | None"
+    pairs: "CheckPairs | None"
 
 
 def _tell(checked: "list[CheckedFile]") -> None:

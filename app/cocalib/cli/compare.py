@@ -28,6 +28,10 @@ class Compare:
     """A calibration in any format that import reads."""
     b: Annotated[Path | None, tyro.conf.Positional, called("B")] = None
     """Another calibration of the same sensors."""
+    same_sensors: Switch = False
+    """Radar and camera are the same in both, although serials, topics or intrinsics are not."""
+    same_person: Switch = False
+    """The same person clicked the same reflector in both, so what those get wrong cancels, too."""
     json: Switch = False
     """Print one JSON object instead of text."""
     judging: Judging = field(default_factory=JudgingFlags)
@@ -45,17 +49,16 @@ class Compare:
         compared = None
         if self.judging.recording:
             compared, camera = self._on_recording(self.a, self.b, camera)
-        both = compare(found_a, found_b, camera=camera)
+        both = compare(found_a, found_b, camera=camera, same_sensors=self.same_sensors, same_person=self.same_person)
         figures = [(row.label, row.text) for row in both.figures]
-        verdict = both.verdict(self.a.name, self.b.name)
         if self.json:
-            print_exactly(_json(self.a.name, self.b.name, figures, verdict, compared))
+            print_exactly(_json(self.a.name, self.b.name, figures, both.verdict, compared))
             return 0
         if compared is not None:
             from cocalib.evaluation.comparing import comparison_lines
 
             print("\n".join(comparison_lines(compared)))
-        print("\n".join([*(f"{label}: {text}" for label, text in figures), verdict]))
+        print("\n".join([*both.lines(), both.verdict]))
         return 0
 
     def _on_recording(self, a: Path, b: Path, camera: "Camera | None") -> "tuple[ComparedOnRecording, Camera]":

@@ -36,7 +36,7 @@ def _sections(subject: ReportSubject) -> list[Child]:
     """Return the sections in their order; what nothing is known of is left out."""
     shown: list[Child] = [answer(subject), cautions(subject)]
     if subject.against is not None:
-        shown.append(comparison(subject.against, subject.name))
+        shown.append(comparison(subject.against))
     shown.append(uncertainty(subject))
     if subject.calibration is not None:
         shown += _of_pairs(subject, subject.calibration)

@@ -83,7 +83,7 @@ def _pixels(at: PixelDifference) -> Figure:
 
 
 def _chance(both: Comparison) -> tuple[Figure, ...]:
-    if not np.isfinite(both.p_value):
+    if both.change is None:
         return ()
     words = "Probability of a difference this large if both are right and independent."
-    return (Figure("apart_chance", "probability", plain(both.p_value, 2), "", words),)
+    return (Figure("apart_chance", "probability", plain(both.change.p_value, 2), "", words),)

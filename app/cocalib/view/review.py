@@ -375,7 +375,7 @@ def compared(revision: int, a: Solution, b: Solution) -> Compared:
     """Compare two solutions: the figures are those of `cocalib check B --against A`."""
     both = compare(a.found, b.found, camera=a.calibration.camera)
     rows = tuple(ComparedRow(figure.label, figure.text) for figure in both.figures)
-    verdict = sentence(both.verdict("A", "B"))
+    verdict = sentence(both.verdict)
     return Compared(revision, a.name, b.name, rows, verdict, tuple(_marks(a.calibration, b.calibration)))
 
 

@@ -1,6 +1,6 @@
 """Do two calibrations agree: how far apart they are, judged by limits or by the covariances they state; if not, by which slip."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,7 +8,9 @@ import numpy as np
 from calib_core.arrays import Matrix66
 from calib_core.camera import Camera
 from calib_core.errors import InputError
+from calib_core.estimation.pose_change import PoseChange, level_of, pose_change
 from calib_core.geometry import RigidTransform, pose_difference, rotation_angle_rad, squared_distance
+from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.check.pixel_differences import (
     DISTANCES_M,
     LOST_TEXT,
@@ -21,9 +23,11 @@ from calib_core.interchange.check.pixel_differences import (
 )
 from calib_core.interchange.check.slips import CheckResult, explain, explained
 from calib_core.interchange.format import ImportedCalibration, WrittenPose
+from calib_core.interchange.own.camera_document import camera_document
+from calib_core.results.verdict import degrees_of_freedom
 
-CHI2_95 = 12.591587243743977
-"""The 95 % quantile of chi2 with 6 degrees of freedom."""
+LEVEL = 0.05
+"""Of the test by the covariances, unless --max-sigma gives another: one of twenty right pairs of calibrations fails it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +43,7 @@ class ComparedFigure:
     text: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
     """The difference between two calibrations.
 
@@ -49,14 +53,12 @@ class Comparison:
         position_cm: distance between the two camera positions in the radar frame.
         position_sigma_cm: its standard deviation along its own direction; NaN if neither is known.
         pixels: at 5, 20 and 60 m; empty without a camera.
-        chi2: squared Mahalanobis distance under the known covariances, 6 degrees of freedom; NaN if neither is known.
-        chi2_limit: what chi2 is below in 95 % of cases if the two are independent and right: the largest quantile they state.
-        p_value: probability of a chi2 this large in that case; NaN if chi2 is.
+        change: of the camera between the two, what they share taken out; None if neither covariance is known.
+        shared: whose errors are the same in both, so that they were taken out; empty if every error counts as independent.
+        unshared: why no error was taken out; "" if some were, or if there is nothing to say.
         covariances: how many of the two covariances are known.
-        sigmas: the same as p_value, as the standard deviations that one normal variable exceeds as rarely; NaN if chi2 is.
         lens: how far the two lenses are apart; None if one of the two states none.
         lens_note: what of the lenses is compared, if that is not all of them; else "".
-        beyond: for each of the two, whether the other's pose is outside its 95 % ellipsoid; None if it states no uncertainty.
     """
 
     rotation_deg: float
@@ -64,14 +66,12 @@ class Comparison:
     position_cm: float
     position_sigma_cm: float
     pixels: tuple[PixelDifference, ...]
-    chi2: float
-    p_value: float
+    change: PoseChange | None
+    shared: tuple[str, ...]
+    unshared: str
     covariances: int
-    beyond: tuple[bool | None, bool | None]
-    sigmas: float = float("nan")
     lens: LensDifference | None = None
     lens_note: str = ""
-    chi2_limit: float = CHI2_95
 
     @property
     def figures(self) -> tuple[ComparedFigure, ...]:
@@ -91,34 +91,43 @@ class Comparison:
             by_pose = f", {_by_pose(at)} by the pose alone" if other_lens else ""
             expected = "" if np.isnan(at.sigma_px) else f", expected {at.sigma_px:.3g} px from the covariances"
             rows.append(ComparedFigure(f"at {at.distance_m:g} m", f"{pixels_text(at)}{by_pose}{expected}"))
-        if np.isfinite(self.chi2):
-            independent = f"(p = {self.p_value:.2g} if the two are independent, {self.sigmas:.3g} sigma)"
-            rows.append(ComparedFigure("overall", f"chi2 {shown(self.chi2)} for 6 degrees of freedom {independent}"))
+        if self.change is not None:
+            rows.append(ComparedFigure("change", _change_text(self.change)))
         return tuple(rows)
 
-    def verdict(self, a: str, b: str) -> str:
-        """Say whether the difference exceeds what the two state about themselves, with these names for them."""
-        parts = {True: "exceeds", False: "is within", None: "cannot be judged by"}
-        of_a, of_b = (parts[beyond] for beyond in self.beyond)
-        what = "the stated 95 % uncertainty of"
-        if self.beyond == (None, None):
-            return "neither of the two states an uncertainty"
-        if self.beyond[0] == self.beyond[1]:
-            return f"the difference {of_a} {what} both"
-        if None in self.beyond:
-            (part, name), silent = ((of_a, a), b) if self.beyond[1] is None else ((of_b, b), a)
-            return f"the difference {part} {what} {name}; {silent} states none"
-        return f"the difference {of_a} {what} {a} and {of_b} that of {b}"
+    @property
+    def verdict(self) -> str:
+        """Whether the two agree by their covariances, or by the usual limits, and why."""
+        found = judge(self, AgreementLimits())
+        return f"{'the two agree' if found.agree else 'the two differ'}: {found.text}"
 
     def lines(self) -> tuple[str, ...]:
         """Return the comparison as readable lines; the first of the two is called the other."""
-        rows = [f"{row.label}: {row.text}" for row in self.figures]
-        rows.append(self.verdict("the other", "this one"))
-        if self.lens_note:
-            rows.append(self.lens_note)
-        if self.covariances == 1:
-            rows.append("only one of the two uncertainties is known; the standard deviations come from that one alone")
-        return tuple(rows)
+        return (*(f"{row.label}: {row.text}" for row in self.figures), *self.notes)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was compared, if that is not all of both."""
+        one = "only one of the two uncertainties is known; the standard deviations come from that one alone"
+        shared = f"the errors of {_listed(self.shared)} are the same in both, and are taken out" if self.shared else ""
+        unshared = f"every error counts as independent, because {self.unshared}" if self.unshared else ""
+        return tuple(filter(None, (self.lens_note, shared, unshared, one if self.covariances == 1 else "")))
+
+
+def _change_text(change: PoseChange) -> str:
+    pose = change.first.perturbed(change.error)
+    found = pose_difference(change.first, pose, change.covariance)
+    turned = f"{shown(found.rotation_deg)} deg{_plus_minus(found.rotation_sigma_deg, 'deg')}"
+    moved = f"{shown(found.position_cm)} cm{_plus_minus(found.position_sigma_cm, 'cm')}"
+    return (
+        f"turned by {turned}, moved by {moved}: p = {change.p_value:.2g} if nothing changed, {change.sigmas:.3g} sigma"
+    )
+
+
+def noticed_text(change: PoseChange, level: float) -> str:
+    """Return what change a test at this level would have noticed, of the least visible axes."""
+    sizes = change.noticeable(level)
+    return f"would have noticed {sizes[:3].max():.2g} deg, {sizes[3:].max():.2g} cm"
 
 
 def _lens_text(lens: LensDifference) -> str:
@@ -135,20 +144,28 @@ def _plus_minus(sigma: float, unit: str) -> str:
     return "" if np.isnan(sigma) else f" (standard deviation {sigma:.2g} {unit})"
 
 
-def compare(a: ImportedCalibration, b: ImportedCalibration, *, camera: Camera | None = None) -> Comparison:
-    """Compare two calibrations of the same sensors, each through its own lens; covariances are added, as for independent data.
+def compare(
+    a: ImportedCalibration,
+    b: ImportedCalibration,
+    *,
+    camera: Camera | None = None,
+    same_sensors: bool = False,
+    same_person: bool = False,
+) -> Comparison:
+    """Compare two calibrations of the same sensors, each through its own lens; which of the two is the first changes nothing.
 
     Args:
         a: one of them.
         b: the other.
         camera: the intrinsics, if neither has any.
+        same_sensors: radar and camera are the same, whatever serials, topics and intrinsics say.
+        same_person: the same person clicked the same reflector in both.
     """
     a_pose, b_pose = a.camera_from_radar, b.camera_from_radar
     known = _known_covariances(a, b)
     covariance = np.sum(known, axis=0) if known else np.full((6, 6), np.nan)
     difference = pose_difference(a_pose, b_pose, covariance)
-    limit = _chi2_limit(a, b)
-    likelihood = difference.squared * CHI2_95 / limit  # a larger quantile stands for heavier tails: 5 % are beyond it
+    change, shared, unshared = _change(a, b, covariance, same_sensors=same_sensors, same_person=same_person)
     lenses = lenses_of(a, b, camera)
     return Comparison(
         rotation_deg=difference.rotation_deg,
@@ -158,24 +175,55 @@ def compare(a: ImportedCalibration, b: ImportedCalibration, *, camera: Camera | 
         pixels=tuple(pixel_difference(a_pose, b_pose, lenses, distance_m, covariance) for distance_m in DISTANCES_M)
         if lenses
         else (),
-        chi2=difference.squared,
-        p_value=_p_value(likelihood),
+        change=change,
+        shared=shared,
+        unshared=unshared,
         covariances=len(known),
-        beyond=(_beyond(a, difference.error), _beyond(b, a_pose.error_from(b_pose))),
-        sigmas=_sigmas(likelihood),
-        chi2_limit=limit,
         lens=lenses.difference if lenses else None,
         lens_note=lenses.note if lenses else "",
     )
 
 
-def _beyond(side: ImportedCalibration, error: np.ndarray) -> bool | None:
-    """Return whether an error (6,) of a pose is outside its 95 % ellipsoid; None if it states none."""
-    if side.file is None:
-        return None
-    squared = squared_distance(error, side.file.calibration.covariance)
-    quantile = side.file.calibration.covariance_quantile
-    return squared > quantile if np.isfinite(squared) and np.isfinite(quantile) else None
+def _change(
+    a: ImportedCalibration, b: ImportedCalibration, covariance: Matrix66, *, same_sensors: bool, same_person: bool
+) -> tuple[PoseChange | None, tuple[str, ...], str]:
+    """Return the change between the two, whose errors were taken out of it, and why none were."""
+    error = b.camera_from_radar.error_from(a.camera_from_radar)
+    if not np.isfinite(squared_distance(error, covariance)):
+        return None, (), ""
+    files = [side.file for side in (a, b) if side.file is not None]
+    freedom = min(degrees_of_freedom(file.calibration.covariance_quantile) for file in files)
+    apart = PoseChange(a.camera_from_radar, error, covariance, freedom)
+    if len(files) < 2:
+        return apart, (), ""
+    if unshared := "" if same_sensors else _other_sensors(*files):
+        return apart, (), unshared
+    lens = not _other_intrinsics(*files)
+    joint = pose_change(files[0].calibration, files[1].calibration, same_lens=lens, same_person=same_person)
+    if not isinstance(joint, PoseChange):
+        return apart, (), joint
+    return joint, ("radar", *(["lens"] if lens else []), *(["clicks"] if same_person else [])), ""
+
+
+def _listed(names: Sequence[str]) -> str:
+    return " and ".join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else names[0]
+
+
+def _other_sensors(a: CalibrationFile, b: CalibrationFile) -> str:
+    """Return what shows that two calibrations may be of other sensors; "" if nothing does."""
+    told = "give --same-sensors if they are the same"
+    if (a.vehicle.radar_serial, a.vehicle.camera_serial) != (b.vehicle.radar_serial, b.vehicle.camera_serial):
+        return f"the two state other serials; {told}"
+    topics = [(*one.provenance.radar_topics, one.provenance.image_topic) for one in (a, b)]
+    if topics[0] != topics[1]:
+        return f"the two are of other topics; {told}"
+    return f"the two have other intrinsics; {told}" if _other_intrinsics(a, b) else ""
+
+
+def _other_intrinsics(a: CalibrationFile, b: CalibrationFile) -> bool:
+    """Return whether two calibrations were solved with different intrinsics, or with others to refine."""
+    one, other = (file.calibration.given_camera or file.calibration.camera for file in (a, b))
+    return camera_document(one) != camera_document(other)
 
 
 def _known_covariances(a: ImportedCalibration, b: ImportedCalibration) -> list[Matrix66]:
@@ -184,26 +232,6 @@ def _known_covariances(a: ImportedCalibration, b: ImportedCalibration) -> list[M
         for side in (a, b)
         if side.file is not None and np.isfinite(side.file.calibration.covariance).all()
     ]
-
-
-def _chi2_limit(a: ImportedCalibration, b: ImportedCalibration) -> float:
-    quantiles = [side.file.calibration.covariance_quantile for side in (a, b) if side.file is not None]
-    return max(CHI2_95, *(quantile for quantile in quantiles if np.isfinite(quantile)), CHI2_95)
-
-
-def _p_value(chi2: float) -> float:
-    from scipy.special import chdtrc
-
-    return float(chdtrc(6, chi2)) if np.isfinite(chi2) else float("nan")
-
-
-def _sigmas(chi2: float) -> float:
-    """Return how many standard deviations one normal variable exceeds as rarely as chi2 of 6 degrees of freedom is exceeded."""
-    from scipy.special import ndtri_exp
-
-    half = chi2 / 2.0
-    tail = np.log1p(half + half**2 / 2.0) - half  # of 6 degrees of freedom; p itself is 0 in floating point beyond 1500
-    return max(0.0, float(-ndtri_exp(tail - np.log(2.0)))) if np.isfinite(chi2) else float("nan")
 
 
 WITHOUT_COVARIANCE = {"deg": 1.0, "cm": 5.0, "px": 10.0}
@@ -272,11 +300,13 @@ class Judgement:
         criteria: all of them must be met.
         basis: what decided, in words.
         significant: whether the difference is beyond what the covariances allow in 95 % of cases; None if they do not say.
+        noticed: what change the test would have noticed; "" if it was none.
     """
 
     criteria: tuple[Criterion, ...]
     basis: str
     significant: bool | None
+    noticed: str = ""
 
     @property
     def agree(self) -> bool:
@@ -290,7 +320,7 @@ class Judgement:
         said = f"{', '.join(named)} ({self.basis})"
         if self.agree and self.significant:
             said += "; the difference is significant under the covariances, but within the limits"
-        return said
+        return "; ".join(filter(None, (said, self.noticed)))
 
 
 def judge(comparison: Comparison, limits: AgreementLimits) -> Judgement:
@@ -299,23 +329,33 @@ def judge(comparison: Comparison, limits: AgreementLimits) -> Judgement:
     Raises:
         InputError: a limit cannot be tested: the covariances or the camera are unknown.
     """
-    tested = np.isfinite(comparison.chi2)
-    significant = bool(comparison.chi2 > comparison.chi2_limit) if tested else None
+    change = comparison.change
+    significant = None if change is None else change.p_value < LEVEL
+    level = LEVEL
     if limits.given:
         criteria, basis = _by_limits(comparison, limits), "limits as given"
-    elif tested:
-        criteria, basis = [_by_covariance(comparison)], "95 % test under the stated covariances"
+        level = LEVEL if limits.max_sigma is None else level_of(limits.max_sigma)
+    elif change is not None:
+        criteria, basis = [_by_change(change)], "95 % test under the stated covariances"
+        basis = f"95 % test with the errors of {_listed(comparison.shared)} taken out" if comparison.shared else basis
     else:
         criteria = _by_limits(comparison, AgreementLimits(WITHOUT_COVARIANCE["deg"], WITHOUT_COVARIANCE["cm"]))
         criteria += _pixels_at(comparison, _JUDGED_AT_M, WITHOUT_COVARIANCE["px"])
         basis = "usual limits, because no covariance is known; give yours with --max-deg, --max-cm and --max-px"
-    return Judgement((*criteria, *_by_lens(comparison, limits)), basis, significant)
+    by_test = change is not None and (not limits.given or limits.max_sigma is not None)
+    noticed = noticed_text(change, level) if by_test and change is not None else ""
+    return Judgement((*criteria, *_by_lens(comparison, limits)), basis, significant, noticed)
 
 
-def _by_covariance(comparison: Comparison) -> Criterion:
-    beyond = ">" if comparison.chi2 > comparison.chi2_limit else "<="
-    text = f"chi2 {shown(comparison.chi2)} {beyond} {comparison.chi2_limit:.3g}, p = {comparison.p_value:.2g}"
-    return Criterion("chi2", comparison.chi2, comparison.chi2_limit, text)
+def _by_change(change: PoseChange) -> Criterion:
+    limit = change.limit(LEVEL)
+    beyond = ">" if change.squared > limit else "<="
+    return Criterion(
+        "chi2",
+        change.squared,
+        limit,
+        f"chi2 {shown(change.squared)} {beyond} {limit:.3g}, p = {change.p_value:.2g}",
+    )
 
 
 def _by_limits(comparison: Comparison, limits: AgreementLimits) -> list[Criterion]:
@@ -330,12 +370,12 @@ def _by_limits(comparison: Comparison, limits: AgreementLimits) -> list[Criterio
         for at in comparison.pixels:
             criteria += _pixels_at(comparison, at.distance_m, limits.max_px)
     if limits.max_sigma is not None:
-        if not np.isfinite(comparison.sigmas):
+        if comparison.change is None:
             raise InputError(
                 "--max-sigma needs a covariance, and neither file states one that determines the pose; "
                 "use --max-deg, --max-cm and --max-px"
             )
-        criteria.append(_criterion("sigma", comparison.sigmas, limits.max_sigma, "standard deviations"))
+        criteria.append(_criterion("sigma", comparison.change.sigmas, limits.max_sigma, "standard deviations"))
     return criteria
 
 

@@ -6,7 +6,9 @@ import numpy as np
 
 from calib_core.arrays import Flags, Matrix66, Points2, Points3, Values
 from calib_core.camera import Camera
+from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, skew
+from calib_core.interchange.cameras.rectification import rectified_camera
 from calib_core.interchange.format import ImportedCalibration
 
 DISTANCES_M = (5.0, 20.0, 60.0)
@@ -23,10 +25,10 @@ class PixelDifference:
 
     Attributes:
         distance_m: distance from the camera.
-        rms_px: root mean square over the image; infinite if most points are behind the other camera.
+        rms_px: root mean square over the image of either; infinite if most points are behind the other camera.
         max_px: maximum over the image.
         sigma_px: root mean square of the pose's part that the two covariances predict; NaN if neither is known.
-        pose_rms_px: the part of the pose: root mean square with the first one's lens for both.
+        pose_rms_px: the part of the pose: root mean square with one lens for both.
         lost_share: share of the image that the other one does not project into or near its picture.
     """
 
@@ -78,7 +80,8 @@ class Lenses:
 def lenses_of(a: ImportedCalibration, b: ImportedCalibration, camera: Camera | None) -> Lenses | None:
     """Return the lenses of two calibrations; one that states none is seen through the other's. None if nothing is known.
 
-    A file that states only the matrix of undistorted pictures is compared in such pictures: matrix with matrix.
+    A file that states only the matrix of undistorted pictures is compared in such pictures: with the same matrix, or with that
+    of the rectified pictures of our exports.
 
     Args:
         a: the first.
@@ -95,7 +98,7 @@ def lenses_of(a: ImportedCalibration, b: ImportedCalibration, camera: Camera | N
         return Lenses(one, one)
     note = ""
     if (a.camera is None or b.camera is None) and (of_a.is_distorted or of_b.is_distorted):
-        of_a, of_b = _undistorted(of_a), _undistorted(of_b)
+        of_a, of_b = _undistorted(of_a, of_b), _undistorted(of_b, of_a)
         note = (
             "one of the two states only the matrix of undistorted pictures, so the lens is compared without distortion"
         )
@@ -110,8 +113,14 @@ def _stated(side: ImportedCalibration, size_px: tuple[int, int]) -> Camera | Non
         return None
 
 
-def _undistorted(camera: Camera) -> Camera:
-    return Camera("pinhole", camera.width_px, camera.height_px, camera.matrix_px)
+def _undistorted(camera: Camera, other: Camera) -> Camera:
+    """Return the camera of undistorted pictures: with its own matrix, or our exports', whichever is nearer to the other's."""
+    same = Camera("pinhole", camera.width_px, camera.height_px, camera.matrix_px)
+    try:
+        ours = rectified_camera(camera) if camera.is_distorted else same
+    except InputError:  # no picture can be cut from this lens
+        return same
+    return min(same, ours, key=lambda one: float(np.abs(one.matrix_px - other.matrix_px).max()))
 
 
 def _lens_difference(first: Camera, second: Camera) -> LensDifference:
@@ -142,22 +151,48 @@ def _different_numbers(first: Camera, second: Camera) -> list[str]:
 def pixel_difference(
     a_pose: RigidTransform, b_pose: RigidTransform, lenses: Lenses, distance_m: float, covariance: Matrix66
 ) -> PixelDifference:
-    """Compare the projections of points at one distance along the rays of a pixel grid.
+    """Compare the projections of points at one distance along the rays of a pixel grid, in either direction.
 
     Args:
         a_pose: camera_from_radar of the first.
         b_pose: of the second.
         lenses: what each projects through.
-        distance_m: of the points from the first camera.
+        distance_m: of the points from the camera whose rays they are on.
         covariance: (6, 6) of the difference of the poses; NaN where unknown.
     """
-    pixels, rays = _grid(lenses.first)
+    b_from_a = b_pose @ a_pose.inverse()
+    both = [
+        _one_way(moved, lens, other, distance_m, covariance)
+        for moved, lens, other in (
+            (b_from_a, lenses.first, lenses.second),
+            (b_from_a.inverse(), lenses.second, lenses.first),
+        )
+    ]
+    rms_px, sigma_px, pose_rms_px = (
+        float(np.sqrt(np.mean([getattr(one, name) ** 2 for one in both])))
+        for name in ("rms_px", "sigma_px", "pose_rms_px")
+    )
+    return PixelDifference(
+        distance_m,
+        rms_px,
+        max(one.max_px for one in both),
+        sigma_px,
+        pose_rms_px,
+        float(np.mean([one.lost_share for one in both])),
+    )
+
+
+def _one_way(
+    moved: RigidTransform, lens: Camera, other: Camera, distance_m: float, covariance: Matrix66
+) -> PixelDifference:
+    """Compare along the rays of one of the two lenses; `moved` leads from its camera to the other's."""
+    pixels, rays = _grid(lens)
     points_camera_m = rays * distance_m
-    moved_camera_m = b_pose @ (a_pose.inverse() @ points_camera_m)
-    apart, lost = _apart(lenses.second, moved_camera_m, pixels)
-    by_pose = _rms_and_max(*_apart(lenses.first, moved_camera_m, pixels))[0]
+    moved_camera_m = moved @ points_camera_m
+    apart, lost = _apart(other, moved_camera_m, pixels)
+    by_pose = _rms_and_max(*_apart(lens, moved_camera_m, pixels))[0]
     motion = np.stack([np.hstack([np.eye(3), -skew(point)]) for point in points_camera_m])
-    by_error = lenses.first.project_with_jacobian(points_camera_m)[1] @ motion
+    by_error = lens.project_with_jacobian(points_camera_m)[1] @ motion
     variances = np.einsum("nij,jk,nik->n", by_error, covariance, by_error)
     return PixelDifference(
         distance_m, *_rms_and_max(apart, lost), float(np.sqrt(np.mean(variances))), by_pose, float(lost.mean())

@@ -13,9 +13,11 @@ import msgspec
 import numpy as np
 
 from calib_core.camera import Camera
+from calib_core.estimation.pose_change import AXES
 from calib_core.geometry import RigidTransform, rotation_angle_rad
 from calib_core.input_files import encodable
 from calib_core.interchange.check.agreement import (
+    LEVEL,
     AgreementLimits,
     Comparison,
     Judgement,
@@ -134,6 +136,8 @@ def check(
     limits: AgreementLimits | None = None,
     camera: Camera | None = None,
     pairs: CheckPairs | None = None,
+    same_sensors: bool = False,
+    same_person: bool = False,
 ) -> CheckReport:
     """Check a calibration against its own check point, another calibration and pairs, and for plausibility.
 
@@ -144,6 +148,8 @@ def check(
         limits: what counts as agreement with `against`; None judges by the covariances.
         camera: the intrinsics, if the file has none.
         pairs: radar positions and the pixels where they were seen.
+        same_sensors: radar and camera of `against` are the same, whatever serials, topics and intrinsics say.
+        same_person: the same person clicked the same reflector in both.
 
     Raises:
         InputError: a limit cannot be tested with these files.
@@ -158,7 +164,11 @@ def check(
         results.append(by_check_point(imported.pose, stated, camera, own=_own_camera(imported)))
     if of is not None:
         results += by_its_calibration(imported, of)
-    comparison = compare(against, imported, camera=camera) if against is not None else None
+    comparison = (
+        compare(against, imported, camera=camera, same_sensors=same_sensors, same_person=same_person)
+        if against is not None
+        else None
+    )
     judgement = judge(comparison, limits or AgreementLimits()) if comparison is not None else None
     if against is not None and comparison is not None and judgement is not None:
         changed = any(result.code == CHECK_POINT_MISSED for result in results)
@@ -583,11 +593,24 @@ def _comparison(report: CheckReport) -> dict[str, Any] | None:
             for at in both.pixels
         ],
         "lens": lens,
-        "chi2": _number(both.chi2),
-        "chi2_limit": both.chi2_limit,
-        "p_value": _number(both.p_value),
-        "sigmas": _number(both.sigmas),
+        **_change(both),
         "covariances": both.covariances,
+        "shared": list(both.shared),
+        "unshared": both.unshared,
+    }
+
+
+def _change(both: Comparison) -> dict[str, Any]:
+    change = both.change
+    if change is None:
+        return dict.fromkeys(("chi2", "chi2_limit", "p_value", "sigmas", "noticeable"))
+    sizes = zip(AXES, change.noticeable(LEVEL).tolist(), strict=True)
+    return {
+        "chi2": change.squared,
+        "chi2_limit": change.limit(LEVEL),
+        "p_value": change.p_value,
+        "sigmas": change.sigmas,
+        "noticeable": {f"{axis}_{'deg' if k < 3 else 'cm'}": size for k, (axis, size) in enumerate(sizes)},
     }
 
 

@@ -9,6 +9,7 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange.cameras.camera_format import FoundCamera
 from calib_core.interchange.cameras.fields import find_cameras
+from calib_core.interchange.check.pair_residuals import CheckPairs
 from calib_core.interchange.format import ImportedCalibration, WrittenPose
 from calib_core.interchange.formats.mat import MATLAB
 from calib_core.interchange.formats.named_arrays import NUMPY
@@ -191,6 +192,28 @@ def read_clear(content: str | bytes, source: str = "calibration") -> ImportedCal
             f"{source}: does not state what its numbers mean ({keys}, for example); pick it with cocalib import FILE --as MEANING"
         )
     return as_imported(file, pose, clear, by_hand=False)
+
+
+def clear_meaning(
+    content: str | bytes, source: str, *, pairs: CheckPairs | None = None, against: ImportedCalibration | None = None
+) -> ImportedCalibration | None:
+    """Return what the one pose in a file that states nothing must mean; None if the file states it, or if it is not clear.
+
+    Args:
+        content: of the file.
+        source: its name.
+        pairs: radar positions and the pixels where they were seen; they decide where meanings differ.
+        against: a calibration of the same sensors that is known to be right; likewise.
+
+    Raises:
+        InputError: it is of no known format, and nothing in it can be a pose.
+    """
+    file = read_unstated(content, source)
+    if file is None or len(file.poses) > 1:
+        return None
+    other = None if against is None else against.camera_from_radar
+    clear = clear_one(file.poses[0], hypotheses_of(file.poses[0], pairs=pairs, against=other))
+    return None if clear is None else as_imported(file, file.poses[0], clear, by_hand=False)
 
 
 def _camera(file: UnstatedFile) -> tuple[Camera | None, np.ndarray | None]:

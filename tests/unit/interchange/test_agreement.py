@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from calib_core.calibration import preview_pairs
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange import (
@@ -17,6 +18,8 @@ from calib_core.interchange import (
     CheckReport,
     FrameNames,
     ImportedCalibration,
+    Provenance,
+    VehicleNote,
     adopt,
     check,
     choose_check_point,
@@ -30,6 +33,7 @@ from calib_core.interchange import (
     write_calibration,
 )
 from calib_core.interchange.syntax.zip_archives import pack, unpack
+from calib_core.synthetic import random_rig, simulate_pairs
 
 
 def moved(file: CalibrationFile, *error: float) -> CalibrationFile:
@@ -67,7 +71,7 @@ def test_a_difference_far_beyond_the_covariances_is_no_agreement(file):
 
     assert error_codes(report) == ["disagrees"]
     assert report.verdict == "wrong"
-    assert report.comparison.chi2 > 1000
+    assert report.comparison.change.squared > 1000
     assert any(line.startswith("DIFFERS: 9.4 deg") and "chi2" in line for line in report.lines())
 
 
@@ -130,23 +134,88 @@ def test_standard_deviations_are_those_of_one_normal_variable(file):
     both = compare(imported(file), imported(moved(file, 0.01, 0, 0, 0, 2e-3, 0)))
     far = compare(imported(file), imported(moved(file, 0, 0, 0, 0, 1.0, 0)))
 
-    assert 2 * norm.sf(both.sigmas) == pytest.approx(both.p_value)
-    assert far.p_value == 0.0
-    assert np.sqrt(far.chi2) - 1 < far.sigmas < np.sqrt(far.chi2)
+    assert 2 * norm.sf(both.change.sigmas) == pytest.approx(both.change.p_value)
+    assert far.change.p_value < 1e-12
+    assert 7 < far.change.sigmas < np.sqrt(far.change.squared)
 
 
 def test_a_larger_quantile_makes_the_test_more_patient(file):
     other = imported(moved(file, 0, 0, 0, 0, 0.008, 0))
     strict = compare(imported(file), other)
     patient = dataclasses.replace(
-        file, calibration=dataclasses.replace(file.calibration, covariance_quantile=4 * strict.chi2_limit)
+        file, calibration=dataclasses.replace(file.calibration, covariance_quantile=4 * strict.change.limit(0.05))
     )
 
     report = check(other, against=imported(patient))
 
     assert check(other, against=imported(file)).verdict == "wrong"
     assert report.verdict == "right"
-    assert report.comparison.p_value > 0.05 > strict.p_value
+    assert report.comparison.change.p_value > 0.05 > strict.change.p_value
+
+
+def test_which_of_the_two_is_the_first_changes_no_figure(file):
+    wide = seen_by(moved(file, 0.3, 0, 0.2, 0.1, 0.2, 0), longer_focal_length(file.calibration.camera, 1.1))
+    one, other = compare(imported(file), imported(wide)), compare(imported(wide), imported(file))
+
+    for at, back in zip(one.pixels, other.pixels, strict=True):
+        assert dataclasses.astuple(at) == pytest.approx(dataclasses.astuple(back), rel=1e-9)
+    assert one.change.squared == pytest.approx(other.change.squared, rel=1e-9)
+
+
+@pytest.fixture(scope="module")
+def twice(file) -> tuple[CalibrationFile, CalibrationFile]:
+    """Return two calibrations of one rig, each from pairs of its own."""
+    rig = random_rig(np.random.default_rng(5), camera=file.calibration.camera)
+    solved = [
+        preview_pairs(drawn.pairs, drawn.camera).unwrap()
+        for drawn in (simulate_pairs(20, rng=np.random.default_rng(k), noise="imaging", rig=rig) for k in (1, 2))
+    ]
+    return CalibrationFile(solved[0]), CalibrationFile(solved[1])
+
+
+def test_errors_cancel_between_calibrations_of_the_same_sensors_only(twice):
+    first, second = twice
+    two = Provenance(radar_topic="/radar", radar_topics=("/radar",))
+    other_lens = seen_by(second, longer_focal_length(second.calibration.camera, 1.001))
+    same = compare(imported(first), imported(second))
+    forced = compare(imported(first), imported(other_lens), same_sensors=True, same_person=True)
+
+    assert (same.shared, same.unshared) == (("radar", "lens"), "")
+    assert forced.shared == ("radar", "clicks")
+    assert "would have noticed" in same.verdict
+    for other, reason in (
+        (dataclasses.replace(second, vehicle=VehicleNote(radar_serial="7")), "other serials"),
+        (dataclasses.replace(second, provenance=two), "other topics"),
+        (other_lens, "other intrinsics"),
+    ):
+        apart = compare(imported(first), imported(other))
+        assert apart.shared == ()
+        assert reason in apart.unshared
+        assert "--same-sensors" in apart.unshared
+        assert (apart.change.noticeable(0.05) > same.change.noticeable(0.05)).all()
+
+
+def test_files_without_pairs_are_compared_with_every_error_counted_twice(twice):
+    silent = dataclasses.replace(twice[1], calibration=dataclasses.replace(twice[1].calibration, pairs=()))
+    report = check(imported(silent), against=imported(twice[0]))
+
+    assert "every error counts as independent, because one of the two keeps no pairs to solve again" in str(report)
+    assert "would have noticed" in str(report)
+    assert report.verdict == "right"
+
+
+def test_the_power_is_that_of_the_level_that_was_asked_for(twice):
+    plain, strict = (
+        check(imported(twice[1]), against=imported(twice[0]), limits=AgreementLimits(max_sigma=sigma)).judgement.noticed
+        for sigma in (1.96, 3.29)
+    )
+    noticed_deg = [float(text.split()[3]) for text in (plain, strict)]
+
+    assert noticed_deg[1] > 1.1 * noticed_deg[0]
+    assert check(imported(twice[1]), against=imported(twice[0])).judgement.noticed == plain
+    assert not check(
+        imported(twice[1]), against=imported(twice[0]), limits=AgreementLimits(max_deg=2.0)
+    ).judgement.noticed
 
 
 def test_another_lens_is_found_and_named_with_its_part_of_the_difference(file):
@@ -158,7 +227,7 @@ def test_another_lens_is_found_and_named_with_its_part_of_the_difference(file):
     at = report.comparison.pixels[1]
     assert at.rms_px > 5
     assert at.pose_rms_px == pytest.approx(0, abs=1e-6)
-    assert report.comparison.lens.rms_px == pytest.approx(at.rms_px, rel=1e-6)
+    assert report.comparison.lens.rms_px == pytest.approx(at.rms_px, rel=0.05)
     assert "by the lens alone" in str(report)
     assert "fx " in str(report)
     assert "0 px rms by the pose alone" in str(report)
@@ -202,6 +271,21 @@ def test_the_matrix_of_another_camera_in_a_file_of_rectified_pictures_is_seen(fi
 
     assert any("fx" in result.message for result in report.results if result.code == "other-lens")
     assert check(read_any(text), against=imported(file)).results[-1].code == "agrees"
+
+
+@pytest.mark.parametrize("name", ["kitti", "nuscenes"])
+def test_the_matrix_of_our_rectified_pictures_is_that_of_the_same_camera(file, name):
+    written = read_any(export(file, name).data)
+    k_px = np.array(written.matrix_px)
+    assert abs(k_px[0, 0] - file.calibration.camera.matrix_px[0, 0]) > 20
+
+    for limits in (AgreementLimits(), AgreementLimits(max_px=2.0)):
+        report = check(written, against=imported(file), limits=limits)
+        assert report.verdict == "right"
+        assert "other-lens" not in str(report.results)
+    k_px[0, 0] *= 1.2
+    other = dataclasses.replace(written, matrix_px=k_px, check_point=None)
+    assert check(other, against=imported(file), limits=AgreementLimits(max_px=2.0)).verdict == "wrong"
 
 
 def test_points_behind_the_other_camera_are_said_to_be_there(file):

@@ -5,16 +5,14 @@ from cocalib.report.subject import Against
 from cocalib.view.wording import sentence
 
 
-def comparison(against: Against, name: str) -> Markup:
+def comparison(against: Against) -> Markup:
     """Return the comparison.
 
     Args:
         against: the other calibration and the difference.
-        name: of this one.
     """
     found = against.comparison
     rows = (tag("tr", tag("th", one.label, scope="row"), tag("td", one.text)) for one in found.figures)
-    known = len(found.figures) + 1
     return tag(
         "section",
         tag("h2", f"Compared with {against.name}"),
@@ -24,8 +22,8 @@ def comparison(against: Against, name: str) -> Markup:
             tag("tbody", *rows),
             class_="figures",
         ),
-        tag("p", sentence(found.verdict(against.name, name))),
+        tag("p", sentence(found.verdict)),
         *(tag("p", sentence(line)) for line in against.judged),
-        *(tag("p", sentence(line), class_="note") for line in found.lines()[known:]),
+        *(tag("p", sentence(line), class_="note") for line in found.notes),
         id="comparison",
     )
