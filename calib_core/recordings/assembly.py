@@ -221,17 +221,19 @@ def _stamped(selection: Selection, inventory: Inventory) -> Mapping[str, Stamped
 
 def _radar_choice(selection: Selection, stamped: Mapping[str, StampedTopic], inventory: Inventory) -> RadarChoice:
     """Compare the radar topics, each by its own clock, and choose those of one radar."""
-    streams, frames = [], []
+    streams, frames, by_stamps = [], [], []
     for topic in selection.radars if len(selection.radars) > 1 else ():
         both = stamped[topic.name]
         if selection.radar_named:
             about_lost(topic.name, len(topic), both)  # what the user named must be readable
         if len(both.topic):
             stamps = _both_clocks(both, inventory)
-            times_ns = _times(stamps, choose_clock(stamps).clocks[0])
+            clock = choose_clock(stamps).clocks[0]
+            times_ns = _times(stamps, clock)
+            by_stamps.append(clock == "header")
             streams.append(_topic_stream(both.topic, inventory, times_ns, both.heads))
             frames.append(_frame(both.topic))
-    return choose_radar(streams, frames, inventory, selection)
+    return choose_radar(streams, frames, by_stamps, inventory, selection)
 
 
 def _head_bytes(usage: Usage) -> int:

@@ -445,13 +445,20 @@ class RadarChoice:
 
 
 def choose_radar(
-    streams: Sequence[RadarStream], frames: Sequence[str], inventory: Inventory, selection: Selection
+    streams: Sequence[RadarStream],
+    frames: Sequence[str],
+    stamped: Sequence[bool],
+    inventory: Inventory,
+    selection: Selection,
 ) -> RadarChoice:
     """Group the radar topics into sensors and choose one.
+
+    Of topics with the same returns, one with Doppler is read, then one with stamps, then one with a frame.
 
     Args:
         streams: of the selection's radar topics, the preferred one first.
         frames: their frame_ids.
+        stamped: whether their times are stamps.
         inventory: all topics.
         selection: what the user asked for.
 
@@ -461,12 +468,13 @@ def choose_radar(
     if not streams:
         return RadarChoice()
     examined = [
-        Examined.of(stream, frame, returns=_has_returns(stream, inventory))
-        for stream, frame in zip(streams, frames, strict=True)
+        Examined.of(stream, frame, returns=_has_returns(stream, inventory), stamped=has_stamps)
+        for stream, frame, has_stamps in zip(streams, frames, stamped, strict=True)
     ]
     if selection.radar_named:
         (sensor,) = sensors_of(examined, together=True)
         return RadarChoice((sensor,), f"{_described(sensor)}, as requested", tuple(_about_frames(examined)))
+    examined.sort(key=lambda one: (one.figures.doppler, one.stamped, bool(one.frame)), reverse=True)
     sensors = sensors_of(examined)
     if selection.sensor is not None:
         wanted = [sensor for sensor in sensors if sensor.name == selection.sensor]
@@ -495,10 +503,11 @@ def _chosen_radar(sensors: Sequence[RadarSensor], examined: dict[str, Examined],
 
     ordered = tuple(sorted(sensors, key=rank, reverse=True))
     best, others = ordered[0], ordered[1:]
+    chosen = f"{_described(best)}{_why_not_read(best, examined)}"
     if not others:
-        return RadarChoice(ordered, _described(best) if len(best.topics) > 1 or best.copies else "")
+        return RadarChoice(ordered, chosen if len(best.topics) > 1 or best.copies else "")
     listed = "; ".join(_described(sensor) for sensor in others)
-    reason = f"{_described(best)}; {_why(best, others, examined)}; not used: {listed}"
+    reason = f"{chosen}; {_why(best, others, examined)}; not used: {listed}"
     comparable = [
         sensor
         for sensor in others
@@ -507,6 +516,23 @@ def _chosen_radar(sensors: Sequence[RadarSensor], examined: dict[str, Examined],
         and sensor.figures.doppler == best.figures.doppler
     ]
     return RadarChoice(ordered, reason, (_unclear(best, comparable),) if comparable else ())
+
+
+def _why_not_read(best: RadarSensor, examined: dict[str, Examined]) -> str:
+    """Say what the topics lack whose returns are those of another one."""
+    first = examined[best.topics[0]]
+    reasons = []
+    for name in best.copies:
+        copy = examined[name]
+        lacks = (
+            (first.figures.doppler and not copy.figures.doppler, "no Doppler"),
+            (first.stamped and not copy.stamped, "no stamps"),
+            (bool(first.frame) and not copy.frame, "no frame"),
+        )
+        missing = [what for is_missing, what in lacks if is_missing]
+        if missing:
+            reasons.append(f"; {name} is not read because it has {' and '.join(missing)}")
+    return "".join(reasons)
 
 
 def _ahead(sensor: RadarSensor, sensors: Sequence[RadarSensor]) -> float:

@@ -166,6 +166,11 @@ class RadarStream(ScanBlocks):
         return frame, point
 
     @property
+    def receive_ns(self) -> TimesNs:
+        """When the first message of each scan (k,) arrived, no earlier than that of the scan before."""
+        return np.maximum.accumulate(self.topic.receive_ns[self._first])
+
+    @property
     def delay_ns(self) -> int:
         """The median time from a scan's stamp to the arrival of its first message [ns]."""
         delays = self.topic.receive_ns[self._first] - self.times_ns

@@ -1,6 +1,7 @@
 """Radar sensors: which topics of a recording are one radar, judged by their returns, frames and times.
 
-Near and far scans agree where their ranges overlap. Two azimuths of each return agree in range and speed, and differ in
+A list and a cloud of one sensor hold the same returns, even if only one of them has stamps and a frame. Near and far scans agree
+where their ranges overlap. Two azimuths of each return agree in range and speed, and differ in
 azimuth. Radars at other places agree in neither: each is a sensor of its own. Topics of one frame whose scans alternate in time
 are one radar that switches between two antennas, unless they show the same ranges in other directions.
 """
@@ -74,6 +75,7 @@ class Examined:
         figures: of a sample.
         spread: how far apart two reports of one return lie.
         returns: whether it has returns, not tracked objects, and is no lidar.
+        stamped: whether its times are stamps of its messages, not receive times.
     """
 
     stream: RadarStream
@@ -81,11 +83,12 @@ class Examined:
     figures: Figures
     spread: Spread
     returns: bool = True
+    stamped: bool = True
 
     @classmethod
-    def of(cls, stream: RadarStream, frame: str = "", *, returns: bool = True) -> "Examined":
+    def of(cls, stream: RadarStream, frame: str = "", *, returns: bool = True, stamped: bool = True) -> "Examined":
         """Examine a topic."""
-        return cls(stream, frame, figures_of(stream), measured_spread(stream), returns)
+        return cls(stream, frame, figures_of(stream), measured_spread(stream), returns, stamped)
 
     @property
     def name(self) -> str:
@@ -216,10 +219,15 @@ def _all_together(figures: Sequence[Figures]) -> Figures:
 def relation(one: Examined, other: Examined) -> Relation:
     """Judge how two topics belong together."""
     elsewhere = _words(one.name, _PLACE_WORDS) != _words(other.name, _PLACE_WORDS)
-    if one.frame != other.frame or elsewhere or not (one.returns and other.returns):
+    unnamed = one.frame != other.frame and not (one.frame and other.frame)
+    if (one.frame != other.frame and not unnamed) or elsewhere or not (one.returns and other.returns):
         return "apart"
-    alternating = alternate(one.stream.times_ns, other.stream.times_ns)
-    both = _common_moments(one.stream, other.stream)
+    stamped = one.stamped == other.stamped
+    times = (
+        [one.stream.times_ns, other.stream.times_ns] if stamped else [one.stream.receive_ns, other.stream.receive_ns]
+    )
+    alternating = not unnamed and alternate(*times)
+    both = _common_moments((one.stream, other.stream), times)
     if both is None:
         return "ranges" if alternating else "apart"
     spreads = one.spread, other.spread
@@ -232,6 +240,8 @@ def relation(one: Examined, other: Examined) -> Relation:
         return "apart"
     if len(matches(first, second, spread)[0]) >= _SAME_SHARE * fewer:
         return "same"
+    if unnamed:
+        return "apart"
     if _are_alternatives(first, second, spread, fewer):
         return "alternatives"
     return "ranges" if _are_ranges(one, other, first, second, spread) else "apart"
@@ -271,17 +281,24 @@ def _varies(stream: RadarStream) -> bool:
     return len(points) > 1 and float(np.std(direction_cosines(points)[:, 1])) > _LEAST_SPREAD
 
 
-def _common_moments(one: RadarStream, other: RadarStream) -> tuple[RadarScans, RadarScans] | None:
-    """Decode some moments that both show; None if there are none."""
-    if not (len(one.times_ns) and len(other.times_ns)):
+def _common_moments(
+    streams: tuple[RadarStream, RadarStream], times: Sequence[TimesNs]
+) -> tuple[RadarScans, RadarScans] | None:
+    """Decode some moments that both show; None if there are none.
+
+    Args:
+        streams: of two topics.
+        times: (n,) of the scans of each by one clock, ascending.
+    """
+    if not min(map(len, times)):
         return None
-    moments = moments_of([one.times_ns, other.times_ns])
+    moments = moments_of(times)
     shown = np.flatnonzero((moments.scan_of >= 0).all(axis=0))
     if not len(shown):
         return None
     chosen = shown[np.unique(np.linspace(0, len(shown) - 1, min(len(shown), _SAMPLED_MOMENTS)).astype(np.int64))]
     scans = []
-    for stream, numbers in zip((one, other), moments.scan_of[:, chosen], strict=True):
+    for stream, numbers in zip(streams, moments.scan_of[:, chosen], strict=True):
         wanted = np.unique(numbers)
         scans.append(aligned(stream.decoded(wanted), np.searchsorted(wanted, numbers), moments.times_ns[chosen]))
     return scans[0], scans[1]

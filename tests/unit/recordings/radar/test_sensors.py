@@ -53,7 +53,7 @@ def clouds(
             "intensity": np.full(len(polar), 20.0),
             "velocity": np.where(np.arange(len(polar)) % 9 == 8, 1.5, 0.0),
         }
-        columns["doppler_vel"] = columns["velocity"]
+        columns |= {"doppler_vel": columns["velocity"], "power": columns["intensity"]}
         stamp = TimeNs(START_NS + round(number * NS_PER_S / rate_hz))
         values = np.column_stack([columns[name] for name in names])
         yield RecordedMessage(topic, TimeNs(stamp + 2_000_000), CloudMessage(stamp, frame, names, values))
@@ -196,6 +196,44 @@ def test_a_topic_with_the_same_returns_is_read_once(tmp_path: Path) -> None:
         (sensor,) = recording.radar_sensors
         assert len(sensor.copies) == 1
         assert "the same returns as" in recording.radar_choice
+
+
+@pytest.mark.parametrize("lack", ["stamps and frame", "frame", "Doppler"])
+def test_a_list_and_a_cloud_of_one_sensor_are_one_radar_and_the_better_one_is_read(tmp_path: Path, lack: str) -> None:
+    """Both arrive together, long after they were measured; the list has the better name."""
+    everything = targets(7)
+    late_ns = 130_000_000
+    frame = "radar" if lack == "Doppler" else ""
+    stamp = TimeNs(0) if lack == "stamps and frame" else None
+    names = (*"xyz", "power") if lack == "Doppler" else NAMES
+    lists = [
+        replace(
+            message,
+            receive_time=TimeNs(message.receive_time + late_ns + 1_000_000),
+            body=replace(message.body, stamp=message.body.stamp if stamp is None else stamp),
+        )
+        for message in clouds("/radar/scan", everything, seed=1, frame=frame, names=names)
+    ]
+    points = [
+        replace(message, receive_time=TimeNs(message.receive_time + late_ns))
+        for message in clouds("/points", everything, seed=1)
+    ]
+    with opened(bag(tmp_path, lists, points)) as recording:
+        assert recording.radar_topics == ("/points",)
+        assert recording.radar_frame == "radar"
+        assert recording.radar_clock == "header"
+        (sensor,) = recording.radar_sensors
+        line = next(line for line in describe(recording).splitlines() if "the same returns as" in line)
+        assert recording.warnings == ()
+    assert sensor.copies == ("/radar/scan",)
+    reason = {"stamps and frame": "no stamps and no frame", "frame": "no frame", "Doppler": "no Doppler"}[lack]
+    assert f"/radar/scan is not read because it has {reason}" in line
+
+
+def test_a_radar_without_a_frame_that_shows_other_returns_stays_apart(tmp_path: Path) -> None:
+    path = bag(tmp_path, clouds("/a", targets(7), seed=1), clouds("/b", targets(8), seed=2, frame=""))
+    with opened(path) as recording:
+        assert len(recording.radar_sensors) == 2
 
 
 def test_other_azimuths_of_the_same_returns_are_alternatives(tmp_path: Path) -> None:
