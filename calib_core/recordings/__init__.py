@@ -6,7 +6,14 @@ from calib_core.recordings.containers.sources import about_assumptions, assumpti
 from calib_core.recordings.following import AwaitedRecording, FollowedRecording, Growth
 from calib_core.recordings.frame_transforms import FrameTransform, frame_transforms
 from calib_core.recordings.plain_files.folder_cameras import size_of_pictures_beside
-from calib_core.recordings.recording import Recording, first_picture, inspect_recording, open_recording, require_files
+from calib_core.recordings.recording import (
+    Recording,
+    about_losses,
+    first_picture,
+    inspect_recording,
+    open_recording,
+    require_files,
+)
 from calib_core.recordings.selection import RecordingOptions, figures_text
 from calib_core.recordings.summary import RecordingSummary, clock_lines, describe, recording_summary
 from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis
@@ -29,6 +36,7 @@ __all__ = [
     "Verification",
     "WrittenVideo",
     "about_assumptions",
+    "about_losses",
     "assumption_hint",
     "clock_lines",
     "describe",

@@ -30,6 +30,7 @@ from calib_core.recordings.plain_files.ti_uart import open_uart_streams
 from calib_core.recordings.plain_files.video import VIDEO_SUFFIXES
 from calib_core.recordings.radar.column_plan import ColumnReading, column_readings, parse_radar_axes
 from calib_core.recordings.radar.merging import MergedStream
+from calib_core.recordings.radar.scan_stream import Losses
 from calib_core.recordings.radar.sensors import RadarSensor, figures_of
 from calib_core.recordings.selection import Inventory, Need, RecordingOptions, Usage, select_image, usage_of
 from calib_core.recordings.time.written_times import parse_zone
@@ -158,7 +159,7 @@ class Recording:
     def warnings(self) -> tuple[DataWarning, ...]:
         """What the user must know, including unreadable messages and damage found so far."""
         found = (*self._assembly.warnings, *(late for source in self.sources for late in source.later_warnings))
-        return (*found, *self._unreadable())
+        return (*found, *self._unreadable(), *self._about_lost())
 
     def _unreadable(self) -> Iterator[DataWarning]:
         """Warn about radar messages that could not be read so far."""
@@ -171,6 +172,21 @@ class Recording:
                     f"the first is number {row}: {why}",
                     "if there are many, copy the file again from its source",
                 )
+
+    def _about_lost(self) -> Iterator[DataWarning]:
+        found = self.losses()
+        if found.lost:
+            yield about_losses(found, "the radar")
+
+    def losses(self, times: Sequence[TimeNs] | None = None, half_window_s: float = 0.0) -> Losses:
+        """Count the radar's lost returns among the scans read so far.
+
+        Args:
+            times: those within half_window_s [s] of any of these; None for all.
+            half_window_s: half the length of the windows.
+        """
+        parts = self._assembly.radar.parts if self._assembly.radar else ()
+        return sum((part.losses(times, half_window_s) for part in parts), Losses())
 
     @property
     def other_azimuths(self) -> tuple[str, ...]:
@@ -344,6 +360,16 @@ class Recording:
             files.append(InputFile(name_text(source.path.name), source.size_bytes, digest.hexdigest()))
         self._fingerprint = tuple(files)
         return self._fingerprint
+
+
+def about_losses(found: Losses, where: str) -> DataWarning:
+    """Warn about lost returns."""
+    return DataWarning(
+        "lost-returns",
+        f"{found.lost} of {found.read} returns of {where} are lost ({100 * found.share:.2g} %): their positions are not "
+        "numbers, or their messages hold more returns than they state",
+        "look for the fault in the radar's driver or in the program that wrote the recording; the reflector may be among them",
+    )
 
 
 def _header_stamps(images: ImageStream, clock: str | None) -> TimesNs:

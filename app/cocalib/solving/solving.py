@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from calib_core.association.pairing import RadarSource, pair_clicks, scans_around
+from calib_core.association.pairing import RadarSource, half_window_s, pair_clicks, scans_around
 from calib_core.calibration import calibrate_pairs, calibration_steps, solve_again
 from calib_core.camera import Camera
 from calib_core.errors import InputError, OptionError
@@ -29,9 +29,9 @@ from calib_core.interchange import (
     read_pairs_table,
 )
 from calib_core.interchange import calibration_text as interchange_text
-from calib_core.measurements import Candidate, Pair, ReflectorClick, Unsolvable
+from calib_core.measurements import Candidate, DataWarning, Pair, ReflectorClick, Unsolvable
 from calib_core.options import CalibrationOptions, checked_options
-from calib_core.recordings import Recording, about_assumptions
+from calib_core.recordings import Recording, about_assumptions, about_losses
 from calib_core.results import Calibration, InputFile, PairResult, UnconfirmedClicks
 from cocalib.platform.resources import version
 from cocalib.session import Outcome
@@ -39,7 +39,10 @@ from cocalib.session import Outcome
 _MOST_CANDIDATES = 50
 """As many as the option allows."""
 
-_KEPT_WARNINGS = ("assumed", "nobody-confirmed")
+_MOST_LOST = 0.05
+"""Share of the returns."""
+
+_KEPT_WARNINGS = ("assumed", "nobody-confirmed", "lost-returns")
 """What solving the same pairs again cannot change."""
 
 _log = logging.getLogger(__name__)
@@ -100,7 +103,24 @@ def solve_in_steps(
         )
         return
     scans = scans_around(recording, clicks, options)
-    yield from calibration_steps(clicks, scans, camera, options, previous=previous, preview=preview)
+    about_lost = _about_lost(recording, clicks, options)
+    for outcome in calibration_steps(clicks, scans, camera, options, previous=previous, preview=preview):
+        if about_lost and isinstance(outcome, Calibration):
+            outcome = dataclasses.replace(outcome, warnings=(*about_lost, *outcome.warnings))
+        yield outcome
+
+
+def _about_lost(
+    recording: RadarSource, clicks: Sequence[ReflectorClick], options: CalibrationOptions
+) -> tuple[DataWarning, ...]:
+    """Warn if returns around the clicks are lost, or more than 5 % of those read so far."""
+    if not isinstance(recording, Recording):
+        return ()
+    near = recording.losses([click.image_time for click in clicks], half_window_s(options))
+    if near.lost:
+        return (about_losses(near, "the radar around the clicks"),)
+    everywhere = recording.losses()
+    return (about_losses(everywhere, "the radar"),) if everywhere.share > _MOST_LOST else ()
 
 
 def check_clicks(

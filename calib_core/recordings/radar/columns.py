@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Points3, Values
+from calib_core.arrays import Flags, Points3, Values
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.recordings.radar.column_plan import ColumnPlan, plain_name
 
@@ -50,6 +50,7 @@ class Returns:
 
     Attributes:
         claimed_polar: range, azimuth and elevation as given in the message, NaN for missing ones; only on request.
+        lost: (n,) which have no position although the message does not mark them as invalid; None if none is lost.
     """
 
     points_radar_m: Points3
@@ -57,6 +58,7 @@ class Returns:
     snr_db: Values
     sigma_polar: Points3
     claimed_polar: Points3 | None = None
+    lost: Flags | None = None
 
     def __len__(self) -> int:
         return len(self.points_radar_m)
@@ -155,17 +157,21 @@ def _returns(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Returns:
     doppler = _doppler(plan, column, position)
     for flag in plan.spoils_doppler:
         doppler = np.where(column(flag).reshape(-1) != 0, np.nan, doppler)
+    lost = ~np.isfinite(position).all(axis=1)
     for flag in plan.spoils_position:
-        position[column(flag).reshape(-1) != 0] = np.nan
+        invalid = column(flag).reshape(-1) != 0
+        position[invalid], lost[invalid] = np.nan, False
     for flag in plan.needed:
-        position[column(flag).reshape(-1) == 0] = np.nan
+        invalid = column(flag).reshape(-1) == 0
+        position[invalid], lost[invalid] = np.nan, False
     turn = plan.turn
     if turn is not None:
         position = position @ turn.T
     if plan.amplitude_scale != 1.0:
         amplitude = amplitude * plan.amplitude_scale
     claimed = _columns(plan.claimed, column, n) * plan.claimed_scales if plan.claiming else None
-    return Returns(position, doppler, amplitude, _sigma(plan, column, position), claimed)
+    sigma = _sigma(plan, column, position)
+    return Returns(position, doppler, amplitude, sigma, claimed, lost if lost.any() else None)
 
 
 def _floats(values: np.ndarray) -> Values:

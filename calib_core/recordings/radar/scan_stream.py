@@ -6,7 +6,7 @@ import threading
 from abc import ABC, abstractmethod
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,6 +29,27 @@ _SMALLEST_CLOUD_BYTES = 256
 _LONGEST_TOGETHER = 1 << 17
 _CLAIMS_OF_A_SCAN = 16
 _MOST_WINDOW_BYTES = 1 << 23
+
+
+@dataclass(frozen=True, slots=True)
+class Losses:
+    """Returns that have no position although their messages do not mark them as invalid, and what was read.
+
+    Attributes:
+        lost: their number: the position is no number, or the message holds more returns than it states.
+        read: number of all returns that were looked at.
+    """
+
+    lost: int = 0
+    read: int = 0
+
+    def __add__(self, other: "Losses") -> "Losses":
+        return Losses(self.lost + other.lost, self.read + other.read)
+
+    @property
+    def share(self) -> float:
+        """Of what was looked at."""
+        return self.lost / max(self.read, 1)
 
 
 class ScanBlocks(ABC):
@@ -137,6 +158,7 @@ class RadarStream(ScanBlocks):
         """The layout of the first part; with one return per message, all parts share it."""
         self._layouts = layouts
         self.unreadable: Mapping[int, str] = {}
+        self._read_of, self._lost_of = np.zeros((2, len(topic)), dtype=np.int32)
         self._cloud_bytes = _USUAL_CLOUD_BYTES
         first = np.arange(len(topic))
         if isinstance(self.layout, PointLayout):
@@ -151,8 +173,30 @@ class RadarStream(ScanBlocks):
         other = copy.copy(self)
         other.layout, *rest = (layout.with_plan(replace(layout.plan, azimuth_from=column)) for layout in self._layouts)
         other._layouts = (other.layout, *rest)
+        other._read_of, other._lost_of = np.zeros((2, len(self.topic)), dtype=np.int32)
         ScanBlocks.__init__(other, self.times_ns)
         return other
+
+    def losses(self, times: Sequence[TimeNs] | None = None, half_window_s: float = 0.0) -> Losses:
+        """Count what was lost in the scans read so far: in all, or in those within half_window_s of any of the times."""
+        if self.layout.plan.azimuth_from is not None:
+            return Losses()  # a return may have no other azimuth
+        if times is None:
+            return Losses(int(self._lost_of.sum()), int(self._read_of.sum()))
+        half_ns = round(half_window_s * NS_PER_S)
+        ends = [np.searchsorted(self.times_ns, [int(time) - half_ns, int(time) + half_ns + 1]) for time in times]
+        scans = np.unique(np.concatenate([np.zeros(0, np.int64), *(np.arange(low, high) for low, high in ends)]))
+        first, last = self._first[scans], self._last[scans]
+        lost, read = (np.concatenate([[0], np.cumsum(of, dtype=np.int64)]) for of in (self._lost_of, self._read_of))
+        return Losses(int((lost[last] - lost[first]).sum()), int((read[last] - read[first]).sum()))
+
+    def _count(self, messages: np.ndarray, counts: np.ndarray, returns: Returns) -> None:
+        """Note how many returns of each message were read and lost."""
+        self._read_of[messages] = counts
+        if returns.lost is not None:
+            ends = np.cumsum(counts)
+            before = np.concatenate([[0], np.cumsum(returns.lost)])
+            self._lost_of[messages] = before[ends] - before[ends - counts]
 
     def _numbers(self, layout: PointLayout, heads: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
         """Read the numbers that separate scans; if a message's strings are longer than the first's, from the whole message."""
@@ -211,7 +255,10 @@ class RadarStream(ScanBlocks):
             together = self._decoded_clouds(self.layout, scans)
             if together is not None:
                 return together
-        returns = [self._returns(int(message)) for message in self._first[scans]]
+        messages = self._first[scans]
+        returns = [self._returns(int(message)) for message in messages]
+        for message, scan in zip(messages, returns, strict=True):
+            self._count(np.array([message]), np.array([len(scan)]), scan)
         return _stacked(self.times_ns[scans], [len(scan) for scan in returns], _joined(returns))
 
     def _decoded_clouds(self, layout: CloudLayout, scans: np.ndarray) -> RadarScans | None:
@@ -225,7 +272,10 @@ class RadarStream(ScanBlocks):
         if longest > heads.rows.shape[1] or int(heads.lengths.min()) < 0:
             return None
         found = layout.returns_of_rows(heads.rows, heads.lengths)
-        return None if found is None else _stacked(self.times_ns[scans], found[1].tolist(), found[0])
+        if found is None:
+            return None
+        self._count(messages, found[1], found[0])
+        return _stacked(self.times_ns[scans], found[1].tolist(), found[0])
 
     def _returns(self, message: int) -> Returns:
         """Decode one message; an unreadable one becomes an empty scan and is reported."""
@@ -249,6 +299,7 @@ class RadarStream(ScanBlocks):
         heads = self.topic.heads(messages, layout.dtype.itemsize)
         short = heads.lengths < layout.dtype.itemsize
         returns = layout.returns_of_rows(heads.rows)
+        self._count(messages, np.ones(len(messages), dtype=np.int64), returns)
         if short.any():
             returns.points_radar_m[short] = np.nan
             self._note_unreadable(dict.fromkeys(messages[short].tolist(), "the message is truncated"))

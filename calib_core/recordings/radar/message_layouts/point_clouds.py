@@ -100,6 +100,9 @@ class CloudLayout:
         if plan is None:
             raise MessageError(f"a cloud has no position, only the fields {', '.join(dtype.names or ('(none)',))}")
         points = _points(data, dtype, height, width, step)
+        beyond = _beyond(data, dtype, width) if height == 1 else 0
+        if beyond:
+            return _with_lost(_returns(points, plan), beyond)
         if height == 1 and order == "<":
             start = _after_header(payload, self.definition) + 8
             self._remember(payload[start : len(payload) - len(data) - 9], _Shape(dtype, plan))
@@ -128,7 +131,7 @@ class CloudLayout:
             width, step = numbers[:, 1], shape.dtype.itemsize
             alike = rows[:, start + 8 : end].tobytes() == block * len(rows) and (numbers[:, 0] == 1).all()
             same_frame = rows[:, 12:16].tobytes() == rows[0, 12:16].tobytes() * len(rows)
-            if alike and same_frame and (width * step <= sizes).all() and (end + 8 + sizes <= lengths).all():
+            if alike and same_frame and (width * step == sizes).all() and (end + 8 + sizes <= lengths).all():
                 return _returns(_points_of_rows(rows, end + 8, width, shape.dtype), shape.plan), width
         return None
 
@@ -152,7 +155,7 @@ class CloudLayout:
                 if height != 1 or payload[start + 8 : end] != block:
                     continue
                 _, size = struct.unpack_from("<II", payload, end)
-                if size < width * shape.dtype.itemsize or end + 8 + size > len(payload):
+                if size != width * shape.dtype.itemsize or end + 8 + size > len(payload):
                     return None
                 return _returns(np.frombuffer(payload, shape.dtype, width, end + 8), shape.plan)
         except struct.error:
@@ -258,6 +261,28 @@ def _cloud_columns(samples: Samples, dtype: np.dtype[Any]) -> list[DescribedColu
             DescribedColumn(name, dtype[name].kind != "f", "", points[name].astype(np.float64))
             for name in dtype.names or ()
         ]
+
+
+def _beyond(data: np.ndarray, dtype: np.dtype[Any], width: int) -> int:
+    """Return how many points lie in the data beyond the width that the message states, up to the last that is not all zero."""
+    rest = data[width * dtype.itemsize :]
+    filled = np.flatnonzero(rest[: len(rest) // dtype.itemsize * dtype.itemsize])
+    return int(filled[-1]) // dtype.itemsize + 1 if len(filled) else 0
+
+
+def _with_lost(returns: Returns, count: int) -> Returns:
+    """Add returns without a position: those that a message holds beyond its stated width."""
+    no_position, nothing = np.full((count, 3), np.nan), np.full(count, np.nan)
+    lost = np.zeros(len(returns), dtype=np.bool_) if returns.lost is None else returns.lost
+    lost = np.concatenate([lost, np.ones(count, dtype=np.bool_)])
+    return replace(
+        returns,
+        points_radar_m=np.concatenate([returns.points_radar_m, no_position]),
+        doppler_mps=np.concatenate([returns.doppler_mps, nothing]),
+        snr_db=np.concatenate([returns.snr_db, nothing]),
+        sigma_polar=np.concatenate([returns.sigma_polar, no_position]),
+        lost=lost,
+    )
 
 
 def _returns(points: np.ndarray, plan: ColumnPlan) -> Returns:

@@ -2,7 +2,7 @@
 
 import json
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
@@ -17,7 +17,9 @@ from calib_core.interchange import CameraFile, camera_info_text, read_calibratio
 from calib_core.measurements import RadarScans, ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions, LocatingOptions
 from calib_core.recordings import Recording, RecordingOptions, open_recording
+from calib_core.recordings.containers.writing import CloudMessage, RecordedMessage, write_ros1_bag
 from calib_core.results import Calibration, DataWarning
+from calib_core.results.verdict import verdict_on
 from cocalib.platform.resources import version
 from cocalib.session import ClicksImported, OptionsChanged
 from cocalib.solving.solving import (
@@ -57,6 +59,45 @@ def solved(recording: Recording, clicks: tuple[ReflectorClick, ...]) -> Calibrat
     outcome = solve_clicks(recording, clicks, recording.camera(), CalibrationOptions())
     assert isinstance(outcome, Calibration)
     return outcome
+
+
+@pytest.mark.parametrize(
+    ("lost", "leads"),
+    [("none", False), ("one in a window", True), ("a few elsewhere", False), ("many elsewhere", True)],
+)
+def test_lost_returns_lead_the_verdict_where_they_can_matter(
+    tmp_path: Path,
+    recording: Recording,
+    clicks: tuple[ReflectorClick, ...],
+    solved: Calibration,
+    lost: str,
+    leads: bool,
+) -> None:
+    scans = recording.radar_scans()
+    half_ns = round(half_window_s(CalibrationOptions()) * 1e9)
+    reached = [np.abs(scans.times_ns - int(click.image_time)) <= half_ns for click in clicks]
+    far = np.flatnonzero(~np.any(reached, axis=0))
+    spoilt = {"none": [], "one in a window": np.flatnonzero(reached[3])[:1], "a few elsewhere": far[:1]}.get(lost, far)
+
+    def messages() -> Iterator[RecordedMessage]:
+        for number in range(len(scans)):
+            scan = scans.scan(number)
+            values = np.column_stack([scan.points_radar_m, scan.snr_db, scan.doppler_mps])
+            if number in spoilt:
+                values[0 if lost == "many elsewhere" else -1 :, 0] = np.nan
+            body = CloudMessage(scan.time, "radar", ("x", "y", "z", "snr_db", "doppler_mps"), values)
+            yield RecordedMessage("/radar", scan.time, body)
+
+    camera = next(path for path in recording.paths if path.name == "camera.bag")
+    with open_recording([camera, write_ros1_bag(tmp_path / "radar.bag", messages())]) as changed:
+        changed.radar_scans()
+        outcome = solve_clicks(changed, clicks, recording.camera(), CalibrationOptions())
+        told = any(warning.code == "lost-returns" for warning in changed.warnings)
+    assert isinstance(outcome, Calibration)
+    verdict = verdict_on(outcome)
+    assert told == (lost != "none")
+    assert (verdict.level == "weak" and "are lost" in verdict.reason) == leads
+    assert any(warning.code == "lost-returns" for warning in outcome.warnings) == leads
 
 
 def test_without_intrinsics_the_answer_says_that_they_are_missing() -> None:

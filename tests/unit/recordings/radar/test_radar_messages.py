@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from calib_core.measurements import NS_PER_S
+from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.radar import cartesian_from_polar
 from calib_core.recordings import RecordingOptions, open_recording
 from calib_core.recordings.radar.columns import plan_columns
@@ -103,6 +103,41 @@ def test_returns_that_are_not_numbers_keep_their_row(ros, write, cloud_points):
         scan = recording.radar_scans().scan(0)
     assert np.isnan(scan.points_radar_m[1]).tolist() == [True, False, False]
     np.testing.assert_array_equal(scan.snr_db, points["snr"])
+
+
+@pytest.mark.parametrize("fault", ["width", "nan"])
+def test_returns_that_a_cloud_loses_are_counted_and_told(ros, write, cloud_points, fault):
+    """A cloud that states too few points, and one whose positions are no numbers; the other clouds are sound."""
+    points = cloud_points(10)
+    broken = points.copy()
+    if fault == "nan":
+        broken["y"][6:] = np.nan
+    bad = ros.cloud(START_NS + 10**8, broken)
+    if fault == "width":
+        bad.width = 6
+    messages = [ros.cloud(START_NS, points), bad, *(ros.cloud(START_NS + i * 10**8, points) for i in range(2, 20))]
+    with opened(write, ros, messages) as recording:
+        scans = recording.radar_scans()
+        everywhere = recording.losses()
+        near = recording.losses([TimeNs(START_NS + 3 * 10**7)], 0.1)
+        elsewhere = recording.losses([TimeNs(START_NS + 10**9)], 0.3)
+        (warning,) = recording.warnings
+    assert np.diff(scans.first_return).tolist() == [10] * 20
+    assert np.isfinite(scans.points_radar_m).all(axis=1).sum() == 196
+    assert (everywhere.lost, everywhere.read) == (4, 200)
+    assert (near.lost, near.read) == (4, 20)
+    assert (elsewhere.lost, elsewhere.read) == (0, 70)
+    assert warning.code == "lost-returns"
+    assert warning.message.startswith("4 of 200 returns of the radar are lost (2 %)")
+
+
+def test_zeros_behind_the_points_of_a_cloud_are_no_lost_returns(ros, write, cloud_points):
+    padded = ros.cloud(START_NS, np.concatenate([cloud_points(5), np.zeros(3, cloud_points(1).dtype)]))
+    padded.width = 5
+    with opened(write, ros, [padded]) as recording:
+        assert np.diff(recording.radar_scans().first_return).tolist() == [5]
+        assert recording.losses().lost == 0
+        assert recording.warnings == ()
 
 
 def test_a_polar_cloud_with_its_own_noise_is_converted(ros, write):
