@@ -73,6 +73,7 @@ class RadarDefects:
     near_and_far: bool = option(
         False, "Publish near scans (25 Hz, up to 10 m) and far scans (20 Hz, from 5 m) as clouds in two topics."
     )
+    in_turn: bool = option(False, "Publish near and far scans in turn, 13 times a second each.")
     second_azimuth: SecondAzimuth = option(
         "none", "Publish a second azimuth of each return: not, or in a column or a topic of its own; as clouds."
     )
@@ -237,6 +238,12 @@ class SimulationOptions:
     reflectors: int = option(
         1, "Number of reflectors, moved in turn; the example clicks name all that stand.", low=1, high=4
     )
+    reflectors_apart_m: float | None = option(
+        None,
+        "How much farther away each further reflector of a scene stands, in another direction [m]; by default anywhere.",
+        low=0.0,
+        high=5.0,
+    )
     islands: bool = option(False, "Record only 2 to 15 s around each dwell, with gaps of 1 to 5 minutes between.")
     rig: RigOptions = option(RigOptions(), "How the sensors are mounted.")
     other_camera: OtherCamera = option(OtherCamera(), "A second camera, on another rig.")
@@ -278,6 +285,12 @@ class SimulationOptions:
         _require(roomy, "scene", self.scene, "another one: the aisle has no room for parked cars or a fence")
         _check_ranges(self)
         _check_traffic(self)
+        _require(
+            self.reflectors_apart_m is None or (self.reflectors > 1 and self.board_corners == 0),
+            "reflectors_apart_m",
+            self.reflectors_apart_m,
+            "left out with one reflector, or with placements at the checkerboard's corners",
+        )
         waved = self.waved_board.duration_s > 0.0
         _require(not (waved and self.islands), "islands", True, "False where a board is waved before the placements")
         _require(not waved or self.standing_places > 0, "placements", 0, "at least 1 after a board is waved")

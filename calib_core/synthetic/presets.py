@@ -44,6 +44,9 @@ PresetName: TypeAlias = Literal[
     "passers-by",
     "islands",
     "two-reflectors-islands",
+    "two-reflectors-close",
+    "two-reflectors-azimuths",
+    "two-reflectors-topics",
     "focal-length",
     "principal-point",
     "double-clicks",
@@ -137,6 +140,18 @@ PRESETS: Mapping[PresetName, SimulationOptions] = {
     "islands": SimulationOptions(dwell_s=10.0, islands=True),
     "two-reflectors-islands": SimulationOptions(
         scene="field", dwell_s=10.0, reflectors=2, islands=True, surroundings=Surroundings(parked_cars=2)
+    ),
+    "two-reflectors-close": SimulationOptions(reflectors=2, reflectors_apart_m=0.7),
+    "two-reflectors-azimuths": SimulationOptions(
+        radar="imaging", reflectors=2, reflectors_apart_m=0.7, defects=RadarDefects(second_azimuth="column")
+    ),
+    "two-reflectors-topics": SimulationOptions(
+        radar="imaging",
+        scene="field",
+        reflectors=2,
+        reflectors_apart_m=0.7,
+        surroundings=_CAR_PARK,
+        defects=RadarDefects(near_and_far=True, in_turn=True, second_azimuth="column"),
     ),
     "focal-length": SimulationOptions(intrinsics=IntrinsicsErrors(focal_length_scale=1.02)),
     "principal-point": SimulationOptions(intrinsics=IntrinsicsErrors(principal_point_px=(30.0, 0.0))),

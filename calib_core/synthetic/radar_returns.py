@@ -133,6 +133,7 @@ def _sine(angle_deg: float | None) -> float | None:
 
 _NEAR_HZ, _NEAR_END_M = 25.0, 10.0
 _FAR_HZ, _FAR_BEGIN_M = 20.0, 5.0
+_IN_TURN_HZ, _IN_TURN_END_M = 13.0, 30.0
 _NEAR_BEAM_DEG, _FAR_BEAM_DEG = 60.0, 20.0
 _NEAR_GAIN_DB, _FAR_GAIN_DB = -4.0, 8.0
 _NEAR_COARSER = 2.0
@@ -175,7 +176,7 @@ def antennas_of(
         islands: what of it is recorded.
     """
 
-    def times(rng: np.random.Generator, rate_hz: float) -> SensorTimes:
+    def times(rng: np.random.Generator, rate_hz: float, first_s: float | None = None) -> SensorTimes:
         return draw_times(
             rng,
             duration_s=duration_s,
@@ -186,11 +187,18 @@ def antennas_of(
             transfer_s=0.003,
             start_ns=options.start_s * NS_PER_S,
             islands=islands,
+            first_s=first_s,
         )
 
     if not options.defects.near_and_far:
         return (Antenna("", profile, times(rngs[0], options.radar_rate_hz)),)
     near, far = _near_and_far(profile)
+    if options.defects.in_turn:
+        begin_s = 0.05
+        return (
+            Antenna("far", far, times(rngs[0], _IN_TURN_HZ, begin_s), min_range_m=_FAR_BEGIN_M),
+            Antenna("near", near, times(rngs[1], _IN_TURN_HZ, begin_s + 0.5 / _IN_TURN_HZ), max_range_m=_IN_TURN_END_M),
+        )
     return (
         Antenna("far", far, times(rngs[0], _FAR_HZ), min_range_m=_FAR_BEGIN_M),
         Antenna("near", near, times(rngs[1], _NEAR_HZ), max_range_m=_NEAR_END_M),

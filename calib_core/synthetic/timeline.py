@@ -101,6 +101,7 @@ def draw_times(
     transfer_s: float,
     start_ns: int,
     islands: Islands | None = None,
+    first_s: float | None = None,
 ) -> SensorTimes:
     """Draw one sensor's times.
 
@@ -114,9 +115,10 @@ def draw_times(
         transfer_s: mean delay from the stamp to the recorder [s].
         start_ns: the recording's start.
         islands: what of the story is recorded; None for all of it.
+        first_s: time of the first measurement [s]; None draws it.
     """
-    first_s = rng.uniform(0.05, 0.05 + 1.0 / rate_hz)
-    moments = np.arange(first_s, duration_s, 1.0 / rate_hz)
+    drawn_s = rng.uniform(0.05, 0.05 + 1.0 / rate_hz)
+    moments = np.arange(drawn_s if first_s is None else first_s, duration_s, 1.0 / rate_hz)
     jitter = np.clip(jitter_s * rng.standard_normal(len(moments)), -0.3 / rate_hz, 0.3 / rate_hz)
     moments = (moments + jitter)[rng.uniform(size=len(moments)) >= dropped_share]
     if islands is None:

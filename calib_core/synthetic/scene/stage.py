@@ -25,7 +25,7 @@ from calib_core.synthetic.timeline import Islands, SensorTimes, draw_islands, dr
 
 if TYPE_CHECKING:  # boards need what calibrates a lens, which is slow to import
     from calib_core.synthetic.scene.board_waving import BoardWaving
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from calib_core.arrays import Vector2, frozen_array
 from calib_core.synthetic.scene.person import PersonState, capsules
@@ -35,6 +35,7 @@ from calib_core.synthetic.scene.traffic import VehicleState, hidden_by
 _BEFORE_BOARD_M = 0.02
 """How far in front of the board's surface the apex is; the reflector's edges reach no farther back."""
 _TRIPOD_M = 1.4
+_WIDEST_RAD, _MOST_DIRECTIONS = np.deg2rad(31.0), 60  # drawn for a further reflector of a scene
 _RIM_SHARE = 0.03
 """Share of the image's width at its border where no reflector is put, so that all of it is visible."""
 
@@ -176,6 +177,7 @@ def _story(positions_m: Points3, scene: Scene, options: SimulationOptions) -> St
             reflectors=options.reflectors,
             leaves=options.person_leaves,
             waving_s=options.waved_board.duration_s,
+            together=1 if options.reflectors_apart_m is None else options.reflectors,
         )
     else:
         story = Story((), options.traffic.duration_s, (), np.zeros(0))
@@ -237,25 +239,55 @@ def _positions(rng: np.random.Generator, scene: Scene, added: Scene, rig: Rig, o
     """Draw apex positions in the world, clear of the solids."""
     if not options.placements:
         return _board_places(rng, scene, rig, options)
-    layout = _layout(scene, options)
     rigs = [one for one in (rig, _other_rig(rig, options)) if one is not None]
+    room = _Room(scene, added, rigs, _layout(scene, options), options)
     world_from_radar = rig.radar_from_world.inverse()
-    found: list[np.ndarray] = []
+    found: list[Vector3] = []
     for _ in range(400):
-        batch = world_from_radar @ draw_positions(rng, count=min(options.placements, 8), rig=rig, layout=layout)
-        whole = in_sight(added, batch)
-        for one in rigs:
-            seen_px = one.camera.project(one.camera_from_world @ batch)
-            whole &= one.camera.in_image(seen_px, margin_px=-_RIM_SHARE * options.width_px)
-        if scene.board is not None:
-            whole &= ~scene.board.hides(batch)
-        for position in batch[whole]:
-            apart = all(np.linalg.norm(position[:2] - other[:2]) >= layout.separation_m for other in found)
-            if apart and scene.free(position[:2], 0.7) and len(found) < options.placements:
-                found.append(position)
+        drawn = draw_positions(rng, count=min(options.placements, 8), rig=rig, layout=room.layout)
+        for position in room.that_fit(world_from_radar @ drawn, found):
+            if len(found) < options.placements:
+                found += room.scene_at(rng, position, found)[: options.placements - len(found)]
         if len(found) == options.placements:
             return np.concatenate([np.array(found), _board_places(rng, scene, rig, options)])
     raise OptionError(f"only {len(found)} of {options.placements} placements fit in the {scene.name}; ask for fewer")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Room:
+    """Where reflectors may stand: in the scene as it is and with what was added to it, seen from all rigs."""
+
+    scene: Scene
+    added: Scene
+    rigs: Sequence[Rig]
+    layout: PairsLayout
+    options: SimulationOptions
+
+    def that_fit(self, batch: Points3, taken: Sequence[Vector3]) -> Iterator[Vector3]:
+        """Yield those of some positions (n, 3) that all cameras see, clear of the solids and of what is taken by then."""
+        whole = in_sight(self.added, batch)
+        for one in self.rigs:
+            seen_px = one.camera.project(one.camera_from_world @ batch)
+            whole &= one.camera.in_image(seen_px, margin_px=-_RIM_SHARE * self.options.width_px)
+        if self.scene.board is not None:
+            whole &= ~self.scene.board.hides(batch)
+        for position in batch[whole]:
+            apart = all(np.linalg.norm(position[:2] - other[:2]) >= self.layout.separation_m for other in taken)
+            if apart and self.scene.free(position[:2], 0.7):
+                yield position
+
+    def scene_at(self, rng: np.random.Generator, first: Vector3, taken: Sequence[Vector3]) -> list[Vector3]:
+        """Draw where the other reflectors of a scene stand, each farther away than the first; nothing if one does not fit."""
+        places, apart_m = [first], self.options.reflectors_apart_m
+        if apart_m is None:
+            return places
+        for number in range(1, self.options.reflectors):
+            range_m = float(np.linalg.norm(first[:2])) + number * apart_m
+            azimuths_rad = rng.uniform(-_WIDEST_RAD, _WIDEST_RAD, _MOST_DIRECTIONS)
+            ground_m = range_m * np.stack([np.cos(azimuths_rad), np.sin(azimuths_rad)], axis=1)
+            batch = np.column_stack([ground_m, np.full(_MOST_DIRECTIONS, first[2])])
+            places += list(self.that_fit(batch, [*taken, *places]))[:1]
+        return places if len(places) == self.options.reflectors else []
 
 
 def _layout(scene: Scene, options: SimulationOptions) -> PairsLayout:

@@ -264,13 +264,13 @@ def _person(leg: Leg, before: Leg, time_s: float) -> PersonState:
     )
 
 
-def _in_order(positions: np.ndarray, start_m: Vector2) -> list[int]:
-    """Return a short walk through all positions: always to the nearest one left."""
-    left, here, order = set(range(len(positions))), start_m, []
+def _in_order(positions: np.ndarray, start_m: Vector2, together: int) -> list[int]:
+    """Return a short walk through all positions, so many together at a time: always to the nearest ones left."""
+    left, here, order = set(range(0, len(positions), together)), start_m, list[int]()
     while left:
         nearest = min(left, key=lambda i: (float(np.linalg.norm(positions[i, :2] - here)), i))
-        order.append(nearest)
-        here = positions[nearest, :2]
+        order += range(nearest, min(nearest + together, len(positions)))
+        here = positions[order[-1], :2]
         left.remove(nearest)
     return order
 
@@ -285,6 +285,7 @@ def tell_story(
     reflectors: int = 1,
     leaves: bool = False,
     waving_s: float = 0.0,
+    together: int = 1,
 ) -> Story:
     """Let a person carry the reflector to each position, always to the nearest one next.
 
@@ -297,12 +298,13 @@ def tell_story(
         reflectors: how many, carried in turn; the last ones stay until the end.
         leaves: the person walks behind the sensors for that time instead of stepping aside.
         waving_s: how long the person waves a board before that; the reflector is fetched from behind the sensors then.
+        together: how many positions that follow each other are visited without another in between.
     """
     script = _waved_script(waving_s) if waving_s else Script(np.array(start_m))
     lead_s = script.time_s
     restings: list[Resting] = []
     stands: list[Vector2] = []
-    for index, chosen in enumerate(_in_order(positions_m, script.place_m)):
+    for index, chosen in enumerate(_in_order(positions_m, script.place_m, together)):
         position = positions_m[chosen]
         away = position[:2] / np.linalg.norm(position[:2])
         stands.append(position[:2] + _BEHIND_M * away)

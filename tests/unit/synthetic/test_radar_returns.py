@@ -187,6 +187,15 @@ def test_returns_scatter_from_scan_to_scan_as_asked() -> None:
     assert np.median(spreads, axis=0) == pytest.approx([0.15, np.deg2rad(1.5), np.deg2rad(3.0)], rel=0.25)
 
 
+def test_near_and_far_scans_may_follow_each_other_in_turn() -> None:
+    defects = RadarDefects(near_and_far=True, in_turn=True)
+    far, near = simulate_scans(replace(QUIET, dropped_share=0.0, placements=2, defects=defects)).stage.antennas
+    times = np.concatenate([far.times.header_ns, near.times.header_ns])
+    order = np.argsort(times)
+    assert (np.diff(order < len(far.times)) != 0).all()
+    assert np.diff(times[order]).min() > 0.3 * np.median(np.diff(far.times.header_ns))
+
+
 def test_near_and_far_scans_come_in_two_topics_at_their_own_rates_and_overlap() -> None:
     near_and_far = replace(QUIET, clutter="scene", dropped_share=0.0, defects=RadarDefects(near_and_far=True))
     messages = list(radar_messages(simulate(replace(near_and_far, placements=3)), 1))

@@ -48,6 +48,14 @@ def test_two_reflectors_stand_at_once_and_are_moved_in_turn() -> None:
     assert min(_seen(_window(session, placement), placement.position_radar_m) for placement in placements) > 0.7
 
 
+def test_the_further_reflector_of_each_scene_stands_as_much_farther_away_as_asked_for() -> None:
+    session = simulate_scans(replace(QUIET, placements=6, reflectors=2, reflectors_apart_m=0.7))
+    places_m = np.array([resting.position_m[:2] for resting in session.stage.story.restings])
+    ranges_m = np.linalg.norm(places_m, axis=1)
+    assert ranges_m[1::2] - ranges_m[::2] == pytest.approx(np.full(3, 0.7))
+    assert np.linalg.norm(places_m[1::2] - places_m[::2], axis=1).min() >= session.stage.scene.layout.separation_m
+
+
 def test_the_clicks_of_two_reflectors_name_both_in_one_dwell_but_in_different_frames() -> None:
     session = simulate_scans(replace(QUIET, reflectors=2))
     times = [int(click.image_time) for click in session.clicks]
