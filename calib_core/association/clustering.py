@@ -18,7 +18,7 @@ from functools import lru_cache
 import numpy as np
 
 from calib_core.arrays import Flags, Points3, Values, Vector3, frozen_array
-from calib_core.association.alternatives import cluster_alternatives
+from calib_core.association.alternatives import cluster_alternatives, first_rows, return_keys
 from calib_core.measurements import NS_PER_S, Candidate, RadarScans, TimeNs
 from calib_core.options import LocatingOptions, NoiseOptions
 from calib_core.radar import covariance_from_sigma_polar, direction_cosines, sigma_polar_of
@@ -54,6 +54,7 @@ class Cluster:
         persistence: share of the window's scans they lie in, 0 to 1.
         alternative_of: clusters of one window with equal numbers hold alternative positions of the same returns; -1 has no
             alternative.
+        listed_first: share of the members that the radar lists first among their alternatives.
     """
 
     centre: Vector3
@@ -66,6 +67,7 @@ class Cluster:
     scans: int
     persistence: float
     alternative_of: int = -1
+    listed_first: float = 1.0
 
     def __post_init__(self) -> None:
         for name in ("centre", "scatter", "message_sigma"):
@@ -222,6 +224,7 @@ def _cluster(window: RadarScans, steps: Points3, amplitude: Values, members: Fla
         returns=int(members.sum()),
         scans=scans,
         persistence=scans / len(window),
+        listed_first=1.0 if window.alternative_of is None else float(first_rows(return_keys(window))[members].mean()),
     )
 
 

@@ -1,24 +1,27 @@
-"""Exclusive returns: two clicks of one moment mark two reflectors, so they cannot both be the same radar return.
+"""Exclusive returns: two clicks of one scene mark two reflectors, so they cannot both be the same radar return.
 
-Clicks of one placement are one pair before this (`placement_groups`); what remains in one moment are different pixels.
+Clicks of one placement are one pair before this (`placement_groups`); what remains in one scene are different pixels. A scene
+lasts as long as its reflectors stand: a return that the radar shows at one place in the windows of two clicks is one return.
 """
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from calib_core.arrays import Indices, Values
+from calib_core.arrays import Flags, Indices, Values
 from calib_core.association.clustering import CLUSTER_SCALE
 from calib_core.measurements import NS_PER_S, Pair
 from calib_core.radar import direction_cosines
 
 _SAME_RETURN = 1.0  # steps between the positions of one return in two windows that overlap
+_SAME_STANDING = 0.5  # the same in windows that do not overlap
+_SCENE_WINDOWS = 4.0  # windows between two clicks of one scene
 _SHARED_COST = 1e9  # of a return taken twice, where a pair has nothing else
-_MOST_EXACT = 4  # pairs in one moment; of more, the cheapest choose first
+_MOST_EXACT = 4  # pairs in one scene; of more, the cheapest choose first
 
 
 def shared_returns(pairs: Sequence[Pair], *, window_s: float) -> Indices:
-    """Label the candidates of all pairs (m,): equal labels are one return in one moment; -1 is shared with no other pair.
+    """Label the candidates of all pairs (m,): equal labels are one return in one scene; -1 is shared with no other pair.
 
     The alternatives of a shared return are that return too.
 
@@ -27,46 +30,72 @@ def shared_returns(pairs: Sequence[Pair], *, window_s: float) -> Indices:
         window_s: images closer in time than this show the same moment to the radar [s].
     """
     owner = np.repeat(np.arange(len(pairs)), [len(pair.candidates) for pair in pairs])
-    labels = np.full(len(owner), -1, dtype=np.int64)
-    timed = [i for i, pair in enumerate(pairs) if pair.image_time is not None]
-    timed.sort(key=lambda i: (pairs[i].image_time, i))
-    first = np.searchsorted(owner, np.arange(len(pairs) + 1))
-    for place, i in enumerate(timed):
-        for j in timed[place + 1 :]:
-            if (pairs[j].image_time or 0) - (pairs[i].image_time or 0) > window_s * NS_PER_S:
-                break
-            _label_common(labels, pairs, first, i, j)
-    _label_alternatives(labels, pairs, owner)
-    return labels
-
-
-def _label_common(labels: Indices, pairs: Sequence[Pair], first: Indices, i: int, j: int) -> None:
-    """Give the candidates that two pairs have in common the same label."""
-    mine, theirs = (
-        direction_cosines(np.array([one.position_radar_m for one in pairs[k].candidates])) / CLUSTER_SCALE
-        for k in (i, j)
-    )
-    squared = ((mine[:, None] - theirs) ** 2).sum(axis=2)
-    nearest = squared.argmin(axis=1)
-    for a, b in enumerate(nearest.tolist()):
-        if squared[a, b] > _SAME_RETURN**2 or int(squared[:, b].argmin()) != a:
-            continue
-        row, other = int(first[i]) + a, int(first[j]) + b
-        known = [int(label) for label in (labels[row], labels[other]) if label >= 0]
-        label = min(known) if known else int(labels.max()) + 1
-        for old in known:
-            labels[labels == old] = label
-        labels[[row, other]] = label
-
-
-def _label_alternatives(labels: Indices, pairs: Sequence[Pair], owner: Indices) -> None:
-    """Give the alternatives of each labelled candidate its label."""
+    rows, others = _common(pairs, owner, window_s)
+    if not len(rows):
+        return np.full(len(owner), -1, dtype=np.int64)
     of = np.array([one.alternative_of for pair in pairs for one in pair.candidates], dtype=np.int64)
-    for row in np.flatnonzero((labels >= 0) & (of >= 0)).tolist():
-        same = (owner == owner[row]) & (of == of[row])
-        for old in set(labels[same].tolist()) - {-1, int(labels[row])}:
-            labels[labels == old] = labels[row]
-        labels[same] = labels[row]
+    alternatives = np.flatnonzero(of >= 0)
+    _, firsts, sets = np.unique(
+        np.stack([owner[alternatives], of[alternatives]], axis=1), axis=0, return_index=True, return_inverse=True
+    )
+    linked = np.concatenate([rows, alternatives]), np.concatenate([others, alternatives[firsts[sets.reshape(-1)]]])
+    roots = _joined(len(owner), *linked)
+    return np.where(np.isin(roots, roots[rows]), roots, -1)
+
+
+def _common(pairs: Sequence[Pair], owner: Indices, window_s: float) -> tuple[Indices, Indices]:
+    """Return the candidate rows (k,) and (k,) that two pairs of one scene have in common: each other's nearest."""
+    times = np.array([pair.image_time or 0 for pair in pairs], dtype=np.int64)[owner]
+    timed = np.flatnonzero(np.array([pair.image_time is not None for pair in pairs], dtype=np.bool_)[owner])
+    places = direction_cosines(
+        np.array([one.position_radar_m for pair in pairs for one in pair.candidates]).reshape(-1, 3)
+    )
+    steps = places / CLUSTER_SCALE
+    order = timed[np.argsort(steps[timed, 0], kind="stable")]
+    found = [np.zeros((0, 2), dtype=np.int64)]
+    for step in range(1, len(order)):
+        low, high = order[:-step], order[step:]
+        near = steps[high, 0] - steps[low, 0] <= _SAME_RETURN
+        if not near.any():
+            break
+        apart_s = np.abs(times[high] - times[low]) / NS_PER_S
+        near &= (owner[low] != owner[high]) & (apart_s <= _SCENE_WINDOWS * window_s)
+        found.append(np.stack([low[near], high[near]], axis=1))
+    rows, others = np.concatenate(found).T
+    away = ((steps[rows] - steps[others]) ** 2).sum(axis=1)
+    within = np.where(np.abs(times[rows] - times[others]) / NS_PER_S <= window_s, _SAME_RETURN, _SAME_STANDING)
+    rows, others, away = (column[away <= within**2] for column in (rows, others, away))
+    mutual = _nearest(rows, owner[others], away) & _nearest(others, owner[rows], away)
+    return rows[mutual], others[mutual]
+
+
+def _nearest(rows: Indices, owners: Indices, away: Values) -> Flags:
+    """Return which entries (k,) are the nearest of their row in the pair that owns the other one."""
+    order = np.lexsort((away, owners, rows))
+    first = np.ones(len(rows), dtype=np.bool_)
+    first[1:] = (np.diff(rows[order]) != 0) | (np.diff(owners[order]) != 0)
+    nearest = np.zeros(len(rows), dtype=np.bool_)
+    nearest[order[first]] = True
+    return nearest
+
+
+def _joined(count: int, rows: Indices, others: Indices) -> Indices:
+    """Return the smallest row (count,) that each is linked to, directly or through others."""
+    roots = np.arange(count)
+    while True:
+        lower = roots.copy()
+        np.minimum.at(lower, rows, roots[others])
+        np.minimum.at(lower, others, roots[rows])
+        lower = lower[lower]
+        if (lower == roots).all():
+            return roots
+        roots = lower
+
+
+def taken_twice(labels: Indices) -> Flags:
+    """Return in which rows of labels (..., n), one per pair, a return is taken twice."""
+    ordered = np.sort(labels, axis=-1)
+    return np.asarray(((ordered[..., 1:] == ordered[..., :-1]) & (ordered[..., 1:] >= 0)).any(axis=-1))
 
 
 def exclusive_rows(cost: Values, first: Indices, labels: Indices) -> Indices:

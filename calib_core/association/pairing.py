@@ -413,18 +413,21 @@ def balanced_pairs(pairs: Sequence[Pair]) -> tuple[Pair, ...]:
 
 
 def _balanced(candidates: tuple[Candidate, ...], near: int, far: int) -> tuple[Candidate, ...]:
-    """Divide the scores of two candidates between them; the alternatives of each share what it gets."""
+    """Divide the scores of two candidates between them; the alternatives of each share what it gets as before."""
     alternatives = alternative_rows([one.alternative_of for one in candidates])
     both = sum(candidates[k].score for k in {*alternatives[near].tolist(), *alternatives[far].tolist()})
     scores: dict[int, float] = {}
     for k, share in ((far, 1.0 / (1.0 + _NEARER)), (near, _NEARER / (1.0 + _NEARER))):
-        scores |= dict.fromkeys(alternatives[k].tolist(), both * share / len(alternatives[k]))
+        rows = alternatives[k].tolist()
+        own = sum(candidates[row].score for row in rows)
+        scores |= {row: both * share * candidates[row].score / own for row in rows}
     balanced = [replace(one, score=scores.get(k, one.score)) for k, one in enumerate(candidates)]
     return tuple(sorted(balanced, key=lambda one: -one.score))
 
 
 _SAME_PLACE = 1.5  # steps within which a cluster of another window is the same object
 _FLOOR = 1e-6
+_LISTED_FIRST = 3.0  # how much likelier the position that the radar lists first is than another of the same return
 _PSEUDO_EMPTY = 0.5  # windows, so that a few windows that all show a place do not rule it out
 _MOST_BACKGROUND = 16
 _LEAST_SCANS = 2
@@ -464,7 +467,8 @@ def scores_of(
     """Score every cluster of every window: amplitude x persistence x novelty, (k,) per window, each summing to 1.
 
     Novelty is the share of the other windows in which the place is empty. Windows that overlap show the same placement and
-    are not compared. What has alternatives was there before only if all of them were, and they share its score.
+    are not compared. What has alternatives was there before only if all of them were, and they share its score, of which the
+    one that the radar lists first gets most.
 
     Args:
         windows: those of the clicks.
@@ -484,7 +488,8 @@ def scores_of(
         plain = np.array([cluster.amplitude * cluster.persistence**2 for cluster in own])
         alternatives = alternative_rows([cluster.alternative_of for cluster in own])
         score = plain * _novelty(places[first[i] : first[i + 1]], places, persistence, first, others, alternatives)
-        score /= np.array([len(rows) for rows in alternatives])
+        likely = np.array([1.0 + (_LISTED_FIRST - 1.0) * cluster.listed_first for cluster in own])
+        score *= likely / np.array([likely[rows].sum() for rows in alternatives])
         scores.append(score / score.sum() if len(score) else score)
     return tuple(scores)
 

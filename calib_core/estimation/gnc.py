@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.arrays import Indices, Values
-from calib_core.association.exclusive_returns import exclusive_rows
+from calib_core.association.exclusive_returns import exclusive_rows, taken_twice
 from calib_core.estimation.measurement_model import Linearization, MeasurementPlanes, PairMeasurements
 from calib_core.geometry import RigidTransform, rotation_exp
 
@@ -134,19 +134,13 @@ def _associated(
     if measurements.one_to_one:
         return np.arange(count), model
     cost = model.squared + model.log_determinant - 2.0 * measurements.log_score
-    if (measurements.returns >= 0).any():
-        rows = _exclusive(cost, measurements)
-        return rows, model.rows(rows)
     first = measurements.first[:-1]
     cheapest = np.minimum.reduceat(cost, first, axis=-1)[..., measurements.owner] == cost
     rows = np.minimum.reduceat(np.where(cheapest, np.arange(count), count), first, axis=-1)  # of equals, the first
+    twice = taken_twice(measurements.returns[rows])
+    if twice.any():
+        rows[twice] = [exclusive_rows(one, measurements.first, measurements.returns) for one in cost[twice]]
     return rows, model.rows(rows)
-
-
-def _exclusive(cost: np.ndarray, measurements: PairMeasurements) -> np.ndarray:
-    """Choose rows (..., n) for costs (..., m), no return twice in one moment."""
-    each = [exclusive_rows(one, measurements.first, measurements.returns) for one in cost.reshape(-1, cost.shape[-1])]
-    return np.array(each).reshape(*cost.shape[:-1], -1)
 
 
 def normal_equations(

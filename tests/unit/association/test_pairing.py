@@ -374,6 +374,14 @@ def test_other_moments_and_pairs_without_a_time_share_nothing() -> None:
     assert shared_returns(pairs, window_s=3.0).tolist() == [-1] * 4
 
 
+def test_a_return_that_stands_in_one_place_is_shared_for_as_long_as_a_scene_lasts() -> None:
+    moved = (6.02, 1.5, -1.0)
+    pairs = [pair("a", 0.0, LEFT, RIGHT), pair("b", 8.0, CART, moved), pair("c", 16.0, (6.1, 1.5, -1.0))]
+    labels = shared_returns(pairs, window_s=3.0)
+    assert labels[0] == labels[3] >= 0
+    assert labels[[1, 2, 4]].tolist() == [-1, -1, -1]  # the last one is as far away as another placement would be
+
+
 def test_two_clicks_that_want_one_return_get_the_cheapest_assignment() -> None:
     pairs = [pair("a", 0.0, LEFT, RIGHT), pair("b", 0.2, LEFT, RIGHT)]
     labels = shared_returns(pairs, window_s=3.0)
