@@ -24,7 +24,7 @@ from calib_core.interchange.formats.registry import GROUP, plugin_formats
 from cocalib.cli import run
 from cocalib.web.channel.export_preview import export_preview
 from cocalib.web.exports import format_rows
-from tests.fake_distribution import install
+from tests.fake_distribution import installing
 
 PARAMETERS = '''
     """A YAML of parameters, as `ros2 param dump` writes one."""
@@ -84,18 +84,8 @@ Install = Callable[..., Path]
 
 @pytest.fixture
 def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
-    """Return what installs a package that adds a format; undone after the test."""
-    folder = tmp_path / "site-packages"
-    folder.mkdir()
-    monkeypatch.syspath_prepend(folder)
-    plugin_formats.cache_clear()
-
-    def add(module: str = PARAMETERS, value: str = "PARAMETERS") -> Path:
-        return install(folder, "acme-params", module, GROUP, value)
-
-    yield add
-    plugin_formats.cache_clear()
-    sys.modules.pop("acme_params", None)
+    source = (PARAMETERS, "PARAMETERS")
+    yield from installing(tmp_path / "site-packages", monkeypatch, "acme-params", GROUP, plugin_formats, *source)
 
 
 def only_line(caplog: pytest.LogCaptureFixture) -> str:

@@ -4,7 +4,6 @@ import contextlib
 import random
 import runpy
 import sqlite3
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,7 @@ from calib_core.recordings.radar.column_plan import parse_radar_axes
 from calib_core.recordings.radar.layouts import recognise
 from calib_core.recordings.radar.registry import DECODERS, GROUP, Decoder, all_decoders
 from calib_core.recordings.topics import join_topics
-from tests.fake_distribution import install
+from tests.fake_distribution import installing
 from tests.unit.recordings.radar.radar_samples import CLOUDS, OTHERS, START_NS, sample
 
 NAMES = [decoder.name for decoder in DECODERS]
@@ -291,18 +290,7 @@ Install = Callable[..., Path]
 
 @pytest.fixture
 def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
-    """Return what installs a package that adds a layout; afterwards it is as if it had never been there."""
-    folder = tmp_path / "site-packages"
-    folder.mkdir()
-    monkeypatch.syspath_prepend(folder)
-    all_decoders.cache_clear()
-
-    def add(module: str = ACME, value: str = "ACME") -> Path:
-        return install(folder, "acme-radar", module, GROUP, value)
-
-    yield add
-    all_decoders.cache_clear()
-    sys.modules.pop("acme_radar", None)
+    yield from installing(tmp_path / "site-packages", monkeypatch, "acme-radar", GROUP, all_decoders, ACME, "ACME")
 
 
 def test_a_layout_of_an_installed_package_decodes_its_messages(installed: Install, ros2: Any, write: Any) -> None:
