@@ -42,6 +42,7 @@ class PictureRecording:
     column_map: tuple[str, ...] = ()
     radar_columns: tuple[Any, ...] = ()
     radar_notes: tuple[str, ...] = ()
+    image_names: tuple[str, ...] = ()
     radar_frame: str = "radar"
     camera_frame: str = "camera_optical"
     topics: tuple[Any, ...] = ()

@@ -1,6 +1,7 @@
 """Small recordings, either good or wrong in exactly one way."""
 
 import json
+import shutil
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -142,14 +143,33 @@ def cocalib(capsys: pytest.CaptureFixture[str]) -> Callable[..., Typed]:
     return typed
 
 
+@pytest.fixture(scope="session")
+def solved_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with a recording, its clicks, and the calibration that they give; tests get copies."""
+    folder = tmp_path_factory.mktemp("solved")
+    recording, clicks = write_ros2(folder / "made.mcap", Made().messages(), container="mcap"), folder / "clicks.json"
+    clicks.write_text(Made().clicks())
+    assert run(["solve", str(recording), "--clicks", str(clicks), "--out", str(folder / "calibration.json")]) == 0
+    return folder
+
+
 @pytest.fixture
-def made(tmp_path: Path) -> Callable[..., Path]:
+def made(tmp_path: Path, solved_folder: Path) -> Callable[..., Path]:
     """Return a function that writes a recording with the given changes and returns its path."""
 
     def write(name: str = "made", **changes: object) -> Path:
+        if name == "made" and not changes:
+            return shutil.copytree(solved_folder / "made.mcap", tmp_path / "made.mcap") / "made.mcap.mcap"
         return write_ros2(tmp_path / f"{name}.mcap", replace(Made(), **changes).messages(), container="mcap")  # type: ignore[arg-type]
 
     return write
+
+
+@pytest.fixture
+def solved(made: Callable[..., Path], solved_folder: Path, clicks_file: Path) -> Path:
+    """Return the calibration solved from a recording, which is beside it as made.mcap, and its clicks."""
+    made()
+    return Path(shutil.copyfile(solved_folder / "calibration.json", clicks_file.with_name("calibration.json")))
 
 
 @pytest.fixture

@@ -14,15 +14,6 @@ Cocalib = Callable[..., Any]
 
 
 @pytest.fixture
-def solved(cocalib: Cocalib, made: Callable[..., Path], clicks_file: Path, tmp_path: Path) -> Path:
-    """Return a calibration solved from a recording, which is beside it as made.mcap."""
-    out = tmp_path / "calibration.json"
-    answer = cocalib("solve", made(), "--clicks", clicks_file, "--out", out)
-    assert answer.code == 0, answer.err
-    return out
-
-
-@pytest.fixture
 def moved(solved: Path, tmp_path: Path) -> Path:
     """Return the pose turned by 5 degrees, as a bare matrix."""
     content = json.loads(solved.read_text())["camera_from_radar"]

@@ -27,12 +27,8 @@ Cocalib = Callable[..., Any]
 
 
 @pytest.fixture
-def calibration(cocalib: Cocalib, made: Callable[..., Path], clicks_file: Path, tmp_path: Path) -> Path:
-    """Return a calibration solved from a recording made for the test."""
-    out = tmp_path / "calibration.json"
-    answer = cocalib("solve", made(), "--clicks", clicks_file, "--out", out)
-    assert answer.code == 0, answer.err
-    return out
+def calibration(solved: Path) -> Path:
+    return solved
 
 
 def test_solve_finds_the_pose_the_recording_was_made_with(calibration: Path) -> None:

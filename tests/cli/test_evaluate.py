@@ -63,13 +63,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory, scene: Street) -> Path:
     return place
 
 
-@pytest.fixture
-def solved(cocalib: Cocalib, made: Callable[..., Path], clicks_file: Path, tmp_path: Path) -> Path:
-    out = tmp_path / "calibration.json"
-    assert cocalib("solve", made(), "--clicks", clicks_file, "--out", out).code == 0
-    return out
-
-
 def test_residuals_come_first_and_say_what_they_rest_on(cocalib: Cocalib, solved: Path) -> None:
     recording = solved.parent / "made.mcap"
     answer = cocalib("evaluate", solved, recording)

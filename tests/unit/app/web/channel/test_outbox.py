@@ -37,27 +37,6 @@ def test_an_item_that_comes_between_the_end_of_the_last_one_and_its_callback_is_
     assert asyncio.run(run()) == [1, 2]
 
 
-def test_of_items_that_come_meanwhile_only_the_newest_is_processed() -> None:
-    async def run() -> list[int]:
-        done: list[int] = []
-        proceed = asyncio.Event()
-
-        async def work(item: int) -> None:
-            await proceed.wait()
-            done.append(item)
-
-        worker = NewestWins(work)
-        for item in range(5):
-            worker.give(item)
-            await asyncio.sleep(0)
-        proceed.set()
-        for _ in range(10):
-            await asyncio.sleep(0)
-        return done
-
-    assert asyncio.run(run()) == [0, 4]
-
-
 FACTS = RecordingFacts("drive", 1_700_000_000_000_000_000 + 100_000_000 * np.arange(10_000), 640, 480)
 NOTHING = view(History(), FACTS)
 
