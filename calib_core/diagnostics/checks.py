@@ -72,8 +72,7 @@ def _wrong_lens(fit: SolvedFit) -> list[DataWarning]:
 
 
 def _systematic_errors(fit: SolvedFit) -> list[DataWarning]:
-    errors, prior = fit.uncertainty.systematic_errors, fit.measurements.prior
-    return systematic_error_warnings(errors, flat=fit.measurements.flat, measured=prior.measured)
+    return systematic_error_warnings(fit.uncertainty.systematic_errors, flat=fit.measurements.flat)
 
 
 def _flat_radar(fit: SolvedFit) -> list[DataWarning]:

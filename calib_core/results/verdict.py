@@ -323,6 +323,7 @@ _CODES: dict[Consequence, tuple[str, ...]] = {
         "smooth-angle-errors",
         "angle-scale",
         "lens-or-radar-scale",
+        "clicks-off-centre",
         "handedness-assumed",
         "nobody-confirmed",
     ),

@@ -15,7 +15,7 @@ const COLOURS = ["#56b4e9", "#e69f00", "#41c99a", "#f0e442", "#d78fbf", "#ff8a5c
 const HANDLE = 4;
 
 export const boxing = {
-  /** Whether boxes are drawn instead of clicks placed: while the tab "Evaluate" is open. */ on: false,
+  /** Whether boxes are drawn instead of clicks placed: while Evaluate is open. */ on: false,
   /** The selected object. @type {string|null} */ selected: null,
   /** The class of the next new box. */ label: "person",
   /** @type {import("../messages.js").FrameBoxes|null} */ frame: null,

@@ -245,6 +245,6 @@ export function goToKeyframe(direction) {
 
 /** Why the selected object's box cannot be changed in this frame; "" if it can. */
 export function withoutBox() {
-  if (!boxing.on) return "Open the tab Evaluate first (A)";
+  if (!boxing.on) return "Open Evaluate first (A)";
   return selectedTrack() ? "" : "No box is selected: click one, or draw one";
 }

@@ -1,12 +1,12 @@
 /**
- * The tab "Evaluate": while it is open, boxes are drawn on the picture; it lists them and says what they say about the calibration:
+ * The sheet "Evaluate": while it is open, boxes are drawn on the picture; it lists them and says what they say about the calibration:
  * Acc, each class, and how Acc changes when the camera is turned, which says what it can see at all.
  */
 
 import { setRectified } from "../picture/rectified.js";
 import { saveFile } from "../shell/asking.js";
 import { themeColour } from "../shell/colours.js";
-import { showTab } from "../shell/layout.js";
+import { closeSheet, showPage } from "../shell/layout.js";
 import { make, toast } from "../shell/notices.js";
 import { send, tell } from "../shell/socket.js";
 import { emit, on, state } from "../shell/state.js";
@@ -17,10 +17,7 @@ import { hideHere, newBox, removeBox, setEdge, setLabel } from "./boxing.js";
 /** @typedef {import("./boxes.js").Track} Track */
 
 const page = /** @type {HTMLElement} */ (document.getElementById("page-evaluate"));
-const count = /** @type {HTMLElement} */ (document.getElementById("box-count"));
 const SIDES = ["left", "top", "right", "bottom"];
-/** The tab to go back to. */
-let before = "tab-pairs";
 const edit = make("section", "box-edit", []);
 const body = make("tbody", "", []);
 const table = make("table", "pairs boxes", [make("thead", "", [make("tr", "", ["Object", "Frames", "Boxes", "Keyframes"].map((name) => make("th", "", name)))]), body]);
@@ -33,7 +30,6 @@ const hide = make("button", "second", "Hidden here");
 const remove = make("button", "second", "Delete");
 const add = make("button", "second", "New box");
 const edgeRow = make("div", "edges", [make("span", "", "Edges"), ...edges, make("span", "unit", "px")]);
-const large = make("button", "second", "⤢");
 const files = make("div", "box-files", []);
 const stop = make("button", "second", "Stop following");
 const save = make("button", "second", "Download boxes");
@@ -52,19 +48,10 @@ export function startEvaluating() {
   follow();
 }
 
-/** Open the tab, or go back to the one before. */
-export function toggleEvaluate() {
-  if (page.hidden) before = document.querySelector('#tabs [aria-selected="true"]')?.id ?? before;
-  showTab(page.hidden ? "tab-evaluate" : before);
-}
+/** Open the sheet, or close it. */
+export const toggleEvaluate = () => (page.hidden ? showPage("evaluate") : closeSheet());
 
-/** Give the tab the whole column, or the 3D view its place back. */
-function enlarge() {
-  document.body.classList.toggle("review-large");
-  emit("box");
-}
-
-/** Boxes take the pointer while the tab is open. */
+/** Boxes take the pointer while the sheet is open. */
 function follow() {
   const open = !page.hidden && !state.looking;
   if (open === boxing.on) return;
@@ -92,23 +79,20 @@ function buildEdit() {
   hide.dataset.hint = "The object is hidden, or out of the picture, from this frame on. (H)";
   remove.dataset.hint = "Delete all boxes of this object. (Del)";
   add.dataset.hint = "A new box in the middle of the picture, for those who do not drag. (Enter)";
-  large.dataset.hint = "Give this tab the whole column, or the 3D view its place back.";
-  large.setAttribute("aria-label", "Enlarge");
-  large.onclick = enlarge;
   hide.onclick = hideHere;
   remove.onclick = removeBox;
   add.onclick = newBox;
   edit.append(
     make("label", "", ["Class", label, labels]),
     edgeRow,
-    make("div", "acts", [add, hide, remove, large]),
+    make("div", "acts", [add, hide, remove]),
   );
 }
 
 /** Boxes from and to files. */
 function buildFiles() {
   const load = make("button", "second", "Load boxes…");
-  load.dataset.hint = "Boxes of a labelling tool or of a detector: boxes.json, COCO, YOLO, CVAT, KITTI, OpenLABEL… They take the place of all boxes here. Dropping the file on this tab does the same.";
+  load.dataset.hint = "Boxes of a labelling tool or of a detector: boxes.json, COCO, YOLO, CVAT, KITTI, OpenLABEL… They take the place of all boxes here. Dropping the file on this sheet does the same.";
   save.dataset.hint = "All boxes, as boxes.json: for cocalib evaluate --boxes, or to load again.";
   stop.dataset.hint = "Leave the boxes where they have been followed to so far.";
   load.onclick = chooseBoxes;
@@ -157,14 +141,13 @@ export async function downloadBoxes() {
 
 /** Put the focus into the class. */
 export function editLabel() {
-  if (page.hidden) showTab("tab-evaluate");
+  if (page.hidden) showPage("evaluate");
   label.focus();
   label.select();
 }
 
 function draw() {
   const tracks = state.view?.boxes ?? [];
-  count.textContent = tracks.length ? String(tracks.length) : "";
   if (page.hidden) return;
   drawEdit();
   drawAcc();
@@ -225,15 +208,15 @@ function pressed(event) {
   if (state.cursor < track.first || state.cursor > track.last) goTo(track.first);
 }
 
-/** What to do next with boxes, in one line on the picture. @returns {{text: (string|{key: string})[], act: boolean}|null} */
+/** What to do next with boxes, in one line on the picture. @returns {import("../pairs/guide.js").Advice} */
 export function boxAdvice() {
   const [track, box] = [selectedTrack(), selectedBox()];
-  if (!state.view?.boxes.length) return { text: ["Drag a box around someone who moves. Wheel: zoom, ", { key: "Shift" }, "+drag: pan, ", { key: "A" }, ": back to the clicks"], act: true };
+  if (!state.view?.boxes.length) return { text: ["Drag a box around someone who moves.", { key: "A", label: "back to the clicks", action: "evaluate" }], act: true };
   if (!track) return { text: ["Click a box to select it, or drag a new one"], act: false };
-  if (!box) return { text: [`${track.id} has no box in this frame: drag one to go on with it. `, { key: "Esc" }, " for another object"], act: false };
+  if (!box) return { text: [`${track.id} has no box in this frame: drag one to go on with it.`, { key: "Esc", label: "another object", action: "deselect-box" }], act: false };
   if (track.note && state.cursor === track.last) return { text: [track.note], act: true };
   if (box.kind === "between") return { text: [`${track.id} was lost before this frame: its box is drawn straight to the next keyframe. Drag it where it is off`], act: true };
-  return { text: [`${track.id}: drag to move, handles resize, `, { key: "H" }, " hidden from here on, ", { key: "." }, " next keyframe"], act: false };
+  return { text: [`${track.id}: drag to move, handles resize`, { key: "H", label: "hidden from here on", action: "hide-box" }, { key: ".", label: "next keyframe", action: "keyframe-forward" }], act: false };
 }
 
 /** @typedef {import("../messages.js").AccPanel} Panel */
@@ -244,7 +227,7 @@ const WIDE = 92;
 const HIGH = 26;
 let drawnAcc = "";
 
-/** The section of the tab. */
+/** The section of the sheet. */
 function accSection() {
   box.setAttribute("aria-label", "What the boxes say");
   on(["theme"], () => {
@@ -285,7 +268,7 @@ function parts(panel) {
     make("tbody", "", panel.sensitivity.map(angleRow)),
   ]);
   const rule = make("details", "acc-rule", [make("summary", "", "Which returns count"), make("p", "", panel.rule)]);
-  return [make("p", "acc-caution", panel.caution), figures, angles, classes, rule];
+  return [make("p", "acc-caution", panel.caution), figures, ...(panel.sensitivity.length ? [angles] : []), classes, rule];
 }
 
 /** @param {Row} row */

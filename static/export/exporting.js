@@ -28,7 +28,7 @@ const IN_REPORT = [
 const PLAIN = { [CLICKS]: "api/clicks.json", [REPORT]: "api/report.html" };
 const ASKING = "Asking the server for the file…";
 const dialog = /** @type {HTMLDialogElement} */ (document.getElementById("export-dialog"));
-const button = /** @type {HTMLButtonElement} */ (document.getElementById("export"));
+const page = /** @type {HTMLElement} */ (document.getElementById("page-deliver"));
 /** @type {Format[]} */
 let formats = [];
 /** @type {{format: string, parent: string[]}} */
@@ -62,10 +62,7 @@ export function startExporting() {
     if (event.target === dialog) dialog.close();
   });
   retry.onclick = load;
-  on(["view"], () => {
-    button.classList.toggle("ready", state.view?.has_calibration ?? false);
-    if (dialog.open) load();
-  });
+  on(["view"], () => void (dialog.open && load()));
   on(["recording"], () => {
     names.typed.clear();
     loadFormats();
@@ -85,8 +82,27 @@ async function loadFormats() {
   drawList();
 }
 
-export function openExport() {
+/** What the page Deliver offers. @type {[string, string, string, string][]} */
+const DELIVERED = [
+  ["export", "Export…", "", "The pose, for ROS, Autoware, Kalibr and others"],
+  ["report", "Report…", REPORT, "How good it is, and how one knows: one HTML file"],
+  ["clicks", "Clicks…", CLICKS, "To go on with on another machine"],
+];
+
+export function startDelivering() {
+  page.append(make("dl", "delivered", DELIVERED.flatMap(([id, label, format, about]) => {
+    const button = make("button", "second", label);
+    button.id = id;
+    button.setAttribute("aria-haspopup", "dialog");
+    button.onclick = () => openExport(format || (kept.format in PLAIN ? "json" : kept.format));
+    return [make("dt", "", [button]), make("dd", "", about)];
+  })));
+}
+
+/** @param {string} [format] the one before if none is given */
+export function openExport(format = kept.format) {
   if (dialog.open || !state.recording) return;
+  keep({ format });
   drawList();
   drawReason(ASKING);
   dialog.showModal();

@@ -1,9 +1,9 @@
 /**
- * The tab "Lens": the intrinsics in use, a form that calibrates them from a board in the recording, how far that is, and the result.
+ * The sheet "Lens": the intrinsics in use, a form that calibrates them from a board in the recording, how far that is, and the result.
  */
 
 import { toggleRectified, withoutRectified } from "../picture/rectified.js";
-import { showTab } from "../shell/layout.js";
+import { showPage } from "../shell/layout.js";
 import { make, toast } from "../shell/notices.js";
 import { send } from "../shell/socket.js";
 import { emit, on, state } from "../shell/state.js";
@@ -12,35 +12,27 @@ import { drawCoverage, drawLensResult, lensResult, parameters, saveCamera, takeL
 
 const page = /** @type {HTMLElement} */ (document.getElementById("page-lens"));
 const present = make("section", "lens-present", []);
-const large = make("button", "second", "⤢");
 const form = boardForm(start);
 let drawn = "";
-/** Whether the tab was opened by itself, since there are no intrinsics. */
+/** Whether the sheet was opened by itself, since there are no intrinsics. */
 let led = false;
 let busy = false;
-/** Whether a calibration ran since the tab last showed a result. */
+/** Whether a calibration ran since the sheet last showed a result. */
 let awaited = false;
 
 export function startLens() {
   present.setAttribute("aria-label", "Intrinsics in use");
   startLensProgress(cancelLens);
-  large.dataset.hint = "Give this tab the whole column, or the 3D view its place back.";
-  large.setAttribute("aria-label", "Enlarge");
-  large.onclick = () => {
-    document.body.classList.toggle("review-large");
-    emit("box");
-  };
   page.append(present, lensProgress, lensResult, form.element);
   on(["lens", "recording", "layers"], draw);
   on(["box", "theme"], drawPlots);
-  on(["box"], () => document.body.classList.toggle("lensing", !page.hidden));
 }
 
 /** @param {import("../messages.js").LensState} message */
 export function takeLens(message) {
   state.lens = message;
   if (state.recording) state.recording.intrinsics = message.intrinsics?.about ?? "";
-  if (!message.intrinsics && message.pictures && !led) showTab("tab-lens");
+  if (!message.intrinsics && message.pictures && !led) showPage("lens");
   led = true;
   emit("lens");
 }
@@ -107,7 +99,7 @@ function drawPresent(lens) {
     const words = lens.pictures
       ? "The lens is not known yet. Calibrate it here from a board in this recording, or drop a camera file on the page. Clicks can be placed already; the pose follows once the lens is known."
       : "There are no pictures in this recording.";
-    return present.replaceChildren(make("div", "lens-head", [make("h2", "", "No intrinsics"), large]), make("p", "lens-none", words));
+    return present.replaceChildren(make("h2", "", "No intrinsics"), make("p", "lens-none", words));
   }
   const rectify = make("button", "second", state.rectified ? "Picture as taken" : "Rectified picture");
   rectify.dataset.hint = "Straight edges must be straight in it. (U)";
@@ -121,7 +113,7 @@ function drawPresent(lens) {
   back.dataset.hint = "Go back to the intrinsics that the recording was opened with. Undo takes that back.";
   back.onclick = useGiven;
   present.replaceChildren(
-    make("div", "lens-head", [make("h2", "", "Intrinsics in use"), large]),
+    make("h2", "", "Intrinsics in use"),
     make("p", "lens-about", [make("strong", "", camera.about), ` · ${camera.model} · ${camera.size} · ${camera.field}`]),
     parameters(camera),
     make("p", "lens-note", camera.known ? "" : "How well they are known is not stated."),

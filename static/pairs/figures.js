@@ -1,9 +1,7 @@
-/** The top of the panel: the verdict in one line and what to do, the metrics; and the tab with the pose. All in the server's text. */
+/** The top of the panel: how good the answer is; and on the page Check the metrics and the pose. All in the server's text. */
 
-import { proposalAdvice } from "../proposals/words.js";
 import { make } from "../shell/notices.js";
 import { on, state } from "../shell/state.js";
-import { drawWarnings } from "./warnings.js";
 
 /** @typedef {import("../messages.js").Figure} Figure */
 const figures = /** @type {HTMLElement} */ (document.getElementById("figures"));
@@ -35,8 +33,8 @@ function draw() {
   if (!view) return;
   figures.classList.toggle("stale", view.solving && !view.checking && view.has_calibration);
   if (state.looking) {
-    figures.replaceChildren(...state.placementFigures.map(cell));
-    return drawWarnings([{ code: "no-camera", message: view.status, hint: view.hint }], state.recording?.warnings ?? [], view.assumptions, view.acknowledged);
+    document.getElementById("page-mark")?.before(figures);
+    return figures.replaceChildren(...state.placementFigures.map(cell));
   }
   figures.replaceChildren(...view.metrics.map(cell));
   poseTable.replaceChildren(...(view.pose.length ? view.pose.map(row) : [make("tr", "", [make("td", "", "Available after the first calibration.")])]));
@@ -45,8 +43,6 @@ function draw() {
   drawSystematic(view.systematic_errors);
   adviceLine.textContent = view.advice?.words ?? "";
   drawReference(view);
-  const failure = view.stage === "unsolvable" ? [{ code: "unsolvable", message: view.status, hint: view.hint }] : [];
-  drawWarnings([...failure, ...view.warnings], state.recording?.warnings ?? [], view.assumptions, view.acknowledged);
 }
 
 /** Name the file that the pose comes from, or show how far the solved pose is from the one in it. @param {import("../messages.js").View} view */
@@ -126,8 +122,11 @@ const SHAPES = {
 };
 let drawn = "";
 
+/** From so many pairs on, their distance says something. */
+const TELLING = 4;
+
 export function startVerdict() {
-  on(["view", "recording", "proposals"], drawVerdict);
+  on(["view", "recording"], drawVerdict);
 }
 
 function drawVerdict() {
@@ -135,17 +134,17 @@ function drawVerdict() {
   box.hidden = !view || state.looking;
   if (!view || state.looking) return;
   box.classList.toggle("stale", view.solving && view.has_calibration);
-  const { level, line, action, key, done } = view.verdict;
-  const proposed = key === "N" ? proposalAdvice() : "";
-  const text = JSON.stringify(view.verdict) + proposed;
+  const { level, line } = view.verdict;
+  const aed = view.metrics.find((figure) => figure.key === "aed");
+  const text = JSON.stringify([level, line, aed]);
   if (text === drawn) return;
   drawn = text;
   box.dataset.level = level;
-  box.dataset.hint = [line, proposed ? `N${proposed}` : action].filter(Boolean).join("\n");
+  box.dataset.hint = line;
   const rest = line.startsWith(level) ? line.slice(level.length) : ` ${line}`;
-  const next = make("p", done ? "next done" : "next", proposed ? [make("span", "key", key), make("span", "", proposed)] : [make("span", "", action)]);
-  if (key && !proposed) next.append(make("span", "key", key));
-  box.replaceChildren(shape(level), make("div", "words", [make("p", "line", [make("strong", "", level), rest]), next]));
+  const told = aed && view.clicks.filter((click) => click.state === "inlier").length >= TELLING ? [make("span", "aed", [make("small", "", "AED "), `${aed.value} ${aed.unit}`])] : [];
+  for (const one of told) one.dataset.hint = aed?.hint;
+  box.replaceChildren(shape(level), make("p", "line", [make("strong", "", level), rest]), ...told);
 }
 
 /** @param {VerdictRow["level"]} level */

@@ -2,17 +2,15 @@
 
 import { comeTo } from "../picture/arriving.js";
 import { toggleExcluded } from "../picture/clicking.js";
-import { proposalAdvice } from "../proposals/words.js";
 import { LARGE_PX, residualColour } from "../shell/colours.js";
 import { make } from "../shell/notices.js";
-import { clicks, on, rangeApart, select, stampKey, state } from "../shell/state.js";
+import { clicks, on, select, stampKey, state } from "../shell/state.js";
 import { candidatesOf, choose } from "./candidates.js";
-import { drawSteps } from "./steps.js";
 
 /** @typedef {import("../messages.js").ClickRow} Click */
 /** So many candidates are listed; the others are less probable. */
-const MOST_CHOICES = 8;
-const page = /** @type {HTMLElement} */ (document.getElementById("page-pairs"));
+const MOST_CHOICES = 6;
+const page = /** @type {HTMLElement} */ (document.getElementById("page-mark"));
 const count = /** @type {HTMLElement} */ (document.getElementById("pair-count"));
 /** @type {{key: "frame"|"residual_px"|"range_m", descending: boolean}} */
 const sorting = { key: "frame", descending: false };
@@ -29,7 +27,7 @@ const head = make("thead", "", []);
 const table = make("table", "pairs", [head, body]);
 /** The table's row of each click, and what it was drawn from: a row is made again only when that changes. @type {Map<string, {from: unknown[], row: HTMLElement}>} */
 const made = new Map();
-/** What else was drawn: the head of the table and the steps. */
+/** What else was drawn: the head of the table, or what to click. */
 let drawn = "";
 
 export function startPairs() {
@@ -63,26 +61,32 @@ function draw() {
   if (state.looking) return; // picture/birdseye.js shows the placements
   const rows = sorted();
   count.textContent = rows.length ? String(rows.length) : "";
-  const steps = !rows.length || !state.view?.has_calibration;
-  const used = rows.filter((click) => click.state !== "excluded" && click.state !== "untouched").length;
-  const text = JSON.stringify([sorting, rows.length > 0, steps, steps && used, steps && proposalAdvice(), state.placements.length, state.placementsKnown, state.recording === null]);
+  const text = JSON.stringify([sorting, rows.length > 0]);
   const held = document.activeElement?.matches("[data-act]") ? idOf(document.activeElement) : undefined;
   const changed = drawRows(rows);
-  if (text !== drawn) drawAround(rows.length > 0, steps);
-  else if (!changed) return drawCandidateRows();
+  if (text !== drawn) {
+    page.replaceChildren(rows.length ? table : reflector());
+    head.replaceChildren(make("tr", "", COLUMNS.map(heading)));
+  } else if (!changed) return drawCandidateRows();
   drawn = text;
   drawCandidateRows();
   if (held) /** @type {HTMLElement|null|undefined} */ (made.get(held)?.row.querySelector("[data-act]"))?.focus({ preventScroll: true });
   body.querySelector('[aria-selected="true"]')?.scrollIntoView({ block: "nearest" });
 }
 
-/** The head of the table, and the steps below it as long as there is no calibration; the table itself stays where it is. @param {boolean} some @param {boolean} steps */
-function drawAround(some, steps) {
-  if (!table.isConnected && some) page.replaceChildren(table);
-  if (!some) page.replaceChildren();
-  head.replaceChildren(make("tr", "", COLUMNS.map(heading)));
-  page.querySelector(".steps")?.remove();
-  if (steps) page.append(drawSteps());
+/** What to click, before there is a pair: a trihedral reflector with its inner corner marked. */
+function reflector() {
+  const drawing = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+  drawing.setAttribute("viewBox", "0 0 120 104");
+  drawing.setAttribute("aria-hidden", "true");
+  for (const [name, d] of [["left", "M60 4 60 62 6 98z"], ["right", "M60 4 60 62 114 98z"], ["floor", "M60 62 6 98 114 98z"], ["corner", "M60 53a9 9 0 1 0 .01 0z"]]) {
+    const part = document.createElementNS("http://www.w3.org/2000/svg", "path");
+    part.setAttribute("d", d);
+    part.setAttribute("class", name);
+    drawing.append(part);
+  }
+  const words = [make("strong", "", "Click the reflector's inner corner"), " where its three sheets meet, at each place where it stood. Eight places or more tell where the camera is, seen from the radar."];
+  return make("figure", "reflector", [drawing, make("figcaption", "", words)]);
 }
 
 /** Bring the rows up to date, one by one. @param {Click[]} rows @returns {boolean} whether any changed */
@@ -194,7 +198,7 @@ function line(click) {
   const row = make("tr", `row ${click.state}`, [
     make("td", "", [make("span", "name", [glyph(click.state, colour), click.id])]),
     make("td", "", `${(state.seconds[click.frame] ?? 0).toFixed(2)} s`),
-    make("td", rangeApart(click) ? "apart-range" : "", rangeApart(click) ? [make("span", "mark", "!"), range] : range),
+    make("td", "", range),
     make("td", "bar", [make("span", "meter", [make("i", "", [bar]), make("span", "", residual)])]),
     make("td", "", [act]),
   ]);
@@ -220,7 +224,6 @@ function explain(click) {
   if (click.projected_px) lines.push(`reprojected at ${click.projected_px.map((value) => value.toFixed(1)).join(", ")} px`);
   if (click.sigma_px !== null) lines.push(`its own standard deviation: ${click.sigma_px.toFixed(2)} px`);
   if (click.range_m !== null) lines.push(`radar: ${click.range_m.toFixed(2)} m, ${toSide(click.azimuth_deg, "left", "right")}, ${toSide(click.elevation_deg, "up", "down")}${click.chosen ? ", chosen by you" : ""}`);
-  if (rangeApart(click)) lines.push(`${rangeApart(click)}: wrong target, or the reflector was being moved. Check the frame, or exclude the pair.`);
   if (click.note) lines.push(click.note);
   return lines.join("\n");
 }

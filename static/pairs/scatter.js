@@ -46,7 +46,7 @@ function place(click, most) {
 }
 
 function draw() {
-  if (document.getElementById("page-pose")?.hidden) return; // "box" comes when the tab is shown
+  if (document.getElementById("page-check")?.hidden) return; // "box" comes when the page is shown
   side = (document.getElementById("panel")?.clientWidth ?? 0) > 440 ? 180 : 140;
   const ratio = window.devicePixelRatio || 1;
   canvas.width = canvas.height = Math.round(side * ratio);
@@ -65,7 +65,7 @@ function draw() {
   pen.lineTo(side - 6, half);
   pen.stroke();
   pen.fillStyle = themeColour("faint");
-  pen.font = `10px ${themeColour("mono")}`;
+  pen.font = `11px ${themeColour("face")}`;
   pen.textAlign = "right";
   pen.fillText(`${most} px`, side - 5, half - 4);
   const shown = clicks().filter((click) => click.projected_px);

@@ -1,58 +1,79 @@
 /**
- * The warnings: one line each, the gravest first; one unfolds to its whole message and what to do about it. Where a calibration does not
- * state what its numbers mean, one picks the meaning here, each drawn over the frame on the screen.
+ * The warnings: one line says how many there are and opens the list, the gravest first; each unfolds to what to do about it. Those of the
+ * recording are in its sheet. Where a calibration does not state what its numbers mean, one picks the meaning here, each drawn over the
+ * frame on the screen.
  */
 
 import { ask, content } from "../shell/asking.js";
-import { showTab } from "../shell/layout.js";
+import { showPage } from "../shell/layout.js";
 import { icon, make, toast } from "../shell/notices.js";
-import { openAgain } from "../shell/opening.js";
+import { notes, openAgain } from "../shell/opening.js";
 import { send } from "../shell/socket.js";
 import { on, state } from "../shell/state.js";
 
 /** @typedef {import("../messages.js").DataWarning} WarningRow */
 /** @typedef {import("../messages.js").AssumptionRow} AssumptionRow */
 const box = /** @type {HTMLElement} */ (document.getElementById("warnings"));
+const opener = /** @type {HTMLElement} */ (document.getElementById("warning-count"));
+/** How many notes there are on the recording: in the header, beside its name. */
+const noted = /** @type {HTMLElement} */ (document.getElementById("recording-notes"));
 /** What the user has unfolded stays so. @type {Set<string>} */
-const openCodes = new Set(["unsolvable", "no-camera", "assumed", "calibration-ambiguous"]);
-/** What is no warning of a calibration, but why there is none. */
-const NOT_TO_ACKNOWLEDGE = ["unsolvable", "no-camera"];
+const openCodes = new Set(["no-camera", "assumed", "calibration-ambiguous"]);
 /** What leaves open what a calibration means: a person picks. */
 const TO_PICK = ["calibration-ambiguous", "calibration-picked"];
 /** What speaks of the lens. */
 const OF_THE_LENS = ["intrinsics-suspected", "lens-or-radar-scale"];
 let drawn = "";
 
-/**
- * @param {WarningRow[]} ofPose about the calibration, the gravest first
- * @param {WarningRow[]} ofRecording
- * @param {AssumptionRow[]} assumptions
- * @param {string[]} acknowledged codes of the warnings that the user has read
- */
-export function drawWarnings(ofPose, ofRecording, assumptions, acknowledged) {
-  const text = JSON.stringify([ofPose, ofRecording, assumptions, acknowledged]);
-  if (text === drawn) return;
-  drawn = text;
-  const all = [...ofPose.map((warning) => ({ warning, kind: "" })), ...ofRecording.map((warning) => ({ warning, kind: "note" }))];
-  const read = all.filter(({ warning }) => acknowledged.includes(warning.code));
-  const unread = all.filter(({ warning }) => !acknowledged.includes(warning.code));
-  const total = unread.length + (assumptions.length ? 1 : 0);
-  if (!total && !read.length) return box.replaceChildren();
-  const held = document.activeElement?.closest("#warnings [data-code]")?.getAttribute("data-code");
-  const ofThePose = unread.filter(({ kind }) => !kind);
-  const rows = make("div", "rows", [
-    ...ofThePose.map(({ warning, kind }) => row(warning, kind, false)),
-    ...(assumptions.length ? [assumptionBox(assumptions)] : []),
-    ...unread.filter(({ kind }) => kind).map(({ warning, kind }) => row(warning, kind, false)),
-    ...(read.length ? [folded("acknowledged", "acknowledged", `${read.length} acknowledged`, read.map(({ warning, kind }) => row(warning, kind, true)))] : []),
-  ]);
-  const count = make("div", "count", `${total} warnings, the gravest first`);
-  box.replaceChildren(...(total > 1 ? [count] : []), rows);
-  if (held) /** @type {HTMLElement|null} */ (box.querySelector(`[data-code="${CSS.escape(held)}"] > summary`))?.focus({ preventScroll: true });
+export function startWarnings() {
+  opener.onclick = () => toggle(box.hidden);
+  on(["view", "recording"], drawAll);
+  on(["recording"], look);
 }
 
-/** @param {WarningRow} warning @param {string} kind @param {boolean} read */
-function row(warning, kind, read) {
+/** @param {boolean} open */
+function toggle(open) {
+  box.hidden = !open;
+  opener.setAttribute("aria-expanded", String(open));
+}
+
+function drawAll() {
+  const [view, recording] = [state.view, state.recording];
+  if (!view || !recording) return;
+  const { acknowledged, assumptions } = view;
+  const ofPose = state.looking ? [{ code: "no-camera", message: view.status, hint: view.hint }] : view.warnings.filter((one) => !view.verdict.line.includes(one.message.replace(/\.$/, ""))); // the verdict says it already
+  const text = JSON.stringify([ofPose, recording.warnings, assumptions, acknowledged]);
+  if (text === drawn) return;
+  drawn = text;
+  const asks = recording.warnings.filter((one) => TO_PICK.includes(one.code));
+  drawList(box, [...ofPose, ...asks], acknowledged, []);
+  drawList(notes, recording.warnings.filter((one) => !asks.includes(one)), acknowledged, assumptions.length ? [assumptionBox(assumptions)] : []);
+  const count = unread(box);
+  opener.hidden = !box.childElementCount;
+  opener.replaceChildren(icon("warning"), `${count} warning${count === 1 ? "" : "s"}`);
+  if (opener.hidden) toggle(false);
+  else if (state.looking) toggle(true);
+  noted.textContent = unread(notes) ? String(unread(notes)) : "";
+  noted.classList.toggle("asks", assumptions.length > 0);
+}
+
+/** @param {HTMLElement} list */
+const unread = (list) => list.querySelectorAll(":scope > .warning").length;
+
+/** @param {HTMLElement} list @param {WarningRow[]} rows @param {string[]} acknowledged codes of those that the user has read @param {HTMLElement[]} first */
+function drawList(list, rows, acknowledged, first) {
+  const read = rows.filter(({ code }) => acknowledged.includes(code));
+  const held = list.contains(document.activeElement) ? document.activeElement?.closest("[data-code]")?.getAttribute("data-code") : null;
+  list.replaceChildren(
+    ...first,
+    ...rows.filter((one) => !read.includes(one)).map((one) => row(one, false)),
+    ...(read.length ? [folded("acknowledged", "acknowledged", `${read.length} acknowledged`, read.map((one) => row(one, true)))] : []),
+  );
+  if (held) /** @type {HTMLElement|null} */ (list.querySelector(`[data-code="${CSS.escape(held)}"] > summary`))?.focus({ preventScroll: true });
+}
+
+/** @param {WarningRow} warning @param {boolean} read */
+function row(warning, read) {
   /** @type {HTMLElement[]} */
   const inside = [make("div", "hint", warning.hint)];
   if (TO_PICK.includes(warning.code)) {
@@ -60,12 +81,12 @@ function row(warning, kind, read) {
     pick.onclick = openMeanings;
     inside.push(pick);
   }
-  if (OF_THE_LENS.includes(warning.code) || (warning.code === "unsolvable" && state.lens && !state.lens.intrinsics)) {
-    const open = make("button", "pick", "Open the tab Lens");
-    open.onclick = () => showTab("tab-lens");
+  if (OF_THE_LENS.includes(warning.code)) {
+    const open = make("button", "pick", "Open Lens");
+    open.onclick = () => showPage("lens");
     inside.push(open);
   }
-  if (!NOT_TO_ACKNOWLEDGE.includes(warning.code)) {
+  if (warning.code !== "no-camera") {
     const button = make("button", "acknowledge", read ? "Show again" : "Acknowledge");
     button.onclick = async () => {
       const refusal = await send({ type: "warnings_acknowledged", codes: [warning.code], acknowledged: !read });
@@ -73,12 +94,12 @@ function row(warning, kind, read) {
     };
     inside.push(button);
   }
-  return folded(warning.code, `warning ${kind}`, warning.message, inside);
+  return folded(warning.code, "warning", warning.message, inside);
 }
 
 /** A line that unfolds. @param {string} code @param {string} className @param {string} line @param {HTMLElement[]} inside */
 function folded(code, className, line, inside) {
-  const made = make("details", className.trim(), [make("summary", "", [icon("warning"), make("span", "", line)]), ...inside]);
+  const made = make("details", className, [make("summary", "", [icon("warning"), make("span", "", line)]), ...inside]);
   made.dataset.code = code;
   made.open = openCodes.has(code);
   made.ontoggle = () => (made.open ? openCodes.add(code) : openCodes.delete(code));
@@ -105,10 +126,6 @@ const dialog = /** @type {HTMLDialogElement} */ (document.getElementById("meanin
 let known = null;
 /** The frame that is drawn on. */
 let frame = -1;
-
-export function startMeanings() {
-  on(["recording"], look);
-}
 
 /** Show the meanings once if the calibration needs a pick. */
 function look() {

@@ -108,7 +108,7 @@ function drawGrid() {
   const [ox, oy] = toCanvas(0, 0);
   pen.strokeStyle = themeColour("line");
   pen.fillStyle = themeColour("faint");
-  pen.font = `10.5px ${themeColour("mono")}`;
+  pen.font = `11px ${themeColour("face")}`;
   pen.lineWidth = 1;
   for (let range = step; range < farthest && range < 60 * step; range += step) {
     pen.beginPath();
@@ -279,7 +279,7 @@ function rampColour(share) {
   return `rgb(${ramp[low].map((value, index) => Math.round(value + (at - low) * (ramp[low + 1][index] - value))).join(" ")})`;
 }
 
-const page = /** @type {HTMLElement} */ (document.getElementById("page-pairs"));
+const page = /** @type {HTMLElement} */ (document.getElementById("page-mark"));
 const group = /** @type {HTMLElement} */ (document.getElementById("look-options"));
 const legend = /** @type {HTMLElement} */ (document.getElementById("legend"));
 const guide = /** @type {HTMLElement} */ (document.getElementById("guide"));
@@ -309,7 +309,7 @@ function enter() {
     button.disabled = true;
     button.dataset.hint = why;
   }
-  const tab = /** @type {HTMLElement} */ (document.getElementById("tab-pairs"));
+  const tab = /** @type {HTMLElement} */ (document.getElementById("tab-mark"));
   tab.textContent = "Placements";
   tab.click();
 }

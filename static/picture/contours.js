@@ -60,6 +60,8 @@ function refresh() {
 
 function drawChips() {
   main.setAttribute("aria-pressed", String(shown !== null));
+  const folded = group.closest("details");
+  if (folded && shown !== null) folded.open = true; // the distances are chosen there
   const chips = shown === null ? [] : (known?.maps ?? []).map((map) => {
     const chip = make("button", "chip", map.label);
     chip.dataset.contours = map.label;

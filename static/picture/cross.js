@@ -14,8 +14,8 @@ import { fit, redraw } from "./picture.js";
 /** A field of the picture, by its centre and size [px]. @typedef {{u: number, v: number, wide: number, high: number}} Field */
 /** @typedef {{frame: number, u: number, v: number, touched: boolean, expected: boolean, fields: Field[]}} Cross `fields` from the widest to the present one */
 
-/** Digits as on a number pad, from the top left. */
-const DIGITS = ["7", "8", "9", "4", "5", "6", "1", "2", "3"];
+/** Digits from the top left, as on the keyboard's row. */
+const DIGITS = ["1", "2", "3", "4", "5", "6", "7", "8", "9"];
 /** The first field around an expected position is this part of the picture. */
 const FIRST = 1 / 9;
 /** A field smaller than this is not divided further [px]. */

@@ -35,7 +35,7 @@ export function startRectified() {
 }
 
 /** Why the picture cannot be rectified now; "" if it can. */
-export const withoutRectified = () => (state.lens?.intrinsics ? "" : "There are no intrinsics to rectify with: calibrate the lens in the tab Lens");
+export const withoutRectified = () => (state.lens?.intrinsics ? "" : "There are no intrinsics to rectify with: calibrate the lens in the menu under Lens");
 
 /** Show the picture rectified, or as taken. */
 export function toggleRectified() {

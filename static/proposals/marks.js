@@ -1,4 +1,4 @@
-/** Draws a proposal on the frame: a dashed cross with its 95 % ring, and faint numbers at the other places in question. */
+/** Draws a proposal on the frame: a dashed cross with its 95 % ring, and faint numbers at the other places once one was asked for. */
 
 import { toDevice, viewport } from "../picture/geometry.js";
 import { cross, outlined } from "../picture/marks.js";
@@ -17,7 +17,7 @@ export function drawProposal(pen) {
   if (!offer) return;
   const { ratio, scale } = viewport;
   offer.row.places.forEach((place, index) => {
-    if (index !== offer.number) drawOther(pen, place, index + 1);
+    if (offer.isOpen && index !== offer.number) drawOther(pen, place, index + 1);
   });
   const [x, y] = toDevice(...offer.place.pixel_px);
   const radius = Math.max(3 * ratio, RING * offer.place.sigma_px * scale);

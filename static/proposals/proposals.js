@@ -8,13 +8,13 @@ import { lookAt, lookInto, pan, toCss, viewport, zoom } from "../picture/geometr
 import { fit, redraw } from "../picture/picture.js";
 import { toast } from "../shell/notices.js";
 import { send } from "../shell/socket.js";
-import { clickIn, emit, isDismissed, isLookedAt, isOffered, on, placementsAt, state } from "../shell/state.js";
+import { clickIn, emit, isOffered, on, placementsAt, state } from "../shell/state.js";
 import { goTo, pause } from "../time/player.js";
 import { dismiss } from "./dismissing.js";
 
 /** @typedef {import("../messages.js").ProposalRow} Row */
 /** @typedef {import("../messages.js").ProposalPlace} Place */
-/** A proposal on screen, and which of its places is taken. @typedef {{row: Row, place: Place, number: number}} Offer */
+/** A proposal on screen, which of its places is taken, and whether another one was asked for. @typedef {{row: Row, place: Place, number: number, isOpen: boolean}} Offer */
 
 /** Nothing is decided so soon after a proposal appeared, or moved to a better place [ms]: nobody has seen it yet. */
 const UNSEEN = 300;
@@ -48,7 +48,14 @@ const onTheWay = new Map();
 /** Whether the last proposal was decided just now: Enter then means nothing else until another key is pressed, or the pointer. */
 let over = false;
 
+/** A proposal this sure is what the page opens on, if it is ready by then. */
+const SURE = 0.9;
+/** Whether the picture may still move by itself: nothing was pressed, and it is not the one that was there before a reload. */
+let isFresh = sessionStorage.getItem("cocalib-frame") === null;
+
 export function startProposals() {
+  for (const type of ["keydown", "pointerdown", "wheel"]) addEventListener(type, () => (isFresh = false), { capture: true });
+  on(["placements", "proposals"], openOn);
   on(["shown"], arrive);
   on(["shown", "view", "proposals", "placements", "playing"], notice);
   on(["view"], settle);
@@ -76,6 +83,17 @@ export function takeProposals(message) {
   emit("proposals");
 }
 
+/** Open on the first placement, or on a proposal that is ready and sure; once. */
+function openOn() {
+  const isMoved = state.cursor !== 0 || state.following !== null || state.looking || state.proposals === null;
+  const first = state.placements.find(isOffered);
+  if (!isFresh || isMoved || !first) return;
+  isFresh = false;
+  const best = openProposals()[0];
+  if (best?.confidence > SURE) show(best);
+  else goTo(first.frame);
+}
+
 /** What the line says for a moment. */
 let said = { text: "", until: 0 };
 
@@ -86,14 +104,14 @@ export function say(text, ms = 5000) {
   if (text) setTimeout(() => emit("proposals"), ms + 20);
 }
 
-/** What is being said now, as a sentence with a space behind it; "" if nothing. */
-export const saidWords = () => (performance.now() < said.until && said.text ? `${said.text}. ` : "");
+/** What is being said now, as a sentence; "" if nothing. */
+export const saidWords = () => (performance.now() < said.until && said.text ? `${said.text}.` : "");
 
 /** While proposals are still being found. */
 export const isSearching = () => Boolean(state.proposals?.on && state.proposals.progress.stage === "looking");
 
-/** How far the search is, as a sentence. */
-export const searchWords = () => `Proposals are being looked for: ${state.proposals?.progress.done} of ${state.proposals?.progress.count}`;
+/** How far the search is; "" if none is going on. */
+export const searchWords = () => (isSearching() ? `Searching, ${state.proposals?.progress.done} of ${state.proposals?.progress.count}` : "");
 
 /** Take note of a proposal that has just appeared on screen. */
 function notice() {
@@ -128,15 +146,7 @@ export function shownOffer() {
   const row = here.find(({ placement }) => placement === current) ?? here[0];
   if (!row) return null;
   const number = Math.min(taken.get(row.placement) ?? 0, row.places.length - 1);
-  return { row, place: row.places[number], number };
-}
-
-/** How many are decided, how many there are, and which one is on screen. @param {Row} row */
-export function counted(row) {
-  const done = state.placements.filter((placement, index) => sent.has(index) || isDismissed(placement) || isLookedAt(placement)).length;
-  const open = openProposals();
-  const passed = open.filter(({ placement }) => skipped.has(placement) && placement !== row.placement).length;
-  return { number: done + passed + 1, total: done + open.length };
+  return { row, place: row.places[number], number, isOpen: taken.has(row.placement) };
 }
 
 /** Go to the proposal that is to be decided next. @returns {boolean} whether there is one */
@@ -193,8 +203,8 @@ export function heldBack() {
   return onTheWay.get(here.find((placement) => onTheWay.has(placement)) ?? -1) ?? "";
 }
 
-/** Whether Enter would open the keyboard's cross where a proposal may come yet. */
-const isTooEarly = () => isSearching() && !state.playing && state.shown !== null && !clickIn(state.shown.index);
+/** Whether Enter leads to a proposal: some wait, and there is nothing to mark on screen, or its proposal may come yet. */
+const leadsOn = () => openProposals().length > 0 && state.shown !== null && !clickIn(state.shown.index) && (isSearching() || !placementsAt(state.shown.index).some(isOffered));
 
 /** Whether N, or a decision, leads to a proposal whose frame is not on screen yet. */
 const isComing = () => awaited !== null && state.cursor === awaited.frame && state.shown?.index !== awaited.frame;
@@ -202,8 +212,8 @@ const isComing = () => awaited !== null && state.cursor === awaited.frame && sta
 /** Whether X and C are about proposals: one is on screen, or about to be. */
 export const takesKeys = () => shownOffer() !== null || isComing();
 
-/** Whether Enter is about proposals: one is on screen, may come yet or was decided without the server, or the last one was decided just now. */
-export const takesEnter = () => takesKeys() || heldBack() !== "" || isTooEarly() || (over && !openProposals().length);
+/** Whether Enter is about proposals: one is on screen or elsewhere, was decided without the server, or the last one was decided just now. */
+export const takesEnter = () => takesKeys() || heldBack() !== "" || leadsOn() || (over && !openProposals().length);
 
 /** The proposal on screen, once somebody can have seen it. @returns {Offer|null} */
 function seenOffer() {
@@ -221,7 +231,7 @@ function isInView({ row, place }) {
 
 /** Enter: what the picture shows becomes a mark, and the next proposal is shown. */
 export async function acceptProposal() {
-  if (!takesKeys()) return void (over ? sayOver() : heldBack() || say(searchWords()));
+  if (!takesKeys()) return void (heldBack() || nextProposal() || sayOver());
   const offer = seenOffer();
   if (!offer) return;
   if (!isInView(offer)) {

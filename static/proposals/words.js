@@ -3,13 +3,16 @@
 import { marks } from "../picture/picture.js";
 import { make, toast } from "../shell/notices.js";
 import { send } from "../shell/socket.js";
-import { on, state } from "../shell/state.js";
-import { counted, heldBack, isSearching, openProposals, saidWords, say, searchWords, shownOffer } from "./proposals.js";
+import { isOffered, on, state } from "../shell/state.js";
+import { heldBack, isSearching, openProposals, saidWords, say, searchWords, shownOffer } from "./proposals.js";
 
-/** @typedef {import("../pairs/steps.js").Words} Words */
+/** @typedef {import("../pairs/guide.js").Words} Words */
 
-/** How many proposals there are, for sentences. */
-const howMany = () => `${openProposals().length} proposal${openProposals().length === 1 ? "" : "s"}${isSearching() ? " so far" : ""}`;
+/** How many placements wait: with proposals those that were found, without any all. */
+function leftWords() {
+  const left = openProposals().length || state.placements.filter(isOffered).length;
+  return `${left} left${isSearching() ? " so far" : ""}`;
+}
 
 /** N found no proposal: say why, if that is not because all are decided. */
 export function sayNone() {
@@ -19,8 +22,8 @@ export function sayNone() {
   else if (isSearching()) say(searchWords());
 }
 
-/** What N does where proposals wait, after the key; "" if none does. */
-export const proposalAdvice = () => (openProposals().length ? ` goes to the first of ${howMany()}.` : "");
+/** What N does. */
+export const proposalAdvice = () => `${state.view?.clicks.length ? "next" : "first"} place where the reflector stood, ${leftWords()}`;
 
 /** What is proposed, and what to do, for the line on the frame; null if nothing is. @returns {Words|null} */
 export function proposalWords() {
@@ -29,12 +32,16 @@ export function proposalWords() {
   const offer = shownOffer();
   if (!offer) return null;
   const { row, number } = offer;
-  const { number: at, total } = counted(row);
-  const several = row.places.length > 1;
   const sure = number ? `place ${number + 1} of ${row.places.length}` : surely(row.confidence);
   const why = row.reason && !number ? `: ${row.reason}` : "";
-  const head = `${saidWords()}Proposal ${at} of ${total}${isSearching() ? " so far" : ""}, ${state.placements[row.placement].range_m.toFixed(1)} m away, ${sure}${why}.\n`;
-  return [head, { key: "Enter", action: "accept-proposal" }, " accepts it, ", ...(several ? [{ key: "C", action: "next-place" }, ` other place${row.places.length > 2 ? "s" : ""}, `] : []), { key: "X", action: "reject-proposal" }, " no reflector, ", { key: "N", action: "next-proposal" }, " next; or click the inner corner"];
+  return [
+    `${saidWords()} Placement ${row.placement + 1}, ${state.placements[row.placement].range_m.toFixed(1)} m away, ${sure}${why}, ${leftWords()}.`.trim(),
+    { key: "Enter", label: "accept", action: "place-mark" },
+    ...(row.places.length > 1 ? [{ key: "C", label: "other place", action: "next-candidate" }] : []),
+    { key: "X", label: "no reflector", action: "exclude" },
+    { key: "N", label: "next", action: "next-placement" },
+    ...(state.view?.clicks.length ? [] : ["or click the inner corner"]),
+  ];
 }
 
 /** A probability in words; none is certain. @param {number} confidence */
@@ -44,7 +51,7 @@ const surely = (confidence) => (confidence > 0.99 ? "over 99 % sure" : `${Math.r
 export function silentWords(placement) {
   const news = state.proposals;
   if (!news?.on) return "";
-  if (isSearching()) return `Not compared yet: pictures of ${news.progress.done} of ${news.progress.count} placements looked at.`;
+  if (isSearching()) return ""; // the status line says so
   const reason = news.unproposed.find((one) => one.placement === placement)?.reason;
   return reason ? `Not proposed: ${reason}.` : "";
 }

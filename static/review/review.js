@@ -1,7 +1,6 @@
 /** The review of all pairs: linked plots of the residuals with a filter, and why the selected pair uses its return. */
 
 import { comeTo } from "../picture/arriving.js";
-import { showTab } from "../shell/layout.js";
 import { make } from "../shell/notices.js";
 import { tell } from "../shell/socket.js";
 import { clicks, on, select, state } from "../shell/state.js";
@@ -15,6 +14,7 @@ import { Plot } from "./plots.js";
 /** A pair that is drawn. @typedef {{click: Click, kind: Kind, right: number, down: number, length: number, order: number, influence: number|null, heldOut: number|null}} Row */
 
 const page = /** @type {HTMLElement} */ (document.getElementById("page-review"));
+const check = /** @type {HTMLElement} */ (document.getElementById("page-check"));
 /** @type {[Kind, string, string][]} */
 const KINDS = [
   ["agreeing", "Agreeing", "Pairs that take part in the pose: filled dots."],
@@ -48,7 +48,7 @@ let pair = null;
 const asked = { review: "", pair: "" };
 /** @type {Map<string, Plot>} */
 export const plots = new Map();
-/** Whether the tab was shown when it was looked at last. */
+/** Whether the page was shown when it was looked at last. */
 let open = false;
 /** The drawing that comes with the next screen frame. */
 let pending = 0;
@@ -79,8 +79,8 @@ export function startReview() {
   });
 }
 
-/** Whether the tab is shown. */
-export const visible = () => !page.hidden;
+/** Whether the page is shown. */
+export const visible = () => !check.hidden;
 
 /** @param {Review} message */
 export function takeReview(message) {
@@ -160,9 +160,7 @@ function drawFilters() {
   const segments = make("div", "segmented", parts);
   segments.setAttribute("role", "group");
   segments.setAttribute("aria-label", "Part of the residual");
-  const large = chip("enlarge", "⤢", "Use the whole column for this tab, or give the 3D view its place back.", document.body.classList.contains("review-large"), enlargeReview);
-  large.setAttribute("aria-label", "Enlarge");
-  filters.replaceChildren(...kinds, make("span", "review-range", ["range", limit("low", "from"), "–", limit("high", "to"), "m"]), segments, large);
+  filters.replaceChildren(...kinds, make("span", "review-range", ["range", limit("low", "from"), "–", limit("high", "to"), "m"]), segments);
   if (held) /** @type {HTMLElement|null} */ (filters.querySelector(`[data-filter="${held}"]`))?.focus({ preventScroll: true });
 }
 
@@ -196,13 +194,6 @@ function limit(end, label) {
 /** @param {() => unknown} what */
 function change(what) {
   what();
-  draw();
-}
-
-/** Give the tab the whole column, or the 3D view its place back. */
-export function enlargeReview() {
-  if (!visible()) showTab("tab-review");
-  document.body.classList.toggle("review-large");
   draw();
 }
 

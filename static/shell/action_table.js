@@ -17,14 +17,13 @@ import { toggleLayer } from "../picture/marks.js";
 import { fit, zoomBy } from "../picture/picture.js";
 import { toggleRectified, withoutRectified } from "../picture/rectified.js";
 import { dismissHere, withoutPlacement } from "../proposals/dismissing.js";
-import { acceptProposal, nextPlace, nextProposal, openProposals, previousProposal, rejectProposal, shownOffer, takesEnter, takesKeys } from "../proposals/proposals.js";
+import { acceptProposal, nextPlace, nextProposal, previousProposal, rejectProposal, takesEnter, takesKeys } from "../proposals/proposals.js";
 import { sayNone, toggleProposals } from "../proposals/words.js";
-import { enlargeReview } from "../review/review.js";
 import { lookFrom, setCamera, toggleHidden, toggleLarge } from "../space/space.js";
 import { goLive, goTo, pause, play, step } from "../time/player.js";
 import { register } from "./actions.js";
 import { toggleHelp } from "./help.js";
-import { showTab } from "./layout.js";
+import { closeSheet, enlargePanel, showPage, toggleTheme } from "./layout.js";
 import { chooseRecording } from "./opening.js";
 import { togglePalette } from "./palette.js";
 import { clickIn, clicks, selectedClick, state } from "./state.js";
@@ -39,15 +38,12 @@ const withSelected = () => withPictures() || (selectedClick() ? "" : "No pair is
 const withResiduals = () => withPictures() || (clicks().some((click) => click.residual_px !== null) ? "" : "There is no calibration yet");
 const undoable = () => withPictures() || (state.view?.can_undo ? "" : "There is nothing to undo");
 const redoable = () => withPictures() || (state.view?.can_redo ? "" : "There is nothing to redo");
-const withProposal = () => withPictures() || (shownOffer() ? "" : openProposals().length ? "No proposal is on screen: N goes to one" : "There is no proposal to decide");
-const withBoxes = () => withPictures() || (boxing.on ? "" : "Open the tab Evaluate first (A)");
+const withBoxes = () => withPictures() || (boxing.on ? "" : "Open Evaluate first (A)");
 const withBox = () => withPictures() || withoutBox();
 const following = () => (state.following && !["complete", "ended"].includes(state.following.state) ? "" : "The recording is complete: no new frames come");
 
 /** @param {number} du @param {number} dv image px */
 const nudge = (du, dv) => () => (boxing.on ? nudgeBox(10 * du, 10 * dv) : nudgeBy(du, dv));
-/** @param {string} id of a button on the page */
-const press = (id) => () => document.getElementById(id)?.click();
 const zoom = (/** @type {number} */ factor) => (state.looking ? zoomEye(factor) : zoomBy(factor));
 
 const FRAMES = { help: "Step one frame", when: withFrames };
@@ -74,10 +70,10 @@ export function registerActions() {
     { id: "previous-placement", group: "Time", words: "Previous placement", keys: ["P"], also: "reflector position back", run: () => previousProposal() || toPlacement(-1), ...PLACES },
     { id: "live", group: "Time", words: "Show the newest frame as it comes", also: "live follow recording now", run: goLive, when: following },
 
-    { id: "place-mark", group: "Mark", words: "Show the keyboard's cross, then set the mark there", keys: ["Enter"], also: "click place add", run: () => (boxing.on ? newBox() : takesEnter() && !state.cross ? acceptProposal() : enterCross()), when: withPictures },
+    { id: "place-mark", group: "Mark", words: "Accept what is proposed; without a proposal, mark with the keyboard's cross", keys: ["Enter"], also: "click place add confirm yes", run: () => (boxing.on ? newBox() : takesEnter() && !state.cross ? acceptProposal() : enterCross()), when: withPictures },
     { id: "cross", group: "Mark", words: "Keyboard's cross: 1 to 9 zoom into a field, arrows move it, Backspace zooms out, Esc ends", keys: ["G"], also: "grid nine fields marking without mouse", run: toggleCross, when: withPictures },
-    { id: "next-candidate", group: "Mark", words: "Take the return that fits better, or the next one", keys: ["C"], also: "candidate choose radar association", run: () => (takesKeys() ? nextPlace() : nextCandidate()), when: () => withPictures() || (takesKeys() ? "" : withoutCandidates()) },
-    { id: "free-candidate", group: "Mark", words: "Leave the choice of the return to the program", keys: ["Shift+C"], also: "candidate automatic unchoose", run: () => choose(-1), when: () => withPictures() || (selectedClick()?.chosen ? "" : "No return was chosen for this mark") },
+    { id: "next-candidate", group: "Mark", words: "Take another place, or with a mark another return", keys: ["C"], also: "candidate choose radar association other next", run: () => (takesKeys() ? nextPlace() : nextCandidate()), when: () => withPictures() || (takesKeys() ? "" : withoutCandidates()) },
+    { id: "free-candidate", group: "Mark", words: "Automatic return", keys: ["Shift+C"], also: "candidate automatic unchoose", run: () => choose(-1), when: () => withPictures() || (selectedClick()?.chosen ? "" : "No return was chosen for this mark") },
     { id: "snap", group: "Mark", words: "Snap the mark, or the keyboard's cross, to the reflector's apex", keys: ["S"], also: "corner magnet refine subpixel image", run: snap, when: withSnappable },
     { id: "mark-left", words: "Move the mark left by 0.1 px", keys: ["Alt+ArrowLeft"], run: nudge(-0.1, 0), ...FINE },
     { id: "mark-right", words: "Move the mark right by 0.1 px", keys: ["Alt+ArrowRight"], run: nudge(0.1, 0), ...FINE },
@@ -91,14 +87,10 @@ export function registerActions() {
     { id: "undo", group: "Mark", words: "Undo", keys: ["Ctrl+Z"], also: "back revert take back", run: () => turnBack("undo"), when: undoable },
     { id: "redo", group: "Mark", words: "Redo", keys: ["Ctrl+Shift+Z", "Ctrl+Y"], also: "again repeat", run: () => turnBack("redo"), when: redoable },
 
-    { id: "next-proposal", group: "Proposal on screen", words: "Go to the next proposal, zoomed; P goes back", shows: ["N"], also: "reflector found suggestion", run: nextProposal, when: () => withPictures() || (openProposals().length ? "" : "There is no proposal to decide") },
-    { id: "accept-proposal", group: "Proposal on screen", words: "Accept the place that the picture shows", shows: ["Enter"], also: "confirm yes", run: acceptProposal, when: withProposal },
-    { id: "next-place", group: "Proposal on screen", words: "Take the next place where the reflector may stand", shows: ["C"], also: "candidate other", run: nextPlace, when: withProposal },
-    { id: "reject-proposal", group: "Proposal on screen", words: "It is not the reflector: dismiss the placement", shows: ["X"], also: "no wrong", run: rejectProposal, when: withProposal },
-    { id: "proposals", group: "Proposal on screen", words: "Propose where the reflector stood, or do not", keys: ["O"], also: "automatic find suggest off on switch", run: toggleProposals, when: withPictures },
+    { id: "proposals", group: "Mark", words: "Suggestions on or off", keys: ["O"], also: "automatic find suggest off on switch", run: toggleProposals, when: withPictures },
 
     { id: "worst", group: "Pairs", words: "Next worst pair", keys: ["J"], also: "outlier residual largest wrong bad", run: nextWorst, when: withResiduals },
-    { id: "exclude", group: "Pairs", words: "Exclude the pair, or include it again; without a mark, dismiss the placement", keys: ["X"], also: "leave out use ignore disable spurious", run: () => (takesKeys() ? rejectProposal() : clickIn(state.cursor) ? toggleExcluded() : dismissHere()), when: () => withPictures() || (takesKeys() ? "" : clickIn(state.cursor) ? withSelected() : withoutPlacement()) },
+    { id: "exclude", group: "Pairs", words: "No: exclude the pair, or include it again; without a mark, dismiss the placement", keys: ["X"], also: "leave out use ignore disable spurious", run: () => (takesKeys() ? rejectProposal() : clickIn(state.cursor) ? toggleExcluded() : dismissHere()), when: () => withPictures() || (takesKeys() ? "" : clickIn(state.cursor) ? withSelected() : withoutPlacement()) },
 
     { id: "evaluate", group: "Boxes", words: "Draw boxes and judge the calibration by them, or go back to the clicks", keys: ["A"], also: "tab evaluate annotate acc accuracy bounding people cars moving", run: toggleEvaluate, when: withPictures },
     { id: "next-box", group: "Boxes", words: "Select the next box in this frame", keys: ["Q"], also: "object cycle", run: nextBox, when: withBoxes },
@@ -122,7 +114,7 @@ export function registerActions() {
     { id: "show-ellipses", words: "Show or hide the 95 % ellipses", keys: ["3"], also: "overlay layer uncertainty covariance", run: () => toggleLayer("ellipses"), ...OVERLAY },
     { id: "show-predictions", words: "Show or hide the expected positions", keys: ["4"], also: "overlay layer predicted guess next placement", run: () => toggleLayer("predictions"), ...OVERLAY },
     { id: "show-uncertainty", words: "Show or hide the uncertainty in the picture", keys: ["5"], also: "overlay layer contours map 95 % lines", run: toggleContours, ...OVERLAY },
-    { id: "rectify", group: "Picture", words: "Show the picture rectified, or as taken; drag lines along straight edges", keys: ["U"], also: "undistort distortion lens straight ruler grid intrinsics", run: toggleRectified, when: () => withPictures() || (boxing.on ? "Leave the tab Evaluate first" : withoutRectified()) },
+    { id: "rectify", group: "Picture", words: "Show the picture rectified, or as taken; drag lines along straight edges", keys: ["U"], also: "undistort distortion lens straight ruler grid intrinsics", run: toggleRectified, when: () => withPictures() || (boxing.on ? "Leave Evaluate first" : withoutRectified()) },
     { id: "loupe-more", group: "Picture", words: "Loupe: magnify more", keys: ["]"], help: "Loupe: 4 to 16 times", also: "zoom magnifier larger", run: () => magnify(1), when: withPictures },
     { id: "loupe-less", group: "Picture", words: "Loupe: magnify less", keys: ["["], help: "Loupe: 4 to 16 times", also: "zoom magnifier smaller", run: () => magnify(-1), when: withPictures },
     { id: "loupe-contrast", group: "Picture", words: "Loupe: stretch the contrast, or not", keys: ["L"], also: "magnifier brightness enhance dark", run: stretchContrast, when: withPictures },
@@ -134,20 +126,21 @@ export function registerActions() {
     { id: "space-hide", words: "Hide or show the 3D view", keys: ["V"], also: "3D close", run: () => toggleHidden(), ...SPACE },
     { id: "space-large", words: "Enlarge the 3D view, or give the picture its place back", keys: ["B"], also: "3D big maximize full", run: () => toggleLarge(), ...SPACE },
 
-    { id: "tab-pairs", group: "Panel", words: "Show the pairs", also: "tab table list clicks placements", run: () => showTab("tab-pairs") },
-    { id: "tab-pose", group: "Panel", words: "Show the pose", also: "tab transform extrinsics rotation translation errors advice", run: () => showTab("tab-pose"), when: withPictures },
-    { id: "tab-review", group: "Panel", words: "Show the review", also: "tab plots residuals histogram influence compare solutions a b", run: () => showTab("tab-review"), when: withPictures },
-    { id: "enlarge-review", group: "Panel", words: "Enlarge the review, or give the 3D view its place back", also: "tab plots large column", run: enlargeReview, when: withPictures },
-    { id: "tab-lens", group: "Panel", words: "Show the lens: intrinsics, and calibrating them from a board", also: "tab camera intrinsics checkerboard charuco aprilgrid calibrate focal length distortion", run: () => showTab("tab-lens"), when: withPictures },
-    { id: "tab-options", group: "Panel", words: "Show the options", also: "tab settings parameters method", run: () => showTab("tab-options"), when: withPictures },
-    { id: "theme", group: "Panel", words: "Light or dark theme", also: "colours colors bright night mode", run: press("theme") },
+    { id: "mark", group: "Panel", words: "Mark: the pairs and the returns that each may use", also: "tab table list clicks placements candidates", run: () => showPage("mark") },
+    { id: "check", group: "Panel", words: "Check: the pose, the review of all pairs, and two solutions compared", also: "tab transform extrinsics rotation translation errors advice plots residuals histogram influence rms cdsd a b", run: () => showPage("check"), when: withPictures },
+    { id: "deliver", group: "Panel", words: "Deliver", also: "tab save download file export report clicks", run: () => showPage("deliver"), when: withPictures },
+    { id: "lens", group: "Panel", words: "Lens: intrinsics, and calibrating them from a board", also: "sheet camera intrinsics checkerboard charuco aprilgrid calibrate focal length distortion", run: () => showPage("lens"), when: withPictures },
+    { id: "options", group: "Panel", words: "Options", also: "sheet settings parameters method", run: () => showPage("options"), when: withPictures },
+    { id: "close-sheet", group: "Panel", words: "Close the sheet: go back to the tab before", also: "leave evaluate lens options", run: closeSheet },
+    { id: "enlarge-panel", group: "Panel", words: "Enlarge the panel, or give the 3D view its place back", also: "tab plots large column", run: enlargePanel },
+    { id: "theme", group: "Panel", words: "Light or dark theme", also: "colours colors bright night mode", run: toggleTheme },
 
-    { id: "export", group: "File", words: "Export the calibration or the clicks", keys: ["E"], also: "save download write file json yaml urdf tf format", run: openExport, when: withPictures },
+    { id: "export", group: "File", words: "Export the calibration or the clicks", keys: ["E"], also: "save download write file json yaml urdf tf format", run: () => openExport(), when: withPictures },
     { id: "recording", group: "File", words: "Choose another recording, other topics, intrinsics or session", also: "open file folder recent camera radar topic intrinsics", run: chooseRecording },
     { id: "save-camera", group: "File", words: "Save the intrinsics in use as camera.yaml", also: "export download camera_info lens", run: () => saveCamera(true), when: () => withPictures() || (state.lens?.intrinsics ? "" : "There are no intrinsics yet") },
     { id: "load-clicks", group: "File", words: "Load clicks from a file", also: "import open clicks.json", run: loadClicks, when: withPictures },
 
     { id: "palette", group: "Help", words: "Search for an action, placement, pair or option", keys: ["Ctrl+K"], also: "command palette find go to", run: togglePalette },
-    { id: "help", group: "Help", words: "Keys, mouse and marks", keys: ["?"], also: "help shortcuts legend manual", run: () => toggleHelp() },
+    { id: "help", group: "Help", words: "Help", keys: ["?"], also: "keys mouse marks shortcuts legend manual", run: () => toggleHelp() },
   );
 }

@@ -6,7 +6,6 @@
  * @property {string} group Heading in the help.
  * @property {string} words What it does, in the imperative.
  * @property {string[]} [keys] Keys that run it, such as "Ctrl+Shift+Z"; the first one is shown.
- * @property {string[]} [shows] Keys in the help, if another action has them and decides by what is on screen.
  * @property {string} [help] The line of the help, where neighbouring actions share one.
  * @property {string} [also] Other words by which someone may look for it.
  * @property {() => unknown} run

@@ -12,9 +12,9 @@ const MOUSE = [
   ["drag", "Pan the picture"],
   ["click", "Place the mark for this frame"],
   ["drag a mark", "Move it"],
-  ["drag", "With the tab Evaluate open: draw, move or resize a box; Shift+drag pans"],
+  ["drag", "With Evaluate open: draw, move or resize a box; Shift+drag pans"],
   ["drag", "In the rectified picture: a line along a straight edge; Shift+drag pans"],
-  ["Alt wheel", "Loupe: 4 to 16 times"],
+  ["Alt wheel", "Loupe: magnify more or less"],
   ["wheel", "On the timeline: zoom; with Shift: pan"],
   ["double click", "On the timeline: show all of it"],
 ];
@@ -67,7 +67,7 @@ function build() {
 function lines() {
   /** @type {{group: string, does: string, keys: string[]}[]} */
   const made = [];
-  for (const { group, words, help = words, shows, keys = shows } of ACTIONS) {
+  for (const { group, words, help = words, keys } of ACTIONS) {
     if (!keys) continue;
     const names = keyNames(keys[0]);
     const last = made.at(-1);

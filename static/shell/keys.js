@@ -78,10 +78,9 @@ function actionOf(event) {
  */
 /** @type {Group[]} */
 const GROUPS = [
-  { within: "#page-pairs", items: "tbody tr.row", back: "ArrowUp", on: "ArrowDown" },
+  { within: "#page-mark", items: "tbody tr.row", back: "ArrowUp", on: "ArrowDown" },
   { within: "#figures", items: ".figure", back: "ArrowLeft", on: "ArrowRight" },
   { within: "#page-pose", items: "tr[data-hint]", back: "ArrowUp", on: "ArrowDown" },
-  { within: "#recording-topics", items: ".fact", back: "ArrowLeft", on: "ArrowRight" },
 ];
 const CONTROLS = "button, input, select, a[href]";
 

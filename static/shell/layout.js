@@ -1,4 +1,4 @@
-/** The shape of the page for the window's size, dividers, panes, tabs and the theme; the user's choices are remembered. */
+/** The shape of the page for the window's size, dividers, panes, the panel's pages and the theme; the user's choices are remembered. */
 
 import { emit, on } from "./state.js";
 
@@ -21,6 +21,7 @@ export function startLayout() {
   for (const name of /** @type {const} */ (["right", "space", "split"])) if (!(Number(kept[name]) < 1)) delete kept[name];
   applyDividers();
   setTheme(kept.theme === "light" ? "light" : "dark");
+  showPage(tabs().some((tab) => nameOf(tab) === kept.tab) ? (kept.tab ?? "") : "mark");
   startPanes();
   addEventListener("resize", takeShape);
   takeShape();
@@ -28,43 +29,55 @@ export function startLayout() {
   startDivider("divider-y", followY);
   on(["box"], tellDividers);
   for (const bar of dividers()) for (const type of ["keyup", "pointerup", "focus"]) bar.addEventListener(type, tellDividers);
-  const theme = /** @type {HTMLElement} */ (document.getElementById("theme"));
-  theme.onclick = () => {
-    kept.theme = root.dataset.theme === "light" ? "dark" : "light";
-    setTheme(kept.theme);
-    keep({});
-  };
-  for (const tab of tabs()) tab.onclick = () => showTab(tab.id);
+  for (const tab of tabs()) tab.onclick = () => showPage(nameOf(tab));
+  element("menu").addEventListener("click", () => element("menu").hidePopover());
   document.getElementById("tabs")?.addEventListener("keydown", (event) => {
     const at = tabs().findIndex((tab) => tab === document.activeElement);
     const next = event.key === "ArrowRight" ? at + 1 : event.key === "ArrowLeft" ? at - 1 : -1;
     if (at < 0 || !tabs()[next]) return;
-    showTab(tabs()[next].id);
+    showPage(nameOf(tabs()[next]));
     tabs()[next].focus();
   });
-  showTab(kept.tab && document.getElementById(kept.tab) ? kept.tab : "tab-pairs");
 }
 
 const tabs = () => /** @type {HTMLElement[]} */ ([...document.querySelectorAll("#tabs button")]);
 
-/** @param {string} id */
-export function showTab(id) {
+/** @param {HTMLElement} part a tab or a page */
+const nameOf = (part) => part.id.replace(/^(tab|page)-/, "");
+
+/** Show a page of the panel: the one of a tab, or a sheet in the place of the tabs. @param {string} name */
+export function showPage(name) {
+  const isSheet = !tabs().some((tab) => nameOf(tab) === name);
+  for (const page of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("#panel > .page"))) page.hidden = nameOf(page) !== name;
   for (const tab of tabs()) {
-    const chosen = tab.id === id;
-    tab.setAttribute("aria-selected", String(chosen));
-    tab.tabIndex = chosen ? 0 : -1;
-    const page = document.getElementById(tab.getAttribute("aria-controls") ?? "");
-    if (page) page.hidden = !chosen;
+    tab.setAttribute("aria-selected", String(nameOf(tab) === name));
+    tab.tabIndex = nameOf(tab) === name ? 0 : -1;
   }
-  keep({ tab: id });
+  element("tabs").hidden = isSheet;
+  element("sheet-title").hidden = element("sheet-close").hidden = !isSheet;
+  element("sheet-title").textContent = isSheet ? element(`page-${name}`).getAttribute("aria-label") : "";
+  if (!isSheet) keep({ tab: name });
+  if (root.dataset.pane) showPane("panel");
+  else emit("box");
+}
+
+/** Go back from a sheet to the tab before. */
+export const closeSheet = () => showPage(kept.tab ?? "mark");
+
+/** Give the panel the whole column, or the 3D view its place back. */
+export function enlargePanel() {
+  document.body.classList.toggle("panel-large");
   emit("box");
 }
 
 /** @param {string} theme */
 function setTheme(theme) {
   root.dataset.theme = theme;
+  keep({ theme });
   emit("theme");
 }
+
+export const toggleTheme = () => setTheme(root.dataset.theme === "light" ? "dark" : "light");
 
 /** Choose the arrangement: "wide" has everything side by side, "low" the picture and one pane, "tall" the picture above one pane. */
 function takeShape() {

@@ -3,7 +3,7 @@
  * on a recording without intrinsics, and camera files dropped on the page.
  */
 
-import { showTab } from "./layout.js";
+import { showPage } from "./layout.js";
 import { make, toast } from "./notices.js";
 import { send, tell, unconfirmed } from "./socket.js";
 import { on, state } from "./state.js";
@@ -16,6 +16,8 @@ const MAX_FILE_BYTES = 512 * 1024;
 const dialog = /** @type {HTMLDialogElement} */ (document.getElementById("opening-dialog"));
 const pane = /** @type {HTMLElement} */ (document.getElementById("picture-pane"));
 const strip = make("div", "", "");
+/** What is to be known of the recording that is open; pairs/warnings.js draws it. */
+export const notes = make("section", "notes", []);
 /** @type {Choices|null} */
 let choices = null;
 /** @type {Draft} */
@@ -38,7 +40,7 @@ export function startOpening() {
     if (dialog.open) dialog.close();
   });
   dialog.addEventListener("cancel", (event) => {
-    if (!choices?.is_open) event.preventDefault(); // there is nothing behind it
+    if (!state.recording) event.preventDefault(); // there is nothing behind it
   });
   window.addEventListener("dragover", (event) => {
     if (!carriesFile(event)) return;
@@ -101,10 +103,14 @@ export function takeFolder(message) {
 /** Ask what can be chosen, and show it. */
 export async function chooseRecording() {
   if (dialog.open) return;
+  if (state.recording) {
+    draw(); // what is known of it, until the server says what can be chosen
+    dialog.showModal();
+  }
   if (!(await known())) return;
   if (choices?.root && !folder) tell({ type: "folder", path: "" });
   draw();
-  dialog.showModal();
+  if (!dialog.open && !state.recording) dialog.showModal();
 }
 
 /** Wait for the present choices. @returns {Promise<boolean>} whether the server can be asked */
@@ -118,27 +124,31 @@ async function known() {
 }
 
 function draw() {
-  if (!choices) return;
-  const title = make("h2", "", choices.is_open || !choices.name ? "Recording" : `${choices.name} cannot be opened as it is`);
+  const title = make("h2", "", !choices || choices.is_open || !choices.name ? "Recording" : `${choices.name} cannot be opened as it is`);
   title.id = "opening-title";
   title.tabIndex = -1;
   title.autofocus = true;
-  const words = problem || choices.problem;
+  const words = problem || (choices?.problem ?? "");
   const box = make("p", "problem", words);
   box.setAttribute("role", "alert");
   box.hidden = !words;
+  const scrolled = dialog.querySelector(".parts")?.scrollTop ?? 0;
+  dialog.replaceChildren(make("header", "", [title, close()]), box, make("div", "parts", [notes, drawReading(), ...(choices ? drawChoices(choices) : [])]), ...(choices ? [footer()] : []));
+  /** @type {HTMLElement} */ (dialog.querySelector(".parts")).scrollTop = scrolled;
+}
+
+/** @param {Choices} choices */
+function drawChoices(choices) {
   const tools = { choices, draft, folder, redraw: draw, give, choose, enter, forget };
   const parts = choices.name ? [drawTopics(tools, "radar"), drawTopics(tools, "image"), drawIntrinsics(tools), drawSession(tools)] : [];
-  const scrolled = dialog.querySelector(".parts")?.scrollTop ?? 0;
-  dialog.replaceChildren(make("header", "", [title, close()]), box, make("div", "parts", [...parts, drawOthers(tools)]), footer());
-  /** @type {HTMLElement} */ (dialog.querySelector(".parts")).scrollTop = scrolled;
+  return [...parts, drawOthers(tools)];
 }
 
 function close() {
   const button = make("button", "icon close", "×");
   button.setAttribute("aria-label", "Close");
   button.onclick = () => dialog.close();
-  button.hidden = !choices?.is_open;
+  button.hidden = !state.recording;
   return button;
 }
 
@@ -243,7 +253,7 @@ function askIntrinsics() {
   const pick = make("button", "chip", "Choose file…");
   pick.onclick = () => input.click();
   const calibrate = make("button", "chip", "Calibrate…");
-  calibrate.onclick = () => showTab("tab-lens");
+  calibrate.onclick = () => showPage("lens");
   const others = make("button", "chip", "More…");
   others.onclick = chooseRecording;
   strip.replaceChildren(make("span", "", [make("strong", "", "No camera intrinsics. "), "Click already; the pose comes once the lens is calibrated or its file is dropped here."]), calibrate, pick, others, input);
@@ -267,6 +277,14 @@ function option({ group, label, about, checked, disabled = false, choose, kind =
   input.onchange = choose;
   const made = make("label", disabled ? "choice off" : "choice", [input, make("span", "name", label), make("small", "", about)]);
   return made;
+}
+
+/** How the recording that is open is read: clocks, axes, units. */
+function drawReading() {
+  const rows = (state.recording?.sensors ?? []).flatMap(({ name, topic, about }) => [make("p", "why", [make("strong", "", `${name}: ${topic}`), ...about.map((line) => make("div", "", line))])]);
+  const box = make("details", "reading", [make("summary", "", "How it is read"), ...rows]);
+  box.hidden = !rows.length;
+  return box;
 }
 
 /** The radars or the cameras of the recording. @param {Tools} tools @param {"radar"|"image"} which */

@@ -1,6 +1,6 @@
 /** The options, built from the server's descriptions: the most used first, all others below. */
 
-import { showTab } from "./layout.js";
+import { showPage } from "./layout.js";
 import { make, settled, toast } from "./notices.js";
 import { send } from "./socket.js";
 import { on, state } from "./state.js";
@@ -143,7 +143,7 @@ function yesNo(field) {
   return row(field, make("span", "control", [input]));
 }
 
-/** Measured camera position: off, or three distances, and how they were measured or their standard deviation. @param {Field} field */
+/** Measured camera position: off, or three distances and their standard deviation. @param {Field} field */
 function cameraPosition(field) {
   const enabled = make("input", "", []);
   enabled.type = "checkbox";
@@ -155,13 +155,8 @@ function cameraPosition(field) {
   });
   const sigma = number(0.0001, 10);
   sigma.dataset.hint = "Standard deviation of each of the three distances [m]";
-  const ways = Object.entries(field.measured);
-  const how = make("select", "", [...ways.map(([words]) => words), "otherwise"].map((words) => make("option", "", words)));
-  how.id = `${idOf(field)}-how`;
-  how.dataset.hint = "How the three distances were measured; this sets their standard deviation";
   const named = [...inputs, sigma].map((input, index) => make("label", "", [make("span", "", names[index] ?? "± sigma"), input]));
-  const measured = make("label", "how", [make("span", "", "measured"), how]);
-  const numbers = make("span", "control triple", [...named, make("span", "unit", "m"), measured]);
+  const numbers = make("span", "control triple", [...named, make("span", "unit", "m")]);
   numbers.setAttribute("role", "group");
   numbers.setAttribute("aria-label", "Camera position relative to the radar");
   const submit = () => {
@@ -171,16 +166,11 @@ function cameraPosition(field) {
   enabled.onchange = () => {
     numbers.hidden = !enabled.checked;
     if (!enabled.checked) return change(field.path, null);
-    if (sigma.value === "") sigma.value = String(ways[0][1]);
+    if (sigma.value === "") sigma.value = "0.01";
     inputs[0].focus();
     submit();
   };
   for (const input of [...inputs, sigma]) input.onchange = submit;
-  how.onchange = () => {
-    const way = ways[how.selectedIndex];
-    if (way) sigma.value = String(way[1]);
-    submit();
-  };
   writers.set(field.path, (value) => {
     const entered = inputs.every((input) => input.value !== "");
     if (value === null && enabled.checked && (!entered || numbers.contains(document.activeElement))) return; // the values are still being entered
@@ -189,8 +179,6 @@ function cameraPosition(field) {
     if (value === null) return; // keep what was entered, in case it is enabled again
     inputs.forEach((input, index) => write(input, value.position_m[index]));
     write(sigma, value.sigma_m);
-    const way = ways.findIndex(([, sigmaM]) => sigmaM === value.sigma_m);
-    how.selectedIndex = way < 0 ? ways.length : way;
   });
   const head = row(field, make("span", "control", [enabled]));
   const box = make("div", "position", [head, numbers]);
@@ -260,7 +248,7 @@ export function optionRows() {
 
 /** Show an option in the panel, ready to be changed. @param {string} path */
 export function openOption(path) {
-  showTab("tab-options");
+  showPage("options");
   const line = /** @type {HTMLElement|null} */ (page.querySelector(`[data-field="${path}"]`));
   const folded = line?.closest("details");
   if (folded) folded.open = true;

@@ -200,14 +200,6 @@ function apart(click, placement) {
   return Math.hypot((Number(click.range_m) - placement.range_m) / APART_M, aside / ASIDE_M);
 }
 
-/** Returns a message if the radar position used for a click is not that of a placement in the timeline, else "". @param {Click} click */
-export function rangeApart(click) {
-  const range = click.range_m;
-  const here = placementsAt(click.frame);
-  if (!here.length || range === null || here.some((one) => Math.abs(range - one.range_m) < APART_M)) return "";
-  return `This pair is at ${range.toFixed(1)} m, but the placement is at ${here.map((one) => one.range_m.toFixed(1)).join(" and ")} m`;
-}
-
 /** Change the selection. @param {string|null} id */
 export function select(id) {
   if (state.selected === id) return;

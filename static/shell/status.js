@@ -3,16 +3,16 @@
  * where there is no room, in full on hover.
  */
 
-import { nextWords } from "../pairs/steps.js";
 import { toDevice, viewport, zoom } from "../picture/geometry.js";
 import { fit } from "../picture/picture.js";
+import { searchWords } from "../proposals/proposals.js";
 import { icon, make } from "./notices.js";
 import { on, state } from "./state.js";
 
 /** @param {string} id */
 const get = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
 /** Buttons that are disabled until the recording is open. */
-const NEED_FRAMES = ["export", "play", "step-back", "step-forward", "previous-placement", "next-placement"];
+const NEED_FRAMES = ["play", "step-back", "step-forward", "previous-placement", "next-placement"];
 /** A return this close to the pointer is shown in the readout [CSS px]. */
 const REACH = 8;
 
@@ -39,26 +39,11 @@ function drawRecording() {
   const recording = state.recording;
   if (!recording) return;
   setLongName(get("recording-name"), recording.name);
-  const picture = `${recording.width_px} × ${recording.height_px} px`;
-  const size = recording.has_pictures ? [fact("picture", picture, `Size of every frame: ${picture}`)] : [];
-  for (const made of size) made.classList.add("short");
-  get("recording-topics").replaceChildren(...recording.sensors.map(sensorFact), ...size);
+  get("choose-recording").dataset.hint = `${recording.name}\nHow it is read, its warnings; another recording, other topics, intrinsics or session`;
+  const received = recording.sensors.filter(({ clock }) => clock === "receive").map(({ name }) => name); // they include the driver's delay
+  get("recording-topics").textContent = received.length ? `receive time: ${received.join(", ")}` : "";
   get("status-right").textContent = `cocalib ${recording.version}`;
   get("status-right").dataset.hint = recording.has_pictures ? `Every click is saved immediately in\n${recording.session.folder}` : "Nothing is saved: there are no pictures to click in.";
-}
-
-/** @param {string} name @param {string} value @param {string} hint */
-function fact(name, value, hint) {
-  const made = make("span", "fact", [make("small", "", name), longName(value)]);
-  made.dataset.hint = hint;
-  return made;
-}
-
-/** A topic; receive times are highlighted, since they include the driver's delay. @param {import("../messages.js").SensorNote} sensor */
-function sensorFact(sensor) {
-  const made = fact(sensor.name, sensor.topic, [`${sensor.name}: ${sensor.topic}`, ...sensor.about].join("\n"));
-  if (sensor.clock === "receive") made.append(make("small", "by-receiving", "receive time"));
-  return made;
 }
 
 function drawStatus() {
@@ -68,9 +53,9 @@ function drawStatus() {
   get("connection").dataset.stage = view?.stage ?? "collecting";
   const opening = state.opening;
   const found = state.looking ? [state.placementSummary, view?.status ?? ""].filter(Boolean) : null;
-  const words = found?.length ? found : opening || !view ? [opening?.problem || opening?.doing || "Opening the recording…"] : [...followWords(), view.status, nextWords()].filter(Boolean);
+  const words = found?.length ? found : opening || !view ? [opening?.problem || opening?.doing || "Opening the recording…"] : [...followWords(), doingWords(view)].filter(Boolean);
   get("status-text").textContent = words.join("  ·  ");
-  get("status-text").dataset.hint = [...words, view?.stage === "unsolvable" ? view.hint : ""].filter(Boolean).join("\n");
+  get("status-text").dataset.hint = words.join("\n");
   const undo = /** @type {HTMLButtonElement} */ (get("undo"));
   const redo = /** @type {HTMLButtonElement} */ (get("redo"));
   undo.disabled = state.looking || !view?.can_undo;
@@ -85,6 +70,13 @@ function drawStatus() {
   if (!progress || !running) return;
   bar.max = progress.total;
   bar.value = progress.done;
+}
+
+/** What is going on: how good the answer is says the verdict, and what to do the line on the frame. @param {import("../messages.js").View} view */
+function doingWords(view) {
+  if (!state.connected) return "Not connected";
+  if (view.solving) return view.checking ? "Checking…" : "Solving…";
+  return searchWords() || (view.reference && !view.has_calibration ? view.status : "Connected");
 }
 
 /** How a recording that is still being written goes on, and where the next placement pays. @returns {string[]} */
@@ -139,19 +131,11 @@ const SHORT = 28;
 /** Right-to-left letters: a name with them is cut at its end only, since parts of mixed directions would change places. */
 const RIGHT_TO_LEFT = /[\p{Script=Arabic}\p{Script=Hebrew}\p{Script=Syriac}\p{Script=Thaana}\p{Script=Nko}]/u;
 
-/** A name in two parts, of which the first gives way. @param {string} name */
-function longName(name) {
-  const made = make("span", "long-name", parts(name));
-  made.dir = "auto"; // a right-to-left name keeps its own order, and its neighbours theirs
-  return made;
-}
-
 /** Show a name in an element that is there already, and all of it on hover. @param {HTMLElement} owner @param {string} name */
 function setLongName(owner, name) {
   owner.classList.add("long-name");
   owner.dir = "auto";
   owner.replaceChildren(...parts(name));
-  owner.dataset.hint = name;
 }
 
 /** @param {string} name */

@@ -164,7 +164,7 @@ function draw() {
 /** @param {Look} look @param {NonNullable<ReturnType<typeof placing>>} place @param {Board} board */
 function drawLook(look, place, board) {
   if (spaceOptions.camera) drawReturns(look, place);
-  pen.font = `600 10.5px ${themeColour("mono")}`;
+  pen.font = `600 11px ${themeColour("face")}`;
   for (const { words, position_m, kind } of look.labels) {
     const reflector = kind === "selected" ? look.reflectors.find(({ id }) => id === state.selected) : undefined;
     const at = place(position_m, reflector?.pixel_px ?? null);
@@ -182,7 +182,7 @@ function drawLook(look, place, board) {
   }
   if (spaceOptions.camera) return;
   const words = (/** @type {number} */ range) => `${Number(range.toPrecision(3))} m`;
-  pen.font = `10.5px ${themeColour("mono")}`;
+  pen.font = `11px ${themeColour("face")}`;
   const project = (/** @type {readonly number[]} */ point) => place(point, null);
   const size = (/** @type {number} */ range) => /** @type {[number, number]} */ ([pen.measureText(words(range)).width + 8, LABEL_HIGH]);
   for (const { range, x, y } of ringPlaces(look.rings_m, look.ground_m, project, board, size)) write(words(range), x, y, "muted");

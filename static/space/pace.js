@@ -1,7 +1,7 @@
 /**
  * Runs in the 3D view's frame, before viser's own script. Viser draws as often as it can and shares its thread with our page;
  * without a graphics card, every drawing delays the picture. The 3D view therefore draws at full rate only while the user moves
- * it, and the picture has priority.
+ * it, the picture has priority, and nothing is drawn once nothing has arrived, moved or changed size for a while.
  */
 {
   /** Minimum time between two drawings [ms]. */
@@ -9,6 +9,8 @@
   const PLAYING = 1000;
   /** How long after the last input the view counts as being moved [ms]. */
   const TOUCH = 1200;
+  /** How long after something arrived or moved it may still change what is drawn [ms]: pictures are decoded meanwhile. */
+  const AWAKE = 3000;
 
   const frame = window.requestAnimationFrame.bind(window);
   /** @type {Map<number, FrameRequestCallback>} */
@@ -17,6 +19,13 @@
   let drawn = 0;
   let touched = -TOUCH;
   let coming = false;
+  let woken = performance.now();
+
+  /** Something has arrived, moved or changed size. */
+  function wake() {
+    woken = performance.now();
+    if (waiting.size) schedule();
+  }
 
   /** When the next drawing may happen. @param {number} now */
   function next(now) {
@@ -25,9 +34,9 @@
     return Math.max(drawn + (page.playing ? (page.every ?? PLAYING) : QUIET), page.holdUntil ?? 0);
   }
 
-  /** Draw when it is time, with all callbacks in one frame. */
+  /** Draw when it is time, with all callbacks in one frame; while nothing happens, they wait. */
   function schedule() {
-    if (coming) return;
+    if (coming || performance.now() - Math.max(woken, touched) > AWAKE) return;
     coming = true;
     const now = performance.now();
     const wait = next(now) - now;
@@ -54,6 +63,20 @@
   window.cancelAnimationFrame = (handle) => {
     waiting.delete(handle);
   };
+  for (const name of /** @type {const} */ (["Worker", "WebSocket"])) {
+    /** @type {any} */
+    const Original = window[name];
+    /** @type {any} */ (window)[name] = class extends Original {
+      /** @param {...any} given */
+      constructor(...given) {
+        super(...given);
+        this.addEventListener("message", wake);
+      }
+    };
+  }
+  for (const type of ["pointermove", "pointerdown", "wheel", "touchstart", "keydown", "resize", "load"])
+    window.addEventListener(type, wake, { capture: true, passive: true });
+  /** @type {any} */ (window).cocalibWake = wake;
   for (const type of ["pointerdown", "wheel", "touchstart", "keydown"])
     window.addEventListener(type, () => (touched = performance.now()), { capture: true, passive: true });
   window.addEventListener("pointermove", (event) => event.buttons && (touched = performance.now()), { capture: true, passive: true });

@@ -91,12 +91,12 @@ function startChips() {
   cameraChip.dataset.viewpoint = "camera";
   largeChip.append(icon("large"));
   for (const [made, id] of /** @type {[HTMLElement, string][]} */ ([[cameraChip, "space-camera"], [largeChip, "space-large"], [hideChip, "space-hide"], [trailChip, "space-trail"], [colours, "space-colour"]])) made.id = id;
-  group.append(cameraChip, largeChip, hideChip);
+  group.append(cameraChip, colours, trailChip, largeChip, hideChip);
   colours.setAttribute("aria-label", "What the colours of the returns mean");
   colours.dataset.hint = "What the colours of the returns mean";
   colours.onchange = () => change({ colour: /** @type {Colour} */ (colours.value) });
   readout.setAttribute("role", "status");
-  pane.append(make("div", "space-bar", [colours, legend, trailChip, standing]), readout);
+  pane.append(make("div", "space-bar", [legend, standing]), readout);
 }
 
 /** @param {string} label @param {string} hint @param {() => void} action */

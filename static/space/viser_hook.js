@@ -13,6 +13,8 @@ const [RADAR, SHOWN] = ["/radar", "/shown"];
 let viser = null;
 /** @type {any} */
 let hookedScene = null;
+/** Lets it draw again while nothing happens (pace.js). */
+let wakeUp = () => {};
 
 /** A frame whose page could not be loaded shows a page of the browser's, which nothing can be read from. @param {any} owner */
 function partsOf(owner) {
@@ -54,6 +56,7 @@ export async function hookInto(owner, drawn) {
   }
   if (missing.length) return missing;
   viser = /** @type {any} */ (owner).__viserMutable;
+  wakeUp = /** @type {any} */ (owner).cocalibWake ?? wakeUp;
   hook(drawn);
   return [];
 }
@@ -71,7 +74,10 @@ function hook(drawn) {
 }
 
 /** Draw the 3D view again, for example after its size has changed. */
-export const drawAgain = () => viser?.requestRender();
+export function drawAgain() {
+  wakeUp();
+  viser?.requestRender();
+}
 
 /** The frame that the 3D view has drawn, and the number of that drawing; null before the first. @returns {{index: number, number: number}|null} */
 export function shownThere() {

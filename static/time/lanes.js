@@ -51,7 +51,7 @@ export function drawLanes(pen, width, height, axis, pointer) {
   pen.clearRect(0, 0, width, height);
   if (!state.seconds.length) return;
   const boxes = laneBoxes(height);
-  [text.px, lanes.left] = height >= LARGE ? [13.5, 96] : [10.5, 74];
+  [text.px, lanes.left] = height >= LARGE ? [14, 96] : [11, 74];
   pen.save();
   pen.beginPath();
   pen.rect(lanes.left - 8, 0, width - lanes.left + 8, height);

@@ -11,11 +11,11 @@ import { themeColour } from "../shell/colours.js";
 /** Height of the ruler [CSS px]. */
 export const RULER = 17;
 /** Size of the text in the timeline [CSS px]. */
-export const text = { px: 10.5 };
+export const text = { px: 11 };
 
 /** Ticks and times; each stretch after a folded gap begins with its own time. @param {Ink} pen @param {number} left @param {number} width @param {number} height @param {Axis} axis */
 export function drawRuler(pen, left, width, height, axis) {
-  pen.font = `${text.px}px ${themeColour("mono")}`;
+  pen.font = `${text.px}px ${themeColour("face")}`;
   pen.textBaseline = "middle";
   pen.textAlign = "center";
   const stretches = axis.folding.stretches.filter(({ from, to }) => to >= axis.from_s && from <= axis.to_s);

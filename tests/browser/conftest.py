@@ -110,10 +110,16 @@ def open_page(chromium: Browser, request: pytest.FixtureRequest) -> Iterator[Cal
     contexts = []
 
     def open_one(
-        url: str, browser: Browser | None = None, ready: str = "__cocalib.state.shown", **context_options: Any
+        url: str,
+        browser: Browser | None = None,
+        ready: str = "__cocalib.state.shown",
+        script: str = "",
+        **context_options: Any,
     ) -> Driver:
         context = (browser or chromium).new_context(**{"viewport": {"width": 1280, "height": 720}, **context_options})
         contexts.append(context)
+        if script:
+            context.add_init_script(script)
         if without_3d_view:
             context.add_init_script(EMPTY_3D_VIEW)
         drivers.append(Driver(context.new_page(), url, ready))

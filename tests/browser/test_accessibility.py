@@ -40,11 +40,13 @@ def test_axe_finds_nothing_in_any_state_of_the_page(page: Driver, truth: Any) ->
     page.drag((u, v), (u + 150, v - 90))
     look("a wrong pair")
     page.press("x")
-    user.click("#tab-pose")
+    user.click("#tab-check")
     look("pose")
-    user.click("#tab-options")
+    user.click("#menu-button")
+    user.click('#menu [data-action="options"]')
     user.click("#page-options summary")
     look("options")
+    user.click("#menu-button")
     user.click("#theme")
     look("options, light")
     user.fill("#option-gating-max_range_m", "-5")
@@ -52,7 +54,8 @@ def test_axe_finds_nothing_in_any_state_of_the_page(page: Driver, truth: Any) ->
     page.until("document.querySelector('.toast')")
     look("a refusal, light")
     user.click(".toast button")
-    user.click("#tab-pairs")
+    user.click("#sheet-close")
+    user.click("#tab-mark")
     look("pairs with an excluded one, light")
     for key, selector in (("?", "#help-dialog"), ("Control+k", "#palette"), ("e", "#export-dialog")):
         user.keyboard.press(key)
@@ -61,6 +64,7 @@ def test_axe_finds_nothing_in_any_state_of_the_page(page: Driver, truth: Any) ->
             expect(user.locator("#export-dialog .text")).to_contain_text("camera_from_radar")
         look(f"{selector}, light")
         user.keyboard.press("Escape")
+    user.click("#menu-button")
     user.click("#theme")
     user.keyboard.press("e")
     expect(user.locator("#export-dialog .text")).to_contain_text("camera_from_radar")
@@ -94,9 +98,9 @@ def test_axe_finds_nothing_without_pictures_and_keys_reach_each_placement(
     open_page: Callable[..., Driver], radar_only_server: RunningServer
 ) -> None:
     page = open_page(radar_only_server.url, ready="__cocalib.state.look", reduced_motion="reduce")
-    page.until("document.querySelectorAll('#page-pairs .row').length > 3")
+    page.until("document.querySelectorAll('#page-mark .row').length > 3")
     assert violations(page) == []
-    page.page.locator("#page-pairs .row").first.focus()
+    page.page.locator("#page-mark .row").first.focus()
     page.page.keyboard.press("ArrowDown")
     page.page.keyboard.press("ArrowDown")
     page.page.keyboard.press("Enter")
@@ -126,8 +130,8 @@ def test_the_picture_and_its_marks_are_told_in_words(page: Driver, truth: Any) -
         assert low < before < high
         divider.focus()
         for _ in range(4):
-            page.page.keyboard.press("ArrowLeft" if low == 30 else "ArrowUp")
-        page.until(f"document.activeElement.getAttribute('aria-valuenow') < {before}")
+            page.page.keyboard.press("ArrowLeft" if low == 30 else "ArrowDown")
+        page.until(f"Number(document.activeElement.getAttribute('aria-valuenow')) !== {before}")
 
 
 def test_tab_reaches_every_control_in_order_and_is_never_caught(page: Driver, truth: Any) -> None:
@@ -162,7 +166,7 @@ def test_tab_reaches_every_control_in_order_and_is_never_caught(page: Driver, tr
 def test_arrows_go_through_the_pairs_and_the_figures(page: Driver, truth: Any) -> None:
     page.load_sample(truth, 5)
     user = page.page
-    rows = user.locator("#page-pairs tr.row")
+    rows = user.locator("#page-mark tr.row")
     expect(rows).to_have_count(5)
     rows.nth(3).focus()
     for key in ("ArrowUp", "ArrowUp", "Enter"):
@@ -172,6 +176,7 @@ def test_arrows_go_through_the_pairs_and_the_figures(page: Driver, truth: Any) -
     page.press("x")
     page.until("__cocalib.state.view.clicks[1].state === 'excluded'")
     page.until("document.activeElement.dataset.id === 'c2'")  # the row was drawn again
+    user.click("#tab-check")
     user.locator("#figures .figure").first.focus()
     user.keyboard.press("ArrowRight")
     page.until("document.activeElement.dataset.key === 'held_out_aed'")

@@ -95,7 +95,7 @@ def test_a_recording_is_found_below_the_root_and_its_other_radar_is_chosen(
     page.until(f"{DIALOG} && document.querySelector('#opening-dialog .problem').innerText.includes('damaged.bag')")
     page.page.keyboard.press("Escape")
     assert page.value(f"Boolean({DIALOG})")  # there is nothing behind the question
-    page.page.click("#opening-dialog summary")
+    page.page.click("#opening-dialog details.others summary")
     page.page.click("#opening-dialog button:has-text('look into two /')")
     for name in ("radar.bag", "camera.bag"):
         page.page.check(f"#opening-dialog label:has-text('{name}') input")
@@ -115,7 +115,7 @@ def test_a_recording_is_found_below_the_root_and_its_other_radar_is_chosen(
     second = open_page(server.url)
     second.page.click("#choose-recording")
     second.until(DIALOG)
-    second.page.click("#opening-dialog summary")
+    second.page.click("#opening-dialog details.others summary")
     assert "radar.bag" in second.text("#opening-dialog .others")
     second.page.click("text=Clear the list")
     second.until("document.querySelector('#opening-dialog .others').innerText.includes('No other recording')")

@@ -26,12 +26,12 @@ def test_explanations_show_on_hover_and_focus_beside_what_they_explain(page: Dri
     user = page.page
     tip = user.locator("#tip")
     for selector, words in (
-        ('#figures [data-key="aed"]', "Mean distance between click and reprojection"),
-        ("#recording-topics .fact", "radar"),
+        ("#verdict .aed", "Mean distance between click and reprojection"),
+        ("#choose-recording", "sample"),
         ("#undo", "Undo (Ctrl+Z)"),
         ("#redo", "Redo (Ctrl+Shift+Z)"),  # disabled: it cannot be focused
         ("#next-placement", "Next placement (N)"),
-        ("#page-pairs tr.row", "reprojected at"),
+        ("#page-mark tr.row", "reprojected at"),
     ):
         user.mouse.move(640, 300)
         expect(tip).to_be_hidden()
@@ -43,9 +43,9 @@ def test_explanations_show_on_hover_and_focus_beside_what_they_explain(page: Dri
         user.keyboard.press("Escape")
         expect(tip).to_be_hidden()
     user.mouse.move(640, 300)
-    user.locator("#help").focus()
+    user.locator("#menu-button").focus()
     user.keyboard.press("Shift+Tab")
-    expect(tip).to_contain_text("theme")
+    expect(tip).to_contain_text("Ctrl+K")
     user.keyboard.press("e")
     expect(user.locator("#export-dialog .text")).to_contain_text("camera_from_radar")
     user.hover("#export-dialog .pose-numbers")
@@ -63,7 +63,8 @@ def test_explanations_show_on_hover_and_focus_beside_what_they_explain(page: Dri
 def test_a_notice_covers_neither_the_field_nor_the_mark(page: Driver, truth: Any) -> None:
     page.load_sample(truth, 2)
     user = page.page
-    user.click("#tab-options")
+    user.click("#menu-button")
+    user.click('#menu [data-action="options"]')
     user.click("#page-options summary")
     field = "#option-gating-max_speed_mps"
     user.locator(field).scroll_into_view_if_needed()
@@ -77,7 +78,7 @@ def test_a_notice_covers_neither_the_field_nor_the_mark(page: Driver, truth: Any
         assert box is not None
         assert not (box["x"] <= x <= box["x"] + box["width"] and box["y"] <= y <= box["y"] + box["height"])
         user.click(".toast button")
-    user.click("#tab-pairs")
+    user.click("#sheet-close")
     page.value("__cocalib.goTo(0)")
 
 

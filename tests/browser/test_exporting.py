@@ -63,6 +63,7 @@ def saved(page: Driver, folder: Path) -> Path:
 
 
 def test_before_a_calibration_the_panel_says_what_is_missing_and_gives_the_clicks(page: Driver, tmp_path: Path) -> None:
+    page.page.click("#tab-deliver")
     page.page.click("#export")
     expect(page.page.locator(f"{DIALOG} .reason")).to_contain_text("four placements")
     expect(page.page.locator(f"{DIALOG} .first")).to_be_disabled()
@@ -71,6 +72,7 @@ def test_before_a_calibration_the_panel_says_what_is_missing_and_gives_the_click
 
 
 def test_the_text_shown_is_the_file_that_is_saved_and_it_is_the_calibration(solved: Driver, tmp_path: Path) -> None:
+    solved.page.click("#tab-deliver")
     solved.page.click("#export")
     choose(solved, "json")
     reference = read_any_file(saved(solved, tmp_path))
@@ -91,6 +93,7 @@ def test_the_text_shown_is_the_file_that_is_saved_and_it_is_the_calibration(solv
 
 def test_the_direction_of_the_file_is_bold_and_the_table_holds_its_own_numbers(solved: Driver) -> None:
     page, shown = solved.page, {}
+    page.click("#tab-deliver")
     page.click("#export")
     for name, rightwards, equation in (
         ("tf2", False, "p_radar = R p_camera + t"),
@@ -125,6 +128,7 @@ def test_the_check_point_is_said_and_marked_on_the_picture_and_the_evidence_is_t
     solved: Driver,
 ) -> None:
     page = solved.page
+    page.click("#tab-deliver")
     page.click("#export")
     choose(solved, "opencv")
     point = solved.value("fetch('api/preview/opencv').then((answer) => answer.json())")["check_point"]
@@ -185,6 +189,7 @@ def test_frames_get_the_names_that_the_user_types_and_a_wrong_one_is_refused_at_
     solved: Driver, tmp_path: Path
 ) -> None:
     page = solved.page
+    page.click("#tab-deliver")
     page.click("#export")
     choose(solved, "tf2")
     radar, camera = (page.locator(f'{DIALOG} [data-field="{name}_frame"]') for name in ("radar", "camera"))
@@ -208,6 +213,7 @@ def test_frames_get_the_names_that_the_user_types_and_a_wrong_one_is_refused_at_
 
 
 def test_a_name_given_by_hand_is_the_name_of_the_file(solved: Driver, tmp_path: Path) -> None:
+    solved.page.click("#tab-deliver")
     solved.page.click("#export")
     choose(solved, "urdf")
     solved.page.fill(f"{DIALOG} .name input", "front.urdf")
@@ -215,10 +221,12 @@ def test_a_name_given_by_hand_is_the_name_of_the_file(solved: Driver, tmp_path: 
 
 
 def test_the_choice_is_remembered(solved: Driver) -> None:
+    solved.page.click("#tab-deliver")
     solved.page.click("#export")
     choose(solved, "kalibr")
     solved.page.reload()
     solved.until("__cocalib.state.shown && __cocalib.state.view.has_calibration")
+    solved.page.click("#tab-deliver")
     solved.page.click("#export")
     expect(solved.page.locator(f'{DIALOG} [data-export="kalibr"]')).to_have_attribute("aria-selected", "true")
     expect(solved.page.locator(f"{DIALOG} .text")).to_contain_text("T_cam_radar")
@@ -227,6 +235,7 @@ def test_the_choice_is_remembered(solved: Driver) -> None:
 def test_the_radar_can_be_posed_in_the_kit_and_a_wrong_pose_is_refused_with_a_reason(
     solved: Driver, tmp_path: Path
 ) -> None:
+    solved.page.click("#tab-deliver")
     solved.page.click("#export")
     choose(solved, "autoware")
     before = read_any(saved(solved, tmp_path).read_bytes())
@@ -254,6 +263,7 @@ def test_a_format_that_cannot_store_distortion_comes_with_maps_until_the_picture
     solved: Driver, tmp_path: Path
 ) -> None:
     page = solved.page
+    page.click("#tab-deliver")
     page.click("#export")
     choose(solved, "opencv")
     expect(page.locator(RECTIFIED)).to_be_hidden()
@@ -280,6 +290,7 @@ def test_a_format_that_cannot_store_distortion_comes_with_maps_until_the_picture
 
     page.reload()
     solved.until("__cocalib.state.shown && __cocalib.state.view.has_calibration")
+    page.click("#tab-deliver")
     page.click("#export")
     page.click(f'{DIALOG} [data-export="kitti"]')
     expect(page.locator(RECTIFIED)).to_be_checked()
@@ -307,6 +318,7 @@ def test_a_keyboard_is_enough_and_stays_in_the_panel(solved: Driver) -> None:
 
 def test_copy_puts_the_text_on_the_clipboard(solved: Driver) -> None:
     solved.page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    solved.page.click("#tab-deliver")
     solved.page.click("#export")
     choose(solved, "matrix")
     solved.page.click(f"{DIALOG} .second:has-text('Copy')")
@@ -318,6 +330,7 @@ def test_copy_puts_the_text_on_the_clipboard(solved: Driver) -> None:
 def test_warnings_of_the_calibration_are_shown_next_to_the_text(page: Driver, truth: Any) -> None:
     page.load_sample(truth, 4)
     warnings = page.view["warnings"]
+    page.page.click("#tab-deliver")
     page.page.click("#export")
     page.until(f"document.querySelector('{DIALOG} .frames')")
     assert warnings
@@ -328,6 +341,7 @@ def test_warnings_of_the_calibration_are_shown_next_to_the_text(page: Driver, tr
 def test_the_panel_fits_the_screen(solved: Driver) -> None:
     for width, height in ((1280, 720), (1440, 900), (390, 844)):
         solved.page.set_viewport_size({"width": width, "height": height})
+        solved.page.click("#tab-deliver")
         solved.page.click("#export")
         choose(solved, "tf2")
         radar = solved.page.locator(f'{DIALOG} [data-field="radar_frame"]')

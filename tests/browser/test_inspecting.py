@@ -29,13 +29,13 @@ def test_clocks_axes_and_warnings_of_the_recording_are_on_the_page(
         running = start(workspace, recording, ServerOptions(port=0, token="test"))
         try:
             page = open_page(running.url)
-            facts = page.page.locator("#recording-topics .fact")
-            assert "receive time" in facts.nth(0).inner_text()
-            facts.nth(0).hover()
+            assert page.text("#recording-topics") == "receive time: radar, camera"
+            page.page.click("#choose-recording")
+            page.page.click("#opening-dialog .reading summary")
             page.until("document.body.innerText.includes('because --clock receive was given')")
             page.until("document.body.innerText.includes('axes as given: x forward, y left, z up')")
             page.until("document.body.innerText.includes('after its stamp')")
-            box = page.text('#warnings [data-code="not-closed"]')
+            box = page.text('#opening-dialog [data-code="not-closed"]')
             assert "complete messages were recovered by reading the whole file" in box
         finally:
             running.close()
@@ -50,14 +50,16 @@ def test_assumptions_are_listed_until_the_user_confirms_them(
         running = start(workspace, recording, ServerOptions(port=0, token="test"))
         try:
             page = open_page(running.url)
-            box = page.text('#warnings [data-code="assumed"]')
+            assert page.page.get_attribute("#recording-notes", "class") == "asks"
+            page.page.click("#choose-recording")
+            box = page.text('#opening-dialog [data-code="assumed"]')
             assert "2 assumptions about the recording are unconfirmed" in box
             assert "f_Azimuth is taken as growing to the left" in box
             assert "--map azimuth=f_Azimuth:rad" in box
-            page.page.locator("#recording-topics .fact").nth(0).hover()
+            page.page.click("#opening-dialog .reading summary")
             page.until("document.body.innerText.includes('azimuth from f_Azimuth [rad], to the left')")
             page.page.locator("#confirm-assumptions").click()
-            page.until("document.querySelectorAll('#warnings [data-code=assumed]').length === 0")
+            page.until("document.querySelectorAll('#opening-dialog [data-code=assumed]').length === 0")
             assert len(workspace.session.confirmed) == 2
         finally:
             running.close()
@@ -67,5 +69,7 @@ def test_assumptions_are_listed_until_the_user_confirms_them(
 def test_a_recording_without_problems_shows_no_warning(page: Driver) -> None:
     assert "receive time" not in page.text("#recording-topics")
     assert page.page.locator("#warnings *").count() == 0
-    page.page.locator("#recording-topics .fact").nth(1).hover()
+    assert page.text("#recording-notes") == ""
+    page.page.click("#choose-recording")
+    page.page.click("#opening-dialog .reading summary")
     page.until("document.body.innerText.includes('because the stamps are sound')")

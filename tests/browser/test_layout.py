@@ -13,18 +13,18 @@ pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
 def test_a_new_user_is_told_what_to_do_and_led_to_the_first_click(page: Driver) -> None:
     page.until("__cocalib.state.placementsKnown")
-    assert page.page.locator(".steps li").count() == 3
-    assert "found in the radar data" in page.text(".steps li.now")
-    assert page.text('[data-key="aed"] dd') == "–"
-    assert page.page.get_attribute("#export", "class") in (None, "")
-    page.press("n")
+    assert "inner corner" in page.text(".reflector")
     page.until("document.getElementById('guide').classList.contains('act')")
-    assert page.text("#guide").startswith("Placement 1 of")
+    assert page.text("#guide").startswith("Placement 1, ")
+    assert page.value("__cocalib.state.cursor === __cocalib.state.placements[0].frame"), (
+        "it opens on the first placement"
+    )
+    page.press("n")
+    page.until("__cocalib.state.shown.index === __cocalib.state.placements[1].frame")
     u, v = page.value("[__cocalib.viewport.imageWidth / 2, __cocalib.viewport.imageHeight / 2]")
     page.click(u, v)
-    assert page.text("#guide").endswith("placements that are left. Press N")
-    assert page.text("#guide") in page.text("#status-text")
-    assert page.page.locator(".steps li.done").count() == 1
+    assert "next place where the reflector stood" in page.text("#guide")
+    assert page.page.locator(".reflector").count() == 0
     assert page.page.locator(".pairs .row").count() == 1
 
 
@@ -38,6 +38,7 @@ def test_dividers_and_theme_are_remembered(page: Driver) -> None:
     page.page.mouse.up()
     page.until(f"Math.abs({before} - 104 - __cocalib.viewport.width) <= 4")
     narrow = page.value("__cocalib.viewport.width")
+    page.page.click("#menu-button")
     page.page.click("#theme")
     page.page.reload()
     page.until("__cocalib.state.shown")
@@ -91,6 +92,7 @@ def out_of_reach(page: Driver, *selectors: str) -> Any:
 
 @pytest.mark.parametrize("names", ["ordinary", "extreme"])
 def test_everything_is_in_the_window_or_a_tab_away_at_any_size(page: Driver, names: str) -> None:
+    page.page.click("#menu-button")
     page.page.click("#theme")
     if names == "extreme":
         give_extreme_names(page)
@@ -99,9 +101,8 @@ def test_everything_is_in_the_window_or_a_tab_away_at_any_size(page: Driver, nam
         page.until(f"innerWidth === {width} && innerHeight === {height} && document.documentElement.dataset.shape")
         page.drawn()
         always = (
-            "#export",
             "#undo",
-            "#help",
+            "#menu-button",
             "#play",
             "#next-placement",
             "#status-text",
@@ -109,13 +110,13 @@ def test_everything_is_in_the_window_or_a_tab_away_at_any_size(page: Driver, nam
             "#picture-pane",
             "#zoom",
         )
-        assert out_of_reach(page, *always, ".recording", '[data-layer="returns"]') == [], (width, height)
-        panel = ("#panel", ".figure", "#tab-pairs", "#tab-options", "#page-pairs")
+        assert out_of_reach(page, *always, ".recording", ".over-picture summary") == [], (width, height)
+        panel = ("#panel", "#verdict", "#tab-mark", "#tab-deliver", "#page-mark")
         if page.value("document.documentElement.dataset.shape") == "wide":
-            assert out_of_reach(page, *panel, "#space", '[data-viewpoint="above"]') == [], (width, height)
+            assert out_of_reach(page, *panel, "#space", ".over-space summary") == [], (width, height)
         else:
             page.page.click('[data-pane="space"]')
-            assert out_of_reach(page, "#space", '[data-viewpoint="above"]', *always) == [], (width, height)
+            assert out_of_reach(page, "#space", ".over-space summary", *always) == [], (width, height)
             page.page.click('[data-pane="picture"]')
             assert page.value("document.getElementById('picture-pane').offsetWidth") >= width - 4
             page.page.click('[data-pane="panel"]')
@@ -145,7 +146,8 @@ def test_at_200_percent_a_click_hits_its_pixel_and_moves_nothing_else(
     assert abs(click["u_px"] - 500) < 2
     assert abs(click["v_px"] - 300) < 2
     assert page.value("document.getElementById('picture-pane').getBoundingClientRect().toJSON()") == before
-    page.page.click("#tab-options")
+    page.page.click("#menu-button")
+    page.page.click('#menu [data-action="options"]')
     page.page.locator(".options input").last.evaluate("(part) => part.focus()")
     assert page.value("[scrollX, scrollY, document.body.scrollTop]") == [0, 0, 0]
     assert page.value("document.getElementById('picture-pane').getBoundingClientRect().toJSON()") == before
@@ -168,3 +170,28 @@ def test_dividers_keep_their_part_in_another_window_and_move_by_keys(page: Drive
     bar.focus()
     page.page.keyboard.press("ArrowDown")
     page.until(f"document.getElementById('picture-pane').offsetHeight > {high} + 10")
+
+
+FULLY_IN_SIGHT = """(selector) => { const box = document.getElementById("page-mark").getBoundingClientRect();
+    const head = document.querySelector("#page-mark thead").getBoundingClientRect().bottom;
+    return [...document.querySelectorAll(`#page-mark ${selector}`)].map((row) => row.getBoundingClientRect())
+        .filter(({ top, bottom }) => top >= head - 1 && bottom <= Math.min(box.bottom, innerHeight) + 1).length; }"""
+
+
+def test_ten_pairs_or_four_and_six_returns_are_in_sight_beside_seven_warnings(page: Driver, truth: Any) -> None:
+    page.until("__cocalib.state.placementsKnown")
+    page.load_sample(truth, 12)
+    page.page.evaluate(
+        "async () => { const { emit, state } = await import('/shell/state.js'); const words = 'a warning that takes a line';"
+        "const seven = [1, 2, 3, 4, 5, 6, 7].map((n) => ({ code: `code-${n}`, message: `${words} ${n}`, hint: words }));"
+        "state.view = { ...state.view, warnings: seven }; emit('view'); }"
+    )
+    assert page.text("#warning-count") == "7 warnings"
+    page.value("document.getElementById('page-mark').scrollTo(0, 0)")
+    assert page.page.evaluate(FULLY_IN_SIGHT, "tr.row") >= 10
+    page.page.locator("#page-mark tr.row").nth(2).click()
+    page.until("document.querySelectorAll('.choices-list .choice').length >= 6")
+    page.drawn()
+    assert page.page.evaluate(FULLY_IN_SIGHT, ".choice") >= 6
+    assert page.page.evaluate(FULLY_IN_SIGHT, "tr.row") >= 4
+    assert page.value("document.getElementById('space').clientHeight") >= 220

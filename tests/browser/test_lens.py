@@ -1,4 +1,4 @@
-"""The tab Lens: from a recording that says nothing of its lens to a pose, and the picture without distortion."""
+"""The sheet Lens: from a recording that says nothing of its lens to a pose, and the picture without distortion."""
 
 import json
 import threading
@@ -86,20 +86,21 @@ def shade_at(page: Driver, u: float, v: float, canvas: str = "picture") -> np.nd
     )
 
 
-def test_a_lens_is_calibrated_in_the_tab_and_the_clicks_give_a_pose(
+def test_a_lens_is_calibrated_on_the_page_and_the_clicks_give_a_pose(
     gate: threading.Event, waved: tuple[RunningServer, Workspace], folder: Path, open_page: Callable[..., Driver]
 ) -> None:
     server, workspace = waved
     truth: Any = json.loads((folder / "truth.json").read_text())
     page = open_page(server.url)
-    page.until("document.getElementById('tab-lens').getAttribute('aria-selected') === 'true'")
+    expect(page.page.locator("#page-lens")).to_be_visible()
     assert "The lens is not known yet" in page.text("#page-lens")
     assert "No camera intrinsics" in page.text("#intrinsics-strip")
 
     page.click_sample(truth)
     assert page.view["stage"] == "unsolvable"
-    page.page.click("#tab-pairs")
-    page.page.get_by_role("button", name="Open the tab Lens").click()
+    page.page.click("#sheet-close")
+    expect(page.page.locator("#page-mark")).to_be_visible()
+    page.page.click("#intrinsics-strip .chip")
     expect(page.page.locator("#page-lens")).to_be_visible()
 
     page.page.fill('[aria-label="Size of the board"]', "nine")

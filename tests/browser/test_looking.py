@@ -40,12 +40,12 @@ def test_the_page_says_what_was_found_and_that_nothing_can_be_clicked(page: Driv
     assert "Add the camera's file to calibrate" in page.text("#warnings")
     for name in ("undo", "redo", "export"):
         assert page.page.is_disabled(f"#{name}")
-    assert not page.page.is_visible("#tab-options")
+    assert not page.page.is_visible("#tab-check")
     assert not page.page.is_visible("#marks")
 
 
 def test_keys_and_the_table_go_from_placement_to_placement(page: Driver) -> None:
-    rows = page.page.locator("#page-pairs [data-placement]")
+    rows = page.page.locator("#page-mark [data-placement]")
     assert rows.count() == page.value("__cocalib.state.placements.length") >= 10
     page.press("n")
     page.until("__cocalib.state.look.index === __cocalib.state.placements[0].frame")

@@ -91,6 +91,8 @@ def test_a_pick_is_named_as_such_and_can_be_changed(
     page.page.keyboard.press("Escape")
     page.until(f"!{DIALOG}")
     for picked in ("camera_from_radar,body,m", RIGHT):
+        if not page.page.is_visible("#warnings"):
+            page.page.click("#warning-count")
         row = page.page.locator("#warnings [data-code^='calibration-']")
         if not row.evaluate("row => row.open"):
             row.locator("summary").click()

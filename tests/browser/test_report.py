@@ -42,6 +42,7 @@ def test_it_prints_to_four_pages_at_most_and_fits_a_telephone_without_a_word_fro
 def test_the_export_panel_downloads_the_report_of_the_answer_on_the_page(
     page: Driver, workspace: Workspace, project_root: Path, tmp_path: Path
 ) -> None:
+    page.page.click("#tab-deliver")
     page.page.click("#export")
     page.page.click('#export-dialog [data-export="report"]')
     expect(page.page.locator("#export-dialog .reason")).to_contain_text("four placements")

@@ -1,4 +1,4 @@
-"""The tab Review: linked plots, contours of the uncertainty, two solutions compared."""
+"""The review on the page Check: linked plots, contours of the uncertainty, two solutions compared."""
 
 import subprocess
 import sys
@@ -35,7 +35,7 @@ def reviewing(open_page: Callable[..., Driver], server: RunningServer, workspace
     workspace.dispatch(ClicksImported.of(tuple(clicks_of(truth))))
     page.until("__cocalib.state.view.has_calibration")
     page.settle()
-    page.page.click("#tab-review")
+    page.page.click("#tab-check")
     page.until("document.querySelector('.review-words').textContent.includes('leans most on')")
     page.drawn()
     return page
@@ -86,7 +86,7 @@ def test_a_dot_is_the_same_pair_in_every_plot_and_leads_to_it_and_contours_are_l
     reviewing: Driver, truth: Any
 ) -> None:
     page = reviewing
-    page.page.click("[data-filter=enlarge]")
+    page.page.click("#panel-large")
     at = on_plot(page, "column", "c3")
     page.page.mouse.move(5, 5)
     quiet = {plot: image_of(page, f"[data-plot={plot}]") for plot in ("range", "influence", "histogram")}

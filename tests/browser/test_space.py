@@ -44,9 +44,15 @@ def items(page: Driver, kind: str) -> list[dict[str, Any]]:
     return found
 
 
+def open_views(page: Driver) -> None:
+    """Show what the 3D view can be looked at from, and its colours."""
+    page.value("document.querySelector('.over-space').open = true")
+
+
 def look_from(page: Driver, viewpoint: str) -> None:
     """Choose a viewpoint, and wait until the view has moved and stands still."""
     page.until("__cocalibSpace.pickable().some((item) => item.kind === 'placement')")
+    open_views(page)
     page.value("window.__where = () => JSON.stringify(__cocalibSpace.pickable().map(({ x, y }) => [x, y]))")
     page.value("window.__from = window.__last = window.__where()")
     page.page.click(f"[data-viewpoint={viewpoint}]")
@@ -131,6 +137,7 @@ def test_the_camera_view_equals_the_picture(solved: Driver, workspace: Workspace
     outcome = workspace.session.outcome
     assert isinstance(outcome, Calibration)
     solved.go_to(solved.view["clicks"][3]["frame"])
+    open_views(solved)
     solved.page.click("#space-camera")
     solved.until(SETTLED)
     stamp = TimeNs(int(sample.image_times[solved.value("__cocalib.state.cursor")]))
@@ -184,6 +191,7 @@ def test_without_pictures_returns_and_placements_can_be_picked_too(
     page = open_page(radar_server.url, ready="__cocalib.state.look")
     page.until("__cocalib.state.placementsKnown && __cocalibSpace.lookShown()?.placements.length >= 10")
     assert not page.page.is_visible("#space-camera")
+    open_views(page)
     page.page.select_option("#space-colour", "height")
     page.until("document.querySelector('.space-legend').textContent.endsWith(' m')")
     look_from(page, "above")
@@ -195,6 +203,7 @@ def test_without_pictures_returns_and_placements_can_be_picked_too(
 def test_the_3d_view_shows_the_scene_and_says_before_a_pose_why_there_are_no_returns(page: Driver) -> None:
     scene_without_visers_own_panels(page)
     keys_while_it_has_the_focus(page)
+    open_views(page)
     page.page.click("#space-camera")
     page.until("document.querySelector('.space-readout').textContent.startsWith('No pose yet')")
     page.page.click("#space-camera")

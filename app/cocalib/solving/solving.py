@@ -98,7 +98,7 @@ def solve_in_steps(
         yield Unsolvable(
             "no-camera",
             "the camera intrinsics are missing: the recording contains none that can be used",
-            "calibrate the lens from a board in a recording (tab Lens, or cocalib intrinsics), or drop a camera file on the "
+            "calibrate the lens from a board in a recording (Lens in the menu, cocalib intrinsics), or drop a camera file on the "
             "page, or start again with --camera FILE",
         )
         return

@@ -128,6 +128,8 @@ def known_labels(tracks: Sequence[BoxTrack]) -> tuple[str, ...]:
 
 
 _SHOWN_DEG = (-1.0, 0.0, 1.0)
+_FEWEST_TARGETS, _FEWEST_RETURNS = 3, 30
+"""With fewer, one loosely drawn box decides what the figures say about the calibration."""
 
 
 def acc_panel(evaluation: Evaluation) -> AccPanel:
@@ -136,6 +138,14 @@ def acc_panel(evaluation: Evaluation) -> AccPanel:
     warnings = tuple(map(warning_in_sentences, evaluation.warnings))
     if boxes is None or boxes.acc is None:
         return AccPanel(problem="No return of anything that moves is in the frames with boxes.", warnings=warnings)
+    returns = sum(frame.returns for frame in boxes.frames)
+    if boxes.matched_targets < _FEWEST_TARGETS or returns < _FEWEST_RETURNS:
+        caution = (
+            f"Too little to judge the calibration by: {boxes.matched_targets} of {_FEWEST_TARGETS} targets with a box, "
+            f"{returns} of {_FEWEST_RETURNS} returns."
+        )
+        others = tuple(one for one in warnings if one.code != "turned-from-boxes")
+        return AccPanel(_figures(boxes), boxes.classes, caution=caution, rule=sentence(boxes.rule), warnings=others)
     words = sensitivity_sentences(boxes)
     return AccPanel(
         figures=_figures(boxes),

@@ -294,11 +294,11 @@ def advice_for(calibration: Calibration, verdict: Verdict) -> Advice | None:
 
 
 def _advice_words(best: NextPlacement, verdict: Verdict) -> str:
-    """Return the verdict's action, and where a placement would help most if it is another one."""
+    """Return where a placement would help most; "" if the verdict's action says it."""
     where = placement_words(best)
     if where in verdict.action:
-        return sentence(verdict.action)
+        return ""
     if best.may_stop:
-        return f"{sentence(verdict.action)} No further placement would reduce the pose uncertainty noticeably."
+        return "No further placement would reduce the pose uncertainty noticeably."
     amount = f"by {100 * (1 - 1 / best.gain):.0f} %" if best.gain > 1 + _NOTICEABLE else "slightly"
-    return f"{sentence(verdict.action)} A placement {where}, would reduce the pose uncertainty {amount}."
+    return f"A placement {where}, would reduce the pose uncertainty {amount}."

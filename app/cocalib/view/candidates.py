@@ -103,7 +103,7 @@ def click_candidates(session: Session, pair: Pair, more: Sequence[Candidate] = (
     ordered = tuple(rows[i] for i in order)
     if better < 0:
         return PairCandidates(pair.id, session.revision, ordered)
-    words = f"The return at {rows[better].words} fits this click: C takes it"
+    words = f"The return at {rows[better].words} fits this click better"
     return PairCandidates(pair.id, session.revision, ordered, order.index(better), words)
 
 

@@ -139,7 +139,7 @@ class Advice:
     Attributes:
         best: where, and what it gains.
         range_m: how far from the radar.
-        words: the same as text, one or two sentences.
+        words: the same as a sentence; "" if the verdict's action says it.
     """
 
     best: NextPlacement
@@ -236,8 +236,8 @@ class AccPanel:
     Attributes:
         figures: Acc with its standard error, the frames that count, and what chance would give.
         classes: by label.
-        sensitivity: one row per axis.
-        caution: that Acc is not accuracy; "" without figures.
+        sensitivity: one row per axis; empty where there is too little to judge the calibration by.
+        caution: that Acc is not accuracy, or that there is too little to judge by; "" without figures.
         rule: which returns count and how they were matched; "" without figures.
         problem: why there are no figures; "" if there are, or nothing was judged so far.
         warnings: what the reader of the figures must know.

@@ -1,4 +1,4 @@
-"""The tab Review: what is beyond the rows of all pairs, which return one pair uses and why, two solutions side by side."""
+"""The page Check: what is beyond the rows of all pairs, which return one pair uses and why, two solutions side by side."""
 
 import math
 from collections.abc import Iterator, Sequence

@@ -233,7 +233,7 @@ class _FrameRectifier:
         import cv2
 
         if camera is None:
-            raise InputError("there are no intrinsics to rectify it with; calibrate the lens in the tab Lens")
+            raise InputError("there are no intrinsics to rectify it with; calibrate the lens in the menu under Lens")
         if pixels.shape[:2] != (camera.height_px, camera.width_px):
             raise InputError(
                 f"the intrinsics are for {camera.width_px} x {camera.height_px} px, and the picture has "

@@ -73,7 +73,11 @@ def test_the_comparison_on_the_page_is_that_of_check(
 def test_acc_on_the_page_is_that_of_the_core() -> None:
     walk, reference = StreetRecording(), reference_calibration()
     evaluation = evaluate_recording(reference.calibration, walk, boxes=walk.street.boxes, held_out=False)
-    panel = acc_panel(evaluation)
+    of_one = acc_panel(evaluation)
+    assert (of_one.sensitivity, of_one.caution[:10]) == ((), "Too little")
+    assert evaluation.boxes is not None
+    panel = acc_panel(replace(evaluation, boxes=replace(evaluation.boxes, matched_targets=3)))
+    assert panel.figures[0] == of_one.figures[0]
     found = moving_targets(walk.street.scans)
     core = box_figures(
         reference.calibration.camera_from_radar, walk.camera(), walk.street.scans, walk.street.boxes, targets=found

@@ -1,4 +1,4 @@
-"""The tab Lens: the intrinsics in use, a calibration of the lens in the background, and what all pages show of its result."""
+"""The sheet Lens: the intrinsics in use, a calibration of the lens in the background, and what all pages show of its result."""
 
 import asyncio
 import logging

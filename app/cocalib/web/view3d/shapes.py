@@ -49,7 +49,7 @@ DARK = Palette(
 )  # fmt: skip
 LIGHT = Palette(
     still=(20, 120, 190), moving=(205, 85, 15), window=(70, 85, 100), ray=(20, 30, 40), next=(10, 90, 160),
-    solved=(10, 111, 179), rings=(140, 152, 165), cells=(200, 207, 215),
+    solved=(10, 111, 179), rings=(140, 152, 165), cells=(221, 226, 232),
 )  # fmt: skip
 _CHI2_95_3D = 7.814727903251178  # 95 % quantile of chi-squared with 3 degrees of freedom
 _CIRCLE = 28

@@ -49,12 +49,12 @@ def test_many_placements_are_enough() -> None:
     assert "No further placement would" in advice.words
 
 
-def test_the_advice_begins_with_the_action_of_the_verdict() -> None:
+def test_the_advice_does_not_repeat_the_action_of_the_verdict() -> None:
     calibration = solved(30)
     advice, verdict = advised(calibration), verdict_on(calibration)
     assert advice is not None
     assert "A tape-measured camera position" in verdict.action
-    assert advice.words.startswith(f"{verdict.action}. A placement ")
+    assert advice.words.startswith("A placement ")
 
 
 def test_the_papers_method_gives_no_advice_since_it_has_no_covariance() -> None:

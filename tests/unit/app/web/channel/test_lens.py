@@ -1,4 +1,4 @@
-"""The desk of the tab Lens: what pages ask for and are told, and what the session becomes."""
+"""The desk of the sheet Lens: what pages ask for and are told, and what the session becomes."""
 
 import asyncio
 import json

@@ -1,0 +1,114 @@
+/** The line on the frame: the one thing to do now, with its keys, which are buttons; by finger only their words are shown. */
+
+import { boxing } from "../boxes/boxes.js";
+import { boxAdvice } from "../boxes/evaluating.js";
+import { saidWords } from "../proposals/proposals.js";
+import { proposalAdvice, proposalWords, silentWords } from "../proposals/words.js";
+import { act, actionNamed } from "../shell/actions.js";
+import { make } from "../shell/notices.js";
+import { clickIn, clicks, isDismissed, isOffered, on, placementAt, placementsAt, state } from "../shell/state.js";
+
+const guide = /** @type {HTMLElement} */ (document.getElementById("guide"));
+
+/** A key and what it does; with an action it can be pressed here too. @typedef {{key: string, label: string, action?: string}} Key */
+/** Text with keys in between. @typedef {(string|Key)[]} Words */
+/** What the line says; `act` if something is to be done in this frame. @typedef {{text: Words, act: boolean}} Advice */
+
+export function startGuide() {
+  on(["opening", "shown", "view", "placements", "playing", "overlay", "candidates", "cross", "selected", "boxes", "layers", "proposals", "connection"], drawGuide);
+}
+
+/** The focus stays where it is. @param {Key} key */
+function keyPart({ key, label, action }) {
+  const parts = [make("kbd", "key", key), label];
+  if (!action) return make("span", "", parts);
+  const button = make("button", "do", parts);
+  button.onmousedown = (event) => event.preventDefault();
+  button.onclick = () => act(actionNamed(action));
+  return button;
+}
+
+function drawGuide() {
+  if (state.looking) return; // picture/birdseye.js says what is there
+  const words = state.shown ? (state.playing ? null : advice(state.shown.index)) : opening();
+  guide.hidden = !words;
+  if (!words) return;
+  guide.classList.toggle("act", words.act);
+  if (guide.dataset.said === JSON.stringify(words.text)) return; // said once
+  guide.dataset.said = JSON.stringify(words.text);
+  guide.replaceChildren(...words.text.map((word) => (typeof word === "string" ? make("span", "", word) : keyPart(word))));
+}
+
+/** What to show before there is a frame. @returns {Advice|null} */
+function opening() {
+  const now = state.opening;
+  return now && !now.problem && state.preview ? { text: ["Preview: you can click once the recording is open"], act: false } : null;
+}
+
+const EXCLUDE = { key: "X", label: "exclude it", action: "exclude" };
+const REMOVE = { key: "Del", label: "delete it", action: "delete" };
+const NEXT = { key: "N", label: "next place", action: "next-placement" };
+
+/** @param {number} index @returns {Advice|null} */
+function advice(index) {
+  if (state.rectified) return { text: ["Straight edges must be straight: drag a line along one.", { key: "U", label: "picture as taken", action: "rectify" }], act: false };
+  if (boxing.on) return boxAdvice();
+  const placement = placementAt(index);
+  const here = clickIn(index);
+  if (state.cross) return atCross(state.cross);
+  const offer = proposalWords();
+  if (offer) return { text: offer, act: true };
+  const said = saidWords();
+  if (said && !(placement && isOffered(placement))) return { text: [said], act: false };
+  if (here) return afterClick(here);
+  if (placement && isDismissed(placement)) return { text: ["Dismissed.", { key: "X", label: "offer it again", action: "exclude" }, NEXT], act: false };
+  if (placement && isOffered(placement)) {
+    const number = state.placements.indexOf(placement) + 1;
+    const several = placementsAt(index).length > 1 ? `, one of ${placementsAt(index).length} at this time` : "";
+    const why = said || silentWords(number - 1);
+    return { text: [`Placement ${number}, ${placement.range_m.toFixed(1)} m away${several}: click the inner corner.${why ? ` ${why}` : ""}`, { key: "X", label: "no reflector", action: "exclude" }, NEXT], act: true };
+  }
+  const next = nextAction();
+  return next ? { text: next, act: false } : null;
+}
+
+/** @param {import("../picture/cross.js").Cross} cross @returns {Advice} */
+function atCross(cross) {
+  const begin = cross.touched || !cross.expected ? [] : ["The radar expects it here."];
+  const last = cross.touched ? "set the mark" : cross.expected ? "leave a guess, which does not count" : "set the mark, once moved";
+  return { text: [...begin, { key: "1–9", label: "zoom" }, { key: "arrows", label: "move" }, { key: "Enter", label: last, action: "place-mark" }], act: true };
+}
+
+/** What is wrong with the pair of this frame, or else what to do next. @param {import("../messages.js").ClickRow} click @returns {Advice|null} */
+function afterClick(click) {
+  const better = state.candidates?.click === click.id ? state.candidates.suggestion : "";
+  if (better) return { text: [better, { key: "C", label: "take it", action: "next-candidate" }], act: true };
+  if (click.state === "untouched") return { text: ["A guess, which does not count: move it to the inner corner.", REMOVE], act: true };
+  if (click.state === "unpaired") return { text: ["No radar position here: click another frame of this placement.", NEXT], act: true };
+  if (click.state === "outlier") return { text: outlierWords(click), act: true };
+  const next = nextAction();
+  return next ? { text: next, act: false } : null;
+}
+
+/** What may be wrong with a pair that disagrees: the mark, or the return. @param {import("../messages.js").ClickRow} click @returns {Words} */
+function outlierWords(click) {
+  if (!click.note.startsWith("Disagrees")) return [click.note]; // the method or an option sets the pair aside: the note says which
+  const carried = state.placements.length > 0 && !placementsAt(click.frame).length ? " Was the reflector being carried?" : "";
+  const others = state.candidates?.click === click.id && state.candidates.rows.length > 1;
+  return [`${click.id} disagrees with the other pairs. Is the mark on the inner corner?${carried}`, ...(others ? [{ key: "C", label: "another return", action: "next-candidate" }] : []), EXCLUDE];
+}
+
+/** The next thing to do: the verdict's action, with its key; null when there is nothing to say. @returns {Words|null} */
+function nextAction() {
+  const view = state.view;
+  if (!view || view.stage === "solving") return null;
+  const { action, key, done } = view.verdict;
+  const guesses = clicks().filter((click) => click.state === "untouched").length;
+  if (guesses && !state.placements.some(isOffered)) return [`${guesses} ${guesses > 1 ? "marks are guesses" : "mark is a guess"} and ${guesses > 1 ? "do" : "does"} not count: move ${guesses > 1 ? "each" : "it"} to the inner corner`];
+  if (done) return ["Done.", { key: "E", label: "export", action: "export" }];
+  if (key === "N") return [{ key, label: proposalAdvice(), action: "next-placement" }];
+  if (key === "J") return [action, { key, label: "show it", action: "worst" }];
+  if (view.clicks.length) return [action];
+  if (!state.placementsKnown) return ["Looking for the places where the reflector stood. You can click meanwhile"];
+  return state.placements.length ? [action] : [`${state.placementSummary}. ${action}`];
+}
