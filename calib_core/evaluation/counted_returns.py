@@ -274,7 +274,7 @@ def _rule(labelled: bool, gap_s: float, boxless: float) -> str:
 
 def _require_classes(boxes: Boxes, classes: Sequence[str]) -> None:
     unknown = [name for name in classes if name not in boxes.labels]
-    if unknown:
+    if unknown and len(unknown) == len(classes):
         raise InputError(
             f"{boxes.source}: no box is of the class '{unknown[0]}'; there are: {_listed(boxes)}; name one of these, or map "
             f"a class to it, as in --class-map pedestrian={unknown[0]}"

@@ -156,6 +156,9 @@ def test_classes_are_chosen_and_renamed(cocalib: Cocalib, folder: Path) -> None:
     assert "  pedestrian: " in named.out
     wrong = cocalib(*where, "--classes", "car")
     assert (wrong.code, "no box is of the class 'car'; there are: 'person'" in wrong.err) == (2, True)
+    absent = cocalib(*where, "--classes", "car,person")
+    assert "no box is of the class 'car'" in absent.out
+    assert "  person: " in absent.out
     assert "expected FROM=TO" in cocalib(*where, "--class-map", "person").err
 
 

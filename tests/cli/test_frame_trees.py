@@ -1,7 +1,9 @@
 """`cocalib import`, `check` and `export` with the frame tree of a vehicle."""
 
 import json
+import os
 import re
+import stat
 from pathlib import Path
 
 import numpy as np
@@ -106,6 +108,22 @@ def test_into_prints_a_diff_and_writes_only_when_told(calibration, car, tmp_path
     assert run(["check", str(car), "--against", str(calibration), *frames]) == 0
     assert run([*arguments, "--to", "urdf"]) == 2
     assert "give one of them" in capsys.readouterr().err
+
+
+def test_into_keeps_mode_and_owner_and_refuses_a_read_only_file(calibration, car, capsys):
+    arguments = ["export", str(calibration), "--into", str(car), "--write"]
+    car.chmod(0o444)
+
+    assert run(arguments) == 2
+    assert "is read-only" in capsys.readouterr().err
+    assert car.read_text(encoding="utf-8") == vehicles.CAR_URDF
+    car.chmod(0o664)
+    owner = (1234, 2345) if os.getuid() == 0 else (os.getuid(), os.getgid())
+    os.chown(car, *owner)
+    assert run(arguments) == 0
+    found = car.stat()
+    assert car.read_text(encoding="utf-8") != vehicles.CAR_URDF
+    assert (stat.S_IMODE(found.st_mode), found.st_uid, found.st_gid) == (0o664, *owner)
 
 
 def test_into_respects_the_drivers_chain_of_a_recording(calibration, recording, tmp_path):

@@ -108,7 +108,7 @@ def _placed(
     clicks: tuple[ReflectorClick, ...] = ()
     if file is not None and row.clicks is not None:
         at_frames = clicks_in_recording(file.clicks, recording, camera, source=row.clicks)
-        notes.extend(at_frames.moved)
+        notes.extend(at_frames.notes)
         clicks = at_frames.clicks
     if not row.auto:
         return PlacedClicks(clicks, file.unconfirmed if file is not None else None)

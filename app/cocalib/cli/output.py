@@ -32,14 +32,20 @@ def explain_unsolvable(outcome: "Unsolvable", *, what: str = "no calibration") -
     return 1
 
 
-def write_whole(path: Path, content: str | bytes) -> None:
+def write_whole(path: Path, content: str | bytes, *, again: bool = False) -> None:
     """Write a file atomically: a reader finds the old or the new content, never a part.
+
+    Args:
+        path: of the file.
+        content: of it.
+        again: it is a file that was read and changed: it keeps its mode and owner, and a read-only one is refused.
 
     Raises:
         InputError: the folder is missing or not writable.
     """
     try:
-        files.write_whole(path, content.encode("utf-8") if isinstance(content, str) else content)
+        write = files.rewrite_whole if again else files.write_whole
+        write(path, content.encode("utf-8") if isinstance(content, str) else content)
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
 
@@ -74,7 +80,7 @@ def told_clicks_at_frames(
     from cocalib.session.click_stamps import clicks_at_frames
 
     found = clicks_at_frames(clicks, recording.image_times, source=source, others=recording.other_image_times)
-    _tell_notes(found.moved)
+    _tell_notes(found.notes)
     return found.clicks
 
 
@@ -89,7 +95,7 @@ def recorded_clicks(
     from cocalib.solving.recorded_clicks import clicks_in_recording
 
     found = clicks_in_recording(clicks, recording, camera, source=source)
-    _tell_notes(found.moved)
+    _tell_notes(found.notes)
     return found.clicks
 
 

@@ -127,7 +127,7 @@ class TreeFlags:
             print_exactly(change.diff())
             print("nothing is written; --write changes the file, --out FILE writes a copy", file=sys.stderr)
             return 0
-        write_whole(target, change.data)
+        write_whole(target, change.data, again=target == Path(change.source))
         print(f"written to {target}")
         return 0
 

@@ -140,7 +140,7 @@ def evidence_in(
     if boxes is None:
         return Evidence(pairs, unpaired, None, lost)
     _require_camera(boxes, camera)
-    lost = (*lost, *_taken(boxes))
+    lost = (*lost, *_taken(boxes, options.classes))
     if labels is not None:
         reach_s = options.max_gap_s or longest_gap_s(recording.radar_times)
         scans = recording.radar_scans_around(boxes.times_ns.tolist(), reach_s + 1e-3)
@@ -241,10 +241,12 @@ def _lost(unpaired: Sequence[Unpaired]) -> tuple[DataWarning, ...]:
     return (DataWarning("no-paired-clicks", message, first.hint),)
 
 
-def _taken(boxes: Boxes) -> tuple[DataWarning, ...]:
-    """Pass on what reading the boxes took for granted or left out."""
+def _taken(boxes: Boxes, classes: Sequence[str]) -> tuple[DataWarning, ...]:
+    """Pass on what reading the boxes took for granted or left out, and name the classes that no box has."""
+    absent = (f"no box is of the class '{name}'" for name in classes if name not in boxes.labels)
+    notes = (*boxes.notes, *absent)
     hint = "check that this is so: boxes of other frames or other objects give a wrong Acc"
-    return tuple(DataWarning("boxes-note", f"{boxes.source}: {note}", hint) for note in boxes.notes)
+    return tuple(DataWarning("boxes-note", f"{boxes.source}: {note}", hint) for note in notes)
 
 
 def _about(returns: CountedReturns) -> tuple[DataWarning, ...]:

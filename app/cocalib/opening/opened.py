@@ -228,7 +228,7 @@ def _import_clicks(workspace: Workspace, given: GivenClicks, found: ClicksAtFram
     if workspace.restored.steps > 0:
         print(f"Continuing the existing session; {given.source} was not imported (start over with --fresh)")
         return
-    for line in found.moved:
+    for line in found.notes:
         print(f"note: {line}", file=sys.stderr)
     unconfirmed = read_clicks_file(given.text, source=given.source).unconfirmed
     if unconfirmed is not None:

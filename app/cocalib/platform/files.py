@@ -3,6 +3,7 @@
 import errno
 import os
 import secrets
+import stat
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,10 +17,27 @@ _MAX_TEXT_BYTES = 64 * 1024 * 1024
 _PATIENCE_S = 2.0
 
 
-def write_whole(path: Path, data: bytes) -> None:
+def rewrite_whole(path: Path, data: bytes) -> None:
+    """Replace a file as `write_whole` does, and keep its mode and owner.
+
+    Raises:
+        OSError: it is read-only, or cannot be written or given to its owner; the old file stays.
+    """
+    before = path.stat()
+    if not before.st_mode & 0o222 or not os.access(path, os.W_OK):
+        raise PermissionError(errno.EACCES, "is read-only; make it writable, or write a copy: --out FILE", str(path))
+    write_whole(path, data, like=before)
+
+
+def write_whole(path: Path, data: bytes, *, like: os.stat_result | None = None) -> None:
     """Replace or create a file in one step, durable across a crash.
 
     A symbolic link is followed. A device or a pipe is written to, never replaced.
+
+    Args:
+        path: of the file.
+        data: its content.
+        like: whose mode and owner it gets; None for those of a new file.
 
     Raises:
         OSError: it cannot be written; the old file stays.
@@ -38,10 +56,20 @@ def write_whole(path: Path, data: bytes) -> None:
             file.write(data)
             file.flush()
             os.fsync(file.fileno())
+        if like is not None:
+            _take_over(temporary, like)
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
     _sync_folder(path.parent)
+
+
+def _take_over(path: Path, like: os.stat_result) -> None:
+    """Give a file the owner and mode of another."""
+    own = path.stat()
+    if (own.st_uid, own.st_gid) != (like.st_uid, like.st_gid):
+        os.chown(path, like.st_uid, like.st_gid)
+    path.chmod(stat.S_IMODE(like.st_mode))
 
 
 @contextmanager

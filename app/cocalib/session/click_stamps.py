@@ -19,11 +19,11 @@ class ClicksAtFrames:
 
     Attributes:
         clicks: sorted by time.
-        moved: one sentence per click whose stamp was no frame's, rounding to microseconds aside.
+        notes: one sentence per click whose stamp was no frame's, rounding to microseconds aside: moved, or set aside.
     """
 
     clicks: tuple[ReflectorClick, ...]
-    moved: tuple[str, ...]
+    notes: tuple[str, ...]
 
 
 def clicks_at_frames(
@@ -33,7 +33,7 @@ def clicks_at_frames(
     source: str,
     others: Callable[[], Mapping[str, TimesNs]] = dict,
 ) -> ClicksAtFrames:
-    """Move each click to the nearest frame if that is at most half a frame interval away.
+    """Move each click to the nearest frame if that is at most half a frame interval away, and set others aside.
 
     Args:
         clicks: as read from a file.
@@ -42,11 +42,12 @@ def clicks_at_frames(
         others: gives the stamps of the frames of the image topics that are not in use.
 
     Raises:
-        InputError: a click is farther from every frame, and the first one is named; or the stamps are those of another topic.
+        InputError: half of the clicks or more are farther from every frame, and the first one is named; or the stamps are those
+            of another topic.
     """
     _require_own_topic(clicks, image_times, source, others)
     half_ns = half_interval_ns(image_times)
-    at_frames, moved = [], []
+    at_frames, moved, aside = [], [], []
     for click in clicks:
         index = nearest_frame(image_times, click.image_time)
         frame = TimeNs(int(image_times[index]))
@@ -56,14 +57,14 @@ def clicks_at_frames(
         what = f"click {click.id} at {_seconds(click.image_time)} has the stamp of no frame; the nearest is frame {index + 1}"
         where = f"at {_seconds(frame)}, {_milliseconds(frame - click.image_time)}"
         if abs(frame - click.image_time) > half_ns:
-            raise InputError(
-                f"{source}: {what} {where}, which is more than half a frame interval "
-                f"({half_ns / 1e6:.1f} ms); give the clicks of this recording, with the stamps of its frames"
-            )
+            aside.append(f"{what} {where}, which is more than half a frame interval ({half_ns / 1e6:.1f} ms)")
+            continue
         at_frames.append(replace(click, image_time=frame))
         if abs(frame - click.image_time) >= _ROUNDED_NS:
             moved.append(f"{what} {where}, and is used")
-    return ClicksAtFrames(tuple(sorted(at_frames)), tuple(moved))
+    if aside and 2 * len(aside) >= len(clicks):
+        raise InputError(f"{source}: {aside[0]}; give the clicks of this recording, with the stamps of its frames")
+    return ClicksAtFrames(tuple(sorted(at_frames)), (*moved, *(f"{line}, and is set aside" for line in aside)))
 
 
 def _require_own_topic(

@@ -26,13 +26,13 @@ def file_of_clicks(path: Path) -> ClicksFile:
 def clicks_in_recording(
     clicks: Sequence[ReflectorClick], recording: Recording, camera: Camera, *, source: Path
 ) -> ClicksAtFrames:
-    """Return the clicks of a file at the frames of a recording, and which ones were moved to them.
+    """Return the clicks of a file at the frames of a recording, and which ones were moved to them or set aside.
 
     Raises:
-        InputError: a click is not of this recording.
+        InputError: the clicks are not of this recording, or one is outside its picture.
     """
     found = clicks_at_frames(clicks, recording.image_times, source=str(source), others=recording.other_image_times)
-    _require_inside(clicks, camera, source=source)
+    _require_inside(found.clicks, camera, source=source)
     return found
 
 

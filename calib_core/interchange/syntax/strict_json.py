@@ -5,6 +5,7 @@ import json
 import math
 import re
 import types
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
 from functools import cache
@@ -131,8 +132,7 @@ def _is_too_deep(content: Any) -> bool:
 def _without_repeats(items: list[tuple[str, Any]]) -> dict[str, Any]:
     content = dict(items)
     if len(content) != len(items):
-        keys = [key for key, _ in items]
-        twice = next(key for index, key in enumerate(keys) if key in keys[:index])
+        twice = next(key for key, count in Counter(key for key, _ in items).items() if count > 1)
         raise ValueError(f"the key {twice!r} appears twice in one object; keep one")
     return content
 

@@ -9,7 +9,8 @@ from typing import Any
 
 from calib_core.errors import InputError
 
-_MAX_CHARACTERS = 2 * 1024 * 1024
+_MAX_CHARACTERS = 256 * 1024
+"""Half a megabyte of YAML takes ten seconds to parse."""
 _MAX_DEPTH = 100
 _OPENCV_TAG = "tag:yaml.org,2002:opencv-matrix"
 
@@ -31,8 +32,7 @@ def load_yaml_documents(text: str, *, source: str) -> tuple[Any, ...]:
     Raises:
         InputError: it is not YAML, or too large to be a calibration.
     """
-    if len(text) > _MAX_CHARACTERS:
-        raise InputError(f"{source}: {len(text):,} characters is too large for a calibration; is it the right file?")
+    _require_small(text, source)
     from ruamel.yaml import YAML
     from ruamel.yaml.composer import Composer
     from ruamel.yaml.constructor import SafeConstructor
@@ -60,6 +60,14 @@ def load_yaml_documents(text: str, *, source: str) -> tuple[Any, ...]:
     plain = re.sub(r"\A\ufeff?%YAML[: ][\d.]+[^\n]*\n(---[^\n]*\n)?", "", text)
     with refuse_bad_yaml(text, plain, source=source):
         return tuple(document for document in loader.load_all(plain) if document is not None)
+
+
+def _require_small(text: str, source: str) -> None:
+    if len(text) > _MAX_CHARACTERS:
+        raise InputError(
+            f"{source}: {len(text):,} characters, but at most {_MAX_CHARACTERS:,} are read of YAML and of transforms in JSON; is "
+            "it the right file? If so, keep only the calibration in it"
+        )
 
 
 @contextmanager
@@ -160,8 +168,9 @@ def placed_yaml(text: str, *, source: str) -> tuple[PlacedValue, ...]:
     """Return the documents of a YAML text that `load_yaml` accepts; empty ones are left out.
 
     Raises:
-        InputError: it is not YAML.
+        InputError: it is not YAML, or too large to be a calibration.
     """
+    _require_small(text, source)
     from ruamel.yaml import YAML
 
     with refuse_bad_yaml(text, text, source=source):

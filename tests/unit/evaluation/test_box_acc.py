@@ -122,6 +122,8 @@ def test_only_classes_that_are_asked_for_count_and_their_names_must_exist():
 
     assert cars.acc == 1.0
     assert sum(frame.returns for frame in cars.frames) == 1
+    absent = box_figures(AHEAD, PINHOLE, scans, boxes, labels=labels, classes=("lorry", "car"))
+    assert [frame.returns for frame in absent.frames] == [frame.returns for frame in cars.frames]
     with pytest.raises(InputError, match=r"no box is of the class 'lorry'.*'car', 'person'"):
         box_figures(AHEAD, PINHOLE, scans, boxes, labels=labels, classes=("lorry",))
     assert renamed_classes(boxes, {"person": "pedestrian"}).labels == ("car", "pedestrian")

@@ -25,6 +25,7 @@ from calib_core.interchange import (
     read_calibration,
     write_calibration,
 )
+from calib_core.interchange.syntax import strict_json
 
 
 def with_camera(file: CalibrationFile, model: str, distortion: list[float]) -> CalibrationFile:
@@ -183,3 +184,30 @@ def test_a_fisheye_file_for_opencv_names_the_function_that_projects_with_it(
     projected, _ = cv2.fisheye.projectPoints(point.reshape(1, 1, 3), rvec, position, matrix, lens)
     np.testing.assert_allclose(projected.ravel(), pixel.ravel(), rtol=0, atol=1e-6)
     assert "cv::fisheye" not in export(file, "opencv").data.decode()
+
+
+def test_text_that_takes_long_to_parse_is_refused_unread() -> None:
+    """256 kB of YAML take seconds; transforms in JSON are located by the same parser."""
+    transform = {"frame_id": "a"}, {"translation": dict.fromkeys("xyz", 1), "rotation": dict.fromkeys("xyzw", 0.5)}
+    stamped = [{"header": transform[0], "child_frame_id": f"f{n}", "transform": transform[1]} for n in range(2000)]
+    for text in ("numbers: 1\n" * 30_000, json.dumps({"transforms": stamped})):
+        with pytest.raises(InputError, match="at most 262,144 are read of YAML"):
+            read_any(text.encode(), "big")
+
+
+def test_a_repeated_key_is_found_without_comparing_all_keys() -> None:
+    compared = []
+
+    class Key(str):
+        __slots__ = ()
+
+        def __eq__(self, other: object) -> bool:
+            compared.append(other)
+            return str.__eq__(self, other)
+
+        __hash__ = str.__hash__
+
+    keys = [Key(f"k{number}") for number in range(2000)]
+    with pytest.raises(ValueError, match="'k1999' appears twice"):
+        strict_json._without_repeats([(key, 1) for key in (*keys, Key("k1999"))])
+    assert len(compared) < 100
