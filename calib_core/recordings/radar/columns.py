@@ -41,6 +41,8 @@ _SIGMAS = (
 _INVALID_POSITION = ("invaliddistance", "invalidrange", "invalidazimuth", "invalidelevation")
 _INVALID_DOPPLER = ("invalidrangerate", "invaliddoppler", "invalidvelocity")
 _UNKNOWN = np.full(3 << 16, np.nan)
+_FARTHEST_M = 1e9
+"""What is farther is no number that can be computed with."""
 _UPPER = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
 
 
@@ -157,7 +159,8 @@ def _returns(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Returns:
     doppler = _doppler(plan, column, position)
     for flag in plan.spoils_doppler:
         doppler = np.where(column(flag).reshape(-1) != 0, np.nan, doppler)
-    lost = ~np.isfinite(position).all(axis=1)
+    lost = ~(np.abs(position) <= _FARTHEST_M).all(axis=1)
+    position[lost] = np.nan
     for flag in plan.spoils_position:
         invalid = column(flag).reshape(-1) != 0
         position[invalid], lost[invalid] = np.nan, False
@@ -170,6 +173,8 @@ def _returns(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Returns:
     if plan.amplitude_scale != 1.0:
         amplitude = amplitude * plan.amplitude_scale
     claimed = _columns(plan.claimed, column, n) * plan.claimed_scales if plan.claiming else None
+    doppler = np.where(np.isinf(doppler), np.nan, doppler) if np.isinf(doppler).any() else doppler
+    amplitude = np.where(np.isinf(amplitude), np.nan, amplitude) if np.isinf(amplitude).any() else amplitude
     sigma = _sigma(plan, column, position)
     return Returns(position, doppler, amplitude, sigma, claimed, lost if lost.any() else None)
 

@@ -19,6 +19,7 @@ from calib_core.recordings.radar.scan_stream import RadarStream, ScanBlocks
 from calib_core.recordings.topics import Topic
 
 _HALF_STEP_MPS = (0.01, 0.5)  # least and largest half of a Doppler bin
+_LEAST_STEPS = 0.01  # of clustering's scale: a stated standard deviation may be 0
 _SPAN_M = 1e5  # between the ranges of two scans in one sorted list
 _SNR_DB = 3.0
 _PER_ROW = 1e-3
@@ -57,13 +58,14 @@ def spread_of(scans: RadarScans) -> Spread:
 
     Where they do not show it, the standard deviations in the messages count, and without these a usual radar's bins.
     """
+    scans = scans.take(np.flatnonzero(np.isfinite(scans.points_radar_m).all(axis=1)))
     step = report_spread(scans)
     if step is None:
         sigma = scans.sigma_polar[np.isfinite(scans.sigma_polar).all(axis=1)]
         step = 3.5 * np.median(sigma, axis=0) if len(sigma) else CLUSTER_SCALE
     speeds = np.unique(scans.doppler_mps[np.isfinite(scans.doppler_mps)])
     bin_mps = float(np.quantile(np.diff(speeds), 0.1)) if len(speeds) > 2 else 0.0
-    return Spread(np.asarray(step), float(np.clip(0.5 * bin_mps, *_HALF_STEP_MPS)) * 2.0)
+    return Spread(np.maximum(step, _LEAST_STEPS * CLUSTER_SCALE), float(np.clip(0.5 * bin_mps, *_HALF_STEP_MPS)) * 2.0)
 
 
 def moments_of(times: Sequence[TimesNs]) -> Moments:

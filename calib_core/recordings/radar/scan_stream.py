@@ -299,11 +299,14 @@ class RadarStream(ScanBlocks):
         heads = self.topic.heads(messages, layout.dtype.itemsize)
         short = heads.lengths < layout.dtype.itemsize
         returns = layout.returns_of_rows(heads.rows)
+        misfit = layout.misfits(heads.rows) & ~short
+        if returns.lost is not None:
+            returns.lost[short | misfit] = False  # not read yet
         self._count(messages, np.ones(len(messages), dtype=np.int64), returns)
         if short.any():
             returns.points_radar_m[short] = np.nan
             self._note_unreadable(dict.fromkeys(messages[short].tolist(), "the message is truncated"))
-        misfits = np.flatnonzero(layout.misfits(heads.rows) & ~short).tolist()
+        misfits = np.flatnonzero(misfit).tolist()
         returns = _joined([returns, no_returns()]) if misfits else returns  # a writable copy
         for row in misfits:
             self._reread(layout, int(messages[row]), row, returns)
@@ -317,6 +320,7 @@ class RadarStream(ScanBlocks):
             returns.points_radar_m[row] = np.nan
             self._note_unreadable({message: str(error)})
             return
+        self._count(np.array([message]), np.ones(1, dtype=np.int64), single)
         for name in ("points_radar_m", "doppler_mps", "snr_db", "sigma_polar"):
             getattr(returns, name)[row] = getattr(single, name)[0]
 

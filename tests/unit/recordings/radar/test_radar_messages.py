@@ -101,7 +101,7 @@ def test_returns_that_are_not_numbers_keep_their_row(ros, write, cloud_points):
     points["x"][1] = np.nan
     with opened(write, ros, [ros.cloud(START_NS, points)]) as recording:
         scan = recording.radar_scans().scan(0)
-    assert np.isnan(scan.points_radar_m[1]).tolist() == [True, False, False]
+    assert np.isnan(scan.points_radar_m).tolist() == [[False] * 3, [True] * 3, [False] * 3]
     np.testing.assert_array_equal(scan.snr_db, points["snr"])
 
 

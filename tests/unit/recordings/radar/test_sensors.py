@@ -198,6 +198,40 @@ def test_a_topic_with_the_same_returns_is_read_once(tmp_path: Path) -> None:
         assert "the same returns as" in recording.radar_choice
 
 
+def spoilt(stream: Iterable[RecordedMessage]) -> Iterable[RecordedMessage]:
+    """Add returns to each scan whose numbers are none, infinite or beyond all measure."""
+    rows = np.array([[np.nan] * 5, [np.inf] * 5, [3, np.nan, 0, 1, 1], [1e38] * 5, [-np.inf, 1, 2, 9, -np.inf]])
+    for message in stream:
+        values = np.concatenate([rows[:3], message.body.values, rows[3:]])
+        yield replace(message, body=replace(message.body, values=values))
+
+
+def test_numbers_that_are_none_neither_warn_nor_decide_what_belongs_together(tmp_path: Path) -> None:
+    everything, other = targets(7), targets(7)
+    other[:, 1] = np.arcsin(np.clip(np.sin(other[:, 1]) + OTHER_RAD, -0.99, 0.99))
+    for name, streams, topics, repeats in (
+        ("near", near_and_far(targets(3, 60)), ("/radar/far", "/radar/near"), (0, 1)),
+        ("same", (clouds("/radar", everything, seed=1), clouds("/copy", everything, seed=1)), ("/radar",), (0,)),
+        (
+            "other",
+            (clouds("/radar", everything, seed=1), clouds("/radar_2", other, seed=1)),
+            ("/radar", "/radar_2"),
+            (0, 0),
+        ),
+    ):
+        (tmp_path / name).mkdir()
+        with opened(bag(tmp_path / name, *map(spoilt, streams))) as recording:
+            (sensor,) = recording.radar_sensors
+            lost = ~np.isfinite(recording.radar_scans().points_radar_m)
+        assert (sensor.topics, sensor.repeats) == (topics, repeats)
+        assert (lost.any(axis=1) == lost.all(axis=1)).all(), "a position is whole or none"
+
+
+def test_a_stated_standard_deviation_of_zero_is_no_spread_of_zero() -> None:
+    scans = replace(scans_of(((5.0, 0.0, 0.0),)), sigma_polar=np.zeros((1, 3)))
+    assert (spread_of(scans).step > 0).all()
+
+
 @pytest.mark.parametrize("lack", ["stamps and frame", "frame", "Doppler"])
 def test_a_list_and_a_cloud_of_one_sensor_are_one_radar_and_the_better_one_is_read(tmp_path: Path, lack: str) -> None:
     """Both arrive together, long after they were measured; the list has the better name."""
