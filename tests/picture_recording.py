@@ -1,16 +1,19 @@
-"""A recording made of given pictures and an empty radar: for tests of page and port that need other pictures than the sample."""
+"""A recording made of given pictures and an empty radar, for tests of page and port; simulated recordings with grey pictures."""
 
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
 import cv2
 import numpy as np
+import pytest
 
 from calib_core.arrays import TimesNs
 from calib_core.camera import Camera
 from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
+from calib_core.synthetic.recording import SimulatedFrame, SimulatedRecording
 
 START = 1_760_000_000 * NS_PER_S + 123_456_789
 
@@ -77,3 +80,18 @@ class PictureRecording:
 def grey_pictures(count: int, width_px: int = 320, height_px: int = 240) -> list[np.ndarray]:
     """Return plain pictures, each of another grey."""
     return [np.full((height_px, width_px, 3), 20 + 10 * index % 200, dtype=np.uint8) for index in range(count)]
+
+
+@contextmanager
+def grey_frames() -> Iterator[None]:
+    """Leave what is simulated meanwhile grey: where nobody looks at the pictures, rendering them is most of the work."""
+
+    def frames(recording: SimulatedRecording, limit: int | None = None) -> Iterator[SimulatedFrame]:
+        grey = np.full((recording.camera.height_px, recording.camera.width_px, 3), 90, np.uint8)
+        times = recording.stage.frame_times
+        for header, receive in zip(times.header_ns[:limit].tolist(), times.receive_ns[:limit].tolist(), strict=True):
+            yield SimulatedFrame(TimeNs(header), TimeNs(receive), grey)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(SimulatedRecording, "frames", frames)
+        yield

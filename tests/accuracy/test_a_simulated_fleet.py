@@ -19,6 +19,7 @@ from cocalib.batch.job import jobs_of
 from cocalib.batch.manifest import read_manifest
 from cocalib.batch.results_folder import ResultsFolder
 from cocalib.fleet.reading import read_fleet
+from tests.picture_recording import grey_frames
 
 _SMALL = replace(RECORDING, width_px=240, height_px=150, placements=10, radar_rate_hz=2.0)
 _TURNED = Remount(12.0, 0.05)  # what 10 placements in pictures of 240 px show for certain
@@ -39,7 +40,8 @@ def _few(plan: FleetPlan) -> FleetPlan:
 def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("fleet")
     plan = _few(plan_fleet(7, 2, 3, recording=_SMALL, remounts=(_TURNED,)))
-    manifest = write_fleet(folder, plan, InProcess())
+    with grey_frames():
+        manifest = write_fleet(folder, plan, InProcess())
     drive(jobs_of(read_manifest(manifest).rows, folder), InProcess(), ResultsFolder(folder / "out"))
     return folder
 

@@ -11,6 +11,7 @@ import pytest
 
 from calib_core.synthetic import PRESETS, SimulationOptions, simulate, write_recording
 from tests.browser.driving import Driver
+from tests.picture_recording import grey_frames
 from tests.served_process import ServedProcess, served_process
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
@@ -23,14 +24,12 @@ SMALL: dict[str, Any] = {"dwell_s": 4.0, "width_px": 320, "height_px": 200, "cam
 def recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with a recording without intrinsics, one with two radars, and a damaged one."""
     folder = tmp_path_factory.mktemp("recordings")
-    write_recording(simulate(SimulationOptions(placements=6, **SMALL)), folder, ("csv",))
-    (folder / "recording_csv" / "camera.yaml").rename(folder / "camera.yaml")
+    two_radars = replace(PRESETS["two-radars"], placements=1, surroundings=SimulationOptions().surroundings, **SMALL)
     (folder / "two").mkdir()
-    write_recording(
-        simulate(replace(PRESETS["two-radars"], placements=1, surroundings=SimulationOptions().surroundings, **SMALL)),
-        folder / "two",
-        ("ros1",),
-    )
+    with grey_frames():
+        write_recording(simulate(SimulationOptions(placements=6, **SMALL)), folder, ("csv",))
+        write_recording(simulate(two_radars), folder / "two", ("ros1",))
+    (folder / "recording_csv" / "camera.yaml").rename(folder / "camera.yaml")
     (folder / "damaged.bag").write_bytes(b"GIF89a")
     return folder
 

@@ -23,13 +23,12 @@ def answer(page: Driver) -> Any:
 
 
 def test_guesses_leave_the_answer_as_the_clicks_gave_it(page: Driver, truth: Any) -> None:
-    for placement in truth["placements"][:4]:
-        place(page, placement)
+    page.load_sample(truth, 4)
     before = answer(page)
     assert page.view["has_calibration"]
     page.until("__cocalib.state.placementsKnown")
     guesses = 0
-    for _ in range(16):
+    for _ in range(8):
         page.press("n")
         page.until(
             "__cocalib.state.shown.index === __cocalib.state.cursor && __cocalib.state.overlay.index === __cocalib.state.cursor"
@@ -39,7 +38,7 @@ def test_guesses_leave_the_answer_as_the_clicks_gave_it(page: Driver, truth: Any
         page.press("Enter", "Enter")
         guesses += page.value("__cocalib.clicksIn(__cocalib.state.cursor).length")
     rows = page.view["clicks"]
-    assert [row["state"] for row in rows].count("untouched") == guesses >= 10
+    assert [row["state"] for row in rows].count("untouched") == guesses >= 5
     assert answer(page) == before
     assert "guess" in page.text(".pairs tr.untouched")
     first = next(row for row in rows if row["state"] == "untouched")

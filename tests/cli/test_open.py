@@ -10,6 +10,7 @@ from calib_core.recordings import Recording
 from calib_core.synthetic import OtherCamera, SimulationOptions, simulate, write_recording
 from cocalib.cli import run
 from cocalib.workspace import Workspace
+from tests.picture_recording import grey_frames
 
 
 @pytest.fixture
@@ -72,7 +73,8 @@ def test_a_camera_alone_is_refused_with_what_to_do(
 
 def test_intrinsics_next_to_the_recording_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     options = SimulationOptions(placements=2, dwell_s=4.0, width_px=128, height_px=80, camera_rate_hz=2.0)
-    write_recording(simulate(options), tmp_path, ("csv",))
+    with grey_frames():
+        write_recording(simulate(options), tmp_path, ("csv",))
     clicks = tmp_path / "clicks.json"
     assert run(["solve", str(tmp_path / "recording_csv"), "--clicks", str(clicks), "--confirm-assumptions"]) == 2
     assert f"such as --camera {tmp_path / 'recording_csv' / 'camera.yaml'}" in capsys.readouterr().err
@@ -90,7 +92,8 @@ def test_each_of_two_cameras_in_one_recording_is_opened_by_its_topic(
         camera_rate_hz=1.0,
         other_camera=OtherCamera(present=True),
     )
-    write_recording(simulate(options), tmp_path)
+    with grey_frames():
+        write_recording(simulate(options), tmp_path)
     bags = [str(tmp_path / name) for name in ("radar.bag", "camera.bag")]
     topic = f"/{camera}/image_raw/compressed"
     given = ["--image-topic", topic, "--clicks", str(tmp_path / clicks), "--no-browser"]
