@@ -8,9 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from calib_core.recordings import RecordingOptions
-from tests.corpus_layouts.truth import CAMERA, HEIGHT_PX, START_NS, WIDTH_PX, Returns, Truth, jpeg, picture_times, scene
-
-_DATED_START_NS = START_NS
+from tests.corpus_layouts.truth import START_NS, Returns, Truth, jpeg, picture_times, scene
 
 
 def date_text(time_ns: int, pattern: str) -> str:
@@ -23,19 +21,6 @@ def write_dated_pictures(folder: Path, times_ns: np.ndarray) -> None:
     folder.mkdir(parents=True)
     for number, time_ns in enumerate(times_ns.tolist()):
         (folder / date_text(time_ns, "img_%Y-%m-%d_%H-%M-%S-%f.jpg")).write_bytes(jpeg(number))
-
-
-def write_camera_yaml(path: Path) -> None:
-    """Write the camera as ROS' camera_calibration does."""
-    figures = ", ".join(f"{value:.6f}" for value in CAMERA.reshape(-1))
-    projection = ", ".join(f"{value:.6f}" for value in np.hstack([CAMERA, np.zeros((3, 1))]).reshape(-1))
-    path.write_text(
-        f"image_width: {WIDTH_PX}\nimage_height: {HEIGHT_PX}\ncamera_name: front\n"
-        f"camera_matrix:\n  rows: 3\n  cols: 3\n  data: [{figures}]\n"
-        "distortion_model: plumb_bob\ndistortion_coefficients:\n  rows: 1\n  cols: 5\n  data: [0, 0, 0, 0, 0]\n"
-        "rectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n"
-        f"projection_matrix:\n  rows: 3\n  cols: 4\n  data: [{projection}]\n"
-    )
 
 
 def json_lines(folder: Path) -> Truth:
