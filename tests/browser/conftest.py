@@ -14,6 +14,7 @@ from cocalib.web.port.server import RunningServer, start
 from cocalib.workspace import Workspace, open_workspace
 from tests.browser.driving import FLAGS, Driver
 from tests.find_browser import find_browser
+from tests.serving import serving
 
 EMPTY_3D_VIEW = """document.addEventListener("readystatechange", () => {
   if (document.readyState === "interactive") document.getElementById("space-view")?.setAttribute("src", "about:blank");
@@ -90,13 +91,14 @@ def server(workspace: Workspace, sample: Recording) -> Iterator[RunningServer]:
 
 @pytest.fixture
 def radar_only_server(project_root: Path, tmp_path: Path) -> Iterator[RunningServer]:
-    """Serve a recording without pictures."""
-    with open_recording(project_root / "sample_data" / "rooftop" / "radar.bag", require=("radar",)) as recording:
-        opened = open_workspace(recording, camera=None, session_folder=tmp_path / "s", name="radar.bag")
-        running = start(opened, recording, ServerOptions(port=0, token="test"))
+    """Serve a recording without pictures; nothing is stored, because the session belongs to a recording with pictures."""
+    radar, folder = project_root / "sample_data" / "rooftop" / "radar.bag", tmp_path / "s"
+    with (
+        open_recording(radar, require=("radar",)) as recording,
+        serving(recording, folder, name="radar.bag", token="test") as (running, _),
+    ):
         yield running
-        running.close()
-        opened.close()
+    assert not folder.exists()
 
 
 @pytest.fixture

@@ -9,11 +9,10 @@ from typing import Any
 import pytest
 from playwright.sync_api import expect
 
-from cocalib.web.port.link import ServerOptions
-from cocalib.web.port.server import RunningServer, start
-from cocalib.workspace import open_workspace
+from cocalib.web.port.server import RunningServer
 from tests.browser.accessibility import violations
 from tests.browser.driving import Driver
+from tests.serving import serving
 from tests.street_recording import StreetRecording, reference_calibration, true_edges
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
@@ -26,13 +25,10 @@ def walk() -> StreetRecording:
 
 @pytest.fixture
 def street_server(walk: StreetRecording, tmp_path: Path) -> Iterator[RunningServer]:
-    workspace = open_workspace(
-        walk, camera=walk.camera(), session_folder=tmp_path / "s", name="street", reference=reference_calibration()
-    )
-    running = start(workspace, walk, ServerOptions(port=0, token="test"))
-    yield running
-    running.close()
-    workspace.close()
+    with serving(
+        walk, tmp_path / "s", camera=walk.camera(), name="street", reference=reference_calibration(), token="test"
+    ) as (running, _):
+        yield running
 
 
 def judged(page: Driver) -> float:

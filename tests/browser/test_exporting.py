@@ -13,10 +13,8 @@ from playwright.sync_api import expect
 
 from calib_core.interchange import FORMATS, check, format_named, read_any, read_any_file
 from calib_core.recordings import Recording
-from cocalib.web.port.link import ServerOptions
-from cocalib.web.port.server import start
-from cocalib.workspace import open_workspace
 from tests.browser.driving import Driver
+from tests.serving import serving
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 DIALOG = "#export-dialog"
@@ -26,14 +24,13 @@ RECTIFIED = f"{DIALOG} .rectified input"
 @pytest.fixture(scope="module")
 def solved_sample(sample: Recording, project_root: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """Serve the sample with its clicks, which no test of the panel changes; return the link."""
-    workspace = open_workspace(
-        sample, camera=sample.camera(), session_folder=tmp_path_factory.mktemp("solved") / "session", name="sample"
-    )
-    running = start(workspace, sample, ServerOptions(port=0, token="test"))
-    workspace.import_clicks((project_root / "sample_data/rooftop/clicks.json").read_text(), "clicks.json")
-    yield running.url
-    running.close()
-    workspace.close()
+    folder = tmp_path_factory.mktemp("solved")
+    with serving(sample, folder / "session", camera=sample.camera(), name="sample", token="test") as (
+        running,
+        workspace,
+    ):
+        workspace.import_clicks((project_root / "sample_data/rooftop/clicks.json").read_text(), "clicks.json")
+        yield running.url
 
 
 @pytest.fixture

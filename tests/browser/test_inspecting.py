@@ -6,10 +6,8 @@ from pathlib import Path
 import pytest
 
 from calib_core.recordings import RecordingOptions, open_recording
-from cocalib.web.port.link import ServerOptions
-from cocalib.web.port.server import start
-from cocalib.workspace import open_workspace
 from tests.browser.driving import Driver
+from tests.serving import serving
 from tests.vendor_recording import vendor_sample
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
@@ -25,9 +23,7 @@ def test_clocks_axes_and_warnings_of_the_recording_are_on_the_page(
     options = RecordingOptions(clock="receive", radar_axes="forward,left,up")
     with open_recording([cut, folder / "camera.bag"], options) as recording:
         camera = recording.camera()
-        workspace = open_workspace(recording, camera=camera, session_folder=tmp_path / "s", name="cut")
-        running = start(workspace, recording, ServerOptions(port=0, token="test"))
-        try:
+        with serving(recording, tmp_path / "s", camera=camera, name="cut", token="test") as (running, _):
             page = open_page(running.url)
             assert page.text("#recording-topics") == "receive time: radar, camera"
             page.page.click("#choose-recording")
@@ -37,33 +33,27 @@ def test_clocks_axes_and_warnings_of_the_recording_are_on_the_page(
             page.until("document.body.innerText.includes('after its stamp')")
             box = page.text('#opening-dialog [data-code="not-closed"]')
             assert "complete messages were recovered by reading the whole file" in box
-        finally:
-            running.close()
-            workspace.close()
 
 
 def test_assumptions_are_listed_until_the_user_confirms_them(
     open_page: Callable[..., Driver], project_root: Path, tmp_path: Path
 ) -> None:
-    with open_recording(vendor_sample(project_root / "sample_data" / "rooftop", tmp_path)) as recording:
-        workspace = open_workspace(recording, camera=recording.camera(), session_folder=tmp_path / "s", name="vendor")
-        running = start(workspace, recording, ServerOptions(port=0, token="test"))
-        try:
-            page = open_page(running.url)
-            assert page.page.get_attribute("#recording-notes", "class") == "asks"
-            page.page.click("#choose-recording")
-            box = page.text('#opening-dialog [data-code="assumed"]')
-            assert "2 assumptions about the recording are unconfirmed" in box
-            assert "f_Azimuth is taken as growing to the left" in box
-            assert "--map azimuth=f_Azimuth:rad" in box
-            page.page.click("#opening-dialog .reading summary")
-            page.until("document.body.innerText.includes('azimuth from f_Azimuth [rad], to the left')")
-            page.page.locator("#confirm-assumptions").click()
-            page.until("document.querySelectorAll('#opening-dialog [data-code=assumed]').length === 0")
-            assert len(workspace.session.confirmed) == 2
-        finally:
-            running.close()
-            workspace.close()
+    with (
+        open_recording(vendor_sample(project_root / "sample_data" / "rooftop", tmp_path)) as recording,
+        serving(recording, tmp_path / "s", camera=recording.camera(), token="test") as (running, workspace),
+    ):
+        page = open_page(running.url)
+        assert page.page.get_attribute("#recording-notes", "class") == "asks"
+        page.page.click("#choose-recording")
+        box = page.text('#opening-dialog [data-code="assumed"]')
+        assert "2 assumptions about the recording are unconfirmed" in box
+        assert "f_Azimuth is taken as growing to the left" in box
+        assert "--map azimuth=f_Azimuth:rad" in box
+        page.page.click("#opening-dialog .reading summary")
+        page.until("document.body.innerText.includes('azimuth from f_Azimuth [rad], to the left')")
+        page.page.locator("#confirm-assumptions").click()
+        page.until("document.querySelectorAll('#opening-dialog [data-code=assumed]').length === 0")
+        assert len(workspace.session.confirmed) == 2
 
 
 def test_a_recording_without_problems_shows_no_warning(page: Driver) -> None:

@@ -17,11 +17,11 @@ from calib_core.interchange.cameras.rectification import rectified_camera
 from calib_core.recordings import Recording, open_recording
 from calib_core.synthetic import PRESETS, WavedBoard, simulate, write_recording
 from cocalib.intrinsics import RecordedPictures
-from cocalib.web.port.link import ServerOptions
-from cocalib.web.port.server import RunningServer, start
-from cocalib.workspace import Workspace, open_workspace
+from cocalib.web.port.server import RunningServer
+from cocalib.workspace import Workspace
 from tests.browser.accessibility import violations
 from tests.browser.driving import Driver
+from tests.serving import serving
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
@@ -51,11 +51,8 @@ def waved(folder: Path, tmp_path: Path) -> Iterator[tuple[RunningServer, Workspa
     """Serve a recording without intrinsics in which a board is waved first."""
     with open_recording([folder / "radar.bag", folder / "camera.bag"]) as recording:
         assert recording.camera() is None
-        workspace = open_workspace(recording, camera=None, session_folder=tmp_path / "s", name="waved")
-        running = start(workspace, recording, ServerOptions(port=0, token="test"))
-        yield running, workspace
-        running.close()
-        workspace.close()
+        with serving(recording, tmp_path / "s", name="waved", token="test") as (running, workspace):
+            yield running, workspace
 
 
 @pytest.fixture

@@ -1,35 +1,19 @@
 """A recording without pictures: its radar can be looked at, nothing can be clicked, and the page says what was found."""
 
 import re
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable
 
 import pytest
 
-from calib_core.recordings import open_recording
-from cocalib.web.port.link import ServerOptions
-from cocalib.web.port.server import RunningServer, start
-from cocalib.workspace import open_workspace
+from cocalib.web.port.server import RunningServer
 from tests.browser.driving import Driver
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
 
 @pytest.fixture
-def radar_server(project_root: Path, tmp_path: Path) -> Iterator[RunningServer]:
-    radar = project_root / "sample_data" / "rooftop" / "radar.bag"
-    with open_recording(radar, require=("radar",)) as recording:
-        workspace = open_workspace(recording, camera=None, session_folder=tmp_path / "s", name="radar.bag")
-        running = start(workspace, recording, ServerOptions(port=0, token="test"))
-        yield running
-        running.close()
-        workspace.close()
-    assert not (tmp_path / "s").exists(), "nothing is stored: the session belongs to a recording with pictures"
-
-
-@pytest.fixture
-def page(open_page: Callable[..., Driver], radar_server: RunningServer) -> Driver:
-    driver = open_page(radar_server.url, ready="__cocalib.state.look")
+def page(open_page: Callable[..., Driver], radar_only_server: RunningServer) -> Driver:
+    driver = open_page(radar_only_server.url, ready="__cocalib.state.look")
     driver.until("__cocalib.state.placementsKnown && __cocalib.state.radarMap")
     return driver
 

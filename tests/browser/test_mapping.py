@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
-from cocalib.web.port.link import ServerOptions
-from cocalib.web.port.server import RunningServer, start
-from cocalib.workspace import open_workspace
+from cocalib.web.port.server import RunningServer
 from tests.browser.driving import Driver
 from tests.picture_recording import PictureRecording
+from tests.serving import serving
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
@@ -26,13 +25,8 @@ def dots(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningServer]:
     for picture, (u, v) in zip(pictures, DOTS, strict=True):
         picture[v, u] = 255
     recording = PictureRecording(pictures)
-    workspace = open_workspace(
-        recording, camera=None, session_folder=tmp_path_factory.mktemp("dots") / "s", name="dots"
-    )
-    running = start(workspace, recording, ServerOptions(port=0, token="test"))
-    yield running
-    running.close()
-    workspace.close()
+    with serving(recording, tmp_path_factory.mktemp("dots") / "s", name="dots", token="test") as (running, _):
+        yield running
 
 
 def drawn_at(page: Driver, u: float, v: float, ratio: float) -> tuple[float, float]:

@@ -16,9 +16,10 @@ from calib_core.proposing import DwellView, FrameSource, PictureCandidate, ViewP
 from calib_core.recordings import Recording
 from cocalib.web.port.link import ServerOptions
 from cocalib.web.port.server import RunningServer, start
-from cocalib.workspace import Workspace, open_workspace
+from cocalib.workspace import Workspace
 from tests.browser.accessibility import violations
 from tests.browser.driving import Driver
+from tests.serving import serving
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
@@ -323,15 +324,10 @@ def test_what_is_accepted_while_the_server_is_gone_is_drawn_and_sent_when_it_is_
 def test_without_intrinsics_the_line_says_why_nothing_is_proposed(
     sample: Recording, tmp_path: Path, open_page: Callable[..., Driver]
 ) -> None:
-    opened = open_workspace(sample, camera=None, session_folder=tmp_path / "session", name="sample")
-    running = start(opened, sample, ServerOptions(port=0, token="test", proposes=True))
-    try:
+    with serving(sample, tmp_path / "session", name="sample", token="test", proposes=True) as (running, _):
         page = open_page(running.url)
         page.until("__cocalib.state.proposals?.progress.problem")
         page.press("n")
         page.until("document.getElementById('guide').textContent.includes('No proposals: ')")
         page.until("__cocalib.state.shown.index === __cocalib.state.cursor")
         assert "intrinsics" in page.text("#guide")
-    finally:
-        running.close()
-        opened.close()

@@ -9,10 +9,8 @@ import pytest
 
 from calib_core.recordings import Recording
 from cocalib.opening.opened import reference_from
-from cocalib.web.port.link import ServerOptions
-from cocalib.web.port.server import start
-from cocalib.workspace import open_workspace
 from tests.browser.driving import Driver
+from tests.serving import serving
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
@@ -24,15 +22,9 @@ def test_a_calibration_is_shown_checked_and_compared(
     rows = np.hstack([true["rotation"], np.reshape(true["translation_m"], (3, 1))])
     file.write_text("\n".join(" ".join(repr(float(value)) for value in row) for row in rows))
     camera = sample.camera()
-    workspace = open_workspace(
-        sample,
-        camera=camera,
-        session_folder=tmp_path / "session",
-        name="sample",
-        reference=reference_from(file, camera),
-    )
-    running = start(workspace, sample, ServerOptions(port=0, token="test"))
-    try:
+    with serving(
+        sample, tmp_path / "session", camera=camera, name="sample", reference=reference_from(file, camera), token="test"
+    ) as (running, _):
         page = open_page(running.url)
         assert page.text("#status-text").startswith("Showing the calibration from factory.txt; click reflectors")
         page.until("__cocalib.state.overlay.returns.length > 0")
@@ -47,6 +39,3 @@ def test_a_calibration_is_shown_checked_and_compared(
         assert float(figures["rotation_apart"]["value"].split()[0]) < 1.0
         assert "Difference from factory.txt" in page.text("#page-pose")
         assert "at 20 m" in page.text("#page-pose .apart")
-    finally:
-        running.close()
-        workspace.close()

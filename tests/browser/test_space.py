@@ -1,6 +1,6 @@
 """The 3D view in a browser: what is in it can be picked and read, and the Camera view equals the picture."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from calib_core.measurements import TimeNs
-from calib_core.recordings import Recording, open_recording
+from calib_core.recordings import Recording
 from calib_core.results import Calibration
-from cocalib.web.port.link import ServerOptions
-from cocalib.web.port.server import RunningServer, start
+from cocalib.web.port.server import RunningServer
 from cocalib.web.radar_sight import RadarSight
-from cocalib.workspace import Workspace, open_workspace
+from cocalib.workspace import Workspace
 from tests.browser.driving import Driver
 
 pytestmark = pytest.mark.browser
@@ -175,20 +174,10 @@ PICTURE_DIFFERENCE = """([left, top, scale]) => {
 }"""
 
 
-@pytest.fixture
-def radar_server(project_root: Path, tmp_path: Path) -> Iterator[RunningServer]:
-    with open_recording(project_root / "sample_data" / "rooftop" / "radar.bag", require=("radar",)) as recording:
-        workspace = open_workspace(recording, camera=None, session_folder=tmp_path / "s", name="<i>radar</i>")
-        running = start(workspace, recording, ServerOptions(port=0, token="test"))
-        yield running
-        running.close()
-        workspace.close()
-
-
 def test_without_pictures_returns_and_placements_can_be_picked_too(
-    open_page: Callable[..., Driver], radar_server: RunningServer
+    open_page: Callable[..., Driver], radar_only_server: RunningServer
 ) -> None:
-    page = open_page(radar_server.url, ready="__cocalib.state.look")
+    page = open_page(radar_only_server.url, ready="__cocalib.state.look")
     page.until("__cocalib.state.placementsKnown && __cocalibSpace.lookShown()?.placements.length >= 10")
     assert not page.page.is_visible("#space-camera")
     open_views(page)

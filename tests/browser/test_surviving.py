@@ -12,11 +12,9 @@ from typing import Any
 
 import pytest
 
-from cocalib.web.port.link import ServerOptions
-from cocalib.web.port.server import start
-from cocalib.workspace import open_workspace
 from tests.browser.driving import Driver
 from tests.picture_recording import PictureRecording, grey_pictures
+from tests.serving import serving
 
 pytestmark = pytest.mark.browser
 
@@ -100,9 +98,7 @@ def test_killing_the_server_loses_no_click_and_the_page_reconnects_by_itself(
 def test_names_in_a_recording_are_text_and_never_run(open_page: Callable[..., Driver], tmp_path: Path) -> None:
     hostile = '<img src=x onerror="window.hit=1"><script>window.hit=1</script>'
     recording = PictureRecording(grey_pictures(3), image_topic=hostile, radar_topic=f"radar{hostile}")
-    workspace = open_workspace(recording, camera=None, session_folder=tmp_path / "s", name=f"name{hostile}")
-    running = start(workspace, recording, ServerOptions(port=0, token="test"))
-    try:
+    with serving(recording, tmp_path / "s", name=f"name{hostile}", token="test") as (running, _):
         page = open_page(running.url)
         page.click(100, 100)
         page.press("?")
@@ -113,9 +109,6 @@ def test_names_in_a_recording_are_text_and_never_run(open_page: Callable[..., Dr
         page.page.click("#choose-recording")
         assert hostile in page.text("#opening-dialog .reading")
         assert page.page.locator("img").count() == 0
-    finally:
-        running.close()
-        workspace.close()
 
 
 @pytest.mark.no_3d_view
@@ -123,15 +116,10 @@ def test_large_frames_play_at_half_size_and_stand_at_full_size(
     open_page: Callable[..., Driver], tmp_path: Path
 ) -> None:
     recording = PictureRecording(grey_pictures(30, 2400, 1200))
-    workspace = open_workspace(recording, camera=None, session_folder=tmp_path / "s", name="large")
-    running = start(workspace, recording, ServerOptions(port=0, token="test"))
-    try:
+    with serving(recording, tmp_path / "s", name="large", token="test") as (running, _):
         page = open_page(running.url)
         assert page.value("__cocalib.state.shown.scale") == 1
         page.press(" ")
         page.until("__cocalib.state.shown.index > 1 && __cocalib.state.shown.scale === 0.5")
         page.press(" ")
         page.until("!__cocalib.state.playing && __cocalib.state.shown.scale === 1")
-    finally:
-        running.close()
-        workspace.close()

@@ -2,7 +2,7 @@
 
 import logging
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,27 +12,15 @@ import pytest
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
 from calib_core.errors import RecordingError
-from calib_core.measurements import RadarScans, ReflectorClick, TimeNs, Unsolvable
+from calib_core.measurements import RadarScans, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
 from calib_core.synthetic import simulate_pairs
 from cocalib.session import Solved
 from cocalib.solving.worker import SolverWorker
+from tests.unit.app.solving.test_solving import CLICK, Radar
 
 CAMERA = Camera("pinhole", 640, 480, np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]]))
-CLICK = ReflectorClick(TimeNs(10**18), "c1", 1.0, 2.0)
-
-
-class Radar:
-    """A radar recording that records what was requested."""
-
-    def __init__(self, answer: Callable[[], RadarScans] = RadarScans) -> None:
-        self.asked: list[tuple[tuple[int, ...], float]] = []
-        self._answer = answer
-
-    def radar_scans_around(self, times, half_window_s: float) -> RadarScans:
-        self.asked.append((tuple(times), half_window_s))
-        return self._answer()
 
 
 class Gate:

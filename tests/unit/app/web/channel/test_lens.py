@@ -2,7 +2,7 @@
 
 import asyncio
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -25,11 +25,11 @@ from calib_core.intrinsics import (
 )
 from calib_core.results import DataWarning
 from cocalib.session import RecordingFacts
-from cocalib.session.file import open_session_file
 from cocalib.web.channel.lens import LensDesk, camera_table, lens_result, view_corners
 from cocalib.web.channel.outbox import Outbox
 from cocalib.web.messages import LensCalibrate, LensCancel, LensResult, LensState, LensUse, Outgoing, encode, parse
-from cocalib.workspace import GivenIntrinsics, Workspace
+from cocalib.workspace import Workspace
+from tests.unit.app.web.channel.desk import session_without_solver, visited
 
 FACTS = RecordingFacts("a.bag", np.arange(1, 5) * 10**9, 640, 480)
 GIVEN = Camera("pinhole", 640, 480, np.array([[600.0, 0, 320], [0, 600, 240], [0, 0, 1]]))
@@ -45,19 +45,10 @@ class Frames:
     image_times = FACTS.image_times
 
 
-class NoSolver:
-    """Solves nothing; keeps the camera that it was to solve with."""
-
-    def request(self, *_: object) -> None: ...
-    def close(self) -> None: ...
-
-
 @pytest.fixture
-def workspace(tmp_path: Path) -> Any:
-    file = open_session_file(tmp_path / "s", FACTS)
-    made = Workspace(FACTS, file.restored, file, NoSolver(), None, GivenIntrinsics(GIVEN, None, "/camera_info"))
-    yield made
-    made.close()
+def workspace(tmp_path: Path) -> Iterator[Workspace]:
+    with session_without_solver(tmp_path, FACTS, GIVEN) as opened:
+        yield opened
 
 
 @pytest.fixture
@@ -73,18 +64,7 @@ def found(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def at_desk(workspace: Workspace, visit: Callable[[LensDesk, list[Outgoing]], Any]) -> list[Outgoing]:
     """Run a visit at a desk; return what the pages were told."""
-    told: list[Outgoing] = []
-
-    async def run() -> None:
-        desk = LensDesk(workspace, Frames(), lambda message, _kind: told.append(message))  # type: ignore[arg-type]
-        desk.start()
-        try:
-            await visit(desk, told)
-        finally:
-            await desk.close()
-
-    asyncio.run(run())
-    return told
+    return visited(lambda tell: LensDesk(workspace, Frames(), tell), visit)  # type: ignore[arg-type]
 
 
 async def until_done(told: list[Outgoing]) -> LensState:

@@ -19,6 +19,7 @@ from cocalib.web.channel.radar_survey import GrowingSurvey, Survey, survey_of
 from cocalib.web.messages import FollowNote, FramesAdded, Outgoing
 from cocalib.workspace import Workspace
 from tests.growing_recording import SampleWriter
+from tests.unit.app.web.channel.desk import NoSolver
 
 DEADLINE_S = 60.0
 
@@ -45,12 +46,6 @@ class ToldPages:
     @property
     def note(self) -> FollowNote:
         return [FollowNote("live", ""), *(each for each in self.messages if isinstance(each, FollowNote))][-1]
-
-
-class NoSolver:
-    def request(self, *_: object) -> None: ...
-
-    def close(self) -> None: ...
 
 
 async def until(condition: Callable[[], bool]) -> None:

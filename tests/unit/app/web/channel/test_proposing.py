@@ -1,7 +1,7 @@
 """The desk of the proposals: what pages are told, why there are none, and how they are switched off and on."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,11 +13,11 @@ import pytest
 from calib_core.measurements import TimeNs
 from calib_core.proposing import ViewProgress
 from cocalib.session import PlacementDismissed, RecordingFacts
-from cocalib.session.file import open_session_file
 from cocalib.web.channel.proposing import ProposingDesk
-from cocalib.web.messages import Outgoing, ProposalNews, ProposingSwitch, SnapWanted
-from cocalib.workspace import GivenIntrinsics, Workspace
+from cocalib.web.messages import ProposalNews, ProposingSwitch, SnapWanted
+from cocalib.workspace import Workspace
 from tests.drawn_views import draw_views
+from tests.unit.app.web.channel.desk import session_without_solver, visited
 
 DRAWN = draw_views(3)
 PLACEMENTS = tuple(view.placement for view in DRAWN.views)
@@ -34,19 +34,10 @@ class Sensors:
         self.radar_times = np.arange(scans)
 
 
-class NoSolver:
-    """Solves nothing."""
-
-    def request(self, *_: object) -> None: ...
-    def close(self) -> None: ...
-
-
 @pytest.fixture
-def workspace(tmp_path: Path) -> Any:
-    file = open_session_file(tmp_path / "s", FACTS)
-    made = Workspace(FACTS, file.restored, file, NoSolver(), None, GivenIntrinsics(DRAWN.camera, None, "/camera_info"))
-    yield made
-    made.close()
+def workspace(tmp_path: Path) -> Iterator[Workspace]:
+    with session_without_solver(tmp_path, FACTS, DRAWN.camera) as opened:
+        yield opened
 
 
 @pytest.fixture(autouse=True)
@@ -74,18 +65,7 @@ def at_desk(
     workspace: Workspace, visit: Callable[[ProposingDesk, list[Any]], Any], recording: object = None, *, on: bool = True
 ) -> list[Any]:
     """Run a visit at a desk; return what the pages were told."""
-    told: list[Outgoing] = []
-
-    async def run() -> None:
-        desk = ProposingDesk(workspace, recording or Sensors(), lambda message, _kind: told.append(message), on=on)  # type: ignore[arg-type]
-        desk.start()
-        try:
-            await visit(desk, told)
-        finally:
-            await desk.close()
-
-    asyncio.run(run())
-    return told
+    return visited(lambda tell: ProposingDesk(workspace, recording or Sensors(), tell, on=on), visit)  # type: ignore[arg-type]
 
 
 async def until(told: list[Any], holds: Callable[[ProposalNews], bool]) -> ProposalNews:

@@ -8,11 +8,10 @@ import pytest
 
 from cocalib.web.port import entrance as module
 from cocalib.web.port.entrance import Backoff
-from cocalib.web.port.link import ServerOptions
-from cocalib.web.port.server import RunningServer, start
-from cocalib.workspace import open_workspace
+from cocalib.web.port.server import RunningServer
 from tests.picture_recording import PictureRecording, grey_pictures
 from tests.port_client import come_in, get
+from tests.serving import serving
 
 TOKEN = "a long enough token"
 
@@ -62,11 +61,8 @@ def test_tries_take_turns_and_only_so_many_wait() -> None:
 def server(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[RunningServer]:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     recording = PictureRecording(grey_pictures(1))
-    workspace = open_workspace(recording, camera=None, session_folder=tmp_path / "s", name="one grey")
-    running = start(workspace, recording, ServerOptions(port=0, no_browser=True, token=TOKEN))
-    yield running
-    running.close()
-    workspace.close()
+    with serving(recording, tmp_path / "s", name="one grey", token=TOKEN) as (running, _):
+        yield running
 
 
 def test_wrong_tokens_are_slowed_down_and_an_admitted_page_is_not(

@@ -10,12 +10,11 @@ import websockets.http11
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from cocalib.web.port.link import ServerOptions
-from cocalib.web.port.server import RunningServer, start
+from cocalib.web.port.server import RunningServer
 from cocalib.web.port.websockets_hook import read_head
-from cocalib.workspace import open_workspace
 from tests.picture_recording import PictureRecording, grey_pictures
 from tests.port_client import come_in
+from tests.serving import serving
 
 HOST = b"Host: 127.0.0.1\r\n"
 UPGRADE = (
@@ -95,13 +94,8 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningServer]:
     patch = pytest.MonkeyPatch()
     patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
     recording = PictureRecording(grey_pictures(1))
-    workspace = open_workspace(
-        recording, camera=None, session_folder=tmp_path_factory.mktemp("s") / "s", name="one grey"
-    )
-    running = start(workspace, recording, ServerOptions(port=0, no_browser=True))
-    yield running
-    running.close()
-    workspace.close()
+    with serving(recording, tmp_path_factory.mktemp("s") / "s", name="one grey") as (running, _):
+        yield running
     patch.undo()
 
 

@@ -21,6 +21,7 @@ from cocalib.workspace import Workspace, open_workspace
 from tests.page_view import PageView
 from tests.picture_recording import START, PictureRecording, grey_pictures
 from tests.port_client import channel, come_in, get, wanted
+from tests.serving import serving
 
 HOSTILE = '<img src=x onerror="alert(1)">'
 
@@ -31,11 +32,8 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningServer]:
     patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
     recording = PictureRecording(grey_pictures(5), image_topic=HOSTILE)
     folder = tmp_path_factory.mktemp("session") / "s"
-    workspace = open_workspace(recording, camera=recording.camera(), session_folder=folder, name="five greys")
-    running = start(workspace, recording, ServerOptions(port=0, no_browser=True))
-    yield running
-    running.close()
-    workspace.close()
+    with serving(recording, folder, camera=recording.camera(), name="five greys") as (running, _):
+        yield running
     patch.undo()
 
 

@@ -10,10 +10,9 @@ import pytest
 
 from cocalib.cli import run
 from cocalib.web.port.address import AddressError
-from cocalib.web.port.link import ServerOptions, forwarding_command, listening_socket, remove_socket
-from cocalib.web.port.server import start
-from cocalib.workspace import open_workspace
+from cocalib.web.port.link import forwarding_command, listening_socket, remove_socket
 from tests.picture_recording import PictureRecording, grey_pictures
+from tests.serving import serving
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no Unix sockets")
 
@@ -50,9 +49,7 @@ def got(path: Path, target: str, **headers: str) -> http.client.HTTPResponse:
 def test_the_page_is_served_through_the_socket_and_to_its_owner_only(private: Path, tmp_path: Path) -> None:
     path = private / "s"
     recording = PictureRecording(grey_pictures(1))
-    workspace = open_workspace(recording, camera=None, session_folder=tmp_path / "session", name="one grey")
-    running = start(workspace, recording, ServerOptions(port=9999, no_browser=True, socket=path))
-    try:
+    with serving(recording, tmp_path / "session", name="one grey", port=9999, socket=path) as (running, _):
         assert path.stat().st_mode & 0o077 == 0
         assert running.url.startswith("http://127.0.0.1:9999/?token=")
         assert got(path, "/").status == 401
@@ -62,9 +59,6 @@ def test_the_page_is_served_through_the_socket_and_to_its_owner_only(private: Pa
         cookie = admitted.headers["Set-Cookie"].partition(";")[0]
         assert got(path, "/", Cookie=cookie).status == 200
         assert got(path, "/", Cookie=cookie, Host="localhost:1234", Origin="http://localhost:1234").status == 200
-    finally:
-        running.close()
-        workspace.close()
     assert not path.exists()
 
 
