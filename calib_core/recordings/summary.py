@@ -428,7 +428,7 @@ def _times_used(topic: TopicSummary) -> str:
     if not topic.chosen or topic.clocks is None:
         return ""
     from_files = topic.clocks.times_from
-    return _CLOCKS[topic.clock] if not from_files else "assumed" if from_files.startswith("assumed") else "of the files"
+    return _CLOCKS[topic.clock] if not from_files else "assumed" if topic.clocks.is_assumed else "of the files"
 
 
 def _clocks(topics: Sequence[TopicSummary]) -> list[str]:

@@ -5,6 +5,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
 from calib_core.errors import RecordingError
 from calib_core.measurements import DataWarning
 from calib_core.recordings.containers.sources import Assumption
@@ -116,7 +118,7 @@ class _Opening:
             if source is not None:
                 opened[place] = source
                 self.sources.append(source)
-                known = known or (source if source.names and not source.counted else None)
+                known = known or (source if _tells_times(source) else None)
         for place, source in opened.items() if known is not None else ():
             if source.counted and source.names:
                 opened[place] = self._opened(*self.found[place][:2], known) or source
@@ -179,6 +181,11 @@ class _Opening:
         """Close what was opened."""
         for source in self.sources:
             source.close()
+
+
+def _tells_times(source: PlainSource) -> bool:
+    """Return whether the times of a folder's files are theirs and tell them apart."""
+    return bool(source.names) and not source.counted and bool((np.diff(source.times_ns) > 0).all())
 
 
 def _has_pictures(files: Sequence[Path]) -> bool:

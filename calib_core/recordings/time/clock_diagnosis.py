@@ -73,8 +73,15 @@ class ClockDiagnosis:
     times_from: str = ""
 
     @property
+    def is_assumed(self) -> bool:
+        """Whether nothing states the times, so that nothing can be said of the clock."""
+        return self.times_from.startswith("assumed")
+
+    @property
     def remarks(self) -> tuple[str, ...]:
         """Notable observations as text; empty if there are none."""
+        if self.is_assumed:
+            return ()
         found = [
             (self.zero_stamps > 0, f"{self.zero_stamps} of {self.messages} stamps are zero"),
             (self.from_1970, "the stamps count from the start of a device, not from 1970"),
@@ -246,7 +253,7 @@ def about_clocks(found: Sequence[ClockDiagnosis]) -> list[DataWarning]:
                     "synchronize the clocks of both sensors (PTP or NTP), or use --clock receive",
                 )
             )
-    apart = [one for one in found if one.islands > 1]
+    apart = [one for one in found if one.islands > 1 and not one.is_assumed]
     if apart:
         listed = "; ".join(
             f"{one.topic} has {one.islands} stretches of data separated by up to {span_text(one.longest_gap_s)}: "

@@ -149,12 +149,14 @@ def test_the_times_beside_numbered_stills_are_found_and_told(tmp_path) -> None:
 
 
 def test_an_assumed_time_is_never_called_sound_and_has_no_rate(tmp_path) -> None:
-    folder = pictures(tmp_path / "zed_left", [f"{number:06}.png" for number in (1, 15, 29, 43, 57)])
+    folder = pictures(tmp_path / "zed_left", [f"{number:06}.png" for number in (1, 15, 29, 43, 570)])
     with open_recording(folder, require=("image",)) as recording:
         text = describe(recording)
         (topic,) = recording.topics
+        assert [warning.code for warning in recording.warnings] == ["numbered-files"]
     assert (topic.rate_hz, topic.jitter_s) == (None, None)
     assert "times are assumed" in text
+    assert "stamps count" not in text
     assert "Hz" not in text
     assert "sound" not in text
 
@@ -186,6 +188,22 @@ def test_files_without_times_have_those_of_the_other_sensor(tmp_path, stamped, s
         wanted = [START_NS + number * 10**9 for number in (4, 5, 9)]
         assert recording.image_times.tolist() == recording.radar_times.tolist() == wanted
     assert f"with the same {what}" in warning.message
+
+
+def test_times_that_do_not_tell_files_apart_are_given_to_no_other(tmp_path) -> None:
+    """A lidar's tables with one and the same time in all of them, beside pictures and a radar's without any."""
+    pictures(tmp_path / "camera_front", [f"{number:06}.png" for number in range(4)])
+    for folder, head, row in (
+        ("lidar", "x_m y_m z_m time_s", "1 2 3 6"),
+        ("radar", "x_m y_m z_m doppler_mps", "9 2 3 1"),
+    ):
+        (tmp_path / folder).mkdir()
+        for number in range(4):
+            (tmp_path / folder / f"{number:06}.txt").write_text(f"{head}\n{row}\n{row}\n")
+    with open_recording(tmp_path) as recording:
+        assert recording.radar_topic == "/radar/radar"
+        assert recording.image_times.tolist() == recording.radar_times.tolist()
+        assert len(set(recording.image_times.tolist())) == 4
 
 
 def test_pictures_without_a_time_are_skipped_with_a_warning(tmp_path) -> None:
