@@ -100,13 +100,15 @@ class CloudLayout:
         if plan is None:
             raise MessageError(f"a cloud has no position, only the fields {', '.join(dtype.names or ('(none)',))}")
         points = _points(data, dtype, height, width, step)
+        dense = np.array([not (self.definition.names & {"is_dense"}) or bool(message.whole("is_dense"))])
+        returns = _unless_marked(_returns(points, plan), dense, np.array([len(points)]))
         beyond = _beyond(data, dtype, width) if height == 1 else 0
         if beyond:
-            return _with_lost(_returns(points, plan), beyond)
+            return _with_lost(returns, beyond)
         if height == 1 and order == "<":
             start = _after_header(payload, self.definition) + 8
             self._remember(payload[start : len(payload) - len(data) - 9], _Shape(dtype, plan))
-        return _returns(points, plan)
+        return returns
 
     def returns_of_rows(self, rows: np.ndarray, lengths: np.ndarray) -> tuple[Returns, np.ndarray] | None:
         """Read many one-row clouds at once; None unless all have the frame and field description of an earlier cloud.
@@ -132,7 +134,9 @@ class CloudLayout:
             alike = rows[:, start + 8 : end].tobytes() == block * len(rows) and (numbers[:, 0] == 1).all()
             same_frame = rows[:, 12:16].tobytes() == rows[0, 12:16].tobytes() * len(rows)
             if alike and same_frame and (width * step == sizes).all() and (end + 8 + sizes <= lengths).all():
-                return _returns(_points_of_rows(rows, end + 8, width, shape.dtype), shape.plan), width
+                returns = _returns(_points_of_rows(rows, end + 8, width, shape.dtype), shape.plan)
+                after = np.minimum(end + 8 + sizes, rows.shape[1] - 1)
+                return _unless_marked(returns, rows[np.arange(len(rows)), after] != 0, width), width
         return None
 
     def with_plan(self, plan: ColumnPlan) -> "CloudLayout":
@@ -157,7 +161,8 @@ class CloudLayout:
                 _, size = struct.unpack_from("<II", payload, end)
                 if size != width * shape.dtype.itemsize or end + 8 + size > len(payload):
                     return None
-                return _returns(np.frombuffer(payload, shape.dtype, width, end + 8), shape.plan)
+                returns = _returns(np.frombuffer(payload, shape.dtype, width, end + 8), shape.plan)
+                return _unless_marked(returns, np.array([any(payload[end + 8 + size :][:1])]), np.array([width]))
         except struct.error:
             return None
         return None
@@ -261,6 +266,21 @@ def _cloud_columns(samples: Samples, dtype: np.dtype[Any]) -> list[DescribedColu
             DescribedColumn(name, dtype[name].kind != "f", "", points[name].astype(np.float64))
             for name in dtype.names or ()
         ]
+
+
+def _unless_marked(returns: Returns, dense: np.ndarray, counts: np.ndarray) -> Returns:
+    """Count no return as lost in a cloud that says that it has invalid ones, unless it has no valid one.
+
+    Args:
+        returns: of some clouds.
+        dense: (m,) whether each says that all its returns are valid.
+        counts: (m,) number of returns of each.
+    """
+    if returns.lost is None or dense.all():
+        return returns
+    cloud = np.repeat(np.arange(len(counts)), counts)
+    marked = ~dense & (np.bincount(cloud, returns.lost, len(counts)) < counts)
+    return replace(returns, lost=returns.lost & ~marked[cloud])
 
 
 def _beyond(data: np.ndarray, dtype: np.dtype[Any], width: int) -> int:

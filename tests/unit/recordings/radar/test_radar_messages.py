@@ -131,6 +131,23 @@ def test_returns_that_a_cloud_loses_are_counted_and_told(ros, write, cloud_point
     assert warning.message.startswith("4 of 200 returns of the radar are lost (2 %)")
 
 
+def test_positions_that_are_none_mark_invalid_returns_in_a_cloud_that_is_not_dense(ros, write, cloud_points):
+    holes, nothing = cloud_points(10), cloud_points(10)
+    holes["x"][3:], nothing["x"] = np.nan, np.nan
+    messages = [ros.cloud(START_NS + i * 10**8, nothing if i == 5 else holes) for i in range(20)]
+    for message in messages:
+        message.is_dense = False
+    with opened(write, ros, messages) as recording:
+        recording.radar_scans()
+        at_once = recording.losses().lost
+    rows = [("/radar", START_NS + i * 10**8, messages[i]) for i in (4, 5)]
+    with open_recording(write(ros, rows, name="few"), require=("radar",)) as recording:
+        for time in recording.radar_times.tolist():
+            recording.radar_scans(TimeNs(time), TimeNs(time))
+        one_by_one = recording.losses().lost
+    assert at_once == one_by_one == 10, "only the cloud without any valid return is lost"
+
+
 def test_zeros_behind_the_points_of_a_cloud_are_no_lost_returns(ros, write, cloud_points):
     padded = ros.cloud(START_NS, np.concatenate([cloud_points(5), np.zeros(3, cloud_points(1).dtype)]))
     padded.width = 5
