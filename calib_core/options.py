@@ -170,14 +170,28 @@ class ReflectorOptions:
     )
 
 
+HowMeasured: TypeAlias = Literal["housing", "antenna", "drawing"]
+HOW_MEASURED: Mapping[HowMeasured, tuple[str, float]] = {
+    "housing": ("from housing to housing", 0.05),
+    "antenna": ("from the antennas to the lens", 0.02),
+    "drawing": ("from a drawing", 0.005),
+}
+"""How a camera position was measured: in words, and the standard deviation per axis [m] that it then has."""
+
+
 @dataclass(frozen=True, slots=True)
 class CameraPositionPrior:
-    """A tape-measured camera position; no other extra measurement helps as much."""
+    """A tape-measured camera position; no other extra measurement helps as much. It may be off by more than its sigma says."""
 
     position_m: tuple[float, float, float] = option(
         (0.0, 0.0, 0.0), "Camera centre in the radar frame: forward, left, up [m].", low=-100.0, high=100.0
     )
-    sigma_m: float = option(0.01, "Standard deviation of that position, per axis [m].", low=1e-4, high=10.0)
+    sigma_m: float = option(0.03, "Standard deviation of that position, per axis [m].", low=1e-4, high=10.0)
+
+    @classmethod
+    def measured(cls, position_m: tuple[float, float, float], how: HowMeasured) -> "CameraPositionPrior":
+        """Return a position that was measured in one of the ways of `HOW_MEASURED`, with the sigma that this has."""
+        return cls(position_m, HOW_MEASURED[how][1])
 
 
 @dataclass(frozen=True, slots=True)

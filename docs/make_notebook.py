@@ -78,7 +78,7 @@ CELLS: tuple[tuple[str, str], ...] = (
     ),
     (
         "code",
-        "tape = cc.CameraPositionPrior(position_m=(0.0, 0.0, 0.045), sigma_m=0.01)\n"
+        'tape = cc.CameraPositionPrior.measured((0.0, 0.0, 0.045), "antenna")\n'
         "options = cc.CalibrationOptions(solving=cc.SolvingOptions(camera_position=tape))\n"
         "measured = cc.calibrate_pairs(pairs, simulated.camera, options).unwrap()\n"
         'for name, one in (("free", calibration), ("with tape", measured)):\n'

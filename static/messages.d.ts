@@ -97,7 +97,7 @@ export interface ReflectorOptions {
   click_offset_sigma_px: number;
 }
 
-/** A tape-measured camera position; no other extra measurement helps as much. */
+/** A tape-measured camera position; no other extra measurement helps as much. It may be off by more than its sigma says. */
 export interface CameraPositionPrior {
   position_m: [number, number, number];
   sigma_m: number;
@@ -409,6 +409,7 @@ export interface OptionDescription {
   low: number | null;
   high: number | null;
   default: boolean | number | string | CameraPositionPrior | null;
+  measured: Record<string, number>;
 }
 
 /** Related options; the first group has no name and contains the method. */

@@ -7,7 +7,7 @@ import difflib
 import inspect
 import typing
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any, TypeAlias
 
@@ -15,6 +15,7 @@ import msgspec
 
 from calib_core.errors import OptionError
 from calib_core.options import (
+    HOW_MEASURED,
     RANGES,
     RETIRED_METHODS,
     UNITS,
@@ -57,6 +58,7 @@ class OptionDescription:
         low: smallest allowed value; None if unlimited.
         high: largest allowed value; None if unlimited.
         default: the value if it is not set.
+        measured: of a camera position, how it was measured, in words, and the sigma [m] that it then has.
     """
 
     path: str
@@ -68,6 +70,7 @@ class OptionDescription:
     low: float | None
     high: float | None
     default: OptionValue
+    measured: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,10 +156,15 @@ def option_groups() -> tuple[OptionGroup, ...]:
                 low=low,
                 high=high,
                 default=typing.cast(OptionValue, leaf.field.default),
+                measured=_ways_to_measure() if kind_of(leaf) == "camera-position" else {},
             )
         )
     ordered = sorted(groups.items(), key=lambda item: item[0] != "")
     return tuple(OptionGroup(name, inspect.getdoc(owners[name]) or "", tuple(group)) for name, group in ordered)
+
+
+def _ways_to_measure() -> dict[str, float]:
+    return {"with a tape": CameraPositionPrior().sigma_m, **dict(HOW_MEASURED.values())}
 
 
 def _changes(tree: object, prefix: str) -> Iterator[OptionChange]:

@@ -72,7 +72,8 @@ def _wrong_lens(fit: SolvedFit) -> list[DataWarning]:
 
 
 def _systematic_errors(fit: SolvedFit) -> list[DataWarning]:
-    return systematic_error_warnings(fit.uncertainty.systematic_errors, flat=fit.measurements.flat)
+    errors, prior = fit.uncertainty.systematic_errors, fit.measurements.prior
+    return systematic_error_warnings(errors, flat=fit.measurements.flat, measured=prior.measured)
 
 
 def _flat_radar(fit: SolvedFit) -> list[DataWarning]:

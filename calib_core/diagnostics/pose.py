@@ -1,14 +1,13 @@
 """Warnings about the pose as a whole: a second pose, also among the samples of the posterior or of the pairs set aside, and an
 implausible camera position."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from calib_core.arrays import Matrix33, Matrix66, Values, Vector3
+from calib_core.arrays import Values
 from calib_core.diagnostics.pairs import listed
 from calib_core.diagnostics.solved_fit import SolvedFit
-from calib_core.estimation.covariance import pose_covariance
 from calib_core.estimation.errors_in_variables import fit_errors_in_variables
 from calib_core.estimation.gnc import GncSolution, associate, mixture_cost
 from calib_core.geometry import RigidTransform
@@ -145,93 +144,22 @@ def _away(error: Values) -> str:
     return f"{np.rad2deg(np.linalg.norm(error[3:])):.1f} deg and {100 * np.linalg.norm(error[:3]):.0f} cm away"
 
 
-_CONTRADICTION_LEVEL = 0.99
-_OTHER_UNIT_SIGMAS = 4.0
-_SCREENING_SIGMAS = 1.8
-_AGREEING_SIGMAS = 3.0
-
-_UNIT_SLIPS = (
-    ("the measured position looks like centimetres", 0.01, 2.0),
-    ("the measured position looks like millimetres", 0.001, 2.0),
-    ("the measured position looks like feet", 0.3048, 0.0),
-    ("the radar's ranges look like feet", 1.0 / 0.3048, 0.0),
-)
-"""What would remove a contradiction, the factor on the measured position, and the smallest position [m] it is said of."""
-
-
 def camera_position(fit: SolvedFit) -> list[DataWarning]:
-    """Warn if the pairs contradict the measured camera position.
-
-    A position with a small sigma overrides the pairs and only makes the residuals large, or not even that, so it becomes a
-    weak prior here. One step from the solved pose tells whether the fit without it is needed.
-    """
-    if not fit.measurements.prior.measured:
+    """Say that the pairs contradict the measured camera position, and that the pose leaves it out."""
+    found = fit.contradicted
+    if found is None:
         return []
-    prior, refined = fit.refined.measurements.prior, fit.refined
-    residual, jacobian = prior.rows(refined.camera_from_radar)
-    weak_jacobian = prior.weakened().rows(refined.camera_from_radar)[1]
-    information = fit.uncertainty.information.copy()
-    information[:6, :6] += weak_jacobian.T @ weak_jacobian - jacobian.T @ jacobian
-    covariance = np.linalg.inv(information)[:6, :6]
-    moved = refined.camera_from_radar.perturbed(-covariance @ jacobian.T @ residual)
-    if _Centre.of(fit, moved, covariance).sigmas_from(prior.position_m) < _SCREENING_SIGMAS:
-        return []
-    start = GncSolution(refined.camera_from_radar, 0.0, float(refined.noise_scale.max()))
-    weakened = replace(fit.measurements, prior=prior.weakened())
-    alone = fit_errors_in_variables(weakened, start, estimate_scale=fit.options.noise.estimate_scale)
-    centre = _Centre.of(fit, alone.camera_from_radar, pose_covariance(alone).covariance)
-    sigmas = centre.sigmas_from(prior.position_m)
-    if sigmas < _contradiction_sigmas(alone.degrees_of_freedom):
-        return []
-    away_m = float(np.linalg.norm(centre.position_m - prior.position_m))
+    other_unit = f"; {found.other_unit}" if found.other_unit else ""
     return [
         DataWarning(
             "camera-position-contradicted",
-            f"the pairs alone place the camera {100 * away_m:.0f} cm from the measured position, "
-            f"{sigmas:.1f} standard deviations{_other_unit(centre, prior.position_m)}",
-            "measure again from the radar's antennas to the lens: forward, left, up; or state a larger uncertainty",
+            f"the pairs alone place the camera {100 * found.away_m:.0f} cm from the measured position, "
+            f"{found.sigmas:.1f} standard deviations{other_unit}; clicks that all lie as far beside the radar's phase centre "
+            "would look the same; the pose is that of the pairs alone",
+            "measure again from the radar's antennas to the lens: forward, left, up; and click the reflector's apex, where its "
+            "three sheets meet, not its mouth or its stand",
         )
     ]
-
-
-def _contradiction_sigmas(degrees_of_freedom: float) -> float:
-    """Return the distance in standard deviations that a right position exceeds in 1 % of the sets: 3 F(3, nu), or chi-square."""
-    from scipy.special import chdtri, fdtri
-
-    if degrees_of_freedom <= 0:
-        return float(np.sqrt(chdtri(3.0, 1.0 - _CONTRADICTION_LEVEL)))
-    return float(np.sqrt(3.0 * fdtri(3.0, degrees_of_freedom, _CONTRADICTION_LEVEL)))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Centre:
-    """The camera centre from the pairs alone, (3,) [m], with the covariance (3, 3) of its distance from the measured one."""
-
-    position_m: Vector3
-    covariance_m2: Matrix33
-
-    @classmethod
-    def of(cls, fit: SolvedFit, camera_from_radar: RigidTransform, covariance: Matrix66) -> "_Centre":
-        """Take it from a pose."""
-        prior = fit.measurements.prior
-        jacobian = prior.centre_jacobian(camera_from_radar)
-        measured_m2 = prior.sigma_m**2 * np.eye(3)
-        return cls(_camera_centre(camera_from_radar), jacobian @ covariance @ jacobian.T + measured_m2)
-
-    def sigmas_from(self, position_m: Vector3) -> float:
-        """Return the distance from a position in standard deviations."""
-        away_m = self.position_m - position_m
-        return float(np.sqrt(away_m @ np.linalg.solve(self.covariance_m2, away_m)))
-
-
-def _other_unit(centre: _Centre, measured_m: Vector3) -> str:
-    """Return in words which other unit would remove the contradiction; empty if none would."""
-    size_m = float(np.linalg.norm(measured_m))
-    for text, factor, least_m in _UNIT_SLIPS:
-        clear = centre.sigmas_from(np.zeros(3)) > _OTHER_UNIT_SIGMAS or least_m > 0.0
-        if clear and size_m > least_m and centre.sigmas_from(factor * measured_m) < _AGREEING_SIGMAS:
-            return f"; {text}"
-    return ""
 
 
 def _camera_centre(camera_from_radar: RigidTransform) -> np.ndarray:

@@ -154,8 +154,9 @@ def _clearly_not_mirrored(measurements: PairMeasurements, refined: ErrorsInVaria
     corrected = measurements.with_errors(refined.measurements.errors.values)
     assumed = associate(corrected, refined.camera_from_radar)[1].squared.mean() / 2.0
     agreeing = agreeing and float(assumed) < _PLAUSIBLE_SCALE**2
-    prior_residual = measurements.prior.rows(refined.camera_from_radar)[0]
-    return measurements.prior.measured and bool(agreeing) and float(np.linalg.norm(prior_residual)) < _NEAR_PRIOR
+    pose = refined.camera_from_radar
+    near = float(measurements.prior.squared(pose.rotation, pose.translation_m)) < _NEAR_PRIOR**2
+    return measurements.prior.measured and bool(agreeing) and near
 
 
 def _some_pairs(measurements: PairMeasurements) -> PairMeasurements:

@@ -183,15 +183,20 @@ class Linearization:
         )
 
 
+_FREEDOM = 4.0  # of a measured position
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraPrior:
-    """What is known of the camera centre before any pair.
+    """What is known of the camera centre before any pair: the farther the camera, the less the prior weighs.
+
+    A measured position is Student's t with nu degrees of freedom: of ten tapes, one is off by more than twice its sigma. Where
+    the pairs say nothing, the expected variance of one that is d away is (nu sigma^2 + d^2) / (nu - 2) per axis.
 
     Attributes:
         position_m: (3,) in the radar frame.
         sigma_m: per axis.
-        measured: whether it was measured with a tape and is fully used by the estimate; otherwise it only selects between
-            poses, and its weight in the estimate decreases with the distance.
+        measured: whether it was measured with a tape; otherwise it only selects between poses.
         height_sigma_m: what is added to the variance of its up coordinate, for a radar that does not measure elevation.
     """
 
@@ -215,11 +220,19 @@ class CameraPrior:
         turned = camera_from_radar.rotation.T
         return np.concatenate([-turned, -turned @ skew(camera_from_radar.translation_m)], axis=1)
 
+    @property
+    def _near_m2(self) -> float:
+        """The variance per axis of a camera at the prior's position."""
+        return self.sigma_m**2 * (_FREEDOM / (_FREEDOM - 2.0) if self.measured else 1.0)
+
+    @property
+    def loosening(self) -> float:
+        """The share of its squared distance that is added."""
+        return 1.0 / (_FREEDOM - 2.0) if self.measured else 1.0
+
     def _variance_m2(self, away_m: np.ndarray) -> np.ndarray:
         """Return the variance per radar axis (..., 3), for a camera (..., 3) away from the prior's position."""
-        variance = np.full(away_m.shape, self.sigma_m**2)
-        if not self.measured:
-            variance += (away_m**2).sum(axis=-1, keepdims=True)
+        variance = self._near_m2 + self.loosening * (away_m**2).sum(axis=-1, keepdims=True) * np.ones(3)
         variance[..., 2] += self.height_sigma_m**2
         return variance
 
@@ -240,8 +253,8 @@ class CameraPrior:
     def _precision(self, rotations: np.ndarray, missed_m: np.ndarray) -> np.ndarray:
         """Return the precision (..., 3, 3) in camera axes, for a camera missed by (..., 3)."""
         if not self.height_sigma_m:  # the same along all axes, so the rotation cancels
-            farther = 0.0 if self.measured else (missed_m**2).sum(axis=-1)[..., None, None]
-            return np.asarray(np.eye(3) / (self.sigma_m**2 + farther))
+            farther = self.loosening * (missed_m**2).sum(axis=-1)[..., None, None]
+            return np.asarray(np.eye(3) / (self._near_m2 + farther))
         to_radar = np.swapaxes(rotations, -1, -2)
         variance = self._variance_m2((to_radar @ missed_m[..., None])[..., 0])
         return np.asarray((rotations / variance[..., None, :]) @ to_radar)
@@ -250,11 +263,16 @@ class CameraPrior:
         """Return the same position as a weak prior, with a sigma of at least 1 m."""
         return replace(self, sigma_m=max(self.sigma_m, 1.0), measured=False)
 
+    def squared(self, rotations: np.ndarray, translations_m: np.ndarray) -> Values:
+        """Return the squared distance of the camera of each pose (s,) from the position, in standard deviations."""
+        away_m = (np.swapaxes(rotations, -1, -2) @ translations_m[..., None])[..., 0] + self.position_m
+        variance_m2 = self._near_m2 + np.array([0.0, 0.0, self.height_sigma_m**2])
+        return np.asarray((away_m**2 / variance_m2).sum(axis=-1))
+
     def costs(self, rotations: np.ndarray, translations_m: np.ndarray) -> Values:
         """Return twice the negative log-probability of each pose (s,), up to a constant."""
-        away_m = (np.swapaxes(rotations, -1, -2) @ translations_m[..., None])[..., 0] + self.position_m
-        sigma_m = np.array([self.sigma_m, self.sigma_m, np.hypot(self.sigma_m, self.height_sigma_m)])
-        return np.asarray(((away_m / sigma_m) ** 2).sum(axis=-1))
+        squared = self.squared(rotations, translations_m)
+        return np.asarray(np.log1p(self.loosening * squared) / self.loosening) if self.measured else squared
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -807,70 +807,51 @@ def _value_text(error: SystematicErrorResult) -> str:
 
 _CLEAR_SIGMAS = 3.0
 _NOTABLE_SCALE = 0.015
-_BEYOND_PRIOR = 2.0  # of the prior's standard deviations
 _SCALES = ("azimuth_scale", "elevation_scale")
-_SIDES = {
-    "reflector_right_m": ("to the right of", "to the left of"),
-    "reflector_down_m": ("below", "above"),
-    "reflector_forward_m": ("beyond", "in front of"),
-}
 
 
-def systematic_error_warnings(errors: Sequence[SystematicErrorResult], *, flat: bool) -> list[DataWarning]:
-    """Warn of errors that the pairs clearly show: scaled angles, with what would look the same, and clicks beside the target.
+def systematic_error_warnings(
+    errors: Sequence[SystematicErrorResult], *, flat: bool, measured: bool
+) -> list[DataWarning]:
+    """Warn of scaled angles that the pairs clearly show, with what would look the same.
 
     Args:
         errors: all that the pairs share, with what is known of them.
         flat: whether the radar does not measure elevation.
+        measured: whether the camera position was measured, so that its error is one of the causes.
     """
-    warnings = []
-    for one in errors:
-        if one.name in _SCALES and _is_clear(one) and abs(one.value) > _NOTABLE_SCALE:
-            warnings.append(_azimuth_scale(one, flat=flat) if one.name == "azimuth_scale" else _elevation_scale(one))
-    off = [
-        one
+    tape = "; so would a camera that is not where it was measured" if measured else ""
+    return [
+        _azimuth_scale(one, tape, flat=flat) if one.name == "azimuth_scale" else _elevation_scale(one, tape)
         for one in errors
-        if one.name in _SIDES and _is_clear(one) and abs(one.value) > _BEYOND_PRIOR * one.prior_sigma
+        if one.name in _SCALES and _is_clear(one) and abs(one.value) > _NOTABLE_SCALE
     ]
-    return [*warnings, _clicks_off_centre(off)] if off else warnings
 
 
 def _is_clear(one: SystematicErrorResult) -> bool:
     return one.estimated and abs(one.value) > _CLEAR_SIGMAS * one.sigma
 
 
-def _azimuth_scale(one: SystematicErrorResult, *, flat: bool) -> DataWarning:
+def _azimuth_scale(one: SystematicErrorResult, tape: str, *, flat: bool) -> DataWarning:
     size, length = ("large", "long") if one.value > 0.0 else ("small", "short")
     tilted = "; so would a tilt of the radar" if flat and one.value > 0.0 else ""
     return DataWarning(
         "angle-scale",
         f"the radar's azimuths look {_percent(one)} too {size}; a given focal length that is too {length} by the same amount "
-        f"would look the same, and pairs cannot tell them apart{tilted}",
+        f"would look the same, and pairs cannot tell them apart{tilted}{tape}",
         "check the element spacing and wavelength that the radar's driver assumes, and whether the intrinsics belong to this "
         "camera, lens, zoom and image size; whichever is known to be right, give it a smaller sigma among the options",
     )
 
 
-def _elevation_scale(one: SystematicErrorResult) -> DataWarning:
+def _elevation_scale(one: SystematicErrorResult, tape: str) -> DataWarning:
     size, side = ("large", "above") if one.value > 0.0 else ("small", "below")
     return DataWarning(
         "angle-scale",
         f"the radar's elevations look {_percent(one)} too {size}; on flat ground, clicks {side} the radar's phase centre would "
-        "look the same",
+        f"look the same{tape}",
         "click the reflector's apex, where its three sheets meet, not its mouth or its stand; to tell the two apart, put a few "
         "placements at other heights (a tripod)",
-    )
-
-
-def _clicks_off_centre(off: Sequence[SystematicErrorResult]) -> DataWarning:
-    """Warn that, with a measured camera position, all clicks clearly lie beside the radar's phase centre."""
-    parts = [f"{_centimetres(one)} {_SIDES[one.name][one.value < 0.0]}" for one in off]
-    return DataWarning(
-        "clicks-off-centre",
-        f"all clicks lie {' and '.join(parts)} the radar's phase centre, or the camera is that far from its measured "
-        "position: pairs cannot tell them apart",
-        "click the reflector's apex, where its three sheets meet, not its mouth or its stand; and measure again from the "
-        "radar's antennas to the lens",
     )
 
 
@@ -883,8 +864,3 @@ def _by_pairs_alone(one: SystematicErrorResult) -> tuple[float, float]:
 def _percent(one: SystematicErrorResult) -> str:
     value, sigma = _by_pairs_alone(one)
     return f"{100.0 * value:.1f} ± {100.0 * sigma:.1f} %"
-
-
-def _centimetres(one: SystematicErrorResult) -> str:
-    value, sigma = _by_pairs_alone(one)
-    return f"{100.0 * value:.0f} ± {100.0 * sigma:.0f} cm"

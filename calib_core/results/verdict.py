@@ -323,7 +323,6 @@ _CODES: dict[Consequence, tuple[str, ...]] = {
         "smooth-angle-errors",
         "angle-scale",
         "lens-or-radar-scale",
-        "clicks-off-centre",
         "handedness-assumed",
         "nobody-confirmed",
     ),

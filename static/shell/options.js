@@ -143,7 +143,7 @@ function yesNo(field) {
   return row(field, make("span", "control", [input]));
 }
 
-/** Measured camera position: off, or three distances and their standard deviation. @param {Field} field */
+/** Measured camera position: off, or three distances, and how they were measured or their standard deviation. @param {Field} field */
 function cameraPosition(field) {
   const enabled = make("input", "", []);
   enabled.type = "checkbox";
@@ -155,8 +155,13 @@ function cameraPosition(field) {
   });
   const sigma = number(0.0001, 10);
   sigma.dataset.hint = "Standard deviation of each of the three distances [m]";
+  const ways = Object.entries(field.measured);
+  const how = make("select", "", [...ways.map(([words]) => words), "otherwise"].map((words) => make("option", "", words)));
+  how.id = `${idOf(field)}-how`;
+  how.dataset.hint = "How the three distances were measured; this sets their standard deviation";
   const named = [...inputs, sigma].map((input, index) => make("label", "", [make("span", "", names[index] ?? "± sigma"), input]));
-  const numbers = make("span", "control triple", [...named, make("span", "unit", "m")]);
+  const measured = make("label", "how", [make("span", "", "measured"), how]);
+  const numbers = make("span", "control triple", [...named, make("span", "unit", "m"), measured]);
   numbers.setAttribute("role", "group");
   numbers.setAttribute("aria-label", "Camera position relative to the radar");
   const submit = () => {
@@ -166,11 +171,16 @@ function cameraPosition(field) {
   enabled.onchange = () => {
     numbers.hidden = !enabled.checked;
     if (!enabled.checked) return change(field.path, null);
-    if (sigma.value === "") sigma.value = "0.01";
+    if (sigma.value === "") sigma.value = String(ways[0][1]);
     inputs[0].focus();
     submit();
   };
   for (const input of [...inputs, sigma]) input.onchange = submit;
+  how.onchange = () => {
+    const way = ways[how.selectedIndex];
+    if (way) sigma.value = String(way[1]);
+    submit();
+  };
   writers.set(field.path, (value) => {
     const entered = inputs.every((input) => input.value !== "");
     if (value === null && enabled.checked && (!entered || numbers.contains(document.activeElement))) return; // the values are still being entered
@@ -179,6 +189,8 @@ function cameraPosition(field) {
     if (value === null) return; // keep what was entered, in case it is enabled again
     inputs.forEach((input, index) => write(input, value.position_m[index]));
     write(sigma, value.sigma_m);
+    const way = ways.findIndex(([, sigmaM]) => sigmaM === value.sigma_m);
+    how.selectedIndex = way < 0 ? ways.length : way;
   });
   const head = row(field, make("span", "control", [enabled]));
   const box = make("div", "position", [head, numbers]);

@@ -175,7 +175,9 @@ def test_a_camera_position_is_used_only_once_it_is_entered(page: Driver, truth: 
     page.page.keyboard.press("Enter")
     page.until("__cocalib.state.view.options.solving.camera_position !== null")
     page.settle()
-    assert page.view["options"]["solving"]["camera_position"]["sigma_m"] == 0.01
+    assert page.view["options"]["solving"]["camera_position"]["sigma_m"] == 0.03
+    page.page.locator("#option-solving-camera_position-how").select_option("from the antennas to the lens")
+    page.until("__cocalib.state.view.options.solving.camera_position.sigma_m === 0.02")
     assert page.view["pose"] != without["pose"]
     page.page.locator("#option-solving-camera_position").uncheck()
     page.until("__cocalib.state.view.options.solving.camera_position === null")

@@ -143,6 +143,7 @@ def test_three_pairs_are_too_few(cocalib: Cocalib, pairs_file: Callable[..., Pat
         (["info", "a.bag", "--clock", "wall"], "--clock takes auto, header or receive, not 'wall'"),
         (["open", "a.bag", "--port", "http"], "--port takes a whole number, not 'http'"),
         (["solve", "a.bag", "--camera-position-m", "0", "1", "up"], "--camera-position-m takes X Y Z"),
+        (["solve", "a.bag", "--camera-position-by", "eye"], "--camera-position-by"),
         (["session", "export", "a"], "needs the name of the new file: --out clicks.json"),
         (["session", "export", "--out", "b"], "takes one session folder, or its recording; 0 given"),
         (["session", "repair", "a", "b"], "takes one session folder, or its recording; 2 given"),

@@ -356,7 +356,7 @@ def test_a_calibration_is_solved_again_and_only_typed_options_change(
     assert cocalib("solve", "--pairs", first, "--out", again).code == 0
     assert (
         cocalib(
-            "solve", "--pairs", first, "--method", "default", "--camera-position-sigma-m", "0.01", "--out", turned
+            "solve", "--pairs", first, "--method", "default", "--camera-position-by", "antenna", "--out", turned
         ).code
         == 0
     )  # both are the defaults: typed, they replace what the file says
@@ -365,7 +365,7 @@ def test_a_calibration_is_solved_again_and_only_typed_options_change(
         key: value for key, value in texts[1].items() if key != "provenance"
     }
     assert texts[2]["options"]["method"] == "default"
-    assert texts[2]["options"]["solving"]["camera_position"] == {"position_m": [0.1, 0.0, 0.05], "sigma_m": 0.01}
+    assert texts[2]["options"]["solving"]["camera_position"] == {"position_m": [0.1, 0.0, 0.05], "sigma_m": 0.02}
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no named pipes in the file system")

@@ -117,7 +117,6 @@ class ManifestDocument(Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 
 _MOST_BYTES = 64 * 1024 * 1024
 _TEXTS = ("vehicle", "session", "vehicle_type", "radar_serial", "camera_serial")
-_TAPE_SIGMA_M = 0.01
 
 
 def read_manifest(path: Path) -> Manifest:
@@ -245,10 +244,12 @@ def _options(document: SessionDocument, where: str) -> CalibrationOptions:
         raise InputError(f"{where}: {error}") from None
     if position is None:
         return options
-    sigma_m = _TAPE_SIGMA_M if document.camera_position_sigma_m is None else document.camera_position_sigma_m
-    if not 0.0 < sigma_m < 10.0 or not all(abs(value) < 100.0 for value in position):
+    prior = CameraPositionPrior(position)
+    if document.camera_position_sigma_m is not None:
+        prior = CameraPositionPrior(position, document.camera_position_sigma_m)
+    if not 0.0 < prior.sigma_m < 10.0 or not all(abs(value) < 100.0 for value in position):
         raise InputError(f"{where}: camera_position_m: give metres, and a standard deviation above 0")
-    solving = replace(options.solving, camera_position=CameraPositionPrior(position, sigma_m))
+    solving = replace(options.solving, camera_position=prior)
     return replace(options, solving=solving)
 
 

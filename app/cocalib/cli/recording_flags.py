@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, TypeAlias
 import tyro
 
 from calib_core.errors import InputError
-from calib_core.options import CalibrationOptions, CameraPositionPrior
+from calib_core.options import CalibrationOptions, CameraPositionPrior, HowMeasured
 from calib_core.recordings import RecordingOptions
 from cocalib.cli.flags import File, Switch, called, same
 
@@ -114,8 +114,10 @@ class OptionFlags:
 
     camera_position_m: Annotated[tuple[float, float, float] | None, called("X Y Z")] = None
     """Measured position of the camera's lens in the radar frame: forward, left, up [m]."""
-    camera_position_sigma_m: float = 0.01
-    """Standard deviation of that position, per axis [m]."""
+    camera_position_by: Annotated[HowMeasured | None, called("{housing,antenna,drawing}")] = None
+    """How it was measured: from housing to housing (5 cm), antenna to lens (2 cm), or in a drawing (0.5 cm); else 3 cm."""
+    camera_position_sigma_m: float = CameraPositionPrior().sigma_m
+    """Its standard deviation per axis [m], where it is not said how it was measured."""
     options: _Options = field(default_factory=CalibrationOptions)
 
     @classmethod
@@ -125,13 +127,15 @@ class OptionFlags:
         if position is None:
             return cls(options=options)
         free = replace(options, solving=replace(options.solving, camera_position=None))
-        return cls(position.position_m, position.sigma_m, free)
+        return cls(position.position_m, camera_position_sigma_m=position.sigma_m, options=free)
 
     def all(self) -> CalibrationOptions:
         """Return the options with the measured position, if there is one."""
         if self.camera_position_m is None:
             return self.options
         prior = CameraPositionPrior(self.camera_position_m, self.camera_position_sigma_m)
+        if self.camera_position_by is not None:
+            prior = CameraPositionPrior.measured(self.camera_position_m, self.camera_position_by)
         return replace(self.options, solving=replace(self.options.solving, camera_position=prior))
 
 

@@ -125,9 +125,9 @@ def _change_text(change: PoseChange) -> str:
 
 
 def noticed_text(change: PoseChange, level: float) -> str:
-    """Return what change a test at this level would have noticed, of the least visible axes."""
-    sizes = change.noticeable(level)
-    return f"would have noticed {sizes[:3].max():.2g} deg, {sizes[3:].max():.2g} cm"
+    """Return what change a test at this level would have noticed, from the most to the least visible axis."""
+    deg, cm = (f"{part.min():.2g} to {part.max():.2g}" for part in np.split(change.noticeable(level), 2))
+    return f"would have noticed {deg} deg or {cm} cm, by axis"
 
 
 def _lens_text(lens: LensDifference) -> str:

@@ -97,7 +97,7 @@ class PositionDocument(Struct, frozen=True, forbid_unknown_fields=True):
     """A tape-measured camera centre in the radar frame: forward, left, up."""
 
     position_m: Position
-    sigma_m: Positive = 0.01
+    sigma_m: Positive = 0.03
 
 
 class PairDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):

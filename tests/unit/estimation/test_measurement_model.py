@@ -84,13 +84,35 @@ def test_a_position_behind_the_camera_has_no_influence() -> None:
 
 def test_the_prior_rows_are_the_derivative_of_the_camera_centre() -> None:
     pairs, _ = simulated()
-    prior = CameraPrior(np.array([0.1, -0.2, 0.3]), 0.01, measured=True)
-    residual, jacobian = prior.rows(pairs.camera_from_radar)
+    pose = pairs.camera_from_radar
+    prior = CameraPrior(pose.inverse().translation_m, 0.01, measured=True)  # where its weight does not change
+    residual, jacobian = prior.rows(pose)
     for k in range(6):
         step = np.zeros(6)
         step[k] = 1e-6
-        slope = (prior.rows(pairs.camera_from_radar.perturbed(step))[0] - residual) / 1e-6
+        slope = (prior.rows(pose.perturbed(step))[0] - residual) / 1e-6
         assert -slope == pytest.approx(jacobian[:, k], abs=1e-3)
+
+
+@pytest.mark.parametrize("measured", [True, False])
+@pytest.mark.parametrize("height_sigma_m", [0.0, 0.5])
+def test_a_step_by_the_priors_rows_goes_down_its_cost(measured: bool, height_sigma_m: float) -> None:
+    """Of a measured position, the gradient of the cost is twice that of the rows: the weight follows from the distance."""
+    pose = simulated()[0].camera_from_radar
+    away_m = np.array([0.04, -0.02, 0.03])
+    prior = CameraPrior(pose.inverse().translation_m + away_m, 0.03, measured, height_sigma_m)
+    residual, jacobian = prior.rows(pose)
+    gradient = np.zeros(6)
+    for k in range(6):
+        step = np.zeros(6)
+        step[k] = 1e-6
+        ends = (pose.perturbed(step), pose.perturbed(-step))
+        up, down = (float(prior.costs(one.rotation, one.translation_m)) for one in ends)
+        gradient[k] = (up - down) / 2e-6
+    pull = -2.0 * jacobian.T @ residual
+    assert float(gradient @ pull) > 0.0
+    if measured and not height_sigma_m:
+        assert gradient == pytest.approx(pull, rel=1e-4)
 
 
 def test_a_weak_camera_prior_has_less_weight_the_farther_it_is_off() -> None:
