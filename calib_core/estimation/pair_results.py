@@ -4,13 +4,13 @@ Under a solved pose also how well each radar return that may belong to a click e
 residuals should be (`expected_shares`), the distribution behind a histogram of them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib_core.arrays import Values, Vector2, frozen_array
-from calib_core.association.placement_groups import PlacementGroup, click_sigmas, steps_of_sigma
+from calib_core.arrays import Values, Vector2, Vector3, frozen_array
+from calib_core.association.placement_groups import PlacementGroup, click_sigmas, placement_groups, steps_of_sigma
 from calib_core.camera import Camera
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.gnc import associate
@@ -148,6 +148,36 @@ def _click_result(calibration: Calibration, result: PairResult, pair: Pair, clic
         image_time=click.image_time,
         measured=click,
     )
+
+
+def averaged_distances_px(calibration: Calibration) -> Values:
+    """Return the residuals (n,) [px] that the AED averages: of the placements that agree, as pose and radar errors project them.
+
+    The paper's method averages all clicks that are used. A file without the candidates of its pairs cannot be divided into
+    placements; each of its clicks counts.
+    """
+    used, as_printed = [pair for pair in calibration.pairs if not pair.excluded], not calibration.options.models_noise
+    measured = [pair.measured for pair in used if pair.measured is not None]
+    if as_printed or len(measured) < len(used):
+        averaged = [(pair.point_radar_m, pair.pixel_px) for pair in used if pair.inlier or as_printed]
+    else:
+        results = {pair.id: pair for pair in used}
+        groups = placement_groups(measured, calibration.options)
+        averaged = [(_return_of(group, results), group.pair.pixel_px) for group in groups if _agrees(group, results)]
+    points_radar_m, pixels_px = (np.array([one[k] for one in averaged]).reshape(-1, 3 - k) for k in (0, 1))
+    return distances(calibration.reproject(points_radar_m), pixels_px)
+
+
+def _agrees(group: PlacementGroup, results: Mapping[str, PairResult]) -> bool:
+    return any(results[click.id].inlier for click in group.clicks)
+
+
+def _return_of(group: PlacementGroup, results: Mapping[str, PairResult]) -> Vector3:
+    """Return the radar position (3,) that the pair of a placement uses, from the results of its clicks."""
+    click = next(click for click in group.clicks if results[click.id].inlier)
+    own = steps_of_sigma(click.candidates)[results[click.id].candidate]
+    nearest = ((steps_of_sigma(group.pair.candidates) - own) ** 2).sum(axis=1).argmin()
+    return group.pair.candidates[int(nearest)].position_radar_m
 
 
 _NONE_OF_THEM = 0.1

@@ -64,6 +64,7 @@ from calib_core.interchange.own.calibration_json import (
 from calib_core.interchange.own.clicks_json import read_clicks, write_clicks
 from calib_core.interchange.own.documents import CALIBRATION_SCHEMA, names_schema
 from calib_core.interchange.own.pairs_files import PairsFile, read_pairs, read_pairs_table, write_pairs
+from calib_core.interchange.own.raw_data import for_raw
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.trees.frame_choice import WantedFrames
 from calib_core.interchange.trees.frame_tree import FrameTree, Joint, Place
@@ -129,6 +130,7 @@ __all__ = [
     "export",
     "export_all",
     "files_beside",
+    "for_raw",
     "format_named",
     "imported",
     "joined_tree",

@@ -228,6 +228,8 @@ class CalibrationFile:
         verdict: how far to trust it, as it was judged when it was solved; None in files of older versions and other tools.
         evidence: what the pose rests on, as the file states it; None in files of older versions.
         vehicle: what is stated of the vehicle and its sensors.
+        corrected: the calibration that this one was made from, if its pose is for radar data as reported, without corrections.
+        aed_either_way_px: what `raw_data.aed_either_way` found through the lens, of a file for rectified pictures; else None.
         made_from_sha256: the SHA-256 of the calibration-1 file that this was made from, if something was changed on the way to
             another format, such as the camera of rectified pictures; "" if nothing was.
     """
@@ -241,6 +243,8 @@ class CalibrationFile:
     evidence: Evidence | None = None
     made_from_sha256: str = ""
     vehicle: VehicleNote = field(default_factory=VehicleNote)
+    corrected: Calibration | None = None
+    aed_either_way_px: tuple[float, float] | None = None
 
     @property
     def rests_on(self) -> Evidence:

@@ -18,7 +18,7 @@ from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
 from calib_core.interchange.cameras.rectification import maps_npz, rectified_camera, rectified_file
 from calib_core.interchange.format import Format, WrittenPose
 from calib_core.interchange.formats.registry import format_named, written_formats
-from calib_core.interchange.formats.statement import missing_map
+from calib_core.interchange.formats.statement import corrections_lines, missing_map
 from calib_core.interchange.formats.static_transform import ChildFrame, second_parent_notes, write_command, write_python
 from calib_core.interchange.formats.urdf import write_joint
 from calib_core.interchange.own.calibration_json import calibration_sha256
@@ -148,6 +148,10 @@ def export(
         InputError: no such format, or it cannot represent this calibration; the message says why and what to use instead.
     """
     chosen = format_named(name)
+    if file.corrected is not None and chosen.holds_corrections:
+        raise InputError(
+            f"the format {name} holds what the radar gets wrong, so its pose is never one for raw data; omit --for"
+        )
     if frames is not None and frames != file.frames:
         file = replace(file, frames=frames, made_from_sha256=calibration_sha256(file))
     if chosen.write is None:
@@ -163,9 +167,11 @@ def export(
         raise InputError(f"the format {name} has no third frame to place the radar in; formats that have one: {able}")
     else:
         content = chosen.write_in_parent(prepared.file, parent_from_radar)
-    lost = () if chosen.holds_angle_map else missing_map(file.calibration)
+    hint = "" if file.corrected is not None else "; --for raw writes the pose for that"
+    uncorrected = () if chosen.holds_corrections else (f"{line}{hint}" for line in corrections_lines(file))
+    lost = () if chosen.holds_corrections else missing_map(file.calibration)
     notes_on = chosen.notes_on(file) if chosen.notes_on else ()
-    notes = (*lost, *chosen.notes, *notes_on, *prepared.notes)
+    notes = (*uncorrected, *lost, *chosen.notes, *notes_on, *prepared.notes)
     return Export(chosen.file_name, content, notes, prepared.extra_files)
 
 

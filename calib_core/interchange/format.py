@@ -143,6 +143,7 @@ class ImportedCalibration:
         calibration_sha256: of the calibration-1 file that it says it was exported from; None if it states none.
         covariance: (6, 6) of camera_from_radar, in the order of calibration-1; None if it states none. That of a
             calibration-1 file is in `file`.
+        for_raw: it states that its pose is for radar data as reported, without corrections.
         in_third_frame: the poses of radar and camera as written, if both are in a third frame and the radar is not its origin.
     """
 
@@ -162,6 +163,7 @@ class ImportedCalibration:
     calibration_sha256: str | None = None
     covariance: Matrix66 | None = None
     in_third_frame: tuple[WrittenPose, WrittenPose] | None = None
+    for_raw: bool = False
 
     def camera_for(self, image_size_px: tuple[int, int]) -> Camera | None:
         """Return the camera; one whose size the file does not state gets that of the pictures. None if there is none.
@@ -247,7 +249,7 @@ class Format:
         used_in: where its files are used: the heading in lists.
         also: other words that someone may search for.
         notes_on: returns more notes, which depend on the calibration; None if there are none.
-        holds_angle_map: it stores the radar's angle map.
+        holds_corrections: it stores what the radar gets wrong: its errors and its angle map.
         is_unpacked: it is a zip archive whose files are meant to be unpacked: written into a folder, if one is given.
     """
 
@@ -264,7 +266,7 @@ class Format:
     used_in: str = "Other tools"
     also: str = ""
     notes_on: Callable[[CalibrationFile], tuple[str, ...]] | None = None
-    holds_angle_map: bool = False
+    holds_corrections: bool = False
     is_unpacked: bool = False
 
     @property

@@ -215,9 +215,12 @@ def _renamed(found: ImportedCalibration, wanted: WantedFrames) -> ImportedCalibr
 
 def _with_origin(found: ImportedCalibration, content: Content) -> ImportedCalibration:
     """Add what the text says about the calibration that the file was made from, unless the reader found it in a key."""
-    if found.file is not None or found.evidence is not None or content.syntax == "bytes":
+    if found.file is not None or content.syntax == "bytes":
         return found
     origin = stated_origin(content.text)
+    found = replace(found, for_raw=found.for_raw or origin.for_raw)
+    if found.evidence is not None:
+        return found
     return replace(found, evidence=origin.evidence, calibration_sha256=origin.calibration_sha256)
 
 

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
@@ -46,6 +46,8 @@ class Export:
 
     rectified: Switch = False
     """Your pictures are rectified already, with the same camera matrix; else kitti and nuscenes get maps and a matrix of ours."""
+    for_: Annotated[Literal["raw"] | None, tyro.conf.arg(name="for", help_behavior_hint="")] = None
+    """raw: the pose for radar data as reported, for users who cannot take out what the radar gets wrong."""
     trees: Trees = field(default_factory=TreeFlags)
     frames: Frames = field(default_factory=FrameFlags)
 
@@ -110,7 +112,10 @@ class Export:
     def _calibration(self) -> "CalibrationFile":
         if len(self.calibration) != 1:
             raise InputError("export takes one calibration: cocalib export CALIBRATION.json --to FORMAT [--out FILE]")
-        return _own_calibration(self.calibration[0])
+        from calib_core.interchange import for_raw
+
+        file = _own_calibration(self.calibration[0])
+        return file if self.for_ is None else for_raw(file)
 
     def _export_recording(self) -> int:
         """Write the recording again with the calibration in it; return the exit code."""
@@ -122,6 +127,8 @@ class Export:
             raise InputError(
                 f"export into a recording: cocalib export CALIBRATION.json --to {MCAP} --recording RECORDING... --out NEW.mcap"
             )
+        if self.for_ is not None:
+            raise InputError(f"--for raw does not apply to --to {MCAP}: it writes the corrections, too")
         file = _own_calibration(self.calibration[0])
         code = _into_recording(file, self.recording, self.out, topics=self.topics, force=self.force)
         _print_warnings(file)

@@ -10,6 +10,7 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.own.calibration_json import calibration_sha256
+from calib_core.interchange.own.raw_data import aed_either_way
 from calib_core.interchange.syntax.zip_archives import pack_arrays
 from calib_core.results import CheckPoint
 
@@ -90,7 +91,13 @@ def rectified_file(file: CalibrationFile, rectified: Camera) -> CalibrationFile:
     if check is not None:
         pixel_px = rectified.project(calibration.camera_from_radar @ check.radar_m[None])[0]
         check = CheckPoint(check.radar_m, pixel_px) if np.isfinite(pixel_px).all() else None
-    return replace(file, calibration=calibration, check_point=check, made_from_sha256=calibration_sha256(file))
+    return replace(
+        file,
+        calibration=calibration,
+        check_point=check,
+        aed_either_way_px=aed_either_way(file),
+        made_from_sha256=calibration_sha256(file),
+    )
 
 
 def maps_npz(camera: Camera, rectified: Camera) -> bytes:

@@ -7,9 +7,9 @@ from typing import Literal
 import numpy as np
 
 from calib_core.arrays import Points2, Points3, Values, frozen_array
-from calib_core.association.placement_groups import placement_groups, steps_of_sigma
 from calib_core.camera import Camera
 from calib_core.errors import InputError
+from calib_core.estimation.pair_results import averaged_distances_px
 from calib_core.geometry import RigidTransform
 from calib_core.input_files import file_text, read_input
 from calib_core.interchange.check.pixel_differences import LOST_TEXT, far_outside, lenses_of, shown
@@ -170,32 +170,12 @@ def by_own_pairs(imported: ImportedCalibration) -> list[CheckResult]:
         hint = "pose, camera or pairs were changed after solving; solve again"
         return [CheckResult("error", "pairs-disagree", message, hint)]
     results = [CheckResult("good", "pairs", f"all {len(pairs)} pairs project where the file says")]
-    averaged_px, of_what = _averaged(file.calibration)
+    averaged_px = averaged_distances_px(file.calibration)
     aed_px = file.calibration.metrics.aed_px
     if len(averaged_px) and np.isfinite(aed_px) and abs(np.mean(averaged_px) - aed_px) > tolerances.max():
-        message = f"aed_px is {aed_px:.3f}, but the {of_what} average {np.mean(averaged_px):.3f} px"
+        message = f"aed_px is {aed_px:.3f}, but the placements that agree average {np.mean(averaged_px):.3f} px"
         results.append(CheckResult("error", "metrics-disagree", message, "solve again"))
     return results
-
-
-def _averaged(calibration: Calibration) -> tuple[Values, str]:
-    """Return the residuals (n,) [px] that the AED averages, and of what: of placements, if clicks share some."""
-    used = [pair for pair in calibration.pairs if not pair.excluded]
-    if not calibration.options.models_noise:  # averages what disagrees, too
-        return np.array([pair.distance_px for pair in used]), "pairs that are used"
-    measured = [pair.measured for pair in used if pair.measured is not None]
-    groups = placement_groups(measured, calibration.options) if len(measured) == len(used) else ()
-    if len(groups) == len(used):
-        return np.array([pair.distance_px for pair in used if pair.inlier]), "inliers"
-    results, distances_px = {pair.id: pair for pair in used}, []
-    for group in groups:
-        click = next((results[one.id] for one in group.clicks if results[one.id].inlier), None)
-        if click is not None and click.measured is not None:
-            places = steps_of_sigma(group.pair.candidates)
-            chosen = ((places - steps_of_sigma(click.measured.candidates)[click.candidate]) ** 2).sum(axis=1).argmin()
-            point_radar_m = group.pair.candidates[int(chosen)].position_radar_m
-            distances_px.append(float(np.linalg.norm(calibration.reproject(point_radar_m[None]) - group.pair.pixel_px)))
-    return np.array(distances_px), "inlier placements"
 
 
 def _tolerances_px(imported: ImportedCalibration, pairs: list[PairResult]) -> Values:

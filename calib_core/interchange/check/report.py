@@ -37,9 +37,12 @@ from calib_core.interchange.check.slips import (
     within_rounding,
 )
 from calib_core.interchange.format import ImportedCalibration, StatedCheckPoint, WrittenPose
+from calib_core.interchange.format import imported as calibration_imported
 from calib_core.interchange.own.calibration_json import calibration_sha256
+from calib_core.interchange.own.raw_data import for_raw
 from calib_core.interchange.rotations import looks_forward, off_forward_rad
 from calib_core.interchange.syntax.strict_json import json_text
+from calib_core.radar import RadarErrors
 
 Verdict = Literal["right", "wrong", "doubtful", "unproven"]
 """Confirmed; contradicted; implausible, with nothing to test it against; plausible, with nothing to test it against."""
@@ -108,6 +111,8 @@ class CheckReport:
         frames = self.imported.frames
         named = f", radar {frames.radar!r}, camera {frames.camera!r}" if frames else ", frames not named"
         rows = [f"read as {self.imported.format}{named}"]
+        if self.imported.for_raw:
+            rows.append("note: its pose is for radar data as reported, without corrections, and is compared as such")
         rows += [f"assumed: {assumption.removeprefix('assumed ')}" for assumption in self.imported.assumptions]
         rows += [f"note: {note}" for note in self.imported.notes]
         stated = self.imported.file.verdict if self.imported.file is not None else None
@@ -154,6 +159,9 @@ def check(
     Raises:
         InputError: a limit cannot be tested with these files.
     """
+    if imported.for_raw:
+        of, against = (None if one is None else _as_reported(one) for one in (of, against))
+        pairs = None if pairs is None else dataclasses.replace(pairs, radar_errors=RadarErrors())
     results = [
         CheckResult("error", "contradiction", fault, "correct the one that is wrong") for fault in imported.faults
     ]
@@ -191,6 +199,15 @@ def check(
             CheckResult("warning", one.code, one.message, one.hint) for one in own if one.code == "rests-on-fleet-prior"
         ]
     return CheckReport(imported, tuple(results), comparison, judgement, no_proof)
+
+
+def _as_reported(other: ImportedCalibration) -> ImportedCalibration:
+    """Return another calibration as its pose for radar data as reported, if it has the pairs to solve it from.
+
+    Raises:
+        InputError: its pairs determine no such pose.
+    """
+    return other if other.for_raw or other.file is None else calibration_imported(for_raw(other.file))
 
 
 def _own_camera(imported: ImportedCalibration) -> Camera | None:

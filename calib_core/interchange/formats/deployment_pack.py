@@ -115,7 +115,7 @@ PACK = Format(
     notes=_NOTES,
     write=_write,
     reads=Reads(_recognizes, _read),
-    holds_angle_map=True,
+    holds_corrections=True,
     is_unpacked=True,
 )
 

@@ -7,6 +7,7 @@ from calib_core.interchange.calibration_file import EVIDENCE_LEVELS, Calibration
 from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.format import Format, ImportedCalibration, Reads, StatedCheckPoint, WrittenPose
 from calib_core.interchange.own.calibration_json import calibration_sha256
+from calib_core.interchange.own.raw_data import aed_either_way
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import numbers_text
 
@@ -17,6 +18,7 @@ _NOTES = (
 )
 _SHA256_BYTES, _BYTE_DIGITS = 32, 3
 _ASSUMPTION = "the format names no frames and assumes undistorted images"
+_AED, _FOR_RAW = "cocalib_aed_px", "cocalib_for_raw_aed_px"
 _CHECK_POINT, _EVIDENCE, _SHA256 = "cocalib_check_point", "cocalib_evidence", "cocalib_calibration_sha256"
 _POSE_KEYS = ("Tr_velo_to_cam", "Tr_radar_to_cam", "Tr_velo_cam")
 
@@ -37,7 +39,8 @@ def _write(file: CalibrationFile) -> str:
 
 def _stated_numbers(file: CalibrationFile) -> dict[str, str]:
     """Return what the file states as numbers, because readers convert the values of every key: p_radar, p_camera and the
-    rectified pixel of the check point; the number of the evidence level; the bytes of the calibration's SHA-256."""
+    rectified pixel of the check point; the number of the evidence level; the bytes of the calibration's SHA-256; AED with the
+    radar's corrections and without, or the other way round if the pose is for radar data as reported."""
     stated = {}
     check = file.check_point
     if check is not None:
@@ -45,6 +48,9 @@ def _stated_numbers(file: CalibrationFile) -> dict[str, str]:
         stated[_CHECK_POINT] = numbers_text((*check.radar_m, *point_camera_m, *check.pixel_px), " ")
     stated[_EVIDENCE] = str(EVIDENCE_LEVELS.index(file.rests_on))
     stated[_SHA256] = " ".join(map(str, bytes.fromhex(calibration_sha256(file))))
+    figures = aed_either_way(file)
+    if figures is not None:
+        stated[_AED if file.corrected is None else _FOR_RAW] = numbers_text(figures, " ")
     return stated
 
 
@@ -90,6 +96,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         check_point=check_point,
         evidence=_evidence(lines.get(_EVIDENCE, "")),
         calibration_sha256=_sha256(lines.get(_SHA256, "")),
+        for_raw=_FOR_RAW in lines,
     ).checked(source)
 
 

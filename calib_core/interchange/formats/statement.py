@@ -13,6 +13,7 @@ import numpy as np
 from calib_core.interchange.calibration_file import EQUATION, CalibrationFile, Evidence, FrameNames, stated_evidence
 from calib_core.interchange.format import ImportedCalibration, StatedCheckPoint
 from calib_core.interchange.own.calibration_json import calibration_sha256
+from calib_core.interchange.own.raw_data import aed_either_way
 from calib_core.interchange.syntax.yaml_text import numbers_text, quoted
 from calib_core.radar import RadarErrors
 from calib_core.results import Calibration
@@ -32,6 +33,7 @@ _CHECK_POINT = re.compile(
     rf"(?: -> pixel \[([^\]]*)\] px({_OF_RECTIFIED})?)?"
 )
 
+_FOR_RAW = "FOR RADAR DATA AS REPORTED"
 _ORIGIN = re.compile(r"evidence: ([^;\s]+); from the calibration with sha256 ([0-9a-f]{64})")
 
 
@@ -62,6 +64,7 @@ def statement(file: CalibrationFile, meaning: str, *, rectified: bool = False) -
             "p_radar is a true position; first take the radar's errors out of a reported one, as in docs/formats.md: "
             + ", ".join(f"{one.name} {getattr(errors, one.name):.6g}" for one in fields(errors))
         )
+    lines += corrections_lines(file)
     lines += origin_lines(file)
     # The version in a file may be any text; the frame names are checked and kept unchanged, including spaces.
     version = " ".join((file.provenance.version or "").split())
@@ -98,6 +101,7 @@ def with_statement(found: ImportedCalibration, text: str) -> ImportedCalibration
         assumptions=() if frames else found.assumptions,
         evidence=origin.evidence,
         calibration_sha256=origin.calibration_sha256,
+        for_raw=origin.for_raw,
     )
 
 
@@ -132,10 +136,12 @@ class Origin:
     Attributes:
         evidence: what the pose rests on; None if it states none.
         calibration_sha256: of the calibration-1 file that it was made from; None if it states none.
+        for_raw: whether its pose is for radar data as reported.
     """
 
     evidence: Evidence | None = None
     calibration_sha256: str | None = None
+    for_raw: bool = False
 
 
 def origin_lines(file: CalibrationFile) -> tuple[str, ...]:
@@ -164,10 +170,23 @@ def missing_map(calibration: Calibration) -> tuple[str, ...]:
     )
 
 
+def corrections_lines(file: CalibrationFile) -> tuple[str, ...]:
+    """Return the line about the AED with and without the radar's corrections; nothing if there are none."""
+    found = aed_either_way(file)
+    if found is None:
+        return ()
+    if file.corrected is None:
+        return (f"without the corrections AED {found[1]:.3g} instead of {found[0]:.3g} px",)
+    return (
+        f"{_FOR_RAW}: the pose was solved without taking out what the radar gets wrong, AED {found[0]:.3g} px; "
+        f"with the corrections {found[1]:.3g} px",
+    )
+
+
 def stated_origin(text: str) -> Origin:
     """Find the evidence and the calibration's hash in a file's text."""
     match = _ORIGIN.search(text)
-    return Origin(stated_evidence(match[1]), match[2]) if match else Origin()
+    return Origin(stated_evidence(match[1]), match[2], f"{_FOR_RAW}: " in text) if match else Origin()
 
 
 def _figures(calibration: Calibration) -> str:

@@ -338,7 +338,7 @@ CALIBRATION_1 = Format(
     comment="keys",
     write=write_calibration,
     reads=Reads(_recognizes, _read),
-    holds_angle_map=True,
+    holds_corrections=True,
 )
 """calibration-1 as a format of the registry."""
 

@@ -25,7 +25,10 @@ from calib_core.interchange import (
     adopt,
     calibration_text,
     check,
+    contents_text,
     export,
+    for_raw,
+    imported,
     read_any,
     read_calibration,
     read_check_pairs,
@@ -34,12 +37,13 @@ from calib_core.interchange import (
 )
 from calib_core.interchange.calibration_file import MOST_CHARACTERS
 from calib_core.interchange.own.calibration_json import calibration_file
+from calib_core.interchange.own.raw_data import aed_either_way
 from calib_core.measurements import time_from_parts
 from calib_core.options import CalibrationOptions, CameraPositionPrior, NoiseOptions, SolvingOptions
 from calib_core.radar import RadarErrors, cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration
 from calib_core.results.verdict import verdict_on
-from calib_core.synthetic import simulate_pairs
+from calib_core.synthetic import SystematicErrors, simulate_pairs
 
 
 @pytest.fixture
@@ -417,3 +421,56 @@ def test_the_schema_says_the_same(file: CalibrationFile, project_root: Path) -> 
     assert validator.is_valid(json.loads(with_vehicle({"plate": "F-17"})))
     for wrong in ("V017", {"name": ""}, {"type": "x" * 121}, {"session": 3}):
         assert not validator.is_valid(json.loads(with_vehicle(wrong)))
+
+
+@pytest.fixture(scope="module")
+def scaled() -> CalibrationFile:
+    """Return a calibration of a radar that reports its azimuths 4 % too large."""
+    errors = SystematicErrors(azimuth_scale=0.04, range_bias_m=0.05)
+    drawn = simulate_pairs(24, rng=np.random.default_rng(12), noise="imaging", systematic=errors)
+    return calibration_file(calibrate_pairs(drawn.pairs, drawn.camera).unwrap())
+
+
+CORRECTED = [known for known in FORMATS if not known.holds_corrections and known.reads and known.write]
+
+
+@pytest.mark.parametrize("known", CORRECTED, ids=[known.name for known in CORRECTED])
+def test_an_export_states_the_aed_with_and_without_what_it_cannot_hold(scaled, known):
+    right, other = aed_either_way(scaled)
+    written = export(scaled, known.name, rectified=known.is_for_rectified)
+
+    assert other > 1.5 * right
+    assert any(f"AED {other:.3g} instead of {right:.3g} px; --for raw" in note for note in written.notes)
+    assert f"{other:.3g} instead of {right:.3g} px" in contents_text(written) or f"{right} {other}" in contents_text(
+        written
+    )
+    assert not read_any(written.data).for_raw
+
+
+@pytest.mark.parametrize("known", CORRECTED, ids=[known.name for known in CORRECTED])
+def test_a_pose_for_raw_data_says_so_in_its_file_and_check_knows_it(scaled, known):
+    raw = for_raw(scaled)
+    with_errors, without = aed_either_way(scaled), aed_either_way(raw)
+    found = read_any(export(raw, known.name, rectified=known.is_for_rectified).data)
+
+    assert without[0] < with_errors[1]
+    assert without[1] == with_errors[0]
+    assert found.for_raw
+    whole = imported(scaled)
+    report = check(found, of=whole, against=whole, pairs=read_check_pairs(write_calibration(scaled)))
+    assert report.verdict == "right", str(report)
+    assert {"same-pose", "agrees", "pairs-fit"} <= {one.code for one in report.results}
+    assert "for radar data as reported" in str(report)
+    plain = read_any(export(scaled, known.name, rectified=known.is_for_rectified).data)
+    assert np.linalg.norm(plain.pose.translation_m - found.pose.translation_m) > 0.02
+
+
+def test_a_format_that_holds_the_corrections_has_no_pose_without_them(scaled):
+    raw = for_raw(scaled)
+
+    for name in ("json", "pack"):
+        with pytest.raises(InputError, match="omit --for"):
+            export(raw, name)
+    assert not np.isfinite(raw.calibration.covariance).any()
+    with pytest.raises(InputError, match="solved from the pairs"):
+        for_raw(replace(scaled, calibration=replace(scaled.calibration, pairs=())))

@@ -176,7 +176,7 @@ def test_a_fresh_file_with_two_clicks_of_one_placement_states_the_aed_of_its_pla
     assert check(imported(fresh)).verdict == "right"
     (wrong,) = (one for one in check(imported(calibration_file(edited))).results if one.level == "error")
     assert wrong.code == "metrics-disagree"
-    assert "inlier placements average" in wrong.message
+    assert "placements that agree average" in wrong.message
 
 
 def test_two_calibrations_are_compared_in_degrees_centimetres_and_pixels(file):

@@ -3,6 +3,8 @@
 import numpy as np
 
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
+from calib_core.interchange import CalibrationFile
+from calib_core.interchange.formats.statement import corrections_lines
 from calib_core.results import Calibration
 from calib_core.results.verdict import Verdict, verdict_on
 from cocalib.report.markup import Child, Markup, tag
@@ -201,7 +203,12 @@ def _figures(calibration: Calibration) -> Markup:
         rows.append(("chi2 / degrees of freedom", f"{plain(metrics.chi2)} / {metrics.degrees_of_freedom}"))
     if np.isfinite(metrics.picture_sigma_px):
         rows.append(("in the picture (1 sigma, pose)", f"± {plain(metrics.picture_sigma_px, 2)} px"))
-    return tag("div", heading, _table(("figure", "value"), rows))
+    uncorrected = [
+        f"{line}: formats other than calibration-1 and the pack cannot hold what the radar gets wrong"
+        for line in corrections_lines(CalibrationFile(calibration))
+    ]
+    notes = (tag("p", sentence(line), class_="note") for line in uncorrected)
+    return tag("div", heading, _table(("figure", "value"), rows), *notes)
 
 
 def _table(heads: tuple[str, str], rows: list[tuple[str, str]]) -> Markup:

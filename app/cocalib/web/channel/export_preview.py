@@ -130,7 +130,7 @@ def export_preview(file: CalibrationFile, key: str, query: str, recording_name: 
     whole = imported(named)
     report = check(read_any(written.data, written.file_name) if form.reads else whole, against=whole)
     saved = written.download
-    lost = () if form.holds_angle_map else missing_map(file.calibration)
+    lost = () if form.holds_corrections else missing_map(file.calibration)
     return ExportPreview(
         key=key,
         file_name=f"{_slug(recording_name)}_{saved.file_name}",
