@@ -182,6 +182,7 @@ class Provenance:
         version: the version of this program.
         column_map: which columns of the radar the user gave, each in the syntax of --map.
         assumptions: what the files do not state and reading them takes for granted.
+        damage: what of the recording is damaged or missing.
         unconfirmed: the clicks that were placed automatically and that nobody confirmed; None if there are none.
     """
 
@@ -199,6 +200,7 @@ class Provenance:
     column_map: tuple[str, ...] = ()
     assumptions: tuple[AssumptionNote, ...] = ()
     unconfirmed: UnconfirmedClicks | None = None
+    damage: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,6 +41,13 @@ _HASH_BYTES = 1 << 22
 _STAMP_BYTES = 12
 
 
+LOSSES = frozenset({
+    "checksum", "damaged-file", "definitions-damaged", "file-left-out", "messages-missing", "missing-file", "not-closed",
+    "packed-file-damaged",
+})  # fmt: skip
+"""The codes of warnings that a part of the recording is damaged or missing."""
+
+
 class Recording:
     """An open recording. Created by open_recording; use it in a with statement.
 
@@ -160,6 +167,11 @@ class Recording:
         """What the user must know, including unreadable messages and damage found so far."""
         found = (*self._assembly.warnings, *(late for source in self.sources for late in source.later_warnings))
         return (*found, *self._unreadable(), *self._about_lost())
+
+    @property
+    def damage(self) -> tuple[DataWarning, ...]:
+        """The warnings that a part of the recording is damaged or missing."""
+        return tuple(warning for warning in self.warnings if warning.code in LOSSES)
 
     def _unreadable(self) -> Iterator[DataWarning]:
         """Warn about radar messages that could not be read so far."""

@@ -21,14 +21,8 @@ from calib_core.recordings.containers.sources import Channel, Progress, Source
 from calib_core.recordings.messages.decoding import decode
 from calib_core.recordings.messages.definitions import Definition, definition_of
 from calib_core.recordings.plain_files.source import PlainSource
-from calib_core.recordings.recording import Recording
+from calib_core.recordings.recording import LOSSES, Recording
 from calib_core.recordings.summary import FileSummary, files_of
-
-_LOSSES = frozenset({
-    "checksum", "damaged-file", "definitions-damaged", "file-left-out", "messages-missing", "missing-file", "not-closed",
-    "packed-file-damaged",
-})  # fmt: skip
-
 
 _PROGRESS_MESSAGES = 200
 
@@ -118,7 +112,7 @@ def verify_recording(
     warnings = recording.warnings
     checks = tuple(sorted(topics.found.values(), key=lambda one: one.topic))
     lost = any(one.damaged or one.undecodable for one in checks)
-    sound = not lost and not any(warning.code in _LOSSES for warning in warnings)
+    sound = not lost and not any(warning.code in LOSSES for warning in warnings)
     return Verification(sound, files_of(recording), checks, warnings)
 
 

@@ -1,4 +1,4 @@
-"""What a pose rests on beside its pairs: clicks that nobody confirmed, or the fleet's prior of an older version."""
+"""What a pose rests on beside its pairs: clicks that nobody confirmed, a damaged recording, an older version's fleet prior."""
 
 from calib_core.results import DataWarning, UnconfirmedClicks
 
@@ -23,6 +23,21 @@ def nobody_confirmed(unconfirmed: UnconfirmedClicks, count: int) -> DataWarning:
         "nobody-confirmed",
         f"{of_all} placed automatically (confidence {probability_text(unconfirmed.confidence)}), and nobody confirmed them",
         "look at each of them on the page: open the recording with the clicks that solve --auto --clicks-out wrote",
+    )
+
+
+def damaged_recording(lost: int, damage: DataWarning) -> DataWarning:
+    """Warn that clicks have no radar data in a recording that is damaged.
+
+    Args:
+        lost: how many clicks.
+        damage: the recording's own warning.
+    """
+    clicks = "clicks have" if lost > 1 else "click has"
+    return DataWarning(
+        "damaged-recording",
+        f"{lost} {clicks} no radar data, and the recording is damaged: {damage.message}",
+        "copy the recording again from its source",
     )
 
 

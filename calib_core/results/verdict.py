@@ -303,6 +303,7 @@ _CODES: dict[Consequence, tuple[str, ...]] = {
         "doubtful-pair",
     ),
     "weak": (
+        "damaged-recording",
         "lost-returns",
         "rests-on-fleet-prior",
         "off-its-kind",

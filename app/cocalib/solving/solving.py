@@ -33,6 +33,7 @@ from calib_core.measurements import Candidate, DataWarning, Pair, ReflectorClick
 from calib_core.options import CalibrationOptions, checked_options
 from calib_core.recordings import Recording, about_assumptions, about_losses
 from calib_core.results import Calibration, InputFile, PairResult, UnconfirmedClicks
+from calib_core.results.confirmation import damaged_recording
 from cocalib.platform.resources import version
 from cocalib.session import Outcome
 
@@ -42,7 +43,7 @@ _MOST_CANDIDATES = 50
 _MOST_LOST = 0.05
 """Share of the returns."""
 
-_KEPT_WARNINGS = ("assumed", "nobody-confirmed", "lost-returns")
+_KEPT_WARNINGS = ("assumed", "nobody-confirmed", "lost-returns", "damaged-recording")
 """What solving the same pairs again cannot change."""
 
 _log = logging.getLogger(__name__)
@@ -107,7 +108,18 @@ def solve_in_steps(
     for outcome in calibration_steps(clicks, scans, camera, options, previous=previous, preview=preview):
         if about_lost and isinstance(outcome, Calibration):
             outcome = dataclasses.replace(outcome, warnings=(*about_lost, *outcome.warnings))
-        yield outcome
+        yield _with_damage(outcome, recording) if isinstance(recording, Recording) else outcome
+
+
+def _with_damage(outcome: Calibration | Unsolvable, recording: Recording) -> Calibration | Unsolvable:
+    """Let it lead the verdict if the recording is damaged and there are no returns around some clicks."""
+    lost, damage = sum(one.code == "no-scan" for one in outcome.unpaired), recording.damage
+    if not (damage and lost):
+        return outcome
+    warning = damaged_recording(lost, damage[0])
+    if isinstance(outcome, Unsolvable):
+        return dataclasses.replace(outcome, reason=f"{warning.message}; {outcome.reason}", hint=warning.hint)
+    return dataclasses.replace(outcome, warnings=(warning, *outcome.warnings))
 
 
 def _about_lost(
@@ -298,6 +310,7 @@ def calibration_text(
     if unsure:
         calibration = dataclasses.replace(calibration, warnings=(*calibration.warnings, *unsure))
     provenance = Provenance(
+        damage=tuple(one.message for one in recording.damage),
         inputs=(
             *recording.fingerprint(),
             *([] if camera_file is None else [_input_file(camera_file.source, camera_file.data)]),

@@ -173,7 +173,8 @@ def by_own_pairs(imported: ImportedCalibration) -> list[CheckResult]:
     averaged_px = averaged_distances_px(file.calibration)
     aed_px = file.calibration.metrics.aed_px
     if len(averaged_px) and np.isfinite(aed_px) and abs(np.mean(averaged_px) - aed_px) > tolerances.max():
-        message = f"aed_px is {aed_px:.3f}, but the placements that agree average {np.mean(averaged_px):.3f} px"
+        which = "placements that agree" if file.calibration.options.models_noise else "pairs that are used"
+        message = f"aed_px is {aed_px:.3f}, but the {which} average {np.mean(averaged_px):.3f} px"
         results.append(CheckResult("error", "metrics-disagree", message, "solve again"))
     return results
 

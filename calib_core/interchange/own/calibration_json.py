@@ -445,6 +445,7 @@ def provenance_document(provenance: Provenance) -> documents.ProvenanceDocument:
         column_map=list(provenance.column_map) or UNSET,
         assumptions=list(provenance.assumptions) or UNSET,
         unconfirmed=provenance.unconfirmed or UNSET,
+        damage=list(provenance.damage) or UNSET,
     )
 
 
@@ -465,6 +466,7 @@ def provenance_of(document: documents.ProvenanceDocument) -> Provenance:
         column_map=tuple(document.column_map or ()),
         assumptions=tuple(document.assumptions or ()),
         unconfirmed=unconfirmed_of(document.unconfirmed),
+        damage=tuple(document.damage or ()),
     )
 
 

@@ -225,6 +225,7 @@ class ProvenanceDocument(Struct, frozen=True):
     column_map: list[str] | UnsetType = UNSET
     assumptions: list[AssumptionNote] | UnsetType = UNSET
     unconfirmed: UnconfirmedClicks | UnsetType = UNSET
+    damage: list[str] | UnsetType = UNSET
 
 
 class NoiseScaleDocument(Struct, frozen=True):

@@ -88,6 +88,7 @@ def _facts(subject: ReportSubject) -> Iterator[tuple[str, str]]:
             ("radar axes", made.radar_axes),
             ("video start", made.video_start),
             ("columns", ", ".join(made.column_map)),
+            ("damaged", "; ".join(made.damage)),
             ("options", _options(file.calibration.options)),
             ("made from", made_from if (made_from := file.made_from_sha256) else None),
         )

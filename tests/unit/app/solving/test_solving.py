@@ -100,6 +100,28 @@ def test_lost_returns_lead_the_verdict_where_they_can_matter(
     assert any(warning.code == "lost-returns" for warning in outcome.warnings) == leads
 
 
+@pytest.mark.parametrize(("share", "lost"), [(1.0, 0), (0.5, 9), (0.125, 18)])
+def test_a_recording_cut_off_leads_the_verdict_where_clicks_lost_their_returns(
+    sample: Path, tmp_path: Path, clicks: tuple[ReflectorClick, ...], share: float, lost: int
+) -> None:
+    whole = (sample / "radar.bag").read_bytes()
+    (tmp_path / "radar.bag").write_bytes(whole[: int(share * len(whole))])
+    with open_recording([tmp_path / "radar.bag", sample / "camera.bag"]) as cut:
+        outcome = solve_clicks(cut, clicks, cut.camera(), CalibrationOptions())
+        text = calibration_text(outcome, cut) if isinstance(outcome, Calibration) else ""
+    verdict = verdict_on(outcome)
+
+    led = verdict.reason.startswith(
+        f"{lost} clicks have no radar data, and the recording is damaged: radar.bag has no usable"
+    )
+    assert led == (lost > 0)
+    assert (verdict.action == "Copy the recording again from its source") == (lost > 0)
+    if text:
+        damage = read_calibration(text).provenance.damage
+        assert any("could not be parsed and are lost" in one for one in damage) == (lost > 0)
+        assert ("damage" in json.loads(text)["provenance"]) == (lost > 0)
+
+
 def test_without_intrinsics_the_answer_says_that_they_are_missing() -> None:
     outcome = solve_clicks(Radar(), [CLICK], None, CalibrationOptions())
     assert isinstance(outcome, Unsolvable)
