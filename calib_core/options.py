@@ -205,6 +205,12 @@ class SolvingOptions:
         low=0.01,
         high=100.0,
     )
+    rig_size_m: float = option(
+        3.0,
+        "Largest distance between the sensors [m]: another pose with the camera farther away is no answer; 30 for two rigs.",
+        low=0.01,
+        high=1000.0,
+    )
     sensors_above_placements: bool = option(
         True,
         "Radar and camera are on the same side of the plane of the placements, as above a floor; this tells mirrored axes.",

@@ -107,6 +107,7 @@ export interface CameraPositionPrior {
 export interface SolvingOptions {
   camera_position: CameraPositionPrior | null;
   nominal_camera_distance_m: number;
+  rig_size_m: number;
   sensors_above_placements: boolean;
   seed: number;
 }
@@ -243,9 +244,10 @@ export interface SystematicErrorTable {
 
 /** How far the calibration can be trusted, in one line, and what to do. */
 export interface VerdictRow {
-  level: "good" | "usable" | "weak" | "contradictory" | "nothing";
+  level: "good" | "usable" | "coarse" | "contradictory" | "nothing";
   line: string;
   action: string;
+  assumes: string;
   key: "" | "N" | "E" | "J";
   done: boolean;
 }

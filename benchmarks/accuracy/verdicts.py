@@ -174,8 +174,8 @@ def section(kept: Kept) -> Section:
     for level in _LEVELS[:3]:
         inside = share_inside(everything, (level,))
         if len(inside):
-            verdicts += [at_least(share(inside), _AIM)] if level != "weak" else []
-            cells.append((level, str(len(inside)), share(inside).percent, f"{_AIM:g} %" if level != "weak" else "-"))
+            verdicts += [at_least(share(inside), _AIM)] if level != "coarse" else []
+            cells.append((level, str(len(inside)), share(inside).percent, f"{_AIM:g} %" if level != "coarse" else "-"))
     rows = [_row(key.removeprefix("verdict-"), several) for key, several in trials.items() if several]
     head = ("row", "trials", *_LEVELS, "inside, good and usable")
     parts = (

@@ -28,6 +28,8 @@ _NOISE_EXCESS = 2.5
 _NOTABLE_GROWTH = 2.5
 _FEW_INLIERS = 8
 _MANY_PLACES = 500  # of more, neighbours come from a tree: all distances would take too long
+_UNCLEAR = ("two-poses", "camera-far-away", "handedness-open", "many-outliers", "agreeing-outliers", "doubtful-pair")
+_TOLD_BY_MORE = ("handedness-assumed", "weak-geometry", "one-pair-decides", "uncertain-association")
 _FOLLOWS_FROM_PIXELS = {"mirrored-axes", "handedness-open", "handedness-assumed", "intrinsics-suspected"}
 
 
@@ -41,7 +43,6 @@ def warnings_of(fit: SolvedFit) -> tuple[DataWarning, ...]:
         camera_position,
         _flat_radar,
         _many_outliers,
-        _few_inliers,
         _wrong_lens,
         lens_or_scale,
         _systematic_errors,
@@ -58,7 +59,21 @@ def warnings_of(fit: SolvedFit) -> tuple[DataWarning, ...]:
     )
     wrong_pixels = any(warning.code == PIXELS_SUSPECTED for warning in suspected)
     found = [warning for check in checks for warning in check(fit)]
-    return (*suspected, *(one for one in found if not (wrong_pixels and one.code in _FOLLOWS_FROM_PIXELS)))
+    found = [one for one in found if not (wrong_pixels and one.code in _FOLLOWS_FROM_PIXELS)]
+    return (*suspected, *_counted_up(found, int(fit.inliers.sum())))
+
+
+def _counted_up(found: list[DataWarning], count: int) -> list[DataWarning]:
+    """With few pairs, say how many there are instead of what only more of them can tell."""
+    if count >= _FEW_INLIERS:
+        return found
+    clear = not any(one.code in _UNCLEAR for one in found)
+    few = DataWarning(
+        "few-pairs",
+        f"{count} of {_FEW_INLIERS} pairs, {'looks consistent' if clear else 'not clear yet'}",
+        "add placements: ten or more, near and far, on both sides",
+    )
+    return [*(one for one in found if one.code not in (*_UNCLEAR, *_TOLD_BY_MORE)), few]
 
 
 def _other_poses(fit: SolvedFit) -> list[DataWarning]:
@@ -89,19 +104,6 @@ def _many_outliers(fit: SolvedFit) -> list[DataWarning]:
             "many-outliers",
             f"{len(outliers)} of {len(fit.ids)} pairs do not fit: {listed(outliers)}",
             "check each of them: was the reflector clicked, was it at rest, do both recordings use the same clock?",
-        )
-    ]
-
-
-def _few_inliers(fit: SolvedFit) -> list[DataWarning]:
-    count = int(fit.inliers.sum())
-    if count >= _FEW_INLIERS:
-        return []
-    return [
-        DataWarning(
-            "few-pairs",
-            f"the pose is based on only {count} pairs; neither a wrong pair nor a wrong noise level could be detected",
-            "add placements: ten or more, near and far, on both sides",
         )
     ]
 

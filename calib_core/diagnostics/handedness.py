@@ -96,6 +96,8 @@ def mirrored_axes(fit: SolvedFit) -> list[DataWarning]:
     sides, heights_decide = _expected_sides(plane, fit), _heights_decide(plane)
     if sides is not None and sides.same and not heights_decide:
         return []
+    if not heights_decide and not fit.measurements.prior.measured and not _mirrored_on_rig(plane, fit):
+        return []
     if sides is not None and sides.opposite and not heights_decide:
         return [_on_other_side(sides)]
     if fit.mirror_gain > MIRRORED_GAIN:
@@ -135,6 +137,13 @@ def assumed_axes(fit: SolvedFit) -> list[DataWarning]:
             "measure the camera position (0.3 m is enough for this), or add placements at other heights (a tripod)",
         )
     ]
+
+
+def _mirrored_on_rig(plane: _Plane, fit: SolvedFit) -> bool:
+    """Return whether the camera, reflected in the plane of the placements, is as near to the radar as one rig allows."""
+    centre_m = fit.refined.camera_from_radar.inverse().translation_m
+    reflected_m = centre_m - 2.0 * plane.height_m(centre_m)[0] * plane.axes[2]
+    return float(np.linalg.norm(reflected_m)) <= fit.options.solving.rig_size_m
 
 
 def _on_other_side(sides: GroundSides) -> DataWarning:

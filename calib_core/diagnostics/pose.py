@@ -15,6 +15,7 @@ from calib_core.results import DataWarning
 
 _ALMOST_AS_LIKELY = 6.0  # a difference of twice the log-likelihood
 _WORTH_REFINING = 40.0
+_AS_A_WHOLE = 12.0  # the same, of the posterior's other peaks and of pairs that were set aside
 _OTHER_POSE_SIGMAS = 6.0
 _LEAST_PROBABILITY = 0.05
 _OTHER_PEAK_SIGMAS = 4.0
@@ -27,6 +28,8 @@ def two_poses(fit: SolvedFit) -> list[DataWarning]:
     left out of one comparison: what makes the companion echo more than the reflector does so at every placement.
     """
     for other in fit.alternatives[1:]:
+        if not on_rig(fit, other.camera_from_radar):
+            continue
         error = other.camera_from_radar.error_from(fit.refined.camera_from_radar)
         sigmas = float(np.sqrt(error @ fit.uncertainty.pose_information @ error))
         if sigmas <= _OTHER_POSE_SIGMAS:
@@ -40,6 +43,20 @@ def two_poses(fit: SolvedFit) -> list[DataWarning]:
         if _cost_without_prior(fit, other) < _ALMOST_AS_LIKELY:
             return [_assumed_distance(fit, other, away)]
     return []
+
+
+def on_rig(fit: SolvedFit, camera_from_radar: RigidTransform) -> bool:
+    """Return whether a pose has the camera as near to the radar as one rig allows; a measured position says where it is."""
+    near = float(np.linalg.norm(_camera_centre(camera_from_radar))) <= fit.options.solving.rig_size_m
+    return near or fit.measurements.prior.measured
+
+
+def _is_as_likely(fit: SolvedFit, camera_from_radar: RigidTransform) -> bool:
+    """Return whether a pose explains all pairs about as well as the solved one."""
+    here, there = (
+        mixture_cost(fit.refined.measurements, one) for one in (fit.refined.camera_from_radar, camera_from_radar)
+    )
+    return there - here < _AS_A_WHOLE
 
 
 def _two_poses(fit: SolvedFit, other: GncSolution, away: str) -> DataWarning:
@@ -111,6 +128,8 @@ def possible_poses(fit: SolvedFit) -> list[DataWarning]:
     for other in fit.beyond.possible:
         error = other.camera_from_radar.error_from(here)
         sigmas = float(np.sqrt(error @ np.linalg.solve(fit.uncertainty.covariance, error)))
+        if not on_rig(fit, other.camera_from_radar):
+            continue
         if other.probability >= _LEAST_PROBABILITY and sigmas > _OTHER_PEAK_SIGMAS:
             return [
                 DataWarning(
@@ -129,12 +148,22 @@ def agreeing_outliers(fit: SolvedFit) -> list[DataWarning]:
     if found is None:
         return []
     names = [fit.ids[i] for i in found.pairs]
+    pose = found.camera_from_radar
+    if on_rig(fit, pose) and _is_as_likely(fit, pose):
+        return [
+            DataWarning(
+                "two-poses",
+                f"another pose, {_away(found.difference)}, explains the pairs as well: {len(names)} of {len(fit.ids)} agree "
+                f"on it, {listed(names)}",
+                "check which group shows the reflector, and exclude the other",
+            )
+        ]
     return [
         DataWarning(
             "agreeing-outliers",
-            f"{len(names)} pairs that were set aside agree on another pose, {_away(found.difference)}: {listed(names)}",
-            "check which group shows the reflector: an object that always stands near it, such as a cart, or a second "
-            "reflector gives such a group; exclude the wrong one",
+            f"{len(names)} pairs are off in the same way and were set aside: {listed(names)}",
+            f"look at the returns of {names[0]}: a cart beside the reflector, a second reflector, or elevations that jump "
+            "give such a group",
         )
     ]
 

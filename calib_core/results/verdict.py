@@ -5,7 +5,7 @@ each warning decide the level; docs/warnings.md lists both, and the measured sha
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -122,21 +122,23 @@ def _rounded_up(value: float) -> float:
     return float(f"{np.ceil(value / step - 1e-9) * step:.3g}")
 
 
-VerdictLevel: TypeAlias = Literal["good", "usable", "weak", "contradictory", "nothing"]
+VerdictLevel: TypeAlias = Literal["good", "usable", "coarse", "contradictory", "nothing"]
+"""How large the error is, or why there is no saying."""
 
 GOOD_DEG, GOOD_CM = 1.0, 10.0
 """A stated error up to these is good."""
 USABLE_DEG, USABLE_CM = 3.0, 30.0
-"""A stated error up to these is usable; a larger one is weak. Of a radar without elevation only its yaw is judged: its picture
+"""A stated error up to these is usable; a larger one is coarse. Of a radar without elevation only its yaw is judged: its picture
 does not depend on how it is mounted, its position does."""
 SURE_PAIRS = 8
-"""With fewer pairs neither a wrong pair nor a wrong noise level can be detected: the verdict is weak."""
+"""With fewer pairs neither a wrong pair nor a wrong noise level can be detected: the verdict is coarse, and counts up to them."""
 HELD_OUT_RATIO = 2.0
 """With a held-out error above this many times the fitted one, single pairs decide: the verdict is not good."""
 
 _CONTRADICTIONS = ("mirrored-axes", "no-pose", "camera-position-contradicted", "no-consensus", "refinement-diverged")
-_ABOUT_FIGURES = ("weak-geometry", "few-pairs")
-_MORE_PAIRS_HELP = (*_ABOUT_FIGURES, "one-pair-decides")
+_MORE_PAIRS_HELP = ("many-outliers", "repeated-placements")
+_NOT_MIRRORED = "handedness-assumed"
+_FEW = "few-pairs"
 _BETWEEN = {"good": " to ", "usable": " to ", "nothing": " yet: "}
 _LEAST_VARIANCE, _MOST_VARIANCE = 1e-18, 1e12
 _CORNER = "the reflector's inner corner, where its three sheets meet"
@@ -149,18 +151,20 @@ _DEFAULT_METHOD = "Solve with the default method, which states the error of the 
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """How far to trust the result: a word, the stated error or what is wrong, and the one action that helps most.
+    """How far to trust the result: how large its error is, what could be wrong, and the one action that helps most.
 
     Attributes:
-        level: "good" and "usable" state an error that holds with 95 %; "weak" is not to be relied on; "contradictory": the
-            data contradict the pose or each other; "nothing": there is no calibration.
-        reason: the stated error, or what is wrong; without a full stop.
+        level: how large the error is, which holds with 95 %: "good", "usable" or "coarse"; or "contradictory": the data
+            contradict the pose or each other; or "nothing": there is no calibration.
+        reason: the stated error, or what contradicts; without a full stop.
         action: the one thing that helps most; a sentence without a full stop.
+        assumes: what the stated error rests on and no pair can show; without a full stop, empty if there is nothing.
     """
 
     level: VerdictLevel
     reason: str
     action: str
+    assumes: str = ""
 
     @property
     def line(self) -> str:
@@ -193,10 +197,21 @@ def verdict_on(outcome: Calibration | Unsolvable | None, *, left: int | None = N
         return Verdict("contradictory", warning.message, _capitalized(warning.hint) if by_default else _DEFAULT_METHOD)
     if unconfirmed:
         reason = f"{unconfirmed} of the recording's units or axes {'is' if unconfirmed == 1 else 'are'} assumed, not confirmed"
-        return Verdict("weak", reason, "Confirm what is assumed about the recording, or state what is right")
+        return Verdict("coarse", reason, "Confirm what is assumed about the recording, or state what is right")
     if not _states_error(outcome):
         return _without_covariance(outcome, warning)
-    return _judged(outcome, stated_error(outcome), warning, left)
+    return replace(_judged(outcome, stated_error(outcome), warning, left), assumes=_assumption(outcome))
+
+
+def _assumption(calibration: Calibration) -> str:
+    """Return what no pair can show without a measured camera position: what moves the pose and leaves every residual as it is."""
+    if calibration.options.solving.camera_position is not None:
+        return ""
+    rest = "its elevations are right and the picture is not cropped"
+    mirrored = any(warning.code == _NOT_MIRRORED for warning in calibration.warnings)
+    if not calibration.sees_elevation:
+        rest = "the picture is not cropped"
+    return f"you clicked the very point that the radar sees, {'no radar axis is mirrored, ' if mirrored else ''}{rest}"
 
 
 def placement_words(best: NextPlacement) -> str:
@@ -224,26 +239,26 @@ def _without_covariance(calibration: Calibration, warning: DataWarning | None) -
     """Judge a pose whose method states no error, as the paper's: nothing can be promised of it."""
     spread = f"its residuals are {calibration.metrics.rms_px:.3g} px (RMS)"
     reason = f"the method states no error of its pose; {spread}"
-    if warning is not None and consequence_of(warning.code) == "weak":
-        return Verdict("weak", f"{reason}; {warning.message}", _DEFAULT_METHOD)
-    return Verdict("weak", reason, _DEFAULT_METHOD)
+    if warning is not None and consequence_of(warning.code) == "coarse":
+        return Verdict("coarse", f"{reason}; {warning.message}", _DEFAULT_METHOD)
+    return Verdict("coarse", reason, _DEFAULT_METHOD)
 
 
 def _judged(calibration: Calibration, error: StatedError, warning: DataWarning | None, left: int | None) -> Verdict:
-    """Judge a pose by its gravest warning and its stated error."""
+    """Judge a pose by its stated error, and by its gravest warning."""
     consequence: Consequence = "note" if warning is None else consequence_of(warning.code)
     count = sum(pair.inlier for pair in calibration.pairs)
-    if warning is not None and consequence == "weak":
-        hint = _capitalized(warning.hint)
-        action = _click_the_rest(left) if left and warning.code in _MORE_PAIRS_HELP else hint
-        if warning.code not in _ABOUT_FIGURES:
-            return Verdict("weak", warning.message, action)
-        few = f", from only {count} clicks" if warning.code == "few-pairs" else ""
-        return Verdict("weak", f"uncertain to {error.text}{few}", action)
+    if warning is not None and consequence == "coarse":
+        more = left and warning.code in _MORE_PAIRS_HELP
+        action = _click_the_rest(left) if left and more else _capitalized(warning.hint)
+        return Verdict("coarse", f"{warning.message}; uncertain to {error.text}", action)
     if count < SURE_PAIRS:
-        return Verdict("weak", f"uncertain to {error.text}, from only {count} clicks", _most_helpful(calibration, left))
+        told = next((one for one in calibration.warnings if one.code == _FEW), None)
+        seen = f"{count} of {SURE_PAIRS} pairs" if told is None else told.message
+        helpful = _most_helpful(calibration, left) if told is None or left else _capitalized(told.hint)
+        return Verdict("coarse", f"{seen}; uncertain to {error.text}", helpful)
     if error.rotation_deg > USABLE_DEG or error.position_cm > USABLE_CM:
-        return Verdict("weak", f"uncertain to {error.text}", _most_helpful(calibration, left))
+        return Verdict("coarse", f"uncertain to {error.text}", _most_helpful(calibration, left))
     steady = not calibration.metrics.held_out_aed_px > HELD_OUT_RATIO * calibration.metrics.aed_px
     small = error.rotation_deg <= GOOD_DEG and error.position_cm <= GOOD_CM and steady
     if small and consequence == "note":
@@ -283,9 +298,9 @@ def _most_helpful(calibration: Calibration, left: int | None) -> str:
     return "No further placement would help noticeably: state less noise among the options if the radar is better than that"
 
 
-Consequence: TypeAlias = Literal["contradictory", "weak", "limited", "note"]
-"""What a warning says of the pose: another one is as likely or the input is not what it claims to be; it cannot be relied
-on; it rests on an assumption, so it cannot be called good; nothing."""
+Consequence: TypeAlias = Literal["contradictory", "coarse", "limited", "note"]
+"""What a warning says of the pose: another one is as likely or the input is not what it claims to be; the stated error does
+not hold; it rests on an assumption, so it cannot be called good; nothing."""
 
 _CODES: dict[Consequence, tuple[str, ...]] = {
     "contradictory": (
@@ -298,33 +313,33 @@ _CODES: dict[Consequence, tuple[str, ...]] = {
         "two-poses",
         "handedness-open",
         "camera-far-away",
-        "many-outliers",
-        "agreeing-outliers",
-        "doubtful-pair",
     ),
-    "weak": (
+    "coarse": (
         "damaged-recording",
         "lost-returns",
         "rests-on-fleet-prior",
         "off-its-kind",
-        "weak-geometry",
         "swapped-parts",
-        "one-pair-decides",
-        "few-pairs",
-        "residuals-too-large",
+        "many-outliers",
         "intrinsics-suspected",
         "clock-bias-suspected",
         "radar-axes-suspected",
         "repeated-placements",
     ),
     "limited": (
+        "agreeing-outliers",
+        "doubtful-pair",
+        "one-pair-decides",
+        "weak-geometry",
+        _FEW,
+        "residuals-too-large",
         "flat-radar",
         "choices-unused",
         "uncertain-association",
         "smooth-angle-errors",
         "angle-scale",
         "lens-or-radar-scale",
-        "handedness-assumed",
+        _NOT_MIRRORED,
         "nobody-confirmed",
     ),
 }

@@ -116,7 +116,7 @@ const box = /** @type {HTMLElement} */ (document.getElementById("verdict"));
 const SHAPES = {
   good: ["M8 1.5a6.5 6.5 0 1 0 .01 0z", "M4.8 8.2 7.2 10.6 11.4 5.6"],
   usable: ["M8 1.5a6.5 6.5 0 1 0 .01 0z", "M8 4.4v7.2M4.4 8h7.2"],
-  weak: ["M8 1.6 15 14H1z", "M8 6v4M8 11.4v1.2"],
+  coarse: ["M8 1.6 15 14H1z", "M8 6v4M8 11.4v1.2"],
   contradictory: ["M8 .8 15.2 8 8 15.2.8 8z", "M5.6 5.6l4.8 4.8M10.4 5.6 5.6 10.4"],
   nothing: ["M8 1.8a6.2 6.2 0 1 0 .01 0z"],
 };
@@ -134,17 +134,17 @@ function drawVerdict() {
   box.hidden = !view || state.looking;
   if (!view || state.looking) return;
   box.classList.toggle("stale", view.solving && view.has_calibration);
-  const { level, line } = view.verdict;
+  const { level, line, assumes } = view.verdict;
   const aed = view.metrics.find((figure) => figure.key === "aed");
-  const text = JSON.stringify([level, line, aed]);
+  const text = JSON.stringify([level, line, assumes, aed]);
   if (text === drawn) return;
   drawn = text;
   box.dataset.level = level;
-  box.dataset.hint = line;
+  box.dataset.hint = [line, assumes].filter(Boolean).join("\n");
   const rest = line.startsWith(level) ? line.slice(level.length) : ` ${line}`;
   const told = aed && view.clicks.filter((click) => click.state === "inlier").length >= TELLING ? [make("span", "aed", [make("small", "", "AED "), `${aed.value} ${aed.unit}`])] : [];
   for (const one of told) one.dataset.hint = aed?.hint;
-  box.replaceChildren(shape(level), make("p", "line", [make("strong", "", level), rest]), ...told);
+  box.replaceChildren(shape(level), make("p", "line", [make("strong", "", level), rest, ...(assumes ? [make("small", "assumes", ` ${assumes}`)] : [])]), ...told);
 }
 
 /** @param {VerdictRow["level"]} level */

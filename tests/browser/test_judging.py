@@ -36,12 +36,12 @@ def test_the_verdict_is_in_sight_from_nothing_to_done(page: Driver, truth: Any) 
     assert in_sight(page)
     page.load_sample(truth, 5)
     verdict = page.view["verdict"]
-    assert (verdict["level"], verdict["action"]) == ("weak", "Click the 15 placements that are left.")
+    assert (verdict["level"], verdict["action"]) == ("coarse", "Click the 15 placements that are left.")
     assert page.text("#verdict .line") == verdict["line"]
     assert page.text("#status-text") == "Connected"
     assert "next place where the reflector stood, 15 left" in page.text("#guide")
     assert in_sight(page)
-    assert page.page.get_attribute("#verdict", "data-level") == "weak"
+    assert page.page.get_attribute("#verdict", "data-level") == "coarse"
 
     codes = [warning["code"] for warning in page.view["warnings"]]
     assert len(codes) > 1
@@ -74,7 +74,7 @@ def test_the_verdict_is_in_sight_from_nothing_to_done(page: Driver, truth: Any) 
     page.page.click('[data-method="paper"]')
     page.until("__cocalib.state.view.method === 'paper'")
     page.settle()
-    assert page.view["verdict"]["level"] in ("weak", "contradictory"), "it states no error"
+    assert page.view["verdict"]["level"] in ("coarse", "contradictory"), "it states no error"
     notes = [click["note"] for click in page.view["clicks"] if click["state"] == "outlier"]
     assert notes
     assert all("Algorithm 1" in note and "Check the click" not in note for note in notes)

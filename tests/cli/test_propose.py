@@ -170,7 +170,7 @@ def test_a_weak_calibration_that_nobody_confirmed_fails_where_a_usable_one_is_re
     answer = cocalib("solve", recording, "--clicks", few, "--out", out, "--require", "usable")
     assert answer.code == 3, answer.err
     written = json.loads(out.read_text())
-    assert written["verdict"]["level"] == "weak"
+    assert written["verdict"]["level"] == "coarse"
     assert written["provenance"]["unconfirmed"]["clicks"] == [click["id"] for click in document["clicks"]]
 
 

@@ -71,7 +71,7 @@ def test_it_states_no_uncertainty_and_is_never_called_usable() -> None:
     result = calibrate_by_mounting(PAIRS[:1], CAMERA, OPTIONS)
     assert np.isnan(result.covariance).all()
     assert "states no error" in verdict_on(result).reason
-    assert verdict_on(result).level == "weak"
+    assert verdict_on(result).level == "coarse"
 
 
 def test_pairs_agree_where_the_assumed_noise_explains_them() -> None:
@@ -137,7 +137,7 @@ def test_it_says_what_it_is_and_states_no_error(by_both: tuple[Calibration, Cali
     (note,) = (one for one in found.warnings if one.code == "swapped-parts")
     assert "rotation of one calibration and the translation of another" in note.message
     assert np.isnan(found.covariance).all()
-    assert verdict_on(found).level in ("weak", "contradictory")
+    assert verdict_on(found).level in ("coarse", "contradictory")
 
 
 def test_two_cameras_cannot_be_combined(by_both: tuple[Calibration, Calibration]) -> None:

@@ -9,7 +9,7 @@ from cocalib.fleet.kinds import Kind
 from cocalib.fleet.records import FleetRecord, SessionRecord, VehicleRecord
 
 _DAY_NS = 86_400_000_000_000
-_POOR = ("weak", "contradictory", "nothing")
+_POOR = ("coarse", "weak", "contradictory", "nothing")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

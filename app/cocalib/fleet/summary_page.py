@@ -24,8 +24,8 @@ SUMMARY_FILE: Final = "summary.html"
 _DASH = "–"
 _LONG = 20
 """Longer names may be broken into lines."""
-_BAD = ("weak", "contradictory", "nothing", "refused", "failed")
-_ORDER = ("good", "usable", "weak", "contradictory", "nothing", "refused", "failed")
+_BAD = ("coarse", "weak", "contradictory", "nothing", "refused", "failed")
+_ORDER = ("good", "usable", "coarse", "weak", "contradictory", "nothing", "refused", "failed")
 _OTHER_SIGNS = {"refused": "□", "failed": "✕"}
 _OUTCOMES = {"remounted": "remounted", "unchanged": "unchanged", "cannot-tell": "cannot tell"}
 _WIDTH, _HEIGHT = 128.0, 27.0

@@ -188,7 +188,8 @@ def summary_lines(calibration: Calibration) -> tuple[str, ...]:
     figures = tuple(replace(one, label=_PAPER_NAMES.get(one.key, one.label)) for one in figures)
     width = max(len(figure.label) for figure in figures)
     verdict = verdict_on(calibration)
-    head = (f"verdict: {verdict.line}", f"next: {sentence(verdict.action)}")
+    assumed_words = (f"assuming: {verdict.assumes}",) if verdict.assumes else ()
+    head = (f"verdict: {verdict.line}", *assumed_words, f"next: {sentence(verdict.action)}")
     lines = [_line(figure, width) for figure in figures]
     if assumed:
         parts = ", ".join(f"{figure.label} {figure.value} {figure.unit}" for figure in assumed)
@@ -257,6 +258,7 @@ def verdict_row(verdict: Verdict, session: Session, placements: Sequence[Placeme
         level=verdict.level,
         line=verdict.line,
         action=sentence(verdict.action),
+        assumes=f"Assuming {verdict.assumes}." if verdict.assumes else "",
         key=_key(verdict, session, placements_left(session, placements)),
         done=_is_done(verdict),
     )

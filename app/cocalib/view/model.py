@@ -155,6 +155,7 @@ class VerdictRow:
         level: decides word, colour and shape.
         line: level and reason: "usable to 0.5 deg, 6 cm (95 %); 7 px at 20 m".
         action: the one thing that helps most, as a sentence.
+        assumes: what the stated error rests on and no pair can show, as a sentence; "" if there is nothing.
         key: of the page, that does or begins it; "" if there is none.
         done: nothing more is needed.
     """
@@ -162,6 +163,7 @@ class VerdictRow:
     level: VerdictLevel
     line: str
     action: str
+    assumes: str = ""
     key: Literal["", "N", "E", "J"] = ""
     done: bool = False
 

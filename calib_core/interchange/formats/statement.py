@@ -153,6 +153,7 @@ def origin_lines(file: CalibrationFile) -> tuple[str, ...]:
     ]
     if file.verdict is not None:
         lines.append(f"verdict: {file.verdict.level}, {_one_line(file.verdict.reason)}")
+        lines += [f"assuming: {_one_line(file.verdict.assumes)}"] if file.verdict.assumes else []
     if calibration.warnings:
         codes = dict.fromkeys(_one_line(warning.code) for warning in calibration.warnings)
         lines.append(f"warnings of the calibration, explained in calibration.json: {', '.join(codes)}")

@@ -237,6 +237,14 @@ def consistent_file(found: ImportedCalibration, source: str) -> CalibrationFile:
     return found.file
 
 
+def _with_levels_of_today(content: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the content of a file; older versions called a coarse calibration weak."""
+    verdict = content.get("verdict")
+    if not isinstance(verdict, dict) or verdict.get("level") != "weak":
+        return content
+    return {**content, "verdict": {**verdict, "level": "coarse"}}
+
+
 def _recognizes(content: Content) -> bool:
     return str(content.json_mapping.get("schema", "")).startswith("cocalib/calibration-")
 
@@ -251,7 +259,7 @@ def _imported(content: Mapping[str, Any], source: str) -> ImportedCalibration:
     Raises:
         InputError: invalid content; the message names the file, the place and what to do.
     """
-    document = document_in(content, documents.CalibrationDocument, source=source)
+    document = document_in(_with_levels_of_today(content), documents.CalibrationDocument, source=source)
     stated, inverse = document.camera_from_radar, document.radar_from_camera
     bare = documents.TransformDocument(stated.rotation, stated.translation_m)
     pose = transform_of(bare, source=source, place="camera_from_radar")

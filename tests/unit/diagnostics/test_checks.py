@@ -248,7 +248,11 @@ def test_a_pose_that_differs_in_position_only_is_said(fit: SolvedFit) -> None:
 
 
 def test_the_expected_distance_is_asked_for_when_it_decides_between_two_poses(fit: SolvedFit) -> None:
-    (warning,) = two_poses(with_another(fit, 4.0, worse_by_pairs=1.0))
+    assert two_poses(with_another(fit, 4.0, worse_by_pairs=1.0)) == []  # no rig has its camera there
+    assert two_poses(with_another(fit, 4.0, worse_by_pairs=-20.0)) == []
+    solving = replace(fit.options.solving, rig_size_m=30.0)
+    two_rigs = replace(fit, options=replace(fit.options, solving=solving))
+    (warning,) = two_poses(with_another(two_rigs, 4.0, worse_by_pairs=1.0))
     assert warning.code == "camera-far-away"
     assert "only because about 1 m is expected" in warning.message
     assert "same rig" in warning.hint

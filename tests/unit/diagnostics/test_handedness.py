@@ -22,7 +22,7 @@ TRIPOD = replace(FIELD, max_height_m=1.5)
 
 
 def apart(distance_m: float) -> CalibrationOptions:
-    return CalibrationOptions(solving=SolvingOptions(nominal_camera_distance_m=distance_m))
+    return CalibrationOptions(solving=SolvingOptions(nominal_camera_distance_m=distance_m, rig_size_m=30.0))
 
 
 def moved(pairs: Sequence[Pair], change: np.ndarray) -> list[Pair]:

@@ -112,7 +112,7 @@ def test_a_file_without_a_verdict_stays_without_one(project_root: Path):
 
 
 def test_an_unconfirmed_assumption_makes_the_verdict_in_the_file_weak(truth: Calibration):
-    for confirmed, level in ((False, "weak"), (True, verdict_on(truth).level)):
+    for confirmed, level in ((False, "coarse"), (True, verdict_on(truth).level)):
         provenance = Provenance(assumptions=(AssumptionNote("/radar: z in metres", confirmed),))
         assert calibration_file(truth, provenance=provenance).verdict.level == level
 
@@ -198,7 +198,7 @@ def test_a_pose_that_rests_on_a_fleets_prior_is_read_with_one_warning_and_solved
     file = read_calibration(text)
     assert [one.code for one in file.calibration.warnings] == ["rests-on-fleet-prior"]
     assert "of type van" in file.calibration.warnings[0].message
-    assert file.verdict.level == "weak"
+    assert file.verdict.level == "coarse"
     assert check(read_any(text)).ok
 
     written = write_calibration(file)

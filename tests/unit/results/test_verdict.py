@@ -63,9 +63,9 @@ def test_a_good_calibration_states_its_error_and_is_done(good: Calibration) -> N
     assert verdict_on(good, left=0).action == DONE
 
 
-def test_a_larger_stated_error_is_usable_then_weak(good: Calibration) -> None:
+def test_a_larger_stated_error_is_usable_then_coarse(good: Calibration) -> None:
     levels = [verdict_on(replace(good, covariance=good.covariance * factor**2)).level for factor in (1, 2, 20)]
-    assert levels == ["good", "usable", "weak"]
+    assert levels == ["good", "usable", "coarse"]
 
 
 def test_the_stated_error_is_larger_than_one_sigma_and_grows_with_the_quantile(good: Calibration) -> None:
@@ -78,7 +78,7 @@ def test_the_stated_error_is_larger_than_one_sigma_and_grows_with_the_quantile(g
 def test_each_consequence_has_its_level(good: Calibration) -> None:
     for code, level in (
         ("two-poses", "contradictory"),
-        ("intrinsics-suspected", "weak"),
+        ("intrinsics-suspected", "coarse"),
         ("handedness-assumed", "usable"),
     ):
         verdict = verdict_on(warned(good, code))
@@ -88,8 +88,8 @@ def test_each_consequence_has_its_level(good: Calibration) -> None:
 
 
 def test_the_gravest_warning_decides_whatever_the_order(good: Calibration) -> None:
-    codes = ("not-closed", "handedness-assumed", "few-pairs", "doubtful-pair")
-    assert verdict_on(warned(good, *codes)).reason == "about doubtful-pair"
+    codes = ("not-closed", "handedness-assumed", "intrinsics-suspected", "two-poses")
+    assert verdict_on(warned(good, *codes)).reason == "about two-poses"
     ordered = by_consequence(warned(good, *codes).warnings)
     assert [warning.code for warning in ordered] == list(reversed(codes))
 
@@ -102,25 +102,42 @@ def test_every_documented_warning_of_a_calibration_has_a_consequence(project_roo
     assert [code for code in codes if consequence_of(code) == "note"] == []
 
 
-def test_few_pairs_are_weak_before_they_are_checked() -> None:
+def test_few_pairs_are_counted_in_neutral_words() -> None:
     calibration = replace(solved(6), warnings=())
     verdict = verdict_on(calibration)
-    assert verdict.level == "weak"
-    assert verdict.reason.endswith(", from only 6 clicks")
+    assert verdict.level == "coarse"
+    assert verdict.reason.startswith("6 of 8 pairs; uncertain to ")
+    checked = verdict_on(solved(6))
+    assert checked.level == "coarse"
+    assert checked.reason.startswith("6 of 8 pairs, looks consistent; uncertain to ")
+
+
+def test_a_free_pose_states_what_no_pair_can_show_and_a_measured_one_nothing(good: Calibration) -> None:
+    assert verdict_on(good).assumes == ""
+    free = verdict_on(solved(tape_m=None))
+    assert "point that the radar sees" in free.assumes
+    assert "elevations" in free.assumes
+    assert "cropped" in free.assumes
+
+
+def test_what_the_figures_cover_does_not_make_them_coarse(good: Calibration) -> None:
+    for code in ("residuals-too-large", "agreeing-outliers", "weak-geometry", "one-pair-decides", "doubtful-pair"):
+        verdict = verdict_on(warned(good, code))
+        assert (verdict.level, verdict.reason) == ("usable", stated_error(good).text)
 
 
 def test_the_papers_method_is_never_good_and_blames_no_mark() -> None:
     verdict = verdict_on(solved(30, method="paper"))
-    assert verdict.level == "weak"
+    assert verdict.level == "coarse"
     assert "states no error" in verdict.reason
     assert "default method" in verdict.action
-    contradicted = verdict_on(warned(solved(30, method="paper"), "many-outliers"))
+    contradicted = verdict_on(warned(solved(30, method="paper"), "two-poses"))
     assert (contradicted.level, contradicted.action) == ("contradictory", verdict.action)
 
 
 def test_what_is_assumed_of_the_recording_must_be_confirmed_first(good: Calibration) -> None:
     verdict = verdict_on(good, unconfirmed=2)
-    assert verdict.level == "weak"
+    assert verdict.level == "coarse"
     assert verdict.action.startswith("Confirm")
 
 
@@ -142,7 +159,7 @@ def test_placements_without_a_click_come_first_and_the_end_is_said() -> None:
 
 def test_the_documented_consequences_are_those_of_the_table(project_root: Path) -> None:
     text = (project_root / "docs" / "warnings.md").read_text(encoding="utf-8")
-    for consequence, name in (("contradictory", "contradictory"), ("weak", "weak"), ("limited", "not good")):
+    for consequence, name in (("contradictory", "contradictory"), ("coarse", "coarse"), ("limited", "not good")):
         [row] = re.findall(rf"^\| {name} \| (`.*) \|$", text, flags=re.MULTILINE)
         codes = re.findall(r"`([a-z-]+)`", row)
         assert {consequence_of(code) for code in codes} == {consequence}

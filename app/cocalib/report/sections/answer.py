@@ -20,7 +20,15 @@ from cocalib.view.figures import (
 )
 from cocalib.view.wording import plain, sentence
 
-LEVEL_SIGNS = {"good": "●", "usable": "◐", "weak": "○", "contradictory": "✕", "nothing": "–", "not judged": "–"}
+LEVEL_SIGNS = {
+    "good": "●",
+    "usable": "◐",
+    "coarse": "○",
+    "weak": "○",
+    "contradictory": "✕",
+    "nothing": "–",
+    "not judged": "–",
+}
 """The level as a shape, for print without colour."""
 _ROW = 15.0
 _GOOD_LIMITS = "10 cm and 1 deg"
@@ -41,7 +49,7 @@ def answer(subject: ReportSubject) -> Markup:
 
 
 def _verdict(subject: ReportSubject) -> Markup:
-    level, reason, action = _judgement(subject)
+    level, reason, action, assumes = _judgement(subject)
     return tag(
         "div",
         tag(
@@ -50,13 +58,18 @@ def _verdict(subject: ReportSubject) -> Markup:
             tag("strong", level),
             class_="level",
         ),
-        tag("div", tag("p", sentence(reason)), tag("p", tag("b", "Next: "), sentence(action), class_="next")),
+        tag(
+            "div",
+            tag("p", sentence(reason)),
+            *([tag("p", tag("b", "Assuming: "), sentence(assumes))] if assumes else []),
+            tag("p", tag("b", "Next: "), sentence(action), class_="next"),
+        ),
         class_=f"verdict {level.split()[0]}",
     )
 
 
-def _judgement(subject: ReportSubject) -> tuple[str, str, str]:
-    """Return level, reason and action: as the file states them, else judged now, if there is anything to judge by."""
+def _judgement(subject: ReportSubject) -> tuple[str, str, str, str]:
+    """Return level, reason, action and what is assumed: of the file, else judged now, if there is anything to judge by."""
     stated = subject.found.file.verdict if subject.found.file is not None else None
     calibration = subject.calibration
     if stated is None and (calibration is None or not (calibration.pairs or np.isfinite(calibration.covariance).all())):
@@ -65,9 +78,11 @@ def _judgement(subject: ReportSubject) -> tuple[str, str, str]:
             "the file states no uncertainty and contains no pairs, so nothing in it says how good the pose is",
             "click the reflector in a recording of these sensors with cocalib open RECORDING --calibration FILE, "
             "and report it with that recording",
+            "",
         )
     found: Verdict = stated if stated is not None else verdict_on(calibration)
-    return found.level, (f"to {found.reason}" if found.level in ("good", "usable") else found.reason), found.action
+    reason = f"to {found.reason}" if found.level in ("good", "usable") else found.reason
+    return found.level, reason, found.action, found.assumes
 
 
 def _transforms(subject: ReportSubject) -> tuple[Markup, Markup]:

@@ -9,7 +9,7 @@ from cocalib.report.subject import ReportSubject
 from cocalib.view.wording import sentence
 
 _MOST, _MOST_UNPAIRED = 10, 5
-_SIGNS = {"contradictory": "✕", "weak": "▲", "limited": "△", "note": "·"}
+_SIGNS = {"contradictory": "✕", "coarse": "▲", "limited": "△", "note": "·"}
 
 
 def cautions(subject: ReportSubject) -> Markup:

@@ -135,7 +135,7 @@ def test_a_method_without_a_noise_model_gets_no_error_bars_and_no_map(project_ro
     options = replace(calibration.options, method="paper")
     unknown = np.full((6, 6), np.nan)
     words = _words(subject_for(project_root, replace(calibration, covariance=unknown, options=options)))
-    assert "weak" in words
+    assert "coarse" in words
     assert "The method states no error of its pose" in words
     assert "No error bars: this calibration states no covariance." in words
     assert "This method states no uncertainty, so there is nothing to draw." in words

@@ -84,7 +84,7 @@ def test_a_radar_without_elevation_shows_first_what_is_firm(flat: Calibration) -
     assert list(figures)[:4] == ["camera_x", "camera_y", "yaw", "picture"]
     assert [one.key for one in assumed_figures(flat)] == ["camera_z", "roll", "pitch"]
     lines = summary_lines(flat)
-    labels = [line.split("  ")[0] for line in lines[2:6]]
+    labels = [line.split("  ")[0] for line in lines[3:7]]
     assert [label.split(" ")[0] for label in labels] == ["camera", "camera", "yaw", "in"]
     assert "assumed, because this radar measures no elevation: camera " in next(
         line for line in lines[2:] if "assumed" in line

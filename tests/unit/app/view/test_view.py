@@ -96,12 +96,12 @@ def agreeing(seen: View) -> tuple[str, str]:
 
 def test_a_solved_session_says_how_many_clicks_agree() -> None:
     four_agree = (*FIVE[:4], pair("c5", inlier=False))
-    assert agreeing(shown(5, calibration(*FIVE))) == ("weak", "5 of 5")
-    assert agreeing(shown(5, calibration(*four_agree))) == ("weak", "4 of 5")
+    assert agreeing(shown(5, calibration(*FIVE))) == ("coarse", "5 of 5")
+    assert agreeing(shown(5, calibration(*four_agree))) == ("coarse", "4 of 5")
 
 
 def test_an_excluded_pair_is_not_among_those_that_could_agree() -> None:
-    assert agreeing(shown(5, calibration(*FIVE[:4], pair("c5", excluded=True)))) == ("weak", "4 of 4")
+    assert agreeing(shown(5, calibration(*FIVE[:4], pair("c5", excluded=True)))) == ("coarse", "4 of 4")
 
 
 def test_an_unsolvable_session_shows_reason_and_hint() -> None:
@@ -154,7 +154,7 @@ def test_a_preview_is_shown_as_being_checked() -> None:
     assert agreeing(drawn)[1] == "4 of 5"
     checked = shown(5, replace(preview, checking=False))
     assert (checked.checking, checked.solving) == (False, False)
-    assert agreeing(checked) == ("weak", "4 of 5")
+    assert agreeing(checked) == ("coarse", "4 of 5")
 
 
 def test_the_view_says_what_can_be_undone_and_redone() -> None:
@@ -289,8 +289,9 @@ def test_the_summary_for_the_command_line_has_the_same_figures_and_all_warnings(
     )
     lines = summary_lines(outcome)
     assert lines[0] == f"verdict: {verdict_on(outcome).line}"
-    assert lines[1] == f"next: {verdict_on(outcome).action}."
-    assert lines[2] == "AED                12.4 px"
+    assert lines[1] == f"assuming: {verdict_on(outcome).assumes}"
+    assert lines[2] == f"next: {verdict_on(outcome).action}."
+    assert lines[3] == "AED                12.4 px"
     assert lines[-2:] == ("warning: B. C.", "unpaired: c9: No scan. Click elsewhere.")
 
 
