@@ -1,4 +1,4 @@
-"""All options of a simulated recording. They define the flags of `cocalib simulate`."""
+"""All options of a simulated recording, which `cocalib simulate --set` takes by name."""
 
 import dataclasses
 import math
@@ -309,9 +309,9 @@ def _check_traffic(options: SimulationOptions) -> None:
     """
     traffic, scene = options.traffic, options.scene
     only = (
-        (traffic.robots, "traffic.robots", ("aisle",), "--scene aisle"),
-        (traffic.cars, "traffic.cars", ("road",), "--scene road"),
-        (options.board_corners, "board_corners", ("checkerboard", "open-yard"), "--scene open-yard"),
+        (traffic.robots, "traffic.robots", ("aisle",), "scene=aisle"),
+        (traffic.cars, "traffic.cars", ("road",), "scene=road"),
+        (options.board_corners, "board_corners", ("checkerboard", "open-yard"), "scene=open-yard"),
     )
     for number, name, scenes, remedy in only:
         _require(not number or scene in scenes, name, number, f"0 in the scene {scene}; ask for {remedy}")
@@ -325,7 +325,7 @@ def _check_traffic(options: SimulationOptions) -> None:
     several = options.defects.near_and_far or options.defects.side_radar or options.defects.second_azimuth != "none"
     _require(not (traffic.any and several), "traffic", "given", "without a radar of several topics")
     if not options.standing_places:
-        _require(traffic.any, "placements", 0, "at least 1 where nothing else moves; or ask for --traffic.walkers 2")
+        _require(traffic.any, "placements", 0, "at least 1 where nothing else moves; or ask for traffic.walkers=2")
         _require(not options.islands, "islands", True, "False without placements, around which islands are recorded")
 
 

@@ -199,3 +199,20 @@ def test_the_help_names_every_value(cocalib: Cocalib, command: str) -> None:
     assert answer.code == 0
     assert "None" not in answer.out
     assert "STR" not in answer.out
+
+
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        ("noise.sigmapx=3", "unknown option 'noise.sigmapx'; did you mean noise.sigma_px?"),
+        ("noise=3", "unknown option 'noise'"),
+        ("noise.sigma_px=many", "option noise.sigma_px: expected `float`"),
+        ("noise.sigma_px=0", "option noise.sigma_px: 0 is out of range"),
+        ("noise.sigma_px", "--set noise.sigma_px: give NAME=VALUE"),
+    ],
+)
+def test_a_setting_that_is_none_is_refused_in_one_line(cocalib: Callable[..., Any], setting: str, words: str) -> None:
+    refused = cocalib("propose", "nowhere.bag", "--set", setting)
+    assert (refused.code, refused.out) == (2, "")
+    assert refused.err.startswith(f"cocalib: {words}")
+    assert refused.err.count("\n") == 1

@@ -81,7 +81,7 @@ def test_solve_refines_the_intrinsics_and_solves_its_file_again(
     assert document["camera"]["covariance"]["order"][:2] == ["fx_px", "fy_px"]
     assert cocalib("solve", "--pairs", out, "--out", again).code == 0
     assert json.loads(again.read_text()) | {"provenance": 0} == document | {"provenance": 0}
-    assert cocalib("solve", "--pairs", out, "--out", plain, "--refining.intrinsics", "False").code == 0
+    assert cocalib("solve", "--pairs", out, "--out", plain, "--set", "refining.intrinsics=false").code == 0
     assert json.loads(plain.read_text())["camera"] == document["given_camera"]
     assert cocalib("check", again, "--of", out).code == 0
 
@@ -410,7 +410,7 @@ def test_options_of_a_recording_are_refused_for_pairs(
         assert (refused.code, refused.out) == (2, "")
         assert words in refused.err
     assert cocalib("solve", "--pairs", pairs_file(), "--out", tmp_path / "a.json").code == 0
-    refused = cocalib("solve", "--pairs", tmp_path / "a.json", "--gating.max-range-m", "8")
+    refused = cocalib("solve", "--pairs", tmp_path / "a.json", "--set", "gating.max_range_m=8")
     assert refused.code == 2
     assert "gating.max_range_m chooses radar returns" in refused.err
 

@@ -1,4 +1,4 @@
-"""`cocalib simulate`: presets fill the options that are not typed."""
+"""`cocalib simulate`: presets fill the options that are not set by name."""
 
 import json
 from collections.abc import Callable
@@ -8,10 +8,8 @@ from typing import Any
 import numpy as np
 
 Cocalib = Callable[..., Any]
-TINY = (
-    *("--placements", 3, "--dwell-s", 3.5, "--radar-rate-hz", 5, "--camera-rate-hz", 3, "--person", False),
-    *("--width-px", 64, "--height-px", 64, "--clutter", "none"),
-)
+_TINY = ("placements=3", "dwell_s=3.5", "radar_rate_hz=5", "camera_rate_hz=3", "person=false", "clutter=none")
+TINY = tuple(word for one in (*_TINY, "width_px=64", "height_px=64") for word in ("--set", one))
 
 
 def _spans(folder: Path) -> list[tuple[float, float]]:
@@ -19,19 +17,27 @@ def _spans(folder: Path) -> list[tuple[float, float]]:
     return [(p["start"]["sec"], p["end"]["sec"]) for p in placements]
 
 
-def test_a_preset_fills_what_is_not_typed_and_what_is_typed_wins(cocalib: Cocalib, tmp_path: Path) -> None:
+def test_a_preset_fills_what_is_not_set_and_what_is_set_wins(cocalib: Cocalib, tmp_path: Path) -> None:
     both, one = tmp_path / "both", tmp_path / "one"
     assert cocalib("simulate", "--out", both, "--preset", "two-reflectors", *TINY).code == 0
-    assert cocalib("simulate", "--out", one, *TINY, "--preset", "two-reflectors", "--reflectors", 1).code == 0
+    assert cocalib("simulate", "--out", one, *TINY, "--preset", "two-reflectors", "--set", "reflectors=1").code == 0
     assert _spans(both)[1][0] < _spans(both)[0][1]
     assert _spans(one)[1][0] >= _spans(one)[0][1]
     assert {path.name for path in both.iterdir()} == {"radar.bag", "camera.bag", "truth.json", "clicks.json"}
 
 
-def test_groups_of_options_have_flags_of_their_own(cocalib: Cocalib, tmp_path: Path) -> None:
-    out = tmp_path / "low"
-    typed = ("--clicking.low-px", 9, "--defects.azimuth-scale", 1.03, "--surroundings.companion", True)
-    assert cocalib("simulate", "--out", out, *TINY, *typed).code == 0
+def test_options_come_from_a_file_by_name_and_as_the_flags_of_earlier_versions(
+    cocalib: Cocalib, tmp_path: Path
+) -> None:
+    out, file = tmp_path / "low", tmp_path / "options.toml"
+    file.write_text("[clicking]\nlow_px = 9\n[defects]\nazimuth_scale = 1.5\n")
+    typed = ("--defects.azimuth-scale", 1.03, "--surroundings.companion=True", "--rig.camera-angles-deg", 0, 2, 0)
+    answer = cocalib("simulate", "--out", out, *TINY, "--options", file, *typed)
+    assert answer.code == 0
+    assert answer.err == (
+        "cocalib: options are set by name now: --set defects.azimuth_scale=1.03 --set surroundings.companion=True "
+        "--set rig.camera_angles_deg=0,2,0\n"
+    )
     truth, clicks = (json.loads((out / name).read_text()) for name in ("truth.json", "clicks.json"))
     pixels = np.array([p["pixel_px"] for p in truth["placements"]])
     off_px = np.array([c["pixel_px"] for c in clicks["clicks"]]) - pixels

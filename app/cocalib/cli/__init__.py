@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from difflib import get_close_matches
 
 from calib_core.errors import CalibrationError, InputError, NoAnswerError
-from cocalib.cli.commands import COMMANDS, PROGRAM, overview
+from cocalib.cli.commands import COMMANDS, PROGRAM, Command, overview
 from cocalib.cli.exit_codes import NO_ANSWER
 from cocalib.platform.error_boundary import INTERNAL_ERROR, error_boundary
 from cocalib.platform.terminal import escaped_output
@@ -82,9 +82,25 @@ def _run(first: str = "--help", *others: str) -> int:
         return 0
     if first not in COMMANDS:
         raise InputError(f"{_unknown(first)}; see {PROGRAM} --help")
+    if "-h" in others or "--help" in others:
+        return _help(COMMANDS[first], everything=others[-1] == "all")
     from cocalib.cli.usage import read_command
 
     return read_command(COMMANDS[first], others).run()
+
+
+def _help(command: Command, *, everything: bool) -> int:
+    from cocalib.cli.help import named_options_help, short_help
+
+    if not everything:
+        print(short_help(command), end="")
+        return 0
+    from cocalib.cli.usage import read_command
+
+    with contextlib.suppress(SystemExit):  # tyro's, once it has printed
+        read_command(command, ("--help",))
+    print(named_options_help(command.load()), end="")
+    return 0
 
 
 def _unknown(first: str) -> str:

@@ -7,7 +7,7 @@ import importlib
 import textwrap
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Protocol, Self, cast, runtime_checkable
+from typing import Protocol, cast
 
 from cocalib.cli.exit_codes import exit_codes
 
@@ -24,15 +24,6 @@ class Runnable(Protocol):
         ...
 
 
-@runtime_checkable
-class HasFileDefaults(Protocol):
-    """A command whose defaults may come from a file or a preset that its arguments name."""
-
-    def file_defaults(self) -> Self | None:
-        """Return the command with those defaults; None to keep its own."""
-        ...
-
-
 @dataclass(frozen=True, slots=True)
 class Command:
     """One command.
@@ -41,11 +32,13 @@ class Command:
         name: as typed.
         where: its module and class, such as "cocalib.cli.info:Info"; imported only when this command is used.
         summary: the first paragraph of the class's docstring, on one line.
+        examples: what to type after its name, for the two most usual tasks.
     """
 
     name: str
     where: str
     summary: str
+    examples: tuple[str, ...] = ()
 
     def load(self) -> type[Runnable]:
         """Import the command's class."""
@@ -57,91 +50,161 @@ COMMANDS: Mapping[str, Command] = {
     command.name: command
     for command in (
         Command("demo", "cocalib.cli.demo:Demo", "Open the sample recording in the browser."),
-        Command("open", "cocalib.cli.open:Open", "Calibrate your own recording in the browser."),
+        Command(
+            "open",
+            "cocalib.cli.open:Open",
+            "Calibrate your own recording in the browser.",
+            (
+                "radar.bag camera.bag",
+                "drive.mcap --camera camera_info.yaml",
+            ),
+        ),
         Command(
             "info",
             "cocalib.cli.info:Info",
             "Show what a recording contains: files, topics, types, rates, stamps, overlap, camera, warnings.",
+            (
+                "radar.bag camera.bag",
+                "drive.mcap --verify",
+            ),
         ),
         Command(
             "intrinsics",
             "cocalib.cli.intrinsics:Intrinsics",
             "Calibrate a camera's lens from pictures of a board, or convert a file with intrinsics.",
+            (
+                "drive.mcap --board 9x6 --square-mm 25 --out camera.yaml",
+                "camera.yaml --to mrcal --out camera.cameramodel",
+            ),
         ),
         Command(
             "propose",
             "cocalib.cli.propose:Propose",
             "Find where the reflector probably stands in the pictures, for a person or a script to confirm.",
+            (
+                "drive.mcap",
+                "drive.mcap --clicks clicks.json --out proposals.json",
+            ),
         ),
         Command(
             "solve",
             "cocalib.cli.solve:Solve",
             "Compute a calibration from a recording and its clicks, or from a file of pairs.",
+            (
+                "drive.mcap --clicks clicks.json --out calibration.json",
+                "--pairs pairs.csv --camera camera.yaml --out calibration.json",
+            ),
         ),
         Command(
             "export",
             "cocalib.cli.export:Export",
             "Write a calibration in the format of another tool; `--to list` lists the formats.",
+            (
+                "calibration.json --to tf2",
+                "calibration.json --into robot.urdf",
+            ),
         ),
         Command(
             "check",
             "cocalib.cli.check:Check",
             "Check calibration files for errors, or compare them.",
+            (
+                "calibration.json",
+                "calibration.json --against old.json",
+            ),
         ),
         Command(
             "evaluate",
             "cocalib.cli.evaluate:Evaluate",
             "Judge a calibration on a recording: residuals at clicks (AED, CDSD), radar returns in boxes (Acc).",
+            (
+                "calibration.json other.mcap",
+                "calibration.json other.mcap --boxes boxes.json",
+            ),
         ),
         Command(
             "compare",
             "cocalib.cli.compare:Compare",
             "Compare two calibrations; with a recording, say which is better there, and whether that is more than noise.",
+            (
+                "old.json new.json",
+                "old.json new.json other.mcap",
+            ),
         ),
         Command(
             "report",
             "cocalib.cli.report:Report",
             "Write a report on a calibration: one HTML file, and a PDF if wanted: how good, where, and how one knows.",
+            (
+                "calibration.json --out report.html",
+                "calibration.json radar.bag camera.bag --out report.html --pdf",
+            ),
         ),
         Command(
             "import",
             "cocalib.cli.import_file:Import",
             "Convert a calibration from any known format to cocalib/calibration-1 JSON.",
+            (
+                "old.yaml --camera camera.yaml --out calibration.json",
+                "robot.urdf --camera camera.yaml --out calibration.json",
+            ),
         ),
         Command(
             "video",
             "cocalib.cli.video:Video",
             "Write the camera's frames to a video, each at its recorded time; recorded JPEG is not re-encoded.",
+            (
+                "drive.mcap --out camera.mp4",
+                "drive.mcap --overlay --calibration cal.json --out overlay.mp4",
+            ),
         ),
         Command(
             "record-rrd",
             "cocalib.cli.record_rrd:RecordRrd",
             "Write a recording with its calibration to an .rrd file for the Rerun viewer.",
+            ("drive.mcap --calibration calibration.json --out drive.rrd",),
         ),
         Command(
             "rerun",
             "cocalib.cli.rerun:Rerun",
             "Show a recording with its calibration in the Rerun viewer.",
+            ("drive.mcap --calibration calibration.json",),
         ),
         Command(
             "batch",
             "cocalib.cli.batch:Batch",
             "Calibrate many sessions: solve, evaluate, report and export each; what is done already is not done again.",
+            (
+                "fleet.toml --init recordings/",
+                "fleet.toml --out out --workers 8",
+            ),
         ),
         Command(
             "session",
             "cocalib.cli.session:Session",
             "List the sessions of recordings, repair a damaged one, or export its clicks.",
+            (
+                "list",
+                "repair drive.cocalib-session --yes",
+            ),
         ),
         Command(
             "fleet",
             "cocalib.cli.fleet:Fleet",
             "Tell how a fleet is calibrated, from the results of a batch: status, history, comparisons, summary page.",
+            (
+                "status out",
+                "history V017 out",
+            ),
         ),
         Command(
             "simulate",
             "cocalib.cli.simulate:Simulate",
             "Simulate a recording: radar, camera, and the ground truth (truth.json).",
+            (
+                "--out somewhere",
+                "--out somewhere --preset unkind --set placements=12",
+            ),
         ),
     )
 }

@@ -35,7 +35,7 @@ class Export:
     calibration: Annotated[tuple[Path, ...], tyro.conf.Positional, called("CALIBRATION.json")] = ()
     """A calibration written by cocalib (cocalib/calibration-1 JSON)."""
     to: Annotated[str, tyro.conf.arg(metavar="FORMAT")] = "list"
-    """Output format: tf2, urdf, ...; "list" lists them, "all" writes every one that can hold the calibration into a folder."""
+    """Output format, such as tf2; "list" lists them, "all" writes every one that can hold the calibration into a folder."""
     out: File = None
     """Output file or folder; without it, text formats go to stdout. pack: NAME.zip, or a folder for its files."""
     parent_from_radar: Annotated[

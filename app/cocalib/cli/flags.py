@@ -8,6 +8,9 @@ import tyro
 
 from cocalib.cli.exit_codes import Required
 
+MORE = "more"
+"""Marks a flag, or a group of flags, that `--help all` shows, and `--help` does not."""
+
 
 def called(metavar: str | None = None) -> object:
     """Name a value in the help, and omit its default: None or False would say nothing."""
@@ -24,4 +27,5 @@ File: TypeAlias = Annotated[Path | None, called("FILE")]
 NewFile: TypeAlias = Annotated[Path, tyro.conf.arg(metavar="FILE")]
 Folder: TypeAlias = Annotated[Path | None, called("FOLDER")]
 Switch: TypeAlias = Annotated[bool, called()]
+MoreSwitch: TypeAlias = Annotated[bool, called(), MORE]
 Require: TypeAlias = Annotated[Required | None, called("{good,usable}")]

@@ -13,7 +13,7 @@ from calib_core.errors import InputError
 from calib_core.input_files import name_text
 from calib_core.options import IntrinsicsOptions
 from calib_core.recordings import RecordingOptions
-from cocalib.cli.flags import File, Folder, Switch, called, same
+from cocalib.cli.flags import MORE, File, Folder, Switch, called, same
 from cocalib.cli.output import explain_unsolvable, write_whole
 from cocalib.platform.terminal import print_exactly
 
@@ -97,7 +97,7 @@ class Intrinsics:
     """Print everything as JSON (cocalib/intrinsics-1)."""
     verbose: Switch = False
     """List every view and every picture that was left out."""
-    options: Annotated[IntrinsicsOptions, tyro.conf.arg(name=""), tyro.conf.FlagConversionOff] = field(
+    options: Annotated[IntrinsicsOptions, tyro.conf.arg(name=""), tyro.conf.FlagConversionOff, MORE] = field(
         default_factory=IntrinsicsOptions
     )
 

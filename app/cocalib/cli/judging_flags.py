@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 import tyro
 
 from calib_core.errors import InputError, NoAnswerError
-from cocalib.cli.flags import File, called
+from cocalib.cli.flags import MORE, File, called
 from cocalib.cli.output import progress_bar, told_clicks_at_frames
 from cocalib.cli.recording_flags import Recorded, RecordedFlags, TopicFlags
 from cocalib.cli.tree_flags import FrameFlags, Frames
@@ -34,13 +34,13 @@ class EvidenceFlags:
     """With --boxes: the true origin of each return (cocalib/labels-1 JSON of a simulation), which then decides."""
     classes: Annotated[str | None, called("NAME,...")] = None
     """Count only targets whose boxes are of these classes, such as person,car."""
-    class_map: Annotated[tuple[str, ...], called("FROM=TO"), tyro.conf.UseAppendAction] = ()
+    class_map: Annotated[tuple[str, ...], called("FROM=TO"), tyro.conf.UseAppendAction, MORE] = ()
     """Rename a class of the boxes, such as pedestrian=person; may be given several times."""
-    max_time_gap_s: Annotated[float | None, called("SECONDS")] = None
+    max_time_gap_s: Annotated[float | None, called("SECONDS"), MORE] = None
     """Longest time between an annotated frame and its scan; by default half the period of the scans."""
-    min_speed_mps: Annotated[float, tyro.conf.arg(metavar="SPEED")] = 0.3
+    min_speed_mps: Annotated[float, tyro.conf.arg(metavar="SPEED"), MORE] = 0.3
     """Least Doppler speed over ground of a moving target's return [m/s]."""
-    sensors: Literal["auto", "still", "moving"] = "auto"
+    sensors: Annotated[Literal["auto", "still", "moving"], MORE] = "auto"
     """Whether the sensors stood still or moved; auto finds out from the returns' Doppler speeds."""
 
     def options(self) -> "EvidenceOptions":

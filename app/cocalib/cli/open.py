@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from calib_core.errors import InputError
-from cocalib.cli.flags import File, Folder, Switch
+from calib_core.options import CalibrationOptions
+from cocalib.cli.flags import MORE, File, Folder, Switch
 from cocalib.cli.recording_flags import CameraFlags, GivenCamera, OptionFlags, Options, Recordings, TopicFlags, Topics
 from cocalib.cli.serving_flags import ServingFlags
 from cocalib.platform.files import read_text
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 @dataclass(frozen=True, slots=True)
 class Open:
     """Calibrate your own recording in the browser."""
+
+    NAMED = CalibrationOptions
 
     recording: Recordings
     """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several are read as one recording.
@@ -39,7 +42,7 @@ class Open:
     """Folder in which recordings can be chosen in the page; none by default, so that only recent ones can be chosen."""
     topics: Topics = field(default_factory=TopicFlags)
     options: Options = field(default_factory=OptionFlags)
-    serving: Annotated[ServingFlags, tyro.conf.arg(name="")] = field(default_factory=ServingFlags)
+    serving: Annotated[ServingFlags, tyro.conf.arg(name=""), MORE] = field(default_factory=ServingFlags)
 
     def run(self) -> int:
         """Serve until Ctrl+C, SIGTERM or SIGHUP; return the exit code."""

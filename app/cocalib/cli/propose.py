@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from calib_core.errors import InputError
 from calib_core.input_files import name_text
-from calib_core.options import checked_options
+from calib_core.options import CalibrationOptions, checked_options
 from cocalib.cli.flags import File, Switch
 from cocalib.cli.output import explain_unsolvable, recorded_clicks, shown_progress, tell_choices, write_whole
 from cocalib.cli.recording_flags import (
@@ -34,6 +34,8 @@ class Propose:
 
     Nothing is accepted by that; the page shows the same proposals to confirm with a key.
     """
+
+    NAMED = CalibrationOptions
 
     clicks: File = None
     """Clicks that a person placed (cocalib/clicks-1 JSON): one shows what the reflector looks like."""

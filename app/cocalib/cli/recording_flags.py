@@ -8,9 +8,17 @@ from typing import TYPE_CHECKING, Annotated, TypeAlias
 import tyro
 
 from calib_core.errors import InputError
-from calib_core.options import CalibrationOptions, CameraPositionPrior, HowMeasured
+from calib_core.options import (
+    HOW_MEASURED,
+    CalibrationOptions,
+    CameraPositionPrior,
+    HowMeasured,
+    Method,
+    checked_options,
+)
 from calib_core.recordings import RecordingOptions
-from cocalib.cli.flags import File, Switch, called, same
+from cocalib.cli.flags import MORE, File, MoreSwitch, called, same
+from cocalib.cli.named_options import Settings, with_named
 
 if TYPE_CHECKING:
     from calib_core.interchange import CameraFile, VehicleNote
@@ -37,7 +45,7 @@ class TopicFlags(RecordingOptions):
     radar_start: Annotated[str | None, called("TIME[,SECONDS]")] = same(RecordingOptions, "radar_start")
 
 
-Topics: TypeAlias = Annotated[TopicFlags, tyro.conf.arg(name="")]
+Topics: TypeAlias = Annotated[TopicFlags, tyro.conf.arg(name=""), MORE]
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +79,7 @@ class CameraFlags:
 
     camera: File = None
     """Intrinsics to use if there are none, or instead of the recording's own: any format that `cocalib intrinsics` writes."""
-    rescale_camera: Switch = False
+    rescale_camera: MoreSwitch = False
     """With --camera: scale its intrinsics to the recorded pictures, if these are the calibrated ones resized."""
 
     def read(self) -> "CameraFile | None":
@@ -102,12 +110,6 @@ def checked_reflector_m(reflector_m: float) -> float:
     return reflector_m
 
 
-# The camera position has its own flags; in the options it would become a subcommand.
-_Options: TypeAlias = Annotated[
-    CalibrationOptions, tyro.conf.arg(name=""), tyro.conf.AvoidSubcommands, tyro.conf.FlagConversionOff
-]
-
-
 @dataclass(frozen=True, slots=True)
 class OptionFlags:
     """The options of a calibration, with a tape-measured camera position; no other extra measurement helps as much."""
@@ -116,27 +118,49 @@ class OptionFlags:
     """Measured position of the camera's lens in the radar frame: forward, left, up [m]."""
     camera_position_by: Annotated[HowMeasured | None, called("{housing,antenna,drawing}")] = None
     """How it was measured: from housing to housing (5 cm), antenna to lens (2 cm), or in a drawing (0.5 cm); else 3 cm."""
-    camera_position_sigma_m: float = CameraPositionPrior().sigma_m
-    """Its standard deviation per axis [m], where it is not said how it was measured."""
-    options: _Options = field(default_factory=CalibrationOptions)
+    camera_position_sigma_m: Annotated[float | None, called("FLOAT"), MORE] = None
+    """Instead of how it was measured: its standard deviation per axis [m]."""
+    method: Annotated[Method | None, called("{default,paper}")] = None
+    """The robust estimator, or the paper's Algorithm 1 as printed."""
+    options: File = None
+    """Options by name in a TOML file, such as sigma_px = 3 below [noise]."""
+    set: Settings = ()
+    """An option by name, such as noise.sigma_px=3; may be repeated. `--help all` lists them."""
 
-    @classmethod
-    def of(cls, options: CalibrationOptions) -> "OptionFlags":
-        """Return the flags that give these options."""
-        position = options.solving.camera_position
-        if position is None:
-            return cls(options=options)
-        free = replace(options, solving=replace(options.solving, camera_position=None))
-        return cls(position.position_m, camera_position_sigma_m=position.sigma_m, options=free)
+    def all(self, base: CalibrationOptions | None = None) -> CalibrationOptions:
+        """Return all options of a calibration.
 
-    def all(self) -> CalibrationOptions:
-        """Return the options with the measured position, if there is one."""
-        if self.camera_position_m is None:
-            return self.options
-        prior = CameraPositionPrior(self.camera_position_m, self.camera_position_sigma_m)
-        if self.camera_position_by is not None:
-            prior = CameraPositionPrior.measured(self.camera_position_m, self.camera_position_by)
-        return replace(self.options, solving=replace(self.options.solving, camera_position=prior))
+        Args:
+            base: what is not typed; None takes the defaults.
+
+        Raises:
+            InputError: it is said in words and in figures how well the position is known, or of no position.
+            OptionError: an option by name is unknown or out of range.
+        """
+        options = with_named(base or CalibrationOptions(), self.set, self.options)
+        if self.method is not None:
+            options = replace(options, method=self.method)
+        position = self._position(options.solving.camera_position)
+        return checked_options(replace(options, solving=replace(options.solving, camera_position=position)))
+
+    def _position(self, known: CameraPositionPrior | None) -> CameraPositionPrior | None:
+        """Return the camera's position as typed, else as it was known."""
+        how, sigma_m = self.camera_position_by, self.camera_position_sigma_m
+        if how is not None and sigma_m is not None:
+            raise InputError(
+                f"--camera-position-by {how} stands for a standard deviation of {HOW_MEASURED[how][1]:g} m, and "
+                f"--camera-position-sigma-m states {sigma_m:g} m; give one of them"
+            )
+        if self.camera_position_m is not None:
+            known = CameraPositionPrior(self.camera_position_m)
+        stated_m = sigma_m if how is None else HOW_MEASURED[how][1]
+        if stated_m is None:
+            return known
+        if known is None:
+            raise InputError(
+                "how well the camera's position is known is said, but not where it is: --camera-position-m"
+            )
+        return replace(known, sigma_m=stated_m)
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,6 +194,6 @@ class VehicleFlags:
 
 
 # Without a prefix, but in a group of their own in the help.
-Vehicle: TypeAlias = Annotated[VehicleFlags, tyro.conf.OmitArgPrefixes]
+Vehicle: TypeAlias = Annotated[VehicleFlags, tyro.conf.OmitArgPrefixes, MORE]
 GivenCamera: TypeAlias = Annotated[CameraFlags, tyro.conf.arg(name="")]
 Options: TypeAlias = Annotated[OptionFlags, tyro.conf.arg(name="")]

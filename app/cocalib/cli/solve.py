@@ -4,9 +4,7 @@ import dataclasses
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Self
-
-import tyro
+from typing import TYPE_CHECKING, Annotated
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
@@ -15,7 +13,7 @@ from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
 from calib_core.results.verdict import verdict_on
 from cocalib.cli.exit_codes import exit_code
-from cocalib.cli.flags import File, Require, Switch
+from cocalib.cli.flags import MORE, File, MoreSwitch, Require, Switch
 from cocalib.cli.output import explain_unsolvable, recorded_clicks, shown_progress, tell_choices, write_whole
 from cocalib.cli.recording_flags import (
     CameraFlags,
@@ -49,13 +47,15 @@ class Solve:
     The same clicks give the same file as the page's download, byte for byte.
     """
 
+    NAMED = CalibrationOptions
+
     clicks: File = None
     """Clicks in this recording (cocalib/clicks-1 JSON)."""
     auto: Switch = False
     """Click without a person where pictures and radar agree; with --clicks, only placements without a click."""
     clicks_out: File = None
     """With --auto: write the clicks to this file (cocalib/clicks-1 JSON), to look at on the page."""
-    reflector_m: float = _REFLECTOR_M
+    reflector_m: Annotated[float, MORE] = _REFLECTOR_M
     """With --auto: width of the reflector as the camera sees it [m]."""
     pairs: File = None
     """Instead of a recording: radar positions and pixels (cocalib/pairs-1 JSON, or with --camera a CSV of x, y, z, u, v), or a
@@ -63,26 +63,13 @@ class Solve:
     camera: GivenCamera = field(default_factory=CameraFlags)
     out: File = None
     """Output file (cocalib/calibration-1 JSON); stdout if omitted."""
-    refine_intrinsics: Switch = False
+    refine_intrinsics: MoreSwitch = False
     """Estimate focal length, principal point and k1 with the pose; their covariance or the refining options say how sure."""
     require: Require = None
     """Exit code 3 for a verdict below this."""
     vehicle: Vehicle = field(default_factory=VehicleFlags)
     recorded: Recorded = field(default_factory=RecordedFlags)
     options: Options = field(default_factory=OptionFlags)
-    given: Annotated[Any, tyro.conf.Fixed, tyro.conf.Suppress] = None
-    """The file of pairs (GivenPairs), once it has been read: a pipe can be read only once."""
-
-    def file_defaults(self) -> Self | None:
-        """Take the options of a calibration that is to be solved again; typed options replace them."""
-        if self.pairs is None or self.recorded.recording or self.clicks:
-            return None
-        from cocalib.solving.solving import GivenPairs
-
-        given = GivenPairs.read(read_text(self.pairs), str(self.pairs), self.camera.read())
-        if given.file is None:
-            return type(self)(given=given)
-        return type(self)(options=OptionFlags.of(given.file.calibration.options), given=given)
 
     def run(self) -> int:
         """Solve, write the calibration, print its summary; return the exit code."""
@@ -104,9 +91,13 @@ class Solve:
             )
         return self._solve_recording(vehicle)
 
-    def _all_options(self) -> CalibrationOptions:
-        """Return the options with what has a flag of its own."""
-        options = self.options.all()
+    def _all_options(self, base: CalibrationOptions | None = None) -> CalibrationOptions:
+        """Return the options with what has a flag of its own.
+
+        Args:
+            base: what is not typed; None takes the defaults.
+        """
+        options = self.options.all(base)
         if not self.refine_intrinsics:
             return options
         return dataclasses.replace(options, refining=dataclasses.replace(options.refining, intrinsics=True))
@@ -193,8 +184,9 @@ class Solve:
     def _solve_pairs(self, path: Path, vehicle: "VehicleNote") -> int:
         from cocalib.solving.solving import GivenPairs, calibration_text_of_pairs, solve_pairs
 
-        given = GivenPairs.read(read_text(path), str(path), self.camera.read()) if self.given is None else self.given
-        outcome = solve_pairs(given, self._all_options())
+        given = GivenPairs.read(read_text(path), str(path), self.camera.read())
+        again = None if given.file is None else given.file.calibration.options
+        outcome = solve_pairs(given, self._all_options(again))
         if isinstance(outcome, Unsolvable):
             return explain_unsolvable(outcome)
         return self._deliver(outcome, calibration_text_of_pairs(outcome, given, vehicle))

@@ -12,7 +12,7 @@ import tyro
 
 from calib_core.errors import InputError
 from calib_core.input_files import name_text
-from cocalib.cli.flags import File, Switch, called
+from cocalib.cli.flags import MORE, File, Switch, called
 from cocalib.cli.output import write_whole
 from cocalib.platform.terminal import print_exactly
 
@@ -88,7 +88,7 @@ class FrameFlags:
         return dataclasses.replace(file, frames=frames, made_from_sha256=calibration_sha256(file))
 
 
-Frames: TypeAlias = Annotated[FrameFlags, tyro.conf.arg(name="")]
+Frames: TypeAlias = Annotated[FrameFlags, tyro.conf.arg(name=""), MORE]
 
 
 @dataclass(frozen=True, slots=True)

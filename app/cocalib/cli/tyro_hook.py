@@ -124,7 +124,6 @@ def parse(
     *,
     program: str,
     refuse: Callable[[Fault], None],
-    default: Parsed | None = None,
 ) -> Parsed:
     """Parse the arguments of one command.
 
@@ -133,7 +132,6 @@ def parse(
         arguments: the command-line arguments after the command.
         program: the program and command names, as shown in the help.
         refuse: called with the fault if the arguments are invalid; raises. If it returns, tyro prints its message and exits.
-        default: the value of what is not typed; None takes the dataclass's own defaults.
 
     Raises:
         SystemExit: the help was requested and printed, or tyro printed an error.
@@ -141,10 +139,7 @@ def parse(
 
     def read() -> Parsed:
         config = (tyro.conf.OmitSubcommandPrefixes, tyro.conf.FlagCreatePairsOff)
-        args = list(arguments)
-        if default is None:
-            return tyro.cli(kind, prog=program, args=args, config=config, registry=_VALUES)
-        return tyro.cli(kind, prog=program, args=args, config=config, registry=_VALUES, default=default)
+        return tyro.cli(kind, prog=program, args=list(arguments), config=config, registry=_VALUES)
 
     def on_event(event: Any) -> None:
         if (fault := _fault(event)) is not None:
@@ -171,7 +166,7 @@ def missing_parts() -> tuple[str, ...]:
 
 
 def flags_of(kind: type[Any], prefix: str = "") -> Iterator[str]:
-    """Yield the options of a command, such as `--out` and `--noise.sigma-px`, from the fields of its dataclass."""
+    """Yield the options of a command, such as `--out`, from the fields of its dataclass."""
     hints = typing.get_type_hints(kind, include_extras=True)
     for field in dataclasses.fields(kind):
         annotated = typing.get_origin(hints[field.name]) is typing.Annotated
@@ -199,7 +194,9 @@ def _fault(event: Any) -> Fault | None:
         case "BadValue":
             return MissingValue(_argument(event.argument))
         case "InvalidChoice":
-            return WrongChoice(_argument(event.argument), event.value, tuple(event.choices))
+            given = [choice for choice in event.choices if choice != "None"]  # unset is nothing to type
+            choices = event.choices if len(given) == len(event.choices) else sorted(given)
+            return WrongChoice(_argument(event.argument), event.value, tuple(choices))
         case "InstantiationFailure" if event.argument is not None:
             typed = re.search(r"'([^']*)'$", event.message)
             return BadValue(_argument(event.argument), typed[1] if typed else None)

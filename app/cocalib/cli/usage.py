@@ -1,11 +1,13 @@
 """Parse a command's arguments; report wrong usage in one line that suggests a correction."""
 
+import sys
 from collections.abc import Sequence
 from difflib import get_close_matches
 from typing import NoReturn
 
 from calib_core.errors import InputError
-from cocalib.cli.commands import PROGRAM, Command, HasFileDefaults, Runnable
+from cocalib.cli.commands import PROGRAM, Command, Runnable
+from cocalib.cli.named_options import flags_to_settings
 from cocalib.cli.tyro_hook import (
     Argument,
     BadValue,
@@ -47,10 +49,13 @@ def read_command(command: Command, arguments: Sequence[str]) -> Runnable:
     def refuse(fault: Fault) -> NoReturn:
         raise InputError(f"{_reason(fault, kind)}; see {program} --help")
 
+    named = getattr(kind, "NAMED", None)
+    if named is not None:
+        arguments, settings = flags_to_settings(arguments, named, tuple(flags_of(kind)))
+        if settings:
+            print(f"{PROGRAM}: options are set by name now: {' '.join(settings)}", file=sys.stderr)
     with with_colours():  # of the help
-        parsed = parse(kind, arguments, program=program, refuse=refuse)
-        default = parsed.file_defaults() if isinstance(parsed, HasFileDefaults) else None
-        return parsed if default is None else parse(kind, arguments, program=program, refuse=refuse, default=default)
+        return parse(kind, arguments, program=program, refuse=refuse)
 
 
 def _reason(fault: Fault, kind: type[Runnable]) -> str:

@@ -1,0 +1,141 @@
+"""Options by name, of calibrations and of simulations: `--set noise.sigma_px=3`, and `--options FILE.toml`.
+
+A name is its path in the dataclass of options, as in the `options` of calibration.json.
+"""
+
+import re
+import tomllib
+import typing
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields, is_dataclass, replace
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Annotated, Any, TypeAlias, TypeVar
+
+import msgspec
+import tyro
+
+from calib_core.errors import InputError, OptionError
+from cocalib.platform.files import read_text
+
+Settings: TypeAlias = Annotated[
+    tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE", help_behavior_hint=""), tyro.conf.UseAppendAction
+]
+Named = TypeVar("Named")
+
+_UNSET = "none"
+_FLAG = re.compile(r"--([a-z][\w-]*(?:\.[a-z][\w-]*)*)(?:=(.*))?", re.DOTALL)
+
+
+def with_named(options: Named, settings: Sequence[str], file: Path | None = None) -> Named:
+    """Return options with some of them changed, all at once: by a TOML file, then by texts.
+
+    Args:
+        options: a dataclass, whose fields may be dataclasses.
+        settings: such as "noise.sigma_px=3".
+        file: with tables as in calibration.json: `[noise]`, `sigma_px = 3`.
+
+    Raises:
+        InputError: a text is no NAME=VALUE, or the file is not TOML.
+        OptionError: a name is unknown (the nearest one is suggested), or a value has the wrong type.
+    """
+    tree: dict[str, Any] = {}
+    if file is not None:
+        try:
+            tree = tomllib.loads(read_text(file))
+        except tomllib.TOMLDecodeError as error:
+            raise InputError(f"{file}: not TOML: {str(error)[:1].lower()}{str(error)[1:]}") from None
+    for text in settings:
+        name, sign, value = text.partition("=")
+        if not sign:
+            raise InputError(f"--set {text}: give NAME=VALUE, such as --set {next(names_of(type(options)))}=...")
+        _put(tree, name.strip().replace("-", "_").split("."), value.strip())
+    return _changed(options, tree, "", tuple(names_of(type(options)))) if tree else options
+
+
+def names_of(kind: type[Any], prefix: str = "") -> Iterator[str]:
+    """Yield the names of all options in a dataclass, such as "noise.sigma_px"."""
+    hints = typing.get_type_hints(kind)
+    for field in fields(kind):
+        if is_dataclass(hints[field.name]):
+            yield from names_of(hints[field.name], f"{prefix}{field.name}.")
+        else:
+            yield f"{prefix}{field.name}"
+
+
+def flags_to_settings(arguments: Sequence[str], kind: type[Any], flags: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Replace flags that were options of their own in earlier versions, by `--set`: with a group, as in --GROUP.NAME 3.
+
+    Args:
+        arguments: as typed.
+        kind: the dataclass of options.
+        flags: of the command today.
+
+    Returns:
+        The arguments to parse, and the replacements.
+    """
+    known = {f"--{name.replace('_', '-')}": name for name in names_of(kind)}
+    taken, told = [], []
+    left = list(arguments)
+    while left:
+        token = left.pop(0)
+        match = _FLAG.fullmatch(token)
+        flag = "" if match is None else f"--{match[1]}".replace("_", "-")
+        if match is None or flag not in known or flag in flags or (match[2] is None and not left):
+            taken.append(token)
+            continue
+        count = len(typing.get_args(_tuple_of(kind, known[flag]))) or 1
+        value = ",".join(left[:count]) if match[2] is None else match[2]
+        del left[: count if match[2] is None else 0]
+        taken += ["--set", f"{known[flag]}={value}"]
+        told.append(f"--set {known[flag]}={value}")
+    return taken, told
+
+
+def _tuple_of(kind: type[Any], name: str) -> Any:
+    """Return the type of an option if it is a tuple, else None."""
+    for part in name.split("."):
+        kind = typing.get_type_hints(kind)[part]
+    return kind if typing.get_origin(kind) is tuple else None
+
+
+def _put(tree: dict[str, Any], path: Sequence[str], value: str) -> None:
+    for part in path[:-1]:
+        inner = tree.setdefault(part, {})
+        tree = inner if isinstance(inner, dict) else {}
+    tree[path[-1]] = value
+
+
+def _changed(options: Named, tree: Mapping[str, Any], prefix: str, known: Sequence[str]) -> Named:
+    hints = typing.get_type_hints(type(options))
+    changed: dict[str, Any] = {}
+    for name, value in tree.items():
+        path = f"{prefix}{name}"
+        present = getattr(options, name, None) if name in hints else None
+        if name not in hints or (is_dataclass(hints[name]) and not isinstance(value, Mapping)):
+            raise _unknown(path, known)
+        if present is not None and is_dataclass(present) and isinstance(value, Mapping):
+            changed[name] = _changed(present, value, f"{path}.", known)
+            continue
+        typed = isinstance(value, str)
+        if typed and typing.get_origin(hints[name]) is tuple:
+            value = value.split(",")
+        elif typed and value.lower() == _UNSET and type(None) in typing.get_args(hints[name]):
+            value = None
+        try:
+            changed[name] = msgspec.convert(value, hints[name], strict=not typed)
+        except msgspec.ValidationError as error:
+            raise OptionError(f"option {path}: {str(error)[:1].lower()}{str(error)[1:]}") from None
+    return replace(options, **changed)  # type: ignore[type-var]
+
+
+def _unknown(path: str, known: Sequence[str]) -> OptionError:
+    by_end = {name.rpartition(".")[2]: name for name in known}
+    near = get_close_matches(path, known, n=1) or [
+        by_end[end] for end in get_close_matches(path.rpartition(".")[2], by_end, n=1)
+    ]
+    groups = dict.fromkeys(name.partition(".")[0] for name in known)
+    return OptionError(
+        f"unknown option '{path[:80]}'; "
+        + (f"did you mean {near[0]}?" if near else f"known groups: {', '.join(groups)}")
+    )
