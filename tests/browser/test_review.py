@@ -1,15 +1,16 @@
 """The review on the page Check: linked plots, contours of the uncertainty, two solutions compared."""
 
-import subprocess
-import sys
 from collections.abc import Callable
+from contextlib import redirect_stdout
 from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from calib_core.measurements import ReflectorClick, time_from_parts
+from cocalib.cli import run
 from cocalib.session import ClickExcluded, ClicksImported
 from cocalib.web.port.server import RunningServer
 from cocalib.workspace import Workspace
@@ -76,10 +77,10 @@ def figures(page: Driver) -> list[str]:
 
 def printed(calibration: Path, against: Path) -> list[str]:
     """Return the figures that `cocalib check` prints."""
-    command = [sys.executable, "-m", "cocalib", "check", str(calibration), "--against", str(against)]
-    lines = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60).stdout.splitlines()
-    told = [line.strip().removeprefix("compared with the other: ") for line in lines]
-    return [line for line in told if line.startswith(("rotation:", "camera position:", "at ", "overall:"))]
+    with redirect_stdout(StringIO()) as out:
+        run(["check", str(calibration), "--against", str(against)])
+    told = [line.strip().removeprefix("compared with the other: ") for line in out.getvalue().splitlines()]
+    return [line for line in told if line.startswith(("rotation:", "camera position:", "at ", "overall:", "change:"))]
 
 
 def test_a_dot_is_the_same_pair_in_every_plot_and_leads_to_it_and_contours_are_labelled(
