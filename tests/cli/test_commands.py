@@ -299,23 +299,18 @@ def test_export_poses_the_radar_in_the_kit(cocalib: Cocalib, calibration: Path, 
     assert "qw last" in wrong.err
 
 
-def test_a_bare_matrix_that_looks_wrong_has_its_own_exit_code_until_pairs_prove_it(
+def test_a_bare_matrix_is_checked_as_import_reads_it_and_proven_by_pairs(
     cocalib: Cocalib, calibration: Path, tmp_path: Path
 ) -> None:
     matrix = np.eye(4)
     matrix[:3, :3] = json.loads(calibration.read_text())["camera_from_radar"]["rotation"]
-    np.savetxt(tmp_path / "inverse.txt", np.linalg.inv(matrix))
-    np.savetxt(tmp_path / "right.txt", matrix)
-
-    doubtful = cocalib("check", tmp_path / "inverse.txt")
-    assert doubtful.code == 3
-    assert "DOUBTFUL" in doubtful.out
-    unproven = cocalib("check", tmp_path / "right.txt")
-    assert unproven.code == 3
-    assert "not proven" in unproven.out
-    proven = cocalib("check", tmp_path / "inverse.txt", "--pairs", calibration)
-    assert proven.code == 1
-    assert "the direction is swapped" in proven.out
+    for name, given in (("camera_from_radar", matrix), ("radar_from_camera", np.linalg.inv(matrix))):
+        np.savetxt(tmp_path / "bare.txt", given)
+        unproven = cocalib("check", tmp_path / "bare.txt")
+        assert unproven.code == 3
+        assert f"({name},optical,m)" in unproven.out
+        assert "not proven" in unproven.out
+        assert cocalib("check", tmp_path / "bare.txt", "--pairs", calibration).code == 0
 
 
 def test_video_writes_the_camera_and_says_when_it_begins(
