@@ -47,7 +47,7 @@ class HeldOut:
     Attributes:
         folds: number of groups; each placement is one group when one placement is left out at a time.
         distances_px: one per pair, in the pairs' order; NaN where the rest cannot be solved.
-        aed_px: their mean.
+        aed_px: their mean; of one placement at a time that over the placements that agree, as a solve of these clicks states it.
     """
 
     folds: int

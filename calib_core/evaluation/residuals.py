@@ -13,7 +13,7 @@ import numpy as np
 
 from calib_core.arrays import Flags, Indices, Values, frozen_array
 from calib_core.association.placement_groups import linked_clicks
-from calib_core.calibration import preview_pairs
+from calib_core.calibration import calibrate_pairs, preview_pairs
 from calib_core.camera import Camera
 from calib_core.estimation.gnc import associate
 from calib_core.estimation.measurement_model import pair_measurements
@@ -114,7 +114,9 @@ def residual_figures(
         pixels_px=pixels_px,
         projected_px=projected_px,
         inliers=inliers,
-        metrics=metrics_of(seen_px, held_out_distances_px=_finite(left_out[0])),
+        metrics=replace(
+            metrics_of(seen_px), held_out_aed_px=float("nan") if left_out[0] is None else left_out[0].aed_px
+        ),
         median_px=float(np.median(seen_px)) if len(seen_px) else float("nan"),
         inlier_share=float(inliers.mean()) if len(inliers) else float("nan"),
         by_range=spreads(polar[:, 0], distances_px),
@@ -152,21 +154,23 @@ def _explained(pairs: Sequence[Pair], calibration: Calibration) -> np.ndarray:
 def _both_held_out(
     found: AssociatedPairs, calibration: Calibration, progress: Callable[[int, int], None] | None
 ) -> tuple[HeldOut | None, HeldOut | None]:
-    """Leave out one placement at a time, and a fifth of them at a time."""
+    """Leave out one placement at a time, as a solve does, and a fifth of them at a time."""
     count = int(found.placements.max(initial=-1)) + 1
     if count <= MIN_PAIRS:
         return None, None
     folds = min(_FOLDS, count)
-    total = count + (folds if count > folds else 0)
-    one = held_out(found, calibration.camera, calibration.options, found.placements, _told(progress, 0, total))
-    if count <= folds:
-        return one, one
-    groups = found.placements % folds
-    return one, held_out(found, calibration.camera, calibration.options, groups, _told(progress, count, total))
+    one = _left_out(found, calibration, count)
+    told = None if progress is None else lambda done: progress(1 + done, 1 + folds)
+    return one, held_out(found, calibration.camera, calibration.options, found.placements % folds, told)
 
 
-def _told(progress: Callable[[int, int], None] | None, before: int, total: int) -> Callable[[int], None] | None:
-    return None if progress is None else lambda done: progress(before + done, total)
+def _left_out(found: AssociatedPairs, calibration: Calibration, count: int) -> HeldOut:
+    """Return what a solve of these clicks says of leaving out each placement: its held-out AED is over those that agree."""
+    own = calibrate_pairs(found.every, calibration.camera, replace(calibration.options, method="default"))
+    if not isinstance(own, Calibration):
+        return HeldOut(count, np.full(len(found.pairs), np.nan), float("nan"))
+    held_out_px = {pair.id: pair.held_out_px for pair in own.pairs}
+    return HeldOut(count, np.array([held_out_px[pair.id] for pair in found.pairs]), own.metrics.held_out_aed_px)
 
 
 def held_out(
@@ -203,10 +207,6 @@ def _distance_px(pair: Pair, calibration: Calibration) -> float:
     positions = np.array([one.position_radar_m for one in pair.candidates])
     away_px = np.linalg.norm(calibration.reproject(positions) - pair.pixel_px, axis=1)
     return float(away_px[0] if len(away_px) == 1 or np.isnan(away_px).all() else np.nanmin(away_px))
-
-
-def _finite(held: HeldOut | None) -> Values | None:
-    return None if held is None else held.distances_px[np.isfinite(held.distances_px)]
 
 
 _QUANTILE = 12.591587243743977  # the 95 % quantile of chi2 with 6 degrees of freedom

@@ -43,12 +43,13 @@ def shown(solved: Calibration, recording: Recording, clicks: tuple[ReflectorClic
 def test_the_residuals_on_the_page_are_those_of_evaluate(
     recording: Recording, clicks: tuple[ReflectorClick, ...], solved: Calibration
 ) -> None:
-    judged = evaluate_recording(solved, recording, clicks=clicks, held_out=False).residuals
+    judged = evaluate_recording(solved, recording, clicks=clicks).residuals
     assert judged is not None
     page = figures_of(shown(solved, recording, clicks, None).metrics)
     assert page["aed"] == plain(judged.metrics.aed_px)
     assert page["cdsd"] == plain(judged.metrics.cdsd_px)
     assert page["rms"] == plain(judged.metrics.rms_px)
+    assert page["held_out_aed"] == plain(judged.metrics.held_out_aed_px)
     assert page["inliers"] == f"{judged.inliers.sum()} of {len(judged.ids)}"
     assert judged.metrics.aed_px == pytest.approx(solved.metrics.aed_px, rel=1e-12)
 
