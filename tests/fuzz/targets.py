@@ -337,7 +337,7 @@ TARGETS: tuple[Target, ...] = (
     _file_target("csv", ".csv", _fixed(*_CSV), b"time_ns", b"x_m", b"y_m", b"range_m", b"azimuth_deg", b",", b";", b"\t"),
     _file_target("json-lines", ".jsonl", _fixed(*_JSON_LINES), b'"points"', b'"x_m"', b"null", b"[[", b"1e999", b"NaN"),
     _folder_target("pcd", ".pcd", _pcd, b"FIELDS", b"DATA ascii\n", b"WIDTH", b"COUNT", b"rgb"),
-    _folder_target("bin", ".bin", _fixed(np.arange(14, dtype="<f4").tobytes(), bytes(28))),
+    _folder_target("bin", ".bin", _fixed(np.array([3, 4, 0, 1, 5, 9, 0.9, 0], "<f4").tobytes(), bytes(28))),
     _folder_target("jpeg", ".jpg", _fixed(_jpeg(), _jpeg(8, 8)), b"\xff\xd8", b"\xff\xe1", b"\xff\xd9", b"\xff\xc0"),
     Target("definition", _definition, _fixed(_DEFINITION + b"\0" + bytes(64), b"float64 x\nfloat64 y\n\0")),
     Target("calibration", lambda data, _: _swallow(lambda: read_any(data, "input")), _exported, (b"NaN", b"xyzw", b"1e308")),
