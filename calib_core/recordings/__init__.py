@@ -8,7 +8,6 @@ from calib_core.recordings.frame_transforms import FrameTransform, frame_transfo
 from calib_core.recordings.plain_files.folder_cameras import size_of_pictures_beside
 from calib_core.recordings.recording import (
     Recording,
-    about_losses,
     first_picture,
     inspect_recording,
     open_recording,
@@ -36,7 +35,6 @@ __all__ = [
     "Verification",
     "WrittenVideo",
     "about_assumptions",
-    "about_losses",
     "assumption_hint",
     "clock_lines",
     "describe",

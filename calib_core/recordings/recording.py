@@ -36,6 +36,7 @@ from calib_core.recordings.selection import Inventory, Need, RecordingOptions, U
 from calib_core.recordings.time.written_times import parse_zone
 from calib_core.recordings.topics import Topic, TopicSummary, join_topics, read_stamps
 from calib_core.results import InputFile
+from calib_core.results.confirmation import lost_returns
 
 _HASH_BYTES = 1 << 22
 _STAMP_BYTES = 12
@@ -188,7 +189,7 @@ class Recording:
     def _about_lost(self) -> Iterator[DataWarning]:
         found = self.losses()
         if found.lost:
-            yield about_losses(found, "the radar")
+            yield lost_returns(found.lost, found.read, "the radar")
 
     def losses(self, times: Sequence[TimeNs] | None = None, half_window_s: float = 0.0) -> Losses:
         """Count the radar's lost returns among the scans read so far.
@@ -372,16 +373,6 @@ class Recording:
             files.append(InputFile(name_text(source.path.name), source.size_bytes, digest.hexdigest()))
         self._fingerprint = tuple(files)
         return self._fingerprint
-
-
-def about_losses(found: Losses, where: str) -> DataWarning:
-    """Warn about lost returns."""
-    return DataWarning(
-        "lost-returns",
-        f"{found.lost} of {found.read} returns of {where} are lost ({100 * found.share:.2g} %): their positions are not "
-        "numbers, or their messages hold more returns than they state",
-        "look for the fault in the radar's driver or in the program that wrote the recording; the reflector may be among them",
-    )
 
 
 def _header_stamps(images: ImageStream, clock: str | None) -> TimesNs:

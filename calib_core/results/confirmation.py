@@ -1,4 +1,4 @@
-"""What a pose rests on beside its pairs: clicks that nobody confirmed, a damaged recording, an older version's fleet prior."""
+"""What a pose rests on beside its pairs: unconfirmed clicks, a damaged recording, lost returns, a fleet prior."""
 
 from calib_core.results import DataWarning, UnconfirmedClicks
 
@@ -38,6 +38,22 @@ def damaged_recording(lost: int, damage: DataWarning) -> DataWarning:
         "damaged-recording",
         f"{lost} {clicks} no radar data, and the recording is damaged: {damage.message}",
         "copy the recording again from its source",
+    )
+
+
+def lost_returns(lost: int, read: int, where: str) -> DataWarning:
+    """Warn that returns have no position although their messages do not mark them as invalid.
+
+    Args:
+        lost: how many.
+        read: of how many.
+        where: of what, such as "the radar around the clicks".
+    """
+    return DataWarning(
+        "lost-returns",
+        f"{lost} of {read} returns of {where} are lost ({100 * lost / read:.2g} %): their positions are not numbers, or their "
+        "messages hold more returns than they state",
+        "look for the fault in the radar's driver or in the program that wrote the recording; the reflector may be among them",
     )
 
 

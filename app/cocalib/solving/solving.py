@@ -31,9 +31,9 @@ from calib_core.interchange import (
 from calib_core.interchange import calibration_text as interchange_text
 from calib_core.measurements import Candidate, DataWarning, Pair, ReflectorClick, Unsolvable
 from calib_core.options import CalibrationOptions, checked_options
-from calib_core.recordings import Recording, about_assumptions, about_losses
+from calib_core.recordings import Recording, about_assumptions
 from calib_core.results import Calibration, InputFile, PairResult, UnconfirmedClicks
-from calib_core.results.confirmation import damaged_recording
+from calib_core.results.confirmation import damaged_recording, lost_returns
 from cocalib.platform.resources import version
 from cocalib.session import Outcome
 
@@ -130,9 +130,9 @@ def _about_lost(
         return ()
     near = recording.losses([click.image_time for click in clicks], half_window_s(options))
     if near.lost:
-        return (about_losses(near, "the radar around the clicks"),)
+        return (lost_returns(near.lost, near.read, "the radar around the clicks"),)
     everywhere = recording.losses()
-    return (about_losses(everywhere, "the radar"),) if everywhere.share > _MOST_LOST else ()
+    return (lost_returns(everywhere.lost, everywhere.read, "the radar"),) if everywhere.share > _MOST_LOST else ()
 
 
 def check_clicks(
