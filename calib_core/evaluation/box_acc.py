@@ -114,7 +114,13 @@ def judged_by_boxes(
         targets=counted.found_targets,
         matched_targets=counted.matched_targets,
         returns=BoxedReturns(
-            counted.frames, counted.points_radar_m, pixels_px, counted.boxes_px, inside, counted.targets, counted.labels
+            np.searchsorted(_told(counted), counted.frames),
+            counted.points_radar_m,
+            pixels_px,
+            counted.boxes_px,
+            inside,
+            counted.targets,
+            counted.labels,
         ),
     )
 
@@ -238,8 +244,14 @@ def _frames(counted: CountedReturns, inside: Flags) -> tuple[FrameFigure, ...]:
             boxes=int(counted.box_counts[i]),
             range_m=float(np.median(range_m[ends[i] : ends[i + 1]])) if returns[i] else float("nan"),
         )
-        for i in np.flatnonzero((returns > 0) | (counted.box_counts > 0)).tolist()
+        for i in _told(counted).tolist()
     )
+
+
+def _told(counted: CountedReturns) -> Indices:
+    """Return the frames that have returns or boxes; the others are left out of the figures."""
+    returns = np.bincount(counted.frames, minlength=len(counted.image_times))
+    return np.flatnonzero((returns > 0) | (counted.box_counts > 0))
 
 
 def _classes(counted: CountedReturns, inside: Flags) -> tuple[ClassFigure, ...]:

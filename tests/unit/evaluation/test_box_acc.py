@@ -37,7 +37,7 @@ def scan(time_s: float, points: list[tuple[float, float, float]]) -> RadarScan:
     nothing = np.full(len(points), np.nan)
     return RadarScan(
         TimeNs(int(time_s * NS_PER_S)),
-        np.array(points),
+        np.array(points).reshape(-1, 3),
         np.ones(len(points)),
         nothing,
         np.full((len(points), 3), np.nan),
@@ -84,6 +84,18 @@ def test_acc_is_the_mean_share_of_frames_and_zero_frames_stay():
     by_class = {one.label: one for one in figures.classes}
     assert by_class["person"].acc == pytest.approx((2 / 3 + 0 + 1) / 3)
     assert (by_class["car"].acc, by_class["car"].frames) == (1.0, 1)
+
+
+def test_returns_name_their_frames_also_after_a_frame_without_returns_and_boxes():
+    scans, boxes, labels = by_hand()
+    first = TimeNs(NS_PER_S // 2)
+    scans = RadarScans.from_scans([scan(0.5, []), *(scans.scan(number) for number in range(3))])
+    boxes = dataclasses.replace(boxes, frames=(FrameBoxes(first, ()), *boxes.frames))
+    labels = dataclasses.replace(labels, scans=(LabelledScan(first, ()), *labels.scans))
+    figures = box_figures(AHEAD, PINHOLE, scans, boxes, labels=labels)
+    assert figures.returns is not None
+    assert [frame.returns for frame in figures.frames] == [3, 1, 2]
+    assert np.bincount(figures.returns.frames).tolist() == [3, 1, 2]
 
 
 def test_only_the_targets_own_box_counts():
