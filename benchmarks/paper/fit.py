@@ -7,7 +7,7 @@ prediction. `python -m benchmarks.paper --fit` writes both to fit.json; the best
 """
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -80,16 +80,14 @@ def read_fit(path: Path = _FILE) -> Fit:
 
 
 def _gross(seed: int, settings: Settings) -> dict[tuple[float, ...], Figures]:
-    return dict(_gross_figures(seed, settings))
-
-
-def _gross_figures(seed: int, settings: Settings) -> Iterator[tuple[tuple[float, ...], Figures]]:
     other = session("d3", seed, settings).other_camera
     assert other is not None, "D3 has a second camera"
+    found: dict[tuple[float, ...], Figures] = {}
     for count, by_m in itertools.product(range(1, MOST_GROSS + 1), GROSS_M):
         outcome = with_gross_errors(other, replace(settings, gross_m=by_m), count, ppm_options(settings))
         if isinstance(outcome, Calibration):
-            yield (count, by_m), figures_of(outcome)
+            found[count, by_m] = figures_of(outcome)
+    return found
 
 
 def _place(settings: tuple[float, ...], seeds: Sequence[Mapping[str, Figures]]) -> Place:

@@ -23,9 +23,7 @@ PAPER: Mapping[str, tuple[float, float]] = {
 """AED and CDSD [px], in the order of the table."""
 CHOSEN_ROW = "PPM+DR+D3"
 """Its gross errors are an assumption that was chosen for it."""
-_NEAR = 0.25
-_WIDE = 2.0
-_VERY_WIDE = 10.0
+_NEAR, _WIDE, _VERY_WIDE = 0.25, 2.0, 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,14 +93,20 @@ def row_judgement(name: str, seeds: Sequence[Seed]) -> str:
 def verdict(name: str, sets: Sequence[Sequence[Seed]]) -> str:
     """Say of a row whether it is reproduced, for each set of seeds where they differ."""
     said = dict.fromkeys(row_judgement(name, seeds) for seeds in sets)
-    chosen = ", under an assumption chosen for it" if name == CHOSEN_ROW else ""
-    return f"{'; with the other seeds '.join(said)}{chosen}"
+    chosen = "under an assumption chosen for it: " if name == CHOSEN_ROW else ""
+    return f"{chosen}{'; with the other seeds '.join(said)}"
 
 
-def agreeing(first: Sequence[Seed], second: Sequence[Seed]) -> tuple[int, int]:
-    """Count the figures, of 18, of which two sets of seeds say the same: as a judgement, and as our range holding the paper's."""
-    pairs = [(a, b) for name in PAPER for a, b in zip(judged(name, first), judged(name, second), strict=True)]
-    return sum(a.judgement == b.judgement for a, b in pairs), sum(a.holds_paper == b.holds_paper for a, b in pairs)
+def differing(first: Sequence[Seed], second: Sequence[Seed]) -> list[str]:
+    """Name the figures, of 18, that two sets of seeds judge differently, with what the rule goes by."""
+    both = [(name, zip(judged(name, first), judged(name, second), strict=True)) for name in PAPER]
+    return [
+        f"{what} of {name}: {a.judgement} and {b.judgement} (ends of our range {a.high_px / a.low_px:.2f} and "
+        f"{b.high_px / b.low_px:.2f} times apart, median off by {100 * a.off:+.0f} and {100 * b.off:+.0f} %)"
+        for name, figures in both
+        for what, (a, b) in zip(("AED", "CDSD"), figures, strict=True)
+        if a.judgement != b.judgement
+    ]
 
 
 def _range(values: np.ndarray) -> tuple[float, float]:

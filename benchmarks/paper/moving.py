@@ -1,31 +1,27 @@
 """Acc of people, a robot car and cars, and what could make Acc of cars as low as the paper's."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.paper.rows import by_mounting, by_mounting_of_other, calibrated, with_gross_errors
+from benchmarks.paper.rows import by_mounting, calibrated, with_gross_errors
 from benchmarks.paper.settings import Settings, ppm_options, session, under
-from calib_core.arrays import TimesNs
-from calib_core.evaluation import BoxFigures
+from calib_core.evaluation import BoxFigures, CountedReturns, counted_returns, judged_by_boxes, moving_targets
 from calib_core.measurements import NS_PER_S, Box, Boxes, RadarScans, ReturnLabels, TimeNs
 from calib_core.results import Calibration
-from calib_core.synthetic import PRESETS, PresetName, SimulatedRecording, SimulationOptions, simulate
+from calib_core.synthetic import PRESETS, PresetName, SimulatedRecording, simulate
 from calib_core.synthetic.annotations import true_boxes, true_labels
-from cocalib.evaluation.evaluating import Evidence, evidence_in, judged
 
 MOVING: Mapping[PresetName, str] = {
     "people": "people walking on the rooftop",
     "robot": "a robot car in the aisle, camera on the other rig",
-    "cars-near": "cars, 5 to 20 m",
-    "cars-far": "cars, 20 to 60 m",
+    "cars-near": "cars, 5 to 20 m, imaging radar",
+    "cars-far": "cars, 20 to 60 m, imaging radar",
 }
 ACC_OF_PAPER: Mapping[str, str] = {"people": "89 %", "cars-near": "66 %, no range stated", "cars-far": "the same"}
-_SHRUNK = 0.75
-_LATE_S = 0.2
-_SIDE_SHARE = 0.2
-_SIDE_M = 1.5
+_SHRUNK, _LATE_S = 0.75, 0.2
+_SIDE_SHARE, _SIDE_M = 0.2, 1.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,47 +30,15 @@ class Acc:
 
     Attributes:
         ppm: of the paper's method, by the radar's own targets.
-        dropped: the same without frames of 0 %, as the paper's authors count.
+        dropped: the same without frames of 0 %, as the authors' published script counts.
         labelled: the same by the simulation's labels.
         pmm: of the mounting, by the radar's own targets.
-        turned: of the paper's method, turned by 10 deg.
     """
 
     ppm: float
     dropped: float
     labelled: float
     pmm: float
-    turned: float
-
-
-@dataclass(frozen=True, slots=True)
-class Assumption:
-    """One assumption about Acc of cars: what is changed, and Acc before and after."""
-
-    what: str
-    before: float
-    after: float
-
-
-@dataclass(frozen=True, slots=True)
-class _Radar:
-    """The radar of a simulated recording, as an evaluation reads it."""
-
-    scans: RadarScans
-
-    @property
-    def radar_times(self) -> TimesNs:
-        return self.scans.times_ns
-
-    def radar_windows(self) -> Iterator[RadarScans]:
-        yield self.scans
-
-    def radar_scans_around(self, times: Sequence[TimeNs], half_window_s: float, /) -> RadarScans:
-        half_ns = round(half_window_s * NS_PER_S)
-        near = np.zeros(len(self.scans), dtype=np.bool_)
-        for time in times:
-            near |= np.abs(self.scans.times_ns - int(time)) <= half_ns
-        return RadarScans.from_scans([self.scans.scan(int(i)) for i in np.flatnonzero(near)])
 
 
 def recording_of(preset: PresetName, seed: int, settings: Settings, **changed: object) -> SimulatedRecording:
@@ -82,7 +46,7 @@ def recording_of(preset: PresetName, seed: int, settings: Settings, **changed: o
     options = under(PRESETS[preset], seed, settings)
     if preset == "robot":
         options = replace(options, other_camera=PRESETS["paper-d3"].other_camera)
-    recording = simulate(_changed(options, changed))
+    recording = simulate(replace(options, **changed))  # type: ignore[arg-type]
     return recording.other_camera or recording
 
 
@@ -92,7 +56,7 @@ def calibrations_of(preset: PresetName, seed: int, settings: Settings) -> tuple[
         other = session("d3", seed, settings).other_camera
         assert other is not None, "D3 has a second camera"
         ppm = with_gross_errors(other, settings, settings.gross_pairs, ppm_options(settings))
-        return ppm.unwrap(), by_mounting_of_other(other)
+        return ppm.unwrap(), by_mounting(other, other_rig=True)
     first = session("d1", seed, settings)
     return calibrated(first, settings).unwrap(), by_mounting(first)
 
@@ -100,38 +64,35 @@ def calibrations_of(preset: PresetName, seed: int, settings: Settings) -> tuple[
 def judged_by_both(
     preset: PresetName, seed: int, settings: Settings, *, labelled: bool = False
 ) -> tuple[BoxFigures, BoxFigures]:
-    """Return the figures of PPM and PMM, by the radar's own targets or by labels."""
+    """Return the figures of PPM and PMM on true boxes, by the radar's own targets or by labels."""
     ppm, pmm = calibrations_of(preset, seed, settings)
     recording = recording_of(preset, seed, settings)
-    found = _evidence(recording, ppm, true_labels(recording) if labelled else None)
-    return _boxes(ppm, found), _boxes(pmm, found)
+    labels = true_labels(recording) if labelled else None
+    returns = _returns(ppm, _scans(recording), true_boxes(recording), labels)
+    return _judged(ppm, returns), _judged(pmm, returns)
 
 
 def acc_of(preset: PresetName, seed: int, settings: Settings) -> Acc:
-    """Judge PPM and PMM on what moves; the boxes are true ones."""
-    ppm, pmm = calibrations_of(preset, seed, settings)
-    recording = recording_of(preset, seed, settings)
-    found = _evidence(recording, ppm)
-    own, labelled = _boxes(ppm, found), _boxes(ppm, _evidence(recording, ppm, labels=true_labels(recording)))
-    figures = (own.acc, own.acc_without_zero_frames, labelled.acc, _boxes(pmm, found).acc, own.chance)
+    """Judge PPM and PMM on what moves."""
+    own, mounted = judged_by_both(preset, seed, settings)
+    labelled, _ = judged_by_both(preset, seed, settings, labelled=True)
+    figures = (own.acc, own.acc_without_zero_frames, labelled.acc, mounted.acc)
     return Acc(*(float("nan") if one is None else one for one in figures))
 
 
-def assumptions_of(seed: int, settings: Settings) -> list[Assumption]:
-    """Change one assumption at a time about cars at 20 to 60 m, by labels except where the labels are what changes."""
+def assumptions_of(seed: int, settings: Settings) -> dict[str, float]:
+    """Return Acc of cars at 20 to 60 m with one assumption changed, by labels except where the labels are what changes."""
     ppm, _ = calibrations_of("cars-far", seed, settings)
     recording = recording_of("cars-far", seed, settings)
     scans, boxes, labels = _scans(recording), true_boxes(recording), true_labels(recording)
 
     def acc(scans: RadarScans = scans, boxes: Boxes = boxes, labels: ReturnLabels | None = labels) -> float:
-        found = evidence_in(_Radar(scans), ppm.camera, boxes=boxes, labels=labels)
-        return _boxes(ppm, found).acc or 0.0
+        return _judged(ppm, _returns(ppm, scans, boxes, labels)).acc or 0.0
 
     def acc_at(preset: PresetName, **changed: object) -> float:
         other = recording_of(preset, seed, settings, **changed)
         return acc(_scans(other), true_boxes(other), true_labels(other))
 
-    base = acc()
     farther = {"traffic": replace(PRESETS["cars-far"].traffic, nearest_m=60.0, farthest_m=100.0)}
     changed: dict[str, Callable[[], float]] = {
         f"box size: {100 * _SHRUNK:.0f} % of the car's width and height, as of a tight detector": lambda: acc(
@@ -147,45 +108,31 @@ def assumptions_of(seed: int, settings: Settings) -> list[Assumption]:
         ),
         "labels: the radar's own targets instead": lambda: acc(labels=None),
     }
-    return [Assumption(what, base, measure()) for what, measure in changed.items()]
-
-
-def _changed(options: SimulationOptions, changed: Mapping[str, object]) -> SimulationOptions:
-    return replace(options, **changed)  # type: ignore[arg-type]
-
-
-def _evidence(recording: SimulatedRecording, calibration: Calibration, labels: ReturnLabels | None = None) -> Evidence:
-    return evidence_in(_Radar(_scans(recording)), calibration.camera, boxes=true_boxes(recording), labels=labels)
+    return {what: measure() for what, measure in changed.items()}
 
 
 def _scans(recording: SimulatedRecording) -> RadarScans:
     return RadarScans.from_scans(list(recording.scans()))
 
 
-def _boxes(calibration: Calibration, found: Evidence) -> BoxFigures:
-    boxes = judged(calibration, found).boxes
-    assert boxes is not None, "boxes were given"
-    return boxes
+def _returns(calibration: Calibration, scans: RadarScans, boxes: Boxes, labels: ReturnLabels | None) -> CountedReturns:
+    """Return what counts by the rule of `cocalib evaluate`; of the calibration only the lens enters."""
+    return counted_returns(calibration.camera, scans, boxes, moving_targets(scans) if labels is None else labels)
+
+
+def _judged(calibration: Calibration, returns: CountedReturns) -> BoxFigures:
+    return judged_by_boxes(calibration.camera_from_radar, calibration.camera, returns)
 
 
 def _shrunk(boxes: Boxes) -> Boxes:
-    return _with_boxes(boxes, _smaller)
+    frames = (replace(frame, boxes=tuple(map(_smaller, frame.boxes))) for frame in boxes)
+    return replace(boxes, frames=tuple(frames))
 
 
 def _smaller(box: Box) -> Box:
-    across, down = (0.5 * (1.0 - _SHRUNK) * size for size in (box.right_px - box.left_px, box.bottom_px - box.top_px))
-    return replace(
-        box,
-        left_px=box.left_px + across,
-        right_px=box.right_px - across,
-        top_px=box.top_px + down,
-        bottom_px=box.bottom_px - down,
-    )
-
-
-def _with_boxes(boxes: Boxes, change: Callable[[Box], Box]) -> Boxes:
-    frames = tuple(replace(frame, boxes=tuple(map(change, frame.boxes))) for frame in boxes)
-    return replace(boxes, frames=frames)
+    x, y = (0.5 * (1.0 - _SHRUNK) * size for size in (box.right_px - box.left_px, box.bottom_px - box.top_px))
+    left, right, top, bottom = box.left_px + x, box.right_px - x, box.top_px + y, box.bottom_px - y
+    return replace(box, left_px=left, right_px=right, top_px=top, bottom_px=bottom)
 
 
 def _late(boxes: Boxes) -> Boxes:

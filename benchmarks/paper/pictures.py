@@ -1,13 +1,15 @@
 """Figs. 2 to 6 as SVG: rendered frames with what is clicked and projected, and histograms of Acc; all simulated."""
 
 import base64
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.paper.moving import judged_by_both, recording_of
+from benchmarks.paper.judgement import CHOSEN_ROW
+from benchmarks.paper.moving import MOVING, judged_by_both, recording_of
+from benchmarks.paper.page import Measured
 from benchmarks.paper.rows import (
     by_checkerboard,
     by_mounting,
@@ -16,12 +18,14 @@ from benchmarks.paper.rows import (
     points_and_pixels,
     with_gross_errors,
 )
-from benchmarks.paper.settings import Dataset, Settings, options_of, ppm_options
-from calib_core.arrays import Points2
+from benchmarks.paper.settings import SEED_SETS, Dataset, Settings, options_of, ppm_options
+from calib_core.arrays import Flags, Indices, Points2
 from calib_core.evaluation import BoxFigures
+from calib_core.measurements import Box
 from calib_core.results import Calibration
-from calib_core.results.metrics import aed, distances
+from calib_core.results.metrics import aed, cdsd, distances
 from calib_core.synthetic import PresetName, SimulatedRecording, simulate, simulate_scans
+from calib_core.synthetic.annotations import true_boxes
 from calib_core.synthetic.recording import SimulatedPictures
 
 _STYLE = (
@@ -51,29 +55,46 @@ class Panel:
     view: tuple[float, float, float, float]
 
 
-def write_pictures(folder: Path, seed: int, settings: Settings) -> None:
-    """Write fig-2.svg to fig-6.svg of one seed.
-
-    Args:
-        folder: created if it does not exist.
-        seed: the first of the table.
-        settings: of the table.
-    """
+def write_pictures(folder: Path, measured: Measured, settings: Settings) -> None:
+    """Write fig-2.svg to fig-6.svg, each of the seed whose measured figures are nearest to the medians."""
     folder.mkdir(parents=True, exist_ok=True)
     clicked = "red: clicks, blue: projected radar positions"
     moving = "yellow: true boxes, blue: returns inside their own, orange: outside"
+    d1, d2 = _typical_of(measured, "PPM+D1", "PMM+D1"), _typical_of(measured, "PPM+D2", "CCM+D2")
+    d3 = _typical_of(measured, "PPM+D3", CHOSEN_ROW)
+    seeds = {preset: _nearest_to_medians(_accs(measured, preset)) for preset in MOVING}
     figures = {
-        "fig-2": (f"Fig. 2, simulated: D1 ({clicked})", _d1(seed, settings)),
-        "fig-3": (f"Fig. 3, simulated: D2 ({clicked})", _d2(seed, settings)),
-        "fig-4": (f"Fig. 4, simulated: D3, the aisle ({clicked})", _d3(seed, settings)),
-        "fig-5": (f"Fig. 5, simulated: (a) PPM, (b) PMM ({moving})", _real_world(seed, settings)),
-        "fig-6": (
-            "Fig. 6, simulated: share of frames by their Acc, frames of 0 % included",
-            _histograms(seed, settings),
-        ),
+        "fig-2": (f"Fig. 2, simulated: D1, seed {d1} ({clicked})", _d1(d1, settings)),
+        "fig-3": (f"Fig. 3, simulated: D2, seed {d2} ({clicked})", _d2(d2, settings)),
+        "fig-4": (f"Fig. 4, simulated: D3, the aisle, seed {d3} ({clicked})", _d3(d3, settings)),
+        "fig-5": (f"Fig. 5, simulated: (a) PPM, (b) PMM ({moving})", _real_world(seeds, settings)),
+        "fig-6": ("Fig. 6, simulated: frames by their Acc, frames of 0 % included", _histograms(seeds, settings)),
     }
     for name, (title, panels) in figures.items():
         (folder / f"{name}.svg").write_text(_figure(title, panels), encoding="utf-8")
+
+
+def _typical_of(measured: Measured, *names: str) -> int:
+    """Return the seed nearest to the medians in AED and CDSD of some rows, and in how far off the other rig's pose is."""
+    found = {}
+    numbers = [seed for some, ours in zip(SEED_SETS, measured.sets, strict=True) for seed in some[: len(ours)]]
+    for seed, one in zip(numbers, (*measured.sets[0], *measured.sets[1]), strict=True):
+        rows = [one.rows[name] for name in names if name in one.rows]
+        if len(rows) == len(names):
+            poses = [g for g in one.gross if CHOSEN_ROW in names and g.figures == one.rows[CHOSEN_ROW]]
+            values = [(row.aed_px, row.cdsd_px) for row in rows] + [(g.rotation_deg, g.position_m) for g in poses]
+            found[seed] = np.log(values).ravel()
+    return _nearest_to_medians(found)
+
+
+def _accs(measured: Measured, preset: PresetName) -> dict[int, np.ndarray]:
+    both = zip(SEED_SETS[0], measured.accs[preset], strict=False)
+    return {seed: np.array([one.ppm, one.pmm]) for seed, one in both}
+
+
+def _nearest_to_medians(values: Mapping[int, np.ndarray]) -> int:
+    table = np.array(list(values.values()))
+    return list(values)[int(np.abs(table - np.median(table, axis=0)).sum(axis=1).argmin())]
 
 
 def _figure(title: str, panels: Sequence[Panel]) -> str:
@@ -142,57 +163,73 @@ def _clicked(recording: SimulatedRecording, calibrations: Sequence[tuple[str, Ca
         at = np.array([pair.projected_px for pair in one.pairs])
         marks = [_line(a, b, view) for a, b in zip(pixels, at, strict=True)]
         marks += [_dot(a, _CLICK, view) for a in pixels] + [_dot(b, _AT, view) for b in at]
-        panels.append(Panel(f"{title}: AED {aed(distances(at, pixels)):.1f} px", back + "".join(marks), view))
+        lengths = distances(at, pixels)
+        figures = f"AED {aed(lengths):.1f}, CDSD {cdsd(lengths):.1f} px"
+        panels.append(Panel(f"{title}: {figures}", back + "".join(marks), view))
     return panels
 
 
-def _real_world(seed: int, settings: Settings) -> list[Panel]:
+def _real_world(seeds: Mapping[PresetName, int], settings: Settings) -> list[Panel]:
     return [
-        *_moving("people", "(A) people on the rooftop", seed, settings),
-        *_moving("robot", "(B) robot car in the aisle, seen from the other rig", seed, settings),
-        *_moving("cars-near", "(C) cars on the road", seed, settings),
-        *_moving("cars-far", f"(D) a car beyond {_FAR_M:g} m", seed, settings, nearest_m=_FAR_M),
+        *_moving("people", "(A) people on the rooftop", seeds, settings),
+        *_moving("robot", "(B) robot car in the aisle, seen from the other rig", seeds, settings),
+        *_moving("cars-near", "(C) cars on the road", seeds, settings),
+        *_moving("cars-far", f"(D) a far car, counted beyond {_FAR_M:g} m", seeds, settings, nearest_m=_FAR_M),
     ]
 
 
-def _moving(preset: PresetName, title: str, seed: int, settings: Settings, nearest_m: float = 0.0) -> list[Panel]:
-    """Draw the frame with the most returns at or beyond a range, by PPM and by PMM."""
-    recording, both = recording_of(preset, seed, settings), judged_by_both(preset, seed, settings, labelled=True)
-    returns = both[0].returns
-    assert returns is not None, "they were judged here"
-    far = np.linalg.norm(returns.points_radar_m, axis=1) >= nearest_m
-    boxed = np.isfinite(returns.boxes_px).all(axis=1)
-    number = int(np.bincount(returns.frames[far & boxed]).argmax())
-    own = (returns.frames == number) & far
-    frame = int(np.searchsorted(recording.stage.frame_times.header_ns, both[0].frames[number].image_time))
-    boxes = np.unique(returns.boxes_px[own & boxed], axis=0)
-    view = _view_around(boxes.reshape(-1, 2), recording, least=0.25)
-    back = _background(recording, frame, view)
+def _moving(
+    preset: PresetName, title: str, seeds: Mapping[PresetName, int], settings: Settings, nearest_m: float = 0.0
+) -> list[Panel]:
+    """Draw a typical frame with returns at or beyond a range, by PPM and by PMM."""
+    recording = recording_of(preset, seeds[preset], settings)
+    both = judged_by_both(preset, seeds[preset], settings, labelled=True)
+    found = [one.returns for one in both if one.returns is not None]
+    far = np.linalg.norm(found[0].points_radar_m, axis=1) >= nearest_m
+    boxed = np.isfinite(found[0].boxes_px).all(axis=1)
+    number = _typical_frame(found[0].frames[far], [one.inside[far] for one in found])
+    own = found[0].frames == number
+    time = both[0].frames[number].image_time
+    (shown,) = (frame for frame in true_boxes(recording) if frame.image_time == time)
+    view = _view_around(found[0].boxes_px[own & far & boxed].reshape(-1, 2), recording, least=0.25)
+    back = _background(recording, int(np.searchsorted(recording.stage.frame_times.header_ns, time)), view)
     panels = []
-    for letter, figures in zip("ab", both, strict=True):
-        found = figures.returns
-        assert found is not None, "they were judged here"
-        marks = [_outline(box, view) for box in boxes]
-        inside, at = found.inside[own], found.pixels_px[own]
+    for letter, one in zip("ab", found, strict=True):
+        inside, at = one.inside[own], one.pixels_px[own]
+        marks = [_outline(box, view) for box in shown.boxes]
         marks += [_dot(a, _AT if good else _MISSED, view) for a, good in zip(at, inside, strict=True)]
-        share = f"{int(inside.sum())} of {len(inside)} returns inside"
-        panels.append(Panel(f"{title[:2]}, {letter}{title[2:]}: {share}", back + "".join(marks), view))
+        share = f"{int(one.inside[own & far].sum())} of {int((own & far).sum())} returns inside"
+        name = f"{title[:2]}, {letter}{title[2:]}, seed {seeds[preset]}: {share}"
+        panels.append(Panel(name, back + "".join(marks), view))
     return panels
 
 
-def _histograms(seed: int, settings: Settings) -> list[Panel]:
+def _typical_frame(frames: Indices, inside: Sequence[Flags]) -> int:
+    """Return the frame whose shares of returns inside are nearest to Acc, of those with the median number of returns or more."""
+    counts = np.bincount(frames)
+    seen = counts > 0
+    off = np.where(counts >= np.median(counts[seen]), 0.0, np.inf)
+    for one in inside:
+        share = np.bincount(frames, weights=one) / np.maximum(counts, 1)
+        off += np.abs(share - share[seen].mean())
+    return int(off.argmin())
+
+
+def _histograms(seeds: Mapping[PresetName, int], settings: Settings) -> list[Panel]:
     panels = []
-    for letters, preset, name in (("ab", "people", "people walking"), ("cd", "cars-far", "cars, 20 to 60 m")):
-        both = judged_by_both(preset, seed, settings)  # type: ignore[arg-type]
+    names: Mapping[PresetName, str] = {"people": "people walking", "cars-far": "cars, 20 to 60 m"}
+    for letters, (preset, name) in zip(("ab", "cd"), names.items(), strict=True):
+        both = judged_by_both(preset, seeds[preset], settings)
         for letter, method, figures in zip(letters, ("PPM", "PMM"), both, strict=True):
-            panels.append(_histogram(f"({letter}) {method}, {name}: Acc {100 * (figures.acc or 0.0):.0f} %", figures))
+            shown = f"{name}, seed {seeds[preset]}: Acc {100 * (figures.acc or 0.0):.0f} %"
+            panels.append(_histogram(f"({letter}) {method}, {shown}", figures))
     return panels
 
 
 def _histogram(title: str, figures: BoxFigures) -> Panel:
     shares = [frame.share for frame in figures.frames if frame.returns]
     counts = np.histogram(shares, np.linspace(0.0, 1.0, 11))[0] / max(len(shares), 1)
-    left, low, tall, step = 50.0, _HEIGHT - 45.0, _HEIGHT - 70.0, (_WIDTH - 70.0) / 10.0
+    left, low, tall, step = 70.0, _HEIGHT - 45.0, _HEIGHT - 70.0, (_WIDTH - 90.0) / 10.0
     parts = []
     for percent in (25, 50, 75, 100):
         y = low - tall * percent / 100.0
@@ -206,7 +243,10 @@ def _histogram(title: str, figures: BoxFigures) -> Panel:
     parts.append(f'<path class="axis" d="M{left:.0f} {low - tall:.0f}V{low:.0f}H{_WIDTH - 20}"/>')
     parts += [f'<text class="middle" x="{left + b * step:.0f}" y="{low + 18:.0f}">{10 * b}</text>' for b in range(11)]
     parts.append(f'<text class="middle" x="{_WIDTH / 2}" y="{low + 38:.0f}">Acc of a frame [%]</text>')
-    return Panel(title, "".join(parts), (0.0, 0.0, float(_WIDTH), float(_HEIGHT)))
+    parts.append(
+        f'<text class="middle" transform="translate(14 {low - tall / 2:.0f}) rotate(-90)">share of the frames</text>'
+    )
+    return Panel(f"{title}, {len(shares)} frames", "".join(parts), (0.0, 0.0, float(_WIDTH), float(_HEIGHT)))
 
 
 def _view_around(
@@ -240,24 +280,19 @@ def _background(recording: SimulatedRecording, frame: int, view: tuple[float, fl
 
 
 def _dot(at_px: np.ndarray, colour: str, view: tuple[float, float, float, float]) -> str:
-    if not np.isfinite(at_px).all():
-        return ""
     unit = view[2] / _WIDTH
-    return (
-        f'<circle cx="{at_px[0]:.1f}" cy="{at_px[1]:.1f}" r="{4.0 * unit:.2f}" fill="{colour}" '
-        f'stroke="#fff" stroke-width="{0.8 * unit:.2f}"/>'
-    )
+    where = f'cx="{at_px[0]:.1f}" cy="{at_px[1]:.1f}" r="{4.0 * unit:.2f}"'
+    width = f'stroke-width="{0.8 * unit:.2f}"'
+    return f'<circle {where} fill="{colour}" stroke="#fff" {width}/>' if np.isfinite(at_px).all() else ""
 
 
 def _line(a_px: np.ndarray, b_px: np.ndarray, view: tuple[float, float, float, float]) -> str:
-    if not np.isfinite([a_px, b_px]).all():
-        return ""
     (x, y), (u, v) = a_px, b_px
-    unit = view[2] / _WIDTH
-    return f'<path d="M{x:.1f} {y:.1f}L{u:.1f} {v:.1f}" stroke="#fff" stroke-width="{1.5 * unit:.2f}"/>'
+    line = f'<path d="M{x:.1f} {y:.1f}L{u:.1f} {v:.1f}" stroke="#fff" stroke-width="{1.5 * view[2] / _WIDTH:.2f}"/>'
+    return line if np.isfinite([a_px, b_px]).all() else ""
 
 
-def _outline(box_px: np.ndarray, view: tuple[float, float, float, float]) -> str:
-    left, top, right, bottom = box_px
-    size = f'x="{left:.1f}" y="{top:.1f}" width="{right - left:.1f}" height="{bottom - top:.1f}"'
-    return f'<rect {size} fill="none" stroke="{_BOX}" stroke-width="{2.0 * view[2] / _WIDTH:.2f}"/>'
+def _outline(box: Box, view: tuple[float, float, float, float]) -> str:
+    size = f'width="{box.right_px - box.left_px:.1f}" height="{box.bottom_px - box.top_px:.1f}"'
+    style = f'fill="none" stroke="{_BOX}" stroke-width="{2.0 * view[2] / _WIDTH:.2f}"'
+    return f'<rect x="{box.left_px:.1f}" y="{box.top_px:.1f}" {size} {style}/>'

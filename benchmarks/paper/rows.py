@@ -78,20 +78,10 @@ def calibrated(simulated: SimulatedScans, settings: Settings) -> Calibration | U
     return calibrate(simulated.clicks, simulated.scans, simulated.camera, ppm_options(settings))
 
 
-def by_mounting(simulated: SimulatedScans, pairs: Sequence[Pair] = ()) -> Calibration:
-    """Return the pose of the mounting (PMM): nominal rotation and measured offset, judged on pairs."""
-    return _mounted(simulated, pairs, simulated.stage.options.rig.camera_offset_m)
-
-
-def by_mounting_of_other(other: SimulatedScans) -> Calibration:
-    """Return what a tape measure and a protractor say of the camera on the other rig."""
-    nominal = other.stage.options.other_camera
-    return _mounted(other, (), nominal.offset_m, nominal.yaw_deg)
-
-
-def _mounted(
-    simulated: SimulatedScans, pairs: Sequence[Pair], offset_m: tuple[float, float, float], yaw_deg: float = 0.0
-) -> Calibration:
+def by_mounting(simulated: SimulatedScans, pairs: Sequence[Pair] = (), *, other_rig: bool = False) -> Calibration:
+    """Return what tape measure and protractor say (PMM): nominal rotation and measured offset, judged on pairs."""
+    rig, other = simulated.stage.options.rig, simulated.stage.options.other_camera
+    offset_m, yaw_deg = (other.offset_m, other.yaw_deg) if other_rig else (rig.camera_offset_m, 0.0)
     options = CalibrationOptions(
         method="paper",
         mounting=MountingOptions(yaw_deg=yaw_deg),

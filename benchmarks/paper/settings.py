@@ -27,6 +27,7 @@ class Settings:
         width_px: of the pictures, which are 16 to 9.
         mounting_error_deg: standard deviation of the true rotation about the nominal one, per axis [deg].
         placements: of the reflector on the ground, in D1 and D3.
+        distortion: whether the lens has the typical one.
         outshone_share: share of those errors' variance that comes from clutter below the reflector: a larger reflector,
             whose echo grows with the fourth power of its edge, outshines it. The rest is multipath, which grows with it.
         click_sigma_px: standard deviation of a click, per axis [px].
@@ -41,6 +42,7 @@ class Settings:
     width_px: int = 1920
     mounting_error_deg: float = 3.0
     placements: int = 40
+    distortion: bool = True
     outshone_share: float = 0.5
     click_sigma_px: float = 0.7
     ransac_threshold_px: float = 8.0
@@ -85,6 +87,7 @@ def under(options: SimulationOptions, seed: int, settings: Settings, share: floa
         defects=defects,
         rig=replace(options.rig, camera_angle_sigma_deg=settings.mounting_error_deg),
         angle_bins=False,
+        camera_model="plumb_bob" if settings.distortion else "pinhole",
         width_px=settings.width_px,
         height_px=settings.width_px * 9 // 16,
         click_sigma_px=settings.click_sigma_px,

@@ -230,7 +230,7 @@ class BoxFigures:
     Attributes:
         acc: mean over the frames with returns, frames of 0 % kept, 0 to 1; None if no frame counts.
         acc_standard_error: of that mean, with neighbouring frames taken together; NaN below two groups.
-        acc_without_zero_frames: the same without the frames of 0 %, as the authors published it; None likewise.
+        acc_without_zero_frames: the same without the frames of 0 %, as the authors' script computes it; None likewise.
         frames: one per frame that has boxes or returns of targets, in order of time.
         classes: by label.
         ranges: the returns by range.

@@ -72,7 +72,7 @@ def acc(inside: Sequence[Flags], *, zero_frames: ZeroFrames = "keep") -> float |
     """Return the share of reprojected radar returns that fall within detection boxes, averaged over frames (paper, Acc).
 
     Acc = (1 / F) sum over frames of (returns inside a box) / (returns). A frame without returns has no share and does not
-    count in F. The authors also drop the frames whose share is 0 before averaging, which can only raise the figure: a
+    count in F. The authors' script also drops the frames whose share is 0 before averaging, which can only raise the figure: a
     calibration that misses half of the frames entirely would still score 100 %. Zero frames are kept by default.
 
     Args:

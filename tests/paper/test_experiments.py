@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.paper.fit import AZIMUTHS_DEG, CORNERS, ELEVATIONS_DEG, FITTED_ROWS, mismatch_of, read_fit
-from benchmarks.paper.judgement import PAPER, Judged, agreeing, judged, row_judgement
+from benchmarks.paper.judgement import PAPER, Judged, differing, judged, row_judgement
 from benchmarks.paper.page import page, read_measured, write_measured
 from benchmarks.paper.rows import Figures, Seed, displaced, measured_pairs, with_gross_errors
 from benchmarks.paper.settings import FIT_SEEDS, FITTED, SEED_SETS, Dataset, options_of, ppm_options, session
@@ -122,11 +122,15 @@ def test_aed_and_cdsd_of_a_row_are_judged_each() -> None:
     assert row_judgement("CCM+D1", seeds_around("CCM+D1", (0.01, 0.01), (2.0, 2.0))) == "reproduced in order only"
 
 
-def test_equal_judgements_of_two_sets_are_counted() -> None:
+def test_figures_that_two_sets_judge_differently_are_named_with_the_reason() -> None:
     good = [Seed({name: Figures(aed * a, cdsd * a, 0.0) for name, (aed, cdsd) in PAPER.items()}) for a in (0.9, 1.1)]
-    bad = [Seed({**seed.rows, "PPM+D1": Figures(1.0, 1.0, 0.0)}) for seed in good]
-    assert agreeing(good, good) == (18, 18)
-    assert agreeing(good, bad) == (16, 16)
+    bad = [Seed({**seed.rows, "PPM+D1": Figures(7.655, 9.4 * (k + 0.5), 0.0)}) for k, seed in enumerate(good)]
+    assert differing(good, good) == []
+    aed, cdsd = differing(good, bad)
+    assert aed.startswith("AED of PPM+D1: reproduced and not reproduced")
+    assert "median off by +0 and -50 %" in aed
+    assert cdsd.startswith("CDSD of PPM+D1: reproduced and compatible")
+    assert "range 1.20 and 2.64 times apart" in cdsd
 
 
 def test_gross_errors_are_of_the_stated_number_and_size_and_never_behind_the_radar() -> None:
