@@ -289,7 +289,7 @@ def _diagnoses(
                 chosen=clocks[name],
                 requested=options.clock,
                 one_per_return=isinstance(stream, RadarStream) and isinstance(stream.layout, PointLayout),
-                times_from=_times_from(stream.topic),
+                times_from=times_from(stream.topic),
             )
     return found
 
@@ -328,7 +328,7 @@ def _topic_stream(topic: Topic, inventory: Inventory, times_ns: TimesNs, heads: 
     first = inventory.usages[topic.name].radar
     assert first is not None, "a topic to choose from has a layout"
     layouts = layouts_of_parts(first, [topic.definition(number) for number in range(len(topic.parts))])
-    return RadarStream(topic, layouts, times_ns, heads)
+    return RadarStream(topic, layouts, times_ns, heads, is_timed=times_from(topic) != COUNTED)
 
 
 def _about_claims(radar: RadarStream | MergedStream | None) -> list[DataWarning]:
@@ -355,7 +355,8 @@ def _frame(topic: Topic | None) -> str:
     return str(frame).lstrip("/")
 
 
-def _times_from(topic: Topic) -> str:
+def times_from(topic: Topic) -> str:
+    """Return where the times of a topic made of files come from; "" if its messages state them."""
     source = topic.parts[0][0]
     return source.times_from if isinstance(source, PlainSource) else ""
 
@@ -380,7 +381,7 @@ def _summary(
 ) -> TopicSummary:
     usage = inventory.usages[topic.name]
     times = stamps.get(topic.name, topic.receive_ns)
-    rhythm = Rhythm() if _times_from(topic) == COUNTED else Rhythm.of(times)
+    rhythm = Rhythm() if times_from(topic) == COUNTED else Rhythm.of(times)
     return TopicSummary(
         name=topic.name,
         type=topic.type,

@@ -10,6 +10,7 @@ from calib_core.arrays import TimesNs
 from calib_core.errors import RecordingError
 from calib_core.input_files import name_text
 from calib_core.measurements import NS_PER_S, DataWarning, Stamp, TimeNs
+from calib_core.recordings.assembly import times_from
 from calib_core.recordings.containers.sources import StatedAssumption
 from calib_core.recordings.radar.column_plan import ColumnReading
 from calib_core.recordings.radar.message_layouts.single_returns import PointLayout, first_of_scans
@@ -276,7 +277,11 @@ def _timed(topic: TopicSummary, both: StampedTopic) -> TopicSummary:
     clock = choose_clock(stamps).clocks[0]
     times = both.header_ns if clock == "header" and both.header_ns is not None else both.topic.receive_ns
     scans = np.sort(times[first_of_scans(times)] if one_per_return else times)
-    rhythm = Rhythm.of(times)
+    told = times_from(both.topic)
+    diagnosis = diagnose(
+        stamps, times_ns=scans, chosen=clock, requested="auto", one_per_return=one_per_return, times_from=told
+    )
+    rhythm = Rhythm() if diagnosis.is_assumed else Rhythm.of(times)
     return replace(
         topic,
         start=Stamp.of(TimeNs(int(times.min()))),
@@ -285,7 +290,7 @@ def _timed(topic: TopicSummary, both: StampedTopic) -> TopicSummary:
         rate_hz=rhythm.rate_hz,
         longest_gap_s=rhythm.longest_gap_s,
         jitter_s=rhythm.jitter_s,
-        clocks=diagnose(stamps, times_ns=scans, chosen=clock, requested="auto", one_per_return=one_per_return),
+        clocks=diagnosis,
     )
 
 

@@ -164,9 +164,7 @@ def _by_name(folder: Path, files: Sequence[Path], named: NamedTimes) -> StampedF
                 "check a few names; the times are used: add a CSV with the columns file,time_ns if they are wrong",
             ),
         )
-    told = (
-        f"they stand in the file names; assumed: {named.assumed}" if named.assumed else "they stand in the file names"
-    )
+    told = f"those in the file names{f'; {named.assumed}' if named.assumed else ''}"
     return _stamped(folder, files, times, *warnings, zoneless=named.zoneless, assumed=named.assumed, times_from=told)
 
 

@@ -150,10 +150,20 @@ class RadarStream(ScanBlocks):
         layouts: one per part of the topic.
         stamps_ns: (n,) one time per message, by the chosen clock.
         heads: (n, size) the first bytes of the messages, at least as many as PointLayout.group_bytes.
+        is_timed: whether anything states the times.
     """
 
-    def __init__(self, topic: Topic, layouts: Sequence[RadarLayout], stamps_ns: TimesNs, heads: np.ndarray) -> None:
+    def __init__(
+        self,
+        topic: Topic,
+        layouts: Sequence[RadarLayout],
+        stamps_ns: TimesNs,
+        heads: np.ndarray,
+        *,
+        is_timed: bool = True,
+    ) -> None:
         self.topic = topic
+        self.is_timed = is_timed
         self.layout: RadarLayout = layouts[0]
         """The layout of the first part; with one return per message, all parts share it."""
         self._layouts = layouts

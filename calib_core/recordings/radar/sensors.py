@@ -48,7 +48,7 @@ class Figures:
 
     Attributes:
         returns_per_scan: median.
-        rate_hz: scans per second; None with fewer than two.
+        rate_hz: scans per second; None with fewer than two, or if the times are assumed.
         doppler: whether returns have a speed.
         static_share: share of the returns slower than 0.1 m/s; None without Doppler.
         ahead_per_scan: mean number of static returns within 60 deg of straight ahead, where a camera next to it looks.
@@ -129,7 +129,7 @@ def figures_of(stream: RadarStream) -> Figures:
     nearest_m, farthest_m = np.quantile(polar[finite, 0], [0.02, 0.98]) if finite.any() else (0.0, 0.0)
     return Figures(
         returns_per_scan=float(np.median(np.diff(scans.first_return))) if len(scans) else 0.0,
-        rate_hz=Rhythm.of(stream.times_ns).rate_hz,
+        rate_hz=Rhythm.of(stream.times_ns).rate_hz if stream.is_timed else None,
         doppler=bool(known.any()),
         static_share=float(slow[known].mean()) if known.any() else None,
         ahead_per_scan=float(ahead.sum() / max(len(scans), 1)),

@@ -12,7 +12,7 @@ import pytest
 from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S
 from calib_core.radar import cartesian_from_polar
-from calib_core.recordings import RecordingOptions, describe, inspect_recording, open_recording
+from calib_core.recordings import RecordingOptions, describe, inspect_recording, open_recording, recording_summary
 from calib_core.recordings.time.written_times import read_time, time_from_name
 
 START_NS = 1_700_000_000 * NS_PER_S
@@ -98,6 +98,7 @@ def test_a_folder_of_pictures_is_a_camera(tmp_path) -> None:
         np.testing.assert_array_equal(recording.image(2), pixels(2))
         assert recording.warnings == ()
         assert "folder of images, 4 files" in describe(recording)
+        assert "times are those in the file names\n" in describe(recording)
         (file,) = recording.fingerprint()
         assert file.size_bytes == sum(path.stat().st_size for path in folder.iterdir())
 
@@ -149,12 +150,17 @@ def test_the_times_beside_numbered_stills_are_found_and_told(tmp_path) -> None:
 
 
 def test_an_assumed_time_is_never_called_sound_and_has_no_rate(tmp_path) -> None:
-    folder = pictures(tmp_path / "zed_left", [f"{number:06}.png" for number in (1, 15, 29, 43, 570)])
-    with open_recording(folder, require=("image",)) as recording:
+    """Neither those of the camera in use, nor of the other one, nor the radar's."""
+    numbers = (1, 15, 29, 43, 570)
+    for folder in ("zed_left", "zed_right"):
+        pictures(tmp_path / folder, [f"{number:06}.png" for number in numbers])
+    for folder, seed in (("front", 4), ("rear", 5)):
+        bin_folder(tmp_path / folder, [bin_rows("delft", 40, seed) for _ in numbers])
+    with open_recording(tmp_path) as recording:
         text = describe(recording)
-        (topic,) = recording.topics
-        assert [warning.code for warning in recording.warnings] == ["numbered-files"]
-    assert (topic.rate_hz, topic.jitter_s) == (None, None)
+        topics = recording_summary(recording).topics
+        assert {warning.code for warning in recording.warnings} == {"numbered-files", "several-radars"}
+    assert [(topic.rate_hz, topic.jitter_s) for topic in topics] == [(None, None)] * 4
     assert "times are assumed" in text
     assert "stamps count" not in text
     assert "Hz" not in text
