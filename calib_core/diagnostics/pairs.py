@@ -6,42 +6,24 @@ import numpy as np
 
 from calib_core.arrays import Values
 from calib_core.diagnostics.solved_fit import SolvedFit
-from calib_core.estimation.gnc import associate, log_odds_of
 from calib_core.results import DataWarning
 
-_AMBIGUOUS_MARGIN = 4.0
 _DECISIVE_LOSS = 8.0  # ratio of the standard deviations without and with the pair, in the worst direction
 _LEAST_PAIRS = 6
 
 
 def ambiguous_candidates(fit: SolvedFit) -> list[DataWarning]:
-    """Name the pairs where a second candidate explains the click nearly as well as the chosen one."""
-    if fit.measurements.one_to_one:
-        return []
-    measurements, owner = fit.refined.measurements, fit.refined.measurements.owner
-    margins = np.full(len(measurements), np.inf)
-    cost = _candidate_costs(fit)
-    for i in np.flatnonzero(fit.inliers):
-        own = np.sort(cost[owner == i])
-        if len(own) > 1:
-            margins[i] = own[1] - own[0]
-    ambiguous = [fit.ids[i] for i in np.flatnonzero(margins < _AMBIGUOUS_MARGIN)]
+    """Name the pairs whose click another return explains as well as the chosen one."""
+    ambiguous = [fit.ids[i] for i in np.flatnonzero(fit.refined.rivals >= 0)]
     if not ambiguous:
         return []
     return [
         DataWarning(
             "uncertain-association",
             f"more than one radar position fits the click of {listed(ambiguous)}",
-            "check the radar view at each of them; exclude the pair if the chosen return is not the reflector",
+            "choose the return of each on the page (C), or exclude the pair",
         )
     ]
-
-
-def _candidate_costs(fit: SolvedFit) -> np.ndarray:
-    measurements = fit.refined.measurements
-    each = measurements.candidates_apart()
-    rows, model = associate(each, fit.refined.camera_from_radar)
-    return -2.0 * log_odds_of(each, model, each.log_score[rows], 0.5)
 
 
 def contradicted_pairs(fit: SolvedFit) -> list[DataWarning]:

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from calib_core.arrays import Flags, Indices, Matrix66, Values
-from calib_core.estimation.gnc import GncSolution, associate, log_odds_of, normal_equations
+from calib_core.estimation.gnc import GncSolution, associate, log_odds_of, normal_equations, rival_rows
 from calib_core.estimation.leave_one_out import (
     COMPONENTS,
     PSEUDO_SHARED,
@@ -30,6 +30,7 @@ from calib_core.estimation.leave_one_out import (
 )
 from calib_core.estimation.measurement_model import Linearization, MeasurementPlanes, PairMeasurements
 from calib_core.geometry import RigidTransform
+from calib_core.measurements import MIN_PAIRS
 
 _MOST_ROUNDS = 80
 _ROUNDS_BEFORE_SCALES = 3
@@ -42,6 +43,8 @@ _PRIOR_INLIERS, _PRIOR_OUTLIERS = 3.0, 0.5  # pseudo-counts of the inlier share
 _NEAR_OUTLIER_SHARE = 0.01  # of the pairs that are not outliers anywhere on the image
 _NEAR_OUTLIER_FACTOR = 5.0  # how many times noisier a near outlier is
 _LEAST_PAIRS_FOR_SCALES = 5.0
+_HALF = 0.5
+_MOST_ASKED, _LEAST_DECIDED = 0.2, MIN_PAIRS + 2  # share of the pairs; inliers besides them
 _NEAR = 6.0  # standard deviations beyond which a pair does not update its own true position
 
 
@@ -59,6 +62,8 @@ class ErrorsInVariablesFit:
         noise_scale: (4,) estimated over assumed sigma of (click, range, azimuth, elevation).
         degrees_of_freedom: of the noise scales, those of the assumed sigmas included; 0 if not estimated.
         inlier_share: prior probability of an inlier, estimated.
+        rivals: (n,) the row of another return that explains the pair's click as well; -1 if there is none. Where only a few
+            inliers have one, these count half, and are no inliers until somebody chooses.
     """
 
     camera_from_radar: RigidTransform
@@ -70,6 +75,7 @@ class ErrorsInVariablesFit:
     noise_scale: Values
     degrees_of_freedom: float
     inlier_share: float
+    rivals: Indices
 
     @property
     def placements_z_m(self) -> float:
@@ -80,7 +86,7 @@ class ErrorsInVariablesFit:
     @property
     def inliers(self) -> Flags:
         """The pairs (n,) that are more likely inliers than not."""
-        return np.asarray(self.weights > 0.5)
+        return np.asarray(self.weights > _HALF)
 
 
 @dataclass(slots=True)
@@ -171,9 +177,19 @@ def fit_errors_in_variables(
     noisy = measurements.scaled(state.scale).with_errors(state.errors)
     model, _ = _expect(noisy, state, weigh=True, scaled=degrees > 0.0)
     polar = state.measured.polar if state.polar is None else state.polar
+    rivals = rival_rows(noisy, state.pose, state.weights > _HALF)
+    weights = _until_chosen(state.weights, rivals >= 0)
     return ErrorsInVariablesFit(
-        state.pose, state.rows, state.weights, noisy, polar, model, state.scale, degrees, state.share
+        state.pose, state.rows, weights, noisy, polar, model, state.scale, degrees, state.share, rivals
     )
+
+
+def _until_chosen(weights: Values, undecided: Flags) -> Values:
+    """Halve the weights (n,) of the pairs that two returns explain alike, if these are few: of most pairs, it is no question."""
+    inliers = weights > _HALF
+    asked = inliers & undecided
+    few = asked.sum() <= _MOST_ASKED * len(weights) and (inliers & ~asked).sum() >= _LEAST_DECIDED
+    return np.where(asked, _HALF, weights) if few else weights
 
 
 def _first_weights(measurements: PairMeasurements, state: _State) -> Values:

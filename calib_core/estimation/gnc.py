@@ -10,10 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Indices, Values
+from calib_core.arrays import Flags, Indices, Values
+from calib_core.association.clustering import CLUSTER_SCALE
 from calib_core.association.exclusive_returns import exclusive_rows, taken_twice
 from calib_core.estimation.measurement_model import Linearization, MeasurementPlanes, PairMeasurements
 from calib_core.geometry import RigidTransform, rotation_exp
+from calib_core.radar import cartesian_from_polar, direction_cosines
 
 RADII = (12.0, 8.0, 5.5, 4.0, 3.0)
 """Radii of the Geman-McClure loss in standard deviations, in order of use."""
@@ -141,6 +143,45 @@ def _associated(
     if twice.any():
         rows[twice] = [exclusive_rows(one, measurements.first, measurements.returns) for one in cost[twice]]
     return rows, model.rows(rows)
+
+
+_AS_WELL = 4.0
+"""How much larger -2 log-likelihood may be for another choice of returns to explain the clicks as well: odds of 1 to 7."""
+
+_ELSEWHERE = 3.0  # steps between two returns that are not parts of one
+_RULED_OUT = 1e9
+
+
+def rival_rows(measurements: PairMeasurements, pose: RigidTransform, asked: Flags) -> Indices:
+    """Find for each pair another return that explains its click about as well, while the other pairs give way.
+
+    Args:
+        measurements: the pairs, with the noise of the fit.
+        pose: of the fit.
+        asked: (n,) of which pairs.
+
+    Returns:
+        rows (n,) of candidates; -1 for none.
+    """
+    found = np.full(len(measurements), -1)
+    if measurements.one_to_one:
+        return found
+    candidates, first = _of_candidates(measurements), measurements.first
+    rows, _ = _associated(measurements, candidates, _Poses(pose.rotation, pose.translation_m))
+    model = candidates.linearize(measurements.camera, pose.rotation, pose.translation_m)
+    cost = model.squared + model.log_determinant - 2.0 * measurements.log_score
+    places = direction_cosines(cartesian_from_polar(measurements.reported)) / CLUSTER_SCALE
+    same = ((places - places[rows][measurements.owner]) ** 2).sum(axis=1) <= _ELSEWHERE**2
+    others = np.minimum.reduceat(np.where(same, _RULED_OUT, cost), first[:-1])
+    for pair in np.flatnonzero(asked & (others - cost[rows] < _AS_WELL)).tolist():
+        own = np.arange(*first[pair : pair + 2])
+        without = cost.copy()
+        without[own[same[own]]] = _RULED_OUT
+        again = exclusive_rows(without, first, measurements.returns)
+        worse = float(without[again].sum() - cost[rows].sum())
+        if worse < _AS_WELL and not taken_twice(measurements.returns[again]):
+            found[pair] = again[pair]
+    return found
 
 
 def normal_equations(

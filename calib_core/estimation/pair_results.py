@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib_core.arrays import Values, Vector2, Vector3, frozen_array
+from calib_core.association.clustering import CLUSTER_SCALE
 from calib_core.association.placement_groups import PlacementGroup, click_sigmas, placement_groups, steps_of_sigma
 from calib_core.camera import Camera
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
@@ -18,7 +19,7 @@ from calib_core.estimation.leave_one_out import LeaveOneOut
 from calib_core.estimation.measurement_model import Linearization, PairMeasurements, pair_measurements
 from calib_core.measurements import Candidate, Pair
 from calib_core.options import CalibrationOptions
-from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar
+from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, direction_cosines
 from calib_core.results import Calibration, Metrics, PairResult
 from calib_core.results.metrics import distances, metrics_of
 
@@ -58,6 +59,7 @@ def used_pair_results(
             influence=float(left_out.influence[i]),
             held_out_px=float(left_out.distance_px[i]),
             candidate=chosen,
+            rival=max(int(refined.rivals[i] - measurements.first[i]), -1),
             expected_covariance_px2=expected[i],
             image_time=pair.image_time,
             measured=pair,
@@ -65,6 +67,22 @@ def used_pair_results(
         for i, pair in enumerate(used)
         for chosen in (int(refined.rows[i] - measurements.first[i]),)
     }
+
+
+def changed_returns(before: Sequence[PairResult], after: Sequence[PairResult]) -> frozenset[str]:
+    """Return the ids of the pairs that have another return than before, although nobody chose it or moved the click."""
+    earlier = {result.id: result for result in before}
+    return frozenset(
+        result.id for result in after if result.id in earlier and _has_another_return(earlier[result.id], result)
+    )
+
+
+def _has_another_return(before: PairResult, after: PairResult) -> bool:
+    if before.measured is None or after.measured is None or (before.pixel_px != after.pixel_px).any():
+        return False
+    same_question = before.measured.chosen == after.measured.chosen and before.image_time == after.image_time
+    steps = direction_cosines(np.array([before.point_radar_m, after.point_radar_m])) / CLUSTER_SCALE
+    return same_question and float(np.linalg.norm(steps[1] - steps[0])) > _ELSEWHERE
 
 
 def residual_covariances(model: Linearization) -> np.ndarray:
@@ -130,8 +148,10 @@ def click_results(
 
 
 def _click_result(calibration: Calibration, result: PairResult, pair: Pair, click: Pair, *, off: bool) -> PairResult:
-    steps = steps_of_sigma(click.candidates) - steps_of_sigma(pair.candidates)[result.candidate]
-    chosen = int((steps**2).sum(axis=1).argmin())
+    own, others = steps_of_sigma(click.candidates), steps_of_sigma(pair.candidates)
+    chosen, rival = (
+        int(((own - others[k]) ** 2).sum(axis=1).argmin()) if k >= 0 else -1 for k in (result.candidate, result.rival)
+    )
     point = click.candidates[chosen].position_radar_m
     own_px, pair_px = click_sigmas((click, pair), calibration.options).tolist()
     more_px2 = max(own_px**2 - pair_px**2, 0.0) * calibration.noise_scale[0] ** 2
@@ -144,6 +164,7 @@ def _click_result(calibration: Calibration, result: PairResult, pair: Pair, clic
         inlier=result.inlier and not off,
         outlier_probability=1.0 if off else result.outlier_probability,
         candidate=chosen,
+        rival=rival if rival != chosen else -1,
         expected_covariance_px2=result.expected_covariance_px2 + more_px2 * np.eye(2),
         image_time=click.image_time,
         measured=click,
@@ -180,6 +201,7 @@ def _return_of(group: PlacementGroup, results: Mapping[str, PairResult]) -> Vect
     return group.pair.candidates[int(nearest)].position_radar_m
 
 
+_ELSEWHERE = 3.0  # steps between two returns that are not parts of one
 _NONE_OF_THEM = 0.1
 """Probability, before the click is compared, that none of the candidates is the reflector."""
 

@@ -129,6 +129,7 @@ class PairResult:
         influence: how far leaving it out moves the pose, in standard deviations; NaN if not computed.
         held_out_px: distance from the click to where the other pairs predict it; NaN if not computed, and in files.
         candidate: which of the pair's candidates was chosen.
+        rival: which other one explains the click as well, so that somebody must choose; -1 if there is none.
         expected_covariance_px2: (2, 2) covariance of the residual under the noise model; NaN if there is none.
         image_time: stamp of the clicked frame; None for pairs from a pairs file.
         measured: the pair it came from, with all its candidates, as needed to solve again; None if it was not kept.
@@ -147,6 +148,7 @@ class PairResult:
     image_time: TimeNs | None = None
     measured: Pair | None = None
     held_out_px: float = float("nan")
+    rival: int = -1
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pixel_px", frozen_array(self.pixel_px, (2,)))

@@ -8,8 +8,10 @@ from typing import TypeAlias
 from msgspec.structs import replace as changed
 
 from calib_core.errors import CalibrationError
+from calib_core.estimation.pair_results import changed_returns
 from calib_core.interchange.own.clicks_json import click_of
 from calib_core.measurements import Mark, ReflectorClick, TimeNs, time_parts
+from calib_core.results import Calibration
 from cocalib.option_changes import changed_options, changes_from_tree
 from cocalib.session.click_stamps import nearest_frame
 from cocalib.session.events import (
@@ -72,7 +74,7 @@ def apply(session: Session, event: Step, facts: RecordingFacts) -> Session:
     if isinstance(event, Solved):
         if event.revision != session.revision:
             return session
-        return replace(session, outcome=event.outcome, outcome_revision=event.revision, checked=event.checked)
+        return _answered(event, session)
     if isinstance(event, AxesStated):
         return session
     if isinstance(event, ScansAdded):
@@ -84,6 +86,21 @@ def apply(session: Session, event: Step, facts: RecordingFacts) -> Session:
     if (changed.clicks, changed.options, changed.intrinsics) == (session.clicks, session.options, session.intrinsics):
         return session
     return replace(changed, revision=session.revision + 1)
+
+
+def _answered(event: Solved, session: Session) -> Session:
+    """Return the session with an answer; what its preview changed already counts as changed by it."""
+    before, after = (one.pairs if isinstance(one, Calibration) else () for one in (session.outcome, event.outcome))
+    changed = changed_returns(before, after)
+    if session.outcome_revision == event.revision:
+        changed ^= session.changed_returns
+    return replace(
+        session,
+        outcome=event.outcome,
+        outcome_revision=event.revision,
+        changed_returns=changed,
+        checked=event.checked,
+    )
 
 
 def _aside(event: _Aside, session: Session, facts: RecordingFacts) -> Session:

@@ -136,13 +136,13 @@ def _words(session: Session, stage: Stage, reference: Reference | None, verdict:
     if _waits_for_clicks(session):
         return f"{missing} more placement{'s' if missing > 1 else ''} needed", _next_click(session, verdict)
     if session.is_checking and isinstance(outcome, Calibration):
-        return _agreement(outcome, "Checking…"), ""
+        return _agreement(outcome, "Checking…") + _changed(session), ""
     if stage == "solving":
         return "Solving…", ""
     if isinstance(outcome, Unsolvable):
         return sentence(outcome.reason), sentence(outcome.hint)
     if isinstance(outcome, Calibration):
-        return _agreement(outcome, f"{verdict.level.capitalize()}:"), sentence(verdict.action)
+        return _agreement(outcome, f"{verdict.level.capitalize()}:") + _changed(session), sentence(verdict.action)
     return "", ""
 
 
@@ -165,8 +165,17 @@ def _agreement(calibration: Calibration, word: str) -> str:
     used = [pair for pair in calibration.pairs if not pair.excluded]
     agreeing = sum(pair.inlier for pair in used)
     agreed = f"all {len(used)}" if agreeing == len(used) else f"{agreeing} of {len(used)}"
+    asked = sum(pair.rival >= 0 and not pair.inlier for pair in used)
+    asking = f"; {asked} ask{'s' if asked == 1 else ''} which return is right (C)" if asked else ""
     firm = "" if calibration.sees_elevation else f"; {firm_text(calibration)}"
-    return f"{word} {agreed} clicks agree{firm}"
+    return f"{word} {agreed} clicks agree{asking}{firm}"
+
+
+def _changed(session: Session) -> str:
+    """Say how many clicks have another return since the last answer, because of what is known now."""
+    count = len({click.id for click in session.clicks} & session.changed_returns)
+    words = "1 click changed its return" if count == 1 else f"{count} clicks changed their return"
+    return f"; {words}" if count else ""
 
 
 def _warnings(calibration: Calibration) -> tuple[DataWarning, ...]:
@@ -199,7 +208,7 @@ def summary_lines(calibration: Calibration) -> tuple[str, ...]:
     lines += [
         f"disagrees: {pair.id}: {plain(pair.distance_px)} px from its radar position"
         for pair in calibration.pairs
-        if not pair.inlier and not pair.excluded
+        if not pair.inlier and not pair.excluded and pair.rival < 0
     ]
     lines += [
         f"warning: {sentence(warning.message)} {sentence(warning.hint)}"

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calib_core.arrays import Vector3
 from calib_core.estimation.pair_results import CandidateFit, candidate_fits
 from calib_core.measurements import Candidate, Pair
 from calib_core.radar import polar_from_cartesian
@@ -99,11 +100,13 @@ def click_candidates(session: Session, pair: Pair, more: Sequence[Candidate] = (
         for i, one in enumerate(candidates)
     ]
     order = sorted(range(len(rows)), key=lambda i: (-(rows[i].probability or 0.0), i))
-    better = _better(fits, used)
+    rival = _rival(calibration, pair, candidates)
+    better = _better(fits, used) if rival < 0 else rival
     ordered = tuple(rows[i] for i in order)
     if better < 0:
         return PairCandidates(pair.id, session.revision, ordered)
-    words = f"The return at {rows[better].words} fits this click better"
+    how = "as well" if rival >= 0 else "better"
+    words = f"The return at {rows[better].words} fits this click {how}"
     return PairCandidates(pair.id, session.revision, ordered, order.index(better), words)
 
 
@@ -119,8 +122,18 @@ def _used(calibration: Calibration | None, pair: Pair, candidates: Sequence[Cand
     """Return the index of the candidate in use; -1 before there is a pose."""
     if calibration is None:
         return 0 if pair.chosen is not None else -1
-    point = next(one.point_radar_m for one in calibration.pairs if one.id == pair.id)
-    away = [float(np.abs(one.position_radar_m - point).max()) for one in candidates]
+    return _at(next(one.point_radar_m for one in calibration.pairs if one.id == pair.id), candidates)
+
+
+def _rival(calibration: Calibration | None, pair: Pair, candidates: Sequence[Candidate]) -> int:
+    """Return the index of the candidate that explains the click as well as the one in use; -1 if there is none."""
+    rivals = () if calibration is None else [one.rival for one in calibration.pairs if one.id == pair.id]
+    return next((_at(pair.candidates[rival].position_radar_m, candidates) for rival in rivals if rival >= 0), -1)
+
+
+def _at(position_m: Vector3, candidates: Sequence[Candidate]) -> int:
+    """Return the index of the candidate at a position; -1 if there is none."""
+    away = [float(np.abs(one.position_radar_m - position_m).max()) for one in candidates]
     return int(np.argmin(away)) if away and min(away) <= _SAME_M else -1
 
 

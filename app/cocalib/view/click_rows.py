@@ -14,7 +14,7 @@ from calib_core.radar import polar_from_cartesian
 from calib_core.results import Calibration, PairResult
 from cocalib.session import RecordingFacts, Session
 from cocalib.view.model import ClickRow, ClickState, Ellipse
-from cocalib.view.wording import plain, sentence
+from cocalib.view.wording import plain, position_words, sentence
 
 _CHI2_95_2D = 5.991464547107979  # 95 % quantile of chi-squared with 2 degrees of freedom
 # Pixels are rounded to steps of at most 1 % of the pair's ellipse and a quarter of a pixel, which cannot be seen: with many
@@ -40,6 +40,7 @@ class Reprojection:
         inlier: it took part in the pose.
         excluded: the user had left it out.
         outlier_probability: 0 to 1, to 0.001; None if the method has none.
+        rival: where another return is that explains the click as well; "" if there is none.
     """
 
     projected_px: tuple[float, float] | None
@@ -53,6 +54,7 @@ class Reprojection:
     inlier: bool
     excluded: bool
     outlier_probability: float | None
+    rival: str = ""
 
 
 @lru_cache(maxsize=2)
@@ -80,9 +82,16 @@ def reprojections(pairs: tuple[PairResult, ...]) -> Mapping[str, Reprojection]:
             inlier=pair.inlier,
             excluded=pair.excluded,
             outlier_probability=_rounded(pair.outlier_probability),
+            rival=_rival(pair),
         )
         for pair, (u_px, v_px), step_px, ellipse, (range_m, azimuth_deg, elevation_deg) in rows
     }
+
+
+def _rival(pair: PairResult) -> str:
+    if pair.rival < 0 or pair.measured is None:
+        return ""
+    return position_words(pair.measured.candidates[pair.rival].position_radar_m)
 
 
 def length_px(distance_px: float, step_px: float) -> float:
@@ -242,6 +251,8 @@ def _note(state: ClickState, residual_px: float | None, pair: Reprojection, caus
     where = "is behind the camera" if residual_px is None else f"reprojects {plain(residual_px)} px from the click"
     if state == "excluded":
         return f"Excluded; its radar position {where}."
+    if pair.rival:
+        return f"Another return, {pair.rival}, explains this click as well: it counts half until you choose (C)."
     probability = pair.outlier_probability
     chance = "" if probability is None else f" (outlier probability {plain(100 * probability, 2)} %)"
     return f"{cause.what}{chance}: its radar position {where}. {cause.action}"

@@ -576,6 +576,7 @@ def solved_pair_document(pair: PairResult) -> documents.SolvedPairDocument:
         outlier_probability=finite_or_none(pair.outlier_probability),
         influence=finite_or_none(pair.influence),
         candidate=int(pair.candidate),
+        rival=pair.rival if pair.rival >= 0 else UNSET,
         expected_covariance_px2=nested(pair.expected_covariance_px2),
         sigma_px=measured.sigma_px if measured else None,
         radar_time=measured.radar_time if measured else None,
@@ -602,6 +603,7 @@ def solved_pair_of(document: documents.SolvedPairDocument, *, source: str, place
         outlier_probability=nan_if_none(document.outlier_probability),
         influence=nan_if_none(document.influence),
         candidate=document.candidate,
+        rival=-1 if document.rival is UNSET else document.rival,
         expected_covariance_px2=np.array(document.expected_covariance_px2 or [[np.nan] * 2] * 2),
         image_time=document.image_time,
         measured=_measured(document) if document.candidates else None,
@@ -653,6 +655,8 @@ def _check_candidates(document: documents.SolvedPairDocument, *, source: str, pl
             raise InputError(
                 f"{source}: {place}.candidates[{i}].radar_m: is at the radar's origin; remove the candidate"
             )
+    if document.rival is not UNSET and document.rival >= len(document.candidates):
+        raise InputError(f"{source}: {place}.rival: there is no candidate {document.rival}; remove the rival")
     if not document.candidates:
         return
     chosen = document.candidates[document.candidate] if document.candidate < len(document.candidates) else None

@@ -172,8 +172,9 @@ class CandidateDocument(Struct, frozen=True):
 class SolvedPairDocument(Struct, frozen=True, rename={"chosen": "return"}):
     """One pair under the solved pose; residual_px is projected_px minus pixel_px, distance_px its length.
 
-    sigma_px, radar_time and candidates are the data the pair was solved from; with them it can be solved again. mark and
-    return are those of the click; return is absent unless a person chose one.
+    sigma_px, radar_time and candidates are the data the pair was solved from; with them it can be solved again. rival is the
+    candidate that explains the click as well as the chosen one, if there is one. mark and return are those of the click;
+    return is absent unless a person chose one.
     """
 
     id: Name
@@ -188,6 +189,7 @@ class SolvedPairDocument(Struct, frozen=True, rename={"chosen": "return"}):
     outlier_probability: float | None = None
     influence: float | None = None
     candidate: Count = 0
+    rival: Count | UnsetType = UNSET
     expected_covariance_px2: Matrix22 | None = None
     sigma_px: Positive | None = None
     radar_time: TimeNs | None = None

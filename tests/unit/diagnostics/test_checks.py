@@ -171,6 +171,48 @@ def test_two_radar_positions_that_fit_one_click_are_reported() -> None:
     assert "p1" in warning.message
 
 
+def ambiguous(count: int) -> tuple[SimulatedPairs, list[Pair]]:
+    """Return twelve pairs, so many of them with a second return behind the first."""
+    simulated = simulate_pairs(12, rng=np.random.default_rng(11))
+    pairs = list(simulated.pairs)
+    for i, pair in enumerate(pairs[:count]):
+        chosen = replace(pair.candidates[0], score=0.5)
+        farther = replace(chosen, position_radar_m=1.1 * chosen.position_radar_m)
+        pairs[i] = replace(pair, candidates=(chosen, farther))
+    return simulated, pairs
+
+
+def test_a_click_that_two_returns_fit_does_not_agree_until_one_is_chosen() -> None:
+    simulated, pairs = ambiguous(1)
+    asked, *others = calibrate_pairs(pairs, simulated.camera, measured()).unwrap().pairs
+    assert (asked.inlier, asked.outlier_probability) == (False, 0.5)
+    assert asked.rival == 1 - asked.candidate
+    assert all(other.inlier and other.rival == -1 for other in others)
+    chosen = replace(pairs[0], candidates=pairs[0].candidates[:1])
+    answered = calibrate_pairs([chosen, *pairs[1:]], simulated.camera, measured()).unwrap().pairs[0]
+    assert (answered.inlier, answered.rival) == (True, -1)
+
+
+def test_what_two_returns_do_at_most_placements_keeps_no_click_from_agreeing() -> None:
+    simulated, pairs = ambiguous(8)
+    outcome = calibrate_pairs(pairs, simulated.camera, measured()).unwrap()
+    assert sum(pair.rival >= 0 for pair in outcome.pairs) > 3
+    assert all(pair.inlier for pair in outcome.pairs)
+
+
+def test_a_return_that_another_click_of_the_scene_needs_is_no_rival() -> None:
+    simulated, pairs = ambiguous(1)
+    first, second = pairs[0], pairs[1]
+    needed = replace(second, candidates=(first.candidates[1],), image_time=TimeNs(1), pixel_px=second.pixel_px)
+    camera, pose = simulated.camera, simulated.camera_from_radar
+    pixel_px = camera.project(pose @ first.candidates[1].position_radar_m[None])[0] + [30.0, 0.0]
+    needed = replace(needed, pixel_px=pixel_px)
+    outcome = calibrate_pairs([replace(first, image_time=TimeNs(0)), needed, *pairs[2:]], camera, measured()).unwrap()
+    (result,) = (pair for pair in outcome.pairs if pair.id == first.id)
+    assert result.rival == -1
+    assert result.candidate == 0
+
+
 # A pair that alone determines part of the pose is reported; well-spread placements report none.
 
 

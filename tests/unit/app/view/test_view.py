@@ -9,7 +9,7 @@ from calib_core.association.clustering import candidate_at
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, rotation_exp
-from calib_core.measurements import Stamp, TimeNs, Unpaired, Unsolvable
+from calib_core.measurements import Pair, Stamp, TimeNs, Unpaired, Unsolvable
 from calib_core.options import CalibrationOptions, NoiseOptions
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration, DataWarning, Metrics, PairResult
@@ -17,6 +17,7 @@ from calib_core.results.verdict import verdict_on
 from calib_core.synthetic import simulate_pairs
 from cocalib.session import ClickExcluded, ClickMoved, ClickPlaced, History, RecordingFacts, Solved, Undo, advance
 from cocalib.view import View, summary_lines, view
+from cocalib.view.candidates import click_candidates
 from cocalib.view.click_rows import ellipses_of, reprojections
 from cocalib.view.figures import OPTICAL_FROM_BODY, mounting_of, pose_figures
 from cocalib.view.wording import plain, sentence, with_sigma
@@ -98,6 +99,53 @@ def test_a_solved_session_says_how_many_clicks_agree() -> None:
     four_agree = (*FIVE[:4], pair("c5", inlier=False))
     assert agreeing(shown(5, calibration(*FIVE))) == ("coarse", "5 of 5")
     assert agreeing(shown(5, calibration(*four_agree))) == ("coarse", "4 of 5")
+
+
+def measured_at(name: str, *positions: tuple[float, float, float], **more) -> PairResult:
+    """Return a pair that has the first of some returns."""
+    candidates = tuple(candidate_at(np.array(position), NoiseOptions()) for position in positions)
+    plain_pair = pair(name)
+    kept = Pair(name, plain_pair.pixel_px, candidates)
+    return replace(plain_pair, point_radar_m=np.array(positions[0]), measured=kept, **more)
+
+
+NEAR_M, BEHIND_M = (3.0, 4.0, 0.0), (3.6, 4.8, 0.0)
+
+
+def test_a_click_that_two_returns_fit_asks_for_one_of_them() -> None:
+    asking = measured_at("c5", NEAR_M, BEHIND_M, inlier=False, outlier_probability=0.5, rival=1)
+    seen = shown(5, calibration(*FIVE[:4], asking))
+    assert "1 asks which return is right (C)" in seen.status
+    assert "6.0 m" in seen.clicks[4].note
+    assert "(C)" in seen.clicks[4].note
+    assert not any(line.startswith("disagrees") for line in summary_lines(calibration(*FIVE[:4], asking)))
+    outcome = calibration(*FIVE[:4], asking)
+    session = advance(clicked(5), Solved(5, outcome), FACTS).present
+    assert asking.measured is not None
+    offered = click_candidates(session, asking.measured)
+    assert offered.rows[offered.suggested].position_m == BEHIND_M
+    assert "as well" in offered.suggestion
+
+
+def test_clicks_that_changed_their_return_are_told_until_the_next_answer() -> None:
+    before, after = (calibration(*FIVE[:4], measured_at("c5", at)) for at in (NEAR_M, BEHIND_M))
+    history = advance(clicked(5), Solved(5, before), FACTS)
+    assert "changed" not in view(history, FACTS).status
+    history = advance(
+        advance(history, ClickMoved("c1", (11.0, 20.0)), FACTS), Solved(6, replace(after, checking=True)), FACTS
+    )
+    assert view(history, FACTS).status.endswith("; 1 click changed its return")
+    history = advance(history, Solved(6, after), FACTS)
+    assert view(history, FACTS).status.endswith("; 1 click changed its return")
+    again = advance(history, ClickMoved("c1", (12.0, 20.0)), FACTS)
+    assert "changed" not in view(advance(again, Solved(7, after), FACTS), FACTS).status
+
+
+def test_a_preview_that_the_answer_takes_back_changed_no_return() -> None:
+    before, preview = (calibration(*FIVE[:4], measured_at("c5", at)) for at in (NEAR_M, BEHIND_M))
+    history = advance(advance(clicked(5), Solved(5, before), FACTS), ClickMoved("c1", (11.0, 20.0)), FACTS)
+    history = advance(history, Solved(6, replace(preview, checking=True)), FACTS)
+    assert "changed" not in view(advance(history, Solved(6, before), FACTS), FACTS).status
 
 
 def test_an_excluded_pair_is_not_among_those_that_could_agree() -> None:
