@@ -153,7 +153,7 @@ def test_two_solutions_have_the_figures_of_the_check_command_and_both_are_drawn(
     page.page.set_input_files(".compare input[type=file]", now)
     page.until("document.querySelector('.compare .verdict').textContent.includes('B: now.json')")
     assert figures(page) == printed(now, against=other)
-    assert "95 % uncertainty of both" in page.text(".compare .verdict")
+    assert "95 %" in page.text(".compare .verdict")
     both = image_of(page, "#marks")
     page.value(
         "(() => { const blend = document.querySelector('.blend input'); blend.value = '1'; blend.oninput(); })()"
