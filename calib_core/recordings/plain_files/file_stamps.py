@@ -244,7 +244,7 @@ def _from_table(table: Path, files: Sequence[Path], zone_s: int | None) -> tuple
     if table.stat().st_size > _MAX_TABLE_BYTES:
         return {}, False
     text = table.read_text(encoding="utf-8-sig", errors="replace")
-    by_name = {name: file for file in files for name in (file.stem.lstrip("0"), file.stem, file.name) if name}
+    by_name = {name: file for file in files for name in (file.name, file.stem)}
     rows = [row for row in map(_cells, text.splitlines()) if any(cell.strip() for cell in row)]
     first, time_place, file_place, unit = _places(rows, by_name)
     if time_place < 0:
