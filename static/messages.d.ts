@@ -250,6 +250,7 @@ export interface VerdictRow {
   assumes: string;
   key: "" | "N" | "E" | "J";
   done: boolean;
+  early: boolean;
 }
 
 /** Everything a client draws about the session. */

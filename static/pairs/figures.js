@@ -17,10 +17,11 @@ const systematicWords = make("div", "", []);
 const systematicNote = make("p", "note", "");
 const systematic = make("div", "systematic", []);
 const adviceLine = make("p", "advice", "");
+const assumedLine = make("p", "advice", "");
 const axesLine = make("p", "advice axes", "Relative to the radar's axes: x forward, y left, z up. With all angles at 0, the camera looks along x.");
 
 export function startFigures() {
-  const pose = make("div", "pose", [make("div", "", [poseTable, assumedHead, assumedTable]), axesLine, adviceLine]);
+  const pose = make("div", "pose", [make("div", "", [poseTable, assumedHead, assumedTable]), axesLine, assumedLine, adviceLine]);
   const heads = [["error", ""], ["estimate", "From the pairs, ± one standard deviation"], ["before", "Assumed before any pair: Options"], ["position", "Part of the variance of the position"], ["rotation", "Part of the variance of the rotation"]];
   const head = make("tr", "", heads.map(([name, hint]) => hinted(make("th", "", name), hint)));
   systematic.append(make("div", "pose-head", "Errors that all pairs share"), systematicWords, make("table", "", [make("thead", "", [head]), systematicTable]), systematicNote);
@@ -42,6 +43,7 @@ function draw() {
   assumedTable.replaceChildren(...view.pose_assumed.map(row));
   drawSystematic(view.systematic_errors);
   adviceLine.textContent = view.advice?.words ?? "";
+  assumedLine.textContent = view.verdict.assumes;
   drawReference(view);
 }
 
@@ -134,17 +136,17 @@ function drawVerdict() {
   box.hidden = !view || state.looking;
   if (!view || state.looking) return;
   box.classList.toggle("stale", view.solving && view.has_calibration);
-  const { level, line, assumes } = view.verdict;
+  const { level, line, early, assumes } = view.verdict;
   const aed = view.metrics.find((figure) => figure.key === "aed");
-  const text = JSON.stringify([level, line, assumes, aed]);
+  const text = JSON.stringify([level, line, early, assumes, aed]);
   if (text === drawn) return;
   drawn = text;
-  box.dataset.level = level;
+  box.dataset.level = early ? "early" : level;
   box.dataset.hint = [line, assumes].filter(Boolean).join("\n");
-  const rest = line.startsWith(level) ? line.slice(level.length) : ` ${line}`;
+  const words = line.startsWith(level) ? [make("strong", "", level), line.slice(level.length)] : [line];
   const told = aed && view.clicks.filter((click) => click.state === "inlier").length >= TELLING ? [make("span", "aed", [make("small", "", "AED "), `${aed.value} ${aed.unit}`])] : [];
   for (const one of told) one.dataset.hint = aed?.hint;
-  box.replaceChildren(shape(level), make("p", "line", [make("strong", "", level), rest, ...(assumes ? [make("small", "assumes", ` ${assumes}`)] : [])]), ...told);
+  box.replaceChildren(shape(early ? "nothing" : level), make("p", "line", words), ...told);
 }
 
 /** @param {VerdictRow["level"]} level */

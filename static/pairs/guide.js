@@ -7,10 +7,11 @@ import { proposalAdvice, proposalWords, silentWords } from "../proposals/words.j
 import { act, actionNamed } from "../shell/actions.js";
 import { make } from "../shell/notices.js";
 import { clickIn, clicks, isDismissed, isOffered, on, placementAt, placementsAt, state } from "../shell/state.js";
+import { goToPair } from "./pairs.js";
 
 const guide = /** @type {HTMLElement} */ (document.getElementById("guide"));
 
-/** A key and what it does; with an action it can be pressed here too. @typedef {{key: string, label: string, action?: string}} Key */
+/** A key and what it does; with an action it can be pressed here too, and a pair is gone to. @typedef {{key: string, label: string, action?: string, pair?: string}} Key */
 /** Text with keys in between. @typedef {(string|Key)[]} Words */
 /** What the line says; `act` if something is to be done in this frame. @typedef {{text: Words, act: boolean}} Advice */
 
@@ -19,12 +20,12 @@ export function startGuide() {
 }
 
 /** The focus stays where it is. @param {Key} key */
-function keyPart({ key, label, action }) {
-  const parts = [make("kbd", "key", key), label];
-  if (!action) return make("span", "", parts);
+function keyPart({ key, label, action, pair }) {
+  const parts = [...(key ? [make("kbd", "key", key)] : []), label];
+  if (!action && !pair) return make("span", "", parts);
   const button = make("button", "do", parts);
   button.onmousedown = (event) => event.preventDefault();
-  button.onclick = () => act(actionNamed(action));
+  button.onclick = () => (pair ? goToPair(pair) : act(actionNamed(action ?? "")));
   return button;
 }
 
@@ -107,6 +108,8 @@ function nextAction() {
   if (guesses && !state.placements.some(isOffered)) return [`${guesses} ${guesses > 1 ? "marks are guesses" : "mark is a guess"} and ${guesses > 1 ? "do" : "does"} not count: move ${guesses > 1 ? "each" : "it"} to the inner corner`];
   if (done) return ["Done.", { key: "E", label: "export", action: "export" }];
   if (key === "N") return [{ key, label: proposalAdvice(), action: "next-placement" }];
+  const named = view.verdict.level === "contradictory" ? view.clicks.find(({ id }) => new RegExp(`\\b${id}\\b`).test(action)) : undefined;
+  if (named) return [action, { key: "", label: `show ${named.id}`, pair: named.id }];
   if (key === "J") return [action, { key, label: "show it", action: "worst" }];
   if (view.clicks.length) return [action];
   if (!state.placementsKnown) return ["Looking for the places where the reflector stood. You can click meanwhile"];

@@ -53,8 +53,15 @@ export function nextWorst() {
   const at = lastVisited === state.selected ? ranked.findIndex((click) => click.id === lastVisited) : -1;
   const next = ranked[(at + 1) % ranked.length];
   lastVisited = next.id;
-  comeTo(next.frame);
-  select(next.id);
+  goToPair(next.id);
+}
+
+/** @param {string} id of a click */
+export function goToPair(id) {
+  const click = clicks().find((one) => one.id === id);
+  if (!click) return;
+  comeTo(click.frame);
+  select(id);
 }
 
 function draw() {

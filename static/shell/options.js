@@ -121,7 +121,7 @@ function control(field) {
   input.id = idOf(field);
   input.onchange = () => change(field.path, field.kind === "integer" ? Math.round(Number(input.value)) : Number(input.value));
   writers.set(field.path, (value) => write(input, value));
-  return row(field, make("span", "control", [input, make("span", "unit", field.unit)]));
+  return row(field, make("span", "control", [input, make("span", "unit", field.unit === "deg" ? "°" : field.unit)]));
 }
 
 /** @param {Field} field */

@@ -119,6 +119,7 @@ def test_dragging_away_from_a_mark_pans_and_places_nothing(page: Driver) -> None
 def test_keys_walk_frames_placements_and_overlays(page: Driver) -> None:
     page.until("__cocalib.state.placements.length > 2")
     frames = page.value("__cocalib.state.placements.map((placement) => placement.frame)")
+    page.go_to(0)
     for key, expected in (("ArrowRight", 1), ("Shift+ArrowRight", 11), ("ArrowLeft", 10), ("Home", 0), ("n", frames[0]),
                           ("n", frames[1]), ("p", frames[0]), ("p", frames[-1])):  # fmt: skip
         page.press(key)

@@ -181,6 +181,7 @@ FULLY_IN_SIGHT = """(selector) => { const box = document.getElementById("page-ma
 def test_ten_pairs_or_four_and_six_returns_are_in_sight_beside_seven_warnings(page: Driver, truth: Any) -> None:
     page.until("__cocalib.state.placementsKnown")
     page.load_sample(truth, 12)
+    page.until("!__cocalib.state.view.checking")
     page.page.evaluate(
         "async () => { const { emit, state } = await import('/shell/state.js'); const words = 'a warning that takes a line';"
         "const seven = [1, 2, 3, 4, 5, 6, 7].map((n) => ({ code: `code-${n}`, message: `${words} ${n}`, hint: words }));"

@@ -129,7 +129,7 @@ def test_twenty_placements_take_at_most_160_keys(page: Driver, truth: Any) -> No
                 int(np.clip(np.floor((wanted[axis] - field["uv"[axis]]) / field[size] * 3 + 1.5), 0, 2))
                 for axis, size in ((0, "wide"), (1, "high"))
             )
-            page.page.keyboard.press(str(7 - 3 * row + column))
+            page.page.keyboard.press(str(1 + 3 * row + column))
             keys += 1
         page.press("Enter")
         mark = page.value("__cocalib.clicksIn(__cocalib.state.cursor)[0]")

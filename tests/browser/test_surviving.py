@@ -107,7 +107,7 @@ def test_names_in_a_recording_are_text_and_never_run(open_page: Callable[..., Dr
         assert page.value("document.getElementById('recording-name').textContent") == f"name{hostile}"
         page.page.keyboard.press("Escape")
         page.page.click("#choose-recording")
-        assert hostile in page.text("#opening-dialog .reading")
+        assert hostile in page.page.text_content("#opening-dialog .reading")
         assert page.page.locator("img").count() == 0
 
 

@@ -197,7 +197,7 @@ def _figures(boxes: BoxFigures) -> tuple[Figure, ...]:
             "by chance",
             "–" if chance is None else f"{100 * chance:.0f}",
             "%",
-            "Acc of the same calibration turned by 10 deg to either side.",
+            "Acc of the same calibration turned by 10° to either side.",
         ),
     )
 

@@ -10,7 +10,16 @@ from calib_core.association.placement_groups import linked_clicks
 from calib_core.association.placements import Placement
 from calib_core.measurements import MIN_PAIRS, Unpaired, Unsolvable
 from calib_core.results import Calibration, DataWarning, NextPlacement
-from calib_core.results.verdict import ALL_CLICKED, DONE, Verdict, by_consequence, placement_words, verdict_on
+from calib_core.results.verdict import (
+    ALL_CLICKED,
+    DONE,
+    SURE_PAIRS,
+    Verdict,
+    by_consequence,
+    consequence_of,
+    placement_words,
+    verdict_on,
+)
 from cocalib.session import History, RecordingFacts, Session
 from cocalib.session.boxes_in_frames import CarriedTrack, carried_tracks
 from cocalib.view.box_rows import box_rows, known_labels
@@ -27,7 +36,7 @@ from cocalib.view.figures import (
 )
 from cocalib.view.model import AccPanel, Advice, AssumptionRow, Figure, Stage, SystematicErrorTable, VerdictRow, View
 from cocalib.view.reference import Reference, comparison_figures, reference_words, shown_calibration
-from cocalib.view.wording import plain, sentence, warning_in_sentences
+from cocalib.view.wording import plain, sentence, warning_in_sentences, with_degree_signs
 
 _WITHOUT_PICTURES = (
     "No camera in this recording: nothing can be clicked",
@@ -142,7 +151,8 @@ def _words(session: Session, stage: Stage, reference: Reference | None, verdict:
     if isinstance(outcome, Unsolvable):
         return sentence(outcome.reason), sentence(outcome.hint)
     if isinstance(outcome, Calibration):
-        return _agreement(outcome, f"{verdict.level.capitalize()}:") + _changed(session), sentence(verdict.action)
+        said = _early_line(session) or _agreement(outcome, f"{verdict.level.capitalize()}:")
+        return said + _changed(session), sentence(verdict.action)
     return "", ""
 
 
@@ -262,15 +272,41 @@ def _shown_verdict(session: Session, facts: RecordingFacts, placements: Sequence
 
 
 def verdict_row(verdict: Verdict, session: Session, placements: Sequence[Placement] | None) -> VerdictRow:
-    """Return the verdict for the page."""
+    """Return the verdict for the page; as long as only more pairs are missing, how many there are."""
+    left = placements_left(session, placements)
+    early = "" if verdict.level in ("good", "usable") else _early_line(session)
     return VerdictRow(
         level=verdict.level,
-        line=verdict.line,
+        line=early or with_degree_signs(verdict.line),
         action=sentence(verdict.action),
         assumes=f"Assuming {verdict.assumes}." if verdict.assumes else "",
-        key=_key(verdict, session, placements_left(session, placements)),
+        key="N" if early and left else _key(verdict, session, left),
         done=_is_done(verdict),
+        early=early != "",
     )
+
+
+_MORE_PAIRS_DECIDE = ("few-pairs", "weak-geometry", "one-pair-decides", "two-poses", "handedness-open")
+
+
+def _early_line(session: Session) -> str:
+    """Return how many pairs there are of those that the verdict needs; "" if there are enough, or something else is wrong.
+
+    With fewer, a second pose that fits is what few pairs look like: it contradicts nothing until they are enough.
+    """
+    outcome = session.outcome if session.clicks else None
+    if outcome is None:
+        return "" if session.clicks else "No clicks yet"
+    if isinstance(outcome, Unsolvable):
+        waits = outcome.code == "too-few-pairs" and not outcome.unpaired
+        return f"{len(outcome.pairs)} of {SURE_PAIRS} pairs" if waits else ""
+    used = [pair for pair in outcome.pairs if not pair.excluded]
+    grave = [one.code for one in outcome.warnings if consequence_of(one.code) not in ("limited", "note")]
+    sound = all(pair.inlier for pair in used) and all(code in _MORE_PAIRS_DECIDE for code in grave)
+    if not outcome.options.models_noise or len(used) >= SURE_PAIRS or not sound:
+        return ""
+    seems = "two answers fit so far" if "two-poses" in grave else "looks consistent"
+    return f"{len(used)} of {SURE_PAIRS} pairs, {seems}"
 
 
 def _is_done(verdict: Verdict) -> bool:

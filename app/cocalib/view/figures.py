@@ -90,7 +90,7 @@ def _mounting_figures(calibration: Calibration) -> tuple[Figure, ...]:
     degrees, sigmas_deg = np.rad2deg(mounting.roll_pitch_yaw_rad), np.rad2deg(angle_sigma_rad)
     return (
         *(_directed(*row, "cm", of_position) for row in zip(_POSITION, centimetres, sigmas_cm, strict=True)),
-        *(_directed(*row, "deg", of_rotation) for row in zip(_ANGLES, degrees, sigmas_deg, strict=True)),
+        *(_directed(*row, "°", of_rotation) for row in zip(_ANGLES, degrees, sigmas_deg, strict=True)),
     )
 
 
@@ -125,7 +125,7 @@ def _radar_figures(calibration: Calibration) -> tuple[Figure, ...]:
         f"{plain(angle_map.corrected_aed_px)} px, each pair being corrected from the other pairs only."
     )
     return (
-        Figure("radar_angles", "radar angle error", f"up to {plain(np.rad2deg(angle_map.largest_rad))}", "deg", hint),
+        Figure("radar_angles", "radar angle error", f"up to {plain(np.rad2deg(angle_map.largest_rad))}", "°", hint),
     )
 
 

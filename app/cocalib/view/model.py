@@ -158,6 +158,7 @@ class VerdictRow:
         assumes: what the stated error rests on and no pair can show, as a sentence; "" if there is nothing.
         key: of the page, that does or begins it; "" if there is none.
         done: nothing more is needed.
+        early: nothing is wrong, there are only fewer pairs than the verdict needs; the line counts them.
     """
 
     level: VerdictLevel
@@ -166,6 +167,7 @@ class VerdictRow:
     assumes: str = ""
     key: Literal["", "N", "E", "J"] = ""
     done: bool = False
+    early: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -320,4 +322,4 @@ class View:
     box_labels: tuple[str, ...] = ()
     acc: AccPanel = field(default_factory=AccPanel)
     systematic_errors: SystematicErrorTable = field(default_factory=SystematicErrorTable)
-    verdict: VerdictRow = VerdictRow("nothing", "nothing yet", "")
+    verdict: VerdictRow = VerdictRow("nothing", "No clicks yet", "", early=True)

@@ -51,7 +51,7 @@ def comparison_figures(reference: Reference, calibration: Calibration) -> tuple[
             "rotation_apart",
             "rotation",
             with_sigma(both.rotation_deg, both.rotation_sigma_deg),
-            "deg",
+            "°",
             f"Angle between the solved rotation and the one from {reference.name}, ± the standard deviation of this "
             "difference according to the known covariances.",
         ),

@@ -138,14 +138,14 @@ def _no_camera() -> Markup:
 def _error_bars(calibration: Calibration) -> Markup:
     heading = tag("h3", "Mounting and its error")
     if not np.isfinite(calibration.covariance).all():
-        shown = [one for one in pose_figures(calibration) if one.unit in ("cm", "deg")]
+        shown = [one for one in pose_figures(calibration) if one.unit in ("cm", "°")]
         return tag(
             "div",
             heading,
             _table(("camera", ""), [(one.label, f"{one.value} {one.unit}") for one in shown]),
             tag("p", "No error bars: this calibration states no covariance.", class_="note"),
         )
-    shown = [one for one in pose_figures(calibration) if one.unit in ("cm", "deg") and one.key != "radar_angles"]
+    shown = [one for one in pose_figures(calibration) if one.unit in ("cm", "°") and one.key != "radar_angles"]
     keys = [one.key for one in shown]
     rows = [(one.label, f"{one.value} {one.unit}") for one in shown]
     assumed = ", ".join(f"{one.label} {one.value} {one.unit}" for one in assumed_figures(calibration))

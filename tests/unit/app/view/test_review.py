@@ -12,6 +12,7 @@ from calib_core.results import Calibration
 from calib_core.synthetic import SimulatedPairs, simulate_pairs
 from cocalib.session import ClickPlaced, History, RecordingFacts, Solved, advance
 from cocalib.view.review import compared, pair_review, previous_calibration, review_of, solution_of
+from cocalib.view.wording import sentence
 
 
 @pytest.fixture(scope="module")
@@ -127,7 +128,7 @@ def test_a_difference_is_judged_as_the_check_command_judges_it(solved: Calibrati
         report = check(imported(CalibrationFile(other)), against=imported(CalibrationFile(solved)))
         assert report.judgement is not None
         assert report.judgement.agree == agree
-        assert both.verdict == f"The two {'agree' if agree else 'differ'}: {report.judgement.text}."
+        assert both.verdict == sentence(f"the two {'agree' if agree else 'differ'}: {report.judgement.text}")
 
 
 def test_a_solution_without_pairs_draws_those_of_the_other(solved: Calibration) -> None:

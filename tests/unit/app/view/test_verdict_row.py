@@ -1,17 +1,19 @@
 """The verdict on the page: its key, when it says done, and how many placements are left."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from calib_core.association.placements import Placement
-from calib_core.measurements import ReflectorClick, TimeNs
+from calib_core.measurements import DataWarning, ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions, NoiseOptions
 from calib_core.results.verdict import DONE, Verdict
 from cocalib.session import ClickPlaced, History, PlacementDismissed, RecordingFacts, Session, advance
 from cocalib.view.build import placements_left, verdict_row
 from cocalib.view.click_rows import disagreement
+from tests.unit.app.view.test_view import FIVE, calibration, pair, shown
 
 FACTS = RecordingFacts("drive", 1_000_000_000 * np.arange(50), width_px=640, height_px=480)
 
@@ -48,7 +50,27 @@ def test_a_mark_that_nobody_has_touched_leaves_its_placement_to_be_clicked() -> 
 def test_done_is_said_with_the_key_that_exports() -> None:
     row = verdict_row(Verdict("good", "0.3 deg, 3 cm (95 %)", DONE), Session(), None)
     assert (row.done, row.key, row.action) == (True, "E", f"{DONE}.")
-    assert row.line == "good to 0.3 deg, 3 cm (95 %)"
+    assert row.line == "good to 0.3°, 3 cm (95 %)"
+
+
+TWO_POSES = DataWarning("two-poses", "another pose explains the pairs almost as well", "check the return of c2")
+MIRRORED = DataWarning("mirrored-axes", "an axis is mirrored", "turn it round")
+
+
+@pytest.mark.parametrize(
+    ("pairs", "warnings", "line"),
+    [
+        (FIVE, (), "5 of 8 pairs, looks consistent"),
+        (FIVE, (TWO_POSES,), "5 of 8 pairs, two answers fit so far"),
+        ((*FIVE[:4], pair("c5", inlier=False)), (), ""),
+        (FIVE, (MIRRORED,), ""),
+    ],
+)
+def test_few_pairs_that_agree_are_counted_and_what_is_wrong_is_said(pairs: Any, warnings: Any, line: str) -> None:
+    found = calibration(*pairs)
+    row = shown(5, replace(found, warnings=warnings)).verdict
+    assert row.early == (line != "")
+    assert row.line == line or not row.early
 
 
 @pytest.mark.parametrize(

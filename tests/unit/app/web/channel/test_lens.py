@@ -179,7 +179,7 @@ def test_intrinsics_are_shown_with_what_is_known_of_them() -> None:
         ("fy", "500.0 ± 0.5", "px"),
     ]
     assert table.known
-    assert table.field == "65.2 x 51.3 deg"
+    assert table.field == "65.2° x 51.3°"
     unknown = camera_table(Camera("pinhole", 640, 480, MATRIX), "camera.yaml")
     assert unknown.parameters[0].value == "500.000"
     assert not unknown.known
