@@ -13,7 +13,7 @@ from benchmarks.accuracy.defects.crying_wolf import measure_apart
 from benchmarks.accuracy.defects.flat_radars import measure_flat
 from benchmarks.accuracy.defects.handedness import Hand, measure_hand
 from benchmarks.accuracy.defects.shared_errors import Shared, draw_shared, measure_clean, measure_shared
-from benchmarks.accuracy.defects.two_reflectors import measure_two
+from benchmarks.accuracy.defects.two_reflectors import measure_returns, measure_two
 from benchmarks.accuracy.outcomes import codes_in, outcome_figures, quantile_999, silently_wrong, solved_or_refused
 from benchmarks.accuracy.rows import Figures
 from calib_core.errors import InputError
@@ -104,6 +104,14 @@ def test_a_flat_radars_placements_are_in_view_whatever_its_tilt() -> None:
         forward = simulated.rig.radar_from_world.inverse().rotation[:, 0]
         tilts.append(np.rad2deg(np.arcsin(-forward[2])))
     assert np.std(tilts) > 3.0
+
+
+@pytest.mark.slow
+def test_returns_of_two_reflectors_are_counted_by_click() -> None:
+    measured = measure_returns("two-reflectors-close", 0)
+    assert measured["clicks"] == 20.0
+    assert measured["wrong"] is not None
+    assert (measured["wrong_agreeing"] or 0.0) <= measured["wrong"] <= 1.0
 
 
 def test_placements_of_a_recording_are_counted_once() -> None:
