@@ -23,7 +23,6 @@ from calib_core.estimation.best_fit import BestFit, best_fit, quick_fit
 from calib_core.estimation.beyond_the_fit import look_beyond
 from calib_core.estimation.covariance import PoseCovariance, pose_covariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
-from calib_core.estimation.influential_pairs import average_over_influential_pairs, find_influential_pairs
 from calib_core.estimation.leave_one_out import LeaveOneOut, leave_one_out
 from calib_core.estimation.measured_position import contradicted_position
 from calib_core.estimation.measurement_model import PairMeasurements, pair_measurements
@@ -338,22 +337,18 @@ def _answer(task: _Task, groups: Sequence[PlacementGroup], measurements: PairMea
     rotation_sigma_rad = float(np.sqrt(solution.uncertainty.covariance[3:, 3:].diagonal().max()))
     if not rotation_sigma_rad < _UNDETERMINED_ROTATION_RAD:
         return _explained(unsolved.degenerate(len(used)), used, measurements, options)
-    influential = find_influential_pairs(measurements, solution.refined, solution.uncertainty)
     beyond = look_beyond(measurements, solution.refined, solution.uncertainty, fit.found, seed=options.solving.seed)
-    refined, uncertainty = average_over_influential_pairs(beyond.refined, beyond.uncertainty, influential)
-    solution = replace(solution, refined=refined, uncertainty=uncertainty)
+    solution = replace(solution, refined=beyond.refined, uncertainty=beyond.uncertainty)
     calibration = _described(task, groups, measurements, solution)
     metrics = calibration.metrics
     solved_fit = SolvedFit(
         ids=tuple(pair.id for pair in used),
         measurements=measurements,
-        refined=refined,
-        uncertainty=uncertainty,
+        refined=solution.refined,
+        uncertainty=solution.uncertainty,
         left_out=solution.left_out,
-        influential_pairs=influential,
-        inliers=refined.inliers,
-        alternatives=fit.found,
-        mirror_gain=fit.mirror_gain,
+        inliers=solution.refined.inliers,
+        best=fit,
         chi2_per_degree=metrics.chi2 / max(metrics.degrees_of_freedom, 1),
         options=options,
         beyond=beyond,

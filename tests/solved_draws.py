@@ -35,15 +35,20 @@ class SolvedDraw:
 
 
 def solve_draw(
-    simulated: SimulatedPairs, *, pairs: Sequence[Pair] | None = None, tape: bool = False, estimate_scale: bool = True
+    simulated: SimulatedPairs,
+    *,
+    pairs: Sequence[Pair] | None = None,
+    tape: bool = False,
+    estimate_scale: bool = True,
+    exact: bool = True,
 ) -> SolvedDraw:
-    """Fit simulated pairs of exact instruments, or others with the same camera, as the default method does."""
-    prior = CameraPositionPrior((0.0, 0.0, 0.045), 0.01) if tape else None
+    """Fit simulated pairs, or others with the same camera, as the default method does, told whether the instruments are exact."""
+    prior = CameraPositionPrior((0.0, 0.0, 0.045)) if tape else None
     options = CalibrationOptions(
         noise=NoiseOptions(estimate_scale=estimate_scale), solving=SolvingOptions(camera_position=prior)
     )
-    exact = without_systematic_errors(options)
-    measurements = pair_measurements(simulated.pairs if pairs is None else pairs, simulated.camera, exact)
+    options = without_systematic_errors(options) if exact else options
+    measurements = pair_measurements(simulated.pairs if pairs is None else pairs, simulated.camera, options)
     starts = initial_poses(measurements, most=6, rng=np.random.default_rng(1))
     found = solve_gnc(measurements, starts, estimate_scale=estimate_scale)
     refined = fit_errors_in_variables(measurements, found[0], estimate_scale=estimate_scale)

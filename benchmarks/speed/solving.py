@@ -56,7 +56,7 @@ def _ours(pairs: tuple[Pair, ...], simulated: SimulatedPairs) -> dict[str, Calla
 
 
 def _one_click_off() -> dict[str, Callable[[], object]]:
-    """Move one click of twenty right pairs: influential pairs are left out by full fits, which take extra time."""
+    """Move one click of twenty right pairs."""
     simulated = simulate_pairs(20, rng=np.random.default_rng(20), noise="ti")
     first, *others = simulated.pairs
     moved = dataclasses.replace(first, pixel_px=first.pixel_px + np.array([_MOVED_PX, 0.0]))

@@ -6,12 +6,13 @@ A check returns an empty list if all is well. The texts are for people; the code
 import numpy as np
 
 from calib_core.association.clustering import CLUSTER_SCALE
-from calib_core.diagnostics.handedness import assumed_axes, mirrored_axes
+from calib_core.diagnostics.handedness import handedness
 from calib_core.diagnostics.intrinsics import intrinsics, lens_or_scale, refined_too_far
-from calib_core.diagnostics.pairs import ambiguous_candidates, contradicted_pairs, decisive_pair, listed, pivotal_pair
+from calib_core.diagnostics.pairs import ambiguous_candidates, decisive_pair, listed, pivotal_pair
 from calib_core.diagnostics.pose import agreeing_outliers, camera_position, possible_poses, two_poses
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.diagnostics.uncertainty_map import picture_sigma_px
+from calib_core.estimation.beyond_the_fit import NARROW_CONDITION
 from calib_core.estimation.covariance import PoseCovariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.plausibility import PIXELS_SUSPECTED, implausible_input
@@ -21,7 +22,6 @@ from calib_core.results import DataWarning
 from calib_core.results.radar_axes import sigma_in_radar_axes, without_mounting
 from calib_core.results.systematic_errors import systematic_error_warnings
 
-_NARROW_CONDITION = 5e5
 _WEAK_ROTATION_RAD = np.deg2rad(2.5)
 _WEAK_POSITION_M = 0.3
 _NOISE_EXCESS = 2.5
@@ -38,7 +38,7 @@ def warnings_of(fit: SolvedFit) -> tuple[DataWarning, ...]:
     points = cartesian_from_polar(fit.measurements.polar)
     suspected = implausible_input(fit.ids, points, fit.measurements.pixels_px, fit.measurements.camera, fit.options)
     checks = (
-        mirrored_axes,
+        handedness,
         _other_poses,
         camera_position,
         _flat_radar,
@@ -51,11 +51,9 @@ def warnings_of(fit: SolvedFit) -> tuple[DataWarning, ...]:
         _weak_geometry,
         _same_places,
         ambiguous_candidates,
-        contradicted_pairs,
         pivotal_pair,
         agreeing_outliers,
         decisive_pair,
-        assumed_axes,
     )
     wrong_pixels = any(warning.code == PIXELS_SUSPECTED for warning in suspected)
     found = [warning for check in checks for warning in check(fit)]
@@ -148,7 +146,7 @@ def _weak_geometry(fit: SolvedFit) -> list[DataWarning]:
         covariance = without_mounting(refined.camera_from_radar, covariance, refined.placements_z_m, fit.options.radar)
     sigma = np.sqrt(np.diag(covariance))
     rotation_rad, position_m = float(np.linalg.norm(sigma[3:])), float(np.linalg.norm(sigma[:3]))
-    narrow = fit.uncertainty.condition > _NARROW_CONDITION and not fit.measurements.prior.measured
+    narrow = fit.uncertainty.condition > NARROW_CONDITION and not fit.measurements.prior.measured
     if rotation_rad <= _WEAK_ROTATION_RAD and position_m <= _WEAK_POSITION_M and not narrow:
         return []
     range_m, azimuth_rad, _ = fit.measurements.polar[fit.refined.rows[fit.inliers]].T

@@ -88,8 +88,11 @@ class GroundSides:
         return float(np.sign(radar * camera) * min(abs(radar), abs(camera)))
 
 
-def mirrored_axes(fit: SolvedFit) -> list[DataWarning]:
-    """Warn if mirrored radar axes are more likely, or about as likely."""
+def handedness(fit: SolvedFit) -> list[DataWarning]:
+    """Warn if mirrored radar axes are more likely, or about as likely, or ruled out by the expected camera distance only.
+
+    They are fitted only if the sides of the plane on which radar and camera are do not tell.
+    """
     if fit.measurements.flat:
         return []  # a mirrored axis is then a rotation, which the pose absorbs
     plane = _plane(fit)
@@ -100,16 +103,17 @@ def mirrored_axes(fit: SolvedFit) -> list[DataWarning]:
         return []
     if sides is not None and sides.opposite and not heights_decide:
         return [_on_other_side(sides)]
-    if fit.mirror_gain > MIRRORED_GAIN:
+    gain = fit.best.mirror_gain(fit.options)
+    if gain > MIRRORED_GAIN:
         return [
             DataWarning(
                 "mirrored-axes",
                 "pairs and expected camera position agree better with one radar axis mirrored "
-                f"(log-likelihood ratio {fit.mirror_gain / 2:.1f}): the radar's axes look left-handed",
+                f"(log-likelihood ratio {gain / 2:.1f}): the radar's axes look left-handed",
                 _FLIP,
             )
         ]
-    if fit.mirror_gain > NOT_MIRRORED_GAIN or (sides is not None and sides.opposite):
+    if gain > NOT_MIRRORED_GAIN or (sides is not None and sides.opposite):
         return [
             DataWarning(
                 "handedness-open",
@@ -117,17 +121,8 @@ def mirrored_axes(fit: SolvedFit) -> list[DataWarning]:
                 "measure the camera position with a tape, or add placements at other heights (a tripod)",
             )
         ]
-    return []
-
-
-def assumed_axes(fit: SolvedFit) -> list[DataWarning]:
-    """Warn if only the expected camera distance, and not the pairs, rules out mirrored axes."""
-    already_warned = fit.mirror_gain > NOT_MIRRORED_GAIN or fit.measurements.flat
-    prior, plane = fit.measurements.prior, _plane(fit)
-    if already_warned or prior.measured or _heights_decide(plane):
-        return []
-    sides = _expected_sides(plane, fit)
-    if sides is not None and (sides.same or sides.opposite):
+    prior = fit.measurements.prior
+    if prior.measured or heights_decide or (sides is not None and sides.same):
         return []
     return [
         DataWarning(

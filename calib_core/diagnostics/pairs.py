@@ -1,4 +1,4 @@
-"""Warnings about single pairs: ambiguous candidates, influential pairs, and pairs that no other pair checks."""
+"""Warnings about single pairs: ambiguous candidates, the pivotal pair, and pairs that no other pair checks."""
 
 from collections.abc import Sequence
 
@@ -26,24 +26,10 @@ def ambiguous_candidates(fit: SolvedFit) -> list[DataWarning]:
     ]
 
 
-def contradicted_pairs(fit: SolvedFit) -> list[DataWarning]:
-    """Name the influential pairs: the pose depends on them, and the other pairs contradict them."""
-    return [
-        DataWarning(
-            "doubtful-pair",
-            f"without {fit.ids[influential.pair]} the camera moves {50 * influential.camera_move_m:.0f} cm, and the other "
-            f"pairs predict it {influential.standard_deviations:.1f} standard deviations from its click; the stated pose is "
-            "midway between the poses with and without it, and its uncertainty covers both",
-            f"check the click of {fit.ids[influential.pair]}: correct it, exclude it, or add placements near it",
-        )
-        for influential in fit.influential_pairs
-    ]
-
-
 def pivotal_pair(fit: SolvedFit) -> list[DataWarning]:
     """Name the pair without which the others, judged anew, agree on another pose."""
     found = fit.beyond.pivotal
-    if found is None or any(influential.pair == found.pair for influential in fit.influential_pairs):
+    if found is None:
         return []
     name = fit.ids[found.pair]
     changed = f", and {listed([fit.ids[i] for i in found.switched])} would change sides" if found.switched else ""
@@ -63,7 +49,7 @@ def decisive_pair(fit: SolvedFit) -> list[DataWarning]:
         return []
     loss = _losses(fit)
     most = int(np.argmax(loss))
-    if loss[most] < _DECISIVE_LOSS or any(influential.pair == most for influential in fit.influential_pairs):
+    if loss[most] < _DECISIVE_LOSS:
         return []
     return [
         DataWarning(

@@ -27,7 +27,7 @@ def two_poses(fit: SolvedFit) -> list[DataWarning]:
     A plane seen from far away has two poses, and so have returns with a constant companion. The scores of the candidates are
     left out of one comparison: what makes the companion echo more than the reflector does so at every placement.
     """
-    for other in fit.alternatives[1:]:
+    for other in fit.best.found[1:]:
         if not on_rig(fit, other.camera_from_radar):
             continue
         error = other.camera_from_radar.error_from(fit.refined.camera_from_radar)
@@ -38,7 +38,7 @@ def two_poses(fit: SolvedFit) -> list[DataWarning]:
             f"{np.rad2deg(np.linalg.norm(error[3:])):.1f} deg and {_moved_m(fit, other):.2f} m away ({sigmas:.0f} standard "
             "deviations)"
         )
-        if min(other.cost - fit.alternatives[0].cost, _cost_without_scores(fit, other)) < _ALMOST_AS_LIKELY:
+        if min(other.cost - fit.best.found[0].cost, _cost_without_scores(fit, other)) < _ALMOST_AS_LIKELY:
             return [_two_poses(fit, other, away)]
         if _cost_without_prior(fit, other) < _ALMOST_AS_LIKELY:
             return [_assumed_distance(fit, other, away)]
@@ -79,7 +79,7 @@ def _two_poses(fit: SolvedFit, other: GncSolution, away: str) -> DataWarning:
 
 def _assumed_distance(fit: SolvedFit, other: GncSolution, away: str) -> DataWarning:
     here_m, there_m = (
-        float(np.linalg.norm(_camera_centre(one.camera_from_radar))) for one in (fit.alternatives[0], other)
+        float(np.linalg.norm(_camera_centre(one.camera_from_radar))) for one in (fit.best.found[0], other)
     )
     return DataWarning(
         "camera-far-away",
@@ -111,7 +111,7 @@ def _cost_without_prior(fit: SolvedFit, other: GncSolution) -> float:
         return np.inf
     by_pairs = [
         one.cost - float(prior.costs(one.camera_from_radar.rotation, one.camera_from_radar.translation_m))
-        for one in (other, fit.alternatives[0])
+        for one in (other, fit.best.found[0])
     ]
     return by_pairs[0] - by_pairs[1]
 

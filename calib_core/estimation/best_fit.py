@@ -89,12 +89,21 @@ class BestFit:
     Attributes:
         refined: the fit.
         found: the GNC solutions of all starts, the most likely first.
-        mirror_gain: gain in twice the log-likelihood with mirrored radar axes; negative if they fit worse.
+        measurements: all pairs with the assumed noise.
     """
 
     refined: ErrorsInVariablesFit
     found: tuple[GncSolution, ...]
-    mirror_gain: float
+    measurements: PairMeasurements
+
+    def mirror_gain(self, options: CalibrationOptions) -> float:
+        """Return the gain in twice the log-likelihood with mirrored radar axes; negative if they fit worse."""
+        if _clearly_not_mirrored(self.measurements, self.refined):
+            return -np.inf
+        few = _some_pairs(self.measurements)
+        plain = self.refined if few is self.measurements else None
+        estimate_scale, seed = options.noise.estimate_scale, options.solving.seed
+        return mirror_gain(few, self.found[0], plain=plain, estimate_scale=estimate_scale, seed=seed)
 
 
 def best_fit(measurements: PairMeasurements, options: CalibrationOptions) -> BestFit | Unsolvable:
@@ -107,15 +116,12 @@ def best_fit(measurements: PairMeasurements, options: CalibrationOptions) -> Bes
     if not found:
         return degenerate(len(measurements))
     refined = fit_errors_in_variables(measurements, found[0], estimate_scale=estimate_scale)
-    gain = -np.inf
-    if not _clearly_not_mirrored(measurements, refined):
-        fitted = refined if few is measurements else None
-        gain = mirror_gain(few, found[0], plain=fitted, estimate_scale=estimate_scale, seed=seed)
+    best = BestFit(refined, found, measurements)
     inliers = int(refined.inliers.sum())
     if inliers < MIN_PAIRS:
         reason = f"only {inliers} of {len(measurements)} pairs agree on any pose"
-        return mirrored(reason) if gain > MIRRORED_GAIN else no_pose(reason)
-    return BestFit(refined, found, gain)
+        return mirrored(reason) if best.mirror_gain(options) > MIRRORED_GAIN else no_pose(reason)
+    return best
 
 
 def quick_fit(

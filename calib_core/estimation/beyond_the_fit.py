@@ -26,9 +26,9 @@ from calib_core.arrays import Indices, Matrix66, Values
 from calib_core.estimation.covariance import PoseCovariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.gnc import GncSolution, solve_gnc
-from calib_core.estimation.influential_pairs import InfluentialPair, find_pivotal_pair
 from calib_core.estimation.initialization import initial_poses
 from calib_core.estimation.measurement_model import PairMeasurements
+from calib_core.estimation.pivotal_pair import PivotalPair, find_pivotal_pair
 from calib_core.estimation.pose_posterior import batch_of, pose_posterior
 from calib_core.estimation.posterior_samples import (
     Modes,
@@ -259,6 +259,10 @@ def _log_ratios(modes: Modes, sigma_m: float) -> Values:
 
 
 _MOST_PAIRS = 150  # in larger sets the posterior has one peak, and samples cost seconds
+_CLEARLY_ENOUGH, _CLEARLY_AGREEING = 12, 0.75  # inliers, and their share, beyond which samples never changed an answer
+
+NARROW_CONDITION = 5e5
+"""The scaled condition number above which the placements lie in too narrow a strip."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -276,7 +280,7 @@ class BeyondTheFit:
     refined: ErrorsInVariablesFit
     uncertainty: PoseCovariance
     possible: tuple[PossiblePose, ...] = ()
-    pivotal: InfluentialPair | None = None
+    pivotal: PivotalPair | None = None
     agreeing: AgreeingOutliers | None = None
 
 
@@ -307,7 +311,9 @@ def look_beyond(
         pivotal=find_pivotal_pair(corrected, refined),
         agreeing=find_agreeing_outliers(corrected, refined, rng=rng),
     )
-    if measurements.prior.measured or measurements.flat or len(measurements) > _MOST_PAIRS:
+    enough = refined.inliers.sum() >= _CLEARLY_ENOUGH and refined.inliers.mean() >= _CLEARLY_AGREEING
+    clear = enough and uncertainty.condition <= NARROW_CONDITION
+    if clear or measurements.prior.measured or measurements.flat or len(measurements) > _MOST_PAIRS:
         return beyond
     alone = np.linalg.inv(uncertainty.information[:6, :6])
     poses = [one.camera_from_radar for one in others]

@@ -131,17 +131,6 @@ class LeaveOneOutPrediction:
         )
 
 
-def tail_chance(squared: Values, degrees_of_freedom: Values) -> Values:
-    """Return the probability (n,) of a squared distance as large or larger in two dimensions: 2 F(2, nu), or chi-square.
-
-    Args:
-        squared: (n,) Mahalanobis distances.
-        degrees_of_freedom: (n,) nu; infinite if the noise is known.
-    """
-    nu = np.minimum(degrees_of_freedom, _MANY_DEGREES)
-    return np.asarray(np.exp(-0.5 * nu * np.log1p(squared / nu)))
-
-
 def noise_parts(measurements: PairMeasurements, model: Linearization, sigma_polar: np.ndarray) -> NoiseParts:
     """Split the whitened noise of each pair into its components.
 
@@ -197,6 +186,7 @@ def predict_left_out(
         others = _Others(parts, weights, jacobian, moves, left, propagated, inverse, back, _scaled_by(factor, own))
         found, degrees = _scales_of_others(others, scale)
         growth = found / scale
+        propagated = _scaled_by(propagated, growth.min(axis=1) ** 2)
     return LeaveOneOutPrediction(left, _noise(parts, growth, model), propagated, degrees)
 
 

@@ -274,11 +274,11 @@ def fit(monkeypatch: pytest.MonkeyPatch) -> SolvedFit:
 
 def with_another(fit: SolvedFit, step_m: float, *, worse_by_pairs: float) -> SolvedFit:
     """Add an alternative whose camera is moved, and which the pairs alone find a little less likely."""
-    best, prior = fit.alternatives[0], fit.measurements.prior
+    best, prior = fit.best.found[0], fit.measurements.prior
     pose = best.camera_from_radar.perturbed(np.array([step_m, 0.0, 0.0, 0.0, 0.0, 0.0]))
     by_prior = [float(prior.costs(one.rotation, one.translation_m)) for one in (pose, best.camera_from_radar)]
     cost = best.cost + worse_by_pairs + by_prior[0] - by_prior[1]
-    return replace(fit, alternatives=(best, GncSolution(pose, cost, 1.0)))
+    return replace(fit, best=replace(fit.best, found=(best, GncSolution(pose, cost, 1.0))))
 
 
 def test_a_pose_that_differs_in_position_only_is_said(fit: SolvedFit) -> None:

@@ -81,7 +81,7 @@ def test_a_known_noise_level_takes_the_chi_square_quantile() -> None:
 # What of a covariance rests on stated sigmas is what the pose moves by if these errors are there.
 
 
-_SIGMA_M = 0.4
+_SIGMA_M = 1.0
 _STEP = 0.02
 """Share of a sigma by which each error is changed: the pose follows in proportion."""
 _RADAR = RadarOptions(range_scale_sigma=0.0)
@@ -133,7 +133,7 @@ def with_tape(position_m: np.ndarray) -> CalibrationOptions:
 
 @pytest.fixture(scope="module")
 def drawn() -> tuple[Drawn, ...]:
-    return tuple(Drawn.of(seed) for seed in range(4))
+    return tuple(Drawn.of(seed) for seed in range(8))
 
 
 def test_the_systematic_part_is_what_errors_of_the_radar_move_the_pose_by(drawn: tuple[Drawn, ...]) -> None:
