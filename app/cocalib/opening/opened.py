@@ -15,6 +15,7 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.input_files import name_text
 from calib_core.interchange import adopted_calibration, calibration_bytes, read_any
+from calib_core.interchange.cameras.camera_format import refuse_another_size
 from calib_core.interchange.hypotheses.ranking import clear_one, hypotheses_of, likely_ones
 from calib_core.interchange.hypotheses.reading import as_imported, picked, read_unstated
 from calib_core.interchange.own.clicks_json import read_clicks_file
@@ -374,8 +375,10 @@ def camera_of(found: "ImportedCalibration", path: Path, size_px: tuple[int, int]
     """Return the camera of a calibration for pictures of a size; None if it has none.
 
     Raises:
-        InputError: its matrix is not a camera's.
+        InputError: its matrix is not a camera's, or is that of pictures of another size.
     """
+    if found.camera is None and found.matrix_px is not None:
+        refuse_another_size(found.matrix_px, size_px, str(path))
     try:
         return found.camera_for(size_px)
     except ValueError as error:

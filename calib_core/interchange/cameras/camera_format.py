@@ -65,7 +65,7 @@ class FoundCamera:
         model, distortion = self.lens(source=source)
         matrix = np.reshape(self.matrix_px, (3, 3))
         if self.size_px is None:
-            _refuse_another_size(matrix, size, f"{source}: {self.name}")
+            refuse_another_size(matrix, size, f"{source}: {self.name}")
         try:
             camera = Camera(model, *size, matrix, np.array(distortion), self.covariance)
             if self.window is None:
@@ -103,8 +103,13 @@ _OFF_CENTRE = 0.1
 _ALIKE = 0.06
 
 
-def _refuse_another_size(matrix_px: np.ndarray, size_px: tuple[int, int], where: str) -> None:
+def refuse_another_size(matrix_px: np.ndarray, size_px: tuple[int, int], where: str) -> None:
     """Refuse a matrix whose principal point is as far off the middle along the columns as along the rows.
+
+    Args:
+        matrix_px: (3, 3), from a file that states no size.
+        size_px: width and height of the pictures it is to be used for.
+        where: the start of the message.
 
     Raises:
         InputError: it is, so the lens was calibrated in pictures of another size.

@@ -23,6 +23,7 @@ from calib_core.interchange import (
 )
 from calib_core.interchange.cameras.rectification import rectified_camera
 from calib_core.interchange.own.calibration_json import calibration_sha256
+from cocalib.opening.opened import camera_of
 from cocalib.web.channel.export_preview import export_preview, exported
 from cocalib.web.exports import format_rows
 
@@ -208,3 +209,12 @@ def test_the_page_knows_which_formats_ask_for_it(file):
     assert with_maps.text.startswith("P0: ")
     assert not export_preview(through(file, "pinhole", []), "nuscenes", "", "drive").is_for_rectified
     assert not export_preview(file, "tf2", "", "drive").is_for_rectified
+
+
+def test_a_matrix_without_a_size_is_not_that_of_pictures_twice_as_large(file, tmp_path):
+    found, path = read_any(export(file, "kitti").data), tmp_path / "calib.txt"
+    size_px = (file.calibration.camera.width_px, file.calibration.camera.height_px)
+
+    assert camera_of(found, path, size_px).width_px == size_px[0]
+    with pytest.raises(InputError, match=r"calib.txt: the principal point \(\d+, \d+\) is that of pictures of about"):
+        camera_of(found, path, (2 * size_px[0], 2 * size_px[1]))
