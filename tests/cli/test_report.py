@@ -34,10 +34,18 @@ def test_on_its_recording_the_report_has_held_out_errors_and_a_picture_and_names
     html = out.read_text(encoding="utf-8")
     assert "Residuals at the clicks in radar.bag + camera.bag, which it was solved from" in html
     assert "data:image/jpeg;base64," in html
+    assert 'class="return"' in html
     assert "no difference on this recording" in html.lower()
     for folder in (solved.parent, sample, tmp_path):
         assert str(folder) not in html
     assert len(html.encode()) < 3_000_000
+
+
+def test_limits_that_are_not_met_end_with_exit_code_3(solved: Path, tmp_path: Path) -> None:
+    out = tmp_path / "report.html"
+    assert run(["report", str(solved), "--out", str(out), "--require", "max-deg=9", "max-cm=90"]) == 0
+    assert run(["report", str(solved), "--out", str(out), "--require", "max-deg=0.01"]) == 3
+    assert "FAIL" in out.read_text(encoding="utf-8")
 
 
 def test_a_calibration_by_the_paper_is_reported_with_its_doubts(solved: Path, tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from calib_core.errors import InputError
+from cocalib.cli.exit_codes import DONE, IN_DOUBT
 from cocalib.cli.flags import File, Switch, called
 from cocalib.cli.judging_flags import Judging, JudgingFlags
 from cocalib.cli.output import progress_bar, write_whole
@@ -31,21 +32,27 @@ class Report:
     """Also print it to a PDF beside the HTML, with the same name, by Chrome, Chromium, Edge or Brave."""
     against: File = None
     """Compare it with this other calibration of the same sensors."""
+    require: Annotated[tuple[str, ...], called("NAME=LIMIT...")] = ()
+    """Your limits on the stated 95 % error, such as max-deg=1 max-cm=10 max-px=15: pass or fail, with exit code 3."""
     judging: Judging = field(default_factory=JudgingFlags)
 
     def run(self) -> int:
         """Write the report; return the exit code."""
-        from cocalib.report import print_pdf, report_html
+        from cocalib.report import limits_met, print_pdf, report_html
 
         out = self._required_out()
-        html = report_html(self._subject())
+        subject = replace(self._subject(), required=self.require)
+        limits = limits_met(self.require, subject.calibration)
+        html = report_html(subject)
         write_whole(out, html)
         print(f"written to {out}")
         if self.pdf:
             printed = out.with_suffix(".pdf")
             write_whole(printed, print_pdf(html))
             print(f"printed to {printed}")
-        return 0
+        for one in limits:
+            print(f"{one.name}={one.limit:g}: {'pass' if one.met else 'FAIL'}, stated {one.stated:g}")
+        return DONE if all(one.met for one in limits) else IN_DOUBT
 
     def _required_out(self) -> Path:
         """Return the output file.

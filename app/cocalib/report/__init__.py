@@ -3,6 +3,7 @@
 from cocalib.report.making import against_of, current_report, known_calibration, subject_of, watched
 from cocalib.report.page import report_html
 from cocalib.report.printing import PrintingError, print_pdf
+from cocalib.report.sections.acceptance import limits_met
 from cocalib.report.subject import Against, Judged, Picture, ReportSubject, Watched
 
 __all__ = [
@@ -15,6 +16,7 @@ __all__ = [
     "against_of",
     "current_report",
     "known_calibration",
+    "limits_met",
     "print_pdf",
     "report_html",
     "subject_of",

@@ -15,11 +15,13 @@ from calib_core.recordings import Recording
 from calib_core.results import Calibration, DataWarning, InputFile
 from cocalib.evaluation.recording_check import calibration_of
 from cocalib.platform.resources import version
+from cocalib.recorded_view import seen_in
 from cocalib.report.page import report_html
 from cocalib.report.subject import Against, Picture, ReportSubject, Watched
 
 _WIDTH_PX = 640
 _QUALITY = 70
+_NEAR_S = 0.3
 _NAME = "calibration.json"
 
 
@@ -117,7 +119,16 @@ def _picture(recording: Recording, calibration: Calibration | None) -> Picture |
     grey = cv2.cvtColor(cv2.resize(pixels, size, interpolation=cv2.INTER_AREA), cv2.COLOR_BGR2GRAY)
     _, jpeg = cv2.imencode(".jpg", grey, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
     sec, nanosec = time_parts(TimeNs(int(recording.image_times[index])))
-    return Picture(jpeg.tobytes(), f"the frame at {sec}.{nanosec:09d} s")
+    return Picture(jpeg.tobytes(), f"the frame at {sec}.{nanosec:09d} s", _returns_px(recording, calibration, index))
+
+
+def _returns_px(recording: Recording, calibration: Calibration, index: int) -> tuple[tuple[float, float], ...]:
+    """Return where the returns of the scan nearest to a frame are in it."""
+    if not recording.radar_topic:
+        return ()
+    time = TimeNs(int(recording.image_times[index]))
+    seen = seen_in(calibration, recording.radar_scans_around((time,), _NEAR_S))
+    return tuple((float(u), float(v)) for u, v in seen.pixels_px[seen.near(time)])
 
 
 def _frame(recording: Recording, calibration: Calibration) -> int:

@@ -6,6 +6,7 @@ from calib_core.results import Calibration
 from cocalib.report.markup import Child, Markup, html_file, tag
 from cocalib.report.residual_rows import rows_at_clicks, rows_of_pairs
 from cocalib.report.sections.acc import acc
+from cocalib.report.sections.acceptance import acceptance, limits_met
 from cocalib.report.sections.answer import answer
 from cocalib.report.sections.cautions import cautions
 from cocalib.report.sections.comparison import comparison
@@ -43,6 +44,7 @@ def _sections(subject: ReportSubject) -> list[Child]:
     boxes = subject.judged.evaluation.boxes if subject.judged is not None else None
     shown.append(acc(boxes) if boxes is not None else None)
     shown.append(provenance(subject))
+    shown.append(acceptance(subject, limits_met(subject.required, subject.calibration)))
     return shown
 
 

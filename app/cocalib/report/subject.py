@@ -15,10 +15,12 @@ class Picture:
     Attributes:
         jpeg: the frame, downscaled.
         words: which frame it is.
+        returns_px: where the calibration puts the returns of the nearest scan, as pixels of the frame before downscaling.
     """
 
     jpeg: bytes
     words: str
+    returns_px: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +85,7 @@ class ReportSubject:
         recording: that it is judged on.
         judged: what the recording says of it.
         against: another calibration.
+        required: the reader's limits, such as "max-deg=1".
     """
 
     name: str
@@ -93,6 +96,7 @@ class ReportSubject:
     recording: Watched | None = None
     judged: Judged | None = None
     against: Against | None = None
+    required: tuple[str, ...] = ()
 
     @property
     def frames(self) -> FrameNames:

@@ -1,9 +1,9 @@
-"""The map of uncertainty over the picture: how far from its drawn place a point may appear at 5, 20 and 60 m."""
+"""The picture: the radar's returns on it, and how far from its drawn place a point may appear at 5, 20 and 60 m."""
 
 from calib_core.results import Calibration
 from cocalib.report.markup import Child, Markup, number, tag
 from cocalib.report.plots import captioned, drawing, polyline, text
-from cocalib.report.subject import ReportSubject
+from cocalib.report.subject import Picture, ReportSubject
 from cocalib.view.contours import ContourMap, contour_maps
 
 _WIDTH = 320.0
@@ -21,6 +21,8 @@ def uncertainty(subject: ReportSubject) -> Markup | None:
         return tag("section", tag("h2", "Uncertainty in the picture"), words, id="uncertainty")
     picture = subject.recording.picture if subject.recording is not None else None
     behind = f" Drawn over {picture.words}." if picture is not None else ""
+    returns = _returns(calibration, picture) if picture is not None and picture.returns_px else None
+    grid = "three" if returns is None else "three and-returns"
     return tag(
         "section",
         tag("h2", "Uncertainty in the picture"),
@@ -30,9 +32,20 @@ def uncertainty(subject: ReportSubject) -> Markup | None:
             f"noise of a single radar position.{behind}",
             class_="note",
         ),
-        tag("div", *(_map(calibration, one, with_picture=picture is not None) for one in maps), class_="three"),
+        tag("div", returns, *(_map(calibration, one, with_picture=picture is not None) for one in maps), class_=grid),
         id="uncertainty",
     )
+
+
+def _returns(calibration: Calibration, picture: Picture) -> Markup:
+    """Return the frame with the returns of its scan as rings: what a reviewer looks at first."""
+    scale, height = _WIDTH / calibration.camera.width_px, _height(calibration)
+    rings = [
+        tag("circle", cx=(u + 0.5) * scale, cy=(v + 0.5) * scale, r=2.6, class_="return") for u, v in picture.returns_px
+    ]
+    words = f"{len(rings)} returns of the nearest scan where this calibration puts them."
+    layer = picture_layer(calibration, with_picture=True)
+    return captioned("returns", drawing(words, *layer, *rings, width=_WIDTH, height=float(number(height))), words)
 
 
 def picture_layer(calibration: Calibration, *, with_picture: bool) -> list[Child]:

@@ -141,7 +141,9 @@ def fullest_subject(project_root: Path) -> ReportSubject:
     files = tuple(InputFile(f"part_{k}.bag", 10**9 + k, f"{k:064x}") for k in range(40))
     frame = np.full((height_px, width_px, 3), 200, np.uint8)
     jpeg = cv2.imencode(".jpg", frame)[1].tobytes()
-    seen = watched_recording(inputs=files, warnings=warnings, picture=Picture(jpeg, "the frame at 1.000000000 s"))
+    seen = watched_recording(
+        inputs=files, warnings=warnings, picture=Picture(jpeg, "the frame at 1.000000000 s", ((9.0, 9.0), (99.0, 40.0)))
+    )
     moved = replace(full, camera_from_radar=full.camera_from_radar.perturbed(np.full(6, 0.01)))
     against = Against(
         "other.json", (FILE,), compare(subject_for(project_root, moved).found, subject.found), (long,) * 4

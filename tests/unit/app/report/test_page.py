@@ -8,11 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from calib_core.errors import InputError
 from calib_core.evaluation import Evaluation
 from calib_core.geometry import quaternion_wxyz_from_matrix
 from calib_core.interchange import AssumptionNote, Provenance, VehicleNote, compare, export, imported, read_any
 from calib_core.results import DataWarning
-from cocalib.report import Against, Judged, ReportSubject, known_calibration, report_html, subject_of
+from calib_core.results.verdict import stated_error
+from cocalib.report import Against, Judged, ReportSubject, known_calibration, limits_met, report_html, subject_of
 from cocalib.view.wording import plain
 from tests.unit.app.report.planted import FILE, box_figures, golden, subject_for, watched_recording
 
@@ -233,3 +235,32 @@ def test_a_comparison_shows_the_figures_of_check(project_root: Path) -> None:
     words = _words(replace(this, against=Against("other.json", (), compared)))
     for figure in compared.figures:
         assert f"{figure.label}{figure.text}" in words
+
+
+def test_limits_are_met_or_not_by_the_stated_error_and_there_is_room_to_sign(project_root: Path) -> None:
+    subject = subject_for(project_root)
+    stated = stated_error(golden(project_root))
+    required = (f"max-deg={stated.rotation_deg}", f"max-cm={stated.position_cm * 0.99}")
+    assert [one.met for one in limits_met(required, golden(project_root))] == [True, False]
+    assert [one.met for one in limits_met(required, None)] == [False, False]
+    words = _words(replace(subject, required=required))
+    assert "pass" in words
+    assert "FAIL" in words
+    assert words.index("Signature") > words.index("Provenance")
+    assert "FAIL" not in _words(subject)
+
+
+@pytest.mark.parametrize("text", ["max-deg", "max-deg=0", "max-deg=nan", "deg=1", "max-cm=few"])
+def test_what_is_no_limit_is_refused(text: str) -> None:
+    with pytest.raises(InputError, match=f"--require {text}: give max-deg=NUMBER"):
+        limits_met((text,), None)
+
+
+def test_the_returns_are_drawn_where_the_calibration_puts_them(project_root: Path) -> None:
+    subject = subject_for(project_root)
+    camera = golden(project_root).camera
+    picture = replace(watched_recording().picture, returns_px=((-0.5, -0.5), (camera.width_px - 0.5, 9.5)))
+    page = _parsed(replace(subject, recording=replace(watched_recording(), picture=picture)))
+    rings = [one for one in page.iter(f"{_SVG}circle") if one.get("class") == "return"]
+    assert [one.get("cx") for one in rings] == ["0", "320"]
+    assert rings[0].get("cy") == "0"
