@@ -4,7 +4,7 @@ import { marks } from "../picture/picture.js";
 import { make, toast } from "../shell/notices.js";
 import { send } from "../shell/socket.js";
 import { isOffered, on, state } from "../shell/state.js";
-import { heldBack, isSearching, openProposals, saidWords, say, searchWords, shownOffer } from "./proposals.js";
+import { heldBack, isSearching, openProposals, saidWords, say, shownOffer } from "./proposals.js";
 
 /** @typedef {import("../pairs/guide.js").Words} Words */
 
@@ -19,7 +19,6 @@ export function sayNone() {
   const news = state.proposals;
   if (!news?.on) return;
   if (news.progress.problem) say(`No proposals: ${[news.progress.problem.replace(/\.$/, ""), news.progress.hint.replace(/\.$/, "")].filter(Boolean).join(". ")}`);
-  else if (isSearching()) say(searchWords());
 }
 
 /** What N does. */

@@ -76,7 +76,8 @@ function drawStatus() {
 function doingWords(view) {
   if (!state.connected) return "Not connected";
   if (view.solving) return view.checking ? "Checking…" : "Solving…";
-  return searchWords() || (view.reference && !view.has_calibration ? view.status : "Connected");
+  if (view.reference && !view.has_calibration) return view.status;
+  return [searchWords() || "Connected", ...(view.stage === "solved" ? view.status.split("; ").slice(1) : [])].join("  ·  ");
 }
 
 /** How a recording that is still being written goes on, and where the next placement pays. @returns {string[]} */
@@ -102,7 +103,7 @@ function drawReadout() {
   const point = state.hover;
   const percent = `${Math.round(zoom() * 100)} %`;
   get("zoom").hidden = !state.shown;
-  get("zoom").replaceChildren(percent, ...(viewport.fitted ? [] : [make("kbd", "", "F"), "fit"]));
+  get("zoom").replaceChildren(percent, ...(viewport.fitted ? [] : [make("kbd", "", "F"), make("span", "", "fit")]));
   get("zoom").setAttribute("aria-label", `${percent}: fit the picture`);
   const parts = [];
   if (point && !state.playing) parts.push(`u ${point.u.toFixed(1)}  v ${point.v.toFixed(1)}`);
