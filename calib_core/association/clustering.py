@@ -143,8 +143,13 @@ def _found_clusters(key: _WindowKey, most: int, scale: tuple[float, ...]) -> tup
             free &= ~members
             cluster_of[members] = len(clusters)
             clusters.append(_cluster(window, steps, amplitude, members, step))
+    if window.alternative_of is None:
+        return tuple(clusters)
     alternatives = cluster_alternatives(window, cluster_of, len(clusters))
-    return tuple(replace(own, alternative_of=of) for own, of in zip(clusters, alternatives.tolist(), strict=True))
+    inside, first = cluster_of >= 0, first_rows(return_keys(window))
+    listed = np.bincount(cluster_of[inside & first], minlength=len(clusters)) / np.bincount(cluster_of[inside])
+    labels = zip(clusters, alternatives.tolist(), listed.tolist(), strict=True)
+    return tuple(replace(own, alternative_of=of, listed_first=share) for own, of, share in labels)
 
 
 def nearest_cluster(clusters: Sequence[Cluster], position_radar_m: Vector3, *, scale: Vector3) -> Cluster | None:
@@ -224,7 +229,6 @@ def _cluster(window: RadarScans, steps: Points3, amplitude: Values, members: Fla
         returns=int(members.sum()),
         scans=scans,
         persistence=scans / len(window),
-        listed_first=1.0 if window.alternative_of is None else float(first_rows(return_keys(window))[members].mean()),
     )
 
 
