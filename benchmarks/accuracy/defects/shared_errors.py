@@ -18,7 +18,17 @@ from calib_core.options import CalibrationOptions
 from calib_core.synthetic import FIELD, PairsLayout, SimulatedPairs, SystematicErrors, simulate_pairs
 from calib_core.synthetic.simulated_pairs import NoiseName, draw_systematic_errors
 
-__all__ = ["CLEAN_ROWS", "ROWS", "Shared", "clean_section", "draw_shared", "measure_clean", "measure_shared", "section"]
+__all__ = [
+    "CLEAN_ROWS",
+    "ROWS",
+    "Shared",
+    "clean_section",
+    "draw_shared",
+    "inside",
+    "measure_clean",
+    "measure_shared",
+    "section",
+]
 
 _TRIALS, _CLEAN_TRIALS = 400, 200
 _NOISES: tuple[NoiseName, ...] = ("ti", "imaging")
@@ -148,7 +158,7 @@ class _Verdicts:
 def _cells(
     case: Shared, trials: Sequence[Figures], before: Mapping[str, float], verdicts: _Verdicts
 ) -> tuple[str, ...]:
-    covered = share(_inside(trials))
+    covered = share(inside(trials))
     verdict = within(covered, 93.0, 97.0)
     verdicts.covered.append(verdict)
     sharpness = [_stated_over_rmse(trials, f"stated_{unit}", name) for unit, name in _ERRORS]
@@ -172,7 +182,7 @@ def _cells(
 _ERRORS = (("rad", "rotation_rad"), ("m", "position_m"))
 
 
-def _inside(trials: Sequence[Figures]) -> np.ndarray:
+def inside(trials: Sequence[Figures]) -> np.ndarray:
     """Flag the trials whose truth lies inside the stated 95 % ellipsoid; NaN without a pose."""
     squared, quantile = column(trials, "squared"), column(trials, "quantile")
     return np.where(np.isfinite(squared), squared <= quantile, np.nan)
@@ -221,7 +231,7 @@ def clean_section(kept: Kept) -> Section:
         judged = [at_most(cost, aim) for cost, aim in zip(costs, aims, strict=True)]
         verdicts += judged
         known = "free" if case.tape_m is None else "1 cm"
-        covered = share(_inside(trials)).percent
+        covered = share(inside(trials)).percent
         what = (case.noise, str(case.pairs), known, str(len(trials)))
         cells.append((*what, *map(str, costs), " / ".join(f"{aim:g}" for aim in aims), joined(judged), covered))
     head = ("noise", "pairs", "camera position", "trials", "rotation", "position", "aim", "", "c")

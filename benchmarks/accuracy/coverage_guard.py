@@ -1,0 +1,47 @@
+"""`python -m benchmarks.accuracy.coverage_guard`: does the stated 95 % region still hold the truth? `.ci/run` fails if not.
+
+Both radars of docs/accuracy, with and without a measured camera position, with the errors that all pairs share, on draws from the
+present commit's hash: nobody has seen them. Of 400 sets the share inside must be 90 to 99 %; a right region misses that once in
+a few hundred commits.
+"""
+
+import os
+import subprocess
+import sys
+import zlib
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.accuracy.defects.shared_errors import Shared, inside, measure_shared
+from cocalib.batch.worker_processes import WorkerProcesses
+
+_CASES = tuple(Shared(noise, 20, tape_m) for noise in ("ti", "imaging") for tape_m in (0.01, None))
+_TRIALS, _CHUNK = 100, 10
+_LOW, _HIGH = 0.90, 0.99
+
+
+def _flags(case: Shared, trials: list[int]) -> list[float]:
+    return [float(one) for one in inside([measure_shared(case, trial) for trial in trials])]
+
+
+def main() -> int:
+    """Measure, print the share of each case, return 1 if that of all is outside the limits."""
+    here = Path(__file__).resolve().parents[2]
+    commit = subprocess.run(["git", "rev-parse", "HEAD"], cwd=here, check=True, capture_output=True).stdout
+    first = 10_000_000 * (1 + zlib.crc32(commit))
+    chunks = [
+        (case, list(range(start, start + _CHUNK))) for case in _CASES for start in range(first, first + _TRIALS, _CHUNK)
+    ]
+    found: dict[Shared, list[float]] = {case: [] for case in _CASES}
+    for number, flags in WorkerProcesses(min(os.cpu_count() or 1, 4)).run_all(_flags, chunks):
+        found[chunks[number][0]] += flags
+    for case, flags in found.items():
+        print(f"{case.key}: {np.nanmean(flags):.0%} of {len(flags)} inside the stated 95 % region")
+    share = float(np.nanmean([one for flags in found.values() for one in flags]))
+    print(f"all: {share:.1%}, to be within {_LOW:.0%} and {_HIGH:.0%}")
+    return int(not _LOW <= share <= _HIGH)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
