@@ -17,6 +17,7 @@ from cocalib.view.wording import position_words
 _FITS = 9.21  # 99 % quantile of chi-squared with 2 degrees of freedom
 _BETTER = 0.5  # probability from which on another return is suggested
 _SAME_M = 0.02
+_MARGIN = 0.1  # of the picture's width
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +94,8 @@ def click_candidates(session: Session, pair: Pair, more: Sequence[Candidate] = (
     """
     calibration = session.outcome if isinstance(session.outcome, Calibration) else None
     candidates = _distinct((*pair.candidates, *pair.set_aside, *more))
+    if calibration is not None:
+        candidates = _in_view(calibration, candidates, _used(calibration, pair, candidates))
     used = _used(calibration, pair, candidates)
     fits = candidate_fits(calibration, pair, candidates) if calibration else ()
     rows = [
@@ -108,6 +111,14 @@ def click_candidates(session: Session, pair: Pair, more: Sequence[Candidate] = (
     how = "as well" if rival >= 0 else "better"
     words = f"The return at {rows[better].words} fits this click {how}"
     return PairCandidates(pair.id, session.revision, ordered, order.index(better), words)
+
+
+def _in_view(calibration: Calibration, candidates: Sequence[Candidate], used: int) -> list[Candidate]:
+    """Leave out what the camera does not see, not even with a margin; the return in use stays."""
+    camera = calibration.camera
+    pixels_px = calibration.reproject(np.array([one.position_radar_m for one in candidates]))
+    seen = camera.in_image(pixels_px, margin_px=_MARGIN * camera.width_px)
+    return [one for i, one in enumerate(candidates) if seen[i] or i == used]
 
 
 def _distinct(candidates: Sequence[Candidate]) -> list[Candidate]:

@@ -109,14 +109,14 @@ def measured_at(name: str, *positions: tuple[float, float, float], **more) -> Pa
     return replace(plain_pair, point_radar_m=np.array(positions[0]), measured=kept, **more)
 
 
-NEAR_M, BEHIND_M = (3.0, 4.0, 0.0), (3.6, 4.8, 0.0)
+NEAR_M, BEHIND_M = (6.0, 0.5, 0.0), (7.2, 0.6, 0.0)
 
 
 def test_a_click_that_two_returns_fit_asks_for_one_of_them() -> None:
     asking = measured_at("c5", NEAR_M, BEHIND_M, inlier=False, outlier_probability=0.5, rival=1)
     seen = shown(5, calibration(*FIVE[:4], asking))
     assert "1 asks which return is right (C)" in seen.status
-    assert "6.0 m" in seen.clicks[4].note
+    assert "7.2 m" in seen.clicks[4].note
     assert "(C)" in seen.clicks[4].note
     assert not any(line.startswith("disagrees") for line in summary_lines(calibration(*FIVE[:4], asking)))
     outcome = calibration(*FIVE[:4], asking)
@@ -125,6 +125,19 @@ def test_a_click_that_two_returns_fit_asks_for_one_of_them() -> None:
     offered = click_candidates(session, asking.measured)
     assert offered.rows[offered.suggested].position_m == BEHIND_M
     assert "as well" in offered.suggestion
+
+
+def test_a_return_that_the_camera_does_not_see_is_not_offered() -> None:
+    ahead_m, aside_m = (6.0, 0.5, 0.0), (1.0, 5.0, 0.0)
+    outcome = calibration(*FIVE[:4], measured_at("c5", ahead_m, (7.0, 0.5, 0.0), aside_m))
+    session = advance(clicked(5), Solved(5, outcome), FACTS).present
+    kept = outcome.pairs[4].measured
+    assert kept is not None
+    assert [row.position_m for row in click_candidates(session, kept).rows] == [ahead_m, (7.0, 0.5, 0.0)]
+    only_aside = calibration(*FIVE[:4], measured_at("c5", aside_m, ahead_m))
+    session = advance(clicked(5), Solved(5, only_aside), FACTS).present
+    assert only_aside.pairs[4].measured is not None
+    assert len(click_candidates(session, only_aside.pairs[4].measured).rows) == 2  # the one in use is shown, too
 
 
 def test_clicks_that_changed_their_return_are_told_until_the_next_answer() -> None:
