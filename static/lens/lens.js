@@ -116,7 +116,7 @@ function drawPresent(lens) {
     make("h2", "", "Intrinsics in use"),
     make("p", "lens-about", [make("strong", "", camera.about), ` · ${camera.model} · ${camera.size} · ${camera.field}`]),
     parameters(camera),
-    make("p", "lens-note", camera.known ? "" : "How well they are known is not stated."),
+    make("p", "lens-note", camera.known ? "" : "No uncertainty given."),
     make("div", "acts", [rectify, save, ...(lens.chosen ? [back] : [])]),
   );
 }

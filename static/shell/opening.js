@@ -350,9 +350,9 @@ function drawSession({ choices, draft, redraw }) {
   const held = `${clicks} ${clicks === 1 ? "click" : "clicks"}`;
   /** @type {[Draft["session"], string, string][]} */
   const rows = [
-    ["continue", "Continue where the frames are the same", continues ? `${held}, ${folder}` : `if that in ${folder} is of these frames; another one is left alone`],
-    ["new", "Start a new session", "the one there is kept under another name"],
-    ["copy", "Start a new session with the clicks that fit", `${held} of ${recording || folder}: those whose frames this recording has`],
+    ["continue", "Keep my clicks", continues ? `${held}, ${folder}` : `if that in ${folder} is of these frames; another one is left alone`],
+    ["new", "New session", "the one there is kept under another name"],
+    ["copy", "New session, copy matching clicks", `${held} of ${recording || folder}: those whose frames this recording has`],
   ];
   const options = rows.map(([value, label, about]) =>
     option({

@@ -102,7 +102,7 @@ def test_a_recording_is_found_below_the_root_and_its_other_radar_is_chosen(
     page.until(f"!{DIALOG} && __cocalib.state.shown")
     used = page.value("__cocalib.state.recording.radar_topic")
     page.page.click("#choose-recording")
-    page.until(DIALOG)
+    page.until("document.querySelector('input[name=radar]:not(:checked)')")
     other = page.value(
         "[...document.querySelectorAll('input[name=radar]:not(:checked)')][0].parentNode.children[1].innerText"
     )
