@@ -52,7 +52,7 @@ function drawStatus() {
   get("connection").dataset.hint = state.connected ? "Connected." + (state.looking ? "" : " Every click is saved to disk immediately.") : "Not connected.";
   get("connection").dataset.stage = view?.stage ?? "collecting";
   const opening = state.opening;
-  const found = state.looking ? [state.placementSummary, view?.status ?? ""].filter(Boolean) : null;
+  const found = state.looking ? [state.placementSummary].filter(Boolean) : null;
   const words = found?.length ? found : opening || !view ? [opening?.problem || opening?.doing || "Opening the recording…"] : [...followWords(), doingWords(view)].filter(Boolean);
   get("status-text").textContent = words.join("  ·  ");
   get("status-text").dataset.hint = words.join("\n");
