@@ -62,7 +62,9 @@ EARLIER_STEPS = (
     ClickPlaced(TIMES[3], (100.1, 200.2), None),
     ClickPlaced(TIMES[1], (0.1 + 0.2, 1e-17), None),
     ClickMoved("c1", (101.0, 201.0)),
-    OptionsChanged.of(CalibrationOptions(method="paper", solving=SolvingOptions(CameraPositionPrior((0.1, 0.2, 0.3))))),
+    OptionsChanged.of(
+        CalibrationOptions(method="paper", solving=SolvingOptions(CameraPositionPrior((0.1, 0.2, 0.3), 0.01)))
+    ),
     ClickExcluded("c2", True),
     Undo(),
     Redo(),
