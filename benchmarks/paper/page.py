@@ -232,8 +232,8 @@ on its corners, D3 an aisle with a larger reflector. DR+D3 is the same recording
 
 ## Table I
 
-Two sets of {count} seeds, {first} and {second}, each seed another rig: median and the range that holds 90 % of the seeds, the first set above the second. AED and
-CDSD in px.
+Two sets of {count} seeds, {first} and {second}, each seed another rig: median and the range that holds 90 % of seeds by the
+log-normal distribution fitted to them, the first set above the second. AED and CDSD in px. Seeds and range were fixed before these seeds were looked at.
 
 {table}
 
