@@ -13,8 +13,7 @@ from calib_core.measurements import NS_PER_S, Box, Boxes, RadarScans, ReflectorC
 from calib_core.recordings import Recording
 from calib_core.results import Calibration, PairResult
 from cocalib.colours import ramp_colours
-from cocalib.evaluation.evaluating import evaluate_recording
-from cocalib.solving.solving import check_clicks
+from cocalib.evaluation.evaluating import check_clicks, evaluate_recording
 
 ReturnQuantity: TypeAlias = Literal["range", "speed"]
 

@@ -22,9 +22,9 @@ from calib_core.evaluation import (
     residual_figures,
 )
 from calib_core.evaluation.counted_returns import longest_gap_s
-from calib_core.measurements import NS_PER_S, Boxes, RadarScans, ReflectorClick, ReturnLabels, TimeNs, Unpaired
+from calib_core.measurements import NS_PER_S, Boxes, Pair, RadarScans, ReflectorClick, ReturnLabels, TimeNs, Unpaired
 from calib_core.options import CalibrationOptions
-from calib_core.results import Calibration, DataWarning
+from calib_core.results import Calibration, DataWarning, PairResult
 
 _AROUND_S = 3.0
 """Scans before the first and after the last annotated frame, for targets to be followed into the frames."""
@@ -182,12 +182,36 @@ def judged(
     return Evaluation(residuals, boxes, tuple(warnings))
 
 
+def check_clicks(
+    recording: RadarSource, clicks: Sequence[ReflectorClick], reference: Calibration, options: CalibrationOptions
+) -> tuple[PairResult, ...]:
+    """Evaluate clicks under a calibration that was solved without them; each is marked as excluded.
+
+    Of a click's radar positions, the one reprojected nearest to it is used, which makes the residual slightly too small.
+
+    Raises:
+        CalibrationError: the recording cannot be read at the clicks.
+    """
+    scans = scans_around(recording, clicks, options)
+    return tuple(_under(pair, reference) for pair in pair_clicks(clicks, scans, options).pairs)
+
+
 def evaluation_exit_code(evaluation: Evaluation) -> int:
     """Return 0 if a calibration was judged, 1 if there was nothing to judge it by, 3 if there are doubts."""
     residuals, boxes = evaluation.residuals, evaluation.boxes
     if residuals is None and (boxes is None or boxes.acc is None):
         return 1
     return 3 if any(one.code in _DOUBTFUL for one in evaluation.warnings) else 0
+
+
+def _under(pair: Pair, reference: Calibration) -> PairResult:
+    points_radar_m = np.array([candidate.position_radar_m for candidate in pair.candidates])
+    pixels_px = reference.reproject(points_radar_m)
+    distances_px = np.linalg.norm(pixels_px - pair.pixel_px, axis=1)
+    nearest = int(np.argmin(np.where(np.isfinite(distances_px), distances_px, np.inf)))
+    return PairResult(
+        pair.id, pair.pixel_px, pixels_px[nearest], points_radar_m[nearest], False, True, image_time=pair.image_time
+    )
 
 
 def _pairs(

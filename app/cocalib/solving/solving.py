@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from operator import attrgetter
 from pathlib import Path
 
-import numpy as np
-
 from calib_core.association.pairing import RadarSource, half_window_s, pair_clicks, scans_around
 from calib_core.calibration import calibrate_pairs, calibration_steps, solve_again
 from calib_core.camera import Camera
@@ -29,10 +27,10 @@ from calib_core.interchange import (
     read_pairs_table,
 )
 from calib_core.interchange import calibration_text as interchange_text
-from calib_core.measurements import Candidate, DataWarning, Pair, ReflectorClick, Unsolvable
+from calib_core.measurements import Candidate, DataWarning, ReflectorClick, Unsolvable
 from calib_core.options import CalibrationOptions, checked_options
 from calib_core.recordings import Recording, about_assumptions
-from calib_core.results import Calibration, InputFile, PairResult, UnconfirmedClicks
+from calib_core.results import Calibration, InputFile, UnconfirmedClicks
 from calib_core.results.confirmation import damaged_recording, lost_returns
 from cocalib.platform.resources import version
 from cocalib.session import Outcome
@@ -133,30 +131,6 @@ def _about_lost(
         return (lost_returns(near.lost, near.read, "the radar around the clicks"),)
     everywhere = recording.losses()
     return (lost_returns(everywhere.lost, everywhere.read, "the radar"),) if everywhere.share > _MOST_LOST else ()
-
-
-def check_clicks(
-    recording: RadarSource, clicks: Sequence[ReflectorClick], reference: Calibration, options: CalibrationOptions
-) -> tuple[PairResult, ...]:
-    """Evaluate clicks under a calibration that was solved without them; each is marked as excluded.
-
-    Of a click's radar positions, the one reprojected nearest to it is used, which makes the residual slightly too small.
-
-    Raises:
-        CalibrationError: the recording cannot be read at the clicks.
-    """
-    scans = scans_around(recording, clicks, options)
-    return tuple(_under(pair, reference) for pair in pair_clicks(clicks, scans, options).pairs)
-
-
-def _under(pair: Pair, reference: Calibration) -> PairResult:
-    points_radar_m = np.array([candidate.position_radar_m for candidate in pair.candidates])
-    pixels_px = reference.reproject(points_radar_m)
-    distances_px = np.linalg.norm(pixels_px - pair.pixel_px, axis=1)
-    nearest = int(np.argmin(np.where(np.isfinite(distances_px), distances_px, np.inf)))
-    return PairResult(
-        pair.id, pair.pixel_px, pixels_px[nearest], points_radar_m[nearest], False, True, image_time=pair.image_time
-    )
 
 
 def window_candidates(

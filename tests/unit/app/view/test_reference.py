@@ -25,9 +25,9 @@ from calib_core.measurements import (
     Unsolvable,
 )
 from calib_core.radar import RadarErrors
+from cocalib.evaluation.evaluating import check_clicks
 from cocalib.opening.opened import camera_in, reference_from
 from cocalib.session import History, RecordingFacts, Session
-from cocalib.solving.solving import check_clicks
 from cocalib.view import Reference, shown_calibration, view
 from cocalib.web.radar_sight import overlay_of
 
