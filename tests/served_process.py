@@ -1,4 +1,4 @@
-"""Run `cocalib open` in its own process, as a user does; its address is used as that of a RunningServer."""
+"""Run `cocalib open`, or `cocalib demo`, in its own process, as a user does; its address is used as that of a RunningServer."""
 
 import os
 import re
@@ -41,27 +41,19 @@ class ServedProcess:
 
 
 @contextmanager
-def served_process(*arguments: object, state: Path) -> Iterator[ServedProcess]:
+def served_process(*arguments: object, state: Path, command: str = "open", port: int = 0) -> Iterator[ServedProcess]:
     """Start the command without proposals, and wait for its link; it is ended with the `with` block.
 
     Args:
-        arguments: those after `cocalib open`.
+        arguments: those after the command.
         state: the folder for its state.
+        command: that serves.
+        port: to serve on.
     """
     program = "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\nfrom cocalib.__main__ import main\nmain()"
-    command = [
-        sys.executable,
-        "-c",
-        program,
-        "open",
-        *map(str, arguments),
-        "--no-browser",
-        "--no-proposals",
-        "--port",
-        "0",
-    ]
+    flags = ("--no-browser", "--no-proposals", "--port", str(port))
     process = subprocess.Popen(
-        command,
+        [sys.executable, "-c", program, command, *map(str, arguments), *flags],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,

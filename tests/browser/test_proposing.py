@@ -152,6 +152,20 @@ def test_twenty_placements_take_at_most_25_keys_and_clicks(
     page.settle()
     assert page.view["has_calibration"]
     assert page.value("__cocalib.shownOffer()") is None
+    enter_does_nothing_else(page)
+
+
+def enter_does_nothing_else(page: Driver) -> None:
+    """After the last proposal it sets no mark, until another frame is looked at."""
+    page.press("Enter")
+    page.press("Enter")
+    assert "All proposals are decided." in page.text("#toasts")
+    assert page.value("__cocalib.state.cross") is None
+    assert len(page.view["clicks"]) == 20
+    page.press("ArrowRight")
+    page.until("__cocalib.state.shown.index === __cocalib.state.cursor")
+    page.press("Enter")
+    page.until("__cocalib.state.cross")
 
 
 def test_a_correcting_click_goes_to_the_apex_that_its_frames_show_in_one_step(
@@ -173,29 +187,6 @@ def test_a_correcting_click_goes_to_the_apex_that_its_frames_show_in_one_step(
     page.press("Control+z")
     page.until("__cocalib.state.view.clicks.length === 0 && __cocalib.shownOffer()")
     assert left(page) == before
-
-
-def test_enter_after_the_last_proposal_does_nothing_else(
-    pictures: Pictures, proposing: RunningServer, open_page: Callable[..., Driver]
-) -> None:
-    pictures.allowed.set()
-    page = open_page(proposing.url)
-    page.until(READY)
-    page.press("n")
-    while page.value("__cocalib.state.proposals.rows.length"):
-        page.until(f"{READY} && (({ON_SCREEN}) || !__cocalib.state.proposals.rows.length)")
-        page.press("Enter")
-        page.until("__cocalib.unconfirmed() === 0")
-    clicks = len(page.view["clicks"])
-    page.press("Enter")
-    page.press("Enter")
-    assert "All proposals are decided." in page.text("#toasts")
-    assert page.value("__cocalib.state.cross") is None
-    assert len(page.view["clicks"]) == clicks
-    page.press("ArrowRight")
-    page.until("__cocalib.state.shown.index === __cocalib.state.cursor")
-    page.press("Enter")
-    page.until("__cocalib.state.cross")
 
 
 def test_a_proposal_is_rejected_corrected_and_undone_and_all_of_them_are_switched_off(

@@ -51,15 +51,15 @@ def test_the_viewer_draws_the_picture_with_its_returns_and_asks_nobody_else(
     served: tuple[str, np.ndarray, tuple[int, int, int]], launch: Callable[..., Browser]
 ) -> None:
     link, pixel_px, colour = served
-    page = launch().new_page(viewport={"width": 1000, "height": 700})
+    page = launch().new_page(viewport={"width": 700, "height": 420})
     answered: list[str] = []
     page.on("response", lambda response: answered.append(response.url))
     page.goto(f"{link}&renderer=webgl")
     for _ in range(LATEST_S):
         shown, (left, top, width, height) = picture_in(page)
-        if width * height > 40_000:
+        if width * height > 20_000:
             break
-        page.wait_for_timeout(1000)
+        page.wait_for_timeout(500)
     assert width / height == pytest.approx(320 / 240, rel=0.02), "the picture was not drawn"
     near = (np.array([left, top]) + (pixel_px + 0.5) * width / 320).astype(int)
     around = shown[near[1] - 3 : near[1] + 4, near[0] - 3 : near[0] + 4].reshape(-1, 3).astype(int)

@@ -1,12 +1,9 @@
 """Nothing is lost: not by killing the server, not by clicking while it is down, not by odd names in a recording."""
 
-import os
-import re
-import signal
 import socket
-import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -14,72 +11,39 @@ import pytest
 
 from tests.browser.driving import Driver
 from tests.picture_recording import PictureRecording, grey_pictures
+from tests.served_process import ServedProcess, served_process
 from tests.serving import serving
 
 pytestmark = pytest.mark.browser
 
 
-class Process:
-    """The program as a user starts it: `cocalib demo`."""
-
-    def __init__(self, folder: Path, port: int) -> None:
-        command = [
-            sys.executable,
-            "-m",
-            "cocalib",
-            "demo",
-            "--no-browser",
-            "--port",
-            str(port),
-            "--session",
-            str(folder / "session"),
-        ]
-        environment = {**os.environ, "XDG_STATE_HOME": str(folder)}
-        self.running = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment)
-        assert self.running.stdout is not None
-        found = next((found for line in self.running.stdout if (found := re.search(r"http://\S+", line))), None)
-        self.url = found.group() if found else ""
-
-    def kill(self) -> None:
-        if self.running.poll() is None:
-            self.running.send_signal(signal.SIGKILL)
-            self.running.wait()
-        assert self.running.stdout is not None
-        self.running.stdout.close()
-
-
 @pytest.fixture
-def starter(tmp_path: Path) -> Iterator[Callable[[], Process]]:
+def demo(tmp_path: Path) -> Iterator[Callable[[], ServedProcess]]:
+    """Start `cocalib demo` on the same port each time."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    started: list[Process] = []
-
-    def start_it() -> Process:
-        started.append(Process(tmp_path, port))
-        assert f":{port}/" in started[-1].url, "the port is taken"
-        return started[-1]
-
-    yield start_it
-    for process in started:
-        process.kill()
+    with ExitStack() as stack:
+        session = ("--session", tmp_path / "session")
+        yield lambda: stack.enter_context(served_process(*session, state=tmp_path, command="demo", port=port))
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="kill -9 needs POSIX")
 def test_killing_the_server_loses_no_click_and_the_page_reconnects_by_itself(
-    starter: Callable[[], Process], open_page: Callable[..., Driver], truth: Any
+    demo: Callable[[], ServedProcess], open_page: Callable[..., Driver], truth: Any
 ) -> None:
-    process = starter()
-    page = open_page(process.url)
+    served = demo()
+    page = open_page(served.url)
     page.click_sample(truth, 5)
     before = page.view
-    process.kill()
+    served.process.kill()
+    served.process.wait()
     page.until("!__cocalib.state.connected")
     assert "is not responding" in page.text("#banner")
     u, v = truth["placements"][4]["pixel_px"]
     page.page.mouse.click(*page.place_of(u + 30, v + 20))
     page.until("__cocalib.unconfirmed() === 1")
-    starter()
+    demo()
     page.until("__cocalib.state.connected")
     page.settle()
     after = page.view

@@ -339,21 +339,6 @@ def test_a_signal_while_opening_ends_the_program_quietly(
     assert (returned, errors.strip()) == (code, "")
 
 
-@POSIX_SIGNALS
-@pytest.mark.parametrize(
-    ("sigint", "sent"),
-    [("default_int_handler", signal.SIGINT), ("SIG_IGN", signal.SIGTERM), ("SIG_IGN", signal.SIGHUP)],
-    ids=["SIGINT", "SIGTERM", "SIGHUP"],
-)
-def test_a_signal_while_serving_closes_the_session(tmp_path: Path, sigint: str, sent: signal.Signals) -> None:
-    arguments = ["demo", "--no-browser", "--port", 0, "--session", tmp_path / "session"]
-    running = started(arguments, patch=PRINTS_WHEN_IT_SERVES, sigint=sigint)
-    code, printed, errors = stopped(running, once_printed="serving", by=sent)
-    assert (code, errors) == (0, "")
-    assert "all clicks are saved" in printed
-    assert (tmp_path / "session" / "journal-copy.jsonl").is_file()
-
-
 SLOW_TO_CLOSE = f"""{PRINTS_WHEN_IT_SERVES}
 import os, sys, time
 from cocalib.session.file import SessionFile
@@ -367,13 +352,20 @@ SessionFile.close = close_slowly
 
 
 @POSIX_SIGNALS
-@pytest.mark.parametrize("second", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP], ids=lambda sent: sent.name)
-def test_a_second_signal_does_not_interrupt_the_closing(tmp_path: Path, second: signal.Signals) -> None:
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [(signal.SIGINT, signal.SIGTERM), (signal.SIGTERM, signal.SIGHUP), (signal.SIGHUP, signal.SIGINT)],
+    ids=lambda sent: sent.name,
+)
+def test_a_signal_while_serving_closes_the_session_and_a_second_one_does_not_interrupt_that(
+    tmp_path: Path, first: signal.Signals, second: signal.Signals
+) -> None:
     arguments = ["demo", "--no-browser", "--port", 0, "--session", tmp_path / "session"]
-    running = started(arguments, patch=SLOW_TO_CLOSE, sigint="default_int_handler")
+    sigint = "default_int_handler" if signal.SIGINT in (first, second) else "SIG_IGN"
+    running = started(arguments, patch=SLOW_TO_CLOSE, sigint=sigint)
     assert running.stdout is not None
     assert any("serving" in line for line in running.stdout)
-    running.send_signal(signal.SIGTERM)
+    running.send_signal(first)
     assert any("closing" in line for line in running.stdout)
     running.send_signal(second)
     out, errors = running.communicate("\n", timeout=30)
