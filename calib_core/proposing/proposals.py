@@ -9,7 +9,7 @@ from calib_core.arrays import Vector2, frozen_array
 from calib_core.association.placements import Placement
 from calib_core.geometry import RigidTransform
 from calib_core.input_files import encodable
-from calib_core.interchange.own.documents import ClickDocument
+from calib_core.interchange.own.documents import ClickDocument, finite_or_none
 from calib_core.interchange.own.proposal_documents import (
     PROPOSALS_SCHEMA,
     DwellDocument,
@@ -19,7 +19,6 @@ from calib_core.interchange.own.proposal_documents import (
     RoughMountingDocument,
     UnproposedDocument,
 )
-from calib_core.interchange.own.transform_document import finite_or_none
 from calib_core.interchange.syntax.strict_json import builtins_of, json_text
 from calib_core.measurements import TimeNs
 from calib_core.proposing.dwell_views import DwellView

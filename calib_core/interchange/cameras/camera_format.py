@@ -162,3 +162,17 @@ class CameraFormat:
     suffix: str
     write: Callable[[Camera, str], str | bytes]
     own_syntax: OwnSyntax | None = None
+
+
+def refuse_skew(camera: Camera, whose: str) -> None:
+    """Refuse a camera with skew, for a format whose readers would ignore it.
+
+    Args:
+        camera: the camera to be written.
+        whose: the start of the message, before "no skew", such as "COLMAP's models have".
+
+    Raises:
+        InputError: it has skew.
+    """
+    if camera.matrix_px[0, 1] != 0.0:
+        raise InputError(f"{whose} no skew, but this camera has; export with --to json or matlab instead")

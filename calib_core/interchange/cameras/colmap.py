@@ -5,9 +5,14 @@ from functools import partial
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.interchange.cameras.camera_format import CameraFormat, FoundCamera, OwnSyntax, found_or_refused
+from calib_core.interchange.cameras.camera_format import (
+    CameraFormat,
+    FoundCamera,
+    OwnSyntax,
+    found_or_refused,
+    refuse_skew,
+)
 from calib_core.interchange.cameras.fields import floats
-from calib_core.interchange.own.camera_document import refuse_skew
 from calib_core.interchange.syntax.yaml_text import numbers_text
 from calib_core.lens_models.registry import lenses_named, names_in, written_lens
 

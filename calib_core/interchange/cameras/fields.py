@@ -10,8 +10,7 @@ import numpy as np
 from calib_core.camera import CameraCovariance
 from calib_core.errors import InputError
 from calib_core.interchange.cameras.camera_format import FoundCamera, PictureWindow, found_or_refused
-from calib_core.interchange.own.camera_document import camera_of
-from calib_core.interchange.own.documents import CameraDocument
+from calib_core.interchange.own.documents import CameraDocument, camera_of
 from calib_core.interchange.syntax.strict_json import checked
 from calib_core.lens_models.registry import LENS_MODELS
 

@@ -19,7 +19,7 @@ from calib_core.interchange.cameras.matlab import MATLAB_PARAMETERS
 from calib_core.interchange.cameras.mrcal import MRCAL
 from calib_core.interchange.cameras.opencv import OPENCV_JSON, OPENCV_XML, OPENCV_YAML
 from calib_core.interchange.cameras.ros import ROS
-from calib_core.interchange.own.camera_document import camera_document
+from calib_core.interchange.own.documents import camera_document
 from calib_core.interchange.syntax.strict_json import json_object, json_text
 from calib_core.interchange.syntax.xml_places import load_opencv_xml
 from calib_core.interchange.syntax.yaml_text import load_yaml

@@ -1,8 +1,7 @@
 """Kalibr's camera chain."""
 
 from calib_core.camera import Camera
-from calib_core.interchange.cameras.camera_format import CameraFormat
-from calib_core.interchange.own.camera_document import refuse_skew
+from calib_core.interchange.cameras.camera_format import CameraFormat, refuse_skew
 from calib_core.interchange.syntax.yaml_text import numbers_text, quoted
 from calib_core.lens_models.registry import WrittenLens, written_lens
 

@@ -4,9 +4,8 @@ import re
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.interchange.cameras.camera_format import CameraFormat, FoundCamera, OwnSyntax
+from calib_core.interchange.cameras.camera_format import CameraFormat, FoundCamera, OwnSyntax, refuse_skew
 from calib_core.interchange.cameras.fields import floats
-from calib_core.interchange.own.camera_document import refuse_skew
 from calib_core.interchange.syntax.yaml_text import numbers_text
 from calib_core.lens_models.registry import written_lens
 

@@ -6,9 +6,8 @@ from typing import Any
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.interchange.cameras.camera_format import CameraFormat, FoundCamera, OwnSyntax
+from calib_core.interchange.cameras.camera_format import CameraFormat, FoundCamera, OwnSyntax, refuse_skew
 from calib_core.interchange.cameras.fields import floats
-from calib_core.interchange.own.camera_document import refuse_skew
 from calib_core.interchange.syntax.yaml_text import numbers_text
 
 _COEFFICIENTS = {"LENSMODEL_PINHOLE": 0, "LENSMODEL_OPENCV4": 4, "LENSMODEL_OPENCV5": 5, "LENSMODEL_OPENCV8": 8}

@@ -23,7 +23,7 @@ from calib_core.interchange.check.pixel_differences import (
 )
 from calib_core.interchange.check.slips import CheckResult, explain, explained
 from calib_core.interchange.format import ImportedCalibration, WrittenPose
-from calib_core.interchange.own.camera_document import camera_document
+from calib_core.interchange.own.documents import camera_document
 from calib_core.results.verdict import degrees_of_freedom
 
 LEVEL = 0.05

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.errors import InputError
+from calib_core.interchange.own.documents import finite_or_none, nan_if_none
 from calib_core.interchange.own.lens_documents import (
     BOARD_VIEWS_SCHEMA,
     BoardViewDocument,
@@ -13,7 +14,6 @@ from calib_core.interchange.own.lens_documents import (
     LeftOutDocument,
     SourceDocument,
 )
-from calib_core.interchange.own.transform_document import finite_or_none, nan_if_none
 from calib_core.interchange.syntax.strict_json import document_text, parse_document
 from calib_core.intrinsics import Board, BoardCorners, LeftOutPicture
 from calib_core.measurements import TimeNs

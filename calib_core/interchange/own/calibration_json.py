@@ -34,21 +34,20 @@ from calib_core.interchange.calibration_file import (
 )
 from calib_core.interchange.format import Format, ImportedCalibration, Reads, WrittenPose, imported
 from calib_core.interchange.own import documents
-from calib_core.interchange.own.camera_document import camera_document, camera_of
 from calib_core.interchange.own.clicks_json import refuse_repeated_ids, unconfirmed_of
 from calib_core.interchange.own.documents import (
     AngleMapDocument,
     CovariancePartsDocument,
-)
-from calib_core.interchange.own.documents import Matrix66 as StatedMatrix
-from calib_core.interchange.own.transform_document import (
     are_inverse,
+    camera_document,
+    camera_of,
     finite_or_none,
     nan_if_none,
     nested,
     transform_document,
     transform_of,
 )
+from calib_core.interchange.own.documents import Matrix66 as StatedMatrix
 from calib_core.interchange.syntax.content import Content, decoded
 from calib_core.interchange.syntax.strict_json import (
     builtins_of,

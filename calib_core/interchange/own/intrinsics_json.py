@@ -9,7 +9,7 @@ from calib_core.interchange.own.board_views_json import (
     left_out_documents,
     source_document,
 )
-from calib_core.interchange.own.camera_document import camera_document
+from calib_core.interchange.own.documents import camera_document, finite_or_none
 from calib_core.interchange.own.lens_documents import (
     INTRINSICS_SCHEMA,
     CoverageDocument,
@@ -21,7 +21,6 @@ from calib_core.interchange.own.lens_documents import (
     ResidualFieldDocument,
     UncertaintyDocument,
 )
-from calib_core.interchange.own.transform_document import finite_or_none
 from calib_core.interchange.syntax.strict_json import document_text
 from calib_core.intrinsics import (
     MODEL_ERRORS_UNSEEN,

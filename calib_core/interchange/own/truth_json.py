@@ -3,9 +3,7 @@
 from collections.abc import Mapping
 
 from calib_core.interchange.format import TRUTH_FORMAT, Format, ImportedCalibration, Reads, WrittenPose
-from calib_core.interchange.own.camera_document import camera_of
-from calib_core.interchange.own.documents import CameraDocument, TransformDocument
-from calib_core.interchange.own.transform_document import transform_of
+from calib_core.interchange.own.documents import CameraDocument, TransformDocument, camera_of, transform_of
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.strict_json import checked
 
