@@ -171,7 +171,7 @@ def export(
     uncorrected = () if chosen.holds_corrections else (f"{line}{hint}" for line in corrections_lines(file))
     lost = () if chosen.holds_corrections else missing_map(file.calibration)
     notes_on = chosen.notes_on(file) if chosen.notes_on else ()
-    notes = (*uncorrected, *lost, *chosen.notes, *notes_on, *prepared.notes)
+    notes = (*lost, *uncorrected, *chosen.notes, *notes_on, *prepared.notes)
     return Export(chosen.file_name, content, notes, prepared.extra_files)
 
 
