@@ -217,6 +217,11 @@ class SolvingOptions:
     )
     seed: int = option(1, "Seed of the random generator; the same seed gives the same bytes.", low=0, high=2**32 - 1)
 
+    @property
+    def reach_m(self) -> float:
+        """How far apart the sensors can be [m]: as far as the rig is large, or twice as far as they are expected to be."""
+        return max(self.rig_size_m, 2.0 * self.nominal_camera_distance_m)
+
 
 @dataclass(frozen=True, slots=True)
 class PaperOptions:

@@ -142,8 +142,7 @@ def bound_of(
     radar = covariance_from_sigma_polar(points, np.tile(sigma_polar_of(profile), (len(points), 1)))
     spread = d_point @ radar @ np.swapaxes(d_point, 1, 2) + profile.sigma_px**2 * np.eye(2)
     information = (np.swapaxes(jacobian, 1, 2) @ np.linalg.solve(spread, jacobian)).sum(axis=0)
-    one_metre = CameraPrior(np.zeros(3), 1.0, measured=True)
-    to_centre = one_metre.rows(pose)[1]  # d centre / d (dt, dtheta)
+    to_centre = CameraPrior(np.zeros(3), 1.0, measured=True).centre_jacobian(pose)
     if tape_m is not None:
         information = information + to_centre.T @ to_centre / tape_m**2
     covariance = np.linalg.inv(information)

@@ -32,7 +32,7 @@ def outcome_figures(outcome: Calibration | Unsolvable, truth: RigidTransform) ->
         return {f"{_CODE}{outcome.code}": 1.0, "squared": None}
     pose, covariance = outcome.camera_from_radar, outcome.covariance
     error = truth.error_from(pose)
-    to_centre = CameraPrior(np.zeros(3), 1.0, measured=True).rows(pose)[1]  # d centre / d (dt, dtheta)
+    to_centre = CameraPrior(np.zeros(3), 1.0, measured=True).centre_jacobian(pose)  # d centre / d (dt, dtheta)
     away_m = pose.inverse().translation_m - truth.inverse().translation_m
     stated = bool(np.isfinite(covariance).all())
     codes: Figures = {f"{_CODE}{warning.code}": 1.0 for warning in outcome.warnings}

@@ -138,7 +138,7 @@ def _mirrored_on_rig(plane: _Plane, fit: SolvedFit) -> bool:
     """Return whether the camera, reflected in the plane of the placements, is as near to the radar as one rig allows."""
     centre_m = fit.refined.camera_from_radar.inverse().translation_m
     reflected_m = centre_m - 2.0 * plane.height_m(centre_m)[0] * plane.axes[2]
-    return float(np.linalg.norm(reflected_m)) <= fit.options.solving.rig_size_m
+    return float(np.linalg.norm(reflected_m)) <= fit.options.solving.reach_m
 
 
 def _on_other_side(sides: GroundSides) -> DataWarning:

@@ -47,7 +47,7 @@ def two_poses(fit: SolvedFit) -> list[DataWarning]:
 
 def on_rig(fit: SolvedFit, camera_from_radar: RigidTransform) -> bool:
     """Return whether a pose has the camera as near to the radar as one rig allows; a measured position says where it is."""
-    near = float(np.linalg.norm(_camera_centre(camera_from_radar))) <= fit.options.solving.rig_size_m
+    near = float(np.linalg.norm(_camera_centre(camera_from_radar))) <= fit.options.solving.reach_m
     return near or fit.measurements.prior.measured
 
 
