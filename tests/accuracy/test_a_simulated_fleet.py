@@ -51,7 +51,7 @@ def test_what_was_planned_is_named_and_nothing_else(fleet: Path) -> None:
     assert {one.question: one.wrong for one in judged if one.wrong} == {}
     assert [one.of for one in judged] == [7, 1, 1, 2, 1, 3]
     assert all(
-        words.endswith("verdict weak") for words in verdicts.wrong
+        words.endswith("verdict coarse") for words in verdicts.wrong
     )  # 10 placements in such pictures may be too few
 
 

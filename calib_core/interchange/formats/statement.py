@@ -172,12 +172,13 @@ def missing_map(calibration: Calibration) -> tuple[str, ...]:
 
 
 def corrections_lines(file: CalibrationFile) -> tuple[str, ...]:
-    """Return the line about the AED with and without the radar's corrections; nothing if there are none."""
+    """Return the line about the AED with and without the radar's corrections; nothing if there are none, or both are alike."""
     found = aed_either_way(file)
     if found is None:
         return ()
     if file.corrected is None:
-        return (f"without the corrections AED {found[1]:.3g} instead of {found[0]:.3g} px",)
+        meant, without = (f"{aed_px:.3g}" for aed_px in found)
+        return (f"without the corrections AED {without} instead of {meant} px",) if without != meant else ()
     return (
         f"{_FOR_RAW}: the pose was solved without taking out what the radar gets wrong, AED {found[0]:.3g} px; "
         f"with the corrections {found[1]:.3g} px",
