@@ -50,6 +50,7 @@ class PictureRecording:
     camera_frame: str = "camera_optical"
     topics: tuple[Any, ...] = ()
     warnings: tuple[Any, ...] = ()
+    damage: tuple[Any, ...] = ()
     paths: tuple[Path, ...] = ()
     radar_times: TimesNs = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 

@@ -96,7 +96,7 @@ def test_lost_returns_lead_the_verdict_where_they_can_matter(
     assert isinstance(outcome, Calibration)
     verdict = verdict_on(outcome)
     assert told == (lost != "none")
-    assert (verdict.level == "weak" and "are lost" in verdict.reason) == leads
+    assert (verdict.level == "coarse" and "are lost" in verdict.reason) == leads
     assert any(warning.code == "lost-returns" for warning in outcome.warnings) == leads
 
 
