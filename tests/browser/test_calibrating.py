@@ -1,14 +1,12 @@
 """A user calibrates the sample in a real browser."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from cocalib.web.port.server import RunningServer
 from tests.browser.driving import Driver
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
@@ -133,14 +131,6 @@ def test_keys_walk_frames_placements_and_overlays(page: Driver) -> None:
     assert not page.page.is_visible("#help-dialog")
 
 
-def test_playing_shows_frame_after_frame_and_space_stops_it(page: Driver) -> None:
-    page.press(" ")
-    page.until("__cocalib.state.shown.index >= 3")
-    page.press(" ")
-    assert not page.value("__cocalib.state.playing")
-    page.until("__cocalib.state.shown.index === __cocalib.state.cursor")
-
-
 def test_the_method_and_its_options_can_be_changed_and_reset(page: Driver, truth: Any) -> None:
     page.load_sample(truth, 8)
     robust = page.view["metrics"]
@@ -189,26 +179,3 @@ def test_a_camera_position_is_used_only_once_it_is_entered(page: Driver, truth: 
     page.until("__cocalib.state.view.options.solving.camera_position !== null")
     page.settle()
     assert page.page.get_by_label("left", exact=True).input_value() != ""
-
-
-def test_two_tabs_see_the_same(
-    page: Driver, open_page: Callable[..., Driver], server: RunningServer, truth: Any
-) -> None:
-    other = open_page(server.url)
-    page.load_sample(truth, 2)
-    other.until("__cocalib.state.view.clicks.length === 2")
-    other.go_to(page.value("__cocalib.state.cursor"))
-    other.press("Delete")
-    page.until("__cocalib.state.view.clicks.length === 1")
-    page.settle()
-    other.settle()
-    assert page.view == other.view
-
-
-def test_a_reloaded_page_shows_the_same_frame(page: Driver, truth: Any) -> None:
-    page.load_sample(truth, 4)
-    before, frame = page.view, page.value("__cocalib.state.cursor")
-    page.page.reload()
-    page.until("__cocalib.state.shown && __cocalib.state.view")
-    assert page.view == before
-    assert page.value("__cocalib.state.shown.index") == frame

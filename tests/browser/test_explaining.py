@@ -82,21 +82,6 @@ def test_a_notice_covers_neither_the_field_nor_the_mark(page: Driver, truth: Any
     page.value("__cocalib.goTo(0)")
 
 
-def test_a_short_drag_on_a_mark_does_nothing(page: Driver, truth: Any) -> None:
-    page.load_sample(truth, 1)
-    before = page.view
-    x, y = page.place_of(*truth["placements"][0]["pixel_px"])
-    for dx, dy in ((3, 0), (0, -3), (2, 2)):
-        page.page.mouse.move(x, y)
-        page.page.mouse.down()
-        page.page.mouse.move(x + dx / 2, y + dy / 2)
-        page.page.mouse.move(x + dx, y + dy)
-        page.page.mouse.up()
-        page.settle()
-    assert page.view["clicks"] == before["clicks"]
-    assert page.view["revision"] == before["revision"]
-
-
 def test_the_loupe_magnifies_4_to_16_times_and_stretches_the_contrast(page: Driver, truth: Any) -> None:
     user = page.page
     loupe = user.locator("#loupe")

@@ -80,7 +80,7 @@ def test_a_page_that_missed_a_change_asks_for_a_whole_view(
     assert page.view == json.loads(encode(workspace.view))
 
 
-def test_after_a_calibration_the_page_has_what_a_new_page_gets(
+def test_after_a_calibration_the_page_has_what_a_new_page_gets_and_shows_the_same_frame_when_reloaded(
     page: Driver, workspace: Workspace, truth: dict[str, object]
 ) -> None:
     page.click_sample(truth, 6)
@@ -88,3 +88,8 @@ def test_after_a_calibration_the_page_has_what_a_new_page_gets(
     page.until("__cocalib.state.view.stage === 'solved'")
     assert page.value("__cocalib.follower.changes > 6"), "the page was sent changes"
     assert page.view == json.loads(encode(workspace.view))
+    frame = page.value("__cocalib.state.cursor")
+    page.page.reload()
+    page.until("__cocalib.state.shown && __cocalib.state.view")
+    assert page.view == json.loads(encode(workspace.view))
+    assert page.value("__cocalib.state.shown.index") == frame > 0

@@ -72,9 +72,3 @@ def test_returns_stay_as_long_as_chosen_and_playing_goes_through_the_scans(page:
     page.until(f"__cocalib.state.look.index > {before} + 5")
     page.press(" ")
     page.until("!__cocalib.state.playing && __cocalib.state.look.index === __cocalib.state.cursor")
-
-
-def test_nothing_can_be_clicked_or_exported_by_keys(page: Driver) -> None:
-    page.press("Enter", "e", "Delete", "x", "Control+z")
-    assert page.view["clicks"] == []
-    assert not page.page.is_visible("#export-dialog")

@@ -9,6 +9,9 @@ from tests.browser.driving import Driver
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
+_BY_KEYS = 9
+"""So many placements are marked without a mouse: five of them where the page expects the reflector."""
+
 
 def place(page: Driver, placement: Any) -> None:
     page.go_to(page.frame_at(placement["best_image_time"]))
@@ -107,13 +110,13 @@ def test_a_dismissed_placement_is_not_offered_until_it_is_undone(page: Driver) -
     page.until("__cocalib.state.view.dismissed.length === 0")
 
 
-def test_twenty_placements_take_at_most_160_keys(page: Driver, truth: Any) -> None:
+def test_a_placement_takes_at_most_eight_keys(page: Driver, truth: Any) -> None:
     page.until("__cocalib.state.placements.length >= 15")
     near = {page.frame_at(placement["best_image_time"]): placement for placement in truth["placements"]}
     keys = 1
     page.page.keyboard.press("g")
     errors = []
-    for number in range(len(truth["placements"])):
+    for number in range(_BY_KEYS):
         page.press("n")
         page.until("__cocalib.state.shown.index === __cocalib.state.cursor && __cocalib.state.cross")
         if number >= 4:
@@ -134,6 +137,6 @@ def test_twenty_placements_take_at_most_160_keys(page: Driver, truth: Any) -> No
         page.press("Enter")
         mark = page.value("__cocalib.clicksIn(__cocalib.state.cursor)[0]")
         errors.append(np.hypot(mark["u_px"] - wanted[0], mark["v_px"] - wanted[1]))
-    assert keys <= 160, keys
+    assert keys <= 8 * _BY_KEYS, keys
     assert np.median(errors) < 0.6
     assert page.view["has_calibration"]

@@ -112,5 +112,6 @@ def test_what_needs_pictures_is_refused_with_the_reason(
     expect(page.page.locator("#palette .entry").first).to_contain_text("There are no pictures in this recording")
     page.page.keyboard.press("Escape")
     expect(page.page.locator("dialog[open]")).to_have_count(0)
-    page.press("e", "x", "Enter")
+    page.press("Enter", "e", "Delete", "x", "Control+z")
     assert not page.page.is_visible("dialog[open]")
+    assert page.view["clicks"] == []

@@ -10,7 +10,7 @@ from tests.browser.driving import Driver
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
 
-def test_a_mark_beside_the_reflector_snaps_to_its_apex_and_counts(page: Driver, truth: Any) -> None:
+def test_a_mark_snaps_to_the_apex_beside_it_or_stays_where_no_corner_is(page: Driver, truth: Any) -> None:
     placement = truth["placements"][1]
     u, v = placement["pixel_px"]
     page.go_to(page.frame_at(placement["best_image_time"]))
@@ -25,11 +25,6 @@ def test_a_mark_beside_the_reflector_snaps_to_its_apex_and_counts(page: Driver, 
     page.press("Control+z")
     page.until("__cocalib.state.view.clicks[0].mark === 'clicked'")
 
-
-def test_no_corner_is_said_and_the_mark_stays(page: Driver, truth: Any) -> None:
-    placement = truth["placements"][1]
-    u, v = placement["pixel_px"]
-    page.go_to(page.frame_at(placement["best_image_time"]))
     page.click(u - 150.0, v + 60.0)
     before = page.view["clicks"]
     page.press("s")
