@@ -20,7 +20,14 @@ CHANGED = (
     "this version of viser has changed its private browser API; adapt static/space/viser_hook.js, or lower the upper bound "
     "of viser in pyproject.toml. Missing: "
 )
+SMALL = {"width": 1024, "height": 576}
 SETTLED = "__cocalibSpace.frameShown() === __cocalib.state.cursor && __cocalibSpace.lookShown().index === __cocalib.state.cursor"
+
+
+@pytest.fixture
+def page(open_page: Callable[..., Driver], server: RunningServer) -> Driver:
+    """Open a small page: without a graphics card, each pixel of the 3D view costs time."""
+    return open_page(server.url, viewport=SMALL)
 
 
 @pytest.fixture
@@ -177,7 +184,7 @@ PICTURE_DIFFERENCE = """([left, top, scale]) => {
 def test_without_pictures_returns_and_placements_can_be_picked_too(
     open_page: Callable[..., Driver], radar_only_server: RunningServer
 ) -> None:
-    page = open_page(radar_only_server.url, ready="__cocalib.state.look")
+    page = open_page(radar_only_server.url, ready="__cocalib.state.look", viewport=SMALL)
     page.until("__cocalib.state.placementsKnown && __cocalibSpace.lookShown()?.placements.length >= 10")
     assert not page.page.is_visible("#space-camera")
     open_views(page)

@@ -33,7 +33,7 @@ def test_killing_the_server_loses_no_click_and_the_page_reconnects_by_itself(
     demo: Callable[[], ServedProcess], open_page: Callable[..., Driver], truth: Any
 ) -> None:
     served = demo()
-    page = open_page(served.url)
+    page = open_page(served.url, viewport={"width": 1024, "height": 576})  # in which the 3D view is drawn sooner
     page.click_sample(truth, 5)
     before = page.view
     served.process.kill()
