@@ -85,17 +85,6 @@ def test_viser_still_starts_its_server_as_the_hook_expects(server: RunningServer
         assert isinstance(socket.recv(timeout=20), bytes)
 
 
-@pytest.mark.parametrize("path", ["/", "/main.js", "/api/clicks.json", "/viser/tab1/"])
-def test_without_a_cookie_nothing_is_served(server: RunningServer, path: str) -> None:
-    assert get(server, path).status == 401
-
-
-def test_a_link_works_once(server: RunningServer, cookie: str) -> None:
-    used = server.url.removeprefix(server.origin)
-    assert get(server, used).status == 200
-    assert get(server, used).status == 401
-
-
 @pytest.mark.parametrize("path", ["/ws/tab1", "/viser/tab1", "/viser"])
 def test_a_websocket_from_elsewhere_is_refused(server: RunningServer, cookie: str, path: str) -> None:
     address, origin = server.origin.replace("http", "ws") + path, "http://evil.example"
