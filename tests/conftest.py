@@ -32,8 +32,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
-    """Start one worker more than there are processors: a test that drives a browser waits for half of its time."""
-    return (os.cpu_count() or 1) + 1
+    """Start two workers more than there are processors: tests that drive a browser or start programs wait half of the time."""
+    return (os.cpu_count() or 1) + 2
 
 
 @pytest.fixture(scope="session")
