@@ -3,6 +3,7 @@
  * It starts where the radar expects the reflector. A mark that is set there without the cross being moved is a guess: it does not count.
  */
 
+import { shownOffer } from "../proposals/proposals.js";
 import { ink } from "../shell/colours.js";
 import { toast } from "../shell/notices.js";
 import { clickIn, clicksIn, emit, isOffered, on, placementsAt, state } from "../shell/state.js";
@@ -32,7 +33,7 @@ let wanted = false;
 let pace = { factor: 1, at: 0 };
 
 export function startCross() {
-  on(["shown", "overlay", "playing"], follow);
+  on(["shown", "overlay", "playing", "proposals"], follow);
 }
 
 /** Show the cross, or hide it. */
@@ -48,10 +49,11 @@ function endCross() {
   leaveCross();
 }
 
-/** Another frame has its own cross. */
+/** Another frame has its own cross; one that only Enter brought, and nobody moved, gives way to a proposal. */
 function follow() {
   const cross = state.cross;
   if (state.playing) return leaveCross();
+  if (cross && !cross.touched && !wanted && shownOffer()) return leaveCross();
   if (cross && cross.frame !== state.shown?.index) leaveCross();
   if (cross && !cross.touched && !cross.expected && expectedHere()) return start();
   if (!state.cross && wanted && state.shown && !clicksIn(state.shown.index).length && placementsAt(state.shown.index).length) start();

@@ -23,8 +23,6 @@ from tests.serving import serving
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
-HELD_FROM = 8
-"""Looking at the pictures waits before this placement until the test goes on."""
 UNCERTAIN = 4.0
 """Standard deviation of a place whose apex is not seen [px]."""
 READY = "__cocalib.state.proposals?.progress.stage === 'ready'"
@@ -34,7 +32,8 @@ ON_SCREEN = "__cocalib.shownOffer() && __cocalib.state.shown.index === __cocalib
 class Pictures:
     """What replaces looking at the pictures: true places among others, found placement by placement as the test allows."""
 
-    def __init__(self, truth: Any) -> None:
+    def __init__(self, truth: Any, held_from: int) -> None:
+        self.held_from = held_from
         self.allowed = threading.Event()
         self.pixels = {
             one["best_image_time"]["sec"] * NS_PER_S + one["best_image_time"]["nanosec"]: np.array(one["pixel_px"])
@@ -46,7 +45,7 @@ class Pictures:
     ) -> tuple[DwellView, ...]:
         views: list[DwellView] = []
         for number, placement in enumerate(placements):
-            if number == HELD_FROM:
+            if number == self.held_from:
                 assert self.allowed.wait(60)
             views.append(self._view(number, placement, camera))
             progress(ViewProgress(len(views), len(placements), tuple(views)))
@@ -72,8 +71,14 @@ class Pictures:
 
 
 @pytest.fixture
-def pictures(monkeypatch: pytest.MonkeyPatch, truth: Any) -> Iterator[Pictures]:
-    fake = Pictures(truth)
+def held_from() -> int:
+    """Looking at the pictures waits before this placement until the test goes on."""
+    return 8
+
+
+@pytest.fixture
+def pictures(monkeypatch: pytest.MonkeyPatch, truth: Any, held_from: int) -> Iterator[Pictures]:
+    fake = Pictures(truth, held_from)
     monkeypatch.setattr("cocalib.proposing.dwell_views", fake)
     monkeypatch.setattr("cocalib.proposing.looks_of", lambda *_: iter([object()]))
     monkeypatch.setattr(
@@ -280,6 +285,22 @@ def test_only_what_is_seen_is_decided_and_the_line_says_how_far_the_search_is(
     page.press("Enter")
     assert page.value("document.activeElement.getAttribute('aria-pressed')") != before
     assert len(page.view["clicks"]) == 1
+
+
+@pytest.mark.parametrize("held_from", [0])
+def test_the_cross_that_enter_brings_before_any_proposal_gives_way_to_the_first_one(
+    pictures: Pictures, proposing: RunningServer, open_page: Callable[..., Driver]
+) -> None:
+    page = open_page(proposing.url)
+    page.until("__cocalib.state.placements.length > 0 && __cocalib.state.proposals")
+    page.go_to(page.value("__cocalib.state.placements[0].frame"))
+    page.press("Enter")
+    assert page.value("__cocalib.state.cross") is not None
+    pictures.allowed.set()
+    page.until("__cocalib.state.cross === null")
+    guide(page)
+    page.press("Enter")
+    assert [click["frame"] for click in page.view["clicks"]] == [page.value("__cocalib.state.placements[0].frame")]
 
 
 def test_what_is_accepted_while_the_server_is_gone_is_drawn_and_sent_when_it_is_back(
