@@ -247,15 +247,15 @@ def test_import_takes_the_camera_matrix_of_a_kitti_calibration(
     refused = cocalib("import", kitti, "--out", back)
     assert refused.code == 2
     assert "states the camera matrix but not the image size; give it with --image-size WIDTH HEIGHT" in refused.err
-    assert cocalib("import", kitti, "--out", back, "--image-size", "640", "480").code == 0
+    assert cocalib("import", kitti, "--out", back, "--image-size", "320", "240").code == 0
     (tmp_path / "image_2").mkdir()
-    cv2.imwrite(str(tmp_path / "image_2" / "00000.png"), np.zeros((480, 640, 3), np.uint8))
+    cv2.imwrite(str(tmp_path / "image_2" / "00000.png"), np.zeros((240, 320, 3), np.uint8))
     beside = tmp_path / "beside.json"
     answer = cocalib("import", kitti, "--out", beside)
-    assert "image size 640 x 480 px from the pictures beside the file" in answer.err
+    assert "image size 320 x 240 px from the pictures beside the file" in answer.err
     cameras = [json.loads(path.read_text())["camera"] for path in (back, beside)]
     assert cameras[0] == cameras[1]
-    assert (cameras[0]["model"], cameras[0]["width_px"], cameras[0]["height_px"]) == ("pinhole", 640, 480)
+    assert (cameras[0]["model"], cameras[0]["width_px"], cameras[0]["height_px"]) == ("pinhole", 320, 240)
     written = next(line for line in kitti.read_text().splitlines() if line.startswith("P2")).split()[1:]
     np.testing.assert_allclose(np.ravel(cameras[0]["matrix_px"])[[0, 2]], [float(written[0]), float(written[2])])
 

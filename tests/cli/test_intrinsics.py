@@ -181,7 +181,7 @@ def test_a_board_that_is_only_shifted_gives_no_focal_length(cocalib: Cocalib, tm
     answer = cocalib("intrinsics", tmp_path, *_BOARD, "--model", "pinhole")
     assert answer.code == 1, answer.out
     assert "focal length" in answer.err
-    assert "turned by 30 to 45 deg" in answer.err
+    assert "turned by 30 to 45°" in answer.err
 
 
 def test_pictures_of_different_sizes_are_not_mixed(cocalib: Cocalib, left: list[Path], tmp_path: Path) -> None:
