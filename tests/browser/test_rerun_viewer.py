@@ -1,4 +1,4 @@
-"""Rerun's web viewer, as `cocalib rerun --web` serves it, in a real browser: what it draws, and whom it asks."""
+"""Rerun's web viewer, as `cocalib show --web` serves it, in a real browser: what it draws, and whom it asks."""
 
 import threading
 from collections.abc import Callable, Iterator

@@ -127,8 +127,7 @@ def test_three_pairs_are_too_few(cocalib: Cocalib, pairs_file: Callable[..., Pat
         ),
         (["batch", "a.toml", "--engine=none"], "--engine went in 0.1: use --workers 1 for none"),
         (["batch", "a.toml", "--shard", "1/2"], "--shard went in 0.1: give --scheduler ADDRESS"),
-        (["fleet", "rebuild"], "ACTION rebuild went in 0.1: the commands read the results themselves"),
-        (["fleet", "export", "--parquet", "a"], "--parquet went in 0.1: use --csv"),
+        (["batch", "export", "--parquet", "a"], "--parquet went in 0.1: use --csv"),
         (["export", "a.json", "--to", "tf1-launch"], "format 'tf1-launch' went in 0.1: use tf2 or tf2-launch-py"),
         (["--json", "info"], "unknown option --json; give a command first: demo, open"),
         (["info", "a.bag", "--bogus"], "unknown option --bogus; see cocalib info --help"),
@@ -139,7 +138,11 @@ def test_three_pairs_are_too_few(cocalib: Cocalib, pairs_file: Callable[..., Pat
         (["check", "a.json", "--max-deg", "1"], "are limits for --against FILE"),
         (["check", "a.json", "--clicks", "clicks.json"], "give it with --recording RECORDING"),
         (["check", "a.json", "--radar-topic", "/r"], "apply with --recording RECORDING only"),
-        (["video", "a.bag"], "--out FILE is missing; see cocalib video --help"),
+        (["show", "a.bag", "--out", "a.mp4", "--trail", "3"], "--calibration FILE is missing"),
+        (["show", "a.bag", "--out", "a.mp4", "--web"], "remove --out to open it"),
+        (["solve", "a.bag", "--propose", "--auto"], "--propose solves nothing: give a recording"),
+        (["solve", "a.bag", "--json"], "--json applies with --propose only"),
+        (["check", "a.json", "b.json", "--against", "c.json", "--recording", "d"], "judges two calibrations"),
         (["info", "a.bag", "--clock", "wall"], "--clock takes auto, header or receive, not 'wall'"),
         (["open", "a.bag", "--port", "http"], "--port takes a whole number, not 'http'"),
         (["solve", "a.bag", "--camera-position-m", "0", "1", "up"], "--camera-position-m takes X Y Z"),
@@ -152,21 +155,23 @@ def test_three_pairs_are_too_few(cocalib: Cocalib, pairs_file: Callable[..., Pat
         (["session", "list", "--out", "b"], "--out applies to session export only"),
         (["session", "repair", "absent"], "absent: no such folder"),
         (["session", "mend"], "takes list, repair or export, not 'mend'"),
-        (["fleet", "status"], "fleet status takes OUT; 0 given"),
-        (["fleet", "history", "OUT"], "fleet history takes VEHICLE OUT; 1 given"),
-        (["fleet", "compare", "A", "OUT"], "fleet compare takes A B OUT; 2 given"),
-        (["fleet", "status", "/nowhere"], "/nowhere: no such folder"),
-        (["fleet", "export", "OUT"], "needs the name of the new file: --csv FILE"),
-        (["fleet", "export", "OUT", "--json"], "--json applies to fleet status, history, compare only"),
-        (["fleet", "walk", "OUT"], "not 'walk'"),
-        (["report"], "CALIBRATION is missing; see cocalib report --help"),
-        (["report", "{golden}"], "report writes a file: give its name with --out FILE.html"),
+        (["batch", "status"], "batch status takes OUT; 0 given"),
+        (["batch", "history", "OUT"], "batch history takes VEHICLE OUT; 1 given"),
+        (["batch", "compare", "A", "OUT"], "batch compare takes A B OUT; 2 given"),
+        (["batch", "status", "/nowhere"], "/nowhere: no such folder"),
+        (["batch", "export", "OUT"], "needs the name of the new file: --csv FILE"),
+        (["batch", "export", "OUT", "--json"], "--json applies to batch status, history, compare only"),
+        (["batch", "walk", "OUT"], "batch takes one MANIFEST, or an action: status, history"),
+        (["batch", "status", "OUT", "--workers", "2"], "batch status takes --json or --csv only"),
+        (["compare", "a.json"], "is cocalib check NEW --against OLD now"),
+        (["evaluate"], "CALIBRATION is missing; see cocalib evaluate --help"),
+        (["evaluate", "{golden}"], "evaluate needs a recording, or --report FILE.html"),
         (
-            ["report", "{golden}", "--boxes", "b.json", "--out", "a.html"],
+            ["evaluate", "{golden}", "--boxes", "b.json", "--report", "a.html"],
             "apply with a RECORDING only; give it after the",
         ),
-        (["report", "/nowhere.json", "--out", "a.html"], "/nowhere.json: "),
-        (["report", "{golden}", "--out", "/nowhere/report.html"], "/nowhere/report.html: cannot be written: "),
+        (["evaluate", "/nowhere.json", "--report", "a.html"], "/nowhere.json: "),
+        (["evaluate", "{golden}", "--report", "/nowhere/report.html"], "/nowhere/report.html: cannot be written: "),
         (["solve", "a.bag", "--vehicle", "a/b"], "--vehicle: 'a/b' cannot be a name; give one without slashes"),
         (["solve", "a.bag", "--session-name", ".."], "--session-name: '..' cannot be a name"),
         (["solve", "a.bag", "--vehicle-type", " "], "--vehicle-type is ' '; give 1 to 120 printable characters"),
@@ -191,9 +196,7 @@ def test_wrong_usage_gets_a_clear_error(
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(
-    "command", ["open", "info", "solve", "export", "check", "import", "video", "record-rrd", "rerun", "simulate"]
-)
+@pytest.mark.parametrize("command", ["open", "info", "solve", "export", "check", "import", "show", "simulate"])
 def test_the_help_names_every_value(cocalib: Cocalib, command: str) -> None:
     answer = cocalib(command, "--help")
     assert answer.code == 0
@@ -212,7 +215,7 @@ def test_the_help_names_every_value(cocalib: Cocalib, command: str) -> None:
     ],
 )
 def test_a_setting_that_is_none_is_refused_in_one_line(cocalib: Callable[..., Any], setting: str, words: str) -> None:
-    refused = cocalib("propose", "nowhere.bag", "--set", setting)
+    refused = cocalib("solve", "--propose", "nowhere.bag", "--set", setting)
     assert (refused.code, refused.out) == (2, "")
     assert refused.err.startswith(f"cocalib: {words}")
     assert refused.err.count("\n") == 1

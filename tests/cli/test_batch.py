@@ -35,7 +35,7 @@ def test_from_a_folder_to_a_table(fleet: Path, capsys: pytest.CaptureFixture[str
     assert "failed" in why["broken"]
     assert printed.err.splitlines()[0] == "3 sessions"
     assert (fleet / "fleet" / "summary.html").is_file()
-    assert run(["fleet", "status", str(fleet / "fleet")]) == 3
+    assert run(["batch", "status", str(fleet / "fleet")]) == 3
     assert "not-clicked" in capsys.readouterr().out
 
 
@@ -99,7 +99,7 @@ def test_what_the_last_batch_wanted_counts_and_what_it_lacks_is_named(
         clicks.write_text(text)
         run(["batch", str(manifest), "--out", str(out)])
     capsys.readouterr()
-    run(["fleet", "history", "van", str(out), "--json"])
+    run(["batch", "history", "van", str(out), "--json"])
     (session,) = json.loads(capsys.readouterr().out)["sessions"]
     assert session["pairs"] == 20
     manifest.write_text(
@@ -109,7 +109,7 @@ def test_what_the_last_batch_wanted_counts_and_what_it_lacks_is_named(
     (broken,) = (path.parent for path in out.rglob("outcome.json") if '"vehicle": "b"' in path.read_text())
     shutil.rmtree(broken)
     capsys.readouterr()
-    assert run(["fleet", "status", str(out)]) == 3
+    assert run(["batch", "status", str(out)]) == 3
     told = capsys.readouterr().out
     assert "1 session in the manifest without a result: run the batch again: b/broken" in told
     assert "1 session with a result in no manifest any more" in told

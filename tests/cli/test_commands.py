@@ -317,7 +317,7 @@ def test_video_writes_the_camera_and_says_when_it_begins(
     cocalib: Cocalib, made: Callable[..., Path], tmp_path: Path
 ) -> None:
     pytest.importorskip("av", reason="the extra 'video' is not installed")
-    answer = cocalib("video", made(), "--out", tmp_path / "camera.mp4")
+    answer = cocalib("show", made(), "--out", tmp_path / "camera.mp4")
     assert answer.code == 0, answer.err
     assert re.search(r"camera\.mp4: \d+ frames, [\d.]+ s, from \d+\.\d{9} s", answer.out)
     assert (tmp_path / "camera.mp4").stat().st_size > 1000

@@ -1,4 +1,4 @@
-"""`cocalib fleet`: what it prints, writes and returns."""
+"""`cocalib batch status` and the other actions: what it prints, writes and returns."""
 
 import json
 import re
@@ -31,7 +31,7 @@ def moved(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_sound_fleet_has_nothing_to_look_at(cocalib: Cocalib, sound: Path) -> None:
-    answer = cocalib("fleet", "status", sound)
+    answer = cocalib("batch", "status", sound)
     assert answer.code == 0, answer.err
     lines = answer.out.splitlines()
     assert lines[0].split()[:3] == ["vehicle", "last", "session"]
@@ -41,14 +41,14 @@ def test_a_sound_fleet_has_nothing_to_look_at(cocalib: Cocalib, sound: Path) -> 
 
 
 def test_what_needs_a_look_is_exit_code_3(cocalib: Cocalib, moved: Path) -> None:
-    answer = cocalib("fleet", "status", moved)
+    answer = cocalib("batch", "status", moved)
     assert answer.code == 3
     assert "1 of 2 vehicles to look at:\n  V001: this radar was remounted: " in answer.out
     assert "REMOUNTED" in answer.out
 
 
 def test_status_as_json_has_every_figure(cocalib: Cocalib, moved: Path) -> None:
-    answer = cocalib("fleet", "status", moved, "--json")
+    answer = cocalib("batch", "status", moved, "--json")
     assert answer.code == 3
     found = json.loads(answer.out)
     assert found["schema"] == "cocalib/fleet-status-1"
@@ -63,7 +63,7 @@ def test_status_as_json_has_every_figure(cocalib: Cocalib, moved: Path) -> None:
 
 
 def test_history_has_each_transition_with_its_covariance(cocalib: Cocalib, moved: Path) -> None:
-    answer = cocalib("fleet", "history", "V001", moved, "--json")
+    answer = cocalib("batch", "history", "V001", moved, "--json")
     assert answer.code == 0
     found = json.loads(answer.out)
     assert [one["session"] for one in found["sessions"]] == ["s0", "s1"]
@@ -76,29 +76,29 @@ def test_history_has_each_transition_with_its_covariance(cocalib: Cocalib, moved
     assert squared == pytest.approx(change["squared_distance"], rel=1e-6)
     assert change["outcome"] == "remounted"
     assert change["picture_px"] > 0
-    text = cocalib("fleet", "history", "V001", moved)
+    text = cocalib("batch", "history", "V001", moved)
     assert "this radar was remounted" in text.out
     assert f"superseded by later runs: s0 ({digest_of('V001', 's0')})" in text.out
 
 
 def test_compare_says_whether_two_differ(cocalib: Cocalib, moved: Path) -> None:
-    differing = cocalib("fleet", "compare", "V001/s0", "V001/s1", moved)
+    differing = cocalib("batch", "compare", "V001/s0", "V001/s1", moved)
     assert differing.code == 3
     assert differing.out.startswith("this radar was remounted: ")
-    same = cocalib("fleet", "compare", "V000/s0", "V000/s1", moved, "--json")
+    same = cocalib("batch", "compare", "V000/s0", "V000/s1", moved, "--json")
     assert same.code == 0
     assert json.loads(same.out)["outcome"] in ("same", "cannot-tell")
-    vehicles = cocalib("fleet", "compare", "V000", "V001", moved)
+    vehicles = cocalib("batch", "compare", "V000", "V001", moved)
     assert "V000 and V001" in vehicles.out
 
 
 def test_summary_writes_the_page(cocalib: Cocalib, moved: Path) -> None:
-    assert cocalib("fleet", "summary", moved).code == 0
+    assert cocalib("batch", "summary", moved).code == 0
     assert "<html" in (moved / "summary.html").read_text()
 
 
 def test_export_writes_the_table(cocalib: Cocalib, moved: Path, tmp_path: Path) -> None:
-    answer = cocalib("fleet", "export", moved, "--csv", tmp_path / "f.csv")
+    answer = cocalib("batch", "export", moved, "--csv", tmp_path / "f.csv")
     assert answer.code == 0, answer.err
     assert len((tmp_path / "f.csv").read_text().splitlines()) == 6
 
@@ -106,7 +106,7 @@ def test_export_writes_the_table(cocalib: Cocalib, moved: Path, tmp_path: Path) 
 def test_names_cannot_act_on_the_terminal(cocalib: Cocalib, tmp_path: Path) -> None:
     make_result(tmp_path, "V\x1b[2J", "s\u202e0", status="failed", reason="\x07")
     for action in ("status", "history V\x1b[2J"):
-        out = cocalib("fleet", *action.split(" "), tmp_path).out
+        out = cocalib("batch", *action.split(" "), tmp_path).out
         assert not set(out) & {"\x1b", "\u202e", "\x07"}
 
 
@@ -114,20 +114,20 @@ def test_results_of_another_version_are_named(cocalib: Cocalib, tmp_path: Path) 
     make_fleet(tmp_path, 2, 1)
     place = ResultsFolder(tmp_path).folder_of(digest_of("V001", "s0")) / "outcome.json"
     place.write_text(place.read_text().replace("outcome-1", "outcome-2"))
-    answer = cocalib("fleet", "status", tmp_path)
+    answer = cocalib("batch", "status", tmp_path)
     assert answer.code == 3
     assert re.search(r"note: results/\w+/outcome\.json is no cocalib/outcome-1", answer.err)
     assert "V000" in answer.out
 
 
 def test_a_vehicle_that_there_is_not_is_refused(cocalib: Cocalib, sound: Path) -> None:
-    answer = cocalib("fleet", "history", "V9", sound)
+    answer = cocalib("batch", "history", "V9", sound)
     assert answer.code == 2
     assert "no vehicle 'V9' among 6" in answer.err
 
 
 def test_a_folder_without_results_is_refused(cocalib: Cocalib, tmp_path: Path) -> None:
     for action in ("status", "summary"):
-        answer = cocalib("fleet", action, tmp_path)
+        answer = cocalib("batch", action, tmp_path)
         assert answer.code == 2
         assert "no results" in answer.err

@@ -21,8 +21,8 @@ POSIX = pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX files")
 INPUTS = {
     "info": ["info", "{}"],
     "open": ["open", "{}", "--no-browser"],
-    "video": ["video", "{}", "--out", "v.mp4"],
-    "overlay": ["video", "{}", "--overlay", "--calibration", "absent.json", "--out", "v.mp4"],
+    "video": ["show", "{}", "--out", "v.mp4"],
+    "overlay": ["show", "{}", "--calibration", "absent.json", "--out", "v.mp4"],
     "clicks": ["solve", "absent.bag", "--clicks", "{}"],
     "pairs": ["solve", "--pairs", "{}"],
     "check": ["check", "{}"],

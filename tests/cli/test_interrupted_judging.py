@@ -13,7 +13,7 @@ def interrupted(*_: object, **__: object) -> NoReturn:
     raise KeyboardInterrupt
 
 
-@pytest.mark.parametrize("command", ["evaluate", "compare", "report", "record-rrd", "video"])
+@pytest.mark.parametrize("command", ["evaluate", "compared", "report", "rrd", "video"])
 def test_an_interrupt_leaves_no_file_and_no_traceback(
     cocalib: Cocalib,
     made: Callable[..., Path],
@@ -28,13 +28,13 @@ def test_an_interrupt_leaves_no_file_and_no_traceback(
     monkeypatch.setattr("cocalib.evaluation.evaluating.pair_clicks", interrupted)
     clicks = ("--clicks", clicks_file)
     arguments: dict[str, tuple[object, ...]] = {
-        "evaluate": (pose, recording),
-        "compare": (pose, pose, recording),
-        "report": (pose, recording, "--out", tmp_path / "made.html"),
-        "record-rrd": (recording, "--calibration", pose, "--out", tmp_path / "made.rrd"),
-        "video": (recording, "--overlay", "--calibration", pose, "--out", tmp_path / "made.mp4"),
+        "evaluate": ("evaluate", pose, recording),
+        "compared": ("check", pose, "--against", pose, "--recording", recording),
+        "report": ("evaluate", pose, recording, "--report", tmp_path / "made.html"),
+        "rrd": ("show", recording, "--calibration", pose, "--out", tmp_path / "made.rrd"),
+        "video": ("show", recording, "--calibration", pose, "--out", tmp_path / "made.mp4"),
     }
-    answer = cocalib(command, *arguments[command], *clicks)
+    answer = cocalib(*arguments[command], *clicks)
 
     assert answer.code == 130
     assert "Traceback" not in answer.out + answer.err

@@ -1,4 +1,4 @@
-"""`cocalib propose` and `cocalib solve --auto`: on a small recording, on the sample, and on what they must refuse."""
+"""`cocalib solve --propose` and `cocalib solve --auto`: on a small recording, on the sample, and on what they must refuse."""
 
 import json
 from collections.abc import Callable
@@ -47,7 +47,7 @@ def test_what_is_proposed_is_the_reflector_and_becomes_clicks_that_solve(
     cocalib: Cocalib, recording: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "proposals.json"
-    answer = cocalib("propose", recording, *SIZE, "--out", out)
+    answer = cocalib("solve", "--propose", recording, *SIZE, "--out", out)
     assert answer.code == 0, answer.err
     head, *rows, summary, written = answer.out.splitlines()
     assert head.split()[:3] == ["id", "time", "[s]"]
@@ -78,7 +78,7 @@ def test_a_confirmed_click_stays_and_the_others_keep_their_ids(
     click = {"id": "p2", "image_time": third, "pixel_px": true_pixel_px(third).tolist()}
     clicks = tmp_path / "one.json"
     clicks.write_text(json.dumps({"schema": "cocalib/clicks-1", "clicks": [click]}))
-    answer = cocalib("propose", recording, *SIZE, "--clicks", clicks, "--json")
+    answer = cocalib("solve", "--propose", recording, *SIZE, "--clicks", clicks, "--json")
     assert answer.code == 0, answer.err
     document = json.loads(answer.out)
     assert document["confirmed"] == ["p2"]
@@ -94,7 +94,7 @@ def test_a_click_beside_the_reflector_is_named_and_nothing_is_learned_from_it(
     click = {"id": "beside", "image_time": third, "pixel_px": np.add(true_pixel_px(third), (40.0, 0.0)).tolist()}
     clicks = tmp_path / "one.json"
     clicks.write_text(json.dumps({"schema": "cocalib/clicks-1", "clicks": [click]}))
-    answer = cocalib("propose", recording, *SIZE, "--clicks", clicks, "--json")
+    answer = cocalib("solve", "--propose", recording, *SIZE, "--clicks", clicks, "--json")
     assert answer.code == 0, answer.err
     assert "warning: click beside is " in answer.err
     proposals = json.loads(answer.out)["proposals"]
@@ -209,7 +209,7 @@ def refused(cocalib: Cocalib, tmp_path: Path) -> Callable[..., str]:
     def refuse(*recording: object, code: int) -> str:
         out = tmp_path / "written.json"
         before = names_in(tmp_path)
-        proposed = cocalib("propose", *recording, *SIZE, "--out", out)
+        proposed = cocalib("solve", "--propose", *recording, *SIZE, "--out", out)
         solved = cocalib("solve", *recording, *SIZE, "--auto", "--out", out, "--clicks-out", tmp_path / "clicks.json")
         for answer in (proposed, solved):
             assert (answer.code, answer.out) == (code, ""), answer
@@ -258,7 +258,7 @@ def test_the_pictures_of_another_recording_are_refused(cocalib: Cocalib, tmp_pat
     assert not out.exists()
 
 
-@pytest.mark.parametrize("command", [("propose",), ("solve", "--auto")], ids=["propose", "solve"])
+@pytest.mark.parametrize("command", [("solve", "--propose"), ("solve", "--auto")], ids=["propose", "solve"])
 def test_an_interrupt_leaves_no_file_and_no_traceback(
     cocalib: Cocalib, recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: tuple[str, ...]
 ) -> None:
@@ -275,9 +275,9 @@ def test_an_interrupt_leaves_no_file_and_no_traceback(
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("propose", "--reflector-m", "24"), "--reflector-m 24: give the width of the reflector"),
+        (("solve", "--propose", "--reflector-m", "24"), "--reflector-m 24: give the width of the reflector"),
         (("solve", "--auto", "--reflector-m", "nan"), "--reflector-m nan: give the width of the reflector"),
-        (("propose", "--out", "absent/made.json"), "the folder absent does not exist"),
+        (("solve", "--propose", "--out", "absent/made.json"), "the folder absent does not exist"),
         (("solve", "--auto", "--clicks-out", "absent/made.json"), "the folder absent does not exist"),
         (("solve", "--clicks-out", "made.json"), "--clicks-out and --reflector-m apply with --auto only"),
         (("solve", "--reflector-m", "0.3"), "--clicks-out and --reflector-m apply with --auto only"),
@@ -300,6 +300,6 @@ def test_a_file_of_clicks_of_another_recording_is_refused(cocalib: Cocalib, reco
     clicks = tmp_path / "others.json"
     click = {"id": "c", "image_time": {"sec": 5, "nanosec": 0}, "pixel_px": [1.0, 1.0]}
     clicks.write_text(json.dumps({"schema": "cocalib/clicks-1", "clicks": [click]}))
-    answer = cocalib("propose", recording, "--clicks", clicks)
+    answer = cocalib("solve", "--propose", recording, "--clicks", clicks)
     assert answer.code == 2
     assert "has the stamp of no frame" in answer.err

@@ -1,4 +1,4 @@
-"""`cocalib report`: calibrations of every kind, a recording, and what cannot be done."""
+"""`cocalib evaluate --report`: calibrations of every kind, a recording, and what cannot be done."""
 
 from pathlib import Path
 
@@ -30,7 +30,7 @@ def test_on_its_recording_the_report_has_held_out_errors_and_a_picture_and_names
 ) -> None:
     bags = [str(sample / "radar.bag"), str(sample / "camera.bag")]
     out = tmp_path / "report.html"
-    assert run(["report", str(solved), *bags, "--against", str(solved), "--out", str(out)]) == 0
+    assert run(["evaluate", str(solved), *bags, "--against", str(solved), "--report", str(out)]) == 0
     html = out.read_text(encoding="utf-8")
     assert "Residuals at the clicks in radar.bag + camera.bag, which it was solved from" in html
     assert "data:image/jpeg;base64," in html
@@ -43,15 +43,15 @@ def test_on_its_recording_the_report_has_held_out_errors_and_a_picture_and_names
 
 def test_limits_that_are_not_met_end_with_exit_code_3(solved: Path, tmp_path: Path) -> None:
     out = tmp_path / "report.html"
-    assert run(["report", str(solved), "--out", str(out), "--require", "max-deg=9", "max-cm=90"]) == 0
-    assert run(["report", str(solved), "--out", str(out), "--require", "max-deg=0.01"]) == 3
+    assert run(["evaluate", str(solved), "--report", str(out), "--require", "max-deg=9", "max-cm=90"]) == 0
+    assert run(["evaluate", str(solved), "--report", str(out), "--require", "max-deg=0.01"]) == 3
     assert "FAIL" in out.read_text(encoding="utf-8")
 
 
 def test_a_calibration_by_the_paper_is_reported_with_its_doubts(solved: Path, tmp_path: Path) -> None:
     paper, out = tmp_path / "paper.json", tmp_path / "paper.html"
     assert run(["solve", "--pairs", str(solved), "--method", "paper", "--out", str(paper)]) == 0
-    assert run(["report", str(paper), "--out", str(out)]) == 0
+    assert run(["evaluate", str(paper), "--report", str(out)]) == 0
     html = out.read_text(encoding="utf-8")
     assert "contradictory" in html
     assert "No error bars: this calibration states no covariance." in html
@@ -62,10 +62,10 @@ def test_a_foreign_calibration_without_a_camera_takes_the_one_of_the_recording(
 ) -> None:
     foreign, out = tmp_path / "tf.txt", tmp_path / "tf.html"
     assert run(["export", str(solved), "--to", "tf2", "--out", str(foreign)]) == 0
-    assert run(["report", str(foreign), "--out", str(out)]) == 0
+    assert run(["evaluate", str(foreign), "--report", str(out)]) == 0
     assert "The file contains no camera" in out.read_text(encoding="utf-8")
     bags = [str(sample / "radar.bag"), str(sample / "camera.bag")]
-    assert run(["report", str(foreign), *bags, "--clicks", str(sample / "clicks.json"), "--out", str(out)]) == 0
+    assert run(["evaluate", str(foreign), *bags, "--clicks", str(sample / "clicks.json"), "--report", str(out)]) == 0
     html = out.read_text(encoding="utf-8")
     assert "The file contains no camera" not in html
     assert "Residuals at the clicks in radar.bag + camera.bag" in html
@@ -75,7 +75,7 @@ def test_a_calibration_for_pictures_of_another_size_is_refused(
     golden: Path, sample: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     bags = [str(sample / "radar.bag"), str(sample / "camera.bag")]
-    assert run(["report", str(golden), *bags, "--out", str(tmp_path / "out.html")]) == 2
+    assert run(["evaluate", str(golden), *bags, "--report", str(tmp_path / "out.html")]) == 2
     assert (
         "calibrated for pictures of 640 x 480 px, but the recording's camera has 960 x 600 px"
         in capsys.readouterr().err
@@ -87,7 +87,7 @@ def test_without_a_browser_the_html_is_written_and_the_pdf_is_refused(
 ) -> None:
     monkeypatch.setenv("COCALIB_BROWSER", "/nowhere/browser")
     out, pdf = tmp_path / "out.html", tmp_path / "out.pdf"
-    assert run(["report", str(golden), "--out", str(out), "--pdf"]) == 2
+    assert run(["evaluate", str(golden), "--report", str(pdf), "--report", str(out)]) == 2
     assert "COCALIB_BROWSER=/nowhere/browser is not a program" in capsys.readouterr().err
     assert out.exists()
     assert not pdf.exists()
@@ -98,6 +98,6 @@ def test_the_report_never_takes_the_place_of_the_calibration(
 ) -> None:
     calibration = tmp_path / "calibration.json"
     calibration.write_bytes(golden.read_bytes())
-    assert run(["report", str(calibration), "--out", str(calibration)]) == 2
+    assert run(["evaluate", str(calibration), "--report", str(calibration)]) == 2
     assert "name it NAME.html" in capsys.readouterr().err
     assert calibration.read_bytes() == golden.read_bytes()

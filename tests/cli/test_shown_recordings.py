@@ -43,9 +43,7 @@ def boxes_file(tmp_path: Path) -> Path:
 def test_an_overlay_video_names_its_codec(cocalib: Cocalib, recording: Path, calibration: Path, tmp_path: Path) -> None:
     pytest.importorskip("av", reason="the extra 'video' is not installed")
     out = tmp_path / "out.mp4"
-    answer = cocalib(
-        "video", recording, "--overlay", "--calibration", calibration, "--against", calibration, "--out", out
-    )
+    answer = cocalib("show", recording, "--calibration", calibration, "--against", calibration, "--out", out)
     assert answer.code == 0, answer.err
     assert answer.out == f"{out}: 65 frames, 32.000 s, 640 x 270 px, encoded as H.264\n"
 
@@ -56,7 +54,7 @@ def test_a_file_for_rerun_has_clicks_and_boxes(
     pytest.importorskip("rerun", reason="there is no wheel of rerun-sdk for this machine")
     out = tmp_path / "view.rrd"
     more = ("--clicks", clicks_file, "--boxes", boxes_file)
-    answer = cocalib("record-rrd", recording, "--calibration", calibration, "--out", out, *more)
+    answer = cocalib("show", recording, "--calibration", calibration, "--out", out, *more)
     assert answer.code == 0, answer.err
     assert answer.out.splitlines()[0] == f"{out}: 65 frames, 320 scans, 8 clicks"
     assert out.stat().st_size > 10_000
@@ -69,11 +67,11 @@ def test_rerun_without_a_display_names_other_ways(
     monkeypatch.setattr("sys.platform", "linux")
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
-    answer = cocalib("rerun", recording, "--calibration", calibration)
+    answer = cocalib("show", recording, "--calibration", calibration)
     assert answer.code == 2
     assert "there is no display" in answer.err
     assert "--web" in answer.err
-    assert "record-rrd" in answer.err
+    assert "--out FILE.rrd" in answer.err
 
 
 def test_what_does_not_fit_is_named(
@@ -81,18 +79,17 @@ def test_what_does_not_fit_is_named(
 ) -> None:
     pytest.importorskip("av", reason="the extra 'video' is not installed")
     pytest.importorskip("rerun", reason="there is no wheel of rerun-sdk for this machine")
-    video, rrd = ("video", recording, "--out", tmp_path / "o.mp4"), ("record-rrd", recording)
+    video, rrd = ("show", recording, "--out", tmp_path / "o.mp4"), ("show", recording)
     other = Made().camera.scaled(0.5)
     smaller = made("smaller", camera=other)
     for command, words in (
-        ((*video, "--calibration", calibration), "apply with --overlay only"),
-        ((*video, "--trail", "3"), "--trail and --colour apply with --overlay only"),
-        ((*video, "--overlay"), "--calibration FILE is missing"),
-        ((*video, "--overlay", "--calibration", calibration, "--trail", "-1"), "--trail -1: give a number of scans"),
-        ((*rrd, "--calibration", calibration, "--out", tmp_path / "o.mcap"), "name it NAME.rrd"),
+        ((*video, "--trail", "3"), "--calibration FILE is missing"),
+        ((*video, "--calibration", calibration, "--trail", "-1"), "--trail -1: give a number of scans"),
+        ((*rrd, "--calibration", calibration, "--out", tmp_path / "o.mcap"), "o.mcap"),
+        ((*rrd, "--out", tmp_path / "o.rrd"), "--calibration FILE is missing"),
         ((*rrd, "--calibration", tmp_path / "absent.json", "--out", tmp_path / "o.rrd"), "absent.json"),
         (
-            ("record-rrd", smaller, "--calibration", calibration, "--out", tmp_path / "o.rrd"),
+            ("show", smaller, "--calibration", calibration, "--out", tmp_path / "o.rrd"),
             "its pictures have 160 x 120 px, but the calibration's camera has 320 x 240 px",
         ),
     ):
@@ -107,7 +104,7 @@ def test_speeds_that_no_radar_reports_are_refused(
     cocalib: Cocalib, calibration: Path, made: Callable[..., Path], tmp_path: Path
 ) -> None:
     pytest.importorskip("av", reason="the extra 'video' is not installed")
-    options = ("--overlay", "--calibration", calibration, "--colour", "speed", "--out", tmp_path / "o.mp4")
-    answer = cocalib("video", made("still", with_speeds=False), *options)
+    options = ("--calibration", calibration, "--colour", "speed", "--out", tmp_path / "o.mp4")
+    answer = cocalib("show", made("still", with_speeds=False), *options)
     assert answer.code == 2
     assert "the radar reports no speeds (/radar/points); use --colour range" in answer.err

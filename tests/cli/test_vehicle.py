@@ -19,7 +19,7 @@ def test_the_file_names_it_keeps_it_and_the_report_shows_it(
     assert json.loads(out.read_text())["vehicle"] == expected
     assert cocalib("solve", "--pairs", out, "--out", again, "--session-name", "winter").code == 0
     assert json.loads(again.read_text())["vehicle"] == expected | {"session": "winter"}
-    assert cocalib("report", out, "--out", report).code == 0
+    assert cocalib("evaluate", out, "--report", report).code == 0
     html = report.read_text()
     assert "V&lt;1&gt;, of type van" in html
     assert "radar R-1, camera C-2" in html

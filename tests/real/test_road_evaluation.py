@@ -50,7 +50,7 @@ def test_with_boxes_it_says_that_nothing_moves_within_reach(
     out = capsys.readouterr().out
     assert "no moving target was found in the scans of the annotated frames" in out
     assert "that move within 200 m of the radar" in out
-    assert run(["compare", str(pose), str(pose), str(recording), "--boxes", str(boxes)]) == 0
+    assert run(["check", str(pose), "--against", str(pose), "--recording", str(recording), "--boxes", str(boxes)]) == 0
     out = capsys.readouterr().out
     assert out.startswith("cannot tell which is better on this recording: there is nothing to judge them by")
     assert "at 20 m: 0 px" in out

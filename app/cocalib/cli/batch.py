@@ -9,7 +9,8 @@ import tyro
 
 from calib_core.errors import InputError
 from cocalib.cli.exit_codes import batch_exit_code
-from cocalib.cli.flags import Folder, Require, called
+from cocalib.cli.flags import File, Folder, Require, Switch, called
+from cocalib.cli.fleet import ACTIONS, fleet
 from cocalib.cli.output import progress_bar, write_whole
 
 if TYPE_CHECKING:
@@ -19,10 +20,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """Calibrate many sessions: solve, evaluate, report and export each; what is done already is not done again."""
+    """Calibrate many sessions, finished ones are skipped; status, history, compare, summary: what their results say.
 
-    manifest: Annotated[Path | None, tyro.conf.Positional, called("MANIFEST")] = None
-    """Sessions to calibrate (.toml): vehicle, session, recording, clicks or auto, camera, options."""
+    `batch status OUT`: where each vehicle stands. `batch history VEHICLE OUT`: its sessions and what changed in between.
+    `batch compare A B OUT`: two sessions VEHICLE/SESSION, or two vehicles of one type. `batch summary OUT`: write
+    OUT/summary.html. `batch export OUT --csv FILE`: all sessions as a table. OUT is the folder that batch wrote to.
+    """
+
+    given: Annotated[tuple[str, ...], tyro.conf.Positional, called("MANIFEST|ACTION...")] = ()
+    """Sessions to calibrate (.toml), or an action: status OUT, history VEHICLE OUT, compare A B OUT, summary OUT, export OUT."""
     out: Folder = None
     """Folder for the results; beside the manifest, with its name, unless given."""
     init: Folder = None
@@ -31,18 +37,30 @@ class Batch:
     """Worker processes on this machine; 1: this process does the work; one per processor for many sessions, unless given."""
     require: Require = None
     """Count sessions below this verdict as failed in the exit code."""
+    json: Switch = False
+    """With status, history, compare: print one JSON object instead of text."""
+    csv: File = None
+    """With export: CSV file to write."""
     scheduler: Annotated[str | None, called("ADDRESS")] = None
     """Address of your own Dask scheduler, such as tls://host:8786 (needs cocalib[cluster]); who reaches it can run code."""
 
     def run(self) -> int:
         """Calibrate, print a table of what came of it; return the exit code."""
-        if self.manifest is None:
+        if not self.given:
             raise InputError("MANIFEST is missing; see cocalib batch --help")
+        action, *names = self.given
+        if action in ACTIONS:
+            if Batch(given=self.given, json=self.json, csv=self.csv) != self:
+                raise InputError(f"batch {action} takes --json or --csv only; see cocalib batch --help")
+            return fleet(action, names, json=self.json, csv=self.csv)
+        if names or self.json or self.csv is not None:
+            raise InputError(f"batch takes one MANIFEST, or an action: {', '.join(ACTIONS)}; see cocalib batch --help")
+        manifest = Path(action)
         if self.init is not None:
-            return self._write_first(self.manifest, self.init)
+            return self._write_first(manifest, self.init)
         from cocalib.batch.manifest import read_manifest
 
-        return self._calibrate(read_manifest(self.manifest))
+        return self._calibrate(read_manifest(manifest))
 
     def _write_first(self, manifest: Path, folder: Path) -> int:
         """Write a first manifest, never over another file."""
@@ -96,4 +114,4 @@ def _next_line(results: Path) -> str:
     """Say where the results are, and what comes next."""
     from cocalib.fleet.summary_page import SUMMARY_FILE
 
-    return f"results: {results}; summary: {results / SUMMARY_FILE}; who needs a look: cocalib fleet status {results}"
+    return f"results: {results}; summary: {results / SUMMARY_FILE}; who needs a look: cocalib batch status {results}"

@@ -8,18 +8,17 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from calib_core.errors import CalibrationError, InputError
-from cocalib.cli.flags import File, Switch, called
-from cocalib.cli.output import told_clicks_at_frames, write_whole
+from cocalib.cli.flags import MORE, File, Switch, called
+from cocalib.cli.judging_flags import EvidenceFlags
+from cocalib.cli.output import progress_bar, write_whole
 from cocalib.cli.recording_flags import TopicFlags, Topics
 from cocalib.cli.tree_flags import FrameFlags, Frames
-from cocalib.platform.files import read_text
 from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
     from calib_core.camera import Camera
     from calib_core.interchange import CheckedFile, CheckPairs, CheckReport, ImportedCalibration
-    from calib_core.measurements import ReflectorClick
-    from calib_core.recordings import Recording
+    from cocalib.evaluation.comparing import ComparedOnRecording
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,28 +48,34 @@ class Check:
     pairs: File = None
     """Pairs to test it with: a pairs-1 file, or a calibration-1 file with pairs."""
     recording: Annotated[tuple[Path, ...], called("RECORDING...")] = ()
-    """Does it still hold on this recording? Needs clicks: --clicks, those of its session, or those in the calibration."""
-    clicks: File = None
-    """With --recording: clicks in this recording (cocalib/clicks-1 JSON)."""
+    """Does it still hold on this recording, by its clicks; with --against, which of the two is better there?"""
     json: Switch = False
     """Print one JSON object instead of text."""
     junit: File = None
     """Also write the results as JUnit XML: one test case per result."""
+    evidence: Annotated[EvidenceFlags, tyro.conf.arg(name=""), MORE] = field(default_factory=EvidenceFlags)
     topics: Topics = field(default_factory=TopicFlags)
     frames: Frames = field(default_factory=FrameFlags)
 
     def run(self) -> int:
         """Print the results; return the exit code."""
         from calib_core.interchange import check_json, check_junit, exit_code
+        from cocalib.evaluation.comparing import comparison_document, comparison_lines
 
         self._require_fitting()
         evidence = self._evidence()
+        compared = None
+        if self.recording and evidence.against is not None:
+            compared, lens = self._compared(evidence)
+            evidence = replace(evidence, camera=evidence.camera or lens)
         checked = [self._checked(path, evidence) for path in self.calibration]
         if self.junit is not None:
             write_whole(self.junit, check_junit(checked))
         if self.json:
-            print_exactly(check_json(checked))
+            print_exactly(check_json(checked, None if compared is None else comparison_document(compared)))
         else:
+            if compared is not None:
+                print("\n".join(comparison_lines(compared)))
             _tell(checked)
         return exit_code(checked)
 
@@ -87,8 +92,10 @@ class Check:
             raise InputError("--max-deg, --max-cm, --max-px and --max-sigma are limits for --against FILE; give it too")
         if (self.same_sensors or self.same_person) and self.against is None:
             raise InputError("--same-sensors and --same-person are about --against FILE; give it too")
-        if self.clicks is not None and not self.recording:
-            raise InputError("--clicks are those of a recording; give it with --recording RECORDING")
+        if self.evidence != EvidenceFlags() and not self.recording:
+            raise InputError("--clicks and --boxes are those of a recording; give it with --recording RECORDING")
+        if self.recording and self.against is not None and len(self.calibration) != 1:
+            raise InputError("--recording judges two calibrations: one CALIBRATION, and the one of --against")
         if self.topics != TopicFlags() and not self.recording:
             raise InputError(
                 "the options of a recording apply with --recording RECORDING only; see cocalib check --help"
@@ -120,7 +127,7 @@ class Check:
                 same_sensors=self.same_sensors,
                 same_person=self.same_person,
             )
-            if self.recording:
+            if self.recording and evidence.against is None:
                 report = self._on_recording(report, path, evidence.camera)
             return CheckedFile(str(path), report)
         except CalibrationError as error:
@@ -143,35 +150,43 @@ class Check:
         from cocalib.evaluation.recording_check import other_camera, stale_inputs, with_recording
 
         with open_recording(self.recording, self.topics) as recording:
-            clicks = self._clicks(report, recording)
+            clicks = self.evidence.clicks_in(recording, self.recording, [report.imported])
+            if not clicks:
+                raise InputError(
+                    f"{self.recording[0]}: no clicks in this recording: the calibration keeps none within it, and it has no "
+                    "session; click reflectors with cocalib open RECORDING --calibration FILE, or give --clicks CLICKS.json"
+                )
             stale = stale_inputs(report.imported, recording.fingerprint())
             lens = other_camera(report.imported, recording.camera())
             known = replace(report, results=(*report.results, *stale, *lens))
             return with_recording(known, str(path), recording, clicks, camera=camera or recording.camera())
 
-    def _clicks(self, report: "CheckReport", recording: "Recording") -> "tuple[ReflectorClick, ...]":
-        """Return the clicks: of the file given, else of the recording's session, else those in the calibration.
+    def _compared(self, evidence: "_Evidence") -> "tuple[ComparedOnRecording, Camera]":
+        """Judge both calibrations by the same clicks and boxes of the recording, that of --against as A; also return its lens."""
+        from calib_core.recordings import open_recording
+        from cocalib.evaluation.comparing import compare_on_recording
+        from cocalib.evaluation.recording_check import judged_calibration
 
-        Raises:
-            InputError: there are none.
-        """
-        from calib_core.interchange import read_clicks
-        from cocalib.evaluation.recording_check import clicks_in
-        from cocalib.session.file import inspect_session, recording_session_folder
-
-        if self.clicks is not None:
-            clicks = read_clicks(read_text(self.clicks), source=str(self.clicks))
-            return told_clicks_at_frames(clicks, recording, source=str(self.clicks))
-        folder = recording_session_folder(self.recording)
-        if folder.is_dir():
-            return tuple(inspect_session(folder).clicks)
-        kept = clicks_in(report.imported, int(recording.image_times[0]), int(recording.image_times[-1]))
-        if not kept:
-            raise InputError(
-                f"{self.recording[0]}: no clicks in this recording: the calibration keeps none within it, and it has no session; "
-                "click reflectors with cocalib open RECORDING --calibration FILE, or give --clicks CLICKS.json"
+        assert self.against is not None
+        paths = (self.against, self.calibration[0])
+        options = self.evidence.options()
+        with open_recording(self.recording, self.topics, require=("radar",)) as recording:
+            a, b = (
+                judged_calibration(self.frames.read([one])[0], one, recording, camera=evidence.camera) for one in paths
             )
-        return kept
+            clicks, boxes, labels = self.evidence.found_in(recording, self.recording, [a.found, b.found], "the two")
+            with progress_bar("comparing") as progress:
+                compared = compare_on_recording(
+                    (a.calibration, b.calibration),
+                    recording,
+                    names=(paths[0].name, paths[1].name),
+                    clicks=clicks,
+                    boxes=boxes,
+                    labels=labels,
+                    progress=progress,
+                    options=options,
+                )
+            return compared, a.calibration.camera
 
 
 @dataclass(frozen=True, slots=True)

@@ -78,21 +78,21 @@ COMMANDS: Mapping[str, Command] = {
             ),
         ),
         Command(
-            "propose",
-            "cocalib.cli.propose:Propose",
-            "Find where the reflector probably stands in the pictures, for a person or a script to confirm.",
-            (
-                "drive.mcap",
-                "drive.mcap --clicks clicks.json --out proposals.json",
-            ),
-        ),
-        Command(
             "solve",
             "cocalib.cli.solve:Solve",
             "Compute a calibration from a recording and its clicks, or from a file of pairs.",
             (
                 "drive.mcap --clicks clicks.json --out calibration.json",
                 "--pairs pairs.csv --camera camera.yaml --out calibration.json",
+            ),
+        ),
+        Command(
+            "import",
+            "cocalib.cli.import_file:Import",
+            "Convert a calibration from any known format to cocalib/calibration-1 JSON.",
+            (
+                "old.yaml --camera camera.yaml --out calibration.json",
+                "robot.urdf --camera camera.yaml --out calibration.json",
             ),
         ),
         Command(
@@ -116,67 +116,28 @@ COMMANDS: Mapping[str, Command] = {
         Command(
             "evaluate",
             "cocalib.cli.evaluate:Evaluate",
-            "Judge a calibration on a recording: residuals at clicks (AED, CDSD), radar returns in boxes (Acc).",
+            "Judge a calibration on a recording: residuals at clicks (AED, CDSD), returns in boxes (Acc); or write a report.",
             (
                 "calibration.json other.mcap",
-                "calibration.json other.mcap --boxes boxes.json",
+                "calibration.json --report report.html --require max-deg=1",
             ),
         ),
         Command(
-            "compare",
-            "cocalib.cli.compare:Compare",
-            "Compare two calibrations; with a recording, say which is better there, and whether that is more than noise.",
+            "show",
+            "cocalib.cli.show:Show",
+            "Show a recording with its calibration in Rerun, or write it to a file: .rrd, or a video.",
             (
-                "old.json new.json",
-                "old.json new.json other.mcap",
+                "drive.mcap --calibration calibration.json",
+                "drive.mcap --calibration calibration.json --out overlay.mp4",
             ),
-        ),
-        Command(
-            "report",
-            "cocalib.cli.report:Report",
-            "Write a report on a calibration: one HTML file, and a PDF if wanted: how good, where, and how one knows.",
-            (
-                "calibration.json --out report.html",
-                "calibration.json radar.bag camera.bag --out report.html --pdf",
-            ),
-        ),
-        Command(
-            "import",
-            "cocalib.cli.import_file:Import",
-            "Convert a calibration from any known format to cocalib/calibration-1 JSON.",
-            (
-                "old.yaml --camera camera.yaml --out calibration.json",
-                "robot.urdf --camera camera.yaml --out calibration.json",
-            ),
-        ),
-        Command(
-            "video",
-            "cocalib.cli.video:Video",
-            "Write the camera's frames to a video, each at its recorded time; recorded JPEG is not re-encoded.",
-            (
-                "drive.mcap --out camera.mp4",
-                "drive.mcap --overlay --calibration cal.json --out overlay.mp4",
-            ),
-        ),
-        Command(
-            "record-rrd",
-            "cocalib.cli.record_rrd:RecordRrd",
-            "Write a recording with its calibration to an .rrd file for the Rerun viewer.",
-            ("drive.mcap --calibration calibration.json --out drive.rrd",),
-        ),
-        Command(
-            "rerun",
-            "cocalib.cli.rerun:Rerun",
-            "Show a recording with its calibration in the Rerun viewer.",
-            ("drive.mcap --calibration calibration.json",),
         ),
         Command(
             "batch",
             "cocalib.cli.batch:Batch",
-            "Calibrate many sessions: solve, evaluate, report and export each; what is done already is not done again.",
+            "Calibrate many sessions, finished ones are skipped; status, history, compare, summary: what their results say.",
             (
-                "fleet.toml --init recordings/",
                 "fleet.toml --out out --workers 8",
+                "status out",
             ),
         ),
         Command(
@@ -186,15 +147,6 @@ COMMANDS: Mapping[str, Command] = {
             (
                 "list",
                 "repair drive.cocalib-session --yes",
-            ),
-        ),
-        Command(
-            "fleet",
-            "cocalib.cli.fleet:Fleet",
-            "Tell how a fleet is calibrated, from the results of a batch: status, history, comparisons, summary page.",
-            (
-                "status out",
-                "history V017 out",
             ),
         ),
         Command(

@@ -1,5 +1,7 @@
-"""`cocalib evaluate`: judge a calibration on a recording."""
+"""`cocalib evaluate`: judge a calibration on a recording, and write a report on it."""
 
+import sys
+import typing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -7,53 +9,104 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from calib_core.errors import InputError
-from cocalib.cli.exit_codes import exit_code
-from cocalib.cli.flags import Require, Switch, called
+from cocalib.cli.exit_codes import DONE, IN_DOUBT, NO_ANSWER, Required, exit_code
+from cocalib.cli.flags import File, Switch, called
 from cocalib.cli.judging_flags import Judging, JudgingFlags
-from cocalib.cli.output import progress_bar, tell_choices
+from cocalib.cli.output import progress_bar, tell_choices, write_whole
 from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
+    from calib_core.camera import Camera
     from calib_core.evaluation import Evaluation
     from calib_core.interchange import ImportedCalibration
+    from calib_core.recordings import Recording
+    from calib_core.results import Calibration
+    from cocalib.report import ReportSubject
+
+_LEVELS = typing.get_args(Required)
+_HTML, _PDF = (".html", ".htm"), (".pdf",)
 
 
 @dataclass(frozen=True, slots=True)
 class Evaluate:
-    """Judge a calibration on a recording: residuals at clicks (AED, CDSD), radar returns in boxes (Acc)."""
+    """Judge a calibration on a recording: residuals at clicks (AED, CDSD), returns in boxes (Acc); or write a report.
+
+    A report needs no recording: it says how good the calibration is, where, and how one knows.
+    """
 
     calibration: Annotated[Path | None, tyro.conf.Positional, called("CALIBRATION")] = None
     """A calibration in any format that import reads."""
+    report: Annotated[tuple[Path, ...], called("FILE"), tyro.conf.UseAppendAction] = ()
+    """Write a report, .html, or .pdf (printed by Chrome, Chromium, Edge or Brave); may be repeated."""
+    against: File = None
+    """With --report: compare it with this other calibration of the same sensors."""
+    require: Annotated[tuple[str, ...], called("LIMIT...")] = ()
+    """Exit code 3 for a verdict below good or usable, or a stated 95 % error above max-deg=1 max-cm=10 max-px=15."""
     no_held_out: Switch = False
     """Leave out the held-out figures, which take a solve per placement."""
     json: Switch = False
     """Print one JSON object instead of text."""
-    require: Require = None
-    """Exit code 3 for a calibration whose verdict is below this."""
     judging: Judging = field(default_factory=JudgingFlags)
 
     def run(self) -> int:
-        """Print the figures; return the exit code."""
+        """Print the figures, write the reports; return the exit code."""
+        self = self._with_places()
+        if self.calibration is None:
+            raise InputError("CALIBRATION is missing; see cocalib evaluate --help")
+        if not self.judging.recording and self.judging.of_recording:
+            raise InputError(
+                "clicks, boxes, and the options of a recording apply with a RECORDING only; give it after the calibration"
+            )
+        if self.report:
+            return self._report()
+        if not self.judging.recording:
+            raise InputError("evaluate needs a recording, or --report FILE.html; see cocalib evaluate --help")
+        if self.against is not None:
+            raise InputError("--against is for the report; give --report FILE.html, or see cocalib check --against")
+        return self._told(*self._evaluation(self.calibration))
+
+    def _with_places(self) -> "Evaluate":
+        """Take what follows --require and is no limit as files of the recording."""
+        limits = tuple(one for one in self.require if one in _LEVELS or "=" in one)
+        places = tuple(Path(one) for one in self.require if one not in limits)
+        recorded = replace(self.judging.recorded, recording=(*self.judging.recorded.recording, *places))
+        return replace(self, require=limits, judging=replace(self.judging, recorded=recorded))
+
+    def _limits(self) -> tuple[str, ...]:
+        """Return the limits on the stated error."""
+        return tuple(one for one in self.require if one not in _LEVELS)
+
+    def _told(
+        self, found: "ImportedCalibration", calibration: "Calibration | None", evaluation: "Evaluation | None"
+    ) -> int:
+        """Print the figures and what is required; return the exit code."""
         from calib_core.evaluation import evaluation_json, evaluation_lines
         from cocalib.evaluation.evaluating import evaluation_exit_code
+        from cocalib.report import limits_met
 
-        if self.calibration is None or not self.judging.recording:
-            raise InputError("evaluate needs a calibration and a recording; see cocalib evaluate --help")
-        found, evaluation = self._evaluation(self.calibration)
+        assert self.calibration is not None
+        limits = limits_met(self._limits(), calibration)
         verdict = found.file.verdict if found.file is not None else None
-        code = evaluation_exit_code(evaluation) or exit_code(verdict, found.evidence, self.require)
-        if self.json:
+        level = next((level for level in reversed(_LEVELS) if level in self.require), None)
+        code = NO_ANSWER if self.judging.recording and evaluation is None else DONE
+        code = code if evaluation is None else evaluation_exit_code(evaluation)
+        code = code or exit_code(verdict, found.evidence, level)
+        code = code or (DONE if all(one.met for one in limits) else IN_DOUBT)
+        if evaluation is not None and self.json:
             names = [path.name for path in self.judging.recording]
             print_exactly(
                 evaluation_json(evaluation, calibration=self.calibration.name, recording=names, exit_code=code)
             )
-        else:
+            return code
+        if evaluation is not None:
             print("\n".join(evaluation_lines(evaluation)))
             if verdict is not None:
                 print(f"verdict when it was solved: {verdict.line}")
+        for one in limits:
+            print(f"{one.name}={one.limit:g}: {'pass' if one.met else 'FAIL'}, stated {one.stated:g}")
         return code
 
-    def _evaluation(self, path: Path) -> "tuple[ImportedCalibration, Evaluation]":
+    def _evaluation(self, path: Path) -> "tuple[ImportedCalibration, Calibration, Evaluation]":
         from cocalib.evaluation.evaluating import evaluate_recording
         from cocalib.evaluation.recording_check import judged_calibration
 
@@ -76,4 +129,101 @@ class Evaluate:
                     options=options,
                 )
             tell_choices(recording)
-            return judged.found, replace(evaluation, warnings=(*judged.warnings, *evaluation.warnings))
+            found = replace(evaluation, warnings=(*judged.warnings, *evaluation.warnings))
+            return judged.found, judged.calibration, found
+
+    def _report(self) -> int:
+        """Write the report; return the exit code."""
+        from cocalib.report import limits_met, print_pdf, report_html
+
+        for path in self.report:
+            if path.suffix.lower() not in (*_HTML, *_PDF):  # such as that of the calibration itself
+                raise InputError(f"{path}: the report is an .html or .pdf file; name it NAME.html")
+        subject = self._subject()
+        limits_met(subject.required, subject.calibration)  # refuses what is no limit, before anything is written
+        html = report_html(subject)
+        for path in sorted(self.report, key=lambda path: path.suffix.lower() in _PDF):
+            write_whole(path, print_pdf(html) if path.suffix.lower() in _PDF else html)
+            print(f"written to {path}", file=sys.stderr if self.json else sys.stdout)
+        evaluation = None if subject.judged is None else subject.judged.evaluation
+        return self._told(subject.found, subject.calibration, evaluation)
+
+    def _subject(self) -> "ReportSubject":
+        from cocalib.report import against_of, known_calibration, subject_of
+
+        assert self.calibration is not None
+        name = self.calibration.name
+        found, inputs = self.judging.frames.read([self.calibration])
+        camera = self.judging.read_camera()
+        other, others = self.judging.frames.read([self.against]) if self.against is not None else (None, ())
+        if self.judging.recording:
+            subject, better = self._on_recording(found, other, camera)
+        else:
+            subject, better = subject_of(found, known_calibration(found, name, camera=camera), name), ()
+        subject = replace(subject, inputs=inputs, required=self._limits())
+        if other is None or self.against is None:
+            return subject
+        lens = subject.calibration.camera if subject.calibration is not None else camera
+        return replace(subject, against=against_of(self.against.name, others, other, found, camera=lens, judged=better))
+
+    def _on_recording(
+        self, found: "ImportedCalibration", other: "ImportedCalibration | None", camera: "Camera | None"
+    ) -> "tuple[ReportSubject, tuple[str, ...]]":
+        """Return what is reported with what the recording says of it, and which of two calibrations is better on it."""
+        from cocalib.evaluation.recording_check import other_camera, require_size
+        from cocalib.report import known_calibration, subject_of, watched
+
+        assert self.calibration is not None
+        name = self.calibration.name
+        with self.judging.recorded.open(require=("radar",)) as recording:
+            recorded = recording.camera()
+            calibration = known_calibration(found, name, camera=camera or recorded)
+            if calibration is not None:
+                require_size(calibration.camera, recording, self.calibration)
+            with progress_bar("hashing") as progress:
+                hashes = recording.fingerprint(progress)
+            seen = watched(recording, calibration, hashes, other_camera(found, recorded))
+            subject = replace(subject_of(found, calibration, name), recording=seen)
+            if calibration is None:
+                return subject, ()
+            return self._judged(subject, calibration, other, recording)
+
+    def _judged(
+        self,
+        subject: "ReportSubject",
+        calibration: "Calibration",
+        other: "ImportedCalibration | None",
+        recording: "Recording",
+    ) -> "tuple[ReportSubject, tuple[str, ...]]":
+        """Judge the calibration by clicks and boxes, if there are any, and compare it with the other one by them."""
+        from cocalib.evaluation.comparing import compare_on_recording, comparison_lines
+        from cocalib.evaluation.evaluating import evaluate_recording
+        from cocalib.report import Judged, known_calibration
+
+        options = self.judging.evidence.options()
+        clicks = self.judging.evidence.clicks_in(recording, self.judging.recording, [subject.found])
+        boxes, labels = self.judging.evidence.boxes_in(recording)
+        if not clicks and boxes is None:
+            return subject, ()
+        with progress_bar("evaluating") as progress:
+            evaluation = evaluate_recording(
+                calibration,
+                recording,
+                clicks=clicks,
+                boxes=boxes,
+                labels=labels,
+                held_out=not self.no_held_out,
+                progress=progress,
+                options=options,
+            )
+        subject = replace(subject, judged=Judged(evaluation, clicks))
+        if other is None or self.against is None:
+            return subject, ()
+        rival = known_calibration(other, self.against.name, camera=calibration.camera)
+        assert rival is not None  # a camera is given
+        names = self.against.name, subject.name
+        compared = compare_on_recording(
+            (rival, calibration), recording, names=names, clicks=clicks, boxes=boxes, labels=labels, options=options
+        )
+        lines = comparison_lines(compared)
+        return subject, tuple(line for line in lines if not line.startswith("warning:"))

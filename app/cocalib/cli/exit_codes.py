@@ -19,13 +19,13 @@ _ENOUGH: Final[dict[str | None, tuple[str, ...]]] = {"usable": ("good", "usable"
 _LAW: Final = (
     (
         "solve, import and evaluate",
-        "0 done; 1 no answer (evaluate: nothing to judge by); 3 in doubt: contradictory or unproven, or below --require "
-        "good|usable",
+        "0 done; 1 no answer (evaluate: nothing to judge by); 3 in doubt: contradictory or unproven, or short of --require",
     ),
     ("check", "0 agrees or sound; 1 differs or wrong; 2 unreadable; 3 cannot be decided"),
     (
         "batch",
-        "0 done; 10 + the number of failed sessions, at most 99; a session in doubt fails only with --require",
+        "0 done; 10 + the number of failed sessions, at most 99; a session in doubt fails only with --require; "
+        "status and compare: 3 needs a look",
     ),
     ("the others", "0 done; 1 nothing found, or damage found; 3 needs a look"),
     (

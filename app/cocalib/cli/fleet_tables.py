@@ -1,4 +1,4 @@
-"""What `cocalib fleet` prints for people: tables with one line for each vehicle, session or type."""
+"""What `cocalib batch status` and its like prints for people: tables with one line for each vehicle, session or type."""
 
 from collections.abc import Iterator, Sequence
 

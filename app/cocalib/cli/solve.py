@@ -53,10 +53,14 @@ class Solve:
     """Clicks in this recording (cocalib/clicks-1 JSON)."""
     auto: Switch = False
     """Click without a person where pictures and radar agree; with --clicks, only placements without a click."""
+    propose: Switch = False
+    """Solve nothing: list where the reflector probably stood, for a person or a script to confirm; --out keeps it as JSON."""
     clicks_out: File = None
     """With --auto: write the clicks to this file (cocalib/clicks-1 JSON), to look at on the page."""
     reflector_m: Annotated[float, MORE] = _REFLECTOR_M
-    """With --auto: width of the reflector as the camera sees it [m]."""
+    """With --auto or --propose: width of the reflector as the camera sees it [m]."""
+    json: MoreSwitch = False
+    """With --propose: print everything as JSON (cocalib/proposals-1)."""
     pairs: File = None
     """Instead of a recording: radar positions and pixels (cocalib/pairs-1 JSON, or with --camera a CSV of x, y, z, u, v), or a
     calibration to solve again."""
@@ -73,15 +77,28 @@ class Solve:
 
     def run(self) -> int:
         """Solve, write the calibration, print its summary; return the exit code."""
-        if self.pairs is not None and (self.recorded.recording or self.clicks or self.auto):
-            raise InputError("solve takes either a recording with --clicks or --auto, or --pairs, not both")
+        if self.propose:
+            return self._propose()
         vehicle = self.vehicle.note()
+        self._require_fitting()
+        return self._solve_recording(vehicle) if self.pairs is None else self._solve_pairs(self.pairs, vehicle)
+
+    def _require_fitting(self) -> None:
+        """Refuse options that say nothing together.
+
+        Raises:
+            InputError: they do not fit, or there is nothing to solve.
+        """
+        if self.json:
+            raise InputError("--json applies with --propose only; a calibration is JSON already")
         if not self.auto and (self.clicks_out is not None or self.reflector_m != _REFLECTOR_M):
             raise InputError("--clicks-out and --reflector-m apply with --auto only; add it")
-        if self.pairs is not None and self.recorded.topics != TopicFlags():
-            raise InputError("the options of a recording do not apply to --pairs")
         if self.pairs is not None:
-            return self._solve_pairs(self.pairs, vehicle)
+            if self.recorded.recording or self.clicks or self.auto:
+                raise InputError("solve takes either a recording with --clicks or --auto, or --pairs, not both")
+            if self.recorded.topics != TopicFlags():
+                raise InputError("the options of a recording do not apply to --pairs")
+            return
         if not self.recorded.recording:
             raise InputError("solve needs a recording and --clicks CLICKS.json or --auto, or --pairs PAIRS.json")
         if self.clicks is None and not self.auto:
@@ -89,7 +106,32 @@ class Solve:
                 "solve needs the clicks of this recording: --clicks CLICKS.json (the page exports them), or --auto to do "
                 "without a person"
             )
-        return self._solve_recording(vehicle)
+
+    def _propose(self) -> int:
+        from cocalib.cli.propose import Shown, propose
+
+        fitting = Solve(
+            clicks=self.clicks,
+            propose=True,
+            reflector_m=self.reflector_m,
+            json=self.json,
+            camera=self.camera,
+            out=self.out,
+            recorded=self.recorded,
+            options=self.options,
+        )
+        if fitting != self:
+            raise InputError(
+                "--propose solves nothing: give a recording, and --clicks, --camera, --reflector-m, --out or --json"
+            )
+        return propose(
+            self.recorded,
+            self._all_options(),
+            Shown(self.out, self.json),
+            camera=self.camera,
+            clicks_file=self.clicks,
+            reflector_m=self.reflector_m,
+        )
 
     def _all_options(self, base: CalibrationOptions | None = None) -> CalibrationOptions:
         """Return the options with what has a flag of its own.

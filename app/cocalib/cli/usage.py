@@ -23,8 +23,7 @@ from cocalib.platform.terminal import with_colours
 
 _GONE = {
     "fleet-prior": "each pose rests on its own pairs; add placements, or give --camera-position-m",
-    "prior": "each pose rests on its own pairs; fleet compare shows how vehicles differ",
-    "rebuild": "the commands read the results themselves",
+    "prior": "each pose rests on its own pairs; batch compare shows how vehicles differ",
     "parquet": "use --csv, which has the same columns",
     "shard": "give --scheduler ADDRESS, or batches with manifests of their own and one --out",
     "engine": "use --workers 1 for none, --scheduler ADDRESS for dask",

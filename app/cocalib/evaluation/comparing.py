@@ -2,11 +2,12 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from calib_core.errors import InputError
-from calib_core.evaluation import Evaluation, PairedDifference, acc_difference, residual_difference
+from calib_core.evaluation import Evaluation, PairedDifference, acc_difference, evaluation_document, residual_difference
 from calib_core.evaluation.paired_difference import Winner
 from calib_core.measurements import Boxes, ReflectorClick, ReturnLabels
 from calib_core.results import Calibration, DataWarning
@@ -94,6 +95,32 @@ def compare_on_recording(
         acc = acc_difference(a.boxes, b.boxes)
     fitted_a, fitted_b = (_fitted(one, clicks) for one in calibrations)
     return ComparedOnRecording(names, a, b, residuals, acc, (fitted_a, fitted_b))
+
+
+def comparison_document(compared: ComparedOnRecording) -> dict[str, Any]:
+    """Return the comparison for JSON; docs/evaluation.md lists its keys."""
+    return {
+        "winner": compared.winner,
+        "residuals_px": _difference(compared.residuals),
+        "acc": _difference(compared.acc),
+        "solved_from_these_clicks": list(compared.fitted),
+        "evaluation_a": evaluation_document(compared.a),
+        "evaluation_b": evaluation_document(compared.b),
+    }
+
+
+def _difference(found: PairedDifference | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    return {
+        "b_minus_a": found.mean,
+        "standard_error": found.standard_error,
+        "low": found.low,
+        "high": found.high,
+        "p_value": found.p_value,
+        "groups": found.groups,
+        "winner": found.winner,
+    }
 
 
 def comparison_lines(compared: ComparedOnRecording) -> tuple[str, ...]:

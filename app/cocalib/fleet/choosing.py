@@ -46,7 +46,7 @@ def vehicle_named(fleet: FleetRecord, name: str) -> VehicleRecord:
     near = get_close_matches(name, [one.name for one in fleet.vehicles], n=3)
     raise InputError(
         f"no vehicle {name!r} among {len(fleet.vehicles)}; "
-        + (f"did you mean {' or '.join(near)}?" if near else "cocalib fleet status lists them")
+        + (f"did you mean {' or '.join(near)}?" if near else "cocalib batch status lists them")
     )
 
 
@@ -66,7 +66,7 @@ def compare_sessions(fleet: FleetRecord, a: str, b: str) -> ComparedSessions:
     if first[0].name != second[0].name and None not in types and types[0] != types[1]:
         raise InputError(f"{a} is of type {types[0]} and {b} of type {types[1]}; compare vehicles of one type")
     if first[1] is second[1]:
-        raise InputError(f"{a} and {b} are the same session; name two, as cocalib fleet history lists them")
+        raise InputError(f"{a} and {b} are the same session; name two, as cocalib batch history lists them")
     pose_a, pose_b = _pose(first[1], a), _pose(second[1], b)
     if first[0].name != second[0].name:
         return _of_two_vehicles(pose_a, pose_b)

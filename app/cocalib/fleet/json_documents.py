@@ -1,4 +1,4 @@
-"""What `cocalib fleet --json` prints: status, history and comparison as values for other programs."""
+"""What `cocalib batch status --json` prints: status, history and comparison as values for other programs."""
 
 import math
 from collections.abc import Sequence

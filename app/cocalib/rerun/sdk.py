@@ -25,7 +25,7 @@ def require_sdk() -> None:
     if find_spec("rerun") is None:
         raise InputError(
             "this command needs rerun-sdk, which is not installed (there is none for Intel Macs): pip install 'cocalib[rerun]'; "
-            "cocalib export --to mcap does without it. A video of the overlay needs none either: cocalib video --overlay"
+            "cocalib export --to mcap does without it. A video of the overlay needs none either: cocalib show --out FILE.mp4"
         )
 
 
@@ -42,7 +42,7 @@ def viewer_program() -> Path:
         if (folder / name).is_file():
             return folder / name
     raise InputError(
-        "rerun-sdk is installed without its viewer; write a file with cocalib record-rrd, and open it elsewhere"
+        "rerun-sdk is installed without its viewer; write a file with cocalib show --out FILE.rrd, and open it elsewhere"
     )
 
 

@@ -121,12 +121,12 @@ def _fetched(url: str, process: "subprocess.Popen[bytes]") -> bytes:
                 return bytes(answer.read())
         except urllib.error.HTTPError as error:
             raise InputError(
-                f"Rerun's web viewer has no {url.rsplit('/', 1)[1]} ({error}); use cocalib record-rrd"
+                f"Rerun's web viewer has no {url.rsplit('/', 1)[1]} ({error}); use cocalib show --out FILE.rrd"
             ) from error
         except (OSError, urllib.error.URLError) as error:
             if process.poll() is not None or time.monotonic() > until_s:
                 raise InputError(
-                    f"Rerun's web viewer does not start ({error}); write a file with cocalib record-rrd and open it with rerun"
+                    f"Rerun's web viewer does not start ({error}); write a file with cocalib show --out FILE.rrd"
                 ) from error
             time.sleep(0.05)
 
@@ -194,7 +194,7 @@ def require_display(environment: Mapping[str, str], platform: str = sys.platform
     if platform.startswith("linux") and not (environment.get("DISPLAY") or environment.get("WAYLAND_DISPLAY")):
         raise InputError(
             "no window can be opened here: there is no display (DISPLAY and WAYLAND_DISPLAY are not set, as over ssh). Use "
-            "--web for a viewer in the browser, or write a file with cocalib record-rrd ... --out FILE.rrd and open it on a "
+            "--web for a viewer in the browser, or write a file with cocalib show ... --out FILE.rrd and open it on a "
             "computer with a screen"
         )
 

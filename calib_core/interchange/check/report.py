@@ -555,10 +555,10 @@ def exit_code(files: Sequence[CheckedFile]) -> int:
     return next((code for code in (1, 2, 3) if code in codes), 0)
 
 
-def check_json(files: Sequence[CheckedFile]) -> str:
-    """Return the reports as one JSON object; docs/formats.md lists its keys."""
-    verdicts = [_document(file) for file in files]
-    return json_text(encodable({"schema": CHECK_SCHEMA, "exit_code": exit_code(files), "files": verdicts}))
+def check_json(files: Sequence[CheckedFile], on_recording: dict[str, Any] | None = None) -> str:
+    """Return the reports as one JSON object, with what a recording says of two files; docs/formats.md lists its keys."""
+    document = {"schema": CHECK_SCHEMA, "exit_code": exit_code(files), "files": [_document(file) for file in files]}
+    return json_text(encodable(document if on_recording is None else document | {"on_recording": on_recording}))
 
 
 def _document(file: CheckedFile) -> dict[str, Any]:

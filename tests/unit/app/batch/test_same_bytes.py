@@ -52,7 +52,7 @@ class Commands:
         return self._run("evaluate", self.calibration, *BAGS, *flags, "--json").encode()
 
     def report(self, *flags: str | Path) -> bytes:
-        self._run("report", self.calibration, *BAGS, *flags, "--out", self.folder / "report.html")
+        self._run("evaluate", self.calibration, *BAGS, *flags, "--report", self.folder / "report.html")
         return (self.folder / "report.html").read_bytes()
 
     def export(self, name: str, out: Path) -> None:

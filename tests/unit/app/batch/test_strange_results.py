@@ -61,7 +61,7 @@ def test_a_batch_refuses_a_result_that_status_refuses(tmp_path: Path, capsys: py
     out, jobs = tmp_path / "out", quick_jobs(tmp_path, 1)
     drive(jobs, InProcess(), ResultsFolder(out))
     put("link to a file", place := ResultsFolder(out).folder_of(jobs[0].digest) / OUTCOME_FILE)
-    assert run(["fleet", "status", str(out)]) == 2
+    assert run(["batch", "status", str(out)]) == 2
     words = capsys.readouterr().err.partition("outcome.json: ")[2].strip()
     with pytest.raises(CalibrationError) as refused:
         drive(jobs, InProcess(), ResultsFolder(out))
@@ -75,7 +75,7 @@ def test_a_linked_folder_of_results_is_named_by_one_path(tmp_path: Path, capsys:
     write(folder)
     folder.folder_of(DIGEST).rename(tmp_path / "theirs")
     folder.folder_of(DIGEST).symlink_to(tmp_path / "theirs")
-    assert run(["fleet", "status", str(tmp_path / "out")]) == 2
+    assert run(["batch", "status", str(tmp_path / "out")]) == 2
     assert f"no result can be read: results/{DIGEST}: is a symbolic link" in capsys.readouterr().err
 
 
@@ -170,7 +170,7 @@ def test_the_summary_is_never_written_through_something_else(
     out = tmp_path / "out"
     write(ResultsFolder(out))
     put(kind, out / "summary.html")
-    assert run(["fleet", "summary", str(out)]) == 2
+    assert run(["batch", "summary", str(out)]) == 2
     assert "summary.html: is " in capsys.readouterr().err
     if kind == "link to a file":
         assert (tmp_path / "elsewhere.json").read_text() == "theirs"
@@ -183,5 +183,5 @@ def test_an_outcome_that_is_no_file_is_named_and_left_out(
     folder = ResultsFolder(tmp_path / "out")
     write(folder)
     put(kind, folder.folder_of(DIGEST) / OUTCOME_FILE)
-    assert run(["fleet", "status", str(tmp_path / "out")]) == 2
+    assert run(["batch", "status", str(tmp_path / "out")]) == 2
     assert f"results/{DIGEST}/outcome.json: is a " in capsys.readouterr().err

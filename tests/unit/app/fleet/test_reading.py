@@ -103,11 +103,11 @@ def test_the_history_of_a_vehicle_whose_outcome_cannot_be_read_names_the_file(
     for name in names:
         (ResultsFolder(folder).folder_of(digest_of(*name)) / "outcome.json").write_text("garbage")
     _write_plan(folder, *names, digests={name: digest_of(*name) for name in names})
-    assert run(["fleet", "history", "V000", str(folder)]) == 0
+    assert run(["batch", "history", "V000", str(folder)]) == 0
     assert (
         f"session s0: results/{digest_of('V000', 's0')}/outcome.json is no cocalib/outcome-1" in capsys.readouterr().out
     )
-    assert run(["fleet", "history", "V9", str(folder)]) == 2
+    assert run(["batch", "history", "V9", str(folder)]) == 2
     assert f"'V9': session 's0': results/{digest_of('V9', 's0')}/outcome.json: " in capsys.readouterr().err
 
 

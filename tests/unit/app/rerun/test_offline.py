@@ -54,10 +54,9 @@ def test_commands_without_rerun_work_where_it_is_missing(project_root: Path) -> 
     assert answer.returncode == 0, answer.stderr
 
 
-@pytest.mark.parametrize("command", ["record-rrd", "rerun"])
-def test_commands_that_need_rerun_say_how_to_install_it(command: str, tmp_path: Path) -> None:
-    more = ("--out", tmp_path / "view.rrd") if command == "record-rrd" else ()
-    answer = without_rerun(command, tmp_path / "a.bag", "--calibration", tmp_path / "c.json", *more)
+@pytest.mark.parametrize("more", [(), ("--out", "view.rrd")], ids=["window", "file"])
+def test_commands_that_need_rerun_say_how_to_install_it(more: tuple[str, ...], tmp_path: Path) -> None:
+    answer = without_rerun("show", tmp_path / "a.bag", "--calibration", tmp_path / "c.json", *more)
     assert answer.returncode == 2
     assert "needs rerun-sdk, which is not installed" in answer.stderr
     assert "pip install 'cocalib[rerun]'" in answer.stderr
@@ -65,7 +64,7 @@ def test_commands_that_need_rerun_say_how_to_install_it(command: str, tmp_path: 
 
 
 def test_without_a_display_other_ways_are_named() -> None:
-    with pytest.raises(InputError, match="record-rrd"):
+    with pytest.raises(InputError, match="cocalib show"):
         require_display({}, "linux")
     for environment, platform in (({"DISPLAY": ":0"}, "linux"), ({"WAYLAND_DISPLAY": "w"}, "linux"), ({}, "darwin")):
         require_display(environment, platform)
