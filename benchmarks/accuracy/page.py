@@ -16,8 +16,7 @@ to those of the fixed seeds.
 
 There are two families. Default: the errors that real radars, lenses and clicks have are drawn from the priors that the options
 state, and the estimator is given the default options. Ideal: radar, lens and clicks have nothing but independent noise, and the
-estimator is told so; the Cramer-Rao bound assumes the same. What of the ideal family was not run again is in
-[accuracy-ideal.md](accuracy-ideal.md), as measured with c35a642, whose ideal estimator is the same.ELSEWHERE
+estimator is told so; the Cramer-Rao bound assumes the same.
 
 Noise levels are assumptions based on
 vendors' figures; no real radar was measured. `ti` is a TI AWR1843 (range 1.5 cm, azimuth 0.55 deg, elevation 1 deg),
@@ -31,8 +30,6 @@ one row in forty is missed by chance.
 """
 
 _USUAL = "make bench-accuracy"
-_ELSEWHERE = """ The other methods and the
-cost of each way of marking were last run alone: [accuracy-methods.md](accuracy-methods.md)."""
 
 
 def page(
@@ -52,7 +49,7 @@ def page(
     """
     others = fresh or [None] * len(sections)
     shown = [_section(one, other) for one, other in zip(sections, others, strict=True)]
-    head = _HEAD.replace("COMMAND", command).replace("ELSEWHERE", _ELSEWHERE if command == _USUAL else "")
+    head = _HEAD.replace("COMMAND", command)
     return "\n".join([head, _summary(_claims(sections), _claims(fresh), commit), *shown])
 
 
