@@ -8,7 +8,7 @@ PARALLEL := -n logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 FAST := tests/golden tests/paper tests/properties $(wildcard tests/unit/test_*.py) \
   $(addprefix tests/unit/,association diagnostics estimation interchange results)
 
-.PHONY: help env dev demo test fuzz test-fast test-lowest test-newest check lock bench bench-accuracy paper sample picture clean
+.PHONY: help env dev demo docs test fuzz test-fast test-lowest test-newest check lock bench bench-accuracy paper sample picture clean
 
 help:  ## List the targets.
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -29,12 +29,19 @@ $(VENV)/.dev: requirements/dev.txt $(VENV)/.runtime
 	@VENV="$(VENV)" sh .ci/install requirements/dev.txt
 	@touch $@
 
+$(VENV)/.docs: requirements/docs.txt $(VENV)/.runtime
+	@VENV="$(VENV)" sh .ci/install requirements/docs.txt
+	@touch $@
+
 $(VENV)/.bench: requirements/bench.txt $(VENV)/.dev
 	@VENV="$(VENV)" sh .ci/install requirements/bench.txt
 	@touch $@
 
 demo: env  ## Open the sample recording in the browser.
 	$(BIN)/cocalib demo
+
+docs: $(VENV)/.docs  ## Build the documentation as a site, in site/: offline and strict.
+	$(BIN)/python docs/make_site.py
 
 check: dev  ## Check style, types, layers, frame names, spelling.
 	$(BIN)/ruff check .
@@ -84,4 +91,4 @@ lock: dev  ## Update all pins, with hashes and without index URLs (needs uv).
 	@sh .ci/lock
 
 clean:  ## Remove the files created by make and the tests.
-	rm -rf $(VENV) $(VENV)-lowest $(VENV)-newest .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache dist
+	rm -rf $(VENV) $(VENV)-lowest $(VENV)-newest .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache dist site

@@ -1,0 +1,144 @@
+"""Write the site: docs/*.md, README and glossary, the commands from the parser, Python from its docstrings, the notebook.
+
+`make docs` runs it. Sphinx builds the pages offline and strictly: a link that leads nowhere is an error, and so are a script or
+font from elsewhere and a site of more than 10 MB.
+"""
+
+import argparse
+import json
+import re
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import calib_core
+from cocalib.cli.commands import COMMANDS
+from cocalib.cli.help import named_options_help, written_help
+
+_ROOT = Path(__file__).parent.parent
+_MOST_MB = 10.0
+_PAGES = {
+    "Tour": "tour first-steps",
+    "How to": "radar-formats intrinsics drift fleet proposals boxes evaluation report rerun simulation",
+    "Concepts": "method accuracy conventions GLOSSARY apex paper security",
+    "Reference": "commands python formats warnings",
+    "Studies": "paper-experiments proposals-accuracy intrinsics-accuracy reliability speed",
+    "Project": "CHANGELOG CONTRIBUTING ARCHITECTURE SECURITY",
+}
+_FONT = "system-ui, sans-serif"
+_INLINE = re.compile(r"<script>document\.getElementById\('searchbox'\)[^<]*</script>|\sstyle=\"[^\"]*\"")
+_FORBIDDEN = re.compile(
+    r"<script>|<style|\sstyle=|@import|url\([\"']?(https?:)?//|"
+    r"(src|href)=[\"']?(https?:)?//[^\"'>]*\.(js|css|woff2?|ttf|svg|png)"
+)
+"""What the page's policy does not allow, or what comes from elsewhere."""
+
+
+def _commands() -> Iterator[str]:
+    """Yield the page of the commands."""
+    yield "# Commands\n\n`--help all` after a command lists every option; options by name are at the end.\n"
+    for command in COMMANDS.values():
+        yield f"## {command.name}\n\n```text\n{written_help(command)}```\n"
+    yield f"## Options by name\n\n```text\n{named_options_help(COMMANDS['solve'].load())}```\n"
+
+
+def _python() -> Iterator[str]:
+    """Yield the page of the Python names."""
+    yield "# Python\n\n`import cocalib as cc`. A function that takes or returns arrays says their shapes.\n"
+    for name in calib_core.__all__:
+        kind = "autoclass" if isinstance(getattr(calib_core, name), type) else "autofunction"
+        members = "\n   :members:" if kind == "autoclass" else ""
+        yield f"```{{eval-rst}}\n.. {kind}:: calib_core.{name}{members}\n```\n"
+
+
+def _notebook(path: Path) -> Iterator[str]:
+    """Yield a notebook with the outputs that it holds."""
+    for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
+        text = "".join(cell["source"])
+        yield f"{text}\n" if cell["cell_type"] == "markdown" else f"```python\n{text}\n```\n"
+        for output in cell.get("outputs", []):
+            yield f"```text\n{''.join(output.get('text', []))}\n```\n"
+
+
+def _tree() -> Iterator[str]:
+    """Yield the site's contents."""
+    for caption, pages in _PAGES.items():
+        yield f"```{{toctree}}\n:hidden:\n:caption: {caption}\n\n" + "\n".join(pages.split()) + "\n```\n"
+
+
+def _assemble(folder: Path) -> None:
+    """Write the pages that Sphinx reads, all in one folder."""
+    docs = _ROOT / "docs"
+    pages = {path.stem: path.read_text(encoding="utf-8") for path in docs.glob("*.md")}
+    for name in ("README", "GLOSSARY", *_PAGES["Project"].split()):
+        pages[name] = (_ROOT / f"{name}.md").read_text(encoding="utf-8")
+    pages["index"] = pages.pop("README") + "\n" + "\n".join(_tree())
+    pages["commands"], pages["python"] = "\n".join(_commands()), "\n".join(_python())
+    pages["first-steps"] = "\n".join(_notebook(docs / "first-steps.ipynb"))
+    for name, text in pages.items():
+        for link, target in (
+            ("../", ""),
+            ("docs/", ""),
+            ("README.md", "index.md"),
+            ("first-steps.ipynb", "first-steps.md"),
+        ):
+            text = text.replace(f"]({link}", f"]({target}")
+        (folder / f"{name}.md").write_text(text, encoding="utf-8")
+    for name in ("pictures", "schemas"):
+        shutil.copytree(docs / name, folder / name)
+    for name in ("CITATION.cff", "LICENSE", "pyproject.toml"):
+        shutil.copy(_ROOT / name, folder / name)
+
+
+def main() -> int:
+    """Build the site; return the exit code."""
+    from sphinx.application import Sphinx
+
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=_ROOT / "site")
+    out = parser.parse_args().out
+    settings = {
+        "project": "cocalib",
+        "html_title": "cocalib",
+        "extensions": ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"],
+        "html_theme": "alabaster",
+        "html_copy_source": False,
+        "html_use_index": False,
+        "html_show_sourcelink": False,
+        "html_show_sphinx": False,
+        "html_theme_options": {
+            "page_width": "1200px",
+            "sidebar_width": "250px",
+            "fixed_sidebar": True,
+            "font_family": _FONT,
+            "head_font_family": _FONT,
+        },
+        "myst_heading_anchors": 4,
+        "autodoc_typehints": "none",
+        "napoleon_numpy_docstring": False,
+        "highlight_language": "text",
+        "add_module_names": False,
+    }
+    with tempfile.TemporaryDirectory(prefix="cocalib-docs-") as folder:
+        _assemble(Path(folder))
+        shutil.rmtree(out, ignore_errors=True)
+        app = Sphinx(folder, None, out, Path(folder) / ".doctrees", "html", settings, warningiserror=True, status=None)
+        app.build()
+    for page in out.glob("*.html"):  # the page's policy allows no script or style within a page
+        page.write_text(_INLINE.sub("", page.read_text(encoding="utf-8")), encoding="utf-8")
+    files = [path for path in out.rglob("*") if path.is_file()]
+    size_mb = sum(path.stat().st_size for path in files) / 1e6
+    forbidden = [
+        str(path) for path in files if path.suffix in (".html", ".css") and _FORBIDDEN.search(path.read_text("utf-8"))
+    ]
+    if app.statuscode or forbidden or size_mb > _MOST_MB:
+        print(f"warnings, or what is not allowed in {forbidden}, or {size_mb:.1f} MB of {_MOST_MB:g}", file=sys.stderr)
+        return 1
+    print(f"{out}: {len(list(out.glob('*.html')))} pages, {size_mb:.1f} MB")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
