@@ -114,7 +114,7 @@ def _arguments() -> argparse.Namespace:
         "--seed",
         choices=("fixed", "fresh"),
         default="fixed",
-        help="fixed, or drawn from the present commit's hash; the page shows both (default: fixed)",
+        help="fixed, or drawn from the present commit's hash (default: fixed)",
     )
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes (default: one per processor)")
     parser.add_argument("--scratch", type=Path, default=_ROOT / "build" / "accuracy", help="where raw figures are kept")
@@ -130,23 +130,21 @@ def main() -> int:
     """Measure the accuracy and write the page. An interrupted run resumes if the code is unchanged."""
     arguments = _arguments()
     keeper = Keeper(arguments.kept or arguments.scratch / digest_of_sources())
-    fresh = fresh_seeds(keeper.folder) if arguments.seed == "fresh" else last_fresh_seeds(keeper.folder)
-    first = fresh.first_trial if fresh is not None and arguments.seed == "fresh" else 0
+    fresh = None
+    if arguments.seed == "fresh":
+        fresh = last_fresh_seeds(keeper.folder) if arguments.write_only else fresh_seeds(keeper.folder)
+    first = 0 if fresh is None else fresh.first_trial
     rows = [row for name in TABLES if not arguments.only or name in arguments.only for row in TABLES[name]]
     rows = [row for row in rows if not arguments.rows or any(fnmatch(row.key, one) for one in arguments.rows)]
-    command = (
-        shlex.join(["python", "-m", "benchmarks.accuracy", *sys.argv[1:]]) if arguments.alone else "make bench-accuracy"
-    )
-    shown = arguments.only if arguments.alone and arguments.only else ()
     if not arguments.write_only:
         run(rows, keeper, jobs=arguments.jobs, most=arguments.trials, first=first)
     everything = [row for several in TABLES.values() for row in several]
-    fixed_sections = sections(kept_figures(everything, keeper, most=arguments.trials), shown)
-    if fresh is None:
-        text = page(fixed_sections, command=command)
-    else:
-        kept = kept_figures(everything, keeper, most=arguments.trials, first=fresh.first_trial)
-        text = page(fixed_sections, sections(kept, shown), commit=fresh.commit, command=command)
+    kept = kept_figures(everything, keeper, most=arguments.trials, first=first)
+    alone = arguments.only if arguments.alone and arguments.only else ()
+    command = "make bench-accuracy SEED=fresh" if fresh else "make bench-accuracy"
+    if arguments.alone:
+        command = shlex.join(["python", "-m", "benchmarks.accuracy", *sys.argv[1:]])
+    text = page(sections(kept, alone), commit="" if fresh is None else fresh.commit, command=command)
     arguments.page.write_text(text, encoding="utf-8")
     return 0
 

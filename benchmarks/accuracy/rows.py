@@ -60,11 +60,9 @@ class Section:
         text: how it was measured.
         parts: the tables.
         claims: the aims.
-        side_by_side: show the tables of the fresh seeds too; of other sections, only the aims.
     """
 
     title: str
     text: str
     parts: tuple[Part, ...]
     claims: tuple[Claim, ...]
-    side_by_side: bool = False

@@ -169,7 +169,7 @@ def section(kept: Kept) -> Section:
     title = "Is the error that the verdict states right?"
     aim = "of good and usable verdicts, at least 95 % of the true errors are inside the stated one"
     if not everything:
-        return Section(title, _TEXT, (), (summed_up(aim, [], "not run"),), side_by_side=True)
+        return Section(title, _TEXT, (), (summed_up(aim, [], "not run"),))
     cells, verdicts = [], []
     for level in _LEVELS[:3]:
         inside = share_inside(everything, (level,))
@@ -183,7 +183,7 @@ def section(kept: Kept) -> Section:
         Part("Row by row", head, tuple(rows)),
     )
     claim = summed_up(aim, verdicts, fewest(kept, [row.key for row in ROWS]))
-    return Section(title, _TEXT, parts, (claim,), side_by_side=True)
+    return Section(title, _TEXT, parts, (claim,))
 
 
 def _row(name: str, trials: Sequence[Figures]) -> tuple[str, ...]:

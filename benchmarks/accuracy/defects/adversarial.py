@@ -62,7 +62,7 @@ def section(kept: Kept) -> Section:
     head = ("finding", "trials", "silently wrong", "", "c", "warned", "no pose", "warnings in a quarter or more")
     claims = (_row_claim(counts, lengths), _overall_claim(counts, lengths))
     title = "Defects that were seen: how often is an answer silently wrong?"
-    return Section(title, _TEXT, (Part("", head, tuple(cells)),), claims, side_by_side=True)
+    return Section(title, _TEXT, (Part("", head, tuple(cells)),), claims)
 
 
 def _cells(adversary: Adversary, trials: Sequence[Figures], count: int) -> tuple[str, ...]:

@@ -72,7 +72,7 @@ def section(kept: Kept) -> Section:
     everything = [figures for trials in by_case.values() for figures in trials]
     title = "Nothing wrong: how often is there a warning?"
     if not everything:
-        return Section(title, _TEXT, (), (_claim([], 0, 0),), side_by_side=True)
+        return Section(title, _TEXT, (), (_claim([], 0, 0),))
     cells, verdicts = [], []
     for code in sorted({code for figures in everything for code in codes_in(figures)}):
         measured = _share(everything, code)
@@ -87,7 +87,7 @@ def section(kept: Kept) -> Section:
         Part("", ("warning", "draws", "share", "aim", "", "most often in"), tuple(cells)),
         Part("Sensors 3 m apart, distance not told", ("noise", "draws", "warnings"), _apart_cells(kept)),
     )
-    return Section(title, _TEXT, parts, (_claim(verdicts, len(everything), fewest),), side_by_side=True)
+    return Section(title, _TEXT, parts, (_claim(verdicts, len(everything), fewest),))
 
 
 def _share(trials: Sequence[Figures], code: str) -> Measured:

@@ -78,7 +78,7 @@ def section(kept: Kept) -> Section:
     verdict = MISSED if above else MET if draws >= _TRIALS * len(ROWS) else UNDECIDED
     claim = Claim(aim, f"{above} of {draws} drags jump", verdict) if draws else Claim(aim, "not run", "not run")
     title = "A click is dragged: does the pose jump?"
-    return Section(title, _TEXT, (Part("", head, tuple(cells)),), (claim,), side_by_side=True)
+    return Section(title, _TEXT, (Part("", head, tuple(cells)),), (claim,))
 
 
 _TEXT = """Twelve pairs in the field. The click of the nearest placement is dragged 60 px to the right in steps of 3 px, and the

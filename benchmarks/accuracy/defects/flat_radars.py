@@ -103,7 +103,7 @@ def section(kept: Kept) -> Section:
     aim = "2D radars: held-out residual, median at most 1.0 and 90 % point at most 1.1 times Algorithm 1's"
     claim = summed_up(aim, verdicts, fewest(kept, [row.key for row in ROWS]))
     title = "Radars without elevation: how well are new placements predicted?"
-    return Section(title, _TEXT, (Part("", head, tuple(cells)),), (claim,), side_by_side=True)
+    return Section(title, _TEXT, (Part("", head, tuple(cells)),), (claim,))
 
 
 def _points(trials: Sequence[Figures], level: float) -> tuple[float, float]:

@@ -111,7 +111,7 @@ def section(kept: Kept) -> Section:
         _claim("right radars accused of mirrored axes: 0 in 1,120", counts[False], draws[False], _RIGHT * 14),
     )
     title = "Handedness on one mast and far apart"
-    return Section(title, _TEXT, (Part("", head, tuple(cells)),), claims, side_by_side=True)
+    return Section(title, _TEXT, (Part("", head, tuple(cells)),), claims)
 
 
 def _bad(case: Hand, trials: Sequence[Figures]) -> int:

@@ -122,7 +122,7 @@ def section(kept: Kept) -> Section:
         "error, cm",
     )
     parts = (Part("", head, tuple(line.cells() for line in lines)),)
-    return Section("A camera position that was measured wrong", _TEXT, parts, _claims(lines), side_by_side=True)
+    return Section("A camera position that was measured wrong", _TEXT, parts, _claims(lines))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

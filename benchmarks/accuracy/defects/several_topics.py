@@ -155,7 +155,7 @@ def section(kept: Kept) -> Section:
     aim = "near and far topics with two azimuths: 90 % of the placements right, the pose within 1.1 times that of one ideal topic"
     claim = summed_up(aim, verdicts, fewest(kept, [row.key for row in ROWS]))
     title = "Several topics of one radar: as good as one?"
-    return Section(title, _TEXT, (Part("", head, tuple(cells)),), (claim,), side_by_side=True)
+    return Section(title, _TEXT, (Part("", head, tuple(cells)),), (claim,))
 
 
 _NAMES = ("merged", "single", "ideal")

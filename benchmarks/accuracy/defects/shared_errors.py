@@ -134,7 +134,6 @@ def section(kept: Kept) -> Section:
         _TEXT,
         (Part("", head, tuple(cells)),),
         verdicts.claims(fewest(kept, [row.key for row in ROWS])),
-        side_by_side=True,
     )
 
 
@@ -238,7 +237,7 @@ def clean_section(kept: Kept) -> Section:
     aim = "nothing wrong: default options cost at most 1.1 times in rotation, 1.4 (ti) or 1.9 (imaging) in position"
     claim = summed_up(aim, verdicts, fewest(kept, [row.key for row in CLEAN_ROWS]))
     title = "What do the default options cost where nothing is wrong?"
-    return Section(title, _CLEAN_TEXT, (Part("", head, tuple(cells)),), (claim,), side_by_side=True)
+    return Section(title, _CLEAN_TEXT, (Part("", head, tuple(cells)),), (claim,))
 
 
 _CLEAN_TEXT = """The same draws without shared errors: RMSE with the default options over the RMSE of an estimator that is told

@@ -83,7 +83,7 @@ def section(kept: Kept) -> Section:
     aim = "two reflectors at once: 90 % of the placements found, at most one wrong proposal in five"
     claim = summed_up(aim, verdicts, fewest(kept, [row.key for row in ROWS]))
     title = "Two reflectors in one recording: are the placements found?"
-    return Section(title, _TEXT, (Part("", head, tuple(cells)),), (claim,), side_by_side=True)
+    return Section(title, _TEXT, (Part("", head, tuple(cells)),), (claim,))
 
 
 def _flags(count: int, total: int) -> np.ndarray:
@@ -152,7 +152,7 @@ def returns_section(kept: Kept) -> Section:
     aim = "two reflectors 0.7 m apart in range: 1 % of the clicks with a wrong return, a fifth of these agreeing, 5 % asked"
     claim = summed_up(aim, verdicts, fewest(kept, [row.key for row in RETURN_ROWS]))
     title = "Two reflectors close together: does each click get its own return?"
-    return Section(title, _RETURNS_TEXT, (Part("", head, tuple(cells)),), (claim,), side_by_side=True)
+    return Section(title, _RETURNS_TEXT, (Part("", head, tuple(cells)),), (claim,))
 
 
 _RETURNS_TEXT = """Simulated recordings of the presets of `cocalib simulate`, radar only, opened and solved with default options.

@@ -149,7 +149,7 @@ def section(kept: Kept) -> Section:
     )
     claims = verdicts.claims(fewest(kept, [row.key for row in ROWS]))
     title = "With intrinsics that are off: does the stated uncertainty hold, and what does refining them gain?"
-    return Section(title, _TEXT, (Part("", head, tuple(cells)),), claims, side_by_side=True)
+    return Section(title, _TEXT, (Part("", head, tuple(cells)),), claims)
 
 
 def _as_given(case: WrongLens, kept: Kept) -> Sequence[Figures]:
