@@ -249,6 +249,7 @@ export interface VerdictRow {
   action: string;
   assumes: string;
   key: "" | "N" | "E" | "J";
+  option: "" | "solving.camera_position" | "gating.max_range_m";
   done: boolean;
   early: boolean;
 }

@@ -139,7 +139,7 @@ _CONTRADICTIONS = ("mirrored-axes", "no-pose", "camera-position-contradicted", "
 _MORE_PAIRS_HELP = ("many-outliers", "repeated-placements")
 _NOT_MIRRORED = "handedness-assumed"
 _FEW = "few-pairs"
-_BETWEEN = {"good": " to ", "usable": " to ", "nothing": " yet: "}
+_BETWEEN = {"good": ": within ", "usable": ": within ", "nothing": " yet: "}
 _LEAST_VARIANCE, _MOST_VARIANCE = 1e-18, 1e12
 _CORNER = "the reflector's inner corner, where its three sheets meet"
 DONE = "Done: export the calibration"
@@ -168,7 +168,7 @@ class Verdict:
 
     @property
     def line(self) -> str:
-        """Level and reason: "usable to 0.5 deg, 6 cm (95 %); 7 px at 20 m"."""
+        """Level and reason: "usable: within 0.5 deg, 6 cm (95 %); 7 px at 20 m"."""
         return f"{self.level}{_BETWEEN.get(self.level, ': ')}{self.reason}"
 
     def __str__(self) -> str:

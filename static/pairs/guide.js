@@ -6,12 +6,13 @@ import { saidWords } from "../proposals/proposals.js";
 import { proposalAdvice, proposalWords, silentWords } from "../proposals/words.js";
 import { act, actionNamed } from "../shell/actions.js";
 import { make } from "../shell/notices.js";
+import { openOption } from "../shell/options.js";
 import { clickIn, clicks, isDismissed, isOffered, on, placementAt, placementsAt, state } from "../shell/state.js";
 import { goToPair } from "./pairs.js";
 
 const guide = /** @type {HTMLElement} */ (document.getElementById("guide"));
 
-/** A key and what it does; with an action it can be pressed here too, and a pair is gone to. @typedef {{key: string, label: string, action?: string, pair?: string}} Key */
+/** A key and what it does; with an action it can be pressed here too, a pair is gone to, and an option opened. @typedef {{key: string, label: string, action?: string, pair?: string, option?: string}} Key */
 /** Text with keys in between. @typedef {(string|Key)[]} Words */
 /** What the line says; `act` if something is to be done in this frame. @typedef {{text: Words, act: boolean}} Advice */
 
@@ -20,12 +21,12 @@ export function startGuide() {
 }
 
 /** The focus stays where it is. @param {Key} key */
-function keyPart({ key, label, action, pair }) {
+function keyPart({ key, label, action, pair, option }) {
   const parts = [...(key ? [make("kbd", "key", key)] : []), label];
-  if (!action && !pair) return make("span", "", parts);
+  if (!action && !pair && !option) return make("span", "", parts);
   const button = make("button", "do", parts);
   button.onmousedown = (event) => event.preventDefault();
-  button.onclick = () => (pair ? goToPair(pair) : act(actionNamed(action ?? "")));
+  button.onclick = () => (pair ? goToPair(pair) : option ? openOption(option) : act(actionNamed(action ?? "")));
   return button;
 }
 
@@ -48,6 +49,9 @@ function opening() {
 
 const EXCLUDE = { key: "X", label: "exclude it", action: "exclude" };
 const REMOVE = { key: "Del", label: "delete it", action: "delete" };
+const SHOW = { key: "J", label: "show it", action: "worst" };
+/** What the button of an option says. @type {Record<string, string>} */
+const OPTIONS = { "solving.camera_position": "enter the camera position", "gating.max_range_m": "maximum range" };
 const NEXT = { key: "N", label: "next place", action: "next-placement" };
 
 /** @param {number} index @returns {Advice|null} */
@@ -85,6 +89,8 @@ function afterClick(click) {
   const better = state.candidates?.click === click.id ? state.candidates.suggestion : "";
   if (better) return { text: [better, { key: "C", label: "take it", action: "next-candidate" }], act: true };
   if (click.state === "untouched") return { text: ["A guess, which does not count: move it to the inner corner.", REMOVE], act: true };
+  const near = state.view?.verdict.option === "gating.max_range_m";
+  if (click.state === "unpaired" && near) return { text: ["No return within the maximum range here.", { key: "", label: "change it", option: "gating.max_range_m" }], act: true };
   if (click.state === "unpaired") return { text: ["No radar position here: click another frame of this placement.", NEXT], act: true };
   if (click.state === "outlier") return { text: outlierWords(click), act: true };
   const next = nextAction();
@@ -103,15 +109,17 @@ function outlierWords(click) {
 function nextAction() {
   const view = state.view;
   if (!view || view.stage === "solving") return null;
-  const { action, key, done } = view.verdict;
+  const { action, key, option, done } = view.verdict;
   const guesses = clicks().filter((click) => click.state === "untouched").length;
   if (guesses && !state.placements.some(isOffered)) return [`${guesses} ${guesses > 1 ? "marks are guesses" : "mark is a guess"} and ${guesses > 1 ? "do" : "does"} not count: move ${guesses > 1 ? "each" : "it"} to the inner corner`];
-  if (done) return ["Done.", { key: "E", label: "export", action: "export" }];
+  const by = OPTIONS[option] ? [{ key: "", label: OPTIONS[option], option }] : [];
+  const leftOut = clicks().filter((click) => click.state === "outlier").map(({ id }) => id);
+  if (done) return ["Done.", { key: "E", label: "export", action: "export" }, ...(leftOut.length ? [`Left out: ${leftOut.join(", ")}`, SHOW] : by.length ? ["Better:", ...by] : [])];
   if (key === "N") return [{ key, label: proposalAdvice(), action: "next-placement" }];
   const named = view.verdict.level === "contradictory" ? view.clicks.find(({ id }) => new RegExp(`\\b${id}\\b`).test(action)) : undefined;
   if (named) return [action, { key: "", label: `show ${named.id}`, pair: named.id }];
-  if (key === "J") return [action, { key, label: "show it", action: "worst" }];
-  if (view.clicks.length) return [action];
+  if (key === "J") return [action, SHOW];
+  if (view.clicks.length) return [action, ...by];
   if (!state.placementsKnown) return ["Looking for the places where the reflector stood. You can click meanwhile"];
   return state.placements.length ? [action] : [`${state.placementSummary}. ${action}`];
 }

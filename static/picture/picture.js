@@ -54,7 +54,8 @@ function watchRatio() {
 }
 
 function measure() {
-  if (!geometry.resize(pane.clientWidth, pane.clientHeight)) return;
+  const below = Number.parseFloat(getComputedStyle(pane).paddingBottom); // room for the line on the frame
+  if (!geometry.resize(pane.clientWidth, pane.clientHeight - below)) return;
   for (const canvas of [picture, marks]) {
     canvas.width = Math.round(viewport.width * viewport.ratio);
     canvas.height = Math.round(viewport.height * viewport.ratio);

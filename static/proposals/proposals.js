@@ -341,7 +341,8 @@ function zoomInto({ row, place }) {
   const [u, v] = place.pixel_px;
   lookInto(u, v, field, field);
   lookAt(within(u, viewport.width, viewport.imageWidth), within(v, viewport.height, viewport.imageHeight));
-  pan(0, Math.min(0, viewport.height - BELOW - toCss(u, v)[1]));
+  const below = document.documentElement.dataset.shape === "tall" ? 0 : BELOW; // there the line is below the picture
+  pan(0, Math.min(0, viewport.height - below - toCss(u, v)[1]));
   redraw();
   emit("box");
 }

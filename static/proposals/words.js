@@ -39,7 +39,6 @@ export function proposalWords() {
     ...(row.places.length > 1 ? [{ key: "C", label: "other place", action: "next-candidate" }] : []),
     { key: "X", label: "no reflector", action: "exclude" },
     { key: "N", label: "next", action: "next-placement" },
-    ...(state.view?.clicks.length ? [] : ["or click the inner corner"]),
   ];
 }
 

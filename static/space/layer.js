@@ -164,6 +164,10 @@ function draw() {
 /** @param {Look} look @param {NonNullable<ReturnType<typeof placing>>} place @param {Board} board */
 function drawLook(look, place, board) {
   if (spaceOptions.camera) drawReturns(look, place);
+  for (const row of candidates()) {
+    const at = place(row.position_m, [row.u_px, row.v_px]);
+    if (at) ring(at[0], at[1], row.used ? RING + 2 : RING, themeColour(row.used ? "attention" : "ink"), row.used ? 2 : 1.2, row.used ? [] : [3, 2]);
+  }
   pen.font = `600 11px ${themeColour("face")}`;
   for (const { words, position_m, kind } of look.labels) {
     const reflector = kind === "selected" ? look.reflectors.find(({ id }) => id === state.selected) : undefined;
@@ -176,10 +180,6 @@ function drawLook(look, place, board) {
     if (spaceOptions.camera && known !== "clicked") ring(at[0], at[1], RING, themeColour(known === "open" ? "accent" : "faint"), 1.2, [3, 3]);
     label(board, String(index + 1), at[0] + 11, at[1] - 10, known === "open" ? "accent" : "faint");
   });
-  for (const row of candidates()) {
-    const at = place(row.position_m, [row.u_px, row.v_px]);
-    if (at) ring(at[0], at[1], row.used ? RING + 2 : RING, themeColour(row.used ? "attention" : "ink"), row.used ? 2 : 1.2, row.used ? [] : [3, 2]);
-  }
   if (spaceOptions.camera) return;
   const words = (/** @type {number} */ range) => `${Number(range.toPrecision(3))} m`;
   pen.font = `11px ${themeColour("face")}`;

@@ -9,7 +9,9 @@ import numpy as np
 from calib_core.association.placement_groups import linked_clicks
 from calib_core.association.placements import Placement
 from calib_core.measurements import MIN_PAIRS, Unpaired, Unsolvable
+from calib_core.options import GatingOptions
 from calib_core.results import Calibration, DataWarning, NextPlacement
+from calib_core.results.systematic_errors import TAPE
 from calib_core.results.verdict import (
     ALL_CLICKED,
     DONE,
@@ -281,6 +283,7 @@ def verdict_row(verdict: Verdict, session: Session, placements: Sequence[Placeme
         action=sentence(verdict.action),
         assumes=f"Assuming {verdict.assumes}." if verdict.assumes else "",
         key="N" if early and left else _key(verdict, session, left),
+        option=_option(verdict, session),
         done=_is_done(verdict),
         early=early != "",
     )
@@ -322,6 +325,14 @@ def _key(verdict: Verdict, session: Session, left: int | None) -> Literal["", "N
         return "J" if outcome.warnings and by_consequence(outcome.warnings)[0].code in _OF_PAIRS else ""
     collecting = outcome is None or (isinstance(outcome, Unsolvable) and outcome.code == "too-few-pairs")
     return "N" if left and (collecting or verdict.action.startswith("Click the ")) else ""
+
+
+def _option(verdict: Verdict, session: Session) -> Literal["", "solving.camera_position", "gating.max_range_m"]:
+    """Return the option that does the action: what was measured, or a maximum range that leaves returns out."""
+    if TAPE in verdict.action.lower():
+        return "solving.camera_position"
+    is_near = session.options.gating.max_range_m < GatingOptions().max_range_m
+    return "gating.max_range_m" if is_near and _unpaired(session) else ""
 
 
 _NOTICEABLE = 0.05

@@ -153,10 +153,11 @@ class VerdictRow:
 
     Attributes:
         level: decides word, colour and shape.
-        line: level and reason: "usable to 0.5 deg, 6 cm (95 %); 7 px at 20 m".
+        line: level and reason: "usable: within 0.5 deg, 6 cm (95 %); 7 px at 20 m".
         action: the one thing that helps most, as a sentence.
         assumes: what the stated error rests on and no pair can show, as a sentence; "" if there is nothing.
         key: of the page, that does or begins it; "" if there is none.
+        option: path of the option that does it; "" if there is none.
         done: nothing more is needed.
         early: nothing is wrong, there are only fewer pairs than the verdict needs; the line counts them.
     """
@@ -166,6 +167,7 @@ class VerdictRow:
     action: str
     assumes: str = ""
     key: Literal["", "N", "E", "J"] = ""
+    option: Literal["", "solving.camera_position", "gating.max_range_m"] = ""
     done: bool = False
     early: bool = False
 

@@ -57,7 +57,7 @@ def test_pairs_that_agree_on_no_pose_are_contradictory() -> None:
 
 def test_a_good_calibration_states_its_error_and_is_done(good: Calibration) -> None:
     verdict = verdict_on(good)
-    assert re.fullmatch(r"good to [\d.]+ deg, [\d.]+ cm \(95 %\); [\d.]+ px at \d+ m", verdict.line)
+    assert re.fullmatch(r"good: within [\d.]+ deg, [\d.]+ cm \(95 %\); [\d.]+ px at \d+ m", verdict.line)
     assert verdict.reason == stated_error(good).text
     assert verdict.action == DONE
     assert verdict_on(good, left=0).action == DONE

@@ -174,7 +174,7 @@ def _evidence(file: CalibrationFile) -> str:
     """Return what the pose rests on, with the verdict, in one or two sentences."""
     clicks = sum(1 for pair in file.calibration.pairs if pair.inlier)
     count = f" ({clicks} clicks)" if file.rests_on == "clicked" and clicks else ""
-    verdict = f" Verdict: {file.verdict.line}." if file.verdict is not None else ""
+    verdict = f" {sentence(f'verdict: {file.verdict.line}')}" if file.verdict is not None else ""
     return f"{_EVIDENCE[file.rests_on]}{count}.{verdict}"
 
 

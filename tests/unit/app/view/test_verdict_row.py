@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from calib_core.association.placements import Placement
-from calib_core.measurements import DataWarning, ReflectorClick, TimeNs
-from calib_core.options import CalibrationOptions, NoiseOptions
-from calib_core.results.verdict import DONE, Verdict
+from calib_core.measurements import DataWarning, ReflectorClick, TimeNs, Unpaired, Unsolvable
+from calib_core.options import CalibrationOptions, GatingOptions, NoiseOptions
+from calib_core.results.verdict import DONE, Verdict, verdict_on
 from cocalib.session import ClickPlaced, History, PlacementDismissed, RecordingFacts, Session, advance
 from cocalib.view.build import placements_left, verdict_row
 from cocalib.view.click_rows import disagreement
@@ -50,7 +50,17 @@ def test_a_mark_that_nobody_has_touched_leaves_its_placement_to_be_clicked() -> 
 def test_done_is_said_with_the_key_that_exports() -> None:
     row = verdict_row(Verdict("good", "0.3 deg, 3 cm (95 %)", DONE), Session(), None)
     assert (row.done, row.key, row.action) == (True, "E", f"{DONE}.")
-    assert row.line == "good to 0.3°, 3 cm (95 %)"
+    assert row.line == "good: within 0.3°, 3 cm (95 %)"
+
+
+def test_an_action_that_an_option_does_names_it() -> None:
+    for action, option in (("A tape-measured camera position would help most", "solving.camera_position"), (DONE, "")):
+        assert verdict_row(Verdict("usable", "2 deg", action), Session(), None).option == option
+    near = CalibrationOptions(gating=GatingOptions(max_range_m=1.0))
+    lost = Unsolvable("too-few-pairs", "no pair", "click", (Unpaired("c1", "no-static-return", "no return", "widen"),))
+    session = Session(clicks=(ReflectorClick(TimeNs(0), "c1", 1.0, 1.0),), options=near, outcome=lost)
+    assert verdict_row(verdict_on(lost), session, None).option == "gating.max_range_m"
+    assert verdict_row(verdict_on(lost), replace(session, options=CalibrationOptions()), None).option == ""
 
 
 TWO_POSES = DataWarning("two-poses", "another pose explains the pairs almost as well", "check the return of c2")
