@@ -12,7 +12,6 @@ else:  # to type checkers jaxtyping's names are Annotated too, and importing it 
 Vector2: TypeAlias = Float64[np.ndarray, "2"]
 Vector3: TypeAlias = Float64[np.ndarray, "3"]
 Matrix22: TypeAlias = Float64[np.ndarray, "2 2"]
-Matrix23: TypeAlias = Float64[np.ndarray, "2 3"]
 Matrix33: TypeAlias = Float64[np.ndarray, "3 3"]
 Matrix66: TypeAlias = Float64[np.ndarray, "6 6"]
 Points2: TypeAlias = Float64[np.ndarray, "n 2"]

@@ -157,11 +157,6 @@ def _expected_sides(plane: _Plane, fit: SolvedFit) -> GroundSides | None:
     return _sides_of(plane, fit)
 
 
-def ground_sides(fit: SolvedFit) -> GroundSides:
-    """Fit the plane of the placements, and return on which side of it radar and camera are."""
-    return _sides_of(_plane(fit), fit)
-
-
 def _sides_of(plane: _Plane, fit: SolvedFit) -> GroundSides:
     pose = fit.refined.camera_from_radar
     turned = pose.rotation.T

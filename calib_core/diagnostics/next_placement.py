@@ -185,11 +185,6 @@ class Coverage:
     next: Place | None
     one_height: bool
 
-    @property
-    def is_enough(self) -> bool:
-        """Whether there are enough placements, spread over the field."""
-        return self.placements >= ENOUGH_PLACEMENTS and self.next is None
-
 
 def placement_coverage(positions_radar_m: Points3, *, half_view_rad: float) -> Coverage:
     """Say what placements cover and where the next one should be.

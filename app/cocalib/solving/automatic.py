@@ -3,7 +3,6 @@
 import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -25,10 +24,6 @@ _FARTHEST_M = 0.3
 from place to place beside the reflector looks like a camera so far away."""
 _BY_PERSON = "open the recording on the page and confirm what it proposes, from one click on"
 _BY_TAPE = "if it is, measure its position with a tape (--camera-position-m X Y Z); else look at the clicks on the page"
-
-
-class RecordedSensors(RecordedFrames, RadarSource, Protocol):
-    """The part of a Recording that is needed."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -34,7 +34,6 @@ from calib_core.interchange.calibration_file import (
 )
 from calib_core.interchange.format import Format, ImportedCalibration, Reads, WrittenPose, imported
 from calib_core.interchange.own import documents
-from calib_core.interchange.own.clicks_json import refuse_repeated_ids, unconfirmed_of
 from calib_core.interchange.own.documents import (
     AngleMapDocument,
     CovariancePartsDocument,
@@ -44,8 +43,10 @@ from calib_core.interchange.own.documents import (
     finite_or_none,
     nan_if_none,
     nested,
+    refuse_repeated_ids,
     transform_document,
     transform_of,
+    unconfirmed_of,
 )
 from calib_core.interchange.own.documents import Matrix66 as StatedMatrix
 from calib_core.interchange.syntax.content import Content, decoded

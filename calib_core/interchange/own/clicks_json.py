@@ -3,13 +3,14 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from msgspec import UNSET, UnsetType
+from msgspec import UNSET
 
-from calib_core.errors import InputError
 from calib_core.interchange.own.documents import (
     CLICKS_SCHEMA,
     ClickDocument,
     ClicksDocument,
+    refuse_repeated_ids,
+    unconfirmed_of,
 )
 from calib_core.interchange.syntax.strict_json import document_text, parse_document
 from calib_core.measurements import ReflectorClick
@@ -101,32 +102,3 @@ def click_document(click: ReflectorClick) -> ClickDocument:
         mark=click.mark,
         chosen=click.chosen,
     )
-
-
-def refuse_repeated_ids(ids: Sequence[str], *, source: str, place: str) -> None:
-    """Refuse a list in which two entries have the same id.
-
-    Raises:
-        InputError: two entries have the same id; the message names both places.
-    """
-    first: dict[str, int] = {}
-    for index, name in enumerate(ids):
-        if name in first:
-            places = f"{place}[{first[name]}] and {place}[{index}]"
-            raise InputError(f"{source}: {places}: both have the id {name!r}; give each its own")
-        first[name] = index
-
-
-def unconfirmed_of(
-    stated: UnconfirmedClicks | UnsetType, present: Sequence[str] | None = None
-) -> UnconfirmedClicks | None:
-    """Return the unconfirmed clicks that a file states; None if there are none.
-
-    Args:
-        stated: in the file.
-        present: ids of the file's clicks: others were taken out of it since; None keeps all.
-    """
-    if isinstance(stated, UnsetType):
-        return None
-    ids = tuple(name for name in stated.ids if present is None or name in present)
-    return UnconfirmedClicks(ids, stated.confidence) if ids else None

@@ -4,6 +4,7 @@ JSON Schema is generated from these types (docs/schemas). Inputs and settings re
 """
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from typing import Annotated, Any, Final, Literal
@@ -508,3 +509,32 @@ def _covariance_of(document: CameraCovarianceDocument | UnsetType) -> CameraCova
             f"the covariance of the intrinsics names {count} parameters, its matrix needs as many rows and columns"
         )
     return CameraCovariance(tuple(document.order), np.array(document.matrix, dtype=np.float64).reshape(count, count))
+
+
+def refuse_repeated_ids(ids: Sequence[str], *, source: str, place: str) -> None:
+    """Refuse a list in which two entries have the same id.
+
+    Raises:
+        InputError: two entries have the same id; the message names both places.
+    """
+    first: dict[str, int] = {}
+    for index, name in enumerate(ids):
+        if name in first:
+            places = f"{place}[{first[name]}] and {place}[{index}]"
+            raise InputError(f"{source}: {places}: both have the id {name!r}; give each its own")
+        first[name] = index
+
+
+def unconfirmed_of(
+    stated: UnconfirmedClicks | UnsetType, present: Sequence[str] | None = None
+) -> UnconfirmedClicks | None:
+    """Return the unconfirmed clicks that a file states; None if there are none.
+
+    Args:
+        stated: in the file.
+        present: ids of the file's clicks: others were taken out of it since; None keeps all.
+    """
+    if isinstance(stated, UnsetType):
+        return None
+    ids = tuple(name for name in stated.ids if present is None or name in present)
+    return UnconfirmedClicks(ids, stated.confidence) if ids else None

@@ -12,7 +12,6 @@ from calib_core.arrays import Vector3
 from calib_core.association.array_pairs import pairs_from_arrays, too_near
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.interchange.own.clicks_json import refuse_repeated_ids
 from calib_core.interchange.own.documents import (
     PAIRS_SCHEMA,
     PairDocument,
@@ -21,6 +20,7 @@ from calib_core.interchange.own.documents import (
     RadarDocument,
     camera_document,
     camera_of,
+    refuse_repeated_ids,
 )
 from calib_core.interchange.syntax.strict_json import document_text, parse_document
 from calib_core.measurements import Candidate, Pair

@@ -40,7 +40,7 @@ Backdrop = Literal["city", "trees", "hall"]
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """An upright block, or a round one: centre of its base, sizes along x, y, z [m], rotated about z."""
+    """An upright block, or a round one: centre of its base, sizes along x, y, z [m]."""
 
     x_m: float
     y_m: float
@@ -49,7 +49,6 @@ class Box:
     height_m: float
     material: Material
     base_m: float = 0.0
-    turn_deg: float = 0.0
     is_round: bool = False
 
 

@@ -24,7 +24,6 @@ LEVEL_SIGNS = {
     "good": "●",
     "usable": "◐",
     "coarse": "○",
-    "weak": "○",
     "contradictory": "✕",
     "nothing": "–",
     "not judged": "–",
