@@ -2,6 +2,7 @@
 
 import ast
 import re
+import shlex
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 
 from cocalib.cli.commands import COMMANDS
 from cocalib.cli.tyro_hook import flags_of
+from cocalib.cli.usage import read_command
 
 PROSE = {"again", "boxes-1", "cookie", "reads", "therefore", "wrote"}
 """Words that follow the program's name in sentences that do not name a command."""
@@ -98,6 +100,27 @@ def test_the_pages_name_commands_that_exist(page: str, project_root: Path) -> No
     for file in sorted(path.glob("*.md")) if path.is_dir() else [path]:
         text = file.read_text(encoding="utf-8").replace(".venv/bin/cocalib", "cocalib")
         assert [each for code in code_of(text) for each in unknown_names(code, prose=set())] == [], file.name
+
+
+_REMARK = re.compile(r"( \.\.\.)?(\s{3,}\S.*|\s+#.*|)$")
+
+
+def command_lines(page: Path) -> Iterator[str]:
+    """Yield the command lines in a page's fenced blocks, without their remarks."""
+    for block in re.findall(r"^```[^\n]*\n(.*?)^```", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL):
+        for line in block.splitlines():
+            if line.removeprefix("$ ").startswith("cocalib "):
+                yield _REMARK.sub("", line.removeprefix("$ "))
+
+
+def test_the_command_lines_of_the_pages_are_right(project_root: Path) -> None:
+    pages = [project_root / "README.md", *sorted((project_root / "docs").glob("*.md"))]
+    lines = [(page.name, line) for page in pages for line in command_lines(page) if "[" not in line]
+    assert len(lines) > 50
+    for page, line in lines:
+        _, name, *arguments = shlex.split(line)
+        assert name in COMMANDS, (page, line)
+        read_command(COMMANDS[name], arguments)  # refuses in words what it does not know
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,8 @@
 import json
 import os
 import re
+import shlex
+import shutil
 import subprocess
 import sys
 import sysconfig
@@ -11,6 +13,8 @@ import zipfile
 from pathlib import Path
 
 import pytest
+
+from tests.architecture.test_named_commands import command_lines
 
 pytestmark = pytest.mark.slow
 
@@ -159,3 +163,52 @@ def test_the_installed_command_solves_its_sample_and_packs_it(installed: Path, t
     command = [installed / "bin" / "cocalib", "export", out, "--to", "pack", "--out", tmp_path / "pack"]
     assert subprocess.run(command, cwd=tmp_path, capture_output=True).returncode == 0
     assert subprocess.run([sys.executable, "-I", "-S", tmp_path / "pack" / "selftest.py"]).returncode == 0
+
+
+def test_the_command_lines_of_readme_tour_and_report_run_from_the_wheel(
+    installed: Path, project_root: Path, tmp_path: Path
+) -> None:
+    """In an empty folder with the sample's files, called as the pages call them; windows are left out."""
+    for name in ("radar.bag", "camera.bag", "clicks.json"):
+        shutil.copy(project_root / "sample_data" / "rooftop" / name, tmp_path)
+    clicks = json.loads((tmp_path / "clicks.json").read_text())["clicks"]
+    frames = [
+        {"image_time": click["image_time"], "boxes": [{"label": "person", "box_px": [u - 20, v - 20, u + 20, v + 20]}]}
+        for click in clicks
+        for u, v in [click["pixel_px"]]
+    ]
+    boxes = {"schema": "cocalib/boxes-1", "image_size_px": [960, 600], "frames": frames}
+    (tmp_path / "boxes.json").write_text(json.dumps(boxes))
+
+    def run(line: str) -> int:
+        environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+        done = subprocess.run(
+            [installed / "bin" / "cocalib", *shlex.split(line)[1:]],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            env=environment | {"XDG_STATE_HOME": str(tmp_path / "state")},
+        )
+        assert done.returncode in (0, 1, 3), f"{line}: {done.stderr}"
+        return done.returncode
+
+    assert run("cocalib solve radar.bag camera.bag --clicks clicks.json --out calibration.json") == 0
+    assert run("cocalib export calibration.json --to mcap --recording radar.bag camera.bag --out drive.mcap") == 0
+    for name, source in (
+        ("old.json", "calibration.json"),
+        ("factory.json", "calibration.json"),
+        ("other.mcap", "drive.mcap"),
+    ):
+        shutil.copy(tmp_path / source, tmp_path / name)
+    pages = [project_root / name for name in ("README.md", "docs/tour.md", "docs/report.md")]
+    lines = dict.fromkeys(line for page in pages for line in command_lines(page))
+    shown = [
+        line
+        for line in lines
+        if line.split()[1] not in ("demo", "open") and not ("show" in line and "--out" not in line)
+    ]
+    assert len(shown) > 10
+    for line in shown:
+        run(line)
+    assert (tmp_path / "report.html").is_file()
+    assert (tmp_path / "overlay.mp4").is_file()
