@@ -2,7 +2,7 @@
 
 import logging
 import threading
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import takewhile
 from typing import Literal, Protocol, TypeAlias
@@ -17,7 +17,8 @@ from calib_core.errors import CalibrationError
 from calib_core.measurements import NS_PER_S, RadarScans, ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions, GatingOptions
 from calib_core.proposing import DwellView, FrameSource, Proposals, ViewProgress, dwell_views, proposals_of
-from calib_core.proposing.look import Look, look_of, with_look
+from calib_core.proposing.dwell_views import has_changed
+from calib_core.proposing.look import Look, likeness_elsewhere, look_of, with_look
 from cocalib.platform.error_boundary import error_boundary
 
 REFLECTOR_M = 0.24
@@ -106,22 +107,41 @@ def proposed_again(
         CalibrationError: a frame cannot be read.
     """
     counting = [click for click in confirmed if click.counts]
-    looks = [look for click in counting for look in looks_of(click, views, frames)]
-    found = with_look(views, looks, frames, camera) if looks else tuple(views)
+    looks = looks_of(counting, views, frames, camera)
+    found = with_look(views, looks, frames, camera)
     return found, proposals_of(found, camera, options, confirmed=counting)
 
 
-def looks_of(click: ReflectorClick, views: Sequence[DwellView], frames: FrameSource) -> Iterator[Look]:
-    """Yield what a confirmed click shows; nothing if it lies in no dwell, or no frame of that can be read.
+def looks_of(
+    clicks: Sequence[ReflectorClick], views: Sequence[DwellView], frames: FrameSource, camera: Camera
+) -> list[Look]:
+    """Return what confirmed clicks show; nothing of one that lies in no dwell, or no frame of which can be read.
 
-    A click beside the reflector shows nothing either: the same would be found beside the others.
+    A click beside the reflector shows nothing either: the same would be found beside the others. How large the reflector is
+    depends on the range, so on which of the dwells of its time a click is of: on that with which the other dwells show the same.
+
+    Args:
+        clicks: that count, the first one first.
+        views: of all placements, as `dwell_views` found them.
+        frames: of the camera.
+        camera: the intrinsics.
     """
-    pixel_px = np.array([click.u_px, click.v_px])
-    view = view_at(click.image_time, pixel_px, views)
-    beside = beside_the_reflector(click, views) is not None
-    look = None if view is None or beside else look_of(view, frames, pixel_px)
-    if look is not None:
-        yield look
+    found: list[Look] = []
+    for click in clicks:
+        pixel_px = np.array([click.u_px, click.v_px])
+        view = view_at(click.image_time, pixel_px, views)
+        if view is None or beside_the_reflector(click, views) is not None:
+            continue
+        others = [one for one in _meanwhile(click.image_time, views) if one is not view and has_changed(one, pixel_px)]
+        shown = [look for one in (view, *others) if (look := look_of(one, frames, pixel_px)) is not None]
+        if len({round(float(np.log(look.larger)), 1) for look in shown}) < 2:
+            found += shown[:1]
+        elif found:
+            found.append(min(shown, key=lambda look: abs(np.log(look.larger / found[0].larger))))
+        else:
+            elsewhere = [one for one in views if not one.placement.start <= click.image_time <= one.placement.end]
+            found.append(max(shown, key=lambda look: likeness_elsewhere(look, elsewhere, frames, camera)))
+    return found
 
 
 def view_at(image_time: TimeNs, pixel_px: Vector2, views: Sequence[DwellView]) -> DwellView | None:
@@ -134,8 +154,11 @@ def view_at(image_time: TimeNs, pixel_px: Vector2, views: Sequence[DwellView]) -
         pixel_px: (2,) in it.
         views: of all placements.
     """
-    meanwhile = [one for one in views if one.placement.start <= image_time <= one.placement.end and len(one.frames)]
-    return min(meanwhile, key=lambda view: _distance_px(view, pixel_px), default=None)
+    return min(_meanwhile(image_time, views), key=lambda view: _distance_px(view, pixel_px), default=None)
+
+
+def _meanwhile(image_time: TimeNs, views: Sequence[DwellView]) -> list[DwellView]:
+    return [one for one in views if one.placement.start <= image_time <= one.placement.end and len(one.frames)]
 
 
 def beside_the_reflector(click: ReflectorClick, views: Sequence[DwellView]) -> float | None:
@@ -282,7 +305,7 @@ class ProposingJob:
         self._closed = False
         self._seen: tuple[DwellView, ...] = ()
         self._seen_for: ProposingWish | None = None
-        self._looks: dict[tuple[object, ...], Look | None] = {}
+        self._looks: tuple[tuple[object, ...], list[Look]] = ((), [])
         self._carried: list[DwellView] = []
         self._carried_from: list[tuple[object, ...]] = []
 
@@ -350,7 +373,7 @@ class ProposingJob:
                 return
             self._seen, self._seen_for = found[0], wish
             self._carried, self._carried_from = list(found[0]), [()] * len(found[0])
-            self._looks.clear()
+            self._looks = ((), [])
         self._carry(wish)
 
     def _carry(self, wish: ProposingWish) -> None:
@@ -360,7 +383,9 @@ class ProposingJob:
             self._answered = newest
             first = sorted(newest.confirmed, key=lambda click: (len(click.id), click.id))[:_LOOKS]
             key = tuple((click.id, click.image_time, click.u_px, click.v_px) for click in first)
-            looks = [look for click in first if (look := self._look(click)) is not None]
+            if self._looks[0] != key:
+                self._looks = (key, looks_of(first, self._seen, self._recording, newest.camera))
+            looks = self._looks[1]
             if not looks:
                 self._carried, self._carried_from = list(self._seen), [key] * len(self._seen)
             left = [number for number in self._in_turn(newest) if self._carried_from[number] != key]
@@ -383,12 +408,6 @@ class ProposingJob:
         number = {id(view.placement): at for at, view in enumerate(self._seen)}
         order = [*(one.placement for one in now.ranked), *(one for one, _ in now.unproposed)]
         return [at for one in order if (at := number.get(id(one), -1)) >= 0 and at not in wish.dismissed]
-
-    def _look(self, click: ReflectorClick) -> Look | None:
-        key = (click.id, click.image_time, click.u_px, click.v_px)
-        if key not in self._looks:
-            self._looks[key] = next(iter(looks_of(click, self._seen, self._recording)), None)
-        return self._looks[key]
 
     def _take(self, progress: ViewProgress | str) -> None:
         wish = self._wish

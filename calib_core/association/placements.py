@@ -35,6 +35,7 @@ _NOT_MOVED = 0.5  # reaches, between the two parts of an interrupted dwell
 _LONGEST_BREAK_S = 6.0  # while somebody walks between radar and reflector
 _LEAST_SCORE = 0.5  # times that of a good placement of this recording
 _GOOD_SHARE = 0.75  # of the placements score less than a good one
+_MOST_OF_ECHO = 0.9  # of its time the first echo of a second one is there
 _LEAST_COMMON = 0.25  # of the returns of two dwells that are alternatives
 
 
@@ -116,6 +117,7 @@ def find_placements(scans: RadarScans, options: GatingOptions, *, min_dwell_s: f
         min_dwell_s: the shortest placement [s].
     """
     dwells = find_dwells(scans, options, min_dwell_s=min_dwell_s)
+    dwells = [dwell for dwell in dwells if not _is_second_echo(dwell, dwells)]
     alone = _one_at_a_time(dwells)
     typical_db = float(np.median([dwell.strength_db for dwell in alone])) if alone else 0.0
     strong = [dwell for dwell in alone if not dwell.strength_db < typical_db - _WEAKER_DB]
@@ -154,7 +156,11 @@ def _at_once(dwells: Sequence[Dwell], kept: Sequence[Dwell], typical_db: float) 
     for dwell in _heaviest_first(dwells):
         strong = np.isfinite(dwell.snr_db) and dwell.strength_db >= typical_db - _WEAKER_AT_ONCE_DB
         rivals = [other for other in found if _overlap_s(dwell, other) >= _SHORTEST_OVERLAP_S]
-        if strong and not any(_belong_together(dwell, other) for other in rivals):
+        if (
+            strong
+            and not any(_belong_together(dwell, other) for other in rivals)
+            and not _is_second_echo(dwell, dwells)
+        ):
             found.append(dwell)
     return found[len(kept) :]
 
@@ -187,6 +193,16 @@ def _belong_together(one: Dwell, other: Dwell) -> bool:
     ]
     one_return = _near(one, other, _SAME_RETURN) or one.is_alternative_of(other)
     return one_return or (bool(together) and all(together))
+
+
+def _is_second_echo(dwell: Dwell, dwells: Sequence[Dwell]) -> bool:
+    """Return whether a stronger echo comes from half as far in the same direction while it lasts: this one went there twice."""
+    return any(
+        other.snr_db > dwell.snr_db
+        and _overlap_s(dwell, other) >= _MOST_OF_ECHO * (dwell.end - dwell.start) / NS_PER_S
+        and _near(dwell, replace(other, position_radar_m=2.0 * other.position_radar_m), _SAME_RETURN)
+        for other in dwells
+    )
 
 
 def _near(one: Dwell, other: Dwell, reaches: float) -> bool:

@@ -160,6 +160,8 @@ _COAST_S = 1.0  # longest time that a target stays alive without being seen
 _COAST_SCANS = 3  # or as many scans, if that is longer
 _MERGE_S = 0.5  # longest time unseen of a target that merges with another
 _LEAST_SIGHTINGS = 3
+LONGEST_STEP_S = _COAST_S / _LEAST_SIGHTINGS
+"""Time between two scans beyond which a target is given up before it is seen often enough."""
 _LEAST_TRAVEL_M = 1.0  # of a target without Doppler speeds
 _LEAST_TRAVEL_SIGMAS = 6.0
 _TOLD_EVERY = 200  # scans

@@ -194,8 +194,7 @@ def _choices(
         if _within(click, view)
     ]
     share = 1.0 / (1.0 + float(np.exp(min((below_db - _WEAKER_DB) / _WEAKER_STEP_DB, _MOST_LOG_ODDS))))
-    if clicks:
-        share *= 1.0 - _CLICK_IS_RIGHT
+    share *= 1.0 - min(sum(one.odds for one in clicks), _CLICK_IS_RIGHT)
     found = [
         _Choice(float(one.pixel_px[0]), float(one.pixel_px[1]), one.sigma_px, float(share * odds))
         for one, odds in zip(view.candidates, _odds(view.candidates), strict=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from calib_core.arrays import Indices, Vector2, frozen_array
+from calib_core.arrays import Indices, Values, Vector2, frozen_array
 from calib_core.association.placements import Placement
 from calib_core.camera import Camera
 from calib_core.errors import CalibrationError
@@ -51,6 +51,8 @@ class DwellView:
         stills: the same picture for each set of placements that stood together; one if no other stood meanwhile.
         width_px: of the reflector at that range, in the full picture.
         clear: numbers of the few frames that are most like `picture`: nobody walks past in them.
+        change: (k, h, w) uint8, how far each pixel of the k stills lies from what the other dwells show there.
+        change_without: (l, h, w) uint8, the same of other dwells while those stood that stood meanwhile, but not this one.
     """
 
     placement: Placement
@@ -62,6 +64,8 @@ class DwellView:
     stills: tuple[StillPicture, ...] = ()
     width_px: float = float("nan")
     clear: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    change: np.ndarray = field(default_factory=lambda: np.zeros((0, 0, 0), np.uint8))
+    change_without: np.ndarray = field(default_factory=lambda: np.zeros((0, 0, 0), np.uint8))
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "frames", frozen_array(self.frames, (None,), dtype=np.int64))
@@ -159,9 +163,60 @@ def _with_blobs(number: int, views: Sequence[DwellView]) -> DwellView:
         return view
     at_once = frozenset().union(*(still.standing for still in view.stills)) - {number}
     without = [still for still in others if still.standing & at_once]
+    usual = _Usual.of(view.stills[0].picture, others)
+    return with_blobs(replace(view, change=usual.changes_of(view.stills), change_without=usual.changes_of(without)))
+
+
+def with_blobs(view: DwellView) -> DwellView:
+    """Find the places of the reflector's width among the pixels that changed."""
     width_px = view.width_px / view.factor
-    response = changed_places(view.stills, others, width_px, without=without)
+    response = _response(view.change, view.change_without, width_px)
     return replace(view, candidates=tuple(_full(one, view.factor) for one in blobs(response, width_px)))
+
+
+def width_seen_px(view: DwellView, pixel_px: Vector2) -> float:
+    """Return how wide the thing is that changed at a pixel: as the reflector is thought to be, unless another width stands out.
+
+    Args:
+        view: of the dwell.
+        pixel_px: (2,) of the full picture, on the thing.
+    """
+    if not view.change.size:
+        return view.width_px
+    widths_px, shown = _shown(view, pixel_px)
+    best = int(np.argmax(shown))
+    stands_out = shown[best] > max(_STANDS_OUT * shown[0], _LEAST_SIGMAS)
+    other = abs(np.log(widths_px[best] / widths_px[0])) > np.log(_STANDS_OUT)
+    return float(widths_px[best]) * view.factor if stands_out and other else view.width_px
+
+
+def has_changed(view: DwellView, pixel_px: Vector2) -> bool:
+    """Return whether something of any width changed at a pixel (2,) of the full picture."""
+    return bool(view.change.size) and bool(_shown(view, pixel_px)[1].max() > _LEAST_SIGMAS)
+
+
+def _shown(view: DwellView, pixel_px: Vector2) -> tuple[Values, Values]:
+    """Return widths, the reflector's first, and how much a thing of each stands out at a pixel."""
+    middle = np.round((np.asarray(pixel_px) + 0.5) / view.factor - 0.5).astype(int)
+    thought_px = view.width_px / view.factor
+    widths_px = thought_px * np.geomspace(1.0 / _WIDEST, _WIDEST, _WIDTHS)
+    widths_px = np.append(
+        thought_px, widths_px[(widths_px >= _NARROWEST_PX) & (widths_px < 0.3 * view.change.shape[1])]
+    )
+    return widths_px, np.array([_shown_at(view, middle, width_px) for width_px in widths_px.tolist()])
+
+
+def _shown_at(view: DwellView, middle: Indices, width_px: float) -> float:
+    """Return how much a thing of one width stands out whose middle lies within half a width of a pixel."""
+    reach = max(2, round(0.5 * width_px))
+    wide = round(_SURROUNDINGS * width_px) + reach
+    left, top = np.maximum(middle - wide, 0).tolist()
+    right, bottom = (middle + wide + 1).tolist()
+    part = np.s_[:, top:bottom, left:right]
+    response = _response(view.change[part], view.change_without[part], width_px)
+    first = np.maximum(middle - reach - [left, top], 0)
+    last = np.maximum(middle + reach + 1 - [left, top], first)
+    return float(response[first[1] : last[1], first[0] : last[0]].max(initial=0.0))
 
 
 def _with_candidates(number: int, views: Sequence[DwellView], frames: FrameSource) -> DwellView:
@@ -190,6 +245,13 @@ _FLOOR_GREY = 3.0
 """Scatter of a pixel at least: compression and sensor."""
 _MOST_SIGMAS = 8.0
 """A pixel counts no more than this: a bright one is no better evidence than many."""
+_LEVELS_PER_SIGMA = 30.0
+_WIDEST, _WIDTHS, _NARROWEST_PX = 6.0, 25, 4.0
+"""Widths that are tried at a click: up to so many times what the reflector is thought to be, and down to that; how many."""
+_STANDS_OUT, _LEAST_SIGMAS = 1.5, 1.0
+"""Another width is taken if it stands out that many times more, differs by that factor, and stands out at all."""
+_SURROUNDINGS = 4.0
+"""How much of the picture around a place its width is judged by, in widths."""
 _RING = 1.2
 """Weight of the mean around the square: what is larger than a reflector, such as a person, cancels."""
 _PART, _PART_COUNTS = 0.6, 0.8
@@ -220,30 +282,20 @@ def nearest_others(number: int, time: TimeNs, stills: Iterable[StillPicture]) ->
     return others[:_OTHERS]
 
 
-def changed_places(
-    own: Sequence[StillPicture],
-    others: Sequence[StillPicture],
-    width_px: float,
-    *,
-    without: Sequence[StillPicture] = (),
-) -> np.ndarray:
+def _response(change: np.ndarray, without: np.ndarray, width_px: float) -> np.ndarray:
     """Return how strongly each place changed at one size: (h, w) float32, in standard deviations.
 
-    Args:
-        own: of one placement, at least one; only what is in all of them counts.
-        others: in which it did not stand.
-        width_px: of the reflector in these pictures.
-        without: of simultaneous placements while this one did not stand; what changed there too is theirs.
-    """
-    import cv2
+    Only what is in all pictures of the dwell counts, and what changed while it did not stand is not its own.
 
-    usual = _Usual.of(own[0].picture, others)
-    response = _of_size(usual.change_of(own[0].picture), width_px)
-    for still in own[1:]:
-        response = cv2.min(response, _of_size(usual.change_of(still.picture), width_px))
-    for still in without:
-        response -= np.maximum(_of_size(usual.change_of(still.picture), width_px), np.float32(0.0))
-    return np.asarray(response)
+    Args:
+        change: (k, h, w) of the dwell's pictures, at least one.
+        without: (l, h, w) of those without it.
+        width_px: of the reflector in these pictures.
+    """
+    response: np.ndarray = np.min([_of_size(one, width_px) for one in change], axis=0)
+    for one in without:
+        response -= np.maximum(_of_size(one, width_px), np.float32(0.0))
+    return response
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -276,7 +328,13 @@ class _Usual:
             scatter.astype(np.float32) * np.float32(1.48 / _LEVELS_PER_GREY) + np.float32(_FLOOR_GREY),
         )
 
-    def change_of(self, picture: np.ndarray) -> np.ndarray:
+    def changes_of(self, stills: Sequence[StillPicture]) -> np.ndarray:
+        """Return how far each pixel of stills lies from what is usual: (k, h, w) uint8, in levels of `_LEVELS_PER_SIGMA`."""
+        changes = [np.minimum(self._change_of(still.picture), np.float32(_MOST_SIGMAS)) for still in stills]
+        levels = [np.round(one * np.float32(_LEVELS_PER_SIGMA)).astype(np.uint8) for one in changes]
+        return np.array(levels, dtype=np.uint8).reshape(len(stills), *self.median.shape[:2])
+
+    def _change_of(self, picture: np.ndarray) -> np.ndarray:
         """Return how far each pixel lies from what is usual: (h, w) float32, in standard deviations."""
         median = self.median
         if picture is not self.reference:
@@ -287,7 +345,8 @@ class _Usual:
 
 
 def _of_size(change: np.ndarray, width_px: float) -> np.ndarray:
-    """Return how much a place of about one size stands out; part of the reflector may look like what is behind it."""
+    """Return how far a place of about one size stands out [sigmas]; part of the reflector may look like what is behind it."""
+    change = change.astype(np.float32) * np.float32(1.0 / _LEVELS_PER_SIGMA)
     whole, part = (_stands_out(change, share * width_px) for share in (1.0, _PART))
     return np.maximum(whole, np.float32(_PART_COUNTS) * part)
 
@@ -297,11 +356,10 @@ def _stands_out(change: np.ndarray, width_px: float) -> np.ndarray:
     import cv2
 
     side = max(3, 2 * round(0.5 * width_px) + 1)
-    clipped = np.minimum(change, np.float32(_MOST_SIGMAS))
-    inner = cv2.blur(clipped, (side, side))
+    inner = cv2.blur(change, (side, side))
     wide = 2 * side + 1
-    ring = (cv2.blur(clipped, (wide, wide)) * wide**2 - inner * side**2) / (wide**2 - side**2)
-    more = cv2.max(np.float32(_RING) * ring, _of_a_larger_thing(clipped, inner, side))
+    ring = (cv2.blur(change, (wide, wide)) * wide**2 - inner * side**2) / (wide**2 - side**2)
+    more = cv2.max(np.float32(_RING) * ring, _of_a_larger_thing(change, inner, side))
     return np.asarray(inner - more)
 
 

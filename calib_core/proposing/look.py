@@ -9,7 +9,7 @@ from calib_core.arrays import Vector2, frozen_array
 from calib_core.camera import Camera
 from calib_core.proposing.apex import Apex, find_apex
 from calib_core.proposing.apex_refinement import full_picture
-from calib_core.proposing.dwell_views import DwellView
+from calib_core.proposing.dwell_views import DwellView, width_seen_px, with_blobs
 from calib_core.proposing.picture_candidates import PictureCandidate, Surroundings
 from calib_core.proposing.still_pictures import FrameSource
 
@@ -49,6 +49,7 @@ class Look:
         width_px: of the reflector there.
         sigma_px: of the confirmed pixel per axis.
         at_apex: whether it is where three sheets meet, so that the apex is what to look for elsewhere.
+        larger: how many times wider than thought the reflector is: elsewhere, too.
     """
 
     patch: np.ndarray
@@ -56,6 +57,7 @@ class Look:
     width_px: float
     sigma_px: float
     at_apex: bool
+    larger: float = 1.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "offset_px", frozen_array(self.offset_px, (2,)))
@@ -75,14 +77,15 @@ def look_of(view: DwellView, frames: FrameSource, pixel_px: Vector2) -> Look | N
     if picture is None:
         return None
     pixel_px = np.asarray(pixel_px, dtype=np.float64)
-    reach_px = max(_LEAST_SNAP_PX, _SNAP * view.width_px)
-    apex = find_apex(picture, pixel_px, reach_px=reach_px, size_px=view.width_px)
+    width_px = width_seen_px(view, pixel_px)
+    reach_px = max(_LEAST_SNAP_PX, _SNAP * width_px)
+    apex = find_apex(picture, pixel_px, reach_px=reach_px, size_px=width_px)
     at_apex = isinstance(apex, Apex)
     at_px, sigma_px = (apex.pixel_px, apex.sigma_px) if isinstance(apex, Apex) else (pixel_px, _CLICK_SIGMA_PX)
     middle = np.round(at_px)
-    side = 2 * max(4, int(np.ceil(_HALF * view.width_px)) + 2) + 1
+    side = 2 * max(4, int(np.ceil(_HALF * width_px)) + 2) + 1
     patch = cv2.getRectSubPix(picture, (side, side), (float(middle[0]), float(middle[1])))
-    return Look(patch, at_px - middle, view.width_px, sigma_px, at_apex)
+    return Look(patch, at_px - middle, width_px, sigma_px, at_apex, width_px / view.width_px)
 
 
 def with_look(
@@ -101,8 +104,25 @@ def with_look(
     return tuple(_looked_at(view, looks, frames, camera) for view in views)
 
 
+def likeness_elsewhere(look: Look, views: Sequence[DwellView], frames: FrameSource, camera: Camera) -> float:
+    """Return how alike the more similar half of dwells shows the thing, at the sizes that follow from their ranges.
+
+    Args:
+        look: of a click.
+        views: of other dwells; those without pictures show nothing.
+        frames: of the camera.
+        camera: its intrinsics.
+    """
+    found = with_look([view for view in views if view.candidates], [look], frames, camera)
+    likeness = sorted((max((one.likeness for one in view.candidates), default=0.0) for view in found), reverse=True)
+    return float(np.mean(likeness[: (len(likeness) + 1) // 2])) if likeness else 0.0
+
+
 def _looked_at(view: DwellView, looks: Sequence[Look], frames: FrameSource, camera: Camera) -> DwellView:
-    """Compare all candidates roughly, and refine those most alike."""
+    """Compare all candidates roughly, and refine those most alike; of another width than thought, they are found again."""
+    larger = float(np.median([look.larger for look in looks]))
+    if larger != 1.0 and view.change.size:
+        view = with_blobs(replace(view, width_px=larger * view.width_px))
     seen = _with_surroundings(view, frames)
     near = sorted(looks, key=lambda look: _unlike_in_size(look, view.width_px))[:_LOOKS]
     rough = [(_best_match(one, near, view.width_px, _ROUGH_WIDTH_PX, 1.0), one) for one in seen]

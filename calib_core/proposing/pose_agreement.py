@@ -100,6 +100,9 @@ _LEAST_DWELLS = 2
 _OTHER_POSE_RAD = np.radians(2.5)
 """Mean angle between the predictions of two poses that differ clearly."""
 
+_CLICK_STEP = 2.0
+"""The same between the dwells that a click may be of."""
+
 _RIVAL_STEP = 4.0
 """How fast the probability of a pose changes with its score: slower than if dwells were independent."""
 
@@ -183,6 +186,76 @@ def pose_agreement(rays: CandidateRays, prior: MountingPrior, *, most: int = 24)
         off_sigma=off_sigma,
         trials=rough.tried,
     )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ClicksAgreement:
+    """What the clicks alone say of each candidate, through the pose that they leave open.
+
+    Attributes:
+        probability: (n, k) that each candidate is the reflector.
+        score: logarithm of how much better the candidates of the other dwells suit such poses than chance.
+    """
+
+    probability: Points2
+    score: float
+
+
+def clicks_agreement(rays: CandidateRays, prior: MountingPrior) -> ClicksAgreement:
+    """Judge candidates by the poses that clicks and mounting leave open: each bounds rows and columns at every range.
+
+    A click may be of each dwell of its time, which gives as many poses; what the other dwells show weighs them.
+
+    Args:
+        rays: of all dwells, with at least one click.
+        prior: of the mounting.
+    """
+    is_click = rays.click >= 0
+    only = replace(rays, odds=np.where(is_click, rays.odds, 0.0))
+    only = replace(only, missing=np.maximum(1.0 - only.odds.sum(axis=1), 1.0 - is_click.any(axis=1)))
+    poses = _from_first_click(only, prior)
+    for _ in range(2 * _STEPS):
+        poses = _stepped(only, prior, poses)
+    information = normal_equations(only, prior, poses)[0]
+    if int(only.click.max()) == 0:
+        poses, information = _with_nominal(poses, information, prior)
+    seen = expectation(rays, poses)
+    left_open = np.einsum("mnkap,mpq,mnkbq->mnkab", seen.jacobian, np.linalg.inv(information), seen.jacobian)
+    gain = sum(densities(seen.off_rad, seen.covariance + left_open)) * rays.odds / rays.density
+    total = rays.missing + gain.sum(axis=-1)
+    off, precision = _prior_offsets(prior, poses)
+    scores = np.log(total).sum(axis=1) - 0.5 * (precision * off**2).sum(axis=1)
+    weight = np.exp((scores - scores.max()) / _CLICK_STEP)
+    weight /= weight.sum()
+    return ClicksAgreement(np.einsum("m,mnk->nk", weight, gain / total[..., None]), float(scores.max()))
+
+
+def _with_nominal(poses: RoughPoses, information: np.ndarray, prior: MountingPrior) -> tuple[RoughPoses, np.ndarray]:
+    """Add the mounting itself, as far as it is known: the click may be of something that the radar did not report."""
+    count = len(prior.starts_m)
+    _, precision = _prior_offsets(prior, poses)
+    return RoughPoses.of_rotations(
+        np.concatenate([poses.rotations, np.tile(prior.rotation, (count, 1, 1))]),
+        np.concatenate([poses.centres_radar_m, prior.starts_m]),
+        np.zeros(len(poses) + count),
+        0,
+    ), np.concatenate([information, np.tile(np.diag(precision), (count, 1, 1))])
+
+
+def _from_first_click(rays: CandidateRays, prior: MountingPrior) -> RoughPoses:
+    """Return the poses nearest to the mounting that turn a dwell of the first click onto it, for each of its dwells."""
+    dwells, columns = np.nonzero(rays.click == rays.click[rays.click >= 0].min())
+    rotations, centres = [], []
+    for centre in prior.starts_m:
+        directions = _directions(rays, centre)
+        for dwell, column in zip(dwells.tolist(), columns.tolist(), strict=True):
+            thought = prior.rotation @ directions[dwell]
+            axis = np.cross(thought, rays.rays[dwell, column])
+            sine = float(np.linalg.norm(axis))
+            angle = float(np.arctan2(sine, thought @ rays.rays[dwell, column]))
+            rotations.append(rotation_exp(axis[None] * (angle / max(sine, 1e-12)))[0] @ prior.rotation)
+            centres.append(centre)
+    return RoughPoses.of_rotations(np.array(rotations), np.array(centres), np.zeros(len(centres)), 0)
 
 
 def _one(poses: RoughPoses, row: int) -> RoughPoses:

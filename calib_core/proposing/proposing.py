@@ -13,16 +13,24 @@ from calib_core.options import CalibrationOptions
 from calib_core.proposing.candidate_rays import CandidateRays, candidate_rays, weaker_db
 from calib_core.proposing.dwell_views import DwellView
 from calib_core.proposing.mounting_prior import mounting_prior
-from calib_core.proposing.pose_agreement import PoseAgreement, apex_log_odds, pose_agreement
+from calib_core.proposing.pose_agreement import (
+    ClicksAgreement,
+    PoseAgreement,
+    apex_log_odds,
+    clicks_agreement,
+    pose_agreement,
+)
 from calib_core.proposing.proposals import Proposal, Proposals
 
-LEAST_CONFIDENCE = 0.4
+LEAST_CONFIDENCE = 0.5
 """What is less probably the reflector is not proposed."""
 _WEAK, _UNSURE = 0.8, 0.9
 """A proposal of less confidence comes with a reason, and with one if its apex is not seen."""
 _CHANCE_SCORE, _CHANCE_STEP = 20.0, 2.0
 """Score that a pose needs to be as probable as not, and how fast that changes: the radar of one recording with the pictures
 of another reaches up to 19, whatever the number of dwells; ten placements of one recording reach 54 and more."""
+_CHANCE_AFTER_CLICK = 10.0
+"""The same once a click says where one dwell lies: fewer poses are left that could agree by chance."""
 _TEMPER = 1.6
 """By how much log-odds were too large in simulated recordings, where dwells share errors that the model does not know."""
 _LIKE_A_CLICK = 0.8
@@ -37,8 +45,9 @@ _VAGUE_PX = 3.0
 _VAGUE = "its apex is not seen clearly"
 _NO_FRAME = "the camera recorded no frame while it stood there"
 _NO_CHANGE = "nothing of the reflector's size changed in the picture"
-_NO_POSE = "picture and radar agree on no pose yet"
-_NO_APEX = "what stood there shows no reflector's apex; if it is one, click it once"
+_NO_POSE = "picture and radar agree on no pose yet: click the first two places yourself"
+_OPEN = "the clicks leave open where it is; a further one says more"
+_NO_APEX = "what stood there shows no reflector's apex; if it is one, click the first two places yourself"
 _ELSEWHERE = "no place that changed lies where the other placements say"
 _TWO_PLACES = "two places there are about as likely"
 _TAKEN = "the only likely place is another reflector's"
@@ -66,8 +75,10 @@ def proposals_of(
         return Proposals(())
     clicks = [click for click in confirmed if click.counts]
     rays = candidate_rays(views, camera, options, confirmed=clicks)
-    agreement = pose_agreement(rays, mounting_prior(options, is_flat=rays.is_flat))
-    judged = _Judged.of(views, rays, agreement)
+    prior = mounting_prior(options, is_flat=rays.is_flat)
+    agreement = pose_agreement(rays, prior)
+    by_clicks = clicks_agreement(rays, prior) if (rays.click >= 0).any() else None
+    judged = _Judged.of(views, rays, agreement, by_clicks)
     covered = _covered(rays, judged, len(clicks))
     marks = [(views[i].placement, clicks[row]) for i, rows in covered.items() for row in rows]
     ranked: list[Proposal] = []
@@ -142,18 +153,24 @@ class _Judged:
     weaker_db: Values
 
     @classmethod
-    def of(cls, views: Sequence[DwellView], rays: CandidateRays, agreement: PoseAgreement | None) -> "_Judged":
-        """Weigh the candidates by the pose, as far as it is to be trusted, and by the picture alone."""
+    def of(
+        cls,
+        views: Sequence[DwellView],
+        rays: CandidateRays,
+        agreement: PoseAgreement | None,
+        by_clicks: ClicksAgreement | None,
+    ) -> "_Judged":
+        """Weigh the candidates by the pose of all dwells, as far as it is to be trusted, and by what the clicks say."""
         trusted, reflectors, probability = 0.0, 1.0, np.zeros_like(rays.odds)
         if agreement is not None:
-            above = (agreement.score - _CHANCE_SCORE) / _CHANCE_STEP
+            above = (agreement.score - (_CHANCE_SCORE if by_clicks is None else _CHANCE_AFTER_CLICK)) / _CHANCE_STEP
             trusted = agreement.pose_probability * _logistic(above)
-            if not (rays.click >= 0).any():
+            if by_clicks is None:
                 reflectors = _logistic(apex_log_odds(views, agreement))
                 trusted *= reflectors if reflectors >= _MORE_LIKELY else 0.0
             probability = trusted * agreement.probability
-        if (rays.click >= 0).any():
-            probability = probability + (1.0 - trusted) * _LIKE_A_CLICK * rays.odds * _alike(views, rays)
+        if by_clicks is not None:
+            probability = probability + (1.0 - trusted) * _LIKE_A_CLICK * by_clicks.probability * _alike(views, rays)
         probability = _tempered(probability)
         taken = _taken(views, rays, probability)
         sure = np.where(taken, 0.0, probability)
@@ -189,13 +206,18 @@ class _Judged:
         if self.reflectors < _MORE_LIKELY:
             return _NO_APEX
         if self.agreement is None or self.trusted < _MORE_LIKELY:
-            return _NO_POSE if len(self.rays) >= _FEW_DWELLS else _FEW
+            return self._without_pose()
         if self.agreement.off_sigma[i][odds > 0.0].min(initial=np.inf) > _FAR_SIGMA:
             return _ELSEWHERE
         ranked = np.sort(self.agreement.probability[i])[::-1]
         if len(ranked) > 1 and ranked[1] > 0.5 * ranked[0]:
             return _TWO_PLACES
         return _TWO_POSES if self.trusted < _WEAK else _UNLIKELY
+
+    def _without_pose(self) -> str:
+        if (self.rays.click >= 0).any():
+            return _OPEN
+        return _NO_POSE if len(self.rays) >= _FEW_DWELLS else _FEW
 
 
 def _logistic(log_odds: float) -> float:

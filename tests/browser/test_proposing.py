@@ -80,7 +80,7 @@ def held_from() -> int:
 def pictures(monkeypatch: pytest.MonkeyPatch, truth: Any, held_from: int) -> Iterator[Pictures]:
     fake = Pictures(truth, held_from)
     monkeypatch.setattr("cocalib.proposing.dwell_views", fake)
-    monkeypatch.setattr("cocalib.proposing.looks_of", lambda *_: iter([object()]))
+    monkeypatch.setattr("cocalib.proposing.looks_of", lambda clicks, *_: [object()] if clicks else [])
     monkeypatch.setattr(
         "cocalib.proposing.with_look",
         lambda views, *_: tuple(

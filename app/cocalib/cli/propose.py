@@ -95,8 +95,8 @@ def _explain_nothing(proposals: "Proposals", recording: "Recording") -> int:
     nothing = Unsolvable(
         "nothing-proposed",
         f"none of the {len(proposals.unproposed)} placements shows where in the picture the reflector stood",
-        "check that both recordings are of the same time, the intrinsics, --reflector-m and --radar-axes; or give a click "
-        "with --clicks: it shows what the reflector looks like",
+        "click the first two places yourself, on the page or with --clicks: they show how large the reflector is, what it "
+        "looks like and where the camera points; check the intrinsics, --radar-axes and that both recordings are of one time",
     )
     return explain_unsolvable(nothing, what="no proposals")
 

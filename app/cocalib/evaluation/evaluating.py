@@ -22,6 +22,7 @@ from calib_core.evaluation import (
     residual_figures,
 )
 from calib_core.evaluation.counted_returns import longest_gap_s
+from calib_core.evaluation.target_tracking import LONGEST_STEP_S
 from calib_core.measurements import NS_PER_S, Boxes, Pair, RadarScans, ReflectorClick, ReturnLabels, TimeNs, Unpaired
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, DataWarning, PairResult
@@ -148,6 +149,8 @@ def evidence_in(
             camera, scans, boxes, labels, classes=options.classes, max_gap_s=options.max_gap_s or reach_s
         )
         return Evidence(pairs, unpaired, returns, (*lost, *_about(returns)))
+    if too_sparse := _too_sparse(recording.radar_times, boxes):
+        return Evidence(pairs, unpaired, None, (*lost, *too_sparse))
     found = find_targets(_windows(recording, boxes), options.targets, progress=progress)
     stamps = RadarScans(found.moving.scans.times_ns, np.zeros(len(found.moving.scans) + 1, dtype=np.int64))
     returns = counted_returns(camera, stamps, boxes, found.tracks, classes=options.classes, max_gap_s=options.max_gap_s)
@@ -271,6 +274,24 @@ def _taken(boxes: Boxes, classes: Sequence[str]) -> tuple[DataWarning, ...]:
     notes = (*boxes.notes, *absent)
     hint = "check that this is so: boxes of other frames or other objects give a wrong Acc"
     return tuple(DataWarning("boxes-note", f"{boxes.source}: {note}", hint) for note in notes)
+
+
+def _too_sparse(radar_times: TimesNs, boxes: Boxes) -> tuple[DataWarning, ...]:
+    """Warn that between scans, or between frames whose boxes have no tracks, objects move too far to be told apart."""
+    named = all(box.track for frame in boxes for box in frame.boxes)
+    for what, times in (("scans", radar_times), ("annotated frames", boxes.times_ns[:0] if named else boxes.times_ns)):
+        apart_s = float(np.median(np.diff(times))) / NS_PER_S if len(times) > 1 else 0.0
+        times_farther = apart_s / LONGEST_STEP_S
+        if times_farther > 1.0:
+            return (
+                DataWarning(
+                    "sparse-frames",
+                    f"{what} are {times_farther:.3g} times farther apart ({apart_s:.3g} s) than targets can be followed, "
+                    "so there is no Acc",
+                    "give the whole recording in place of its keyframes, and boxes with a track for each object; or --labels",
+                ),
+            )
+    return ()
 
 
 def _about(returns: CountedReturns) -> tuple[DataWarning, ...]:

@@ -55,8 +55,8 @@ class Finding:
             return Unsolvable("stopped", "the search was stopped", "start it again")
         return self.end or (VIEWS, None)
 
-    def look(self, click: ReflectorClick, *_: object) -> Iterator[str]:
-        yield click.id
+    def look(self, clicks: Sequence[ReflectorClick], *_: object) -> list[str]:
+        return [click.id for click in clicks]
 
     def carry(self, views: Sequence[DwellView], looks: Sequence[str], *_: object) -> tuple[DwellView, ...]:
         self.carried += [(VIEWS.index(view), tuple(looks)) for view in views]

@@ -136,14 +136,17 @@ def test_what_comes_and_goes_with_something_stronger_belongs_to_it() -> None:
     assert [placement.position_radar_m[0] < 6.5 for placement in placements] == [True]
 
 
-def test_two_reflectors_that_fill_a_piece_of_recording_are_two_placements() -> None:
-    both = scans_with([(0.0, 100.0, REFLECTOR, 25.0), (0.0, 100.0, (8.0, -2.0, -0.8), 20.0)], length_s=5.0)
+@pytest.mark.parametrize(("other", "count"), [((8.0, -2.0, -0.8), 2), ((12.0, -2.0, -1.6), 2), ((12.0, 2.0, -1.6), 1)])
+def test_two_reflectors_that_fill_a_piece_are_two_placements_and_a_second_echo_is_none(other, count) -> None:
+    both = scans_with([(0.0, 100.0, REFLECTOR, 25.0), (0.0, 100.0, other, 20.0)], length_s=5.0)
     nothing = scans_with([], length_s=60.0)
     later = RadarScans(
         nothing.times_ns + 100 * NS_PER_S, nothing.first_return, *(getattr(nothing, name) for name in COLUMNS)
     )
     pieces = RadarScans.from_scans([part.scan(i) for part in (both, later) for i in range(len(part))])
-    assert len(find_placements(pieces, GatingOptions())) == 2
+    placements = find_placements(pieces, GatingOptions())
+    assert len(placements) == count
+    assert min(abs(one.position_radar_m[0] - REFLECTOR[0]) for one in placements) < 0.1
 
 
 def test_a_dwell_that_somebody_hides_for_a_moment_is_one_placement() -> None:

@@ -240,6 +240,16 @@ def test_the_look_is_found_at_every_range_and_below_a_pixel(views: tuple[DwellVi
         assert all(other.likeness < best.likeness for other in view.candidates[1:])
 
 
+@pytest.mark.parametrize("thought_m", [0.08, 0.24, 0.6])
+def test_a_click_shows_how_wide_the_reflector_is(thought_m: float) -> None:
+    seen = dwell_views(placements_of(LOOKED_AT.dwells), LOOKED_AT, CAMERA, reflector_m=thought_m)
+    look = look_at(seen[0], LOOKED_AT.dwells[0].apex_px)
+    assert look.larger * thought_m == pytest.approx(0.24, rel=0.4)
+    assert look.larger == 1.0 or thought_m != 0.24
+    for view, dwell in zip(with_look(seen, [look], LOOKED_AT, CAMERA), LOOKED_AT.dwells, strict=True):
+        assert np.hypot(*(view.candidates[0].pixel_px - dwell.apex_px)) < 1.0
+
+
 def test_a_click_beside_the_apex_is_carried_as_it_is(views: tuple[DwellView, ...]) -> None:
     low_px = 0.3
     clicked = np.array(LOOKED_AT.dwells[0].apex_px) + np.array([0.0, low_px * views[0].width_px])

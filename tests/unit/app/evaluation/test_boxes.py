@@ -1,15 +1,19 @@
 """What --boxes takes: a file, a topic, or the word moving; anything else is refused with what there is."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from calib_core.boxes import boxes_text, labels_text
 from calib_core.errors import InputError
-from calib_core.measurements import Box, Boxes, FrameBoxes, LabelledScan, ReturnLabels, TimeNs
+from calib_core.measurements import Box, Boxes, FrameBoxes, LabelledScan, RadarScans, ReturnLabels, TimeNs
 from calib_core.recordings import Recording, inspect_recording
+from calib_core.synthetic import typical_camera
 from cocalib.evaluation.boxes import find_boxes, find_labels
+from cocalib.evaluation.evaluating import evidence_in
 from tests.unit.recordings.box_messages import FIRST_FRAME_NS, recorded
 from tests.unit.recordings.conftest import Ros, write_rows
 
@@ -19,7 +23,6 @@ FRAME = FrameBoxes(TimeNs(FIRST_FRAME_NS), (Box(1.0, 2.0, 30.0, 40.0, "person"),
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Recording]:
     import cv2
-    import numpy as np
 
     ros = Ros(2)
     picture = bytes(cv2.imencode(".jpg", np.full((48, 64, 3), 90, dtype=np.uint8))[1])
@@ -59,6 +62,29 @@ def test_the_word_moving_looks_at_the_pictures(recording):
 def test_anything_else_is_refused_with_what_there_is(recording, name):
     with pytest.raises(InputError, match=r"neither a file nor a topic of .* \(its topics with boxes: /boxes\)"):
         find_boxes(name, recording)
+
+
+class Keyframes:
+    """A recording of which only every second half of a second was kept."""
+
+    radar_times = 500_000_000 * np.arange(8)
+
+    def radar_windows(self) -> Iterator[RadarScans]:
+        raise AssertionError("nothing can be followed in it")
+
+    def radar_scans_around(self, times: Sequence[TimeNs], around_s: float) -> RadarScans:
+        raise AssertionError("nothing was clicked")
+
+
+def test_keyframes_give_no_acc_and_say_how_far_apart_they_are():
+    boxes = Boxes(
+        tuple(replace(FRAME, image_time=TimeNs(int(time))) for time in Keyframes.radar_times), "boxes", (64, 48)
+    )
+    found = evidence_in(Keyframes(), replace(typical_camera("pinhole"), width_px=64, height_px=48), boxes=boxes)
+
+    assert found.returns is None
+    assert [one.code for one in found.warnings] == ["sparse-frames"]
+    assert "1.5 times farther apart" in found.warnings[0].message
 
 
 def test_labels_are_read(tmp_path):
