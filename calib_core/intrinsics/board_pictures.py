@@ -1,11 +1,13 @@
 """Where pictures of a board come from, and what is found in one."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Annotated, Protocol
 
 import numpy as np
+from msgspec import Meta, Struct
 
 from calib_core.arrays import Indices, Points2, frozen_array
+from calib_core.json_forms import Name
 from calib_core.measurements import TimeNs
 
 
@@ -61,9 +63,8 @@ class BoardCorners:
         object.__setattr__(self, "pixels_px", frozen_array(self.pixels_px, (count, 2)))
 
 
-@dataclass(frozen=True, slots=True)
-class LeftOutPicture:
-    """A picture that is not used.
+class LeftOutPicture(Struct, frozen=True, forbid_unknown_fields=True):
+    """A picture that is not used, and why.
 
     Attributes:
         index: its number in its source.
@@ -71,6 +72,6 @@ class LeftOutPicture:
         reason: why, as a clause: "blurred: edges are 4.1 px wide, those of the others 1.2 px".
     """
 
-    index: int
-    name: str
-    reason: str
+    index: Annotated[int, Meta(ge=0, le=1_000_000_000)]
+    name: Name
+    reason: Annotated[str, Meta(max_length=10_000)]

@@ -4,7 +4,8 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
-from calib_core.interchange.own.board_views_json import BoardViews, PictureSource, runs_of
+from calib_core.interchange.own.board_views_json import BoardViews, runs_of
+from calib_core.interchange.own.lens_documents import PictureSource
 from calib_core.intrinsics import Board, BoardSearch, SearchProgress, search_boards
 from calib_core.measurements import Unsolvable
 from cocalib.intrinsics.picture_sources import OpenPictures

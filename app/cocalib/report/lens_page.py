@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from calib_core.camera import Camera
-from calib_core.interchange.own.board_views_json import PictureSource
+from calib_core.interchange.own.lens_documents import PictureSource
 from calib_core.intrinsics import (
     MODEL_ERRORS_UNSEEN,
     CalibratedLens,

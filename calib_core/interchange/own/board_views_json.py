@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from msgspec import structs
 
 from calib_core.errors import InputError
 from calib_core.interchange.own.documents import finite_or_none, nan_if_none
@@ -11,27 +12,13 @@ from calib_core.interchange.own.lens_documents import (
     BOARD_VIEWS_SCHEMA,
     BoardViewDocument,
     BoardViewsDocument,
-    LeftOutDocument,
-    SourceDocument,
+    PictureSource,
 )
 from calib_core.interchange.syntax.strict_json import document_text, parse_document
 from calib_core.intrinsics import Board, BoardCorners, LeftOutPicture
 from calib_core.measurements import TimeNs
 
-
-@dataclass(frozen=True, slots=True)
-class PictureSource:
-    """Where pictures come from.
-
-    Attributes:
-        name: what messages call it.
-        pictures: how many there are.
-        sha256: by which it is known again.
-    """
-
-    name: str
-    pictures: int
-    sha256: str
+_LONGEST_NAME = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +77,7 @@ def write_board_views(found: BoardViews) -> str:
     document = BoardViewsDocument(
         BOARD_VIEWS_SCHEMA,
         found.board,
-        source_document(found.source),
+        published_source(found.source),
         found.complete,
         list(found.searched),
         [_view_document(view) for view in found.views],
@@ -122,27 +109,27 @@ def read_board_views(text: str, source: str = "views") -> BoardViews:
         raise InputError(f"{source}: views: two are of the same picture; search again")
     return BoardViews(
         board,
-        PictureSource(document.source.name, pictures, document.source.sha256),
+        document.source,
         views,
         tuple(document.searched),
         document.complete,
     )
 
 
-def source_document(source: PictureSource) -> SourceDocument:
-    """Return the document of a source of pictures."""
-    return SourceDocument(source.name[:200] or "pictures", source.pictures, source.sha256)
+def published_source(source: PictureSource) -> PictureSource:
+    """Return a source of pictures with a name that is not longer than files may state, and not empty."""
+    return structs.replace(source, name=source.name[:_LONGEST_NAME] or "pictures")
 
 
-def left_out_documents(left_out: Iterable[LeftOutPicture]) -> list[LeftOutDocument]:
-    """Return the documents of pictures that are not used."""
-    return [LeftOutDocument(one.index, one.name[:200], one.reason) for one in left_out]
+def published_left_out(left_out: Iterable[LeftOutPicture]) -> list[LeftOutPicture]:
+    """Return pictures that are not used, with names that are not longer than files may state."""
+    return [structs.replace(one, name=one.name[:_LONGEST_NAME]) for one in left_out]
 
 
 def _view_document(view: BoardCorners) -> BoardViewDocument:
     return BoardViewDocument(
         view.index,
-        view.name[:200],
+        view.name[:_LONGEST_NAME],
         view.size_px,
         view.corner_ids.tolist(),
         [tuple(pixel) for pixel in view.pixels_px.tolist()],

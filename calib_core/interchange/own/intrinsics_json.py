@@ -4,11 +4,7 @@ import numpy as np
 
 from calib_core.arrays import Values
 from calib_core.camera import Camera
-from calib_core.interchange.own.board_views_json import (
-    PictureSource,
-    left_out_documents,
-    source_document,
-)
+from calib_core.interchange.own.board_views_json import published_left_out, published_source
 from calib_core.interchange.own.documents import camera_document, finite_or_none
 from calib_core.interchange.own.lens_documents import (
     INTRINSICS_SCHEMA,
@@ -18,6 +14,7 @@ from calib_core.interchange.own.lens_documents import (
     LensPoseDocument,
     LensViewDocument,
     ModelTrialDocument,
+    PictureSource,
     ResidualFieldDocument,
     UncertaintyDocument,
 )
@@ -56,7 +53,7 @@ def write_intrinsics(
         schema=INTRINSICS_SCHEMA,
         camera=camera_document(lens.camera),
         board=lens.board,
-        source=source_document(source),
+        source=published_source(source),
         parameters=_parameters(lens.camera),
         field_of_view_deg=(finite_or_none(field_of_view_deg[0]), finite_or_none(field_of_view_deg[1])),
         rms_px=finite_or_none(lens.rms_px),
@@ -65,7 +62,7 @@ def write_intrinsics(
         models=_models(lens),
         searched=searched,
         views=[_view(view) for view in lens.views],
-        left_out=left_out_documents(lens.left_out),
+        left_out=published_left_out(lens.left_out),
         projection_uncertainty=_uncertainty(lens),
         residual_field=_field(lens),
         coverage=None if coverage is None else _coverage(coverage),

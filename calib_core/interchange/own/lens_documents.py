@@ -6,7 +6,7 @@ import msgspec
 from msgspec import Meta, Struct
 
 from calib_core.interchange.own.documents import CameraDocument
-from calib_core.intrinsics import Board
+from calib_core.intrinsics import Board, LeftOutPicture
 from calib_core.json_forms import Count, Measured, Name, Pixel
 from calib_core.results import DataWarning
 
@@ -18,7 +18,7 @@ _Number = Annotated[int, Meta(ge=0, le=1_000_000_000)]
 _Text = Annotated[str, Meta(max_length=10_000)]
 
 
-class SourceDocument(Struct, frozen=True, forbid_unknown_fields=True):
+class PictureSource(Struct, frozen=True, forbid_unknown_fields=True):
     """Where the pictures come from: what it is called, how many there are, and a hash by which it is known again."""
 
     name: Name
@@ -38,14 +38,6 @@ class BoardViewDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_de
     blur_px: Annotated[float, Meta(ge=0.0, le=1e9)] | None = None
 
 
-class LeftOutDocument(Struct, frozen=True, forbid_unknown_fields=True):
-    """A picture that is not used, and why."""
-
-    index: _Number
-    name: Name
-    reason: _Text
-
-
 class BoardViewsDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """What a search for a board has found so far; with it the search is resumed, or not done again.
 
@@ -54,7 +46,7 @@ class BoardViewsDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_d
 
     schema: Literal["cocalib/board-views-1"]
     board: Board
-    source: SourceDocument
+    source: PictureSource
     complete: bool
     searched: list[tuple[_Number, _Number]]
     views: list[BoardViewDocument]
@@ -136,7 +128,7 @@ class IntrinsicsDocument(Struct, frozen=True):
     schema: Literal["cocalib/intrinsics-1"]
     camera: CameraDocument
     board: Board
-    source: SourceDocument
+    source: PictureSource
     parameters: list[LensParameterDocument]
     field_of_view_deg: tuple[float | None, float | None]
     rms_px: float | None
@@ -145,7 +137,7 @@ class IntrinsicsDocument(Struct, frozen=True):
     models: list[ModelTrialDocument]
     searched: int
     views: list[LensViewDocument]
-    left_out: list[LeftOutDocument]
+    left_out: list[LeftOutPicture]
     projection_uncertainty: UncertaintyDocument
     residual_field: ResidualFieldDocument
     coverage: CoverageDocument | None

@@ -28,12 +28,12 @@ from calib_core.interchange import (
 )
 from calib_core.interchange.own.board_views_json import (
     BoardViews,
-    PictureSource,
     read_board_views,
     runs_of,
     write_board_views,
 )
 from calib_core.interchange.own.clicks_json import read_clicks_file
+from calib_core.interchange.own.lens_documents import PictureSource
 from calib_core.intrinsics import BoardCorners, board_of_size
 from calib_core.measurements import Candidate, Pair, ReflectorClick, TimeNs, time_from_parts
 from calib_core.options import CalibrationOptions
