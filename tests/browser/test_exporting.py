@@ -68,7 +68,9 @@ def test_before_a_calibration_the_panel_says_what_is_missing_and_gives_the_click
     assert json.loads(saved(page, tmp_path).read_text())["schema"] == "cocalib/clicks-1"
 
 
-def test_the_text_shown_is_the_file_that_is_saved_and_it_is_the_calibration(solved: Driver, tmp_path: Path) -> None:
+def test_the_text_shown_is_the_file_that_is_saved_or_copied_and_it_is_the_calibration(
+    solved: Driver, tmp_path: Path
+) -> None:
     solved.page.click("#tab-deliver")
     solved.page.click("#export")
     choose(solved, "json")
@@ -86,6 +88,11 @@ def test_the_text_shown_is_the_file_that_is_saved_and_it_is_the_calibration(solv
             assert "camera" in shown
         else:
             assert shown == data.decode()
+    solved.page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    choose(solved, "matrix")
+    solved.page.click(f"{DIALOG} .second:has-text('Copy')")
+    expect(solved.page.locator(f"{DIALOG} .second.done")).to_be_visible()
+    assert read_any(solved.page.evaluate("() => navigator.clipboard.readText()")).format == "matrix"
 
 
 def test_the_direction_of_the_file_is_bold_and_the_table_holds_its_own_numbers(solved: Driver) -> None:
@@ -295,17 +302,6 @@ def test_a_keyboard_is_enough_and_stays_in_the_panel(solved: Driver) -> None:
     assert all(click["state"] != "excluded" for click in solved.view["clicks"])
     solved.page.keyboard.press("Escape")
     assert not solved.page.is_visible(DIALOG)
-
-
-def test_copy_puts_the_text_on_the_clipboard(solved: Driver) -> None:
-    solved.page.context.grant_permissions(["clipboard-read", "clipboard-write"])
-    solved.page.click("#tab-deliver")
-    solved.page.click("#export")
-    choose(solved, "matrix")
-    solved.page.click(f"{DIALOG} .second:has-text('Copy')")
-    expect(solved.page.locator(f"{DIALOG} .second.done")).to_be_visible()
-    copied = solved.page.evaluate("() => navigator.clipboard.readText()")
-    assert read_any(copied).format == "matrix"
 
 
 def test_warnings_of_the_calibration_are_shown_next_to_the_text(page: Driver, truth: Any) -> None:
