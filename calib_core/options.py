@@ -80,7 +80,7 @@ class NoiseOptions:
 
 @dataclass(frozen=True, slots=True)
 class RadarOptions:
-    """What a radar gets wrong at every placement alike: standard deviations before any pair; 0 means exact."""
+    """Radar errors common to all placements: standard deviations before any pair; 0 means exact."""
 
     azimuth_scale_sigma: float = option(
         0.02,
@@ -157,7 +157,7 @@ class RefiningOptions:
 
 @dataclass(frozen=True, slots=True)
 class ReflectorOptions:
-    """What is wrong with every click alike: standard deviations before any pair; 0 means exact."""
+    """Errors common to all clicks: standard deviations before any pair; 0 means exact."""
 
     offset_sigma_m: float = option(
         0.02,

@@ -72,7 +72,7 @@ export interface NoiseOptions {
   estimate_scale: boolean;
 }
 
-/** What a radar gets wrong at every placement alike: standard deviations before any pair; 0 means exact. */
+/** Radar errors common to all placements: standard deviations before any pair; 0 means exact. */
 export interface RadarOptions {
   azimuth_scale_sigma: number;
   elevation_scale_sigma: number;
@@ -91,7 +91,7 @@ export interface LensOptions {
   distortion_sigma: number;
 }
 
-/** What is wrong with every click alike: standard deviations before any pair; 0 means exact. */
+/** Errors common to all clicks: standard deviations before any pair; 0 means exact. */
 export interface ReflectorOptions {
   offset_sigma_m: number;
   click_offset_sigma_px: number;

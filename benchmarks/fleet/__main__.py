@@ -77,7 +77,7 @@ def named(fleets: int, seed: int) -> Iterator[str]:
 
 
 def called_off(fleets: int, seed: int) -> Iterator[str]:
-    """Say how often a sound vehicle that is not of the fleet is called off its kind."""
+    """Say how often a sound vehicle that is not of the fleet is called unlike its type."""
     yield ""
     yield "| vehicles | scatter | calibrations | sound vehicles called off their kind | no answer |"
     yield "|---|---|---|---|---|"

@@ -1,4 +1,4 @@
-"""A fleet: what was remounted, how the mountings of a vehicle type scatter, and which vehicle is off its kind."""
+"""A fleet: what was remounted, how the mountings of a vehicle type scatter, and which vehicle is unlike its type."""
 
 from calib_core.fleet.mounting_scatter import LeftOut, MountingScatter, OffKind, mounting_scatter, off_kind, off_kinds
 from calib_core.fleet.mountings import (

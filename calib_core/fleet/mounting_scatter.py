@@ -1,4 +1,4 @@
-"""How the mountings of a vehicle type scatter, estimated from their calibrations, and which of them is off its kind.
+"""How the mountings of a vehicle type scatter, estimated from their calibrations, and which of them is unlike its type.
 
 A mounting scatters in where the camera is, as seen from the radar, and in how it is turned; the translation t = -R c of
 camera_from_radar mixes the two. With the common mounting R_0, c_0 the six coordinates are
@@ -172,7 +172,7 @@ def mounting_scatter(mountings: Sequence[Mounting], *, vehicle_type: str) -> Mou
     left_out = []
     for k in np.flatnonzero(~kept).tolist():
         away = measured.deviation(k, effects)
-        reason = f"off its kind: {away.text}, beyond the 1-in-10,000 point of the other mountings"
+        reason = f"unlike its type: {away.text}, beyond the 1-in-10,000 point of the other mountings"
         left_out.append(LeftOut(mountings[k], away, reason))
     return MountingScatter(vehicle_type, common, effects, counted, tuple(left_out), shared)
 
@@ -218,7 +218,7 @@ def _judged(mounting: Mounting, others: MountingScatter) -> OffKind:
         away,
         count,
         True,
-        f"{mounting.vehicle} is off its kind: {away.text} ({figures})",
+        f"{mounting.vehicle} is unlike its type: {away.text} ({figures})",
         "check that radar, camera and intrinsics are this vehicle's and that the type is right",
     )
 

@@ -81,7 +81,9 @@ def automatic_clicks(
     if confidence < LEAST_WHOLE_CONFIDENCE:
         other = rival > chance
         why = "another mounting fits nearly as well" if other else "chance would do nearly as well"
-        return _refused(f"picture and radar agree too little, {why} ({figures}; confidence {confidence:.2f})")
+        return _refused(
+            f"pictures and radar do not agree on one mounting clearly enough, {why} ({figures}; confidence {confidence:.2f})"
+        )
     if len(certain) < _LEAST_CLICKS:
         return _refused(
             f"{len(certain)} of {_placements(len(views))} are certain enough, and {_LEAST_CLICKS} are needed"

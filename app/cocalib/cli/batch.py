@@ -114,4 +114,4 @@ def _next_line(results: Path) -> str:
     """Say where the results are, and what comes next."""
     from cocalib.fleet.summary_page import SUMMARY_FILE
 
-    return f"results: {results}; summary: {results / SUMMARY_FILE}; who needs a look: cocalib batch status {results}"
+    return f"results: {results}; summary: {results / SUMMARY_FILE}; which vehicles need attention: cocalib batch status {results}"

@@ -32,13 +32,13 @@ class Check:
     against: File = None
     """Does it agree with this other calibration? Judged by the covariances, or by the limits below."""
     max_deg: Annotated[float | None, called("DEG")] = None
-    """Largest angle between the rotations that is agreement."""
+    """Accept rotations up to this angle apart."""
     max_cm: Annotated[float | None, called("CM")] = None
-    """Largest distance between the camera positions that is agreement."""
+    """Accept camera positions up to this distance apart."""
     max_px: Annotated[float | None, called("PX")] = None
-    """Largest distance in the picture that is agreement: rms at each of 5, 20 and 60 m, and by the lens alone."""
+    """Accept points up to this far apart in the picture: rms at each of 5, 20 and 60 m, and by the lens alone."""
     max_sigma: Annotated[float | None, called("SIGMA")] = None
-    """Largest difference under the covariances that is agreement, in standard deviations (p = 5 % is 1.96)."""
+    """Accept differences up to this many standard deviations (p = 5 % is 1.96)."""
     same_sensors: Switch = False
     """With --against: radar and camera are the same, although serials, topics or intrinsics are not."""
     same_person: Switch = False

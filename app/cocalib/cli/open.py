@@ -29,7 +29,7 @@ class Open:
     Without one, it is chosen in the page."""
     camera: GivenCamera = field(default_factory=CameraFlags)
     calibration: File = None
-    """A calibration to show, in any format: drawn until the clicks give a new one, then compared with it."""
+    """Existing calibration (any format), shown until your clicks give a new one, then compared with it."""
     clicks: File = None
     """Clicks to start a new session with (cocalib/clicks-1 JSON)."""
     session: Folder = None

@@ -40,7 +40,7 @@ class VehicleStanding:
 
     @property
     def off_kind(self) -> bool:
-        """Whether it is off its kind."""
+        """Whether it is unlike its type."""
         return self.kind is not None and self.kind.is_off
 
 

@@ -227,7 +227,7 @@ def _what(fleet: FleetRecord) -> str:
 def _foot() -> str:
     return (
         "σ: largest standard deviation about or along an axis. Δ: change since the session before, ± its standard deviation, "
-        "both calibrations counted. Remounted, off its kind: beyond what 9,999 of 10,000 sound calibrations show. "
+        "both calibrations counted. Remounted, unlike its type: beyond what 9,999 of 10,000 sound calibrations show. "
         "Drift: distance from the vehicle's first session in units of its error bars; beyond the dashed line it exceeds both; "
         "a cross: remounted. Scatter: standard deviation of the camera's place and rotation as seen from the radar."
     )

@@ -108,6 +108,10 @@ def json_value(text: str, *, source: str) -> Any:
         return content
     except json.JSONDecodeError as error:
         where = f"line {error.lineno}, column {error.colno}"
+        if error.pos >= len(error.doc.rstrip()):
+            raise InputError(
+                f"{source}: {where}: not JSON: the file ends too early; was it copied completely?"
+            ) from None
         raise InputError(f"{source}: {where}: not JSON ({error.msg}); correct it there") from None
     except (ValueError, RecursionError) as error:
         reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)

@@ -77,7 +77,7 @@ def test_wrong_radars_are_left_out_with_the_axis_that_is_off() -> None:
     rows[4], rows[7] = calibrated(WRONG, rng, "v04"), calibrated(WRONG, rng, "v07")
     scatter = scattered(rows)
     assert [one.mounting.vehicle for one in scatter.left_out] == ["v04", "v07"]
-    assert all("yaw +17 deg" in one.reason and "off its kind" in one.reason for one in scatter.left_out)
+    assert all("yaw +17 deg" in one.reason and "unlike its type" in one.reason for one in scatter.left_out)
     assert len(scatter.mountings) == 10
 
 
@@ -126,7 +126,7 @@ def test_a_vehicle_off_its_kind_is_named_with_figures_and_what_to_do() -> None:
     outcome = off_kind(calibrated(WRONG, rng, "odd"), scatter)
     assert isinstance(outcome, OffKind)
     assert outcome.is_off
-    assert outcome.words.startswith("odd is off its kind: ")
+    assert outcome.words.startswith("odd is unlike its type: ")
     assert "20 other mountings" in outcome.words
     assert outcome.hint.startswith("check that radar, camera and intrinsics are this vehicle's")
 

@@ -44,8 +44,8 @@ class JsonTable:
 
 
 _USES = {
-    "calibration-1": "; give it beside the recording: cocalib open RECORDING --calibration FILE",
-    "clicks-1": "; give it beside the recording: cocalib open RECORDING --clicks FILE",
+    "calibration-1": "; give it with the recording: cocalib open RECORDING --calibration FILE",
+    "clicks-1": "; give it with the recording: cocalib open RECORDING --clicks FILE",
     "pairs-1": "; solve it without a recording: cocalib solve --pairs FILE",
 }
 """What our own files are for, by their schema."""
@@ -60,7 +60,9 @@ def open_json_table(path: Path) -> JsonTable:
     first = list(islice(_rows(path), _SAMPLED_ROWS))
     schema = first[0][1].get("schema", "") if first else ""
     if schema.startswith("cocalib/"):
-        raise RecordingError(f"{path}: a {schema} file, no recording{_USES.get(schema.partition('/')[2], '')}")
+        raise RecordingError(
+            f"{path}: this is a {schema} file, not a recording{_USES.get(schema.partition('/')[2], '')}"
+        )
     names = tuple(dict.fromkeys(name for _, row in first for name in row))
     if not names:
         raise RecordingError(

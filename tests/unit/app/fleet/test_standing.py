@@ -41,7 +41,7 @@ def test_what_is_wrong_is_named_and_nothing_else(fleet: FleetRecord) -> None:
     assert [name for name, one in standings.items() if one.off_kind] == ["V002", "odd"]
     assert [name for name, one in standings.items() if one.needs] == ["V002", "V003", "V004", "odd"]
     assert standings["V002"].needs[0].startswith("this radar was remounted: ")
-    assert standings["odd"].needs[0].startswith("is off its kind: pitch -11 deg")
+    assert standings["odd"].needs[0].startswith("is unlike its type: pitch -11 deg")
     assert standings["V003"].needs == ("s2 failed: no such file; check the path",)
     assert standings["V004"].needs == ("s2 is contradictory: see its report",)
 
@@ -67,8 +67,8 @@ def test_the_scatter_names_whom_it_does_not_rest_on_and_why(fleet: FleetRecord) 
     reasons = {(one.vehicle, one.session): one.reason for one in van.not_counted}
     assert reasons[("V003", "s2")] == "failed: no such file"
     assert reasons[("V004", "s2")] == "the verdict is contradictory"
-    assert reasons[("odd", "s0, s1")].startswith("off its kind: pitch ")
-    assert reasons[("V002", "s1")].startswith("off its kind: yaw ")
+    assert reasons[("odd", "s0, s1")].startswith("unlike its type: pitch ")
+    assert reasons[("V002", "s1")].startswith("unlike its type: yaw ")
     assert isinstance(van.scatter, MountingScatter)
     assert {one.vehicle for one in van.scatter.mountings} == {f"V{index:03}" for index in range(7)}
     assert "odd" in {one.mounting.vehicle for one in van.scatter.left_out}

@@ -718,7 +718,7 @@ def test_what_a_folder_holds_and_nobody_reads_is_named(tmp_path) -> None:
         "thumbnails (no times in the file names",
         "imu.csv (no position columns",
         "objects.json (no position columns",
-        "clicks.json (a cocalib/clicks-1 file, no recording; ",
+        "clicks.json (this is a cocalib/clicks-1 file, not a recording; ",
         "mixed (the folder contains",
         "bag (a ROS recording; open it by its own path)",
     ):
