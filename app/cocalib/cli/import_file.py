@@ -31,8 +31,8 @@ _CONTRADICTED = 0.05
 class MeaningFlags:
     """Which pose of a file, and what it means, if the file does not say."""
 
-    pose: Annotated[str | None, called("PLACE")] = None
-    """Which pose, if the file contains several: its place in the file, such as calibration.radar.T."""
+    pose: Annotated[str | None, called("NAME")] = None
+    """Which pose, if the file contains several: its sensor, or its place in the file, such as calibration.radar.T."""
     as_: Annotated[str | None, tyro.conf.arg(name="as", metavar="MEANING", help_behavior_hint="")] = None
     """What the numbers mean, if the file does not say: a meaning from the list that this command prints."""
     sheet: File = None

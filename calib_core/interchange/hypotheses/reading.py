@@ -1,6 +1,7 @@
 """Read a file whose numbers do not state what they mean, and take the meaning that is clear or that a person picks."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 
 import numpy as np
@@ -40,26 +41,34 @@ class UnstatedFile:
         poses: what was found, in file order; at least one.
         unreadable: what has the shape of a pose and is none.
         camera: the camera in it, before any check; None if it has none or several.
+        beside: the camera in the innermost object around a pose, by the pose's place.
     """
 
     source: str
     poses: tuple[FoundPose, ...]
     unreadable: tuple[Unreadable, ...] = ()
     camera: FoundCamera | None = None
+    beside: Mapping[str, FoundCamera] = field(default_factory=dict)
 
     def pose_at(self, place: str | None) -> FoundPose:
-        """Return the pose at a place; if none is given, the only one, or the only one whose names mention a radar.
+        """Return the pose at a place, or the only one below a name.
+
+        If none is given, it is the only one, or the only one whose names mention a radar, or beside which a camera is.
 
         Raises:
             InputError: there is none there, or there are several to choose from.
         """
         places = [pose.place for pose in self.poses]
         named = ", ".join(repr(one) for one in places[:_SHOWN]) + (", ..." if len(places) > _SHOWN else "")
-        radars = [pose for pose in self.poses if pose.hints.names_radar]
-        if place is None and (len(places) == 1 or len(radars) == 1):
-            return radars[0] if len(radars) == 1 else self.poses[0]
         if place is None:
-            raise InputError(f"{self.source}: contains {len(places)} poses; choose one with --pose PLACE: {named}")
+            radars = [pose.place for pose in self.poses if pose.hints.names_radar]
+            for few in (places, radars, [one for one in radars or places if one in self.beside]):
+                if len(few) == 1:
+                    return self.poses[places.index(few[0])]
+            raise InputError(f"{self.source}: contains {len(places)} poses; choose one with --pose NAME: {named}")
+        below = [one for one in places if place in (one, *one.split("."))]
+        if place not in places and len(below) == 1:
+            place = below[0]
         if place not in places:
             raise InputError(f"{self.source}: no pose at {place!r}; there is one at {named}")
         return self.poses[places.index(place)]
@@ -85,7 +94,9 @@ def read_unstated(content: str | bytes, source: str = "calibration") -> Unstated
         if found.poses:
             stem = PurePath(source).name.partition(".")[0]
             poses = tuple(_hinted_by_name(pose, stem) for pose in found.poses)
-            return UnstatedFile(source, poses, found.unreadable, _camera_in(values, source))
+            around = {pose.place: _camera_in(_around(pose.place, values), source) for pose in poses}
+            beside = {place: camera for place, camera in around.items() if camera is not None}
+            return UnstatedFile(source, poses, found.unreadable, _camera_in(values, source), beside)
         unreadable = found.unreadable or unreadable
     if unreadable:
         raise InputError(f"{source}: {unreadable[0].place}: {unreadable[0].fault}; correct it there")
@@ -107,6 +118,13 @@ def _hinted_by_name(pose: FoundPose, stem: str) -> FoundPose:
     if pose.hints.carries_radar != hints_of([]).carries_radar:
         return pose
     return pose.with_hints(replace(pose.hints, carries_radar=named.carries_radar))
+
+
+def _around(place: str, values: object) -> object:
+    """Return the innermost object around a place such as sensors.front.T."""
+    for key in place.split(".")[:-1]:
+        values = values.get(key) if isinstance(values, dict) else None
+    return values
 
 
 def _camera_in(values: object, source: str) -> FoundCamera | None:
@@ -153,7 +171,7 @@ def as_imported(file: UnstatedFile, pose: FoundPose, chosen: Hypothesis, *, by_h
     how = "picked by hand" if by_hand else "the only plausible meaning of the numbers"
     where = "" if pose.place == "the file" else f" at {pose.place}"
     meaning = chosen.meanings[0]
-    camera, matrix_px = _camera(file)
+    camera, matrix_px = _camera(file, pose)
     return ImportedCalibration(
         BARE_POSE,
         WrittenPose(
@@ -216,13 +234,13 @@ def clear_meaning(
     return None if clear is None else as_imported(file, file.poses[0], clear, by_hand=False)
 
 
-def _camera(file: UnstatedFile) -> tuple[Camera | None, np.ndarray | None]:
+def _camera(file: UnstatedFile, pose: FoundPose) -> tuple[Camera | None, np.ndarray | None]:
     """Return the camera in the file, or its matrix alone if the size of its pictures is not stated.
 
     Raises:
         InputError: a parameter is invalid.
     """
-    found = file.camera
+    found = file.beside.get(pose.place, file.camera)
     if found is None:
         return None, None
     if found.size_px is not None:

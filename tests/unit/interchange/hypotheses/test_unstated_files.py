@@ -130,11 +130,23 @@ def test_body_axes_in_both_frames_leave_the_direction_open() -> None:
 def test_several_poses_are_listed_by_their_place() -> None:
     text = json.dumps({"front": {"T": MATRIX.tolist()}, "rear": {"T": MATRIX.tolist()}})
     file = read_unstated(text, "rig.json")
-    with pytest.raises(InputError, match=r"contains 2 poses; choose one with --pose PLACE: 'front.T', 'rear.T'"):
+    with pytest.raises(InputError, match=r"contains 2 poses; choose one with --pose NAME: 'front.T', 'rear.T'"):
         file.pose_at(None)
     with pytest.raises(InputError, match=r"no pose at 'side.T'"):
         file.pose_at("side.T")
-    assert file.pose_at("rear.T").place == "rear.T"
+    assert file.pose_at("rear.T").place == file.pose_at("rear").place == "rear.T"
+
+
+def test_of_several_radars_that_with_a_camera_matrix_is_read_and_with_its_camera() -> None:
+    matrix = {"K": [[900, 0, 640], [0, 900, 360], [0, 0, 1]], "width": 1280, "height": 720}
+    sensors = {name: {"T": MATRIX.tolist()} for name in ("lidar_top", "radar_front", "radar_rear")}
+    sensors["radar_front"] |= matrix
+    file = read_unstated(json.dumps({"sensors": sensors}), "rig.json")
+    pose = file.pose_at(None)
+    assert pose.place == "sensors.radar_front.T"
+    found = as_imported(file, pose, hypotheses_of(pose)[0], by_hand=True)
+    assert found.camera.matrix_px[0, 0] == 900.0
+    assert as_imported(file, file.pose_at("radar_rear"), hypotheses_of(pose)[0], by_hand=True).camera is None
 
 
 def test_each_radar_of_a_mapping_is_a_pose_of_its_own() -> None:
