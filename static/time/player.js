@@ -225,6 +225,7 @@ const follows = () => state.following !== null && state.following.state !== "com
 
 /** Show the newest frame, and each newer one as it comes. */
 export function goLive() {
+  if (state.playing) pause(); // else the frame that is due would take the newest one's place
   state.live = true;
   moving = true;
   askedAt = performance.now();

@@ -62,8 +62,11 @@ def test_the_newest_frame_is_shown_until_the_user_steps_back(page, writer, follo
     writer.write_until(20.0)
     page.until(f"__cocalib.state.seconds.length === {sum(followed.image_times <= writer.start_ns + 20_000_000_000)}")
     assert page.value("__cocalib.state.cursor") == stayed
+    page.press("Home", "Space")
+    page.until("__cocalib.state.playing && __cocalib.state.shown.index > 0")
     page.page.locator("#live").click()
-    page.until(f"__cocalib.state.live && {newest(page)}")
+    page.until(f"__cocalib.state.live && {newest(page)} && __cocalib.state.shown.scale === 1")
+    assert page.value("__cocalib.state.playing") is False
 
 
 def test_placements_and_advice_appear_while_the_file_grows(page, writer):
