@@ -5,6 +5,7 @@ A check returns an empty list if all is well. The texts are for people; the code
 
 import numpy as np
 
+from calib_core.arrays import Flags
 from calib_core.association.clustering import CLUSTER_SCALE
 from calib_core.diagnostics.handedness import handedness
 from calib_core.diagnostics.intrinsics import intrinsics, lens_or_scale, refined_too_far
@@ -58,14 +59,15 @@ def warnings_of(fit: SolvedFit) -> tuple[DataWarning, ...]:
     wrong_pixels = any(warning.code == PIXELS_SUSPECTED for warning in suspected)
     found = [warning for check in checks for warning in check(fit)]
     found = [one for one in found if not (wrong_pixels and one.code in _FOLLOWS_FROM_PIXELS)]
-    return (*suspected, *_counted_up(found, int(fit.inliers.sum())))
+    return (*suspected, *_counted_up(found, fit.inliers))
 
 
-def _counted_up(found: list[DataWarning], count: int) -> list[DataWarning]:
+def _counted_up(found: list[DataWarning], inliers: Flags) -> list[DataWarning]:
     """With few pairs, say how many there are instead of what only more of them can tell."""
+    count = int(inliers.sum())
     if count >= _FEW_INLIERS:
         return found
-    clear = not any(one.code in _UNCLEAR for one in found)
+    clear = bool(inliers.all()) and not any(one.code in _UNCLEAR for one in found)
     few = DataWarning(
         "few-pairs",
         f"{count} of {_FEW_INLIERS} pairs, {'looks consistent' if clear else 'not clear yet'}",

@@ -133,7 +133,7 @@ function draw() {
   box.setAttribute("role", "alert");
   box.hidden = !words;
   const scrolled = dialog.querySelector(".parts")?.scrollTop ?? 0;
-  dialog.replaceChildren(make("header", "", [title, close()]), box, make("div", "parts", [notes, drawReading(), ...(choices ? drawChoices(choices) : [])]), ...(choices ? [footer()] : []));
+  dialog.replaceChildren(make("div", "head", [title, close()]), box, make("div", "parts", [notes, drawReading(), ...(choices ? drawChoices(choices) : [])]), ...(choices ? [footer()] : []));
   /** @type {HTMLElement} */ (dialog.querySelector(".parts")).scrollTop = scrolled;
 }
 
@@ -158,7 +158,7 @@ function footer() {
   open.disabled = busy || (!another && !choices?.name);
   open.onclick = choose;
   const kept = choices?.is_open ? "Clicks are on disk; they stay where the frames are the same." : "";
-  return make("footer", "", [make("span", "", kept), open]);
+  return make("div", "foot", [make("span", "", kept), open]);
 }
 
 /** Send what was chosen; words that refuse it are shown in the dialog, and nothing has changed. */

@@ -122,6 +122,26 @@ def test_a_recording_cut_off_leads_the_verdict_where_clicks_lost_their_returns(
         assert ("damage" in json.loads(text)["provenance"]) == (lost > 0)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_right_clicks_alarm_nobody_in_any_order_and_a_wrong_one_is_named(
+    recording: Recording, clicks: tuple[ReflectorClick, ...], seed: int
+) -> None:
+    order = [clicks[place] for place in np.random.default_rng(seed).permutation(len(clicks))]
+    for count in (5, 9, 12):
+        outcome = solve_clicks(recording, order[:count], recording.camera(), CalibrationOptions())
+        assert isinstance(outcome, Calibration)
+        assert all(pair.inlier for pair in outcome.pairs)
+        assert verdict_on(outcome).level != "contradictory"
+    wrong = replace(order[11], u_px=abs(order[11].u_px - 45.0))
+    outcome = solve_clicks(recording, [*order[:11], wrong], recording.camera(), CalibrationOptions())
+    assert isinstance(outcome, Calibration)
+    assert verdict_on(outcome).level == "coarse" or wrong.id in [pair.id for pair in outcome.pairs if not pair.inlier]
+    outcome = solve_clicks(recording, [*order[:6], wrong], recording.camera(), CalibrationOptions())
+    assert isinstance(outcome, Calibration)
+    consistent = any("looks consistent" in warning.message for warning in outcome.warnings)
+    assert consistent == all(pair.inlier for pair in outcome.pairs), "neither does one that is left out look so"
+
+
 def test_without_intrinsics_the_answer_says_that_they_are_missing() -> None:
     outcome = solve_clicks(Radar(), [CLICK], None, CalibrationOptions())
     assert isinstance(outcome, Unsolvable)
