@@ -124,7 +124,7 @@ def test_one_of_several_poses_is_chosen_by_its_place(cocalib: Cocalib, camera_fi
     several.write_text(json.dumps({"front": POSE.as_matrix().tolist(), "rear": other}))
     refused = cocalib("import", several, "--out", out, "--camera", camera_file)
     assert refused.code == 2
-    assert "choose one with --pose PLACE: 'front', 'rear'" in refused.err
+    assert "choose one with --pose NAME: 'front', 'rear'" in refused.err
     assert cocalib("import", several, "--pose", "front", "--out", out, "--camera", camera_file).code == 3
     assert _is_pose(out)
 
