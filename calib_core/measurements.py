@@ -431,6 +431,7 @@ class Box:
         label: the object's class, such as "person"; "" if the source states none.
         score: the detector's confidence, 0 to 1; 1 for a box drawn by a person.
         track: the same for boxes of one object in several frames; "" if the source does not follow objects.
+        range_m: from the camera to the middle of the object's cuboid; None if the source has none.
     """
 
     left_px: float
@@ -440,6 +441,7 @@ class Box:
     label: str = ""
     score: float = 1.0
     track: str = ""
+    range_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

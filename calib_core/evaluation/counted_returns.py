@@ -95,6 +95,7 @@ class BoxTable:
         labels: (b,) the classes.
         tracks: (b,) equal numbers are one object in several frames.
         names: (b,) what their source calls the objects; "" if it does not follow them.
+        range_m: (b,) from the camera to the object; NaN if the source does not tell.
     """
 
     times_ns: TimesNs
@@ -103,6 +104,7 @@ class BoxTable:
     labels: tuple[str, ...]
     tracks: Indices
     names: tuple[str, ...]
+    range_m: Values
 
     def __post_init__(self) -> None:
         count = len(self.labels)
@@ -439,7 +441,8 @@ def box_table(boxes: Boxes) -> BoxTable:
     every = [box for frame in boxes for box in frame.boxes]
     sides = np.array([[getattr(box, side) for side in _SIDES] for box in every]).reshape(-1, 4)
     labels, names = tuple(box.label for box in every), tuple(box.track for box in every)
-    return BoxTable(boxes.times_ns, frames, sides, labels, _tracks(frames, every, sides), names)
+    range_m = np.array([np.nan if box.range_m is None else box.range_m for box in every])
+    return BoxTable(boxes.times_ns, frames, sides, labels, _tracks(frames, every, sides), names, range_m)
 
 
 @dataclass(slots=True)
@@ -520,7 +523,7 @@ _MOST_PARALLAX_M = 3.0  # distance between the sensors, across
 _STEP_RAD = np.deg2rad(0.5)
 _MOST_VOTES = 20_000
 _ROUNDS = 3
-_PART_M = 5.0  # between the ranges of parts of one target
+_PART_M = 5.0  # between the ranges of parts of one target, or of a target and its cuboid
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -609,6 +612,8 @@ def _meetings(sightings: Sightings, table: BoxTable, camera: Camera) -> _Meeting
     counts = high - low
     own = np.repeat(np.arange(len(sightings.frames)), counts)
     boxes = np.repeat(low, counts) + np.arange(len(own)) - np.repeat(np.cumsum(counts) - counts, counts)
+    near = ~(np.abs(sightings.range_m[own] - table.range_m[boxes]) > _PART_M)
+    own, boxes = own[near], boxes[near]
     middle, half = _middles(table, camera)
     inverse_range = 1.0 / np.maximum(sightings.range_m[own], 0.5)
     tolerance = _TOLERANCE_RAD + half[boxes] + _TOLERANCE_M * inverse_range

@@ -1,8 +1,11 @@
 """KITTI: label_02/NNNN.txt of the tracking benchmark, or a folder label_2 with one file per picture.
 
-Its boxes are pixel indices counted from 0, so they are ours without a shift. Regions marked DontCare are left out.
+Its boxes are pixel indices counted from 0, so they are ours without a shift. Regions marked DontCare are left out. Of the
+cuboid (height, width, length, the middle of its floor in the camera's axes, heading) the range is kept: a heading changes none.
 """
 
+import math
+from dataclasses import replace
 from pathlib import PurePosixPath
 
 from calib_core.boxes.formats.box_format import (
@@ -21,6 +24,8 @@ from calib_core.measurements import Box
 _OBJECT_COLUMNS = (15, 16)  # the last, of results, is the score
 _TRACK_COLUMNS = (17, 18)
 _IGNORED = "DontCare"
+_UNKNOWN_M = -999.0
+"""KITTI writes -1000 where an object has no cuboid."""
 
 
 def _rows(text: str) -> list[list[str]]:
@@ -70,7 +75,7 @@ def _read_objects(file: BoxFile) -> FileBoxes:
             if not _is_object(row):
                 raise InputError(f"{place}: expected KITTI's 15 columns of an object; correct it")
             if row[0] != _IGNORED:
-                boxes.append(_box(row[0], row[4:8], row[15:], place))
+                boxes.append(_box(row[0], row[4:15], row[15:], place))
         frames.append(FileFrame(tuple(boxes), name=PurePosixPath(name).stem))
     return FileBoxes(tuple(frames))
 
@@ -89,7 +94,7 @@ def _read_tracks(file: BoxFile) -> FileBoxes:
             raise InputError(f"{place}: expected KITTI's 17 columns of a tracked object; correct it")
         found = boxes.setdefault(whole_number(row[0], place), [])
         if row[2] != _IGNORED:
-            found.append(_box(row[2], row[6:10], row[17:], place, track=str(whole_number(row[1], place))))
+            found.append(_box(row[2], row[6:17], row[17:], place, track=str(whole_number(row[1], place))))
     lowest, highest = min(boxes), max(boxes)
     if highest - lowest > 1_000_000:
         raise InputError(
@@ -100,10 +105,15 @@ def _read_tracks(file: BoxFile) -> FileBoxes:
     return FileBoxes(tuple(frames), first_number=0, notes=(note,) if len(boxes) <= highest - lowest else ())
 
 
-def _box(label: str, edges: list[str], score: list[str], place: str, track: str = "") -> Box:
+def _box(label: str, columns: list[str], score: list[str], place: str, track: str = "") -> Box:
+    """Make a box of the columns from its left edge to its heading."""
     for value in score:
         finite_number(value, place)
-    return edge_box(edges, place, label=label, score=score_of(score[0]) if score else 1.0, track=track, shift_px=0.0)
+    height_m, _, _, x_m, y_m, z_m = (finite_number(value, place) for value in columns[4:10])
+    range_m = math.hypot(x_m, y_m - 0.5 * height_m, z_m) if height_m > 0.0 and z_m > _UNKNOWN_M else None
+    confidence = score_of(score[0]) if score else 1.0
+    box = edge_box(columns[:4], place, label=label, score=confidence, track=track, shift_px=0.0)
+    return replace(box, range_m=range_m)
 
 
 KITTI_OBJECTS = BoxFormat("KITTI label_2", _recognizes_objects, _read_objects)

@@ -1,6 +1,7 @@
 """Small files in each tool's documented layout: which frame, which pixels, and what is refused."""
 
 import json
+import math
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -202,15 +203,19 @@ def test_kitti_tracks_keep_pixels_and_count_frames_between_as_empty(tmp_path):
     found = only_boxes(read(write(tmp_path, "0004.txt", "\n".join(lines))))
 
     assert list(found) == [1, 2, 3]
-    assert found[1] == (Box(100.0, 50.0, 140.0, 150.0, "Pedestrian", track="4"),)
+    assert found[1] == (
+        Box(100.0, 50.0, 140.0, 150.0, "Pedestrian", track="4", range_m=pytest.approx(math.hypot(1.0, 0.7, 9.0))),
+    )
     assert found[2] == ()
 
 
 def test_kitti_objects_are_one_file_per_picture(tmp_path):
     write(tmp_path, "label_2/000000.txt", f"Car 0.00 0 1.85 100.0 50.0 140.0 150.0 {KITTI_3D} 0.25")
-    write(tmp_path, "label_2/000004.txt", "")
+    write(tmp_path, "label_2/000004.txt", "Van 0 0 -10 1.0 2.0 3.0 4.0 -1 -1 -1 -1000 -1000 -1000 -10")
 
-    assert only_boxes(read(tmp_path)) == {0: (Box(100.0, 50.0, 140.0, 150.0, "Car", 0.25),), 4: ()}
+    found = only_boxes(read(tmp_path))
+    assert found[0] == (Box(100.0, 50.0, 140.0, 150.0, "Car", 0.25, range_m=pytest.approx(math.hypot(1.0, 0.7, 9.0))),)
+    assert found[4] == (Box(1.0, 2.0, 3.0, 4.0, "Van"),)
 
 
 def openlabel(**frame: Any) -> dict[str, Any]:

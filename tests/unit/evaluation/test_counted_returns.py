@@ -1,5 +1,7 @@
 """A frame's scan is the nearest by the recorded stamps, within half a scan period."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -108,6 +110,14 @@ def test_a_target_is_given_one_box_track_over_its_life_and_not_the_nearest_box_o
 def test_a_box_has_one_target_and_the_other_stays_without():
     found = sightings((ACROSS, FAR), (ACROSS + 2.0, np.full(FRAMES, 40.0)), (STILL, FAR))
     assert matched(found, boxes(ACROSS, STILL)) == {0: {"o0"}, 1: {""}, 2: {"o1"}}
+
+
+def test_a_target_far_from_the_cuboid_of_a_box_is_not_its_own():
+    given = boxes(ACROSS)
+    behind = sightings((ACROSS, np.full(FRAMES, 40.0)), (ACROSS + 1.0, FAR))
+    assert matched(behind, given)[0] == {"o0"}
+    frames = [replace(one, boxes=tuple(replace(box, range_m=21.0) for box in one.boxes)) for one in given]
+    assert matched(behind, replace(given, frames=tuple(frames))) == {0: {""}, 1: {"o0"}}
 
 
 def test_parts_of_one_target_share_its_box():
