@@ -45,6 +45,10 @@ def _read(file: BoxFile) -> FileBoxes:
         cameras |= {str(entry["coordinate_system"]) for _, entry in _entries(frame) if entry.get("coordinate_system")}
         stamp, name = _stamp(frame, place), _picture(frame)
         frames.append(FileFrame(tuple(boxes), stamp, whole_number(number, place), name))
+    if not any(frame.boxes for frame in frames) and any(_cuboids(frame) for frame in _part(root, "frames").values()):
+        raise InputError(
+            f"{file.source}: has cuboids and no bbox; export the rectangles of the camera's picture (bbox) as well"
+        )
     if len(cameras) > 1:
         raise InputError(
             f"{file.source}: has the boxes of {len(cameras)} cameras ({', '.join(sorted(cameras)[:5])}); export one camera's"
@@ -61,6 +65,10 @@ def _entries(frame: Any) -> Iterator[tuple[str, Mapping[str, Any]]]:
             for entry in listed if isinstance(listed, list) else ():
                 if isinstance(entry, dict):
                     yield key, entry
+
+
+def _cuboids(frame: Any) -> bool:
+    return any("cuboid" in _part(found, "object_data") for found in _part(frame, "objects").values())
 
 
 def _label(objects: Mapping[str, Any], key: str) -> str:

@@ -230,6 +230,16 @@ def openlabel(**frame: Any) -> dict[str, Any]:
     }
 
 
+def test_openlabel_with_cuboids_alone_is_refused_not_read_as_empty(tmp_path):
+    content = openlabel()
+    data = content["openlabel"]["frames"]["0"]["objects"]["obj-1"]["object_data"]
+    data["cuboid"] = [{"name": "shape", "val": [9, 1, 0, 0, 0, 0, 1, 4, 2, 1.5]}]
+    assert only_boxes(read(write(tmp_path, "both.json", json.dumps(content))))[0]
+    del data["bbox"]
+    with pytest.raises(InputError, match="has cuboids and no bbox"):
+        read(write(tmp_path, "cuboids.json", json.dumps(content)))
+
+
 def test_openlabel_boxes_are_given_by_their_centre(tmp_path):
     found = only_boxes(read(write(tmp_path, "labels.json", openlabel())))
 
