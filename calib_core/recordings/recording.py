@@ -32,6 +32,7 @@ from calib_core.recordings.radar.column_plan import ColumnReading, column_readin
 from calib_core.recordings.radar.merging import MergedStream
 from calib_core.recordings.radar.scan_stream import Losses
 from calib_core.recordings.radar.sensors import RadarSensor, figures_of
+from calib_core.recordings.recording_file import RecordingFile, with_recording_file
 from calib_core.recordings.selection import Inventory, Need, RecordingOptions, Usage, select_image, usage_of
 from calib_core.recordings.time.written_times import parse_zone
 from calib_core.recordings.topics import Topic, TopicSummary, join_topics, read_stamps
@@ -72,12 +73,18 @@ class Recording:
     """
 
     def __init__(
-        self, paths: tuple[Path, ...], sources: tuple[Source, ...], assembly: Assembly, video_start: str | None = None
+        self,
+        paths: tuple[Path, ...],
+        sources: tuple[Source, ...],
+        assembly: Assembly,
+        video_start: str | None = None,
+        file: RecordingFile | None = None,
     ) -> None:
         self.paths = paths
         self.sources = sources
         self._assembly = assembly
         self._video_start = video_start
+        self._file = file
         self._closed = threading.Event()
         self._fingerprint: tuple[InputFile, ...] = ()
         self.topics: tuple[TopicSummary, ...] = assembly.topics
@@ -111,6 +118,11 @@ class Recording:
     def name(self) -> str:
         """The name of the recording for messages."""
         return " + ".join(name_text(path.name) for path in self.paths)
+
+    @property
+    def recording_file(self) -> str:
+        """What is used of a recording.toml beside the recording, in words; "" if there is none."""
+        return "" if self._file is None else self._file.words
 
     @property
     def radar_clock(self) -> str | None:
@@ -371,7 +383,7 @@ class Recording:
             except OSError as error:
                 raise RecordingError(f"{source.path}: can no longer be read: {error.strerror}") from error
             files.append(InputFile(name_text(source.path.name), source.size_bytes, digest.hexdigest()))
-        self._fingerprint = tuple(files)
+        self._fingerprint = (*files, *(() if self._file is None else (self._file.file,)))
         return self._fingerprint
 
 
@@ -406,15 +418,17 @@ def open_recording(
         RecordingError: it cannot be opened, or lacks what is required.
     """
     chosen = (Path(paths),) if isinstance(paths, str | Path) else tuple(Path(path) for path in paths)
-    options = options or RecordingOptions()
-    streams, rest, taken = open_uart_streams(require_files(chosen), options.radar_start)
+    options, file = with_recording_file(require_files(chosen), options or RecordingOptions())
+    streams, rest, taken = open_uart_streams(chosen, options.radar_start)
     sources: tuple[Source, ...] = streams
     try:
         plain_options = replace(_plain_options(options), taken=taken)
         plain, others = open_plain_sources(rest, plain_options, streams) if rest else (streams, ())
         sources = plain
         sources = (*(open_sources(others) if others else ()), *plain)
-        return Recording(chosen, sources, _assembled(chosen, sources, options, require), options.video_start)
+        if file is not None:
+            options, file = file.fitting(options, {c.topic for one in sources for c in one.channels}, require)
+        return Recording(chosen, sources, _assembled(chosen, sources, options, require), options.video_start, file)
     except BaseException:
         for source in sources:
             source.close()

@@ -215,6 +215,7 @@ class RecordingOptions:
         "auto",
         "Times to use: stamps in the message headers, receive times, or auto: stamps unless they cannot be right.",
     )
+    no_recording_file: bool = option(False, "Ignore a recording.toml beside the recording.")
 
 
 def _no_counts() -> dict[str, int]:

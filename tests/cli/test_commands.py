@@ -1,9 +1,11 @@
 """The commands on good input."""
 
+import hashlib
 import json
 import os
 import re
 import threading
+import tomllib
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -418,3 +420,55 @@ def test_output_that_cannot_be_a_file_is_refused_in_one_line(
         assert refused.code == 2
         assert words in refused.err
         assert refused.err.count("\n") == 1
+
+
+def test_a_recording_toml_beside_the_recording_is_written_read_told_and_kept(
+    cocalib: Cocalib, made: Callable[..., Path], clicks_file: Path, tmp_path: Path
+) -> None:
+    recording, out = made(), tmp_path / "out.json"
+    assert cocalib("info", recording, "--write").code == 0
+    (file,) = tmp_path.rglob("recording.toml")
+    assert tomllib.loads(file.read_text()) == {
+        "radar_topic": "/radar/points",
+        "image_topic": "/camera/image/compressed",
+        "camera_info_topic": "/camera/camera_info",
+    }
+    assert cocalib("info", recording, "--write").code == 2, "never over another one"
+    file.write_text('clock = "receive"\nimage_topic = "/camera/image/compressed"\n')
+    told = cocalib("solve", recording, "--clicks", clicks_file, "--out", out)
+    assert told.err.startswith('using recording.toml: clock = "receive", image_topic = "/camera/image/compressed"\n')
+    (kept,) = (one for one in json.loads(out.read_text())["provenance"]["inputs"] if one["name"] == "recording.toml")
+    assert kept["sha256"] == hashlib.sha256(file.read_bytes()).hexdigest()
+    typed = cocalib("info", recording, "--clock", "header")
+    assert "clock" not in typed.err
+    assert "using" not in cocalib("info", recording, "--no-recording-file").err
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("x = 1", "unknown key 'x'; it may have radar_topic"),
+        ("clock = 'wall'", "recording.toml: Invalid enum value 'wall'"),
+        ("clock =", "recording.toml: Invalid value"),
+        ("radar_axes = 'forward,left,up'", "unknown key 'radar_axes'"),
+        ("image_topic = '/none'", "no topic /none"),
+    ],
+)
+def test_a_recording_toml_that_states_nothing_known_is_refused(
+    cocalib: Cocalib, made: Callable[..., Path], clicks_file: Path, text: str, words: str
+) -> None:
+    recording = made()
+    (recording.parent / "recording.toml").write_text(text)
+    answer = cocalib("solve", recording, "--clicks", clicks_file)
+    assert answer.code == 2
+    assert words in answer.err
+
+
+def test_a_recording_toml_of_two_recordings_serves_one_of_them(cocalib: Cocalib, made: Callable[..., Path]) -> None:
+    alone = made("alone", with_images=False, with_camera_info=False)
+    (alone.parent / "recording.toml").write_text(
+        'image_topic = "/camera/image/compressed"\nradar_topic = "/radar/points"\n'
+    )
+    answer = cocalib("info", alone)
+    assert answer.code == 0
+    assert answer.err == 'using recording.toml: radar_topic = "/radar/points"\n'

@@ -14,6 +14,7 @@ from msgspec import Struct, field
 
 from calib_core.errors import CalibrationError
 from calib_core.input_files import special_kind
+from calib_core.recordings.recording_file import recording_file_of
 from cocalib.batch.manifest import ManifestRow
 from cocalib.batch.results_folder import ResultsFolder
 
@@ -124,6 +125,7 @@ def _within(folder: Path) -> Iterator[Path]:
 
 def _side_files(path: Path) -> Iterator[Path]:
     """Yield where `open_recording` looks for more than it was given: bag metadata, tables of times, published intrinsics."""
+    yield recording_file_of(path)
     stem = path.name if path.is_dir() else path.stem
     yield from (path.parent / f"{stem}{suffix}" for suffix in (".csv", ".txt"))
     if not path.is_dir():

@@ -146,10 +146,9 @@ class Check:
         return self.frames.read([path], files)[0]
 
     def _on_recording(self, report: "CheckReport", path: Path, camera: "Camera | None") -> "CheckReport":
-        from calib_core.recordings import open_recording
         from cocalib.evaluation.recording_check import other_camera, stale_inputs, with_recording
 
-        with open_recording(self.recording, self.topics) as recording:
+        with self.topics.open(self.recording) as recording:
             clicks = self.evidence.clicks_in(recording, self.recording, [report.imported])
             if not clicks:
                 raise InputError(
@@ -163,14 +162,13 @@ class Check:
 
     def _compared(self, evidence: "_Evidence") -> "tuple[ComparedOnRecording, Camera]":
         """Judge both calibrations by the same clicks and boxes of the recording, that of --against as A; also return its lens."""
-        from calib_core.recordings import open_recording
         from cocalib.evaluation.comparing import compare_on_recording
         from cocalib.evaluation.recording_check import judged_calibration
 
         assert self.against is not None
         paths = (self.against, self.calibration[0])
         options = self.evidence.options()
-        with open_recording(self.recording, self.topics, require=("radar",)) as recording:
+        with self.topics.open(self.recording, ("radar",)) as recording:
             a, b = (
                 judged_calibration(self.frames.read([one])[0], one, recording, camera=evidence.camera) for one in paths
             )

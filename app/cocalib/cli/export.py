@@ -233,7 +233,7 @@ def _opened(paths: Sequence[Path], topics: TopicFlags, provenance: "Provenance")
             return open_recording(tuple(paths), like_before, require=("image",))
         except RecordingError:
             pass  # another recording of the same sensors may have other topics
-    return open_recording(tuple(paths), topics, require=("image",))
+    return topics.open(tuple(paths), ("image",))
 
 
 def _refuse_overwriting(recording: "Recording", files: Sequence[Path], *, force: bool) -> None:

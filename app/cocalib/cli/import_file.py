@@ -119,13 +119,12 @@ class MeaningFlags:
         Raises:
             CalibrationError: there is no recording or no camera, or they cannot be read.
         """
-        from calib_core.recordings import open_recording
         from cocalib.hypothesis_sheet import contact_sheet, frame_with_returns, png
         from cocalib.solving.solving import required_camera
 
         if not self.recording:
             raise InputError("--sheet draws over a frame of a recording; give it with --recording RECORDING")
-        with open_recording(self.recording, self.topics, require=("image", "radar")) as recording:
+        with self.topics.open(self.recording, ("image", "radar")) as recording:
             used = camera or _camera_in(file) or required_camera(recording, None)
             frame = frame_with_returns(recording, used, _frame_at(recording, self.at))
         write_whole(out, png(contact_sheet(frame, hypotheses)))

@@ -1,10 +1,16 @@
 """`cocalib info`: show what is in a recording."""
 
-from dataclasses import dataclass, field
+import sys
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
+from calib_core.errors import InputError
 from cocalib.cli.flags import Switch
-from cocalib.cli.output import progress_bar
+from cocalib.cli.output import progress_bar, write_whole
 from cocalib.cli.recording_flags import Recordings, TopicFlags, Topics
+
+if TYPE_CHECKING:
+    from calib_core.recordings import Recording
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,6 +25,8 @@ class Info:
     """Read every message and check every checksum; exit code 1 if anything is damaged, lost or undecodable."""
     decode_pictures: Switch = False
     """With --verify, decode every picture; otherwise only its first and last bytes are looked at."""
+    write: Switch = False
+    """Write recording.toml beside the recording: its topics, clock and columns, which every command reads from then on."""
     topics: Topics = field(default_factory=TopicFlags)
 
     def run(self) -> int:
@@ -26,11 +34,13 @@ class Info:
         import msgspec
 
         from calib_core.input_files import encodable
-        from calib_core.recordings import describe, inspect_recording, recording_summary
+        from calib_core.recordings import describe, recording_summary
 
         if self.verify:
             return self._verify()
-        with inspect_recording(self.recording, self.topics) as recording:
+        with self.topics.open(self.recording, ()) as recording:
+            if self.write:
+                self._write(recording)
             if self.json:
                 summary = encodable(msgspec.to_builtins(recording_summary(recording)))
                 print(msgspec.json.format(msgspec.json.encode(summary), indent=2).decode())
@@ -38,13 +48,30 @@ class Info:
                 print(describe(recording))
         return 0
 
+    def _write(self, recording: "Recording") -> None:
+        """Write recording.toml, never over another one."""
+        from calib_core.recordings.recording_file import recording_file_of, recording_file_text
+
+        path = recording_file_of(self.recording[0])
+        if path.exists():
+            raise InputError(f"{path}: exists already; edit it, or move it away")
+        chosen = replace(
+            self.topics,
+            radar_topic=",".join(recording.radar_topics) or None,
+            image_topic=recording.image_topic,
+            camera_info_topic=recording.camera_info_topic,
+            map=recording.column_map,
+        )
+        write_whole(path, recording_file_text(chosen))
+        print(f"written to {path}", file=sys.stderr)
+
     def _verify(self) -> int:
         import msgspec
 
-        from calib_core.recordings import inspect_recording, verification_text, verify_recording
+        from calib_core.recordings import verification_text, verify_recording
 
         with (
-            inspect_recording(self.recording, self.topics) as recording,
+            self.topics.open(self.recording, ()) as recording,
             progress_bar("reading everything") as progress,
         ):
             found = verify_recording(recording, decode_pictures=self.decode_pictures, progress=progress)

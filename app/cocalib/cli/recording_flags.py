@@ -1,5 +1,6 @@
 """Flags of the commands that read a recording: which files and topics, and the options of a calibration."""
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -43,6 +44,24 @@ class TopicFlags(RecordingOptions):
     video_start: Annotated[str | None, called("TIME")] = same(RecordingOptions, "video_start")
     time_zone: Annotated[str | None, called("OFFSET")] = same(RecordingOptions, "time_zone")
     radar_start: Annotated[str | None, called("TIME[,SECONDS]")] = same(RecordingOptions, "radar_start")
+    no_recording_file: Annotated[bool, called()] = same(RecordingOptions, "no_recording_file")
+
+    def open(self, paths: Sequence[Path], require: "Sequence[Need]" = ("radar", "image")) -> "Recording":
+        """Open a recording; say on stderr what a recording.toml beside it states.
+
+        Args:
+            paths: of it.
+            require: what it must have.
+
+        Raises:
+            RecordingError: it cannot be opened.
+        """
+        from calib_core.recordings import open_recording
+
+        recording = open_recording(paths, self, require=require)
+        if recording.recording_file:
+            print(recording.recording_file, file=sys.stderr)
+        return recording
 
 
 Topics: TypeAlias = Annotated[TopicFlags, tyro.conf.arg(name=""), MORE]
@@ -65,9 +84,7 @@ class RecordedFlags:
         Raises:
             RecordingError: it cannot be opened.
         """
-        from calib_core.recordings import open_recording
-
-        return open_recording(self.recording, self.topics, require=require)
+        return self.topics.open(self.recording, require)
 
 
 Recorded: TypeAlias = Annotated[RecordedFlags, tyro.conf.arg(name="")]

@@ -101,8 +101,7 @@ def open_choice(choice: Choice, stack: ExitStack, tell: Callable[[str], None]) -
         _require_unmoved(choice)
     if not len(recording.image_times):
         _require_nothing_to_calibrate(recording, choice)
-    if recording.radar_choice:
-        print(f"radar: {recording.radar_choice}")
+    _tell(recording)
     with part_of_choice("clicks"):
         clicks = _clicks_at_frames(recording, choice.clicks)
     workspace = _workspace(choice, recording)
@@ -116,6 +115,14 @@ def open_choice(choice: Choice, stack: ExitStack, tell: Callable[[str], None]) -
     if choice.clicks is not None and clicks is not None:
         _import_clicks(workspace, choice.clicks, clicks)
     return Opened(recording, workspace)
+
+
+def _tell(recording: Recording) -> None:
+    """Print what is used of a recording.toml, and which radar."""
+    if recording.recording_file:
+        print(recording.recording_file)
+    if recording.radar_choice:
+        print(f"radar: {recording.radar_choice}")
 
 
 def with_remembered(choice: Choice) -> RecordingOptions:
