@@ -31,7 +31,7 @@ def two_poses(fit: SolvedFit) -> list[DataWarning]:
         if not on_rig(fit, other.camera_from_radar):
             continue
         error = other.camera_from_radar.error_from(fit.refined.camera_from_radar)
-        sigmas = float(np.sqrt(error @ fit.uncertainty.pose_information @ error))
+        sigmas = _sigmas_away(fit, other.camera_from_radar)
         if sigmas <= _OTHER_POSE_SIGMAS:
             continue
         away = (
@@ -43,6 +43,12 @@ def two_poses(fit: SolvedFit) -> list[DataWarning]:
         if _cost_without_prior(fit, other) < _ALMOST_AS_LIKELY:
             return [_assumed_distance(fit, other, away)]
     return []
+
+
+def _sigmas_away(fit: SolvedFit, camera_from_radar: RigidTransform) -> float:
+    """Return how many standard deviations of the pairs' noise a pose is away from the solved one."""
+    error = camera_from_radar.error_from(fit.refined.camera_from_radar)
+    return float(np.sqrt(error @ fit.uncertainty.pose_information @ error))
 
 
 def on_rig(fit: SolvedFit, camera_from_radar: RigidTransform) -> bool:
@@ -101,6 +107,8 @@ def _cost_without_scores(fit: SolvedFit, other: GncSolution) -> float:
     estimate_scale = fit.options.noise.estimate_scale
     equal = replace(fit.measurements, log_score=share)
     there = fit_errors_in_variables(equal, other, estimate_scale=estimate_scale, coarse=True)
+    if _sigmas_away(fit, there.camera_from_radar) <= _OTHER_POSE_SIGMAS:
+        return np.inf  # refined, it is the same pose
     return mixture_cost(there.measurements, there.camera_from_radar) - cost
 
 

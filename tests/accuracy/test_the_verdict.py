@@ -1,8 +1,16 @@
 """Does the truth lie inside the error that good and usable verdicts state? All of it: benchmarks.accuracy --only verdict."""
 
+import numpy as np
+import pytest
 from scipy.special import bdtrc
 
 from benchmarks.accuracy.verdicts import Verdicts, measure_verdict, share_inside
+from calib_core.calibration import calibrate
+from calib_core.results.verdict import verdict_on
+from calib_core.synthetic import PRESETS, SimulationOptions, simulate_scans
+from calib_core.synthetic.sample import SAMPLE_OPTIONS
+from cocalib.session import Session
+from cocalib.view.build import verdict_row
 
 CASES = (
     Verdicts("ti", 20, None, 0.2),
@@ -19,3 +27,18 @@ def test_nineteen_in_twenty_good_and_usable_calibrations_are_as_near_the_truth_a
     assert len(inside) > 45
     misses = int((~inside).sum())
     assert bdtrc(misses - 1, len(inside), 0.05) > 0.01, "so many misses have a chance below 1 % if 95 % hold"
+
+
+@pytest.mark.parametrize("options", [SAMPLE_OPTIONS, PRESETS["default"], PRESETS["fine"], PRESETS["paper-d1"]])
+def test_right_clicks_in_any_order_show_no_red(options: SimulationOptions) -> None:
+    """Neither below the pairs that the verdict needs, nor soon after: no contradiction, and no pair that disagrees."""
+    simulated = simulate_scans(options)
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        order = rng.permutation(len(simulated.clicks))
+        for count in (5, 9):
+            clicks = [simulated.clicks[i] for i in order[:count]]
+            outcome = calibrate(clicks, simulated.scans, simulated.camera, background=simulated.scans).unwrap()
+            shown = verdict_row(verdict_on(outcome), Session(clicks=tuple(clicks), outcome=outcome), None)
+            assert shown.early or shown.level != "contradictory", shown.line
+            assert all(pair.inlier for pair in outcome.pairs)
