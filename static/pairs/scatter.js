@@ -67,7 +67,7 @@ function draw() {
   pen.fillStyle = themeColour("faint");
   pen.font = `11px ${themeColour("face")}`;
   pen.textAlign = "right";
-  pen.fillText(`${most} px`, side - 5, half - 4);
+  pen.fillText(`${most} px`, side - 5, 14); // in the corner, where no mark is
   const shown = clicks().filter((click) => click.projected_px);
   for (const click of shown) mark(click, most);
   canvas.setAttribute("aria-label", describe(shown));
