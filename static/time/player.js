@@ -46,6 +46,7 @@ export function pause() {
 
 export function play() {
   if (state.playing || state.seconds.length < 2) return;
+  leaveLive();
   if (state.cursor >= state.seconds.length - 1) state.cursor = 0;
   state.playing = true;
   restart();
@@ -131,14 +132,14 @@ export function requestAgain() {
 export async function receiveFrame(header, data) {
   if (header.index < 0) return receivePreview(header, data);
   coming = coming.filter((request) => request > header.request);
-  const moving = state.playing || state.live;
-  const stale = header.request < newest && !moving;
-  if (stale) return;
+  const isMoving = () => state.playing || state.live;
+  if (header.request < newest && !isMoving()) return;
   const shown = { index: header.index, ...(await decoded(header, data)) };
   if (shown.rectified !== state.rectified) return shown.bitmap.close();
   keep(shown);
-  const wanted = state.playing || state.live ? header.index > (state.shown?.index ?? -1) || header.request === newest : header.index === state.cursor;
-  if (wanted) show(shown);
+  const newer = isMoving() && header.index > (state.shown?.index ?? -1);
+  const again = state.playing && header.request === newest; // playing from the start again
+  if (newer || again || header.index === state.cursor) show(kept.get(header.index) ?? shown);
 }
 
 /** Take a picture that has arrived before the recording is open. @param {any} header @param {Uint8Array<ArrayBuffer>} data */

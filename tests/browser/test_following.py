@@ -16,6 +16,17 @@ pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
 _DWELL_END_S = 21.0
 
+LATE = """async () => {
+  const [{ receiveFrame }, { requestNumber }] = await Promise.all([import('/time/player.js'), import('/shell/socket.js')]);
+  const canvas = new OffscreenCanvas(8, 8);
+  canvas.getContext('2d').fillRect(0, 0, 8, 8);
+  const data = new Uint8Array(await (await canvas.convertToBlob()).arrayBuffer());
+  const header = { request: requestNumber() - 1, format: 'png', scale: 1, width_px: 8, height_px: 8, rectified: false };
+  await receiveFrame({ ...header, index: __cocalib.state.shown.index - 1 }, data);
+  return __cocalib.state.shown.index === __cocalib.state.cursor;
+}"""
+"""Lets the answer to the latest request arrive late, while a newer frame is on screen; says whether that one stays."""
+
 
 @pytest.fixture
 def writer(tmp_path: Path) -> Iterator[SampleWriter]:
@@ -67,6 +78,7 @@ def test_the_newest_frame_is_shown_until_the_user_steps_back(page, writer, follo
     page.page.locator("#live").click()
     page.until(f"__cocalib.state.live && {newest(page)} && __cocalib.state.shown.scale === 1")
     assert page.value("__cocalib.state.playing") is False
+    assert page.page.evaluate(LATE)
 
 
 def test_placements_and_advice_appear_while_the_file_grows(page, writer):
