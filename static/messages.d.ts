@@ -238,7 +238,6 @@ export interface SystematicErrorRow {
 /** The errors that all pairs share. */
 export interface SystematicErrorTable {
   rows: SystematicErrorRow[];
-  note: string;
   sentences: string[];
 }
 
@@ -736,7 +735,7 @@ export interface LensViewRow {
   held_out_rms_px: number;
 }
 
-/** A picture that is not used. */
+/** A picture that is not used, and why. */
 export interface LeftOutPicture {
   index: number;
   name: string;

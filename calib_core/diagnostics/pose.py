@@ -72,14 +72,13 @@ def _two_poses(fit: SolvedFit, other: GncSolution, away: str) -> DataWarning:
     if not names:
         return DataWarning(
             "two-poses",
-            f"another pose, {away}, explains the pairs almost as well",
+            f"two poses fit: the other is {away}",
             "measure the camera position with a tape, or add placements nearer and farther than the present ones",
         )
     return DataWarning(
         "two-poses",
-        f"another pose, {away}, explains the pairs almost as well, with other radar positions for {len(names)} of them",
-        f"check in the radar view which of the returns is the reflector, for example at {names[0]}: something may always stand "
-        "near it; or measure the camera position with a tape",
+        f"two poses fit: the other is {away}, with other returns for {', '.join(names[:3])}{' and others' if names[3:] else ''}",
+        f"check {names[0]}: which return is the reflector? Or measure the camera position with a tape",
     )
 
 

@@ -501,8 +501,7 @@ _PERCENT = (100.0, "%")
 _CENTIMETRES = (100.0, "cm")
 _EDGES = "placements at both edges of the picture"
 _HEIGHTS = "placements at several heights (a tripod)"
-TAPE = "a tape-measured camera position"
-"""What an action names that is carried out by entering that position."""
+_TAPE = "a tape-measured camera position"
 _PHASE_CENTRE = ("clicks off the phase centre", "the distance of the clicked point from the radar's phase centre")
 _CLICKED = ("clicks or principal point", "the principal point, or what one person's clicks are all off by")
 _APEX = (
@@ -521,14 +520,14 @@ ERROR_WORDS: dict[str, ErrorWords] = {
         "azimuth scale",
         "the radar's azimuth scale",
         *_PERCENT,
-        f"{TAPE}, or {_EDGES}, would reduce it",
+        f"{_TAPE}, or {_EDGES}, would reduce it",
         f"{_EDGES} would reduce it",
     ),
     "elevation_scale": ErrorWords(
         "elevation scale",
         "the radar's elevation scale",
         *_PERCENT,
-        f"{TAPE}, or {_HEIGHTS}, would reduce it",
+        f"{_TAPE}, or {_HEIGHTS}, would reduce it",
         f"{_HEIGHTS} would reduce it",
     ),
     "squared_height_m2": ErrorWords(

@@ -14,7 +14,6 @@ const assumedHead = make("div", "pose-head", "Not measured by this radar, assume
 const assumedTable = make("table", "", []);
 const systematicTable = make("tbody", "", []);
 const systematicWords = make("div", "", []);
-const systematicNote = make("p", "note", "");
 const systematic = make("div", "systematic", []);
 const adviceLine = make("p", "advice", "");
 const assumedLine = make("p", "advice", "");
@@ -24,7 +23,7 @@ export function startFigures() {
   const pose = make("div", "pose", [make("div", "", [poseTable, assumedHead, assumedTable]), axesLine, assumedLine, adviceLine]);
   const heads = [["error", ""], ["estimate", "From the pairs, ± one standard deviation"], ["before", "Assumed before any pair: Options"], ["position", "Part of the variance of the position"], ["rotation", "Part of the variance of the rotation"]];
   const head = make("tr", "", heads.map(([name, hint]) => hinted(make("th", "", name), hint)));
-  systematic.append(make("div", "pose-head", "Errors that all pairs share"), systematicWords, make("table", "", [make("thead", "", [head]), systematicTable]), systematicNote);
+  systematic.append(make("div", "pose-head", "Errors that all pairs share"), systematicWords, make("table", "", [make("thead", "", [head]), systematicTable]));
   posePage.append(poseHead, apart, pose, systematic);
   on(["view", "recording", "placements"], draw);
 }
@@ -61,7 +60,6 @@ function drawSystematic(errors) {
   systematic.hidden = errors.rows.length === 0;
   systematicTable.replaceChildren(...errors.rows.map(systematicRow));
   systematicWords.replaceChildren(...errors.sentences.map((text) => make("p", "", text)));
-  systematicNote.textContent = errors.note;
 }
 
 /** @param {import("../messages.js").SystematicErrorRow} error */

@@ -11,7 +11,6 @@ from calib_core.association.placements import Placement
 from calib_core.measurements import MIN_PAIRS, Unpaired, Unsolvable
 from calib_core.options import GatingOptions
 from calib_core.results import Calibration, DataWarning, NextPlacement
-from calib_core.results.systematic_errors import TAPE
 from calib_core.results.verdict import (
     ALL_CLICKED,
     DONE,
@@ -329,7 +328,7 @@ def _key(verdict: Verdict, session: Session, left: int | None) -> Literal["", "N
 
 def _option(verdict: Verdict, session: Session) -> Literal["", "solving.camera_position", "gating.max_range_m"]:
     """Return the option that does the action: what was measured, or a maximum range that leaves returns out."""
-    if TAPE in verdict.action.lower():
+    if "camera position" in verdict.action and "tape" in verdict.action:
         return "solving.camera_position"
     is_near = session.options.gating.max_range_m < GatingOptions().max_range_m
     return "gating.max_range_m" if is_near and _unpaired(session) else ""

@@ -255,10 +255,8 @@ def systematic_errors(calibration: Calibration) -> SystematicErrorTable:
     """Return the table: errors that the pairs determine or that matter, the largest share first."""
     groups = sorted(_groups(calibration.errors_of_firm), key=_largest_share, reverse=True)
     shown = [group for group in groups if _largest_share(group) >= _SHOWN_SHARE or is_determined(group[0])]
-    rest = len(groups) - len(shown)
-    note = f"{rest} more: the pairs do not determine them, and each has less than 3 % of the variance." if rest else ""
     sentences = (*uncertainty_sentences(calibration), *refined_sentences(calibration))
-    return SystematicErrorTable(tuple(map(_row, shown)), note, sentences)
+    return SystematicErrorTable(tuple(map(_row, shown)), sentences)
 
 
 def _groups(errors: Sequence[SystematicErrorResult]) -> list[list[SystematicErrorResult]]:

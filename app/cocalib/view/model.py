@@ -123,12 +123,10 @@ class SystematicErrorTable:
 
     Attributes:
         rows: those that matter, the largest first.
-        note: on those left out; "" if there are none.
         sentences: what the largest of them mean, and what would reduce them.
     """
 
     rows: tuple[SystematicErrorRow, ...] = ()
-    note: str = ""
     sentences: tuple[str, ...] = ()
 
 

@@ -53,7 +53,6 @@ def test_the_table_shows_what_matters_or_is_determined_the_largest_first(calibra
     assert [(row.position_percent, row.rotation_percent) for row in table.rows] == [(40, 10), (0, 2)]
     assert [row.figure.value for row in table.rows] == ["–", "1.1 ± 0.4"]
     assert [f"{row.prior} {row.figure.unit}" for row in table.rows] == ["± 2.0 %", "± 2.0 %"]
-    assert table.note.startswith("1 more:")
     (words,) = table.sentences
     assert words.startswith("About a third of the variance of the position")
     assert words.endswith("would reduce it.")
