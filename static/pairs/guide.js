@@ -50,8 +50,10 @@ function opening() {
 const EXCLUDE = { key: "X", label: "exclude it", action: "exclude" };
 const REMOVE = { key: "Del", label: "delete it", action: "delete" };
 const SHOW = { key: "J", label: "show it", action: "worst" };
-/** What the button of an option says. @type {Record<string, string>} */
-const OPTIONS = { "solving.camera_position": "enter the camera position", "gating.max_range_m": "maximum range" };
+const POSITION = { key: "", label: "enter the camera position", option: "solving.camera_position" };
+const RANGE = { key: "", label: "change it", option: "gating.max_range_m" };
+/** @type {Words} */
+const BEYOND = ["No radar return within the maximum range.", RANGE];
 const NEXT = { key: "N", label: "next place", action: "next-placement" };
 
 /** @param {number} index @returns {Advice|null} */
@@ -89,9 +91,7 @@ function afterClick(click) {
   const better = state.candidates?.click === click.id ? state.candidates.suggestion : "";
   if (better) return { text: [better, { key: "C", label: "take it", action: "next-candidate" }], act: true };
   if (click.state === "untouched") return { text: ["A guess, which does not count: move it to the inner corner.", REMOVE], act: true };
-  const near = state.view?.verdict.option === "gating.max_range_m";
-  if (click.state === "unpaired" && near) return { text: ["No return within the maximum range here.", { key: "", label: "change it", option: "gating.max_range_m" }], act: true };
-  if (click.state === "unpaired") return { text: ["No radar position here: click another frame of this placement.", NEXT], act: true };
+  if (click.state === "unpaired") return { text: state.view?.verdict.option === RANGE.option ? BEYOND : ["No radar position here: click another frame of this placement.", NEXT], act: true };
   if (click.state === "outlier") return { text: outlierWords(click), act: true };
   const next = nextAction();
   return next ? { text: next, act: false } : null;
@@ -112,9 +112,10 @@ function nextAction() {
   const { action, key, option, done } = view.verdict;
   const guesses = clicks().filter((click) => click.state === "untouched").length;
   if (guesses && !state.placements.some(isOffered)) return [`${guesses} ${guesses > 1 ? "marks are guesses" : "mark is a guess"} and ${guesses > 1 ? "do" : "does"} not count: move ${guesses > 1 ? "each" : "it"} to the inner corner`];
-  const by = OPTIONS[option] ? [{ key: "", label: OPTIONS[option], option }] : [];
+  const by = option === POSITION.option ? [POSITION] : [];
   const leftOut = clicks().filter((click) => click.state === "outlier").map(({ id }) => id);
   if (done) return ["Done.", { key: "E", label: "export", action: "export" }, ...(leftOut.length ? [`Left out: ${leftOut.join(", ")}`, SHOW] : by.length ? ["Better:", ...by] : [])];
+  if (option === RANGE.option) return BEYOND;
   if (key === "N") return [{ key, label: proposalAdvice(), action: "next-placement" }];
   const named = view.verdict.level === "contradictory" ? view.clicks.find(({ id }) => new RegExp(`\\b${id}\\b`).test(action)) : undefined;
   if (named) return [action, { key: "", label: `show ${named.id}`, pair: named.id }];

@@ -23,6 +23,18 @@ def test_a_wrong_click_is_named_and_found_by_j(page: Driver, truth: Any) -> None
     assert "exclude it" in page.text("#guide")
 
 
+def test_a_maximum_range_that_leaves_all_returns_out_is_named_with_its_field(page: Driver, truth: Any) -> None:
+    page.load_sample(truth, 1)
+    page.page.click("#menu-button")
+    page.page.click('#menu [data-action="options"]')
+    page.page.fill("#option-gating-max_range_m", "1")
+    page.page.keyboard.press("Enter")
+    page.until("document.getElementById('guide').innerText.includes('maximum range')")
+    page.page.click("#sheet-close")
+    page.page.click("#guide .do")
+    assert page.value("document.activeElement.id") == "option-gating-max_range_m"
+
+
 def test_a_jump_shows_the_reflector_also_when_zoomed_in(page: Driver, truth: Any) -> None:
     page.until("__cocalib.state.placementsKnown")
     page.load_sample(truth, 2)
