@@ -116,6 +116,7 @@ function nextAction() {
   const leftOut = clicks().filter((click) => click.state === "outlier").map(({ id }) => id);
   if (done) return ["Done.", { key: "E", label: "export", action: "export" }, ...(leftOut.length ? [`Left out: ${leftOut.join(", ")}`, SHOW] : by.length ? ["Better:", ...by] : [])];
   if (option === RANGE.option) return BEYOND;
+  if (key === "N" && view.clicks.length && !state.placements.some(isOffered)) return null; // the last one is on its way
   if (key === "N") return [{ key, label: proposalAdvice(), action: "next-placement" }];
   const named = view.verdict.level === "contradictory" ? view.clicks.find(({ id }) => new RegExp(`\\b${id}\\b`).test(action)) : undefined;
   if (named) return [action, { key: "", label: `show ${named.id}`, pair: named.id }];

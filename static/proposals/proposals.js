@@ -231,7 +231,7 @@ function isInView({ row, place }) {
 
 /** Enter: what the picture shows becomes a mark, and the next proposal is shown. */
 export async function acceptProposal() {
-  if (!takesKeys()) return void (heldBack() || nextProposal() || sayOver());
+  if (!takesKeys()) return void (heldBack() || nextProposal());
   const offer = seenOffer();
   if (!offer) return;
   if (!isInView(offer)) {
@@ -296,10 +296,7 @@ function finish() {
   over = true;
   fit();
   emit("proposals");
-  sayOver();
 }
-
-const sayOver = () => toast("All proposals are decided.", state.proposals?.unproposed.length ? "N goes to the placements without a proposal." : "");
 
 /** C: the next place where the reflector may stand. */
 export function nextPlace() {
