@@ -165,6 +165,7 @@ class Ear:
     def close(self) -> None:
         self.user.keyboard.press("Escape")
         expect(self.user.locator("dialog[open]")).to_have_count(0)
+        self.page.drawn()
 
 
 def mark(ear: Ear, truth: Any) -> None:
