@@ -230,8 +230,9 @@ def peer_section(kept: Kept) -> Section:
         parts.append(
             Part(scene.capitalize(), ("noise", "pairs", "wrong", "trials", "ours, 1 cm", "ours", *names), tuple(cells))
         )
-    absent = {name: "not run: its library is not installed" for name in PEERS if not available(name)} | NOT_RUN
-    parts.append(Part("Without a row", ("method", "why"), tuple(absent.items())))
+    if any(part.cells for part in parts):
+        absent = {name: "not run: its library is not installed" for name in PEERS if not available(name)} | NOT_RUN
+        parts.append(Part("Without a row", ("method", "why"), tuple(absent.items())))
     return Section("How do other methods do on the same draws?", _PEER_TEXT, tuple(parts), ())
 
 
