@@ -67,6 +67,15 @@ def _counted_up(found: list[DataWarning], inliers: Flags) -> list[DataWarning]:
     count = int(inliers.sum())
     if count >= _FEW_INLIERS:
         return found
+    if len(inliers) >= max(_FEW_INLIERS, 2 * count):
+        return [
+            DataWarning(
+                "no-consensus",
+                f"only {count} of {len(inliers)} pairs agree on this pose, which can be chance",
+                "check the clicks one by one: was the reflector clicked, was it at rest, do both recordings use the same clock?",
+            ),
+            *found,
+        ]
     clear = bool(inliers.all()) and not any(one.code in _UNCLEAR for one in found)
     few = DataWarning(
         "few-pairs",

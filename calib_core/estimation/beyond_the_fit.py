@@ -53,7 +53,7 @@ class PosteriorSummary:
     """The answer of the samples, and whether the local one stands.
 
     Attributes:
-        local_holds: whether the stated pose and ellipsoid describe the posterior.
+        local_holds: whether the stated pose and ellipsoid describe the posterior; with too few samples they are what is returned.
         camera_from_radar: the mean pose.
         covariance: (6, 6) about it, of the nearest 99 %.
         quantile: the factor on the covariance that gives the 95 % ellipsoid.
@@ -93,15 +93,17 @@ def summarize_posterior(
     moves = np.zeros((len(weights), 6)) if shared is None else _draws(shared, len(weights), rng)
     squared = _squared(drawn.errors_from(stated) + moves, covariance)
     inside = float(weights @ (squared <= quantile))
+    effective = drawn.samples.effective
+    if effective < _LEAST_EFFECTIVE:  # too few to shape an ellipsoid: that of a single one has no volume
+        return PosteriorSummary(True, stated, covariance, quantile, inside, effective)
     shift = _squared(mean.error_from(stated)[None], covariance)[0]
     errors = drawn.errors_from(mean) + moves
     bulk = _covariance(errors, weights)
     distances = _squared(errors, bulk)
     near = np.where(distances <= _quantile(distances, weights, _BULK), weights, 0.0)
     bulk = _covariance(errors, near / near.sum())
-    effective = drawn.samples.effective
     return PosteriorSummary(
-        local_holds=bool(effective < _LEAST_EFFECTIVE or (inside >= _LEAST_INSIDE and shift <= _LARGEST_SHIFT)),
+        local_holds=bool(inside >= _LEAST_INSIDE and shift <= _LARGEST_SHIFT),
         camera_from_radar=mean,
         covariance=bulk,
         quantile=_quantile(_squared(errors, bulk), weights, 0.95),

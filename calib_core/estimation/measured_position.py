@@ -1,8 +1,8 @@
 """Measured camera position: do the pairs contradict it?
 
 The position that the pairs alone give is compared with the measured one. If it is farther away than that of one right set in
-fifty, the measured position is left out: a camera measured to the housing, or with a wrong sign, would otherwise pull the pose
-along and leave its residuals small.
+thirty-three, the measured position is left out: a camera measured to the housing, or with a wrong sign, would otherwise pull the
+pose along and leave its residuals small.
 """
 
 from dataclasses import dataclass, replace

@@ -309,6 +309,7 @@ _CODES: dict[Consequence, tuple[str, ...]] = {
         "mirrored-axes",
         "units-suspected",
         "pixels-suspected",
+        "no-consensus",
         "camera-position-contradicted",
         "two-poses",
         "handedness-open",

@@ -1,6 +1,7 @@
 """From clicks to a calibration: the shared function, the calibration's text, and the worker."""
 
 import json
+import random
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -98,6 +99,17 @@ def test_lost_returns_lead_the_verdict_where_they_can_matter(
     assert told == (lost != "none")
     assert (verdict.level == "coarse" and "are lost" in verdict.reason) == leads
     assert any(warning.code == "lost-returns" for warning in outcome.warnings) == leads
+
+
+@pytest.mark.parametrize(("seed", "count"), [(7, 20), (100, 20), (108, 20), (114, 10), (115, 10)])
+def test_clicks_in_the_frames_of_other_placements_leave_nothing_to_rely_on(
+    recording: Recording, clicks: tuple[ReflectorClick, ...], seed: int, count: int
+) -> None:
+    pixels = [(click.u_px, click.v_px) for click in clicks[:count]]
+    random.Random(seed).shuffle(pixels)
+    mixed = [replace(one, u_px=u_px, v_px=v_px) for one, (u_px, v_px) in zip(clicks, pixels, strict=False)]
+    outcome = solve_clicks(recording, tuple(mixed), recording.camera(), CalibrationOptions())
+    assert verdict_on(outcome).level == "contradictory"
 
 
 @pytest.mark.parametrize(("share", "lost"), [(1.0, 0), (0.5, 9), (0.125, 18)])
