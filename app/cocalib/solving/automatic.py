@@ -126,10 +126,6 @@ def refusal_of(calibration: Calibration, unpaired: tuple[Unpaired, ...] = ()) ->
     if verdict.level == "contradictory":
         reason = f"nobody confirmed the clicks, and the pose from them is contradictory: {verdict.reason}"
         return Unsolvable("not-confident", reason, _BY_PERSON, unpaired)
-    inliers = [pair.inlier for pair in calibration.pairs if not pair.excluded]
-    if 2 * sum(inliers) <= len(inliers):
-        reason = f"nobody confirmed the clicks, and only {sum(inliers)} of {len(inliers)} agree on the pose from them"
-        return Unsolvable("not-confident", reason, _BY_PERSON, unpaired)
     away_m = _least_distance_m(calibration)
     if calibration.options.solving.camera_position is None and away_m > _FARTHEST_M:
         reason = (
