@@ -44,7 +44,7 @@ one row in forty is missed by chance.
 """
 
 _FIXED = "The draws are those of fixed seeds, which development may have seen."
-_FRESH = "The draws come from the hash of {commit}, the commit that was measured: nobody had seen them."
+_FRESH = "The draws come from a commit's hash, {commit}, after the code was written: nobody had seen them."
 
 
 def page(sections: Sequence[Section], *, commit: str = "", command: str = "make bench-accuracy") -> str:

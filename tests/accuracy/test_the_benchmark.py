@@ -93,7 +93,7 @@ def test_the_page_names_the_commit_of_fresh_seeds_and_nothing_that_was_not_run()
         "quantile": 13.0,
     }
     text = page(sections({"shared-field-ti-12-10pc-free": [figures] * 3}), commit=40 * "a")
-    assert "hash of aaaaaaa," in text
+    assert "hash, aaaaaaa," in text
     assert text.count("| field | ti | 12 | 10% | free | 3 |") == 1
     assert "| not run |" not in text
 
