@@ -83,10 +83,10 @@ def test_debugging_shows_the_traceback(monkeypatch: pytest.MonkeyPatch, capsys: 
 def test_a_command_with_a_bug_exits_with_its_own_code(
     state: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def broken(*_: object) -> None:
+    def broken(*_: object, **__: object) -> None:
         raise RecursionError("too deep")
 
-    monkeypatch.setattr("calib_core.recordings.inspect_recording", broken)
+    monkeypatch.setattr("calib_core.recordings.open_recording", broken)
     assert run(["info", "a.bag"]) == INTERNAL_ERROR
     printed = capsys.readouterr()
     (line,) = printed.err.splitlines()
