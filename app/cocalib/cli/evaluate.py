@@ -2,6 +2,7 @@
 
 import sys
 import typing
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -19,8 +20,10 @@ if TYPE_CHECKING:
     from calib_core.camera import Camera
     from calib_core.evaluation import Evaluation
     from calib_core.interchange import ImportedCalibration
+    from calib_core.measurements import Boxes, ReflectorClick, ReturnLabels
     from calib_core.recordings import Recording
     from calib_core.results import Calibration
+    from cocalib.evaluation.evaluating import EvidenceOptions
     from cocalib.report import ReportSubject
 
 _LEVELS = typing.get_args(Required)
@@ -107,7 +110,6 @@ class Evaluate:
         return code
 
     def _evaluation(self, path: Path) -> "tuple[ImportedCalibration, Calibration, Evaluation]":
-        from cocalib.evaluation.evaluating import evaluate_recording
         from cocalib.evaluation.recording_check import judged_calibration
 
         options = self.judging.evidence.options()
@@ -117,20 +119,34 @@ class Evaluate:
             clicks, boxes, labels = self.judging.evidence.found_in(
                 recording, self.judging.recording, [judged.found], path.name
             )
-            with progress_bar("evaluating") as progress:
-                evaluation = evaluate_recording(
-                    judged.calibration,
-                    recording,
-                    clicks=clicks,
-                    boxes=boxes,
-                    labels=labels,
-                    held_out=not self.no_held_out,
-                    progress=progress,
-                    options=options,
-                )
+            evaluation = self._evaluated(judged.calibration, recording, clicks, boxes, labels, options)
             tell_choices(recording)
             found = replace(evaluation, warnings=(*judged.warnings, *evaluation.warnings))
             return judged.found, judged.calibration, found
+
+    def _evaluated(
+        self,
+        calibration: "Calibration",
+        recording: "Recording",
+        clicks: "Sequence[ReflectorClick]",
+        boxes: "Boxes | None",
+        labels: "ReturnLabels | None",
+        options: "EvidenceOptions",
+    ) -> "Evaluation":
+        """Judge a calibration by clicks and boxes, and show how far it is."""
+        from cocalib.evaluation.evaluating import evaluate_recording
+
+        with progress_bar("evaluating") as progress:
+            return evaluate_recording(
+                calibration,
+                recording,
+                clicks=clicks,
+                boxes=boxes,
+                labels=labels,
+                held_out=not self.no_held_out,
+                progress=progress,
+                options=options,
+            )
 
     def _report(self) -> int:
         """Write the report; return the exit code."""
@@ -197,7 +213,6 @@ class Evaluate:
     ) -> "tuple[ReportSubject, tuple[str, ...]]":
         """Judge the calibration by clicks and boxes, if there are any, and compare it with the other one by them."""
         from cocalib.evaluation.comparing import compare_on_recording, comparison_lines
-        from cocalib.evaluation.evaluating import evaluate_recording
         from cocalib.report import Judged, known_calibration
 
         options = self.judging.evidence.options()
@@ -205,17 +220,7 @@ class Evaluate:
         boxes, labels = self.judging.evidence.boxes_in(recording)
         if not clicks and boxes is None:
             return subject, ()
-        with progress_bar("evaluating") as progress:
-            evaluation = evaluate_recording(
-                calibration,
-                recording,
-                clicks=clicks,
-                boxes=boxes,
-                labels=labels,
-                held_out=not self.no_held_out,
-                progress=progress,
-                options=options,
-            )
+        evaluation = self._evaluated(calibration, recording, clicks, boxes, labels, options)
         subject = replace(subject, judged=Judged(evaluation, clicks))
         if other is None or self.against is None:
             return subject, ()
@@ -223,7 +228,13 @@ class Evaluate:
         assert rival is not None  # a camera is given
         names = self.against.name, subject.name
         compared = compare_on_recording(
-            (rival, calibration), recording, names=names, clicks=clicks, boxes=boxes, labels=labels, options=options
+            (rival, calibration),
+            recording,
+            names=names,
+            clicks=clicks,
+            boxes=boxes,
+            labels=labels,
+            options=self.judging.evidence.options(),
         )
         lines = comparison_lines(compared)
         return subject, tuple(line for line in lines if not line.startswith("warning:"))
