@@ -16,72 +16,62 @@ import json
 import math
 import re
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, List, Sequence, Tuple  # noqa: UP035 - Python 3.8 needs them
 
 TOLERANCE_PX = 1e-3
 
 
-@dataclass(frozen=True)
-class Camera:
-    """What camera_info.yaml says of the camera.
+def _camera(path: Path) -> Tuple[str, List[float], List[float]]:  # noqa: UP006
+    """Read camera_info.yaml as it is in the pack: the lens model, K row by row [px] and the coefficients.
 
-    Attributes:
-        model: plumb_bob (k1 k2 p1 p2 k3), rational_polynomial (the same, k4 k5 k6) or equidistant (k1 k2 k3 k4).
-        matrix_px: K, row by row.
-        distortion: the coefficients.
+    The models are plumb_bob (k1 k2 p1 p2 k3), rational_polynomial (the same, k4 k5 k6) and equidistant (k1 k2 k3 k4).
+
+    Raises:
+        ValueError: a value is missing, or the lens model is unknown.
     """
+    text = path.read_text(encoding="utf-8")
+    named = re.search(r"^distortion_model:\s*\"?(\w+)", text, re.MULTILINE)
+    model = named.group(1) if named else ""
+    if model not in ("plumb_bob", "rational_polynomial", "equidistant"):
+        raise ValueError(f"{path.name}: cannot project through the lens model {model!r}")
+    return model, _listed(text, "camera_matrix", path), _listed(text, "distortion_coefficients", path)
 
-    model: str
-    matrix_px: Sequence[float]
-    distortion: Sequence[float]
 
-    @classmethod
-    def read(cls, path: Path) -> Camera:
-        """Read camera_info.yaml as it is in the pack.
+def _pixel(
+    point_m: Sequence[float], model: str, k: Sequence[float], distortion: Sequence[float]
+) -> Tuple[float, float]:  # noqa: UP006
+    """Return the pixel (u, v) of a point in the camera frame (x right, y down, z forward [m]); NaN where there is none.
 
-        Raises:
-            ValueError: a value is missing, or the lens model is unknown.
-        """
-        text = path.read_text(encoding="utf-8")
-        named = re.search(r"^distortion_model:\s*\"?(\w+)", text, re.MULTILINE)
-        model = named.group(1) if named else ""
-        if model not in ("plumb_bob", "rational_polynomial", "equidistant"):
-            raise ValueError(f"{path.name}: cannot project through the lens model {model!r}")
-        return cls(model, _listed(text, "camera_matrix", path), _listed(text, "distortion_coefficients", path))
+    Pixel (0, 0) is the centre of the top-left pixel.
+    """
+    x, y = (_equidistant if model == "equidistant" else _perspective)(point_m, distortion)
+    return k[0] * x + k[1] * y + k[2], k[3] * x + k[4] * y + k[5]
 
-    def project(self, point_m: Sequence[float]) -> Tuple[float, float]:  # noqa: UP006
-        """Return the pixel (u, v) of a point in the camera frame (x right, y down, z forward [m]); NaN where there is none.
 
-        Pixel (0, 0) is the centre of the top-left pixel.
-        """
-        x, y = self._equidistant(point_m) if self.model == "equidistant" else self._perspective(point_m)
-        k = self.matrix_px
-        return k[0] * x + k[1] * y + k[2], k[3] * x + k[4] * y + k[5]
+def _perspective(point_m: Sequence[float], distortion: Sequence[float]) -> Tuple[float, float]:  # noqa: UP006
+    if not point_m[2] > 0.0:
+        return math.nan, math.nan
+    x, y = point_m[0] / point_m[2], point_m[1] / point_m[2]
+    k1, k2, p1, p2, k3, k4, k5, k6 = (list(distortion) + [0.0] * 8)[:8]
+    r2 = x * x + y * y
+    radial = (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)))
+    return (
+        x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
+        y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
+    )
 
-    def _perspective(self, point_m: Sequence[float]) -> Tuple[float, float]:  # noqa: UP006
-        if not point_m[2] > 0.0:
-            return math.nan, math.nan
-        x, y = point_m[0] / point_m[2], point_m[1] / point_m[2]
-        k1, k2, p1, p2, k3, k4, k5, k6 = (list(self.distortion) + [0.0] * 8)[:8]
-        r2 = x * x + y * y
-        radial = (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)))
-        return (
-            x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
-            y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
-        )
 
-    def _equidistant(self, point_m: Sequence[float]) -> Tuple[float, float]:  # noqa: UP006
-        x, y, z = point_m
-        across = math.hypot(x, y)
-        if across == 0.0:
-            return (0.0, 0.0) if z > 0.0 else (math.nan, math.nan)
-        k1, k2, k3, k4 = (list(self.distortion) + [0.0] * 4)[:4]
-        angle = math.atan2(across, z)
-        squared = angle * angle
-        radius = angle * (1.0 + squared * (k1 + squared * (k2 + squared * (k3 + squared * k4))))
-        return radius * x / across, radius * y / across
+def _equidistant(point_m: Sequence[float], distortion: Sequence[float]) -> Tuple[float, float]:  # noqa: UP006
+    x, y, z = point_m
+    across = math.hypot(x, y)
+    if across == 0.0:
+        return (0.0, 0.0) if z > 0.0 else (math.nan, math.nan)
+    k1, k2, k3, k4 = (list(distortion) + [0.0] * 4)[:4]
+    angle = math.atan2(across, z)
+    squared = angle * angle
+    radius = angle * (1.0 + squared * (k1 + squared * (k2 + squared * (k3 + squared * k4))))
+    return radius * x / across, radius * y / across
 
 
 def _listed(text: str, key: str, path: Path) -> List[float]:  # noqa: UP006
@@ -105,7 +95,7 @@ def _correction(folder: Path) -> Any:
 def _largest_difference_px(folder: Path) -> float:
     """Print a line for each point, and return the largest difference from selftest.csv; infinite if a pixel is missing."""
     pose = json.loads((folder / "calibration.json").read_text(encoding="utf-8"))["camera_from_radar"]
-    camera, correction = Camera.read(folder / "camera_info.yaml"), _correction(folder)
+    camera, correction = _camera(folder / "camera_info.yaml"), _correction(folder)
     with (folder / "selftest.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     if not rows:
@@ -119,7 +109,7 @@ def _largest_difference_px(folder: Path) -> float:
             camera_m = [
                 sum(pose["rotation"][i][j] * point_m[j] for j in range(3)) + pose["translation_m"][i] for i in range(3)
             ]
-            pixels += camera.project(camera_m)
+            pixels += _pixel(camera_m, *camera)
             wanted += [float(row["u" + suffix]), float(row["v" + suffix])]
         off_px = max(abs(pixels[i] - wanted[i]) if math.isfinite(pixels[i]) else math.inf for i in range(4))
         off_px = off_px if math.isfinite(off_px) else math.inf
