@@ -4,12 +4,12 @@ import json
 import os
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from calib_core.errors import InputError
 from calib_core.interchange import names_schema
 from calib_core.interchange.own.documents import CLICKS_SCHEMA
+from cocalib.batch.manifest import ManifestRow
 from cocalib.solving.solving import intrinsics_near
 
 _SUFFIXES = (".bag", ".mcap", ".db3")
@@ -34,15 +34,6 @@ _HEAD = """# Which sessions are calibrated, and how: complete it, then run cocal
 _NOT_CLICKED = (
     "# auto = true  # nobody clicked the reflector in it; this lets the machine, or name a file: clicks = ..."
 )
-
-
-@dataclass(frozen=True, slots=True)
-class _Found:
-    """A session as it lies in a folder."""
-
-    vehicle: str
-    session: str
-    recording: tuple[Path, ...]
 
 
 def first_manifest(folder: Path, manifest: Path) -> tuple[str, int]:
@@ -73,7 +64,7 @@ def first_manifest(folder: Path, manifest: Path) -> tuple[str, int]:
     return "\n".join([_HEAD, *(_text(one, home) for one in found), *left_out, *[""] * bool(left_out)]), len(found)
 
 
-def _left_out(folder: Path, found: Sequence[_Found]) -> Iterator[str]:
+def _left_out(folder: Path, found: Sequence[ManifestRow]) -> Iterator[str]:
     """Yield a comment for each folder of pictures, tables or videos beside which there is no recording."""
     taken = {path.parent for one in found for path in one.recording} - {folder}
     for where, inside, names in os.walk(folder):
@@ -88,7 +79,7 @@ def _as_comment(path: Path) -> str:
     return "".join(one if one.isprintable() else "_" for one in path.as_posix())
 
 
-def _sessions(folder: Path) -> Iterator[_Found]:
+def _sessions(folder: Path) -> Iterator[ManifestRow]:
     recordings: dict[tuple[Path, str], list[Path]] = {}
     for path in _recordings(folder, {folder.resolve()}):
         recordings.setdefault((path.parent, _without_sensor(path)), []).append(path)
@@ -99,7 +90,7 @@ def _sessions(folder: Path) -> Iterator[_Found]:
             parts.append(rest or paths[0].stem)
         only_sensors = _without_sensor(paths[0]) == ""
         session = "-".join(parts[1:]) or (_ONLY_SESSION if only_sensors else paths[0].stem)
-        yield _Found(_as_name(parts[0]), _as_name(session), tuple(sorted(paths)))
+        yield ManifestRow(_as_name(parts[0]), _as_name(session), tuple(sorted(paths)))
 
 
 def _as_name(text: str) -> str:
@@ -141,7 +132,7 @@ def _without_sensor(path: Path) -> str:
     return "-".join(word for word in stem.split() if word.lower() not in _SENSORS)
 
 
-def _text(found: _Found, home: Path) -> str:
+def _text(found: ManifestRow, home: Path) -> str:
     where = found.recording[0].parent
     clicks = [path for path in sorted(where.glob("*.json")) if _has_clicks(path)]
     alone = len([*_recordings(where)]) <= len(found.recording)
