@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from calib_core.calibration import calibrate, calibrate_pairs
+from calib_core.estimation.beyond_the_fit import find_pivotal_pair
 from calib_core.estimation.errors_in_variables import fit_errors_in_variables
 from calib_core.estimation.gnc import GncSolution, associate
 from calib_core.estimation.leave_one_out import noise_parts, predict_left_out, shrunk_scales
 from calib_core.estimation.measurement_model import pair_measurements
-from calib_core.estimation.pivotal_pair import find_pivotal_pair
 from calib_core.geometry import RigidTransform
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions, without_systematic_errors
 from calib_core.results import Calibration
