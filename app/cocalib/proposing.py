@@ -9,7 +9,7 @@ from typing import Literal, Protocol, TypeAlias
 
 import numpy as np
 
-from calib_core.arrays import Vector2
+from calib_core.arrays import TimesNs, Vector2
 from calib_core.association.gating import static_returns
 from calib_core.association.placements import Placement, find_placements, in_stretches
 from calib_core.camera import Camera
@@ -219,9 +219,8 @@ def _no_camera() -> Unsolvable:
 
 
 ProposingStage: TypeAlias = Literal["off", "looking", "comparing", "ready", "failed"]
-_EARLY = (3, 6)
-_EVERY = 4
-"""After so many dwells, and after each further four, there are new proposals."""
+_FIRST, _EVERY = 4, 4
+"""From so many dwells on there may be proposals: after each dwell until there is one, then after every fourth."""
 _LOOKS = 3
 """The first clicks show what the reflector looks like; with these, further ones tell where it is, but nothing new of its look."""
 _log = logging.getLogger(__name__)
@@ -285,17 +284,40 @@ class ProposingSnapshot:
     proposals: Proposals = field(default_factory=lambda: Proposals(()))
 
 
+@dataclass(frozen=True, slots=True)
+class _Patient:
+    """A recording whose pictures are decoded when nothing more urgent is going on."""
+
+    recording: RecordedFrames
+    wait: Callable[[], None]
+
+    @property
+    def image_times(self) -> TimesNs:
+        return self.recording.image_times
+
+    def image(self, index: int, /) -> np.ndarray:
+        self.wait()
+        return self.recording.image(index)
+
+    def radar_windows(self) -> Iterable[RadarScans]:
+        return self.recording.radar_windows()
+
+
 class ProposingJob:
     """Proposes in a thread of its own. Every method may be called from any thread."""
 
-    def __init__(self, recording: RecordedFrames, changed: Callable[[], None]) -> None:
+    def __init__(
+        self, recording: RecordedFrames, changed: Callable[[], None], wait: Callable[[], None] = lambda: None
+    ) -> None:
         """Set up the job.
 
         Args:
             recording: with a radar and a camera.
             changed: called after every change, without any lock held.
+            wait: called before each picture and each proposing; returns when nothing more urgent is going on.
         """
-        self._recording = recording
+        self._recording = _Patient(recording, wait)
+        self._wait = wait
         self._changed = changed
         self._news = threading.Condition()
         self._wish: ProposingWish | None = None
@@ -413,7 +435,8 @@ class ProposingJob:
         wish = self._wish
         if wish is None or isinstance(progress, str):
             return
-        if progress.done in _EARLY or progress.done % _EVERY == 0:
+        waiting = not self._snapshot.proposals.ranked
+        if progress.done >= _FIRST and (waiting or progress.done % _EVERY == 0):
             self._propose(wish, progress.views, done=progress.done, count=progress.count)
         else:
             self._set(wish, done=progress.done, count=progress.count)
@@ -421,6 +444,7 @@ class ProposingJob:
     def _propose(self, wish: ProposingWish, views: Sequence[DwellView], **changes: object) -> None:
         if wish.camera is None:
             return
+        self._wait()
         kept = [view for number, view in enumerate(views) if number not in wish.dismissed]
         found = proposals_of(kept, wish.camera, wish.options, confirmed=wish.confirmed)
         self._set(wish, found, tuple(views), **changes)

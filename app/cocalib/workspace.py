@@ -42,6 +42,7 @@ from cocalib.session.file import Closed, Restored, open_session_file
 from cocalib.solving.worker import SolverWorker
 from cocalib.view import AccPanel, Reference, View, shown_calibration, view
 
+_LONGEST_WAIT_S = 1.0
 Subscriber: TypeAlias = Callable[[View], None]
 Judged: TypeAlias = tuple[tuple[CarriedTrack, ...], Calibration | None]
 """Boxes and a calibration that they say something about."""
@@ -150,6 +151,7 @@ class Workspace:
         self._subscribers: tuple[Subscriber, ...] = ()
         self._pending: deque[tuple[View, tuple[Subscriber, ...]]] = deque()
         self._notifying = False
+        self._answered = threading.Event()
         self._ask_for_answer(restored.history.present)
 
     @property
@@ -339,18 +341,26 @@ class Workspace:
         """
         self.dispatch(boxes_loaded(read_sent_boxes(data, name, self.facts), self.facts))
 
+    def wait_for_answer(self) -> None:
+        """Wait until the clicks are answered, a second at most: for work in the background, which would make the answer late."""
+        self._answered.wait(_LONGEST_WAIT_S)
+
     def close(self) -> Closed:
         """Stop the solver and close the session file; return whether all clicks are on the disk.
 
         Safe to call again.
         """
         self._solver.close()
+        self._answered.set()
         with self._lock:
             return self._journal.close()
 
     def _ask_for_answer(self, session: Session) -> None:
         """Request a solve without holding the lock: the answer may come at once; older requests never replace newer ones."""
-        if session.needs_solving:
+        if not session.needs_solving:
+            self._answered.set()
+        else:
+            self._answered.clear()
             camera = self._chosen_camera(session)
             self._solver.request(session.revision, session.clicks, session.options, self.dispatch, camera)
 

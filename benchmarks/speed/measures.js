@@ -22,7 +22,7 @@
   };
   window.__measures = {
     settled,
-    /** Drag the mark of one click by a few pixels, as a user would to correct it. */
+    /** Drag the mark of one click by a few pixels, as a user would to correct it. Earlier versions have no preview: there it is the answer. */
     async click(number) {
       const click = state.view.clicks[number % state.view.clicks.length];
       goTo(click.frame);
@@ -39,13 +39,17 @@
       await until(() => Math.abs(clickIn(click.frame).u_px - click.u_px) > 0.01);
       await painted();
       const mark = performance.now() - start;
-      await until(() => state.view.revision > revision && solved());
-      await painted();
-      return { mark, solved: performance.now() - start };
+      const since = async (condition) => {
+        await until(() => state.view.revision > revision && condition());
+        await painted();
+        return performance.now() - start;
+      };
+      const [preview, answer] = await Promise.all([since(() => state.view.checking || solved()), since(solved)]);
+      return { mark, preview, answer };
     },
-    /** Step one frame forward. */
+    /** Step one frame forward; from the last one to the first. */
     async step() {
-      const target = state.cursor + 1;
+      const target = (state.cursor + 1) % state.seconds.length;
       const start = performance.now();
       goTo(target);
       await until(() => state.shown.index === target);

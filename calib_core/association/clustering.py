@@ -83,10 +83,19 @@ def window_around(scans: RadarScans, time: TimeNs, *, window_s: float) -> RadarS
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _WindowKey:
-    """A window that equals any other of the same content: the cache key of `clusters_of`."""
+    """A window that equals any other of the same content: the key of what is found in it again after each click."""
 
     window: RadarScans
     digest: bytes
+
+    @classmethod
+    def of(cls, window: RadarScans) -> "_WindowKey":
+        content = hashlib.blake2b()
+        columns = (window.first_return, window.points_radar_m, window.snr_db, window.sigma_polar, window.alternative_of)
+        for column in columns:
+            if column is not None:
+                content.update(np.ascontiguousarray(column).data)
+        return cls(window, content.digest())
 
     def __hash__(self) -> int:
         return hash(self.digest)
@@ -107,19 +116,7 @@ def clusters_of(window: RadarScans, *, most: int, scale: Vector3 = CLUSTER_SCALE
     """
     if not len(window.points_radar_m):
         return ()
-    content = hashlib.blake2b()
-    columns = (
-        window.first_return,
-        window.points_radar_m,
-        window.snr_db,
-        window.sigma_polar,
-        window.alternative_of,
-        scale,
-    )
-    for column in columns:
-        if column is not None:
-            content.update(np.ascontiguousarray(column).data)
-    return _found_clusters(_WindowKey(window, content.digest()), most, tuple(scale.tolist()))
+    return _found_clusters(_WindowKey.of(window), most, tuple(scale.tolist()))
 
 
 @lru_cache(maxsize=512)
@@ -333,7 +330,9 @@ def cluster_scale(windows: Sequence[RadarScans]) -> Vector3:
         windows: the static returns of some parts of a recording, or of all of it.
     """
     most = max(_MOST_SCANS // max(len(windows), 1), _LEAST_SCANS)
-    differences = np.concatenate([np.zeros((0, 3)), *(_differences(window, most) for window in windows)])
+    differences = np.concatenate(
+        [np.zeros((0, 3)), *(_kept_differences(_WindowKey.of(window), most) for window in windows)]
+    )
     if len(differences) < _LEAST_DIFFERENCES:
         return CLUSTER_SCALE
     scatter = np.median(differences, axis=0) / _MEDIAN_OF_DIFFERENCE
@@ -356,6 +355,11 @@ def report_spread(scans: RadarScans) -> Vector3 | None:
     scatter = np.median(differences, axis=0) / _MEDIAN_OF_DIFFERENCE
     bins = np.array([_bin_width(axis) for axis in differences.T])
     return np.asarray(CLUSTER_SCALE * np.maximum(np.maximum(2.0 * _STEPS_PER_SIGMA * scatter, bins), _LEAST_SPREAD))
+
+
+@lru_cache(maxsize=512)
+def _kept_differences(key: _WindowKey, most: int) -> Points3:
+    return _differences(key.window, most)
 
 
 def _differences(static: RadarScans, most: int) -> Points3:

@@ -30,8 +30,6 @@ from calib_core.proposing.still_pictures import (
 
 _SETTLED = 9
 """Once so many dwells are seen, further ones hardly change what is said about one of them."""
-_EARLY = (3, 6)
-"""After so many dwells the first candidates are said."""
 _REMEMBERED = 24
 """Dwells whose still pictures are kept in memory, the last ones."""
 _NEAREST_M = 0.3
@@ -77,7 +75,7 @@ class ViewProgress:
     """How far the pictures are looked at.
 
     Attributes:
-        done: dwells whose pictures are decoded.
+        done: dwells with candidates.
         count: of all.
         views: with candidates as far as they can be said by now.
     """
@@ -103,24 +101,23 @@ def dwell_views(
         frames: of the camera.
         camera: its intrinsics.
         reflector_m: width of the reflector.
-        progress: called after each dwell.
+        progress: called after each dwell with candidates.
         stopped: whether to return what there is by now.
     """
     views: list[DwellView] = []
-    settled = 0
+    done, last = 0, len(placements) - 1
     for number, placement in enumerate(placements):
         if stopped is not None and stopped():
             break
         views.append(_seen(number, placements, frames, reflector_width_px(placement, camera, reflector_m)))
-        if len(views) in _EARLY:
-            views = [_with_blobs(k, views) for k in range(len(views))]
-        if len(views) > _SETTLED:
-            views[settled:] = [_with_candidates(k, views, frames) for k in range(settled, len(views))]
-            settled = len(views)
-            views[:-_REMEMBERED] = [_without_pictures(view) for view in views[:-_REMEMBERED]]
-        if progress is not None:
-            progress(ViewProgress(len(views), len(placements), tuple(views)))
-    views[settled:] = [_with_candidates(k, views, frames) for k in range(settled, len(views))]
+        while done < len(views) and (len(views) > _SETTLED or number == last):
+            if stopped is not None and stopped():
+                break
+            views[done] = _with_candidates(done, views, frames)
+            done += 1
+            if progress is not None:
+                progress(ViewProgress(done, len(placements), tuple(views)))
+        views[:-_REMEMBERED] = [_without_pictures(view) for view in views[:-_REMEMBERED]]
     return tuple(views)
 
 

@@ -9,7 +9,7 @@ import { themeColour } from "../shell/colours.js";
 import { closeSheet, showPage } from "../shell/layout.js";
 import { make, toast } from "../shell/notices.js";
 import { send, tell } from "../shell/socket.js";
-import { emit, on, state } from "../shell/state.js";
+import { emit, on, onPainted, state } from "../shell/state.js";
 import { goTo } from "../time/player.js";
 import { boxing, colourOf, selectBox, selectedBox, selectedTrack, shownBoxes } from "./boxes.js";
 import { hideHere, newBox, removeBox, setEdge, setLabel } from "./boxing.js";
@@ -44,7 +44,7 @@ export function startEvaluating() {
   page.append(edit, accSection(), table, empty, files);
   body.addEventListener("click", pressed);
   on(["box"], follow);
-  on(["view", "boxes", "shown", "recording"], draw);
+  onPainted(["view", "boxes", "shown", "recording"], draw);
   follow();
 }
 

@@ -1,7 +1,7 @@
 /** The top of the panel: how good the answer is; and on the page Check the metrics and the pose. All in the server's text. */
 
 import { make } from "../shell/notices.js";
-import { on, state } from "../shell/state.js";
+import { onPainted, state } from "../shell/state.js";
 
 /** @typedef {import("../messages.js").Figure} Figure */
 const figures = /** @type {HTMLElement} */ (document.getElementById("figures"));
@@ -25,7 +25,7 @@ export function startFigures() {
   const head = make("tr", "", heads.map(([name, hint]) => hinted(make("th", "", name), hint)));
   systematic.append(make("div", "pose-head", "Errors that all pairs share"), systematicWords, make("table", "", [make("thead", "", [head]), systematicTable]));
   posePage.append(poseHead, apart, pose, systematic);
-  on(["view", "recording", "placements"], draw);
+  onPainted(["view", "recording", "placements"], draw);
 }
 
 function draw() {
@@ -126,7 +126,7 @@ let drawn = "";
 const TELLING = 4;
 
 export function startVerdict() {
-  on(["view", "recording"], drawVerdict);
+  onPainted(["view", "recording"], drawVerdict);
 }
 
 function drawVerdict() {

@@ -4,7 +4,7 @@ import { comeTo } from "../picture/arriving.js";
 import { toggleExcluded } from "../picture/clicking.js";
 import { LARGE_PX, residualColour } from "../shell/colours.js";
 import { make } from "../shell/notices.js";
-import { clicks, on, select, stampKey, state } from "../shell/state.js";
+import { clicks, onPainted, select, stampKey, state } from "../shell/state.js";
 import { candidatesOf, choose } from "./candidates.js";
 
 /** @typedef {import("../messages.js").ClickRow} Click */
@@ -27,11 +27,13 @@ const head = make("thead", "", []);
 const table = make("table", "pairs", [head, body]);
 /** The table's row of each click, and what it was drawn from: a row is made again only when that changes. @type {Map<string, {from: unknown[], row: HTMLElement}>} */
 const made = new Map();
+/** The click whose row was scrolled to last. @type {string|null} */
+let shownRow = null;
 /** What else was drawn: the head of the table, or what to click. */
 let drawn = "";
 
 export function startPairs() {
-  on(["opening", "view", "selected", "recording", "placements", "candidates", "proposals"], draw);
+  onPainted(["opening", "view", "selected", "recording", "placements", "candidates", "proposals"], draw);
   page.addEventListener("click", pressed);
 }
 
@@ -78,7 +80,9 @@ function draw() {
   drawn = text;
   drawCandidateRows();
   if (held) /** @type {HTMLElement|null|undefined} */ (made.get(held)?.row.querySelector("[data-act]"))?.focus({ preventScroll: true });
-  body.querySelector('[aria-selected="true"]')?.scrollIntoView({ block: "nearest" });
+  const selected = made.get(state.selected ?? "")?.row;
+  if (selected && shownRow !== state.selected) selected.scrollIntoView({ block: "nearest" });
+  shownRow = selected ? state.selected : null;
 }
 
 /** What to click, before there is a pair: a trihedral reflector with its inner corner marked. */

@@ -2,7 +2,7 @@
 
 import { ink, residualColour, themeColour } from "../shell/colours.js";
 import { make } from "../shell/notices.js";
-import { clicks, on, select, state } from "../shell/state.js";
+import { clicks, onPainted, select, state } from "../shell/state.js";
 import { goTo, pause } from "../time/player.js";
 
 /** CSS px of the plot's side: smaller in a narrow panel. */
@@ -18,7 +18,7 @@ export function startScatter() {
   canvas.dataset.hint = "Reprojection minus click for every pair. An off-centre cloud indicates a bias. Click a mark to go to its frame.";
   document.querySelector("#page-pose .pose")?.append(canvas);
   canvas.addEventListener("click", pressed);
-  on(["view", "selected", "theme", "box"], draw);
+  onPainted(["view", "selected", "theme", "box"], draw);
 }
 
 /** Half the width of the plot [px of the image], a round number that covers every inlier. */

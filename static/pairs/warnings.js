@@ -9,7 +9,7 @@ import { showPage } from "../shell/layout.js";
 import { icon, make, toast } from "../shell/notices.js";
 import { notes, openAgain } from "../shell/opening.js";
 import { send } from "../shell/socket.js";
-import { on, state } from "../shell/state.js";
+import { on, onPainted, state } from "../shell/state.js";
 
 /** @typedef {import("../messages.js").DataWarning} WarningRow */
 /** @typedef {import("../messages.js").AssumptionRow} AssumptionRow */
@@ -27,7 +27,7 @@ let drawn = "";
 
 export function startWarnings() {
   opener.onclick = () => toggle(box.hidden);
-  on(["view", "recording"], drawAll);
+  onPainted(["view", "recording"], drawAll);
   on(["recording"], look);
 }
 

@@ -3,7 +3,7 @@
 import { showPage } from "./layout.js";
 import { make, settled, toast } from "./notices.js";
 import { send } from "./socket.js";
-import { on, state } from "./state.js";
+import { on, onPainted, state } from "./state.js";
 
 /** @typedef {import("../messages.js").OptionDescription} Field */
 const page = /** @type {HTMLElement} */ (document.getElementById("page-options"));
@@ -65,7 +65,7 @@ const writers = new Map();
 
 export function startOptions() {
   on(["recording"], build);
-  on(["view"], fill);
+  onPainted(["view"], fill);
 }
 
 function build() {

@@ -52,6 +52,23 @@ export function on(topics, listener) {
   }
 }
 
+/** Listeners that wait for the next picture. @type {Set<() => void>} */
+const waiting = new Set();
+
+/** The same, once for all changes until the next picture is painted: a mark does not wait for a table. @param {Topic[]} topics @param {() => void} listener */
+export function onPainted(topics, listener) {
+  on(topics, () => {
+    if (!waiting.size) requestAnimationFrame(() => setTimeout(callWaiting));
+    waiting.add(listener);
+  });
+}
+
+function callWaiting() {
+  const now = [...waiting];
+  waiting.clear();
+  for (const listener of now) listener();
+}
+
 /** Notify the listeners of a topic. @param {Topic} topic */
 export function emit(topic) {
   if (topic === "view" || topic === "recording") derived = null;

@@ -7,7 +7,7 @@ import { toDevice, viewport, zoom } from "../picture/geometry.js";
 import { fit } from "../picture/picture.js";
 import { searchWords } from "../proposals/proposals.js";
 import { icon, make } from "./notices.js";
-import { on, state } from "./state.js";
+import { on, onPainted, state } from "./state.js";
 
 /** @param {string} id */
 const get = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
@@ -19,7 +19,7 @@ const REACH = 8;
 export function startStatus() {
   on(["opening"], drawOpening);
   on(["recording"], drawRecording);
-  on(["opening", "view", "connection", "progress", "placements", "following", "proposals"], drawStatus);
+  onPainted(["opening", "view", "connection", "progress", "placements", "following", "proposals"], drawStatus);
   get("zoom").onclick = fit;
   on(["cursor", "shown", "recording", "grown"], drawClock);
   on(["playing"], drawPlay);

@@ -158,9 +158,10 @@ function drawRadar(pen, { top, bottom }, axis) {
   pen.fillStyle = themeColour("faint");
   pen.globalAlpha = 0.6;
   const bars = columns(axis, activity.returns.length, (slice) => slice * activity.step_s, (slice) => activity.returns[slice]);
+  const wide = Math.max(1, barWidth(axis, activity.step_s));
   for (const [x, value] of bars) {
     const tall = Math.max(1, (value / most) * (bottom - top));
-    pen.fillRect(x, bottom - tall, Math.max(1, barWidth(axis, activity.step_s)), tall);
+    pen.fillRect(x, bottom - tall, wide, tall);
   }
   pen.globalAlpha = 1;
 }
@@ -169,20 +170,18 @@ function drawRadar(pen, { top, bottom }, axis) {
 function drawPicture(pen, { top, bottom }, axis) {
   if (bottom === top) return;
   pen.fillStyle = themeColour("attention");
+  const most = Math.max(MUCH, ...changes.grey_levels);
   changes.seconds.forEach((at, index) => {
     const stretch = axis.folding.stretches.find(({ from, to }) => from <= at && at <= to);
     const next = Math.min(changes.seconds[index + 1] ?? Infinity, stretch?.to ?? at);
     if (next < axis.from_s || at > axis.to_s) return;
-    const share = changeShare(index);
+    const share = Math.min(1, changes.grey_levels[index] / most);
     const tall = Math.max(1, share * (bottom - top));
     pen.globalAlpha = 0.3 + 0.5 * share;
     pen.fillRect(axis.toX(at), bottom - tall, Math.max(1, axis.toX(next) - axis.toX(at)), tall);
   });
   pen.globalAlpha = 1;
 }
-
-/** A change as a part of the most in the recording. @param {number} index */
-const changeShare = (index) => Math.min(1, changes.grey_levels[index] / Math.max(MUCH, ...changes.grey_levels));
 
 /** The greatest value in each column of pixels, as [x, value]. @param {Axis} axis @param {number} count @param {(index: number) => number} time @param {(index: number) => number} value @returns {Map<number, number>} */
 function columns(axis, count, time, value) {

@@ -1,7 +1,7 @@
 /** The timeline: where a pointer is in time, and what is there; click to go there, wheel or two fingers to zoom. lanes.js draws it. */
 
 import { hideTip, showTip } from "../shell/notices.js";
-import { clicks, on, state } from "../shell/state.js";
+import { clicks, on, onPainted, state } from "../shell/state.js";
 import { changes, drawLanes, fateOf, laneBoxes, lanes } from "./lanes.js";
 import { jump, nearestIndex } from "./player.js";
 import { foldingOf, gapsOf, lengthWords, toFolded, toSeconds as unfolded } from "./ruler.js";
@@ -23,6 +23,8 @@ const fingers = new Map();
 let pointer = null;
 let waiting = false;
 let dragging = false;
+/** Width of the canvas; asking it for its own would lay the page out for each bar [CSS px]. */
+let wide = 1;
 
 export function startTimeline() {
   new ResizeObserver(redraw).observe(canvas);
@@ -31,7 +33,7 @@ export function startTimeline() {
     showAll();
   });
   on(["grown"], extend);
-  on(["view", "placements", "shown", "selected", "cursor", "theme", "proposals"], redraw);
+  onPainted(["view", "placements", "shown", "selected", "cursor", "theme", "proposals"], redraw);
   canvas.addEventListener("pointerdown", pressed);
   canvas.addEventListener("pointermove", moved);
   canvas.addEventListener("pointerup", released);
@@ -97,7 +99,7 @@ function extend() {
   redraw();
 }
 
-const room = () => Math.max(1, canvas.clientWidth - lanes.left - lanes.right);
+const room = () => Math.max(1, wide - lanes.left - lanes.right);
 
 /** @param {number} seconds @returns {number} CSS px */
 export const toX = (seconds) => lanes.left + ((toFolded(folding, seconds) - span.from) / (span.to - span.from)) * room();
@@ -167,10 +169,10 @@ function wheeled(event) {
   zoomTo(width, toDrawn(event.offsetX) + shift * 0.001 * width, event.offsetX);
 }
 
-/** Show this much of the axis, with a place of it at x. @param {number} wide drawn s @param {number} drawn drawn s @param {number} x CSS px */
-function zoomTo(wide, drawn, x) {
+/** Show this much of the axis, with a place of it at x. @param {number} shown drawn s @param {number} drawn drawn s @param {number} x CSS px */
+function zoomTo(shown, drawn, x) {
   const last = length();
-  const width = Math.min(1.02 * last, Math.max(0.5, wide));
+  const width = Math.min(1.02 * last, Math.max(0.5, shown));
   span.from = Math.min(1.01 * last - width, Math.max(-0.01 * last, drawn - ((x - lanes.left) / room()) * width));
   span.to = span.from + width;
   redraw();
@@ -190,13 +192,15 @@ function redraw() {
   waiting = true;
   requestAnimationFrame(() => {
     waiting = false;
-    follow();
     const ratio = window.devicePixelRatio || 1;
-    const [width, height] = [Math.round(canvas.clientWidth * ratio), Math.round(canvas.clientHeight * ratio)];
+    const high = canvas.clientHeight;
+    wide = canvas.clientWidth;
+    const [width, height] = [Math.round(wide * ratio), Math.round(high * ratio)];
     if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    follow();
     const axis = { toX, from_s: unfolded(folding, span.from), to_s: unfolded(folding, span.to), folding };
-    drawLanes(pen, canvas.clientWidth, canvas.clientHeight, axis, pointer);
+    drawLanes(pen, wide, high, axis, pointer);
     label();
   });
 }

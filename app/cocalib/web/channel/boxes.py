@@ -67,6 +67,8 @@ class BoxJudging:
 
     def judge(self) -> None:
         """Judge the present calibration by the present boxes, if they have not been judged."""
+        if not self._workspace.session.boxes and self._workspace.acc == AccPanel():
+            return
         if (
             self._workspace.to_judge != self._judged
             and not self._is_waiting()

@@ -12,7 +12,7 @@ from cocalib.view import View
 from cocalib.web.messages import ViewChange, change_between, encode
 
 Message: TypeAlias = str | bytes | Callable[[], str]
-"""What is sent, or a function that writes it when it is sent."""
+"""What is sent, or a function that writes it when it is sent; "" if there is nothing to send."""
 
 _MOST = 2000
 """A page that leaves more messages than this unread is considered gone."""
@@ -51,7 +51,8 @@ class Outbox:
                 if len(self._waiting) > _MOST:
                     raise BufferError(f"the page has left {len(self._waiting)} messages unread")
                 _, message = self._waiting.popitem(last=False)
-                await send(message() if callable(message) else message)
+                if text := message() if callable(message) else message:
+                    await send(text)
             self._something.clear()
 
 
@@ -128,7 +129,7 @@ class ViewFeed:
         self._before = self._change = None
 
     def message(self, shown: Shown | None) -> tuple[str, Shown]:
-        """Return the text to send to a page, and what the page has afterwards.
+        """Return the text to send to a page, "" if it has the newest View, and what the page has afterwards.
 
         Args:
             shown: what it has now; None if it has nothing, or does not know.
@@ -137,6 +138,8 @@ class ViewFeed:
             return encode(self._newest), Shown(self._newest)
         if self._change is None or shown.view is not self._before:  # pages usually have the same View
             self._before, self._change = shown.view, change_between(shown.view, self._newest, number=0)
+        if not self._change.fields and self._change.clicks is None:
+            return "", Shown(self._newest, shown.changes)
         number = shown.changes + 1
         change = ViewChange(number, self._change.fields, self._change.clicks)
         return encode(change), Shown(self._newest, number)

@@ -62,7 +62,7 @@ class ProposingDesk:
         self._recording = recording
         self._tell = tell
         self._on = on
-        self._job = ProposingJob(recording, self._changed)
+        self._job = ProposingJob(recording, self._changed, workspace.wait_for_answer)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._is_due = False
         self._numbers: tuple[int, ...] = ()

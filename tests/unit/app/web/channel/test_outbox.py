@@ -83,8 +83,9 @@ def test_a_page_that_applies_changes_has_the_newest_view(steps: list[tuple[View,
         if not reads:
             continue
         text, shown = feed.message(shown)
-        message = json.loads(text)
-        page = message if message["type"] == "view" else applied(page, message)
+        if text:
+            message = json.loads(text)
+            page = message if message["type"] == "view" else applied(page, message)
         assert page == json.loads(encode(newest))
 
 
@@ -96,7 +97,8 @@ def test_rows_may_move_and_share_an_id(before: View, after: View) -> None:
     whole, shown = feed.message(None)
     feed.take(after)
     change, _ = feed.message(shown)
-    assert applied(json.loads(whole), json.loads(change)) == json.loads(encode(after))
+    page = json.loads(whole)
+    assert (applied(page, json.loads(change)) if change else page) == json.loads(encode(after))
 
 
 def test_a_click_costs_the_same_however_many_there_are() -> None:
