@@ -160,7 +160,7 @@ def made(tmp_path: Path, solved_folder: Path) -> Callable[..., Path]:
     def write(name: str = "made", **changes: object) -> Path:
         if name == "made" and not changes:
             return shutil.copytree(solved_folder / "made.mcap", tmp_path / "made.mcap") / "made.mcap.mcap"
-        return write_ros2(tmp_path / f"{name}.mcap", replace(Made(), **changes).messages(), container="mcap")  # type: ignore[arg-type]
+        return write_ros2(tmp_path / f"{name}.mcap", replace(Made(), **changes).messages(), container="mcap")
 
     return write
 

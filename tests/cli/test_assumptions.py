@@ -1,9 +1,7 @@
 """The commands on a recording whose messages do not state everything."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -13,8 +11,6 @@ from cocalib.opening.opened import with_remembered
 from cocalib.session import ColumnsMapped
 from tests.unit.app.session.drive import kept
 from tests.vendor_recording import STATED, vendor_sample
-
-Cocalib = Callable[..., Any]
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +23,7 @@ def clicks(project_root: Path) -> Path:
     return project_root / "sample_data" / "rooftop" / "clicks.json"
 
 
-def test_info_shows_what_was_taken_for_what_and_what_is_assumed(cocalib: Cocalib, paths: tuple[Path, Path]) -> None:
+def test_info_shows_what_was_taken_for_what_and_what_is_assumed(cocalib, paths):
     answer = cocalib("info", *paths)
     assert answer.code == 0
     assert "azimuth    f_Azimuth" in answer.out
@@ -43,9 +39,7 @@ def test_info_shows_what_was_taken_for_what_and_what_is_assumed(cocalib: Cocalib
     assert [row["confirmed"] for row in summary["assumptions"]] == [False, False]
 
 
-def test_solve_waits_until_everything_is_confirmed_or_stated(
-    cocalib: Cocalib, paths: tuple[Path, Path], clicks: Path, tmp_path: Path
-) -> None:
+def test_solve_waits_until_everything_is_confirmed_or_stated(cocalib, paths, clicks, tmp_path):
     answer = cocalib("solve", *paths, "--clicks", clicks, "--out", tmp_path / "a.json")
     assert answer.code == 2
     assert "f_Azimuth is taken as growing to the left" in answer.err
@@ -64,9 +58,7 @@ def test_solve_waits_until_everything_is_confirmed_or_stated(
     assert first == second
 
 
-def test_open_uses_the_map_that_the_session_remembers_unless_another_is_given(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_open_uses_the_map_that_the_session_remembers_unless_another_is_given(tmp_path, capsys):
     radar = (tmp_path / "radar.bag",)
     kept(tmp_path, ColumnsMapped(tuple(STATED)))
     assert with_remembered(Choice(radar, session=tmp_path)).map == STATED

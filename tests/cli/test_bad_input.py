@@ -8,7 +8,6 @@ from typing import Any
 import pytest
 
 Cocalib = Callable[..., Any]
-MadeRecording = Callable[..., Path]
 
 
 @pytest.fixture
@@ -40,7 +39,7 @@ def refused(cocalib: Cocalib, tmp_path: Path, clicks_file: Path) -> Callable[...
     ],
     ids=["absent", "no radar", "no intrinsics"],
 )
-def test_a_recording_that_cannot_be_calibrated_is_named(refused, made, tmp_path, recording, words) -> None:
+def test_a_recording_that_cannot_be_calibrated_is_named(refused, made, tmp_path, recording, words):
     line = refused(recording(made, tmp_path))
     assert [word for word in words if word not in line] == []
 
@@ -58,7 +57,7 @@ STRAY = [{"id": "stray", "image_time": {"sec": 1_600_000_000, "nanosec": 5}, "pi
     ],
     ids=["outside the recording", "outside the picture", "too few", "no list"],
 )
-def test_clicks_that_do_not_fit_are_named(refused, made, clicks_file, tmp_path, change, code, words) -> None:
+def test_clicks_that_do_not_fit_are_named(refused, made, clicks_file, tmp_path, change, code, words):
     document = json.loads(clicks_file.read_text())
     clicks = tmp_path / "other.json"
     clicks.write_text(json.dumps(document | {"clicks": change(document["clicks"])}))
@@ -66,9 +65,7 @@ def test_clicks_that_do_not_fit_are_named(refused, made, clicks_file, tmp_path, 
     assert [word for word in words if word not in line] == []
 
 
-def test_nan_returns_do_not_shift_the_clicks(
-    cocalib: Cocalib, made: MadeRecording, clicks_file: Path, tmp_path: Path
-) -> None:
+def test_nan_returns_do_not_shift_the_clicks(cocalib, made, clicks_file, tmp_path):
     """The authors' script drops NaN rows from the radar list only; here each click keeps its returns."""
     whole, holed = tmp_path / "whole.json", tmp_path / "holed.json"
     assert cocalib("solve", made("whole"), "--clicks", clicks_file, "--out", whole).code == 0
@@ -79,9 +76,7 @@ def test_nan_returns_do_not_shift_the_clicks(
         assert holed_pair["radar_m"] == pytest.approx(pair["radar_m"], abs=0.01)
 
 
-def test_a_misspelt_key_in_a_pairs_file_gets_a_suggestion(
-    cocalib: Cocalib, pairs_file: Callable[..., Path], tmp_path: Path
-) -> None:
+def test_a_misspelt_key_in_a_pairs_file_gets_a_suggestion(cocalib, pairs_file, tmp_path):
     def misspell(document: dict[str, Any]) -> None:
         document["pairs"][3]["pixl_px"] = document["pairs"][3].pop("pixel_px")
 
@@ -95,7 +90,7 @@ def test_a_misspelt_key_in_a_pairs_file_gets_a_suggestion(
     assert not out.exists()
 
 
-def test_three_pairs_are_too_few(cocalib: Cocalib, pairs_file: Callable[..., Path], tmp_path: Path) -> None:
+def test_three_pairs_are_too_few(cocalib, pairs_file, tmp_path):
     out = tmp_path / "calibration.json"
     answer = cocalib("solve", "--pairs", pairs_file(3), "--out", out)
     assert answer.code == 1
@@ -179,14 +174,7 @@ def test_three_pairs_are_too_few(cocalib: Cocalib, pairs_file: Callable[..., Pat
         (["simulate", "--out", "absent", "--preset", "kind"], "not 'kind'"),
     ],
 )
-def test_wrong_usage_gets_a_clear_error(
-    cocalib: Cocalib,
-    project_root: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    arguments: list[str],
-    expected: str,
-) -> None:
+def test_wrong_usage_gets_a_clear_error(cocalib, project_root, tmp_path, monkeypatch, arguments, expected):
     monkeypatch.chdir(tmp_path)
     golden = project_root / "tests/golden/calibration-1.json"
     answer = cocalib(*(word.format(golden=golden) for word in arguments))
@@ -197,7 +185,7 @@ def test_wrong_usage_gets_a_clear_error(
 
 
 @pytest.mark.parametrize("command", ["open", "info", "solve", "export", "check", "import", "show", "simulate"])
-def test_the_help_names_every_value(cocalib: Cocalib, command: str) -> None:
+def test_the_help_names_every_value(cocalib, command):
     answer = cocalib(command, "--help")
     assert answer.code == 0
     assert "None" not in answer.out
@@ -214,7 +202,7 @@ def test_the_help_names_every_value(cocalib: Cocalib, command: str) -> None:
         ("noise.sigma_px", "--set noise.sigma_px: give NAME=VALUE"),
     ],
 )
-def test_a_setting_that_is_none_is_refused_in_one_line(cocalib: Callable[..., Any], setting: str, words: str) -> None:
+def test_a_setting_that_is_none_is_refused_in_one_line(cocalib, setting, words):
     refused = cocalib("solve", "--propose", "nowhere.bag", "--set", setting)
     assert (refused.code, refused.out) == (2, "")
     assert refused.err.startswith(f"cocalib: {words}")

@@ -23,7 +23,7 @@ def fleet(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_from_a_folder_to_a_table(fleet: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_from_a_folder_to_a_table(fleet, capsys):
     manifest = fleet / "fleet.toml"
     assert run(["batch", str(manifest), "--init", str(fleet)]) == 0
     assert "3 sessions written to" in capsys.readouterr().out
@@ -39,7 +39,7 @@ def test_from_a_folder_to_a_table(fleet: Path, capsys: pytest.CaptureFixture[str
     assert "not-clicked" in capsys.readouterr().out
 
 
-def test_what_is_done_is_not_done_again(fleet: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_done_is_not_done_again(fleet, capsys):
     manifest = fleet / "fleet.toml"
     manifest.write_text(
         '[[session]]\nvehicle = "van"\nsession = "1"\nrecording = ["van/clicked/radar.bag", "van/clicked/camera.bag"]\n'
@@ -61,7 +61,7 @@ def test_what_is_done_is_not_done_again(fleet: Path, capsys: pytest.CaptureFixtu
     assert solved.read_bytes() == first
 
 
-def test_a_first_manifest_is_never_written_over_another_file(fleet: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_first_manifest_is_never_written_over_another_file(fleet, capsys):
     manifest = fleet / "fleet.toml"
     manifest.write_text("mine", encoding="utf-8")
     assert run(["batch", str(manifest), "--init", str(fleet)]) == 2
@@ -78,17 +78,13 @@ def test_a_first_manifest_is_never_written_over_another_file(fleet: Path, capsys
         (["--scheduler", "tcp://10.0.0.7:8786"], "without TLS is refused"),
     ],
 )
-def test_flags_that_contradict_each_other_are_refused(
-    flags: list[str], fault: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_flags_that_contradict_each_other_are_refused(flags, fault, tmp_path, capsys):
     (tmp_path / "fleet.toml").write_text('[[session]]\nvehicle = "a"\nrecording = "absent.bag"\n', encoding="utf-8")
     assert run(["batch", str(tmp_path / "fleet.toml"), *flags]) == 2
     assert fault in capsys.readouterr().err
 
 
-def test_what_the_last_batch_wanted_counts_and_what_it_lacks_is_named(
-    fleet: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_the_last_batch_wanted_counts_and_what_it_lacks_is_named(fleet, capsys):
     manifest, out, clicks = fleet / "fleet.toml", fleet / "out", fleet / "van" / "clicked" / "clicks.json"
     row = 'recording = ["van/clicked/radar.bag", "van/clicked/camera.bag"]\nclicks = "van/clicked/clicks.json"\n'
     manifest.write_text(f'[[session]]\nvehicle = "van"\nsession = "1"\n{row}', encoding="utf-8")
@@ -116,7 +112,7 @@ def test_what_the_last_batch_wanted_counts_and_what_it_lacks_is_named(
     assert "van/1" in told
 
 
-def test_a_pose_that_nobody_must_use_is_weak_and_not_exported(fleet: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_pose_that_nobody_must_use_is_weak_and_not_exported(fleet, capsys):
     manifest, clicks = fleet / "fleet.toml", fleet / "van" / "clicked" / "clicks.json"
     mirrored = json.loads(clicks.read_text())
     for click in mirrored["clicks"]:

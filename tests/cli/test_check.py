@@ -2,15 +2,11 @@
 
 import json
 import re
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-
-Cocalib = Callable[..., Any]
 
 
 @pytest.fixture
@@ -26,7 +22,7 @@ def moved(solved: Path, tmp_path: Path) -> Path:
     return tmp_path / "moved.txt"
 
 
-def test_a_file_is_that_calibrations_file_or_stale(cocalib: Cocalib, solved: Path, tmp_path: Path) -> None:
+def test_a_file_is_that_calibrations_file_or_stale(cocalib, solved, tmp_path):
     out = tmp_path / "tf.sh"
     cocalib("export", solved, "--to", "tf2", "--out", out)
 
@@ -43,7 +39,7 @@ def test_a_file_is_that_calibrations_file_or_stale(cocalib: Cocalib, solved: Pat
     assert "stale: exported from another calibration than this one (sha256 " in stale.out
 
 
-def test_a_pose_that_rests_on_a_fleets_prior_is_warned_of(cocalib: Cocalib, project_root: Path, tmp_path: Path) -> None:
+def test_a_pose_that_rests_on_a_fleets_prior_is_warned_of(cocalib, project_root, tmp_path):
     drawn = project_root / "tests/golden/calibration-1-fleet-prior.json"
     checked = cocalib("check", drawn)
     assert checked.code in (0, 3)
@@ -54,7 +50,7 @@ def test_a_pose_that_rests_on_a_fleets_prior_is_warned_of(cocalib: Cocalib, proj
     assert "warning: an older version drew this pose to a fleet's prior" in read.err
 
 
-def test_a_difference_fails_the_gate_unless_the_limits_allow_it(cocalib: Cocalib, solved: Path, moved: Path) -> None:
+def test_a_difference_fails_the_gate_unless_the_limits_allow_it(cocalib, solved, moved):
     differs = cocalib("check", moved, "--against", solved)
     assert differs.code == 1
     assert "DIFFERS: 5 deg" in differs.out
@@ -63,7 +59,7 @@ def test_a_difference_fails_the_gate_unless_the_limits_allow_it(cocalib: Cocalib
     assert cocalib("check", solved, "--against", solved, "--max-sigma", "1").code == 0
 
 
-def test_json_is_one_object_with_every_file(cocalib: Cocalib, solved: Path, moved: Path, tmp_path: Path) -> None:
+def test_json_is_one_object_with_every_file(cocalib, solved, moved, tmp_path):
     broken = tmp_path / "broken.json"
     broken.write_text("{}")
 
@@ -82,7 +78,7 @@ def test_json_is_one_object_with_every_file(cocalib: Cocalib, solved: Path, move
     assert "no pose of a camera and a radar" in unreadable["error"]
 
 
-def test_several_files_get_a_line_each(cocalib: Cocalib, solved: Path, moved: Path) -> None:
+def test_several_files_get_a_line_each(cocalib, solved, moved):
     answer = cocalib("check", solved, moved, "--against", solved)
 
     first, second = answer.out.splitlines()
@@ -90,9 +86,7 @@ def test_several_files_get_a_line_each(cocalib: Cocalib, solved: Path, moved: Pa
     assert second.startswith(f"{moved}: wrong: 5 deg")
 
 
-def test_junit_has_a_case_per_result_and_failures_with_words(
-    cocalib: Cocalib, solved: Path, moved: Path, tmp_path: Path
-) -> None:
+def test_junit_has_a_case_per_result_and_failures_with_words(cocalib, solved, moved, tmp_path):
     (tmp_path / "broken.json").write_text("{}")
     out = tmp_path / "report.xml"
 
@@ -111,9 +105,7 @@ def test_junit_has_a_case_per_result_and_failures_with_words(
     assert "5 deg" in (failure.get("message") or "")
 
 
-def test_a_calibration_holds_on_its_own_recording_and_not_after_the_camera_moved(
-    cocalib: Cocalib, solved: Path, clicks_file: Path
-) -> None:
+def test_a_calibration_holds_on_its_own_recording_and_not_after_the_camera_moved(cocalib, solved, clicks_file):
     holds = cocalib("check", solved, "--recording", solved.with_name("made.mcap"), "--clicks", clicks_file)
     assert holds.code == 0, holds.out
     assert "ok: holds: residuals of 8 clicks on this recording" in holds.out
@@ -132,8 +124,8 @@ def test_a_calibration_holds_on_its_own_recording_and_not_after_the_camera_moved
 
 
 def test_a_file_without_a_camera_is_held_against_a_recording_through_its_intrinsics(
-    cocalib: Cocalib, solved: Path, clicks_file: Path, tmp_path: Path
-) -> None:
+    cocalib, solved, clicks_file, tmp_path
+):
     right, wrong = tmp_path / "right.sh", tmp_path / "wrong.sh"
     cocalib("export", solved, "--to", "tf2", "--out", right)
     wrong.write_text(re.sub(r"--x \S+", "--x 9.0", right.read_text()))
@@ -145,7 +137,7 @@ def test_a_file_without_a_camera_is_held_against_a_recording_through_its_intrins
     assert cocalib("check", wrong, *on_it).code == 1
 
 
-def test_a_recording_without_clicks_says_what_is_needed(cocalib: Cocalib, solved: Path, tmp_path: Path) -> None:
+def test_a_recording_without_clicks_says_what_is_needed(cocalib, solved, tmp_path):
     cocalib("export", solved, "--to", "opencv", "--out", tmp_path / "camera.yaml")
 
     answer = cocalib("check", tmp_path / "camera.yaml", "--recording", solved.with_name("made.mcap"))
@@ -154,9 +146,7 @@ def test_a_recording_without_clicks_says_what_is_needed(cocalib: Cocalib, solved
     assert "give --clicks CLICKS.json" in answer.err
 
 
-def test_another_recording_of_the_same_name_is_said(
-    cocalib: Cocalib, solved: Path, made: Callable[..., Path], clicks_file: Path
-) -> None:
+def test_another_recording_of_the_same_name_is_said(cocalib, solved, made, clicks_file):
     solved.with_name("made.mcap").rename(solved.with_name("yesterday"))
     again = made(nan_scans=1)
 

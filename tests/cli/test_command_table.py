@@ -5,28 +5,23 @@ import inspect
 import re
 import subprocess
 import sys
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
 
 import pytest
 
 from calib_core.recordings import RecordingOptions
 from cocalib.cli import tyro_hook
-from cocalib.cli.commands import COMMANDS, Command
+from cocalib.cli.commands import COMMANDS
 from cocalib.cli.help import written_help
 from cocalib.option_changes import option_groups
 
-Cocalib = Callable[..., Any]
-
 
 @pytest.mark.parametrize("command", COMMANDS.values(), ids=lambda command: command.name)
-def test_the_summary_of_a_command_is_the_beginning_of_its_docstring(command: Command) -> None:
+def test_the_summary_of_a_command_is_the_beginning_of_its_docstring(command):
     first_paragraph = (inspect.getdoc(command.load()) or "").split("\n\n")[0]
     assert command.summary == " ".join(first_paragraph.split())
 
 
-def test_the_overview_names_every_command_with_its_summary_within_a_terminal(cocalib: Cocalib) -> None:
+def test_the_overview_names_every_command_with_its_summary_within_a_terminal(cocalib):
     answer = cocalib("--help")
     assert answer.code == 0
     assert answer.err == ""
@@ -37,14 +32,14 @@ def test_the_overview_names_every_command_with_its_summary_within_a_terminal(coc
     assert cocalib("-h") == cocalib() == answer
 
 
-def test_the_version_is_one_line(cocalib: Cocalib) -> None:
+def test_the_version_is_one_line(cocalib):
     answer = cocalib("--version")
     assert answer.code == 0
     assert re.fullmatch(r"cocalib \d+\.\d+\.\d+\S*\n", answer.out)
 
 
 @pytest.mark.parametrize("command", COMMANDS.values(), ids=lambda command: command.name)
-def test_the_options_of_a_command_are_those_its_whole_help_shows(cocalib: Cocalib, command: Command) -> None:
+def test_the_options_of_a_command_are_those_its_whole_help_shows(cocalib, command):
     shown = cocalib(command.name, "--help", "all")
     assert shown.code == 0
     assert shown.out.startswith(f"usage: cocalib {command.name} ")
@@ -53,7 +48,7 @@ def test_the_options_of_a_command_are_those_its_whole_help_shows(cocalib: Cocali
 
 
 @pytest.mark.parametrize("command", COMMANDS.values(), ids=lambda command: command.name)
-def test_the_help_of_a_command_is_one_screen_with_flags_it_has(cocalib: Cocalib, command: Command) -> None:
+def test_the_help_of_a_command_is_one_screen_with_flags_it_has(cocalib, command):
     shown = cocalib(command.name, "--help")
     assert (shown.code, shown.err) == (0, "")
     assert shown.out == written_help(command), "write it again: python -m cocalib.cli.help"
@@ -66,7 +61,7 @@ def test_the_help_of_a_command_is_one_screen_with_flags_it_has(cocalib: Cocalib,
 
 
 @pytest.mark.parametrize("command", ["open", "solve"])
-def test_the_help_has_the_text_of_every_option(cocalib: Cocalib, command: str) -> None:
+def test_the_help_has_the_text_of_every_option(cocalib, command):
     words = " ".join(re.sub("[│╭╮╰╯─]", " ", cocalib(command, "--help", "all").out).split())
     texts = [description.hint for group in option_groups() for description in group.options]
     texts += [field.metadata["help"] for field in dataclasses.fields(RecordingOptions)]
@@ -74,16 +69,14 @@ def test_the_help_has_the_text_of_every_option(cocalib: Cocalib, command: str) -
     assert [text for text in texts if text not in words] == []
 
 
-def test_tyro_still_has_the_private_events_that_our_usage_errors_need() -> None:
+def test_tyro_still_has_the_private_events_that_our_usage_errors_need():
     assert tyro_hook.missing_parts() == (), (
         "this version of tyro has changed its private events; adapt app/cocalib/cli/tyro_hook.py, or lower the upper bound of "
         "tyro in pyproject.toml. Until then tyro prints its own messages for wrong usage."
     )
 
 
-def test_a_tyro_without_those_events_still_runs_commands_and_prints_its_own_errors(
-    cocalib: Cocalib, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_tyro_without_those_events_still_runs_commands_and_prints_its_own_errors(cocalib, monkeypatch):
     monkeypatch.setitem(sys.modules, "tyro._errors_of_tomorrow", None)
     monkeypatch.setattr(tyro_hook, "_PRIVATE", "tyro._errors_of_tomorrow")
     assert tyro_hook.missing_parts() == ("tyro._errors_of_tomorrow",)
@@ -107,9 +100,7 @@ def test_a_tyro_without_those_events_still_runs_commands_and_prints_its_own_erro
         ("fleet history V1 out", "batch history V1 out"),
     ],
 )
-def test_an_old_name_runs_and_says_what_to_type_now(
-    cocalib: Cocalib, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, typed: str, today: str
-) -> None:
+def test_an_old_name_runs_and_says_what_to_type_now(cocalib, tmp_path, monkeypatch, typed, today):
     monkeypatch.chdir(tmp_path)
     answer = cocalib(*typed.split())
     assert answer.code == 2, "there are no such files"
@@ -129,14 +120,14 @@ def imported_after(*arguments: str) -> set[str]:
 
 
 @pytest.mark.parametrize("arguments", [[], ["--help"], ["--version"], ["bogus"], ["solve", "--help"]], ids=str)
-def test_what_needs_no_command_imports_none(arguments: list[str]) -> None:
+def test_what_needs_no_command_imports_none(arguments):
     imported = imported_after(*arguments)
     assert imported & {"numpy", "tyro", "rich", "msgspec", "calib_core.recordings", "calib_core.synthetic"} == set()
     assert imported & {command.where.partition(":")[0] for command in COMMANDS.values()} == set()
 
 
 @pytest.mark.parametrize("names", [[*COMMANDS], [*reversed(COMMANDS)]], ids=["forwards", "backwards"])
-def test_a_command_imports_no_other_command(names: list[str]) -> None:
+def test_a_command_imports_no_other_command(names):
     """In one of the two orders, whatever a command imports of another comes before the other's turn."""
     code = (
         "import sys\nfrom cocalib.cli.commands import COMMANDS\n"

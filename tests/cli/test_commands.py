@@ -6,10 +6,8 @@ import os
 import re
 import threading
 import tomllib
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
@@ -25,15 +23,13 @@ from tests.corpus_calibrations.data_sets import DATA_SETS
 from tests.corpus_calibrations.tools import TOOLS
 from tests.corpus_calibrations.truth import CAMERA_FROM_RADAR, SIZE
 
-Cocalib = Callable[..., Any]
-
 
 @pytest.fixture
 def calibration(solved: Path) -> Path:
     return solved
 
 
-def test_solve_finds_the_pose_the_recording_was_made_with(calibration: Path) -> None:
+def test_solve_finds_the_pose_the_recording_was_made_with(calibration):
     document = json.loads(calibration.read_text())
     truth = Made().camera_from_radar
     turned = np.array(document["camera_from_radar"]["rotation"]) @ truth.rotation.T
@@ -41,9 +37,7 @@ def test_solve_finds_the_pose_the_recording_was_made_with(calibration: Path) -> 
     assert document["camera_from_radar"]["translation_m"] == pytest.approx(truth.translation_m, abs=0.01)
 
 
-def test_clicks_with_rounded_stamps_are_solved_at_their_frames_and_told(
-    cocalib: Cocalib, made: Callable[..., Path], clicks_file: Path, tmp_path: Path
-) -> None:
+def test_clicks_with_rounded_stamps_are_solved_at_their_frames_and_told(cocalib, made, clicks_file, tmp_path):
     recording = made()
     exact = cocalib("solve", recording, "--clicks", clicks_file)
     document = json.loads(clicks_file.read_text())
@@ -60,9 +54,7 @@ def test_clicks_with_rounded_stamps_are_solved_at_their_frames_and_told(
     )
 
 
-def test_solve_prints_the_same_bytes_for_shuffled_clicks(
-    cocalib: Cocalib, clicks_file: Path, calibration: Path, tmp_path: Path
-) -> None:
+def test_solve_prints_the_same_bytes_for_shuffled_clicks(cocalib, clicks_file, calibration, tmp_path):
     document = json.loads(clicks_file.read_text())
     document["clicks"].reverse()
     clicks_file.write_text(json.dumps(document))
@@ -70,9 +62,7 @@ def test_solve_prints_the_same_bytes_for_shuffled_clicks(
     assert (answer.code, answer.out) == (0, calibration.read_text())
 
 
-def test_solve_refines_the_intrinsics_and_solves_its_file_again(
-    cocalib: Cocalib, pairs_file: Callable[..., Path], tmp_path: Path
-) -> None:
+def test_solve_refines_the_intrinsics_and_solves_its_file_again(cocalib, pairs_file, tmp_path):
     out, again, plain = (tmp_path / name for name in ("refined.json", "again.json", "plain.json"))
     answer = cocalib("solve", "--pairs", pairs_file(), "--out", out, "--refine-intrinsics")
     assert answer.code == 0, answer.err
@@ -88,15 +78,13 @@ def test_solve_refines_the_intrinsics_and_solves_its_file_again(
     assert cocalib("check", again, "--of", out).code == 0
 
 
-def test_a_method_of_older_versions_is_no_choice(cocalib: Cocalib, pairs_file: Callable[..., Path]) -> None:
+def test_a_method_of_older_versions_is_no_choice(cocalib, pairs_file):
     answer = cocalib("solve", "--pairs", pairs_file(), "--method", "pmm")
     assert answer.code == 2
     assert "--method takes default or paper, not 'pmm'" in answer.err
 
 
-def test_a_calibration_by_a_method_of_older_versions_is_read_and_solved_again_by_another(
-    cocalib: Cocalib, pairs_file: Callable[..., Path], tmp_path: Path
-) -> None:
+def test_a_calibration_by_a_method_of_older_versions_is_read_and_solved_again_by_another(cocalib, pairs_file, tmp_path):
     old, again = tmp_path / "old.json", tmp_path / "again.json"
     assert cocalib("solve", "--pairs", pairs_file(), "--out", old).code == 0
     document = json.loads(old.read_text())
@@ -111,9 +99,7 @@ def test_a_calibration_by_a_method_of_older_versions_is_read_and_solved_again_by
     assert json.loads(again.read_text())["camera_from_radar"] == document["camera_from_radar"]
 
 
-def test_solve_names_the_pairs_that_disagree(
-    cocalib: Cocalib, made: Callable[..., Path], clicks_file: Path, tmp_path: Path
-) -> None:
+def test_solve_names_the_pairs_that_disagree(cocalib, made, clicks_file, tmp_path):
     document = json.loads(clicks_file.read_text())
     document["clicks"][5]["pixel_px"][1] += 60.0
     clicks_file.write_text(json.dumps(document))
@@ -123,28 +109,28 @@ def test_solve_names_the_pairs_that_disagree(
     assert line.startswith("disagrees: c5: ")
 
 
-def test_info_names_topics_rates_and_choices(cocalib: Cocalib, made: Callable[..., Path]) -> None:
+def test_info_names_topics_rates_and_choices(cocalib, made):
     answer = cocalib("info", made())
     assert answer.code == 0
     for expected in ("/radar/points", "/camera/image/compressed", "/camera/camera_info", "made.mcap"):
         assert expected in answer.out
 
 
-def test_info_as_json_is_one_document(cocalib: Cocalib, made: Callable[..., Path]) -> None:
+def test_info_as_json_is_one_document(cocalib, made):
     answer = cocalib("info", made(), "--json")
     assert answer.code == 0
     topics = json.loads(answer.out)["topics"]
     assert {topic["name"] for topic in topics} == {"/radar/points", "/camera/image/compressed", "/camera/camera_info"}
 
 
-def test_info_describes_a_recording_that_cannot_be_calibrated(cocalib: Cocalib, made: Callable[..., Path]) -> None:
+def test_info_describes_a_recording_that_cannot_be_calibrated(cocalib, made):
     answer = cocalib("info", made(with_radar=False))
     assert answer.code == 0
     assert "/camera/image/compressed" in answer.out
     assert re.search(r"^radar +no readable topic", answer.out, re.MULTILINE)
 
 
-def test_export_writes_what_check_reads_back(cocalib: Cocalib, calibration: Path, tmp_path: Path) -> None:
+def test_export_writes_what_check_reads_back(cocalib, calibration, tmp_path):
     out = tmp_path / "export.sh"
     assert cocalib("export", calibration, "--to", "tf2", "--out", out).code == 0
     answer = cocalib("check", out, "--against", calibration)
@@ -155,9 +141,7 @@ def test_export_writes_what_check_reads_back(cocalib: Cocalib, calibration: Path
     assert not (tmp_path / "back.json").exists()
 
 
-def test_export_of_another_tools_file_says_how_to_convert_it(
-    cocalib: Cocalib, calibration: Path, tmp_path: Path
-) -> None:
+def test_export_of_another_tools_file_says_how_to_convert_it(cocalib, calibration, tmp_path):
     cocalib("export", calibration, "--to", "tf2", "--out", tmp_path / "old.sh")
     refused = cocalib("export", tmp_path / "old.sh", "--to", "urdf")
     assert refused.code == 2
@@ -166,9 +150,7 @@ def test_export_of_another_tools_file_says_how_to_convert_it(
 
 
 @pytest.mark.parametrize("command", [["export", "--to", "urdf"], ["import"]], ids=["export", "import"])
-def test_a_file_is_read_once_and_may_be_a_pipe(
-    cocalib: Cocalib, calibration: Path, tmp_path: Path, command: list[str]
-) -> None:
+def test_a_file_is_read_once_and_may_be_a_pipe(cocalib, calibration, tmp_path, command):
     out = tmp_path / "out"
     reading, writing = os.pipe()
     os.write(writing, calibration.read_bytes())
@@ -181,9 +163,7 @@ def test_a_file_is_read_once_and_may_be_a_pipe(
     assert cocalib("check", out, "--against", calibration).code == 0
 
 
-def test_export_without_out_prints_and_into_a_folder_names_itself(
-    cocalib: Cocalib, calibration: Path, tmp_path: Path
-) -> None:
+def test_export_without_out_prints_and_into_a_folder_names_itself(cocalib, calibration, tmp_path):
     printed = cocalib("export", calibration, "--to", "urdf").out
     folder = tmp_path / "exports"
     folder.mkdir()
@@ -192,9 +172,7 @@ def test_export_without_out_prints_and_into_a_folder_names_itself(
     assert written.read_text() == printed
 
 
-def test_import_converts_another_tools_file_to_a_calibration(
-    cocalib: Cocalib, calibration: Path, tmp_path: Path
-) -> None:
+def test_import_converts_another_tools_file_to_a_calibration(cocalib, calibration, tmp_path):
     other, back = tmp_path / "calib.txt", tmp_path / "back.json"
     assert cocalib("export", calibration, "--to", "kitti", "--rectified", "--out", other).code == 0
     assert cocalib("import", other, "--out", back, "--camera", calibration).code == 0
@@ -203,9 +181,7 @@ def test_import_converts_another_tools_file_to_a_calibration(
     assert "0 deg apart" in checked.out
 
 
-def test_import_takes_the_image_size_for_a_lens_without_one_and_the_file_beside_a_kitti_calibration(
-    cocalib: Cocalib, tmp_path: Path
-) -> None:
+def test_import_takes_the_image_size_for_a_lens_without_one_and_the_file_beside_a_kitti_calibration(cocalib, tmp_path):
     files = {file.name: file for file in (*TOOLS, *DATA_SETS)}
     for name in ("koide3", "Scale frame", "Segments.ai", "KITTI odometry", "KITTI raw"):
         folder, file = tmp_path / name, files[name]
@@ -225,9 +201,7 @@ def test_import_takes_the_image_size_for_a_lens_without_one_and_the_file_beside_
         assert len(written.camera.distortion) == (5 if "lens" in file.holds_camera else 0)
 
 
-def test_camera_info_is_exported_and_read_by_the_camera_option(
-    cocalib: Cocalib, calibration: Path, tmp_path: Path
-) -> None:
+def test_camera_info_is_exported_and_read_by_the_camera_option(cocalib, calibration, tmp_path):
     info, back = tmp_path / "camera_info.yaml", tmp_path / "back.json"
     written = cocalib("export", calibration, "--to", "camera-info", "--out", info)
     assert written.code == 0
@@ -240,9 +214,7 @@ def test_camera_info_is_exported_and_read_by_the_camera_option(
     assert np.array_equal(cameras[0].matrix_px, cameras[1].matrix_px)
 
 
-def test_import_takes_the_camera_matrix_of_a_kitti_calibration(
-    cocalib: Cocalib, calibration: Path, tmp_path: Path
-) -> None:
+def test_import_takes_the_camera_matrix_of_a_kitti_calibration(cocalib, calibration, tmp_path):
     kitti, back = tmp_path / "calib" / "00000.txt", tmp_path / "back.json"
     kitti.parent.mkdir()
     assert cocalib("export", calibration, "--to", "kitti", "--rectified", "--out", kitti).code == 0
@@ -263,8 +235,8 @@ def test_import_takes_the_camera_matrix_of_a_kitti_calibration(
 
 
 def test_a_format_without_a_place_for_distortion_is_written_for_rectified_pictures_with_the_maps_beside_it(
-    cocalib: Cocalib, calibration: Path, tmp_path: Path
-) -> None:
+    cocalib, calibration, tmp_path
+):
     out = tmp_path / "calib.txt"
     refused = cocalib("export", calibration, "--to", "kitti")
     assert refused.code == 2
@@ -287,7 +259,7 @@ def test_a_format_without_a_place_for_distortion_is_written_for_rectified_pictur
     assert cocalib("export", calibration, "--to", "opencv", "--rectified").code == 2
 
 
-def test_export_poses_the_radar_in_the_kit(cocalib: Cocalib, calibration: Path, tmp_path: Path) -> None:
+def test_export_poses_the_radar_in_the_kit(cocalib, calibration, tmp_path):
     posed = cocalib(
         "export", calibration, "--to", "autoware", "--parent-from-radar", *["1.5", "0", "0.25", "0", "0", "0", "1"]
     )
@@ -301,9 +273,7 @@ def test_export_poses_the_radar_in_the_kit(cocalib: Cocalib, calibration: Path, 
     assert "qw last" in wrong.err
 
 
-def test_a_bare_matrix_is_checked_as_import_reads_it_and_proven_by_pairs(
-    cocalib: Cocalib, calibration: Path, tmp_path: Path
-) -> None:
+def test_a_bare_matrix_is_checked_as_import_reads_it_and_proven_by_pairs(cocalib, calibration, tmp_path):
     matrix = np.eye(4)
     matrix[:3, :3] = json.loads(calibration.read_text())["camera_from_radar"]["rotation"]
     for name, given in (("camera_from_radar", matrix), ("radar_from_camera", np.linalg.inv(matrix))):
@@ -315,9 +285,7 @@ def test_a_bare_matrix_is_checked_as_import_reads_it_and_proven_by_pairs(
         assert cocalib("check", tmp_path / "bare.txt", "--pairs", calibration).code == 0
 
 
-def test_video_writes_the_camera_and_says_when_it_begins(
-    cocalib: Cocalib, made: Callable[..., Path], tmp_path: Path
-) -> None:
+def test_video_writes_the_camera_and_says_when_it_begins(cocalib, made, tmp_path):
     pytest.importorskip("av", reason="the extra 'video' is not installed")
     answer = cocalib("show", made(), "--out", tmp_path / "camera.mp4")
     assert answer.code == 0, answer.err
@@ -325,7 +293,7 @@ def test_video_writes_the_camera_and_says_when_it_begins(
     assert (tmp_path / "camera.mp4").stat().st_size > 1000
 
 
-def test_the_demo_of_another_version_has_a_session_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_demo_of_another_version_has_a_session_of_its_own(tmp_path, monkeypatch):
     sessions: list[Path] = []
 
     def serve(choice: Choice, _serving: Serving) -> int:
@@ -344,9 +312,7 @@ def test_the_demo_of_another_version_has_a_session_of_its_own(tmp_path: Path, mo
     assert sessions[2] != sessions[0]
 
 
-def test_a_calibration_is_solved_again_and_only_typed_options_change(
-    cocalib: Callable[..., Any], pairs_file: Callable[..., Path], tmp_path: Path
-) -> None:
+def test_a_calibration_is_solved_again_and_only_typed_options_change(cocalib, pairs_file, tmp_path):
     first, again, turned = (tmp_path / f"{name}.json" for name in ("first", "again", "turned"))
     position = ("--camera-position-m", "0.1", "0", "0.05", "--camera-position-sigma-m", "0.02")
     assert cocalib("solve", "--pairs", pairs_file(), "--method", "paper", *position, "--out", first).code == 0
@@ -367,9 +333,7 @@ def test_a_calibration_is_solved_again_and_only_typed_options_change(
 
 @pytest.mark.skipif(os.name == "nt", reason="no named pipes in the file system")
 @pytest.mark.parametrize("solved", [False, True], ids=["pairs-1", "calibration-1"])
-def test_pairs_are_read_once_so_a_pipe_works(
-    cocalib: Callable[..., Any], pairs_file: Callable[..., Path], tmp_path: Path, solved: bool
-) -> None:
+def test_pairs_are_read_once_so_a_pipe_works(cocalib, pairs_file, tmp_path, solved):
     source, pipe = pairs_file(), tmp_path / "pipe"
     if solved:
         assert cocalib("solve", "--pairs", source, "--out", tmp_path / "a.json").code == 0
@@ -381,9 +345,7 @@ def test_pairs_are_read_once_so_a_pipe_works(
     writer.join(60)
 
 
-def test_a_table_of_pairs_is_solved_with_a_camera(
-    cocalib: Callable[..., Any], pairs_file: Callable[..., Path], tmp_path: Path
-) -> None:
+def test_a_table_of_pairs_is_solved_with_a_camera(cocalib, pairs_file, tmp_path):
     pairs, table = pairs_file(), tmp_path / "pairs.csv"
     rows = [(*pair["radar_m"], *pair["pixel_px"]) for pair in json.loads(pairs.read_text())["pairs"]]
     table.write_text("x_m,y_m,z_m,u_px,v_px\n" + "".join(f"{','.join(map(str, row))}\n" for row in rows))
@@ -395,9 +357,7 @@ def test_a_table_of_pairs_is_solved_with_a_camera(
     assert names == ["pairs.csv", pairs.name]
 
 
-def test_options_of_a_recording_are_refused_for_pairs(
-    cocalib: Callable[..., Any], pairs_file: Callable[..., Path], tmp_path: Path
-) -> None:
+def test_options_of_a_recording_are_refused_for_pairs(cocalib, pairs_file, tmp_path):
     pairs = pairs_file()
     for option, words in (
         (("--camera", pairs), "brings its own camera"),
@@ -412,9 +372,7 @@ def test_options_of_a_recording_are_refused_for_pairs(
     assert "gating.max_range_m chooses radar returns" in refused.err
 
 
-def test_output_that_cannot_be_a_file_is_refused_in_one_line(
-    cocalib: Callable[..., Any], pairs_file: Callable[..., Path], tmp_path: Path
-) -> None:
+def test_output_that_cannot_be_a_file_is_refused_in_one_line(cocalib, pairs_file, tmp_path):
     for out, words in ((tmp_path, "is a folder"), (tmp_path / "nowhere" / "a.json", "does not exist; create it")):
         refused = cocalib("solve", "--pairs", pairs_file(), "--out", out)
         assert refused.code == 2
@@ -422,9 +380,7 @@ def test_output_that_cannot_be_a_file_is_refused_in_one_line(
         assert refused.err.count("\n") == 1
 
 
-def test_a_recording_toml_beside_the_recording_is_written_read_told_and_kept(
-    cocalib: Cocalib, made: Callable[..., Path], clicks_file: Path, tmp_path: Path
-) -> None:
+def test_a_recording_toml_beside_the_recording_is_written_read_told_and_kept(cocalib, made, clicks_file, tmp_path):
     recording, out = made(), tmp_path / "out.json"
     assert cocalib("info", recording, "--write").code == 0
     (file,) = tmp_path.rglob("recording.toml")
@@ -454,9 +410,7 @@ def test_a_recording_toml_beside_the_recording_is_written_read_told_and_kept(
         ("image_topic = '/none'", "no topic /none"),
     ],
 )
-def test_a_recording_toml_that_states_nothing_known_is_refused(
-    cocalib: Cocalib, made: Callable[..., Path], clicks_file: Path, text: str, words: str
-) -> None:
+def test_a_recording_toml_that_states_nothing_known_is_refused(cocalib, made, clicks_file, text, words):
     recording = made()
     (recording.parent / "recording.toml").write_text(text)
     answer = cocalib("solve", recording, "--clicks", clicks_file)
@@ -464,7 +418,7 @@ def test_a_recording_toml_that_states_nothing_known_is_refused(
     assert words in answer.err
 
 
-def test_a_recording_toml_of_two_recordings_serves_one_of_them(cocalib: Cocalib, made: Callable[..., Path]) -> None:
+def test_a_recording_toml_of_two_recordings_serves_one_of_them(cocalib, made):
     alone = made("alone", with_images=False, with_camera_info=False)
     (alone.parent / "recording.toml").write_text(
         'image_topic = "/camera/image/compressed"\nradar_topic = "/radar/points"\n'

@@ -1,10 +1,8 @@
 """`cocalib evaluate`, and `cocalib check` of two calibrations on a recording: answer, JSON, codes, bad input."""
 
 import json
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
@@ -20,8 +18,6 @@ from calib_core.recordings.containers.writing import (
     write_ros2,
 )
 from tests.street import CAMERA, TRUE_POSE, Street, street, turned
-
-Cocalib = Callable[..., Any]
 
 
 def written(path: Path, scene: Street, *, late_s: float = 0.0) -> Path:
@@ -63,7 +59,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory, scene: Street) -> Path:
     return place
 
 
-def test_residuals_come_first_and_say_what_they_rest_on(cocalib: Cocalib, solved: Path) -> None:
+def test_residuals_come_first_and_say_what_they_rest_on(cocalib, solved):
     recording = solved.parent / "made.mcap"
     answer = cocalib("evaluate", solved, recording)
     first, held, *_ = answer.out.splitlines()
@@ -81,7 +77,7 @@ def test_residuals_come_first_and_say_what_they_rest_on(cocalib: Cocalib, solved
     assert document["boxes"] is None
 
 
-def test_acc_is_never_alone(cocalib: Cocalib, folder: Path) -> None:
+def test_acc_is_never_alone(cocalib, folder):
     answer = cocalib("evaluate", folder / "right.txt", folder / "street.mcap", "--boxes", folder / "boxes.json")
 
     assert answer.code == 0, answer.err
@@ -91,7 +87,7 @@ def test_acc_is_never_alone(cocalib: Cocalib, folder: Path) -> None:
     assert "chance: turned by 10 deg to either side 0." in answer.out
 
 
-def test_the_json_has_the_documented_keys(cocalib: Cocalib, folder: Path) -> None:
+def test_the_json_has_the_documented_keys(cocalib, folder):
     arguments = ("evaluate", folder / "right.txt", folder / "street.mcap", "--boxes", folder / "boxes.json", "--json")
     plain = json.loads(cocalib(*arguments).out)
     truth = json.loads(cocalib(*arguments, "--labels", folder / "labels.json").out)
@@ -104,7 +100,7 @@ def test_the_json_has_the_documented_keys(cocalib: Cocalib, folder: Path) -> Non
     assert "labels say which returns" in truth["boxes"]["rule"]
 
 
-def test_a_turned_calibration_is_told_from_the_right_one(cocalib: Cocalib, folder: Path) -> None:
+def test_a_turned_calibration_is_told_from_the_right_one(cocalib, folder):
     where = (folder / "turned.txt", "--against", folder / "right.txt", "--recording", folder / "street.mcap")
     answer = cocalib("check", *where, "--boxes", folder / "boxes.json")
 
@@ -117,9 +113,7 @@ def test_a_turned_calibration_is_told_from_the_right_one(cocalib: Cocalib, folde
     assert document["on_recording"]["acc"]["high"] < 0
 
 
-def test_a_calibration_that_was_solved_from_the_clicks_is_not_compared_by_them(
-    cocalib: Cocalib, solved: Path, tmp_path: Path
-) -> None:
+def test_a_calibration_that_was_solved_from_the_clicks_is_not_compared_by_them(cocalib, solved, tmp_path):
     pose = json.loads(solved.read_text())["camera_from_radar"]
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = pose["rotation"], np.array(pose["translation_m"]) + np.array([0.1, 0.0, 0.0])
@@ -132,7 +126,7 @@ def test_a_calibration_that_was_solved_from_the_clicks_is_not_compared_by_them(
     assert "calibration.json was solved from these clicks" in answer.out
 
 
-def test_small_differences_may_be_noise(cocalib: Cocalib, folder: Path, tmp_path: Path) -> None:
+def test_small_differences_may_be_noise(cocalib, folder, tmp_path):
     close = matrix_file(tmp_path / "close.txt", 0.03)
     answer = cocalib(
         "check",
@@ -149,7 +143,7 @@ def test_small_differences_may_be_noise(cocalib: Cocalib, folder: Path, tmp_path
     )
 
 
-def test_classes_are_chosen_and_renamed(cocalib: Cocalib, folder: Path) -> None:
+def test_classes_are_chosen_and_renamed(cocalib, folder):
     where = ("evaluate", folder / "right.txt", folder / "street.mcap", "--boxes", folder / "boxes.json")
 
     named = cocalib(*where, "--class-map", "person=pedestrian", "--classes", "pedestrian")
@@ -172,18 +166,14 @@ def test_classes_are_chosen_and_renamed(cocalib: Cocalib, folder: Path) -> None:
         (2, ("--max-time-gap-s", "99"), "--max-time-gap-s: is 99"),
     ],
 )
-def test_bad_options_are_answered_in_words(
-    cocalib: Cocalib, folder: Path, code: int, extra: tuple[str, ...], said: str
-) -> None:
+def test_bad_options_are_answered_in_words(cocalib, folder, code, extra, said):
     answer = cocalib("evaluate", folder / "right.txt", folder / "street.mcap", *extra)
     assert answer.code == code
     assert said in answer.err
     assert answer.err.count("\n") == 1
 
 
-def test_boxes_and_radar_without_common_stamps_are_refused(
-    cocalib: Cocalib, folder: Path, scene: Street, tmp_path: Path
-) -> None:
+def test_boxes_and_radar_without_common_stamps_are_refused(cocalib, folder, scene, tmp_path):
     apart = written(tmp_path / "apart.mcap", scene, late_s=3600.0)
     answer = cocalib("evaluate", folder / "right.txt", apart, "--boxes", folder / "boxes.json")
 
@@ -191,7 +181,7 @@ def test_boxes_and_radar_without_common_stamps_are_refused(
     assert "no annotated frame is within 0.05 s of a radar scan" in answer.err
 
 
-def test_boxes_of_another_recording_are_refused(cocalib: Cocalib, folder: Path, scene: Street, tmp_path: Path) -> None:
+def test_boxes_of_another_recording_are_refused(cocalib, folder, scene, tmp_path):
     other = replace(
         scene.boxes,
         frames=tuple(replace(frame, image_time=TimeNs(frame.image_time + 10**13)) for frame in scene.boxes),
@@ -203,14 +193,14 @@ def test_boxes_of_another_recording_are_refused(cocalib: Cocalib, folder: Path, 
     assert "other.json" in answer.err
 
 
-def test_a_calibration_of_another_camera_is_refused(cocalib: Cocalib, folder: Path, solved: Path) -> None:
+def test_a_calibration_of_another_camera_is_refused(cocalib, folder, solved):
     answer = cocalib("evaluate", solved, folder / "street.mcap", "--boxes", folder / "boxes.json")
 
     assert answer.code == 2
     assert "calibrated for pictures of 320 x 240 px, but the recording's camera has 1280 x 720 px" in answer.err
 
 
-def test_without_moving_returns_there_is_no_acc(cocalib: Cocalib, folder: Path, scene: Street, tmp_path: Path) -> None:
+def test_without_moving_returns_there_is_no_acc(cocalib, folder, scene, tmp_path):
     still = written(
         tmp_path / "still.mcap", replace(scene, scans=replace(scene.scans, doppler_mps=0 * scene.scans.doppler_mps))
     )
@@ -220,9 +210,7 @@ def test_without_moving_returns_there_is_no_acc(cocalib: Cocalib, folder: Path, 
     assert "no moving target was found in the scans of the annotated frames" in answer.out
 
 
-def test_a_calibration_that_looks_elsewhere_than_the_boxes_is_doubted(
-    cocalib: Cocalib, folder: Path, tmp_path: Path
-) -> None:
+def test_a_calibration_that_looks_elsewhere_than_the_boxes_is_doubted(cocalib, folder, tmp_path):
     away = matrix_file(tmp_path / "away.txt", 10.0)
     answer = cocalib("evaluate", away, folder / "street.mcap", "--boxes", folder / "boxes.json")
 
@@ -231,9 +219,7 @@ def test_a_calibration_that_looks_elsewhere_than_the_boxes_is_doubted(
     assert "targets and boxes agree best with a camera turned by" in answer.out
 
 
-def test_what_reading_the_boxes_took_for_granted_is_said(
-    cocalib: Cocalib, folder: Path, scene: Street, tmp_path: Path
-) -> None:
+def test_what_reading_the_boxes_took_for_granted_is_said(cocalib, folder, scene, tmp_path):
     found = [
         {
             "image_id": number,

@@ -1,9 +1,7 @@
 """The law of exit codes, command by command; README, help and the table of commands say it alike."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -15,8 +13,6 @@ from cocalib.cli.commands import COMMANDS
 from cocalib.cli.exit_codes import batch_exit_code, exit_codes
 from cocalib.cli.old_names import OLD_NAMES
 from tests.cli.conftest import Made
-
-Cocalib = Callable[..., Any]
 
 _SCENE = "made.mcap"
 _MADE = Made(placements=20)
@@ -135,16 +131,14 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("row", _TABLE, ids=lambda row: " ".join(map(str, row)))
-def test_every_command_keeps_the_law(
-    row: tuple[Any, ...], folder: Path, cocalib: Cocalib, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_every_command_keeps_the_law(row, folder, cocalib, monkeypatch):
     monkeypatch.chdir(folder)
     code, *arguments = row
     answer = cocalib(*arguments)
     assert answer.code == code, answer.out + answer.err
 
 
-def test_the_table_has_every_command() -> None:
+def test_the_table_has_every_command():
     assert {row[1] for row in _TABLE} == {*COMMANDS, *OLD_NAMES}
 
 
@@ -158,12 +152,12 @@ def test_the_table_has_every_command() -> None:
         ([None] * 200, None, 99),
     ],
 )
-def test_a_batch_counts_what_failed(levels: list[str | None], require: Literal["good", "usable"], code: int) -> None:
+def test_a_batch_counts_what_failed(levels, require, code):
     assert batch_exit_code(levels, require) == code
 
 
 @pytest.mark.parametrize("command", ["check", "export"])
-def test_the_verdict_of_a_file_is_said(command: str, folder: Path, cocalib: Cocalib) -> None:
+def test_the_verdict_of_a_file_is_said(command, folder, cocalib):
     flags = ["--to", "tf2"] if command == "export" else []
     for name in ("good", "contradictory"):
         verdict = json.loads((folder / f"{name}.json").read_text())["verdict"]
@@ -171,6 +165,6 @@ def test_the_verdict_of_a_file_is_said(command: str, folder: Path, cocalib: Coca
         assert verdict["reason"] in answer.out + answer.err
 
 
-def test_readme_and_help_state_the_law_alike(cocalib: Cocalib, project_root: Path) -> None:
+def test_readme_and_help_state_the_law_alike(cocalib, project_root):
     for text in (cocalib("--help").out, (project_root / "README.md").read_text(encoding="utf-8")):
         assert exit_codes() in " ".join(text.split())

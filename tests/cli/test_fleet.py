@@ -2,17 +2,13 @@
 
 import json
 import re
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from cocalib.batch.results_folder import ResultsFolder
 from tests.unit.app.fleet.made_results import digest_of, make_fleet, make_result
-
-Cocalib = Callable[..., Any]
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +26,7 @@ def moved(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_a_sound_fleet_has_nothing_to_look_at(cocalib: Cocalib, sound: Path) -> None:
+def test_a_sound_fleet_has_nothing_to_look_at(cocalib, sound):
     answer = cocalib("batch", "status", sound)
     assert answer.code == 0, answer.err
     lines = answer.out.splitlines()
@@ -40,14 +36,14 @@ def test_a_sound_fleet_has_nothing_to_look_at(cocalib: Cocalib, sound: Path) -> 
     assert lines[8].startswith("type van, 6 vehicles: mountings scatter by ")
 
 
-def test_what_needs_a_look_is_exit_code_3(cocalib: Cocalib, moved: Path) -> None:
+def test_what_needs_a_look_is_exit_code_3(cocalib, moved):
     answer = cocalib("batch", "status", moved)
     assert answer.code == 3
     assert "1 of 2 vehicles to look at:\n  V001: this radar was remounted: " in answer.out
     assert "REMOUNTED" in answer.out
 
 
-def test_status_as_json_has_every_figure(cocalib: Cocalib, moved: Path) -> None:
+def test_status_as_json_has_every_figure(cocalib, moved):
     answer = cocalib("batch", "status", moved, "--json")
     assert answer.code == 3
     found = json.loads(answer.out)
@@ -62,7 +58,7 @@ def test_status_as_json_has_every_figure(cocalib: Cocalib, moved: Path) -> None:
     assert "too few" in found["types"][0]["reason"]
 
 
-def test_history_has_each_transition_with_its_covariance(cocalib: Cocalib, moved: Path) -> None:
+def test_history_has_each_transition_with_its_covariance(cocalib, moved):
     answer = cocalib("batch", "history", "V001", moved, "--json")
     assert answer.code == 0
     found = json.loads(answer.out)
@@ -81,7 +77,7 @@ def test_history_has_each_transition_with_its_covariance(cocalib: Cocalib, moved
     assert f"superseded by later runs: s0 ({digest_of('V001', 's0')})" in text.out
 
 
-def test_compare_says_whether_two_differ(cocalib: Cocalib, moved: Path) -> None:
+def test_compare_says_whether_two_differ(cocalib, moved):
     differing = cocalib("batch", "compare", "V001/s0", "V001/s1", moved)
     assert differing.code == 3
     assert differing.out.startswith("this radar was remounted: ")
@@ -92,25 +88,25 @@ def test_compare_says_whether_two_differ(cocalib: Cocalib, moved: Path) -> None:
     assert "V000 and V001" in vehicles.out
 
 
-def test_summary_writes_the_page(cocalib: Cocalib, moved: Path) -> None:
+def test_summary_writes_the_page(cocalib, moved):
     assert cocalib("batch", "summary", moved).code == 0
     assert "<html" in (moved / "summary.html").read_text()
 
 
-def test_export_writes_the_table(cocalib: Cocalib, moved: Path, tmp_path: Path) -> None:
+def test_export_writes_the_table(cocalib, moved, tmp_path):
     answer = cocalib("batch", "export", moved, "--csv", tmp_path / "f.csv")
     assert answer.code == 0, answer.err
     assert len((tmp_path / "f.csv").read_text().splitlines()) == 6
 
 
-def test_names_cannot_act_on_the_terminal(cocalib: Cocalib, tmp_path: Path) -> None:
+def test_names_cannot_act_on_the_terminal(cocalib, tmp_path):
     make_result(tmp_path, "V\x1b[2J", "s\u202e0", status="failed", reason="\x07")
     for action in ("status", "history V\x1b[2J"):
         out = cocalib("batch", *action.split(" "), tmp_path).out
         assert not set(out) & {"\x1b", "\u202e", "\x07"}
 
 
-def test_results_of_another_version_are_named(cocalib: Cocalib, tmp_path: Path) -> None:
+def test_results_of_another_version_are_named(cocalib, tmp_path):
     make_fleet(tmp_path, 2, 1)
     place = ResultsFolder(tmp_path).folder_of(digest_of("V001", "s0")) / "outcome.json"
     place.write_text(place.read_text().replace("outcome-1", "outcome-2"))
@@ -120,13 +116,13 @@ def test_results_of_another_version_are_named(cocalib: Cocalib, tmp_path: Path) 
     assert "V000" in answer.out
 
 
-def test_a_vehicle_that_there_is_not_is_refused(cocalib: Cocalib, sound: Path) -> None:
+def test_a_vehicle_that_there_is_not_is_refused(cocalib, sound):
     answer = cocalib("batch", "history", "V9", sound)
     assert answer.code == 2
     assert "no vehicle 'V9' among 6" in answer.err
 
 
-def test_a_folder_without_results_is_refused(cocalib: Cocalib, tmp_path: Path) -> None:
+def test_a_folder_without_results_is_refused(cocalib, tmp_path):
     for action in ("status", "summary"):
         answer = cocalib("batch", action, tmp_path)
         assert answer.code == 2

@@ -1,9 +1,5 @@
 """`cocalib open --follow`: the file may come later, and what is waited for is said."""
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
-
 import pytest
 
 from calib_core.recordings import FollowedRecording, Recording
@@ -21,12 +17,7 @@ def served(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Recording, int]]:
     return found
 
 
-def test_a_recording_that_has_not_been_begun_is_waited_for(
-    cocalib: Callable[..., Any],
-    served: list[tuple[Recording, int]],
-    monkeypatch: pytest.MonkeyPatch,
-    tmp_path: Path,
-) -> None:
+def test_a_recording_that_has_not_been_begun_is_waited_for(cocalib, served, monkeypatch, tmp_path):
     path = tmp_path / "drive.mcap"
     writers: list[SampleWriter] = []
 
@@ -47,7 +38,7 @@ def test_a_recording_that_has_not_been_begun_is_waited_for(
     assert frames > 5
 
 
-def test_what_cannot_be_followed_is_refused_at_once(cocalib: Callable[..., Any], tmp_path: Path) -> None:
+def test_what_cannot_be_followed_is_refused_at_once(cocalib, tmp_path):
     answer = cocalib("open", "--follow", tmp_path / "radar.csv", "--no-browser", "--port", 0)
     assert answer.code == 2
     assert "radar.csv: cannot be followed" in answer.err

@@ -4,7 +4,6 @@ import json
 import os
 import socket
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,8 +14,6 @@ from calib_core import input_files
 from calib_core.recordings.containers.writing import RecordedMessage, write_ros2
 from tests.cli.conftest import Made
 
-Cocalib = Callable[..., Any]
-MadeRecording = Callable[..., Path]
 POSIX = pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX files")
 INPUTS = {
     "info": ["info", "{}"],
@@ -42,9 +39,7 @@ def one_line(answer: Any) -> str:
 @POSIX
 @pytest.mark.parametrize("arguments", INPUTS.values(), ids=INPUTS)
 @pytest.mark.parametrize("kind", ["pipe", "device", "socket"])
-def test_what_could_never_end_is_refused_at_once(
-    cocalib: Cocalib, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], kind: str
-) -> None:
+def test_what_could_never_end_is_refused_at_once(cocalib, tmp_path, monkeypatch, arguments, kind):
     monkeypatch.setattr(input_files, "_WRITER_TIMEOUT_S", 0.02)
     path = tmp_path / "input"
     if kind == "pipe":
@@ -62,9 +57,7 @@ def test_what_could_never_end_is_refused_at_once(
 @pytest.mark.parametrize(
     "text", ["a: " + "[" * 5000, "- " * 5000 + "x", "a: 2001-99-99", "!!int x", "? [a]\n: b"], ids=str.__len__
 )
-def test_a_metadata_file_of_another_kind_does_no_harm(
-    cocalib: Cocalib, made: MadeRecording, tmp_path: Path, text: str
-) -> None:
+def test_a_metadata_file_of_another_kind_does_no_harm(cocalib, made, tmp_path, text):
     folder = tmp_path / "bag"
     folder.mkdir()
     made().rename(folder / "bag_0.mcap")
@@ -75,7 +68,7 @@ def test_a_metadata_file_of_another_kind_does_no_harm(
 
 
 @pytest.mark.parametrize("word", ["abc", "1e400x", "--"])
-def test_letters_in_an_ascii_scan_are_reported_by_file(cocalib: Cocalib, tmp_path: Path, word: str) -> None:
+def test_letters_in_an_ascii_scan_are_reported_by_file(cocalib, tmp_path, word):
     folder = tmp_path / "radar"
     folder.mkdir()
     head = "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 1\nHEIGHT 1\nPOINTS 1\nDATA ascii\n"
@@ -87,9 +80,7 @@ def test_letters_in_an_ascii_scan_are_reported_by_file(cocalib: Cocalib, tmp_pat
 
 
 @pytest.mark.parametrize("half", ["\\ud800", "\\uDC00x", "x\\ud83d"])
-def test_half_a_character_in_our_files_is_refused(
-    cocalib: Cocalib, clicks_file: Path, made: MadeRecording, half: str
-) -> None:
+def test_half_a_character_in_our_files_is_refused(cocalib, clicks_file, made, half):
     document = json.loads(clicks_file.read_text())
     document["clicks"][0]["id"] = "HALF"
     clicks_file.write_text(json.dumps(document).replace("HALF", half))
@@ -98,7 +89,7 @@ def test_half_a_character_in_our_files_is_refused(
 
 @pytest.mark.parametrize("depth", [101, 100_000])
 @pytest.mark.parametrize("kind", ["json", "yaml", "xml"])
-def test_deep_nesting_is_refused(cocalib: Cocalib, tmp_path: Path, depth: int, kind: str) -> None:
+def test_deep_nesting_is_refused(cocalib, tmp_path, depth, kind):
     opening, closing = ("<a>", "</a>") if kind == "xml" else ("[", "]")
     outside = {
         "json": '{{"a": {}}}',
@@ -112,9 +103,7 @@ def test_deep_nesting_is_refused(cocalib: Cocalib, tmp_path: Path, depth: int, k
 
 
 @POSIX
-def test_a_pipe_that_nobody_reads_is_no_output(
-    cocalib: Cocalib, pairs_file: Callable[..., Path], tmp_path: Path
-) -> None:
+def test_a_pipe_that_nobody_reads_is_no_output(cocalib, pairs_file, tmp_path):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     assert "nobody reads from this pipe" in one_line(cocalib("solve", "--pairs", pairs_file(), "--out", pipe))
@@ -129,7 +118,7 @@ def test_a_pipe_that_nobody_reads_is_no_output(
 @pytest.mark.parametrize(
     "cell", ["[" * 100_000, "(" * 100_000 + "m", " " * 100_000 + "x", "_" * 100_000, "f_" * 50_000]
 )
-def test_a_table_with_a_long_cell_is_read_in_time(cocalib: Cocalib, tmp_path: Path, cell: str) -> None:
+def test_a_table_with_a_long_cell_is_read_in_time(cocalib, tmp_path, cell):
     """A pattern that tries every place took minutes here: this test would not end."""
     path = tmp_path / "radar.csv"
     path.write_text(f'time_ns,points,x\n1,"{cell}",2\n')
@@ -137,14 +126,12 @@ def test_a_table_with_a_long_cell_is_read_in_time(cocalib: Cocalib, tmp_path: Pa
 
 
 @pytest.mark.parametrize("name", ["", "  ", ","])
-def test_a_topic_without_a_name_is_not_chosen_for_the_user(cocalib: Cocalib, made: MadeRecording, name: str) -> None:
+def test_a_topic_without_a_name_is_not_chosen_for_the_user(cocalib, made, name):
     assert "no topic" in one_line(cocalib("info", made(), "--radar-topic", name))
 
 
 @pytest.mark.parametrize("sigma", [1e308, 1e200, 5e-324, 1e-200])
-def test_a_standard_deviation_beyond_any_measurement_is_refused(
-    cocalib: Cocalib, pairs_file: Callable[..., Path], tmp_path: Path, sigma: float
-) -> None:
+def test_a_standard_deviation_beyond_any_measurement_is_refused(cocalib, pairs_file, tmp_path, sigma):
     path = tmp_path / "calibration.json"
     assert cocalib("solve", "--pairs", pairs_file(), "--out", path).code == 0
     document = json.loads(path.read_text())
@@ -154,9 +141,7 @@ def test_a_standard_deviation_beyond_any_measurement_is_refused(
 
 
 @pytest.mark.parametrize("sigma", ["0", "5e-324", "1e-200", "1e-20"])
-def test_an_error_of_next_to_no_standard_deviation_counts_as_exact(
-    cocalib: Cocalib, pairs_file: Callable[..., Path], sigma: str
-) -> None:
+def test_an_error_of_next_to_no_standard_deviation_counts_as_exact(cocalib, pairs_file, sigma):
     priors = ("radar.range-scale-sigma", "radar.range-bias-sigma-m", "radar.height-sigma-m", "lens.distortion-sigma",
               "lens.focal-length-sigma", "radar.azimuth-scale-sigma", "reflector.offset-sigma-m")  # fmt: skip
     typed = [word for prior in priors for word in (f"--{prior}", sigma)]
@@ -164,9 +149,7 @@ def test_an_error_of_next_to_no_standard_deviation_counts_as_exact(
 
 
 @pytest.mark.parametrize("field", ["image_width", "camera_matrix"])
-def test_a_whole_number_of_400_digits_in_a_camera_file_is_refused(
-    cocalib: Cocalib, pairs_file: Callable[..., Path], tmp_path: Path, field: str
-) -> None:
+def test_a_whole_number_of_400_digits_in_a_camera_file_is_refused(cocalib, pairs_file, tmp_path, field):
     camera = {"image_width": 320, "image_height": 240, "camera_matrix": [260, 0, 160, 0, 260, 120, 0, 0, 1]}
     path = tmp_path / "camera.json"
     path.write_text(json.dumps(camera | {field: 10**400 if field == "image_width" else [10**400] * 9}))
@@ -178,7 +161,7 @@ def test_a_whole_number_of_400_digits_in_a_camera_file_is_refused(
 
 
 @pytest.mark.parametrize("value", ["1e308", "-1e308", "1e200", "1e400"])
-def test_a_quaternion_of_huge_numbers_is_refused(cocalib: Cocalib, tmp_path: Path, value: str) -> None:
+def test_a_quaternion_of_huge_numbers_is_refused(cocalib, tmp_path, value):
     path = tmp_path / "static.txt"
     path.write_text(
         "ros2 run tf2_ros static_transform_publisher --x 0 --y 0 --z 0 "
@@ -188,7 +171,7 @@ def test_a_quaternion_of_huge_numbers_is_refused(cocalib: Cocalib, tmp_path: Pat
 
 
 @POSIX
-def test_a_file_name_that_is_not_utf8_is_shown(cocalib: Cocalib, made: MadeRecording, clicks_file: Path) -> None:
+def test_a_file_name_that_is_not_utf8_is_shown(cocalib, made, clicks_file):
     plain = made()
     odd = plain.rename(Path(os.fsdecode(os.fsencode(plain.parent) + b"/odd-\xff\xfe.mcap")))
     assert "odd-\\xff\\xfe.mcap" in cocalib("info", odd).out
@@ -199,7 +182,7 @@ def test_a_file_name_that_is_not_utf8_is_shown(cocalib: Cocalib, made: MadeRecor
     assert "odd-" in one_line(cocalib("solve", odd, "--clicks", odd))
 
 
-def test_names_from_a_recording_do_not_reach_the_terminal(cocalib: Cocalib, tmp_path: Path) -> None:
+def test_names_from_a_recording_do_not_reach_the_terminal(cocalib, tmp_path):
     topic = "/radar\nwarning   forged\x1b[2J\x1b]0;owned\x07\x9b31m\u202egab"
     messages = [replace(message, topic=topic) if "radar" in message.topic else message for message in Made().messages()]
     assert all(isinstance(message, RecordedMessage) for message in messages)

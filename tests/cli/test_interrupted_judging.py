@@ -1,12 +1,8 @@
 """Ctrl+C while a recording is judged, reported or drawn: exit code 130, one line at most, and no half file."""
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import pytest
-
-Cocalib = Callable[..., Any]
 
 
 def interrupted(*_: object, **__: object) -> NoReturn:
@@ -14,14 +10,7 @@ def interrupted(*_: object, **__: object) -> NoReturn:
 
 
 @pytest.mark.parametrize("command", ["evaluate", "compared", "report", "rrd", "video"])
-def test_an_interrupt_leaves_no_file_and_no_traceback(
-    cocalib: Cocalib,
-    made: Callable[..., Path],
-    clicks_file: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    command: str,
-) -> None:
+def test_an_interrupt_leaves_no_file_and_no_traceback(cocalib, made, clicks_file, tmp_path, monkeypatch, command):
     recording, pose = made(), tmp_path / "calibration.json"
     assert cocalib("solve", recording, "--clicks", clicks_file, "--out", pose).code == 0
     before = sorted(tmp_path.rglob("*"))

@@ -17,7 +17,6 @@ from calib_core.interchange import CAMERA_FORMATS, camera_content, read_camera_f
 from cocalib.cli import board_searching as searching
 from cocalib.intrinsics.picture_sources import FilePictures
 
-Cocalib = Callable[..., Any]
 _BOARD = ("--board", "9x6", "--square-mm", "25")
 
 
@@ -53,9 +52,7 @@ def write_shifted(folder: Path, board: np.ndarray, count: int) -> None:
         cv2.imwrite(str(folder / f"flat{index:02d}.png"), np.clip(noisy, 0, 255).astype(np.uint8))
 
 
-def test_real_pictures_give_a_lens_as_good_as_opencv_s_with_everything_written(
-    cocalib: Cocalib, left: list[Path], tmp_path: Path, project_root: Path
-) -> None:
+def test_real_pictures_give_a_lens_as_good_as_opencv_s_with_everything_written(cocalib, left, tmp_path, project_root):
     out, report, rectified = tmp_path / "camera.yaml", tmp_path / "lens.html", tmp_path / "rectified"
     answer = cocalib("intrinsics", *left, *_BOARD, "--json", "--out", out, "--report", report, "--rectified", rectified)
 
@@ -79,9 +76,7 @@ def test_real_pictures_give_a_lens_as_good_as_opencv_s_with_everything_written(
     assert len(list(rectified.glob("*.png"))) == len(left)
 
 
-def test_planted_pictures_are_named_and_no_good_one_is_dropped(
-    cocalib: Cocalib, right: list[Path], tmp_path: Path
-) -> None:
+def test_planted_pictures_are_named_and_no_good_one_is_dropped(cocalib, right, tmp_path):
     planted = []
     for path in right[:3]:
         planted.append(tmp_path / f"blurred-{path.name}")
@@ -108,9 +103,7 @@ def test_planted_pictures_are_named_and_no_good_one_is_dropped(
     assert "7 x 5" in left_out["another_board.png"]
 
 
-def test_a_stopped_search_is_kept_and_resumed_where_it_was(
-    cocalib: Cocalib, left: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_stopped_search_is_kept_and_resumed_where_it_was(cocalib, left, tmp_path, monkeypatch):
     asked: list[int] = []
     original = FilePictures.picture
 
@@ -150,7 +143,7 @@ def test_a_stopped_search_is_kept_and_resumed_where_it_was(
     assert "with 25 mm, but the board is a checkerboard of 9 x 6 inner corners with 30 mm" in smaller.err
 
 
-def test_pictures_without_a_board_say_so(cocalib: Cocalib, tmp_path: Path) -> None:
+def test_pictures_without_a_board_say_so(cocalib, tmp_path):
     rng = np.random.default_rng(1)
     for index in range(3):
         cv2.imwrite(str(tmp_path / f"{index}.png"), rng.integers(0, 255, (240, 320), dtype=np.uint8))
@@ -159,7 +152,7 @@ def test_pictures_without_a_board_say_so(cocalib: Cocalib, tmp_path: Path) -> No
     assert "None of 3 pictures shows a checkerboard of 9 x 6 inner corners. Film the board" in answer.err
 
 
-def test_a_wrong_size_of_the_board_names_the_right_one(cocalib: Cocalib, left: list[Path]) -> None:
+def test_a_wrong_size_of_the_board_names_the_right_one(cocalib, left):
     answer = cocalib("intrinsics", *left[:2], "--board", "8x7", "--square-mm", "25")
     assert answer.code == 1
     assert "show 9 x 6 inner corners" in answer.err
@@ -169,14 +162,14 @@ def test_a_wrong_size_of_the_board_names_the_right_one(cocalib: Cocalib, left: l
     assert "9 x 6 inner corners" in part.err
 
 
-def test_one_view_is_too_few(cocalib: Cocalib, left: list[Path]) -> None:
+def test_one_view_is_too_few(cocalib, left):
     answer = cocalib("intrinsics", left[0], *_BOARD)
     assert answer.code == 1
     assert "1 usable views of the board, at least 3 are needed" in answer.err
     assert "film the board from at least 10 directions" in answer.err.lower()
 
 
-def test_a_board_that_is_only_shifted_gives_no_focal_length(cocalib: Cocalib, tmp_path: Path) -> None:
+def test_a_board_that_is_only_shifted_gives_no_focal_length(cocalib, tmp_path):
     write_shifted(tmp_path, flat_board(9, 6, 28), 7)
     answer = cocalib("intrinsics", tmp_path, *_BOARD, "--model", "pinhole")
     assert answer.code == 1, answer.out
@@ -184,7 +177,7 @@ def test_a_board_that_is_only_shifted_gives_no_focal_length(cocalib: Cocalib, tm
     assert "turned by 30 to 45°" in answer.err
 
 
-def test_pictures_of_different_sizes_are_not_mixed(cocalib: Cocalib, left: list[Path], tmp_path: Path) -> None:
+def test_pictures_of_different_sizes_are_not_mixed(cocalib, left, tmp_path):
     for path in left[:2]:
         cv2.imwrite(str(tmp_path / path.name), cv2.resize(cv2.imread(str(path)), (800, 600)))
     answer = cocalib("intrinsics", *left[2:5], *(tmp_path / path.name for path in left[:2]), *_BOARD)
@@ -192,9 +185,7 @@ def test_pictures_of_different_sizes_are_not_mixed(cocalib: Cocalib, left: list[
     assert "The pictures have different sizes: 3 of 640 x 480, 2 of 800 x 600 pixels." in answer.err
 
 
-def test_input_that_is_none_is_refused_in_words(
-    cocalib: Cocalib, left: list[Path], made: Callable[..., Path], tmp_path: Path
-) -> None:
+def test_input_that_is_none_is_refused_in_words(cocalib, left, made, tmp_path):
     (tmp_path / "empty").mkdir()
     (tmp_path / "broken.mp4").write_bytes(b"not a video")
     recording = made(with_images=False)
@@ -225,7 +216,7 @@ def test_input_that_is_none_is_refused_in_words(
         assert all(word in answer.err for word in words), answer.err
 
 
-def test_every_format_written_by_the_command_is_read_by_it(cocalib: Cocalib, tmp_path: Path) -> None:
+def test_every_format_written_by_the_command_is_read_by_it(cocalib, tmp_path):
     matrix = np.array([[532.5, 0.0, 340.25], [0.0, 533.5, 233.75], [0.0, 0.0, 1.0]])
     camera = Camera("plumb_bob", 640, 480, matrix, np.array([-0.28, 0.06, 0.001, -0.0005]))
     source = tmp_path / "source.json"
@@ -238,7 +229,7 @@ def test_every_format_written_by_the_command_is_read_by_it(cocalib: Cocalib, tmp
         assert np.allclose(read_camera_file(out).matrix_px, matrix, rtol=1e-6)
 
 
-def test_a_file_with_intrinsics_is_printed_and_converted(cocalib: Cocalib, shared_data: Path, tmp_path: Path) -> None:
+def test_a_file_with_intrinsics_is_printed_and_converted(cocalib, shared_data, tmp_path):
     source = shared_data / "real_checkerboards" / "left_intrinsics.yml"
     shown = cocalib("intrinsics", source)
     assert shown.code == 0

@@ -1,7 +1,6 @@
 """`cocalib import` of files that do not say what their numbers mean."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -11,9 +10,8 @@ import pytest
 from calib_core.geometry import RigidTransform
 from calib_core.interchange import camera_info_text, read_calibration
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL
-from tests.cli.conftest import Made, Typed
+from tests.cli.conftest import Made
 
-Cocalib = Callable[..., Typed]
 POSE = Made().camera_from_radar
 BODY = (LINK_FROM_OPTICAL @ POSE).inverse()
 """The pose of the camera's body frame in the radar: near the identity, so that its direction is open."""
@@ -38,9 +36,7 @@ def _is_pose(path: Path, tolerance: float = 1e-9) -> bool:
     return bool(np.abs(found.as_matrix() - POSE.as_matrix()).max() < tolerance)
 
 
-def test_import_lists_what_the_numbers_may_mean_and_writes_nothing(
-    cocalib: Cocalib, ambiguous: Path, camera_file: Path, tmp_path: Path
-) -> None:
+def test_import_lists_what_the_numbers_may_mean_and_writes_nothing(cocalib, ambiguous, camera_file, tmp_path):
     out = tmp_path / "out.json"
     listed = cocalib("import", ambiguous, "--out", out, "--camera", camera_file)
     assert listed.code == 1
@@ -52,13 +48,11 @@ def test_import_lists_what_the_numbers_may_mean_and_writes_nothing(
     assert "Nothing was written: pick one, such as --as " in listed.out
 
 
-def test_import_needs_no_output_file_to_list(cocalib: Cocalib, ambiguous: Path) -> None:
+def test_import_needs_no_output_file_to_list(cocalib, ambiguous):
     assert cocalib("import", ambiguous).code == 1
 
 
-def test_import_writes_what_was_picked_and_says_so(
-    cocalib: Cocalib, ambiguous: Path, camera_file: Path, tmp_path: Path
-) -> None:
+def test_import_writes_what_was_picked_and_says_so(cocalib, ambiguous, camera_file, tmp_path):
     out = tmp_path / "out.json"
     picked = cocalib("import", ambiguous, "--as", "radar_from_camera,body,m", "--out", out, "--camera", camera_file)
     assert picked.code == 3
@@ -69,9 +63,7 @@ def test_import_writes_what_was_picked_and_says_so(
     assert any("picked by hand" in message and "radar_from_camera,body,m" in message for message in assumed)
 
 
-def test_pairs_decide_what_the_numbers_mean(
-    cocalib: Cocalib, ambiguous: Path, camera_file: Path, pairs_file: Callable[..., Path], tmp_path: Path
-) -> None:
+def test_pairs_decide_what_the_numbers_mean(cocalib, ambiguous, camera_file, pairs_file, tmp_path):
     out, pairs = tmp_path / "out.json", pairs_file()
     assert cocalib("import", ambiguous, "--pairs", pairs, "--out", out, "--camera", camera_file).code == 0
     assert _is_pose(out)
@@ -81,9 +73,7 @@ def test_pairs_decide_what_the_numbers_mean(
     assert _is_pose(tmp_path / "second.json")
 
 
-def test_what_the_pairs_contradict_cannot_be_picked(
-    cocalib: Cocalib, ambiguous: Path, camera_file: Path, pairs_file: Callable[..., Path], tmp_path: Path
-) -> None:
+def test_what_the_pairs_contradict_cannot_be_picked(cocalib, ambiguous, camera_file, pairs_file, tmp_path):
     out = tmp_path / "out.json"
     picking = ("--as", "camera_from_radar,body,m", "--pairs", pairs_file())
     refused = cocalib("import", ambiguous, *picking, "--out", out, "--camera", camera_file)
@@ -93,7 +83,7 @@ def test_what_the_pairs_contradict_cannot_be_picked(
     assert not out.exists()
 
 
-def test_a_clear_meaning_is_taken_and_told(cocalib: Cocalib, camera_file: Path, tmp_path: Path) -> None:
+def test_a_clear_meaning_is_taken_and_told(cocalib, camera_file, tmp_path):
     bare, out = tmp_path / "bare.txt", tmp_path / "out.json"
     np.savetxt(bare, POSE.inverse().as_matrix())
     taken = cocalib("import", bare, "--out", out, "--camera", camera_file)
@@ -104,9 +94,7 @@ def test_a_clear_meaning_is_taken_and_told(cocalib: Cocalib, camera_file: Path, 
 
 
 @pytest.mark.parametrize("inverse", [False, True])
-def test_check_reads_a_bare_matrix_as_import_reads_it(
-    cocalib: Cocalib, camera_file: Path, pairs_file: Callable[..., Path], tmp_path: Path, inverse: bool
-) -> None:
+def test_check_reads_a_bare_matrix_as_import_reads_it(cocalib, camera_file, pairs_file, tmp_path, inverse):
     bare, out = tmp_path / "bare.txt", tmp_path / "out.json"
     np.savetxt(bare, (POSE.inverse() if inverse else POSE).as_matrix())
     meaning = "radar_from_camera,optical,m" if inverse else "camera_from_radar,optical,m"
@@ -118,7 +106,7 @@ def test_check_reads_a_bare_matrix_as_import_reads_it(
         assert f"({meaning})" in checked.out
 
 
-def test_one_of_several_poses_is_chosen_by_its_place(cocalib: Cocalib, camera_file: Path, tmp_path: Path) -> None:
+def test_one_of_several_poses_is_chosen_by_its_place(cocalib, camera_file, tmp_path):
     several, out = tmp_path / "rig.json", tmp_path / "out.json"
     other = RigidTransform(POSE.rotation, [0.5, 0.5, 0.5]).as_matrix().tolist()
     several.write_text(json.dumps({"front": POSE.as_matrix().tolist(), "rear": other}))
@@ -129,9 +117,7 @@ def test_one_of_several_poses_is_chosen_by_its_place(cocalib: Cocalib, camera_fi
     assert _is_pose(out)
 
 
-def test_a_sheet_draws_each_meaning_over_a_frame(
-    cocalib: Cocalib, ambiguous: Path, made: Callable[..., Path], tmp_path: Path
-) -> None:
+def test_a_sheet_draws_each_meaning_over_a_frame(cocalib, ambiguous, made, tmp_path):
     sheet = tmp_path / "sheet.png"
     drawn = cocalib("import", ambiguous, "--sheet", sheet, "--recording", made(), "--at", "10")
     assert drawn.code == 1
@@ -142,9 +128,7 @@ def test_a_sheet_draws_each_meaning_over_a_frame(
     assert ((spread.max(axis=1) - spread.min(axis=1)) > 60).sum() > 50  # the frames are grey, the returns are not
 
 
-def test_a_sheet_needs_a_recording_and_a_time_in_it(
-    cocalib: Cocalib, ambiguous: Path, made: Callable[..., Path], tmp_path: Path
-) -> None:
+def test_a_sheet_needs_a_recording_and_a_time_in_it(cocalib, ambiguous, made, tmp_path):
     sheet = tmp_path / "sheet.png"
     refused = cocalib("import", ambiguous, "--sheet", sheet)
     assert refused.code == 2
@@ -154,7 +138,7 @@ def test_a_sheet_needs_a_recording_and_a_time_in_it(
     assert "give a time in them" in refused.err
 
 
-def test_a_format_that_states_its_meaning_refuses_another(cocalib: Cocalib, camera_file: Path, tmp_path: Path) -> None:
+def test_a_format_that_states_its_meaning_refuses_another(cocalib, camera_file, tmp_path):
     out, other = tmp_path / "out.json", tmp_path / "tf.sh"
     bare = tmp_path / "bare.txt"
     np.savetxt(bare, POSE.as_matrix())

@@ -37,9 +37,7 @@ def copied(project_root: Path, tmp_path: Path) -> Callable[[str], Path]:
     return copy
 
 
-def test_a_radar_alone_is_opened_without_intrinsics_and_stores_nothing(
-    served: list[Workspace], copied: Callable[[str], Path], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_radar_alone_is_opened_without_intrinsics_and_stores_nothing(served, copied, capsys):
     radar = copied("radar.bag")
     assert run(["open", str(radar), "--no-browser"]) == 0
     assert (
@@ -51,9 +49,7 @@ def test_a_radar_alone_is_opened_without_intrinsics_and_stores_nothing(
 
 
 @pytest.mark.parametrize("flag", ["--camera", "--calibration", "--clicks"])
-def test_files_that_need_a_camera_are_refused_without_one(
-    flag: str, served: list[Workspace], copied: Callable[[str], Path], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_files_that_need_a_camera_are_refused_without_one(flag, served, copied, capsys):
     clicks = copied("clicks.json")
     assert run(["open", str(copied("radar.bag")), "--no-browser", flag, str(clicks)]) == 2
     errors = capsys.readouterr().err
@@ -61,9 +57,7 @@ def test_files_that_need_a_camera_are_refused_without_one(
     assert served == []
 
 
-def test_a_camera_alone_is_refused_with_what_to_do(
-    served: list[Workspace], copied: Callable[[str], Path], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_camera_alone_is_refused_with_what_to_do(served, copied, capsys):
     assert run(["open", str(copied("camera.bag")), "--no-browser"]) == 2
     errors = capsys.readouterr().err
     assert "camera.bag" in errors
@@ -71,7 +65,7 @@ def test_a_camera_alone_is_refused_with_what_to_do(
     assert served == []
 
 
-def test_intrinsics_next_to_the_recording_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_intrinsics_next_to_the_recording_are_named(tmp_path, capsys):
     options = SimulationOptions(placements=2, dwell_s=4.0, width_px=128, height_px=80, camera_rate_hz=2.0)
     with grey_frames():
         write_recording(simulate(options), tmp_path, ("csv",))
@@ -81,9 +75,7 @@ def test_intrinsics_next_to_the_recording_are_named(tmp_path: Path, capsys: pyte
 
 
 @pytest.mark.parametrize(("camera", "clicks"), [("camera", "clicks.json"), ("camera_2", "clicks_2.json")])
-def test_each_of_two_cameras_in_one_recording_is_opened_by_its_topic(
-    camera: str, clicks: str, served: list[Workspace], tmp_path: Path
-) -> None:
+def test_each_of_two_cameras_in_one_recording_is_opened_by_its_topic(camera, clicks, served, tmp_path):
     options = SimulationOptions(
         placements=4,
         dwell_s=4.0,
@@ -102,9 +94,7 @@ def test_each_of_two_cameras_in_one_recording_is_opened_by_its_topic(
     assert len(served[0].session.clicks) == len(expected) == 4
 
 
-def test_clicks_that_nobody_confirmed_are_opened_with_a_note(
-    served: list[Workspace], made: Callable[..., Path], clicks_file: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_clicks_that_nobody_confirmed_are_opened_with_a_note(served, made, clicks_file, capsys):
     document = json.loads(clicks_file.read_text())
     clicks_file.write_text(json.dumps({**document, "unconfirmed": {"clicks": ["c1", "c4"], "confidence": 0.97}}))
     assert run(["open", str(made()), "--clicks", str(clicks_file), "--no-browser"]) == 0

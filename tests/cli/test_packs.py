@@ -4,16 +4,12 @@ import json
 import subprocess
 import sys
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from calib_core.interchange import export_all, read_calibration, written_formats
 from calib_core.interchange.formats.statement import POSE_ONLY
-
-Cocalib = Callable[..., Any]
 
 
 @pytest.fixture
@@ -21,7 +17,7 @@ def calibration(project_root: Path) -> Path:
     return project_root / "tests/golden/calibration-1.json"
 
 
-def test_a_pack_is_a_zip_or_the_files_in_a_folder(cocalib: Cocalib, calibration: Path, tmp_path: Path) -> None:
+def test_a_pack_is_a_zip_or_the_files_in_a_folder(cocalib, calibration, tmp_path):
     archive, folder, there = tmp_path / "pack.zip", tmp_path / "robot" / "pack", tmp_path / "there"
     there.mkdir()
     for out in (archive, folder, there):
@@ -39,7 +35,7 @@ def test_a_pack_is_a_zip_or_the_files_in_a_folder(cocalib: Cocalib, calibration:
     assert "needs a file: --out radar_camera_pack.zip" in refused.err
 
 
-def test_a_pack_replaces_no_file_that_is_not_its_own(cocalib: Cocalib, calibration: Path, tmp_path: Path) -> None:
+def test_a_pack_replaces_no_file_that_is_not_its_own(cocalib, calibration, tmp_path):
     folder = tmp_path / "project"
     folder.mkdir()
     (folder / "README.txt").write_text("mine")
@@ -52,9 +48,7 @@ def test_a_pack_replaces_no_file_that_is_not_its_own(cocalib: Cocalib, calibrati
         assert cocalib("export", calibration, "--to", "pack", "--out", folder).code == 0
 
 
-def test_a_pack_is_imported_checked_and_exported_like_its_calibration(
-    cocalib: Cocalib, calibration: Path, tmp_path: Path
-) -> None:
+def test_a_pack_is_imported_checked_and_exported_like_its_calibration(cocalib, calibration, tmp_path):
     archive, back = tmp_path / "pack.zip", tmp_path / "back.json"
     assert cocalib("export", calibration, "--to", "pack", "--out", archive).code == 0
     assert cocalib("check", archive).code == 0
@@ -64,7 +58,7 @@ def test_a_pack_is_imported_checked_and_exported_like_its_calibration(
     assert (from_pack.code, from_pack.out) == (0, from_json.out)
 
 
-def test_an_export_without_the_angle_map_says_so_on_stderr(cocalib: Cocalib, calibration: Path, tmp_path: Path) -> None:
+def test_an_export_without_the_angle_map_says_so_on_stderr(cocalib, calibration, tmp_path):
     document = json.loads(calibration.read_text())
     table = [[0.001, 0.002], [0.0, -0.001]]
     document["radar_angle_map"] = {
@@ -83,9 +77,7 @@ def test_an_export_without_the_angle_map_says_so_on_stderr(cocalib: Cocalib, cal
         assert "NOT IN THIS FILE" not in cocalib("export", mapped, "--to", name, "--out", tmp_path / f"{name}.zip").err
 
 
-def test_all_formats_are_written_and_those_that_cannot_hold_the_calibration_say_why(
-    cocalib: Cocalib, calibration: Path, tmp_path: Path
-) -> None:
+def test_all_formats_are_written_and_those_that_cannot_hold_the_calibration_say_why(cocalib, calibration, tmp_path):
     folder = tmp_path / "exports"
     answer = cocalib("export", calibration, "--to", "all", "--out", folder)
     assert answer.code == 0
@@ -105,9 +97,7 @@ def test_all_formats_are_written_and_those_that_cannot_hold_the_calibration_say_
     assert "warning of the calibration: the pairs span 5 m to 15 m" in answer.err
 
 
-def test_all_formats_take_the_parent_and_the_rectified_pictures_where_they_apply(
-    cocalib: Cocalib, calibration: Path, tmp_path: Path
-) -> None:
+def test_all_formats_take_the_parent_and_the_rectified_pictures_where_they_apply(cocalib, calibration, tmp_path):
     parent = ["--parent-from-radar", "1.5", "0", "0.25", "0", "0", "0", "1"]
     answer = cocalib("export", calibration, "--to", "all", "--out", tmp_path / "a", "--rectified", *parent)
     assert answer.code == 0
@@ -115,7 +105,7 @@ def test_all_formats_take_the_parent_and_the_rectified_pictures_where_they_apply
     assert "x: 1.5" in (tmp_path / "a" / "sensor_kit_calibration.yaml").read_text()
 
 
-def test_all_formats_need_a_folder(cocalib: Cocalib, calibration: Path, tmp_path: Path) -> None:
+def test_all_formats_need_a_folder(cocalib, calibration, tmp_path):
     file = tmp_path / "file"
     file.write_text("")
     for flags in ([], ["--out", file], ["--out", file / "inside"]):

@@ -43,9 +43,7 @@ def names_in(folder: Path) -> list[Path]:
     return sorted(folder.rglob("*"))
 
 
-def test_what_is_proposed_is_the_reflector_and_becomes_clicks_that_solve(
-    cocalib: Cocalib, recording: Path, tmp_path: Path
-) -> None:
+def test_what_is_proposed_is_the_reflector_and_becomes_clicks_that_solve(cocalib, recording, tmp_path):
     out = tmp_path / "proposals.json"
     answer = cocalib("solve", "--propose", recording, *SIZE, "--out", out)
     assert answer.code == 0, answer.err
@@ -71,9 +69,7 @@ def test_what_is_proposed_is_the_reflector_and_becomes_clicks_that_solve(
     assert "nobody-confirmed" not in [one["code"] for one in json.loads(solved.out)["warnings"]]
 
 
-def test_a_confirmed_click_stays_and_the_others_keep_their_ids(
-    cocalib: Cocalib, recording: Path, tmp_path: Path
-) -> None:
+def test_a_confirmed_click_stays_and_the_others_keep_their_ids(cocalib, recording, tmp_path):
     third = {"sec": START // 10**9 + 2 * DWELL_S + 2, "nanosec": 0}
     click = {"id": "p2", "image_time": third, "pixel_px": true_pixel_px(third).tolist()}
     clicks = tmp_path / "one.json"
@@ -87,9 +83,7 @@ def test_a_confirmed_click_stays_and_the_others_keep_their_ids(
         assert one["candidates"][0]["likeness"] is not None
 
 
-def test_a_click_beside_the_reflector_is_named_and_nothing_is_learned_from_it(
-    cocalib: Cocalib, recording: Path, tmp_path: Path
-) -> None:
+def test_a_click_beside_the_reflector_is_named_and_nothing_is_learned_from_it(cocalib, recording, tmp_path):
     third = {"sec": START // 10**9 + 2 * DWELL_S + 2, "nanosec": 0}
     click = {"id": "beside", "image_time": third, "pixel_px": np.add(true_pixel_px(third), (40.0, 0.0)).tolist()}
     clicks = tmp_path / "one.json"
@@ -121,8 +115,8 @@ def solved(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> Solved:
 
 
 def test_a_calibration_that_nobody_confirmed_says_so_and_comes_again_from_its_clicks(
-    cocalib: Cocalib, recording: Path, solved: Solved, tmp_path: Path
-) -> None:
+    cocalib, recording, solved, tmp_path
+):
     document = json.loads(solved.pose.read_text())
     pose = document["camera_from_radar"]
     turned = np.array(pose["rotation"]) @ SEEN.camera_from_radar.rotation.T
@@ -144,9 +138,7 @@ def test_a_calibration_that_nobody_confirmed_says_so_and_comes_again_from_its_cl
     assert json.loads(from_pairs.out)["provenance"]["unconfirmed"] == unconfirmed
 
 
-def test_a_pose_that_unconfirmed_clicks_contradict_is_refused(
-    cocalib: Cocalib, recording: Path, solved: Solved, tmp_path: Path
-) -> None:
+def test_a_pose_that_unconfirmed_clicks_contradict_is_refused(cocalib, recording, solved, tmp_path):
     document = json.loads(solved.clicks.read_text())
     pixels = [click["pixel_px"] for click in document["clicks"]]
     for click, pixel_px in zip(document["clicks"], [*pixels[5:], *pixels[:5]], strict=True):
@@ -160,8 +152,8 @@ def test_a_pose_that_unconfirmed_clicks_contradict_is_refused(
 
 
 def test_a_weak_calibration_that_nobody_confirmed_fails_where_a_usable_one_is_required(
-    cocalib: Cocalib, recording: Path, solved: Solved, tmp_path: Path
-) -> None:
+    cocalib, recording, solved, tmp_path
+):
     document = json.loads(solved.clicks.read_text())
     document["clicks"] = document["clicks"][::2]
     few, out = tmp_path / "few.json", tmp_path / "pose.json"
@@ -174,15 +166,13 @@ def test_a_weak_calibration_that_nobody_confirmed_fails_where_a_usable_one_is_re
     assert written["provenance"]["unconfirmed"]["clicks"] == [click["id"] for click in document["clicks"]]
 
 
-def test_clicks_that_nobody_confirmed_are_not_given_as_confirmed(
-    cocalib: Cocalib, recording: Path, solved: Solved
-) -> None:
+def test_clicks_that_nobody_confirmed_are_not_given_as_confirmed(cocalib, recording, solved):
     answer = cocalib("solve", recording, *SIZE, "--auto", "--clicks", solved.clicks)
     assert (answer.code, answer.out) == (2, "")
     assert f"{solved.clicks}: nobody confirmed 11 of its clicks" in answer.err
 
 
-def test_the_sample_is_solved_without_a_person(cocalib: Cocalib, project_root: Path, tmp_path: Path) -> None:
+def test_the_sample_is_solved_without_a_person(cocalib, project_root, tmp_path):
     sample, out = project_root / "sample_data" / "rooftop", tmp_path / "pose.json"
     answer = cocalib("solve", sample / "radar.bag", sample / "camera.bag", "--auto", "--out", out)
     assert answer.code == 0, answer.err
@@ -231,20 +221,18 @@ def refused(cocalib: Cocalib, tmp_path: Path) -> Callable[..., str]:
     ],
     ids=["no radar", "no pictures", "no camera", "one placement", "no reflector in the pictures"],
 )
-def test_what_cannot_be_proposed_is_said(
-    refused: Callable[..., str], made: Callable[..., Path], changes: dict[str, Any], code: int, words: str
-) -> None:
+def test_what_cannot_be_proposed_is_said(refused, made, changes, code, words):
     assert words in refused(made(**changes), code=code)
 
 
-def test_frames_that_show_no_placement_are_said(refused: Callable[..., str], tmp_path: Path) -> None:
+def test_frames_that_show_no_placement_are_said(refused, tmp_path):
     early = START + 3 * 10**9
     messages = (one for one in SEEN.messages() if one.topic != "/camera/image/compressed" or one.receive_time < early)
     path = write_ros2(tmp_path / "early.mcap", messages, container="mcap")
     assert "The camera recorded no frame during any of the 11 placements" in refused(path, code=1)
 
 
-def test_the_pictures_of_another_recording_are_refused(cocalib: Cocalib, tmp_path: Path) -> None:
+def test_the_pictures_of_another_recording_are_refused(cocalib, tmp_path):
     radar = replace(SEEN, with_images=False, with_camera_info=False)
     camera = Reversed(reflector_m=SEEN.reflector_m, placements=SEEN.placements, with_radar=False)
     paths = [
@@ -259,9 +247,7 @@ def test_the_pictures_of_another_recording_are_refused(cocalib: Cocalib, tmp_pat
 
 
 @pytest.mark.parametrize("command", [("solve", "--propose"), ("solve", "--auto")], ids=["propose", "solve"])
-def test_an_interrupt_leaves_no_file_and_no_traceback(
-    cocalib: Cocalib, recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: tuple[str, ...]
-) -> None:
+def test_an_interrupt_leaves_no_file_and_no_traceback(cocalib, recording, tmp_path, monkeypatch, command):
     def interrupted(*_: object, **__: object) -> NoReturn:
         raise KeyboardInterrupt
 
@@ -285,10 +271,7 @@ def test_an_interrupt_leaves_no_file_and_no_traceback(
         (("solve",), "--auto to do without a person"),
     ],
 )
-def test_wrong_usage_is_one_line(
-    cocalib: Cocalib, recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-    arguments: tuple[str, ...], words: str,
-) -> None:  # fmt: skip
+def test_wrong_usage_is_one_line(cocalib, recording, tmp_path, monkeypatch, arguments, words):  # fmt: skip
     monkeypatch.chdir(tmp_path)
     answer = cocalib(*arguments, recording)
     (line,) = answer.err.splitlines()
@@ -296,7 +279,7 @@ def test_wrong_usage_is_one_line(
     assert words in line
 
 
-def test_a_file_of_clicks_of_another_recording_is_refused(cocalib: Cocalib, recording: Path, tmp_path: Path) -> None:
+def test_a_file_of_clicks_of_another_recording_is_refused(cocalib, recording, tmp_path):
     clicks = tmp_path / "others.json"
     click = {"id": "c", "image_time": {"sec": 5, "nanosec": 0}, "pixel_px": [1.0, 1.0]}
     clicks.write_text(json.dumps({"schema": "cocalib/clicks-1", "clicks": [click]}))

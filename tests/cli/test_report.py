@@ -25,9 +25,7 @@ def solved(sample: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def test_on_its_recording_the_report_has_held_out_errors_and_a_picture_and_names_no_folder(
-    solved: Path, sample: Path, tmp_path: Path
-) -> None:
+def test_on_its_recording_the_report_has_held_out_errors_and_a_picture_and_names_no_folder(solved, sample, tmp_path):
     bags = [str(sample / "radar.bag"), str(sample / "camera.bag")]
     out = tmp_path / "report.html"
     assert run(["evaluate", str(solved), *bags, "--against", str(solved), "--report", str(out)]) == 0
@@ -41,14 +39,14 @@ def test_on_its_recording_the_report_has_held_out_errors_and_a_picture_and_names
     assert len(html.encode()) < 3_000_000
 
 
-def test_limits_that_are_not_met_end_with_exit_code_3(solved: Path, tmp_path: Path) -> None:
+def test_limits_that_are_not_met_end_with_exit_code_3(solved, tmp_path):
     out = tmp_path / "report.html"
     assert run(["evaluate", str(solved), "--report", str(out), "--require", "max-deg=9", "max-cm=90"]) == 0
     assert run(["evaluate", str(solved), "--report", str(out), "--require", "max-deg=0.01"]) == 3
     assert "FAIL" in out.read_text(encoding="utf-8")
 
 
-def test_a_calibration_by_the_paper_is_reported_with_its_doubts(solved: Path, tmp_path: Path) -> None:
+def test_a_calibration_by_the_paper_is_reported_with_its_doubts(solved, tmp_path):
     paper, out = tmp_path / "paper.json", tmp_path / "paper.html"
     assert run(["solve", "--pairs", str(solved), "--method", "paper", "--out", str(paper)]) == 0
     assert run(["evaluate", str(paper), "--report", str(out)]) == 0
@@ -57,9 +55,7 @@ def test_a_calibration_by_the_paper_is_reported_with_its_doubts(solved: Path, tm
     assert "No error bars: this calibration states no covariance." in html
 
 
-def test_a_foreign_calibration_without_a_camera_takes_the_one_of_the_recording(
-    golden: Path, solved: Path, sample: Path, tmp_path: Path
-) -> None:
+def test_a_foreign_calibration_without_a_camera_takes_the_one_of_the_recording(golden, solved, sample, tmp_path):
     foreign, out = tmp_path / "tf.txt", tmp_path / "tf.html"
     assert run(["export", str(solved), "--to", "tf2", "--out", str(foreign)]) == 0
     assert run(["evaluate", str(foreign), "--report", str(out)]) == 0
@@ -71,9 +67,7 @@ def test_a_foreign_calibration_without_a_camera_takes_the_one_of_the_recording(
     assert "Residuals at the clicks in radar.bag + camera.bag" in html
 
 
-def test_a_calibration_for_pictures_of_another_size_is_refused(
-    golden: Path, sample: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_calibration_for_pictures_of_another_size_is_refused(golden, sample, tmp_path, capsys):
     bags = [str(sample / "radar.bag"), str(sample / "camera.bag")]
     assert run(["evaluate", str(golden), *bags, "--report", str(tmp_path / "out.html")]) == 2
     assert (
@@ -82,9 +76,7 @@ def test_a_calibration_for_pictures_of_another_size_is_refused(
     )
 
 
-def test_without_a_browser_the_html_is_written_and_the_pdf_is_refused(
-    golden: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_a_browser_the_html_is_written_and_the_pdf_is_refused(golden, tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("COCALIB_BROWSER", "/nowhere/browser")
     out, pdf = tmp_path / "out.html", tmp_path / "out.pdf"
     assert run(["evaluate", str(golden), "--report", str(pdf), "--report", str(out)]) == 2
@@ -93,9 +85,7 @@ def test_without_a_browser_the_html_is_written_and_the_pdf_is_refused(
     assert not pdf.exists()
 
 
-def test_the_report_never_takes_the_place_of_the_calibration(
-    golden: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_report_never_takes_the_place_of_the_calibration(golden, tmp_path, capsys):
     calibration = tmp_path / "calibration.json"
     calibration.write_bytes(golden.read_bytes())
     assert run(["evaluate", str(calibration), "--report", str(calibration)]) == 2

@@ -3,9 +3,7 @@
 import json
 import os
 import shutil
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +13,6 @@ from calib_core.measurements import TimeNs
 from cocalib.session import ClickPlaced, RecordingFacts, advance
 from cocalib.session.file import open_session_file
 
-Cocalib = Callable[..., Any]
 FACTS = RecordingFacts("drive.bag", 1_700_000_000_123_456_789 + 100_000_000 * np.arange(50), 640, 480)
 
 
@@ -59,9 +56,7 @@ def files(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir() if path.name != "lock"}
 
 
-def test_the_list_names_every_session_here_and_in_the_users_folder(
-    cocalib: Cocalib, home: Path, state_folder: Path
-) -> None:
+def test_the_list_names_every_session_here_and_in_the_users_folder(cocalib, home, state_folder):
     clicked(home / "drive.bag.cocalib-session", 3)
     shutil.copytree(clicked(home / "a.bag.cocalib-session", 4), home / "a.bag.cocalib-session.1")
     damaged(clicked(home / "b.bag.cocalib-session", 5), 4)
@@ -83,7 +78,7 @@ def test_the_list_names_every_session_here_and_in_the_users_folder(
     assert len(lines) == 1 + 5 + 1
 
 
-def test_the_list_takes_recordings_and_shows_which_process_has_a_session_open(cocalib: Cocalib, home: Path) -> None:
+def test_the_list_takes_recordings_and_shows_which_process_has_a_session_open(cocalib, home):
     folder = clicked(home / "drive.bag.cocalib-session", 3)
     session_file = open_session_file(folder, FACTS)
     (found,) = json.loads(cocalib("session", "list", home / "drive.bag", "--json").out)
@@ -93,16 +88,14 @@ def test_the_list_takes_recordings_and_shows_which_process_has_a_session_open(co
     session_file.close()
 
 
-def test_the_list_of_nothing_says_so(cocalib: Cocalib, tmp_path: Path) -> None:
+def test_the_list_of_nothing_says_so(cocalib, tmp_path):
     answer = cocalib("session", "list", tmp_path)
     assert (answer.code, answer.out) == (0, "no sessions here or in your user folder\n")
     assert cocalib("session", "list", tmp_path / "absent").code == 2
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows needs a right to make links")
-def test_the_list_follows_no_link_and_prints_no_control_characters(
-    cocalib: Cocalib, home: Path, tmp_path: Path
-) -> None:
+def test_the_list_follows_no_link_and_prints_no_control_characters(cocalib, home, tmp_path):
     target = tmp_path / "target"
     target.write_bytes(b"precious")
     folder = home / "drive.bag.cocalib-session"
@@ -118,7 +111,7 @@ def test_the_list_follows_no_link_and_prints_no_control_characters(
     assert target.read_bytes() == b"precious"
 
 
-def test_a_sound_session_needs_no_repair(cocalib: Cocalib, home: Path) -> None:
+def test_a_sound_session_needs_no_repair(cocalib, home):
     folder = clicked(home / "drive.bag.cocalib-session")
     before = files(folder)
     for arguments in ([folder], [home / "drive.bag"], [folder, "--yes"]):
@@ -128,7 +121,7 @@ def test_a_sound_session_needs_no_repair(cocalib: Cocalib, home: Path) -> None:
     assert files(folder) == before
 
 
-def test_a_repair_shows_what_it_would_keep_and_changes_nothing(cocalib: Cocalib, home: Path) -> None:
+def test_a_repair_shows_what_it_would_keep_and_changes_nothing(cocalib, home):
     folder = damaged(clicked(home / "drive.bag.cocalib-session"), 9)
     before = files(folder)
     answer = cocalib("session", "repair", folder)
@@ -140,7 +133,7 @@ def test_a_repair_shows_what_it_would_keep_and_changes_nothing(cocalib: Cocalib,
     assert files(folder) == before
 
 
-def test_a_repair_with_yes_keeps_what_is_proven_and_the_old_files(cocalib: Cocalib, home: Path) -> None:
+def test_a_repair_with_yes_keeps_what_is_proven_and_the_old_files(cocalib, home):
     folder = damaged(clicked(home / "drive.bag.cocalib-session"), 9)
     before = files(folder)
     answer = cocalib("session", "repair", folder, "--yes")
@@ -154,7 +147,7 @@ def test_a_repair_with_yes_keeps_what_is_proven_and_the_old_files(cocalib: Cocal
     assert cocalib("session", "repair", folder).code == 0
 
 
-def test_two_files_that_do_not_belong_together_are_told_apart_by_hand(cocalib: Cocalib, home: Path) -> None:
+def test_two_files_that_do_not_belong_together_are_told_apart_by_hand(cocalib, home):
     folder, other = clicked(home / "drive.bag.cocalib-session", 3), clicked(home / "other.cocalib-session", 9)
     shutil.copy(damaged(other, 5, with_copy=True) / "journal-copy.jsonl", folder)
     lines = (folder / "journal.jsonl").read_bytes().split(b"\n")
@@ -167,14 +160,14 @@ def test_two_files_that_do_not_belong_together_are_told_apart_by_hand(cocalib: C
     assert {name: files(folder)[f"{name}.backup-1"] for name in before} == before
 
 
-def test_an_export_writes_the_clicks_of_a_sound_session(cocalib: Cocalib, home: Path, tmp_path: Path) -> None:
+def test_an_export_writes_the_clicks_of_a_sound_session(cocalib, home, tmp_path):
     clicked(home / "drive.bag.cocalib-session")
     answer = cocalib("session", "export", home / "drive.bag", "--out", tmp_path / "clicks.json")
     assert (answer.code, answer.err) == (0, "")
     assert len(read_clicks((tmp_path / "clicks.json").read_text())) == 12
 
 
-def test_an_export_tells_of_a_last_step_that_is_not_whole(cocalib: Cocalib, home: Path, tmp_path: Path) -> None:
+def test_an_export_tells_of_a_last_step_that_is_not_whole(cocalib, home, tmp_path):
     folder = clicked(home / "drive.bag.cocalib-session")
     for path in folder.glob("journal*.jsonl"):
         path.write_bytes(path.read_bytes()[:-1])
@@ -184,7 +177,7 @@ def test_an_export_tells_of_a_last_step_that_is_not_whole(cocalib: Cocalib, home
     assert len(read_clicks((tmp_path / "clicks.json").read_text())) == 11
 
 
-def test_a_last_step_that_is_not_whole_is_listed_and_needs_no_repair(cocalib: Cocalib, home: Path) -> None:
+def test_a_last_step_that_is_not_whole_is_listed_and_needs_no_repair(cocalib, home):
     folder = clicked(home / "drive.bag.cocalib-session", 1)
     for path in folder.glob("journal*.jsonl"):
         path.write_bytes(path.read_bytes() + b'{"type":"click_pl')
@@ -197,9 +190,7 @@ def test_a_last_step_that_is_not_whole_is_listed_and_needs_no_repair(cocalib: Co
     assert "Sound" not in answer.out
 
 
-def test_an_export_of_a_damaged_session_writes_what_is_proven_and_says_what_is_not(
-    cocalib: Cocalib, home: Path, tmp_path: Path
-) -> None:
+def test_an_export_of_a_damaged_session_writes_what_is_proven_and_says_what_is_not(cocalib, home, tmp_path):
     folder = damaged(clicked(home / "drive.bag.cocalib-session"), 9)
     before = files(folder)
     answer = cocalib("session", "export", folder, "--out", tmp_path / "clicks.json")
@@ -210,7 +201,7 @@ def test_an_export_of_a_damaged_session_writes_what_is_proven_and_says_what_is_n
     assert files(folder) == before
 
 
-def test_what_proves_nothing_is_not_exported(cocalib: Cocalib, home: Path, tmp_path: Path) -> None:
+def test_what_proves_nothing_is_not_exported(cocalib, home, tmp_path):
     folder = clicked(home / "drive.bag.cocalib-session")
     (folder / "journal-copy.jsonl").unlink()
     (folder / "journal.jsonl").write_bytes(b"no\n")
@@ -221,7 +212,7 @@ def test_what_proves_nothing_is_not_exported(cocalib: Cocalib, home: Path, tmp_p
     assert not (tmp_path / "clicks.json").exists()
 
 
-def test_a_folder_without_a_session_is_refused(cocalib: Cocalib, home: Path) -> None:
+def test_a_folder_without_a_session_is_refused(cocalib, home):
     assert "has no session next to it" in cocalib("session", "repair", home / "drive.bag").err
     (home / "empty.cocalib-session").mkdir()
     assert "holds no session" in cocalib("session", "repair", home / "empty.cocalib-session").err

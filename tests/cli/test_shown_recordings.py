@@ -40,7 +40,7 @@ def boxes_file(tmp_path: Path) -> Path:
     return path
 
 
-def test_an_overlay_video_names_its_codec(cocalib: Cocalib, recording: Path, calibration: Path, tmp_path: Path) -> None:
+def test_an_overlay_video_names_its_codec(cocalib, recording, calibration, tmp_path):
     pytest.importorskip("av", reason="the extra 'video' is not installed")
     out = tmp_path / "out.mp4"
     answer = cocalib("show", recording, "--calibration", calibration, "--against", calibration, "--out", out)
@@ -48,9 +48,7 @@ def test_an_overlay_video_names_its_codec(cocalib: Cocalib, recording: Path, cal
     assert answer.out == f"{out}: 65 frames, 32.000 s, 640 x 270 px, encoded as H.264\n"
 
 
-def test_a_file_for_rerun_has_clicks_and_boxes(
-    cocalib: Cocalib, recording: Path, calibration: Path, clicks_file: Path, boxes_file: Path, tmp_path: Path
-) -> None:
+def test_a_file_for_rerun_has_clicks_and_boxes(cocalib, recording, calibration, clicks_file, boxes_file, tmp_path):
     pytest.importorskip("rerun", reason="there is no wheel of rerun-sdk for this machine")
     out = tmp_path / "view.rrd"
     more = ("--clicks", clicks_file, "--boxes", boxes_file)
@@ -60,9 +58,7 @@ def test_a_file_for_rerun_has_clicks_and_boxes(
     assert out.stat().st_size > 10_000
 
 
-def test_rerun_without_a_display_names_other_ways(
-    cocalib: Cocalib, recording: Path, calibration: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_rerun_without_a_display_names_other_ways(cocalib, recording, calibration, monkeypatch):
     pytest.importorskip("rerun", reason="there is no wheel of rerun-sdk for this machine")
     monkeypatch.setattr("sys.platform", "linux")
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
@@ -74,9 +70,7 @@ def test_rerun_without_a_display_names_other_ways(
     assert "--out FILE.rrd" in answer.err
 
 
-def test_what_does_not_fit_is_named(
-    cocalib: Cocalib, recording: Path, made: Callable[..., Path], calibration: Path, tmp_path: Path
-) -> None:
+def test_what_does_not_fit_is_named(cocalib, recording, made, calibration, tmp_path):
     pytest.importorskip("av", reason="the extra 'video' is not installed")
     pytest.importorskip("rerun", reason="there is no wheel of rerun-sdk for this machine")
     video, rrd = ("show", recording, "--out", tmp_path / "o.mp4"), ("show", recording)
@@ -100,9 +94,7 @@ def test_what_does_not_fit_is_named(
     assert list(tmp_path.glob("*.part*")) == []
 
 
-def test_speeds_that_no_radar_reports_are_refused(
-    cocalib: Cocalib, calibration: Path, made: Callable[..., Path], tmp_path: Path
-) -> None:
+def test_speeds_that_no_radar_reports_are_refused(cocalib, calibration, made, tmp_path):
     pytest.importorskip("av", reason="the extra 'video' is not installed")
     options = ("--calibration", calibration, "--colour", "speed", "--out", tmp_path / "o.mp4")
     answer = cocalib("show", made("still", with_speeds=False), *options)

@@ -1,13 +1,10 @@
 """`cocalib simulate`: presets fill the options that are not set by name."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-Cocalib = Callable[..., Any]
 _TINY = ("placements=3", "dwell_s=3.5", "radar_rate_hz=5", "camera_rate_hz=3", "person=false", "clutter=none")
 TINY = tuple(word for one in (*_TINY, "width_px=64", "height_px=64") for word in ("--set", one))
 
@@ -17,7 +14,7 @@ def _spans(folder: Path) -> list[tuple[float, float]]:
     return [(p["start"]["sec"], p["end"]["sec"]) for p in placements]
 
 
-def test_a_preset_fills_what_is_not_set_and_what_is_set_wins(cocalib: Cocalib, tmp_path: Path) -> None:
+def test_a_preset_fills_what_is_not_set_and_what_is_set_wins(cocalib, tmp_path):
     both, one = tmp_path / "both", tmp_path / "one"
     assert cocalib("simulate", "--out", both, "--preset", "two-reflectors", *TINY).code == 0
     assert cocalib("simulate", "--out", one, *TINY, "--preset", "two-reflectors", "--set", "reflectors=1").code == 0
@@ -26,9 +23,7 @@ def test_a_preset_fills_what_is_not_set_and_what_is_set_wins(cocalib: Cocalib, t
     assert {path.name for path in both.iterdir()} == {"radar.bag", "camera.bag", "truth.json", "clicks.json"}
 
 
-def test_options_come_from_a_file_by_name_and_as_the_flags_of_earlier_versions(
-    cocalib: Cocalib, tmp_path: Path
-) -> None:
+def test_options_come_from_a_file_by_name_and_as_the_flags_of_earlier_versions(cocalib, tmp_path):
     out, file = tmp_path / "low", tmp_path / "options.toml"
     file.write_text("[clicking]\nlow_px = 9\n[defects]\nazimuth_scale = 1.5\n")
     typed = ("--defects.azimuth-scale", 1.03, "--surroundings.companion=True", "--rig.camera-angles-deg", 0, 2, 0)

@@ -1,16 +1,9 @@
 """`cocalib solve --vehicle …`: the calibration says which vehicle it is of, and so does the report."""
 
 import json
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
-
-Cocalib = Callable[..., Any]
 
 
-def test_the_file_names_it_keeps_it_and_the_report_shows_it(
-    cocalib: Cocalib, pairs_file: Callable[..., Path], tmp_path: Path
-) -> None:
+def test_the_file_names_it_keeps_it_and_the_report_shows_it(cocalib, pairs_file, tmp_path):
     out, again, report = (tmp_path / name for name in ("calibration.json", "again.json", "report.html"))
     stated = ("--vehicle", "V<1>", "--vehicle-type", "van", "--session-name", "autumn")
     serials = ("--radar-serial", "R-1", "--camera-serial", "C-2")
@@ -26,9 +19,7 @@ def test_the_file_names_it_keeps_it_and_the_report_shows_it(
     assert "V<1>" not in html
 
 
-def test_nothing_stated_writes_nothing_and_nonsense_is_refused(
-    cocalib: Cocalib, pairs_file: Callable[..., Path], tmp_path: Path
-) -> None:
+def test_nothing_stated_writes_nothing_and_nonsense_is_refused(cocalib, pairs_file, tmp_path):
     answer = cocalib("solve", "--pairs", pairs_file(), "--out", tmp_path / "calibration.json")
     assert answer.code == 0
     assert "vehicle" not in json.loads((tmp_path / "calibration.json").read_text())
@@ -37,9 +28,7 @@ def test_nothing_stated_writes_nothing_and_nonsense_is_refused(
     assert "--radar-serial is ''; give 1 to 120 printable characters" in answer.err
 
 
-def test_a_calibration_from_a_recording_differs_in_what_was_stated_alone(
-    cocalib: Cocalib, made: Callable[..., Path], clicks_file: Path
-) -> None:
+def test_a_calibration_from_a_recording_differs_in_what_was_stated_alone(cocalib, made, clicks_file):
     recording, flags = made(), ("--vehicle", "V017", "--camera-serial", "C-2")
     stated, plain = (cocalib("solve", recording, "--clicks", clicks_file, *given) for given in (flags, ()))
     assert (stated.code, plain.code) == (0, 0), stated.err + plain.err

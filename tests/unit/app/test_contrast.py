@@ -1,7 +1,6 @@
 """Text can be read on every surface of the page, in both themes."""
 
 import re
-from pathlib import Path
 
 import pytest
 
@@ -48,13 +47,13 @@ def contrast(one: Colour, other: Colour) -> float:
     return (high + 0.05) / (low + 0.05)
 
 
-def test_contrast_of_known_colours() -> None:
+def test_contrast_of_known_colours():
     assert contrast((0, 0, 0), (1, 1, 1)) == pytest.approx(21)
     assert contrast(parsed("#767676")[0], (1, 1, 1)) == pytest.approx(4.54, abs=0.01)
 
 
 @pytest.mark.parametrize("theme", ["dark", "light"])
-def test_text_stands_out_from_everything_that_it_is_on(theme: str, project_root: Path) -> None:
+def test_text_stands_out_from_everything_that_it_is_on(theme, project_root):
     colours = themes((project_root / "static" / "shell" / "look.css").read_text())[theme]
     surface = parsed(colours["surface"])[0]
     below = {name: parsed(colours[name])[0] for name in SURFACES}

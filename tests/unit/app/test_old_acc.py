@@ -25,7 +25,7 @@ def workspace(tmp_path: Path) -> Iterator[Workspace]:
     opened.close()
 
 
-def test_figures_of_earlier_boxes_are_marked_in_the_view_that_has_the_new_ones(workspace: Workspace) -> None:
+def test_figures_of_earlier_boxes_are_marked_in_the_view_that_has_the_new_ones(workspace):
     workspace.show_acc(AccPanel(figures=FIGURES), workspace.to_judge)
     assert not workspace.view.acc.judging
     seen = []
@@ -37,6 +37,6 @@ def test_figures_of_earlier_boxes_are_marked_in_the_view_that_has_the_new_ones(w
     assert not workspace.view.acc.judging
 
 
-def test_without_figures_there_is_nothing_to_mark(workspace: Workspace) -> None:
+def test_without_figures_there_is_nothing_to_mark(workspace):
     workspace.dispatch(BoxDrawn(TimeNs(int(workspace.facts.image_times[3])), (10.0, 10.0, 60.0, 90.0), "person"))
     assert not workspace.view.acc.judging

@@ -31,7 +31,7 @@ from cocalib.option_changes import (
 DESCRIPTIONS = {option.path: option for group in option_groups() for option in group.options}
 
 
-def test_a_partial_tree_changes_what_it_names_and_nothing_else() -> None:
+def test_a_partial_tree_changes_what_it_names_and_nothing_else():
     options = changed_options(
         CalibrationOptions(),
         changes_from_tree({"method": "paper", "gating": {"max_range_m": 20, "max_speed_mps": 0.0}}),
@@ -39,7 +39,7 @@ def test_a_partial_tree_changes_what_it_names_and_nothing_else() -> None:
     assert options == CalibrationOptions(method="paper", gating=GatingOptions(max_range_m=20.0, max_speed_mps=0.0))
 
 
-def test_all_options_come_back_from_their_own_tree() -> None:
+def test_all_options_come_back_from_their_own_tree():
     options = CalibrationOptions(
         method="paper",
         solving=SolvingOptions(camera_position=CameraPositionPrior((0.1, -0.2, 0.3), 0.02), seed=7),
@@ -49,7 +49,7 @@ def test_all_options_come_back_from_their_own_tree() -> None:
     assert options_from_tree(msgspec.json.decode(text)) == options
 
 
-def test_a_camera_position_is_set_and_removed_as_a_whole() -> None:
+def test_a_camera_position_is_set_and_removed_as_a_whole():
     tree = {"solving": {"camera_position": {"position_m": [0.1, 0.2, 0.3], "sigma_m": 0.02}}}
     options = options_from_tree(tree)
     assert options.solving.camera_position == CameraPositionPrior((0.1, 0.2, 0.3), 0.02)
@@ -72,7 +72,7 @@ def test_a_camera_position_is_set_and_removed_as_a_whole() -> None:
         ({"solving": {"seed": 1.5}}, "option solving.seed"),
     ],
 )
-def test_what_is_not_understood_is_refused_with_a_clear_error(tree, words: str) -> None:
+def test_what_is_not_understood_is_refused_with_a_clear_error(tree, words):
     with pytest.raises(OptionError) as refused:
         options_from_tree(tree)
     assert words in str(refused.value)
@@ -90,7 +90,7 @@ def test_what_is_not_understood_is_refused_with_a_clear_error(tree, words: str) 
         ({"gating": {"min_range_m": 70.0}}, "70 m is not below gating.max_range_m, 60 m"),
     ],
 )
-def test_a_number_out_of_range_is_refused_with_the_range(tree, words: str) -> None:
+def test_a_number_out_of_range_is_refused_with_the_range(tree, words):
     with pytest.raises(OptionError) as refused:
         options_from_tree(tree)
     assert words in str(refused.value)
@@ -98,13 +98,13 @@ def test_a_number_out_of_range_is_refused_with_the_range(tree, words: str) -> No
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), float("-inf")])
 @pytest.mark.parametrize("path", sorted(path for path in RANGES if "camera_position" not in path))
-def test_no_number_may_be_infinite_or_missing(path: str, value: float) -> None:
+def test_no_number_may_be_infinite_or_missing(path, value):
     with pytest.raises(OptionError, match="out of range"):
         changed_options(CalibrationOptions(), [OptionChange(path, value)])
 
 
 @pytest.mark.parametrize("method", ["pmm", "ccm"])
-def test_what_older_versions_offered_is_left_out_of_the_options_that_a_session_kept(method: str) -> None:
+def test_what_older_versions_offered_is_left_out_of_the_options_that_a_session_kept(method):
     kept = kept_options(
         {"method": method, "board": {"columns": 9, "registration": "linear"}, "noise": {"sigma_px": 3.0}}
     )
@@ -113,28 +113,28 @@ def test_what_older_versions_offered_is_left_out_of_the_options_that_a_session_k
         options_from_tree({"board": {"columns": 9}})
 
 
-def test_a_choice_that_was_set_directly_is_checked_too() -> None:
-    wrong = CalibrationOptions(method="best")  # type: ignore[arg-type]
+def test_a_choice_that_was_set_directly_is_checked_too():
+    wrong = CalibrationOptions(method="best")
     with pytest.raises(OptionError, match="unknown value 'best'; choose default or paper"):
         checked_options(wrong)
 
 
-def test_the_defaults_are_in_range() -> None:
+def test_the_defaults_are_in_range():
     assert checked_options(CalibrationOptions()) == CalibrationOptions()
 
 
-def test_every_number_among_the_options_has_a_range_and_every_range_an_option() -> None:
+def test_every_number_among_the_options_has_a_range_and_every_range_an_option():
     numbers = {path for path, option in DESCRIPTIONS.items() if option.kind in ("number", "integer")}
     prior = {f"solving.camera_position.{field.name}" for field in dataclasses.fields(CameraPositionPrior)}
     assert set(RANGES) == numbers | prior
 
 
-def test_every_option_is_described_by_one_sentence() -> None:
+def test_every_option_is_described_by_one_sentence():
     assert all(len(option.hint) > 5 and "\n" not in option.hint for option in DESCRIPTIONS.values())
     assert all(group.hint for group in option_groups())
 
 
-def test_every_option_field_has_its_text_in_its_metadata() -> None:
+def test_every_option_field_has_its_text_in_its_metadata():
     assert "inspect.getsource" not in inspect.getsource(option_changes)
     for kind in (CalibrationOptions, RecordingOptions, SimulationOptions, RigOptions):
         for field in dataclasses.fields(kind):
@@ -142,7 +142,7 @@ def test_every_option_field_has_its_text_in_its_metadata() -> None:
                 assert dataclasses.is_dataclass(field.default_factory), field.name  # a group of options
 
 
-def test_a_description_has_all_that_an_input_field_needs() -> None:
+def test_a_description_has_all_that_an_input_field_needs():
     option = DESCRIPTIONS["noise.sigma_azimuth_deg"]
     assert (option.label, option.unit, option.kind) == ("sigma azimuth", "deg", "number")
     assert (option.low, option.high, option.default) == (1e-3, 45.0, 0.5)

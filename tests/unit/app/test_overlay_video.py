@@ -2,7 +2,6 @@
 
 import dataclasses
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -41,7 +40,7 @@ def composed(view: RecordedView, index: int, trail_scans: int = 0) -> np.ndarray
     return panels.compose(picture, TimeNs(int(block.times_ns[index - block.first])))
 
 
-def test_every_frame_is_in_the_video_at_its_recorded_time(view: RecordedView, tmp_path: Path) -> None:
+def test_every_frame_is_in_the_video_at_its_recorded_time(view, tmp_path):
     av = pytest.importorskip("av", reason="the extra 'video' is not installed")
     path, done = tmp_path / "out.mp4", []
     written = write_overlay(view, path, OverlayOptions(("c.json",)), progress=lambda *now: done.append(now))
@@ -57,7 +56,7 @@ def test_every_frame_is_in_the_video_at_its_recorded_time(view: RecordedView, tm
     assert [file.name for file in tmp_path.iterdir()] == ["out.mp4"]
 
 
-def test_returns_are_drawn_where_the_lens_projects_them(view: RecordedView) -> None:
+def test_returns_are_drawn_where_the_lens_projects_them(view):
     index = 7  # long after the click
     time = int(view.recording.image_times[index])
     frame = composed(view, index)[:240]
@@ -71,7 +70,7 @@ def test_returns_are_drawn_where_the_lens_projects_them(view: RecordedView) -> N
     assert frame[v_px, u_px, ::-1].tolist() == view.colours.of(scan)[0].tolist()
 
 
-def test_another_calibration_is_drawn_beside_it(view: RecordedView) -> None:
+def test_another_calibration_is_drawn_beside_it(view):
     turned = view.calibration.camera_from_radar.perturbed(np.array([0, 0, 0, 0, 0.05, 0]))
     against = dataclasses.replace(view.calibration, camera_from_radar=turned)
     frame = composed(dataclasses.replace(view, against=against), 7)
@@ -82,13 +81,13 @@ def test_another_calibration_is_drawn_beside_it(view: RecordedView) -> None:
     np.testing.assert_allclose(right, expected[0], atol=2)
 
 
-def test_trails_show_where_returns_were(view: RecordedView) -> None:
+def test_trails_show_where_returns_were(view):
     index = 9  # one second into the second placement
     none, long = composed(view, index), composed(view, index, trail_scans=30)
     assert ((long != GREY).any(axis=2)).sum() > ((none != GREY).any(axis=2)).sum()
 
 
-def test_clicks_stay_half_a_second_with_the_length_of_their_residual(view: RecordedView) -> None:
+def test_clicks_stay_half_a_second_with_the_length_of_their_residual(view):
     pair = view.pairs[0]
     assert pair.image_time is not None
     clicked = int(np.searchsorted(view.recording.image_times, pair.image_time))
@@ -102,7 +101,7 @@ def test_clicks_stay_half_a_second_with_the_length_of_their_residual(view: Recor
     assert picture[60:100, 150:300].any(), "at the right edge the words are to the left of the mark"
 
 
-def test_boxes_are_drawn_at_their_frames_only(view: RecordedView) -> None:
+def test_boxes_are_drawn_at_their_frames_only(view):
     boxed = dataclasses.replace(view, boxes=boxes_around(view.recording, (5,)))
     differs = [bool((composed(boxed, index) != composed(view, index)).any()) for index in (4, 5, 6)]
     assert differs == [False, True, False]
@@ -112,7 +111,7 @@ def test_boxes_are_drawn_at_their_frames_only(view: RecordedView) -> None:
     assert not picture[90, 75].any()
 
 
-def test_static_returns_are_dots_and_moving_ones_triangles() -> None:
+def test_static_returns_are_dots_and_moving_ones_triangles():
     picture = np.zeros((720, 1280, 3), np.uint8)
     places = np.array([[100.0, 100.0], [200.0, 100.0]])
     draw_returns(picture, places, np.array([[10, 20, 250], [10, 20, 250]]), np.array([True, False]))
@@ -123,9 +122,7 @@ def test_static_returns_are_dots_and_moving_ones_triangles() -> None:
     assert triangle[21:].sum() > triangle[:20].sum()
 
 
-def test_without_h264_the_next_codec_is_used_and_without_any_that_is_said(
-    view: RecordedView, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_h264_the_next_codec_is_used_and_without_any_that_is_said(view, tmp_path, monkeypatch):
     pytest.importorskip("av", reason="the extra 'video' is not installed")
     for name, label in (("mpeg4", "MPEG-4"), ("mjpeg", "Motion JPEG")):
         monkeypatch.setattr(writing, "_can_write", name.__eq__)
@@ -135,7 +132,7 @@ def test_without_h264_the_next_codec_is_used_and_without_any_that_is_said(
         write_overlay(view, tmp_path / "out.mp4", OverlayOptions(("c.json",)))
 
 
-def test_an_interrupted_video_leaves_nothing(view: RecordedView, tmp_path: Path) -> None:
+def test_an_interrupted_video_leaves_nothing(view, tmp_path):
     pytest.importorskip("av", reason="the extra 'video' is not installed")
 
     def stop(done: int, _total: int) -> None:
@@ -147,6 +144,6 @@ def test_an_interrupted_video_leaves_nothing(view: RecordedView, tmp_path: Path)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_times_are_written_to_a_millisecond() -> None:
+def test_times_are_written_to_a_millisecond():
     start = TimeNs(1_700_000_000 * NS_PER_S + 5_000_000)
     assert time_text(TimeNs(start + 1_500_000_000), start) == "2023-11-14 22:13:21.505 UTC   +1.50 s"

@@ -79,7 +79,7 @@ class Watched:
 
     def __init__(self) -> None:
         self.told = threading.Condition()
-        self.job = ProposingJob(None, self.take)  # type: ignore[arg-type]
+        self.job = ProposingJob(None, self.take)
 
     def take(self) -> None:
         with self.told:
@@ -107,7 +107,7 @@ def watched(finding: Finding) -> Iterator[Watched]:
     made.job.close()
 
 
-def test_first_proposals_come_while_the_pictures_are_looked_at(finding: Finding, watched: Watched) -> None:
+def test_first_proposals_come_while_the_pictures_are_looked_at(finding, watched):
     watched.job.ask(WISH)
     early = watched.until("looking", 8)
     assert early.proposals.ranked
@@ -116,7 +116,7 @@ def test_first_proposals_come_while_the_pictures_are_looked_at(finding: Finding,
     assert len(watched.until("ready", len(VIEWS)).views) == len(VIEWS)
 
 
-def test_a_click_is_carried_to_the_placements_that_are_left(finding: Finding, watched: Watched) -> None:
+def test_a_click_is_carried_to_the_placements_that_are_left(finding, watched):
     finding.allowed.set()
     watched.job.ask(WISH)
     watched.until("ready", len(VIEWS))
@@ -133,7 +133,7 @@ def test_a_click_is_carried_to_the_placements_that_are_left(finding: Finding, wa
     assert finding.carried == []
 
 
-def test_the_look_is_taken_from_three_clicks(finding: Finding, watched: Watched) -> None:
+def test_the_look_is_taken_from_three_clicks(finding, watched):
     finding.allowed.set()
     clicks = tuple(replace(DRAWN.click(n), id=f"c{n + 1}") for n in range(11))
     watched.job.ask(replace(WISH, clicks=tuple(sorted(clicks))))
@@ -141,14 +141,14 @@ def test_the_look_is_taken_from_three_clicks(finding: Finding, watched: Watched)
     assert {looks for _, looks in finding.carried} == {("c1", "c2", "c3")}
 
 
-def test_a_dismissed_placement_is_not_proposed(finding: Finding, watched: Watched) -> None:
+def test_a_dismissed_placement_is_not_proposed(finding, watched):
     finding.allowed.set()
     watched.job.ask(replace(WISH, dismissed=frozenset({2})))
     found = watched.until("ready", len(VIEWS) - 1)
     assert VIEWS[2].placement not in [one.placement for one in found.proposals.ranked]
 
 
-def test_proposing_is_stopped_and_goes_on_without_looking_again(finding: Finding, watched: Watched) -> None:
+def test_proposing_is_stopped_and_goes_on_without_looking_again(finding, watched):
     finding.allowed.set()
     watched.job.ask(WISH)
     watched.until("ready", len(VIEWS))
@@ -159,7 +159,7 @@ def test_proposing_is_stopped_and_goes_on_without_looking_again(finding: Finding
     assert finding.found == 1
 
 
-def test_with_another_camera_the_pictures_are_looked_at_again(finding: Finding, watched: Watched) -> None:
+def test_with_another_camera_the_pictures_are_looked_at_again(finding, watched):
     watched.job.ask(WISH)
     watched.until("looking", 8)
     watched.job.ask(replace(WISH, camera=draw_views(4).camera))
@@ -168,7 +168,7 @@ def test_with_another_camera_the_pictures_are_looked_at_again(finding: Finding, 
     assert finding.found == 2
 
 
-def test_why_there_are_none_is_said(finding: Finding, watched: Watched) -> None:
+def test_why_there_are_none_is_said(finding, watched):
     finding.allowed.set()
     finding.end = Unsolvable("no-camera", "the camera intrinsics are missing", "calibrate the lens")
     watched.job.ask(replace(WISH, camera=None))
@@ -185,7 +185,7 @@ def test_why_there_are_none_is_said(finding: Finding, watched: Watched) -> None:
         assert watched.told.wait_for(lambda: "frame 7" in watched.job.snapshot.progress.problem, timeout=20)
 
 
-def test_nothing_is_asked_of_a_job_that_is_closed(finding: Finding, watched: Watched) -> None:
+def test_nothing_is_asked_of_a_job_that_is_closed(finding, watched):
     watched.job.ask(WISH)
     watched.until("looking", 8)
     finding.allowed.set()
@@ -217,13 +217,13 @@ def placement(start_s: float, end_s: float, x_m: float = 5.0) -> Placement:
 PLACEMENTS = tuple(placement(start_s, start_s + 5.0) for start_s in (1.0, 9.0, 17.0, 25.0))
 
 
-def test_without_intrinsics_that_is_what_is_said() -> None:
+def test_without_intrinsics_that_is_what_is_said():
     outcome = find_proposals(Frames(), None, OPTIONS, placements=PLACEMENTS)
     assert isinstance(outcome, Unsolvable)
     assert outcome.code == "no-camera"
 
 
-def test_known_placements_are_not_searched_for_again() -> None:
+def test_known_placements_are_not_searched_for_again():
     told: list[ViewProgress | str] = []
     outcome = find_proposals(Frames(), CAMERA, OPTIONS, placements=PLACEMENTS, progress=told.append)
     assert not isinstance(outcome, Unsolvable)
@@ -233,14 +233,14 @@ def test_known_placements_are_not_searched_for_again() -> None:
     assert [one.done for one in told if isinstance(one, ViewProgress)] == [1, 2, 3, 4]
 
 
-def test_placements_of_which_only_some_have_frames_are_all_shown() -> None:
+def test_placements_of_which_only_some_have_frames_are_all_shown():
     outcome = find_proposals(Frames(length_s=20), CAMERA, OPTIONS, placements=PLACEMENTS)
     assert not isinstance(outcome, Unsolvable)
     assert [len(view.frames) > 0 for view in outcome[0]] == [True, True, True, False]
 
 
 @pytest.mark.parametrize("after", [0, 2])
-def test_a_search_that_is_stopped_proposes_nothing(after: int) -> None:
+def test_a_search_that_is_stopped_proposes_nothing(after):
     seen: list[ViewProgress | str] = []
     outcome = find_proposals(
         Frames(), CAMERA, OPTIONS, placements=PLACEMENTS, progress=seen.append, stopped=lambda: len(seen) >= after
@@ -256,9 +256,7 @@ def view_of(one: Placement, pixel_px: tuple[float, float]) -> DwellView:
     return DwellView(one, frames, one.start, np.full((48, 64, 3), 90, np.uint8), 1.0, (candidate,))
 
 
-def test_a_click_shows_the_dwell_whose_candidate_is_nearer_when_two_reflectors_stood_at_once(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_click_shows_the_dwell_whose_candidate_is_nearer_when_two_reflectors_stood_at_once(monkeypatch):
     one, other = view_of(placement(1, 6), (10.0, 10.0)), view_of(placement(2, 7, x_m=9.0), (50.0, 30.0))
     later = view_of(placement(20, 25), (49.0, 29.0))
     looked_at: list[DwellView] = []

@@ -31,7 +31,7 @@ def solved(recording: Recording, clicks: tuple[ReflectorClick, ...]) -> Calibrat
 
 
 def figures_of(rows: object) -> dict[str, str]:
-    return {row.key: row.value for row in rows}  # type: ignore[attr-defined]
+    return {row.key: row.value for row in rows}
 
 
 def shown(solved: Calibration, recording: Recording, clicks: tuple[ReflectorClick, ...], reference: Reference | None):
@@ -40,9 +40,7 @@ def shown(solved: Calibration, recording: Recording, clicks: tuple[ReflectorClic
     return view(History(session), facts, reference)
 
 
-def test_the_residuals_on_the_page_are_those_of_evaluate(
-    recording: Recording, clicks: tuple[ReflectorClick, ...], solved: Calibration
-) -> None:
+def test_the_residuals_on_the_page_are_those_of_evaluate(recording, clicks, solved):
     judged = evaluate_recording(solved, recording, clicks=clicks).residuals
     assert judged is not None
     page = figures_of(shown(solved, recording, clicks, None).metrics)
@@ -54,9 +52,7 @@ def test_the_residuals_on_the_page_are_those_of_evaluate(
     assert judged.metrics.aed_px == pytest.approx(solved.metrics.aed_px, rel=1e-12)
 
 
-def test_the_comparison_on_the_page_is_that_of_check(
-    recording: Recording, clicks: tuple[ReflectorClick, ...], solved: Calibration
-) -> None:
+def test_the_comparison_on_the_page_is_that_of_check(recording, clicks, solved):
     turn = RigidTransform(rotation_exp(np.deg2rad([0.4, -0.3, 1.1])), np.array([0.02, -0.05, 0.01]))
     other = replace(solved, camera_from_radar=turn @ solved.camera_from_radar)
     both = compare(imported(CalibrationFile(other)), imported(CalibrationFile(solved)))
@@ -65,13 +61,12 @@ def test_the_comparison_on_the_page_is_that_of_check(
     assert page["position_apart"] == with_sigma(both.position_cm, both.position_sigma_cm)
     assert page["rotation_apart"].startswith("1.2")
     checked = check(imported(CalibrationFile(solved)), against=imported(CalibrationFile(other))).comparison
-    assert checked is not None
     assert (checked.rotation_deg, checked.position_cm) == (both.rotation_deg, both.position_cm)
     for at in both.pixels:
         assert page[f"apart_{at.distance_m:g}_m"] == plain(at.rms_px)
 
 
-def test_acc_on_the_page_is_that_of_the_core() -> None:
+def test_acc_on_the_page_is_that_of_the_core():
     walk, reference = StreetRecording(), reference_calibration()
     evaluation = evaluate_recording(reference.calibration, walk, boxes=walk.street.boxes, held_out=False)
     of_one = acc_panel(evaluation)

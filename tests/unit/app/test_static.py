@@ -15,7 +15,7 @@ def scripts(static: Path) -> list[Path]:
     return sorted(static.rglob("*.js"))
 
 
-def test_every_element_that_a_script_asks_for_is_on_the_page(static: Path) -> None:
+def test_every_element_that_a_script_asks_for_is_on_the_page(static):
     page = (static / "index.html").read_text()
     ids = set(re.findall(r'\bid="([\w-]+)"', page))
     for script in scripts(static):
@@ -23,14 +23,14 @@ def test_every_element_that_a_script_asks_for_is_on_the_page(static: Path) -> No
             assert name in ids, f"{script.name}: #{name}"
 
 
-def test_every_control_of_the_page_has_a_name(static: Path) -> None:
+def test_every_control_of_the_page_has_a_name(static):
     page = (static / "index.html").read_text()
     for tag, content in re.findall(r"<button ([^>]*)>(.*?)</button>", page, re.S):
         named = "aria-label=" in tag or re.sub(r"<[^>]+>", "", content).strip()
         assert named or re.search(r"\bhidden$", tag), tag  # hidden until a script names it
 
 
-def test_nothing_is_fetched_from_elsewhere_and_no_script_is_inline(static: Path) -> None:
+def test_nothing_is_fetched_from_elsewhere_and_no_script_is_inline(static):
     for file in (path for path in static.rglob("*") if path.is_file()):
         text = file.read_text().replace("http://www.w3.org/", "")
         assert not re.search(r"https?://|//cdn|@import", text), file.name
@@ -39,7 +39,7 @@ def test_nothing_is_fetched_from_elsewhere_and_no_script_is_inline(static: Path)
     assert re.findall(r"\son\w+=|style=", page) == []
 
 
-def test_text_of_a_recording_is_never_read_as_html(static: Path) -> None:
+def test_text_of_a_recording_is_never_read_as_html(static):
     for script in scripts(static):
         assert not re.search(r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|\beval\(", script.read_text()), (
             script.name

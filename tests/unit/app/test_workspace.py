@@ -77,7 +77,7 @@ def workspace(journal: ListJournal, solver: HeldSolver) -> Workspace:
     return Workspace(FACTS, Restored(Path("nowhere"), History()), journal, solver)
 
 
-def test_a_click_is_seen_at_once_and_the_answer_later(workspace: Workspace, solver: HeldSolver) -> None:
+def test_a_click_is_seen_at_once_and_the_answer_later(workspace, solver):
     seen: list[View] = []
     workspace.subscribe(seen.append)
     workspace.dispatch(ClickPlaced(TIMES[3], (1.0, 2.0), "clicked"))
@@ -87,16 +87,14 @@ def test_a_click_is_seen_at_once_and_the_answer_later(workspace: Workspace, solv
     assert seen[-1] == workspace.view == view(workspace.history, FACTS)
 
 
-def test_a_step_is_journalled_before_subscribers_are_notified(workspace: Workspace, journal: ListJournal) -> None:
+def test_a_step_is_journalled_before_subscribers_are_notified(workspace, journal):
     journalled: list[int] = []
     workspace.subscribe(lambda shown: journalled.append(len(journal.steps)))
     workspace.dispatch(ClickPlaced(TIMES[3], (1.0, 2.0), "clicked"))
     assert journalled == [0, 1]
 
 
-def test_a_step_that_cannot_be_stored_is_not_made(
-    workspace: Workspace, journal: ListJournal, solver: HeldSolver
-) -> None:
+def test_a_step_that_cannot_be_stored_is_not_made(workspace, journal, solver):
     seen: list[View] = []
     workspace.subscribe(seen.append)
     journal.refuse = True
@@ -107,9 +105,7 @@ def test_a_step_that_cannot_be_stored_is_not_made(
     assert solver.revisions == []
 
 
-def test_a_step_that_does_not_fit_changes_nothing_and_is_not_journalled(
-    workspace: Workspace, journal: ListJournal
-) -> None:
+def test_a_step_that_does_not_fit_changes_nothing_and_is_not_journalled(workspace, journal):
     with pytest.raises(EventError):
         workspace.dispatch(ClickRemoved("c1"))
     assert journal.steps == []
@@ -117,7 +113,7 @@ def test_a_step_that_does_not_fit_changes_nothing_and_is_not_journalled(
     assert len(workspace.session.clicks) == 1
 
 
-def test_undo_and_redo_are_journalled_and_answers_are_not(workspace: Workspace, journal: ListJournal) -> None:
+def test_undo_and_redo_are_journalled_and_answers_are_not(workspace, journal):
     workspace.dispatch(ClickPlaced(TIMES[3], (1.0, 2.0), "clicked"))
     workspace.dispatch(Solved(1, NO_ANSWER))
     workspace.undo()
@@ -126,15 +122,13 @@ def test_undo_and_redo_are_journalled_and_answers_are_not(workspace: Workspace, 
     assert [type(step).__name__ for step in journal.steps] == ["ClickPlaced", "Undo", "Redo"]
 
 
-def test_edited_options_are_journalled_as_the_whole_of_the_options(workspace: Workspace, journal: ListJournal) -> None:
+def test_edited_options_are_journalled_as_the_whole_of_the_options(workspace, journal):
     workspace.dispatch(OptionsChanged({"method": "paper"}))
     assert journal.steps == [OptionsChanged.of(workspace.session.options)]
     assert workspace.session.options.method == "paper"
 
 
-def test_the_solver_is_asked_for_every_revision_with_clicks_and_only_for_those(
-    workspace: Workspace, solver: HeldSolver
-) -> None:
+def test_the_solver_is_asked_for_every_revision_with_clicks_and_only_for_those(workspace, solver):
     workspace.dispatch(OptionsChanged({"method": "paper"}))
     workspace.dispatch(ClickPlaced(TIMES[3], (1.0, 2.0), "clicked"))
     workspace.dispatch(Solved(2, NO_ANSWER))
@@ -143,7 +137,7 @@ def test_the_solver_is_asked_for_every_revision_with_clicks_and_only_for_those(
     assert solver.revisions == [2, 3]
 
 
-def test_the_camera_chosen_last_is_solved_with(workspace: Workspace, solver: HeldSolver) -> None:
+def test_the_camera_chosen_last_is_solved_with(workspace, solver):
     workspace.dispatch(ClickPlaced(TIMES[3], (1.0, 2.0), "clicked"))
     for focal_px in (500.0, 600.0):
         camera = Camera(
@@ -153,14 +147,14 @@ def test_the_camera_chosen_last_is_solved_with(workspace: Workspace, solver: Hel
         assert solver.camera.matrix_px[0, 0] == workspace.camera.matrix_px[0, 0] == focal_px
 
 
-def test_a_restored_session_is_solved_at_once(journal: ListJournal, solver: HeldSolver) -> None:
+def test_a_restored_session_is_solved_at_once(journal, solver):
     first = Workspace(FACTS, Restored(Path("nowhere"), History()), journal, HeldSolver())
     first.dispatch(ClickPlaced(TIMES[3], (1.0, 2.0), "clicked"))
     Workspace(FACTS, Restored(Path("nowhere"), first.history), journal, solver)
     assert solver.revisions == [1]
 
 
-def test_an_answer_that_comes_within_the_request_does_not_deadlock(journal: ListJournal) -> None:
+def test_an_answer_that_comes_within_the_request_does_not_deadlock(journal):
     class Immediate(HeldSolver):
         def request(self, revision: int, clicks, options, when_done: Callable[[Solved], None], camera=None) -> None:
             when_done(Solved(revision, NO_ANSWER))
@@ -170,7 +164,7 @@ def test_an_answer_that_comes_within_the_request_does_not_deadlock(journal: List
     assert workspace.session.is_solved
 
 
-def test_a_subscriber_may_dispatch(workspace: Workspace) -> None:
+def test_a_subscriber_may_dispatch(workspace):
     def tidy(shown: View) -> None:
         if len(shown.clicks) > 1:
             workspace.dispatch(ClickRemoved(shown.clicks[0].id))
@@ -183,7 +177,7 @@ def test_a_subscriber_may_dispatch(workspace: Workspace) -> None:
     assert seen == [0, 1, 2, 1]
 
 
-def test_an_ended_subscription_receives_nothing_more(workspace: Workspace) -> None:
+def test_an_ended_subscription_receives_nothing_more(workspace):
     seen: list[View] = []
     end = workspace.subscribe(seen.append)
     end()
@@ -191,7 +185,7 @@ def test_an_ended_subscription_receives_nothing_more(workspace: Workspace) -> No
     assert len(seen) == 1
 
 
-def test_a_subscriber_that_fails_does_not_silence_the_workspace(workspace: Workspace) -> None:
+def test_a_subscriber_that_fails_does_not_silence_the_workspace(workspace):
     def fail(shown: View) -> None:
         raise ZeroDivisionError
 
@@ -204,7 +198,7 @@ def test_a_subscriber_that_fails_does_not_silence_the_workspace(workspace: Works
     assert len(workspace.session.clicks) == 1
 
 
-def test_many_threads_at_once_lose_no_step_and_views_come_in_order(workspace: Workspace, journal: ListJournal) -> None:
+def test_many_threads_at_once_lose_no_step_and_views_come_in_order(workspace, journal):
     seen: list[int] = []
     workspace.subscribe(lambda shown: seen.append(shown.revision))
     ready = threading.Barrier(4)
@@ -223,7 +217,7 @@ def test_many_threads_at_once_lose_no_step_and_views_come_in_order(workspace: Wo
     assert seen == list(range(49))
 
 
-def test_downloaded_clicks_can_be_imported_again(workspace: Workspace) -> None:
+def test_downloaded_clicks_can_be_imported_again(workspace):
     for frame in (3, 5):
         workspace.dispatch(ClickPlaced(TIMES[frame], (1.5, 2.5), "clicked"))
     text, clicks = workspace.clicks_text(), workspace.session.clicks
@@ -236,14 +230,12 @@ def test_downloaded_clicks_can_be_imported_again(workspace: Workspace) -> None:
     assert workspace.session.clicks == ()
 
 
-def test_a_file_that_holds_no_clicks_is_refused_with_its_name(workspace: Workspace) -> None:
+def test_a_file_that_holds_no_clicks_is_refused_with_its_name(workspace):
     with pytest.raises(InputError, match=r"holiday\.json"):
         workspace.import_clicks("[]", "holiday.json")
 
 
-def test_close_stops_the_solver_and_closes_the_journal(
-    workspace: Workspace, journal: ListJournal, solver: HeldSolver
-) -> None:
+def test_close_stops_the_solver_and_closes_the_journal(workspace, journal, solver):
     workspace.close()
     assert journal.closed
     assert solver.closed
@@ -276,7 +268,7 @@ class BareRecording:
         return RadarScans()
 
 
-def test_a_workspace_opened_again_has_the_earlier_clicks(tmp_path: Path) -> None:
+def test_a_workspace_opened_again_has_the_earlier_clicks(tmp_path):
     for expected in ([], ["c1"]):
         workspace = open_workspace(BareRecording(), camera=None, session_folder=tmp_path / "s", name="drive")
         assert [click.id for click in workspace.restored.history.present.clicks] == expected
@@ -284,7 +276,7 @@ def test_a_workspace_opened_again_has_the_earlier_clicks(tmp_path: Path) -> None
         workspace.close()
 
 
-def test_a_recording_without_pictures_can_be_looked_at_and_stores_nothing(tmp_path: Path) -> None:
+def test_a_recording_without_pictures_can_be_looked_at_and_stores_nothing(tmp_path):
     recording = BareRecording()
     recording.image_times = np.zeros(0, dtype=np.int64)
     facts = recording_facts(recording, "drive")
@@ -299,14 +291,14 @@ def test_a_recording_without_pictures_can_be_looked_at_and_stores_nothing(tmp_pa
     assert not (tmp_path / "s").exists()
 
 
-def test_a_recording_without_pictures_and_without_radar_is_refused_with_a_clear_error() -> None:
+def test_a_recording_without_pictures_and_without_radar_is_refused_with_a_clear_error():
     recording = BareRecording()
     recording.image_times = recording.radar_times = np.zeros(0, dtype=np.int64)
     with pytest.raises(InputError, match="drive: has neither pictures nor radar scans"):
         recording_facts(recording, "drive")
 
 
-def test_a_recording_that_grows_gets_frames_that_can_be_clicked(workspace: Workspace, journal: ListJournal) -> None:
+def test_a_recording_that_grows_gets_frames_that_can_be_clicked(workspace, journal):
     later = FACTS.image_times[-1] + 100_000_000
     with pytest.raises(EventError):
         workspace.dispatch(ClickPlaced(TimeNs(int(later)), (1.0, 2.0), "clicked"))
@@ -316,9 +308,7 @@ def test_a_recording_that_grows_gets_frames_that_can_be_clicked(workspace: Works
     assert len(journal.steps) == 1
 
 
-def test_clicks_are_solved_again_when_scans_of_their_windows_come(
-    workspace: Workspace, solver: HeldSolver, journal: ListJournal
-) -> None:
+def test_clicks_are_solved_again_when_scans_of_their_windows_come(workspace, solver, journal):
     workspace.dispatch(ClickPlaced(TIMES[3], (1.0, 2.0), "clicked"))
     locating = workspace.session.options.locating
     last = TimeNs(TIMES[3] + round((locating.window_s / 2 + locating.max_time_gap_s) * NS_PER_S))

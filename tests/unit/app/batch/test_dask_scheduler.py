@@ -35,7 +35,7 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(dask_scheduler, "_RESTART_S", 1)
 
 
-def test_workers_of_a_scheduler_that_are_killed_change_no_outcome(address: str, tmp_path: Path) -> None:
+def test_workers_of_a_scheduler_that_are_killed_change_no_outcome(address, tmp_path):
     jobs, random = quick_jobs(tmp_path, 20), np.random.default_rng(2)
     with worker_process(address, count=2) as nanny:
         alive = worker_processes(nanny.pid)
@@ -53,15 +53,13 @@ def test_workers_of_a_scheduler_that_are_killed_change_no_outcome(address: str, 
 
 
 @pytest.mark.usefixtures("impatient")
-def test_a_scheduler_without_workers_is_told_with_the_command_that_starts_one(
-    address: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_scheduler_without_workers_is_told_with_the_command_that_starts_one(address, capsys):
     with pytest.raises(InputError, match=rf"--scheduler {address}: it has no workers; start some with `dask worker"):
         list(DaskScheduler(address).run_all(squared, [(1,)]))
     assert capsys.readouterr().err == f"{address} has no workers; waiting 1 s more for one to start\n"
 
 
-def test_a_worker_of_another_version_is_told_before_any_job_runs(address: str, tmp_path: Path) -> None:
+def test_a_worker_of_another_version_is_told_before_any_job_runs(address, tmp_path):
     other = tmp_path / "other" / "cocalib-9.9.dist-info"
     other.mkdir(parents=True)
     (other / "METADATA").write_text("Metadata-Version: 2.1\nName: cocalib\nVersion: 9.9\n")
@@ -76,7 +74,7 @@ def test_a_worker_of_another_version_is_told_before_any_job_runs(address: str, t
 
 @pytest.mark.usefixtures("impatient")
 @pytest.mark.parametrize("listening", [True, False], ids=["silent", "closed"])
-def test_a_scheduler_that_does_not_answer_is_told_within_seconds(listening: bool) -> None:
+def test_a_scheduler_that_does_not_answer_is_told_within_seconds(listening):
     with socket.socket() as other:
         other.bind(("127.0.0.1", 0))
         if listening:
@@ -89,12 +87,12 @@ def test_a_scheduler_that_does_not_answer_is_told_within_seconds(listening: bool
 
 
 @pytest.mark.usefixtures("impatient")
-def test_tls_without_certificates_is_told_in_words() -> None:
+def test_tls_without_certificates_is_told_in_words():
     with pytest.raises(InputError, match=r"--scheduler tls://127\.0\.0\.1:9: .*certificate"):
         list(DaskScheduler("tls://127.0.0.1:9").run_all(squared, [(1,)]))
 
 
-def test_a_scheduler_that_ends_in_the_middle_is_told_and_what_is_done_is_kept(tmp_path: Path) -> None:
+def test_a_scheduler_that_ends_in_the_middle_is_told_and_what_is_done_is_kept(tmp_path):
     jobs, results = quick_jobs(tmp_path, 20), ResultsFolder(tmp_path / "out")
     with (
         scheduler_process() as (scheduler, address),
@@ -105,7 +103,7 @@ def test_a_scheduler_that_ends_in_the_middle_is_told_and_what_is_done_is_kept(tm
     assert results.outcome(jobs[0].digest) is not None
 
 
-def test_dask_that_is_not_installed_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_dask_that_is_not_installed_is_told(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(
         InputError, match=r"Dask is not installed; install cocalib\[cluster\], or leave out --scheduler"
@@ -117,14 +115,14 @@ def test_dask_that_is_not_installed_is_told(monkeypatch: pytest.MonkeyPatch) -> 
     "address",
     ["tcp://127.0.0.1:8786", "tcp://localhost:1", "tcp://[::1]:8786", "tls://10.0.0.7:8786", "tls://head.example:8786"],
 )
-def test_this_machine_and_tls_are_accepted(address: str) -> None:
+def test_this_machine_and_tls_are_accepted(address):
     assert checked_address(address) == address
 
 
 @pytest.mark.parametrize(
     "address", ["tcp://10.0.0.7:8786", "tcp://head.example:8786", "tcp://127.0.0.1.example:8786", "tcp://[fe80::1]:1"]
 )
-def test_another_machine_without_tls_is_refused_with_the_reason(address: str) -> None:
+def test_another_machine_without_tls_is_refused_with_the_reason(address):
     with pytest.raises(InputError, match=r"without TLS is refused.*run code.*tls://"):
         checked_address(address)
 
@@ -134,7 +132,7 @@ def test_another_machine_without_tls_is_refused_with_the_reason(address: str) ->
     ["", "8786", "localhost:8786", "http://127.0.0.1:8786", "tcp://127.0.0.1", "tcp://:8786", "tcp://127.0.0.1:port",
      "tcp://127.0.0.1:99999", "tcp://[::1:8786", "inproc://1/2", "tcp://127.0.0.1:8786/x", "tcp://u@127.0.0.1:8786"],
 )  # fmt: skip
-def test_what_is_no_address_is_refused_with_an_example(address: str) -> None:
+def test_what_is_no_address_is_refused_with_an_example(address):
     with pytest.raises(InputError, match=r"not an address of a Dask scheduler; write tcp://127\.0\.0\.1:8786"):
         checked_address(address)
 
@@ -143,19 +141,19 @@ def _part(version: str) -> dict[str, Any]:
     return {"packages": {"distributed": version}}
 
 
-def test_equal_versions_are_no_trouble() -> None:
+def test_equal_versions_are_no_trouble():
     part = _part("2026.8.0")
     assert dask_trouble({"client": part, "scheduler": part, "workers": {"tcp://127.0.0.1:1": part}}) == ""
     assert version_trouble("0.1.0", {"tcp://127.0.0.1:1": "0.1.0"}) == ""
 
 
-def test_a_scheduler_of_another_dask_is_named() -> None:
+def test_a_scheduler_of_another_dask_is_named():
     here, there = _part("2026.8.0"), _part("2026.1.0")
     found = dask_trouble({"client": here, "scheduler": there, "workers": {"tcp://127.0.0.1:1": here}})
     assert found.startswith("the scheduler runs Dask 2026.1.0 and this process 2026.8.0; install")
 
 
-def test_a_worker_of_another_dask_is_named() -> None:
+def test_a_worker_of_another_dask_is_named():
     here, there = _part("2026.8.0"), _part("2026.1.0")
     found = dask_trouble(
         {"client": here, "scheduler": here, "workers": {"tcp://127.0.0.1:1": here, "tcp://127.0.0.1:2": there}}
@@ -163,7 +161,7 @@ def test_a_worker_of_another_dask_is_named() -> None:
     assert found.startswith("the worker at tcp://127.0.0.1:2 runs Dask 2026.1.0 and this process 2026.8.0")
 
 
-def test_a_worker_without_cocalib_is_named() -> None:
+def test_a_worker_without_cocalib_is_named():
     found = version_trouble(
         "0.1.0", {"tcp://127.0.0.1:1": "0.1.0", "tcp://127.0.0.1:2": ModuleNotFoundError("No module named 'app'")}
     )
@@ -173,11 +171,11 @@ def test_a_worker_without_cocalib_is_named() -> None:
     )
 
 
-def test_a_worker_that_went_away_is_no_trouble() -> None:
+def test_a_worker_that_went_away_is_no_trouble():
     gone = ConnectionRefusedError("closed")
     assert version_trouble("0.1.0", {"tcp://127.0.0.1:1": "0.1.0", "tcp://127.0.0.1:2": gone}) == ""
 
 
-def test_a_worker_of_another_cocalib_is_named() -> None:
+def test_a_worker_of_another_cocalib_is_named():
     found = version_trouble("0.1.0", {"tcp://127.0.0.1:2": "9.9"})
     assert found.startswith("the worker at tcp://127.0.0.1:2 runs cocalib 9.9 and this is cocalib 0.1.0")

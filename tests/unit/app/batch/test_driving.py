@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Callable, Generator, Sequence
-from pathlib import Path
 from typing import Any, TypeVar
 
 import pytest
@@ -35,7 +34,7 @@ class _Backwards(InProcess):
             yield number, function(job, results)
 
 
-def test_outcomes_are_in_the_order_of_the_jobs_and_equal_jobs_run_once(tmp_path: Path) -> None:
+def test_outcomes_are_in_the_order_of_the_jobs_and_equal_jobs_run_once(tmp_path):
     a, b, c = quick_jobs(tmp_path, 3)
     engine, told = _Backwards(), []
     outcomes = drive((a, b, a, c), engine, ResultsFolder(tmp_path), told.append)
@@ -44,7 +43,7 @@ def test_outcomes_are_in_the_order_of_the_jobs_and_equal_jobs_run_once(tmp_path:
     assert [(now.done, now.count) for now in told] == [(0, 4), (1, 4), (2, 4), (4, 4)]
 
 
-def test_what_is_done_is_not_run_again(tmp_path: Path) -> None:
+def test_what_is_done_is_not_run_again(tmp_path):
     jobs, results, engine = quick_jobs(tmp_path, 3), ResultsFolder(tmp_path), _Backwards()
     first = drive(jobs[:2], engine, results)
     told: list[BatchProgress] = []
@@ -53,7 +52,7 @@ def test_what_is_done_is_not_run_again(tmp_path: Path) -> None:
     assert told[0] == BatchProgress(2, 3)
 
 
-def test_a_killed_driver_goes_on_where_it_was(tmp_path: Path) -> None:
+def test_a_killed_driver_goes_on_where_it_was(tmp_path):
     jobs, results, engine = quick_jobs(tmp_path, 4), ResultsFolder(tmp_path), _Backwards()
 
     def interrupt(now: BatchProgress) -> None:
@@ -66,14 +65,14 @@ def test_a_killed_driver_goes_on_where_it_was(tmp_path: Path) -> None:
     assert engine.ran == [job.digest for job in reversed(jobs)]
 
 
-def test_the_time_left_is_unknown_until_some_jobs_have_finished(tmp_path: Path) -> None:
+def test_the_time_left_is_unknown_until_some_jobs_have_finished(tmp_path):
     clock = iter(range(0, 1000, 10))
     told: list[BatchProgress] = []
     drive(quick_jobs(tmp_path, 5), InProcess(), ResultsFolder(tmp_path), told.append, lambda: float(next(clock)))
     assert [now.left_s for now in told] == [None, None, None, 20.0, 10.0, 0.0]
 
 
-def test_kept_outcomes_do_not_make_the_rest_look_quick(tmp_path: Path) -> None:
+def test_kept_outcomes_do_not_make_the_rest_look_quick(tmp_path):
     jobs, results = quick_jobs(tmp_path, 10), ResultsFolder(tmp_path)
     drive(jobs[:6], InProcess(), results)
     clock = iter(range(0, 1000, 10))
@@ -82,19 +81,19 @@ def test_kept_outcomes_do_not_make_the_rest_look_quick(tmp_path: Path) -> None:
     assert [now.left_s for now in told] == [None, None, None, 10.0, 0.0]
 
 
-def test_small_manifests_run_in_this_process_and_large_ones_on_all_processors(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_small_manifests_run_in_this_process_and_large_ones_on_all_processors(monkeypatch):
     monkeypatch.setattr(os, "cpu_count", lambda: 4)
     assert isinstance(chosen_engine(7), InProcess)
     assert chosen_engine(8) == WorkerProcesses(4)
 
 
-def test_what_is_asked_for_is_taken() -> None:
+def test_what_is_asked_for_is_taken():
     assert chosen_engine(1, workers=3) == WorkerProcesses(3)
     assert chosen_engine(1, scheduler="tls://h:1") == DaskScheduler("tls://h:1")
     assert isinstance(chosen_engine(10_000, workers=1), InProcess)
 
 
-def test_flags_that_do_not_go_together_are_refused() -> None:
+def test_flags_that_do_not_go_together_are_refused():
     with pytest.raises(InputError, match="give one of them"):
         chosen_engine(1, workers=2, scheduler="tls://h:1")
     with pytest.raises(OptionError, match="at least 1"):

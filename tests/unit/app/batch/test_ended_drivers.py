@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import psutil
 import pytest
@@ -16,13 +15,12 @@ _STOPPED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, *_STOPPED], ids=["killed", "Ctrl+C", "terminated", "hung up"])
-def test_a_driver_that_ends_leaves_no_workers(number: signal.Signals, project_root: Path, tmp_path: Path) -> None:
+def test_a_driver_that_ends_leaves_no_workers(number, project_root, tmp_path):
     environment = {**os.environ, "PYTHONPATH": str(project_root), "TMPDIR": str(tmp_path)}
     driver = subprocess.Popen(
         [sys.executable, "-m", "tests.batch_driver"],
         cwd=project_root, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
     )  # fmt: skip
-    assert driver.stdout is not None
     lines = sorted(driver.stdout.readline().strip() for _ in range(3))
     assert lines == ["finished 0", "running 1", "running 2"]
     if number in (signal.SIGINT, signal.SIGHUP):

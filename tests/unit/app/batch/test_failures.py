@@ -56,16 +56,14 @@ def raising(error: BaseException) -> Callable[..., object]:
 
 
 @pytest.mark.parametrize("name", ["radar.bag", "clicks.json"])
-def test_a_missing_file_is_not_final(name: str, row: ManifestRow, tmp_path: Path) -> None:
+def test_a_missing_file_is_not_final(name, row, tmp_path):
     (tmp_path / name).unlink()
     outcome = outcome_of(row, tmp_path / "results")
     assert (outcome.status, outcome.is_final) == ("failed", False)
     assert name in outcome.reason
 
 
-def test_a_file_that_only_the_worker_misses_is_not_final(
-    row: ManifestRow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_file_that_only_the_worker_misses_is_not_final(row, tmp_path, monkeypatch):
     def unreached(*_arguments: object, **_flags: object) -> object:
         try:
             raise OSError(errno.ESTALE, "stale file handle", "radar.bag")
@@ -76,20 +74,20 @@ def test_a_file_that_only_the_worker_misses_is_not_final(
     assert not outcome_of(row, tmp_path / "results").is_final
 
 
-def test_a_broken_recording_is_final(row: ManifestRow, tmp_path: Path) -> None:
+def test_a_broken_recording_is_final(row, tmp_path):
     (tmp_path / "radar.bag").write_bytes(b"#ROSBAG V2.0\n")
     outcome = outcome_of(dataclasses.replace(row, recording=row.recording[:1]), tmp_path / "results")
     assert (outcome.status, outcome.is_final) == ("failed", True)
     assert "radar.bag" in outcome.reason
 
 
-def test_clicks_that_are_no_clicks_are_final(row: ManifestRow, tmp_path: Path) -> None:
+def test_clicks_that_are_no_clicks_are_final(row, tmp_path):
     (tmp_path / "clicks.json").write_text("[]")
     outcome = outcome_of(row, tmp_path / "results")
     assert (outcome.status, outcome.is_final, outcome.files) == ("failed", True, ())
 
 
-def test_clicks_of_another_recording_are_refused_as_the_command_does(row: ManifestRow, tmp_path: Path) -> None:
+def test_clicks_of_another_recording_are_refused_as_the_command_does(row, tmp_path):
     document = json.loads((tmp_path / "clicks.json").read_text())
     for click in document["clicks"]:
         click["image_time"]["sec"] += 1000
@@ -99,14 +97,14 @@ def test_clicks_of_another_recording_are_refused_as_the_command_does(row: Manife
     assert "has the stamp of no frame" in outcome.reason
 
 
-def test_nothing_was_clicked(row: ManifestRow, tmp_path: Path) -> None:
+def test_nothing_was_clicked(row, tmp_path):
     outcome = outcome_of(dataclasses.replace(row, clicks=None), tmp_path / "results")
     assert (outcome.status, outcome.reason, outcome.is_final) == ("refused", "nothing was clicked", True)
     assert outcome.recorded_ns is not None
     assert outcome.steps == {}
 
 
-def test_too_few_clicks_are_refused_with_a_hint(row: ManifestRow, tmp_path: Path) -> None:
+def test_too_few_clicks_are_refused_with_a_hint(row, tmp_path):
     document = json.loads((tmp_path / "clicks.json").read_text())
     (tmp_path / "clicks.json").write_text(json.dumps({**document, "clicks": document["clicks"][:2]}))
     outcome = outcome_of(row, tmp_path / "results")
@@ -124,9 +122,7 @@ def test_too_few_clicks_are_refused_with_a_hint(row: ManifestRow, tmp_path: Path
         (OSError("av: invalid data"), "internal error (OSError: av: invalid data)"),
     ],
 )
-def test_what_nobody_expected_is_not_final(
-    error: Exception, words: str, row: ManifestRow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_nobody_expected_is_not_final(error, words, row, tmp_path, monkeypatch):
     monkeypatch.setattr(running_job, "solve_session", raising(error))
     outcome = outcome_of(row, tmp_path / "results")
     assert (outcome.status, outcome.is_final) == ("failed", False)
@@ -138,7 +134,7 @@ def test_what_nobody_expected_is_not_final(
     assert outcome_of(row, tmp_path / "results").status == "solved"
 
 
-def test_to_be_interrupted_is_no_outcome(row: ManifestRow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_to_be_interrupted_is_no_outcome(row, tmp_path, monkeypatch):
     monkeypatch.setattr(running_job, "solve_session", raising(KeyboardInterrupt()))
     with pytest.raises(KeyboardInterrupt):
         outcome_of(row, tmp_path / "results")
@@ -153,16 +149,7 @@ def test_to_be_interrupted_is_no_outcome(row: ManifestRow, tmp_path: Path, monke
         ("export", "export_session", InputError("no"), True, {"calibration.json", "evaluation.json", "report.html"}),
     ],
 )  # fmt: skip
-def test_a_step_fails_on_its_own(
-    step: str,
-    function: str,
-    error: Exception,
-    final: bool,
-    files: set[str],
-    row: ManifestRow,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_step_fails_on_its_own(step, function, error, final, files, row, tmp_path, monkeypatch):
     def export(*_arguments: object) -> dict[str, bytes]:
         return {"export/kitti.txt": b"P2: 1"}
 
@@ -177,9 +164,7 @@ def test_a_step_fails_on_its_own(
     assert {file.name for file in outcome.files} == files
 
 
-def test_an_input_that_changes_while_the_job_runs_is_no_result(
-    row: ManifestRow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_input_that_changes_while_the_job_runs_is_no_result(row, tmp_path, monkeypatch):
     def change(*_arguments: object) -> Unsolvable:
         os.utime(tmp_path / "camera.bag", (1, 1))
         return Unsolvable("too-few-pairs", "reason", "hint")
@@ -191,9 +176,7 @@ def test_an_input_that_changes_while_the_job_runs_is_no_result(
     assert not (tmp_path / "results" / "results").exists()
 
 
-def test_an_input_that_changed_before_the_job_ran_is_not_read(
-    row: ManifestRow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_input_that_changed_before_the_job_ran_is_not_read(row, tmp_path, monkeypatch):
     job = job_of(row, tmp_path / "results")
     with (tmp_path / "camera.bag").open("ab") as file:
         file.write(b"more")
@@ -201,9 +184,7 @@ def test_an_input_that_changed_before_the_job_ran_is_not_read(
     assert "an input changed" in run_job(job, tmp_path / "results").reason
 
 
-def test_a_full_disk_is_an_outcome_that_nobody_keeps(
-    row: ManifestRow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_full_disk_is_an_outcome_that_nobody_keeps(row, tmp_path, monkeypatch):
     monkeypatch.setattr(running_job, "solve_session", lambda *_: Unsolvable("too-few-pairs", "reason", "hint"))
     monkeypatch.setattr(running_job, "listed_files", raising(OSError(errno.ENOSPC, "No space left on device")))
     outcome = outcome_of(row, tmp_path / "results")

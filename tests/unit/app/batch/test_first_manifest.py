@@ -27,7 +27,7 @@ def read_back(folder: Path) -> dict[tuple[str, str], ManifestRow]:
     return {(row.vehicle, row.session): row for row in rows}
 
 
-def test_vehicles_and_sessions_are_folders(tmp_path: Path) -> None:
+def test_vehicles_and_sessions_are_folders(tmp_path):
     lay(
         tmp_path,
         "van 7/spring/radar.bag",
@@ -42,20 +42,20 @@ def test_vehicles_and_sessions_are_folders(tmp_path: Path) -> None:
     assert len(found["van 8", "1"].recording) == 2
 
 
-def test_recordings_of_one_folder_belong_together_if_only_the_sensor_differs(tmp_path: Path) -> None:
+def test_recordings_of_one_folder_belong_together_if_only_the_sensor_differs(tmp_path):
     lay(tmp_path, "van/radar_01.bag", "van/camera_01.bag", "van/radar_02.bag", "van/camera_02.bag", "single.bag")
     found = read_back(tmp_path)
     assert set(found) == {("van", "01"), ("van", "02"), ("single", "single")}
     assert [path.name for path in found["van", "02"].recording] == ["camera_02.bag", "radar_02.bag"]
 
 
-def test_a_bag_folder_is_one_recording(tmp_path: Path) -> None:
+def test_a_bag_folder_is_one_recording(tmp_path):
     lay(tmp_path, "van/2026-01-02/bag/metadata.yaml", "van/2026-01-02/bag/bag_0.db3", ".hidden/a.bag")
     found = read_back(tmp_path)
     assert [row.recording for row in found.values()] == [(tmp_path / "van" / "2026-01-02" / "bag",)]
 
 
-def test_clicks_beside_the_only_recording_are_taken(tmp_path: Path) -> None:
+def test_clicks_beside_the_only_recording_are_taken(tmp_path):
     lay(tmp_path, "van/a/drive.bag", "van/a/clicks.json", "van/b/drive.bag", "van/b/one.json", "van/b/two.json")
     (tmp_path / "van" / "a" / "truth.json").write_text('{"schema": "cocalib/truth-1"}', encoding="utf-8")
     found = read_back(tmp_path)
@@ -65,13 +65,13 @@ def test_clicks_beside_the_only_recording_are_taken(tmp_path: Path) -> None:
     assert "van/b/one.json, van/b/two.json" in first_manifest(tmp_path, tmp_path / "x.toml")[0]
 
 
-def test_names_of_any_kind_survive(tmp_path: Path) -> None:
+def test_names_of_any_kind_survive(tmp_path):
     lay(tmp_path, 'a"b é/c d.bag')
     ((row),) = read_back(tmp_path).values()
     assert row.recording == (tmp_path / 'a"b é' / "c d.bag",)
 
 
-def test_a_manifest_elsewhere_names_whole_paths(tmp_path: Path) -> None:
+def test_a_manifest_elsewhere_names_whole_paths(tmp_path):
     lay(tmp_path, "data/van.bag")
     manifest = tmp_path / "other" / "fleet.toml"
     manifest.parent.mkdir()
@@ -80,7 +80,7 @@ def test_a_manifest_elsewhere_names_whole_paths(tmp_path: Path) -> None:
     assert row.recording == (tmp_path / "data" / "van.bag",)
 
 
-def test_folders_of_pictures_and_tables_are_named_as_left_out(tmp_path: Path) -> None:
+def test_folders_of_pictures_and_tables_are_named_as_left_out(tmp_path):
     lay(
         tmp_path,
         "van 1/drive.mcap",
@@ -96,21 +96,21 @@ def test_folders_of_pictures_and_tables_are_named_as_left_out(tmp_path: Path) ->
     assert set(read_back(tmp_path)) == {("van 1", "drive")}
 
 
-def test_of_many_left_out_folders_some_are_named_and_the_rest_counted(tmp_path: Path) -> None:
+def test_of_many_left_out_folders_some_are_named_and_the_rest_counted(tmp_path):
     lay(tmp_path, "van/drive.mcap", *(f"p{k:02}/1.png" for k in range(25)))
     text, _ = first_manifest(tmp_path, tmp_path / "fleet.toml")
     assert text.count("# left out: ") == 20
     assert text.endswith("# and 5 more folders\n")
 
 
-def test_a_folder_without_recordings_is_refused(tmp_path: Path) -> None:
+def test_a_folder_without_recordings_is_refused(tmp_path):
     with pytest.raises(InputError, match="no recording in it"):
         first_manifest(tmp_path, tmp_path / "x.toml")
     with pytest.raises(InputError, match="no such folder"):
         first_manifest(tmp_path / "absent", tmp_path / "x.toml")
 
 
-def test_links_are_followed_once_and_every_name_is_one_that_a_manifest_takes(tmp_path: Path) -> None:
+def test_links_are_followed_once_and_every_name_is_one_that_a_manifest_takes(tmp_path):
     lay(tmp_path, "van/spring/drive.mcap", "a\\b/autumn/drive.mcap")
     (tmp_path / "van" / "loop").symlink_to(tmp_path, target_is_directory=True)
     (tmp_path / "again").symlink_to(tmp_path / "van" / "spring", target_is_directory=True)

@@ -70,7 +70,7 @@ def table_beside(root: Path) -> Path:
 
 
 @pytest.mark.parametrize(("layout", "beside"), [(kitti_frames, 2), (kitti_raw, 2), (table_beside, 1)])
-def test_what_opening_reads_is_an_input(layout, beside: int, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+def test_what_opening_reads_is_an_input(layout, beside, tmp_path):
     given = layout(tmp_path)
     command = [sys.executable, "-c", _OPENED, str(tmp_path), str(given)]
     printed = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
@@ -82,7 +82,7 @@ def test_what_opening_reads_is_an_input(layout, beside: int, tmp_path: Path) -> 
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no named pipes")
-def test_a_pipe_is_never_read_and_its_job_says_so(tmp_path: Path) -> None:
+def test_a_pipe_is_never_read_and_its_job_says_so(tmp_path):
     pipe = tmp_path / "drive.bag"
     os.mkfifo(pipe)
     with pytest.raises(OSError, match="is a named pipe"):

@@ -64,21 +64,19 @@ CHANGES: dict[str, Callable[[Path], object]] = {
 
 
 @pytest.mark.parametrize("name", [one.name for one in dataclasses.fields(ManifestRow) if one.name != "place"])
-def test_each_field_of_a_row_changes_the_digest(name: str, row: ManifestRow, tmp_path: Path) -> None:
+def test_each_field_of_a_row_changes_the_digest(name, row, tmp_path):
     changed = dataclasses.replace(row, **{name: CHANGES[name](tmp_path)})
     assert job_of(changed, tmp_path).digest != job_of(row, tmp_path).digest
 
 
-def test_where_a_row_stands_and_where_its_files_lie_does_not_matter(row: ManifestRow, tmp_path: Path) -> None:
+def test_where_a_row_stands_and_where_its_files_lie_does_not_matter(row, tmp_path):
     shutil.copytree(tmp_path / "in", tmp_path / "copy")
     copied = tuple(tmp_path / "copy" / path.name for path in row.recording)
     moved = dataclasses.replace(row, recording=copied, place="line 9")
     assert job_of(moved, tmp_path).digest == job_of(row, tmp_path).digest
 
 
-def test_another_version_of_the_program_makes_another_digest(
-    row: ManifestRow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_another_version_of_the_program_makes_another_digest(row, tmp_path, monkeypatch):
     before = job_of(row, tmp_path).digest
     monkeypatch.setattr("cocalib.batch.job.version", lambda: "9.9.9")
     assert job_of(row, tmp_path).digest != before
@@ -92,7 +90,7 @@ def test_another_version_of_the_program_makes_another_digest(
         "v1.0-mini/calibrated_sensor.json",
     ],
 )
-def test_a_file_that_is_read_with_the_recording_changes_the_digest(name: str, row: ManifestRow, tmp_path: Path) -> None:
+def test_a_file_that_is_read_with_the_recording_changes_the_digest(name, row, tmp_path):
     before = job_of(row, tmp_path)
     put(tmp_path / "in" / name, "other content")
     after = job_of(row, tmp_path)
@@ -101,13 +99,13 @@ def test_a_file_that_is_read_with_the_recording_changes_the_digest(name: str, ro
 
 
 @pytest.mark.parametrize("name", ["clicks.json", "other.bag", "pictures/.hidden", "drive.bag.cocalib-session/journal"])
-def test_a_file_that_is_not_read_with_the_recording_does_not(name: str, row: ManifestRow, tmp_path: Path) -> None:
+def test_a_file_that_is_not_read_with_the_recording_does_not(name, row, tmp_path):
     before = job_of(row, tmp_path)
     put(tmp_path / "in" / name)
     assert job_of(row, tmp_path) == before
 
 
-def test_names_and_contents_are_not_mixed_up(tmp_path: Path) -> None:
+def test_names_and_contents_are_not_mixed_up(tmp_path):
     one, other = tmp_path / "one" / "in", tmp_path / "other" / "in"
     put(one / "a", "b"), put(one / "c", "d")
     put(other / "a", "d"), put(other / "c", "b")
@@ -115,14 +113,14 @@ def test_names_and_contents_are_not_mixed_up(tmp_path: Path) -> None:
     assert jobs[0].digest != jobs[1].digest
 
 
-def test_a_missing_input_makes_a_job_too(row: ManifestRow, tmp_path: Path) -> None:
+def test_a_missing_input_makes_a_job_too(row, tmp_path):
     missing = dataclasses.replace(row, clicks=tmp_path / "clicks.json")
     before = job_of(missing, tmp_path)
     put(tmp_path / "clicks.json")
     assert job_of(missing, tmp_path).digest != before.digest != job_of(row, tmp_path).digest
 
 
-def test_a_camera_of_several_in_a_file_is_told_apart(row: ManifestRow, tmp_path: Path) -> None:
+def test_a_camera_of_several_in_a_file_is_told_apart(row, tmp_path):
     put(tmp_path / "cameras.yaml")
     digests = {
         job_of(dataclasses.replace(row, camera=tmp_path / f"cameras.yaml#{name}"), tmp_path).digest for name in "ab"
@@ -142,7 +140,7 @@ class Reading:
         self.calls.append((done, total))
 
 
-def test_what_has_not_changed_is_not_read_again(row: ManifestRow, tmp_path: Path) -> None:
+def test_what_has_not_changed_is_not_read_again(row, tmp_path):
     first, second = Reading(), Reading()
     jobs = jobs_of([row, row], tmp_path, first)
     assert first.calls == [(7, 14), (14, 14)]
@@ -151,13 +149,13 @@ def test_what_has_not_changed_is_not_read_again(row: ManifestRow, tmp_path: Path
 
 
 @pytest.mark.parametrize("kept", ["", "{", '{"schema": "cocalib/input-digests-9", "inputs": {}}', "[]"])
-def test_a_file_of_digests_that_cannot_be_read_is_as_good_as_none(kept: str, row: ManifestRow, tmp_path: Path) -> None:
+def test_a_file_of_digests_that_cannot_be_read_is_as_good_as_none(kept, row, tmp_path):
     before = job_of(row, tmp_path)
     (tmp_path / "inputs.json").write_text(kept)
     assert job_of(row, tmp_path) == before
 
 
-def test_content_of_the_same_size_with_a_new_time_is_read_again(row: ManifestRow, tmp_path: Path) -> None:
+def test_content_of_the_same_size_with_a_new_time_is_read_again(row, tmp_path):
     before = job_of(row, tmp_path)
     put(row.recording[0], "CONTENT", age_s=59.0)
     after = job_of(row, tmp_path)
@@ -165,9 +163,7 @@ def test_content_of_the_same_size_with_a_new_time_is_read_again(row: ManifestRow
     assert after.state != before.state
 
 
-def test_what_was_changed_just_now_is_not_kept(
-    row: ManifestRow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_was_changed_just_now_is_not_kept(row, tmp_path, monkeypatch):
     monkeypatch.setattr(inputs, "_SETTLED_NS", 10**15)
     job_of(row, tmp_path)
     reading = Reading()
@@ -175,7 +171,7 @@ def test_what_was_changed_just_now_is_not_kept(
     assert reading.calls[-1] == (14, 14)
 
 
-def test_drivers_that_share_a_folder_keep_what_the_others_read(row: ManifestRow, tmp_path: Path) -> None:
+def test_drivers_that_share_a_folder_keep_what_the_others_read(row, tmp_path):
     given = inputs_of(row)
     one, other = InputDigests(tmp_path), InputDigests(tmp_path)
     one.digest(given[0]), other.digest(given[1])
@@ -185,7 +181,7 @@ def test_drivers_that_share_a_folder_keep_what_the_others_read(row: ManifestRow,
     assert reading.calls == []
 
 
-def test_the_state_of_inputs_does_not_depend_on_where_they_are(row: ManifestRow, tmp_path: Path) -> None:
+def test_the_state_of_inputs_does_not_depend_on_where_they_are(row, tmp_path):
     shutil.copytree(tmp_path / "in", tmp_path / "copy")
     copied = dataclasses.replace(row, recording=tuple(tmp_path / "copy" / path.name for path in row.recording))
     assert state_of(inputs_of(copied)) == state_of(inputs_of(row))

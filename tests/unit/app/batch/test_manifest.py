@@ -46,20 +46,19 @@ def fault_of(text: str, folder: Path, name: str = "fleet.toml") -> str:
     return str(error.value).removeprefix(f"{folder / name}: ")
 
 
-def test_a_session_has_what_the_file_says_and_what_the_defaults_say(tmp_path: Path) -> None:
+def test_a_session_has_what_the_file_says_and_what_the_defaults_say(tmp_path):
     first, second = rows_of(TOML, tmp_path)
     assert (first.vehicle, first.session, first.vehicle_type, first.radar_serial) == ("van 7", "spring", "van", "R-1")
     assert first.recording == (tmp_path / "a" / "radar.bag", tmp_path / "a" / "camera.bag")
     assert first.clicks == tmp_path / "a" / "clicks.json"
     assert (first.options.noise.sigma_px, first.options.gating.max_range_m) == (1.5, 30.0)
-    assert first.options.solving.camera_position is not None
     assert first.options.solving.camera_position.position_m == (0.1, 0.0, -0.2)
     assert (first.topics.radar_topic, first.exports, first.auto) == ("/radar", ("tf2",), False)
     assert (second.session, second.vehicle_type, second.auto) == ("b", "lorry", True)
     assert (second.options.noise.sigma_px, second.options.gating.max_range_m) == (3.0, 60.0)
 
 
-def test_an_absolute_path_stays_as_it_is(tmp_path: Path) -> None:
+def test_an_absolute_path_stays_as_it_is(tmp_path):
     elsewhere = tmp_path / "elsewhere" / "a.bag"
     (row,) = rows_of(f'[[session]]\nvehicle = "a"\nrecording = "{elsewhere.as_posix()}"\n', tmp_path)
     assert row.recording == (elsewhere,)
@@ -119,11 +118,11 @@ def test_an_absolute_path_stays_as_it_is(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_a_mistake_is_named_with_its_place(text: str, fault: str, tmp_path: Path) -> None:
+def test_a_mistake_is_named_with_its_place(text, fault, tmp_path):
     assert fault_of(text, tmp_path).startswith(fault)
 
 
-def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
+def test_a_file_of_another_kind_is_refused(tmp_path):
     for name in ("fleet.yaml", "fleet.csv"):
         assert fault_of("a: 1", tmp_path, name).startswith("a manifest is a .toml file; cocalib batch FILE.toml --init")
     with pytest.raises(InputError, match=r"no such file; cocalib batch .*absent\.toml --init FOLDER writes one"):
@@ -133,7 +132,7 @@ def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
         read_manifest(tmp_path / "binary.toml")
 
 
-def test_the_size_of_the_reflector_and_resized_pictures(tmp_path: Path) -> None:
+def test_the_size_of_the_reflector_and_resized_pictures(tmp_path):
     path = tmp_path / "fleet.toml"
     path.write_text(
         '[defaults]\nreflector_m = 0.3\n[[session]]\nvehicle = "a"\nrecording = "a.bag"\nrescale_camera = true\n'
@@ -145,7 +144,7 @@ def test_the_size_of_the_reflector_and_resized_pictures(tmp_path: Path) -> None:
         read_manifest(path)
 
 
-def test_another_encoding_is_named_with_what_to_do(tmp_path: Path) -> None:
+def test_another_encoding_is_named_with_what_to_do(tmp_path):
     path = tmp_path / "fleet.toml"
     path.write_bytes('[[session]]\nvehicle = "K\xe4fer"\n'.encode("latin-1"))
     with pytest.raises(InputError, match="save it as UTF-8"):
@@ -171,5 +170,5 @@ def test_another_encoding_is_named_with_what_to_do(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_slips_of_the_pen_are_told_with_what_to_write(tmp_path: Path, text: str, words: str) -> None:
+def test_slips_of_the_pen_are_told_with_what_to_write(tmp_path, text, words):
     assert re.search(words, fault_of(text, tmp_path))

@@ -1,7 +1,5 @@
 """The outcome's file is read strictly, and one of another version is told by its name."""
 
-from pathlib import Path
-
 import msgspec
 import pytest
 
@@ -22,11 +20,11 @@ OUTCOME = Outcome(
 )
 
 
-def test_what_is_written_is_read() -> None:
+def test_what_is_written_is_read():
     assert read_outcome(outcome_text(OUTCOME)) == OUTCOME
 
 
-def test_a_result_of_another_version_is_named() -> None:
+def test_a_result_of_another_version_is_named():
     text = outcome_text(OUTCOME).replace("outcome-1", "outcome-2")
     with pytest.raises(
         msgspec.ValidationError, match=r"another version of cocalib \(cocalib/outcome-2, this one reads"
@@ -45,12 +43,12 @@ def test_a_result_of_another_version_is_named() -> None:
         outcome_text(OUTCOME).replace('"vehicle"', '"car"'),
     ],
 )
-def test_anything_else_is_refused(text: str) -> None:
+def test_anything_else_is_refused(text):
     with pytest.raises(msgspec.DecodeError):
         read_outcome(text)
 
 
-def test_the_published_schema_is_that_of_the_type(tmp_path: Path, project_root: Path) -> None:
+def test_the_published_schema_is_that_of_the_type(tmp_path, project_root):
     written = write_outcome_schema(tmp_path)
     published = project_root / "docs" / "schemas" / written.name
     assert published.read_text(encoding="utf-8") == written.read_text(encoding="utf-8"), (

@@ -38,12 +38,11 @@ def hidden(folder: ResultsFolder) -> list[str]:
     return [one.name for one in folder.folder_of("").iterdir() if one.name.startswith(".")]
 
 
-def test_a_result_is_listed_without_its_outcome_and_its_log(tmp_path: Path) -> None:
+def test_a_result_is_listed_without_its_outcome_and_its_log(tmp_path):
     folder = ResultsFolder(tmp_path)
     assert folder.outcome(DIGEST) is None
     write(folder)
     found = folder.outcome(DIGEST)
-    assert found is not None
     assert [file.name for file in found.files] == ["calibration.json", "export/tf2.sh"]
     assert hidden(folder) == []
 
@@ -51,7 +50,7 @@ def test_a_result_is_listed_without_its_outcome_and_its_log(tmp_path: Path) -> N
 @pytest.mark.parametrize(
     "damage", ["changed", "missing", "outcome cut", "outcome empty", "of another job", "no folder"]
 )
-def test_a_damaged_result_is_none_and_can_be_written_again(damage: str, tmp_path: Path) -> None:
+def test_a_damaged_result_is_none_and_can_be_written_again(damage, tmp_path):
     folder = ResultsFolder(tmp_path)
     write(folder)
     place = folder.folder_of(DIGEST)
@@ -75,18 +74,17 @@ def test_a_damaged_result_is_none_and_can_be_written_again(damage: str, tmp_path
     assert hidden(folder) == []
 
 
-def test_what_may_go_well_another_time_is_run_again_and_replaced(tmp_path: Path) -> None:
+def test_what_may_go_well_another_time_is_run_again_and_replaced(tmp_path):
     folder = ResultsFolder(tmp_path)
     write(folder, is_final=False)
     assert folder.outcome(DIGEST) is None
     write(folder, reason="second")
     write(folder, is_final=False, reason="third")
     found = folder.outcome(DIGEST)
-    assert found is not None
     assert found.reason == "second"
 
 
-def test_an_error_while_writing_leaves_nothing(tmp_path: Path) -> None:
+def test_an_error_while_writing_leaves_nothing(tmp_path):
     folder = ResultsFolder(tmp_path)
     with pytest.raises(FileNotFoundError), folder.writing(DIGEST) as unfinished:
         (unfinished / "missing" / "calibration.json").write_text("{}")
@@ -144,7 +142,7 @@ def run_python(code: str, *arguments: str | Path) -> str:
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
-def test_killed_at_any_moment_a_result_is_whole_or_absent(tmp_path: Path) -> None:
+def test_killed_at_any_moment_a_result_is_whole_or_absent(tmp_path):
     moments, finished = run_python(_KILLED, tmp_path).split()
     assert int(moments) > 20
     assert finished == "True"
@@ -171,14 +169,14 @@ _AT_ONCE = """
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
-def test_several_processes_that_write_the_same_result_leave_one(tmp_path: Path) -> None:
+def test_several_processes_that_write_the_same_result_leave_one(tmp_path):
     assert run_python(_AT_ONCE, tmp_path).strip() == "[0, 0, 0, 0]"
     folder = ResultsFolder(tmp_path)
     assert folder.outcome(DIGEST) is not None
     assert [one.name for one in folder.folder_of("").iterdir()] == [DIGEST]
 
 
-def test_what_a_living_process_writes_is_not_removed(tmp_path: Path) -> None:
+def test_what_a_living_process_writes_is_not_removed(tmp_path):
     folder = ResultsFolder(tmp_path)
     with folder.writing(DIGEST) as unfinished:
         os.utime(unfinished, (0, 0))
@@ -187,7 +185,7 @@ def test_what_a_living_process_writes_is_not_removed(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("age_s", [60, 7200])
-def test_what_another_machine_left_is_removed_once_it_is_old(age_s: int, tmp_path: Path) -> None:
+def test_what_another_machine_left_is_removed_once_it_is_old(age_s, tmp_path):
     folder = ResultsFolder(tmp_path)
     elsewhere = folder.folder_of(Writer("0" * 12, 17, 4).folder_name(DIGEST))
     elsewhere.mkdir(parents=True)

@@ -70,7 +70,7 @@ def commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Commands:
     return Commands(tmp_path / "commands", capsys)
 
 
-def test_a_clicked_session(commands: Commands, tmp_path: Path) -> None:
+def test_a_clicked_session(commands, tmp_path):
     row = ManifestRow("van", "1", BAGS, **SENSORS, clicks=CLICKS, exports=("tf2", "opencv", "pack"))
     outcome, files = done(row, tmp_path / "results")
     assert (outcome.status, outcome.is_final, outcome.step_reasons) == ("solved", True, {})
@@ -97,7 +97,7 @@ def same_but_for_the_run(one: Outcome, other: Outcome) -> bool:
     return all(getattr(one, name) == getattr(other, name) for name in Outcome.__struct_fields__ if name != "run")
 
 
-def test_intrinsics_of_a_file_a_measured_position_and_options(commands: Commands, tmp_path: Path) -> None:
+def test_intrinsics_of_a_file_a_measured_position_and_options(commands, tmp_path):
     given = tmp_path / "camera.yaml"
     commands.solve("--clicks", CLICKS)
     commands.export("camera-info", given)
@@ -107,7 +107,6 @@ def test_intrinsics_of_a_file_a_measured_position_and_options(commands: Commands
     )
     row = ManifestRow("van", "1", BAGS, **SENSORS, clicks=CLICKS, camera=given, rescale_camera=True, options=options)
     given_camera = solving.given_files(row).camera
-    assert given_camera is not None
     assert given_camera.rescale
     outcome, files = done(row, tmp_path / "results")
     flags = ("--camera-position-m", "0", "0", "0.045", "--camera-position-sigma-m", "0.02", "--refine-intrinsics")
@@ -119,7 +118,7 @@ def test_intrinsics_of_a_file_a_measured_position_and_options(commands: Commands
     assert outcome.steps["evaluate"] == "done"
 
 
-def test_clicks_of_a_person_and_of_nobody(commands: Commands, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_clicks_of_a_person_and_of_nobody(commands, tmp_path, monkeypatch):
     given = tmp_path / "clicks.json"
     document = json.loads(CLICKS.read_text())
     given.write_text(json.dumps({**document, "clicks": document["clicks"][:4]}))

@@ -45,7 +45,7 @@ def put(kind: str, place: Path) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", [OUTCOME_FILE, "calibration.json", "export/tf2.sh"])
-def test_a_result_with_something_else_than_files_is_refused_and_stays(kind: str, name: str, tmp_path: Path) -> None:
+def test_a_result_with_something_else_than_files_is_refused_and_stays(kind, name, tmp_path):
     folder = ResultsFolder(tmp_path)
     write(folder)
     put(kind, place := folder.folder_of(DIGEST) / name)
@@ -57,7 +57,7 @@ def test_a_result_with_something_else_than_files_is_refused_and_stays(kind: str,
     assert not list(folder.folder_of("").glob(".*"))
 
 
-def test_a_batch_refuses_a_result_that_status_refuses(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_batch_refuses_a_result_that_status_refuses(tmp_path, capsys):
     out, jobs = tmp_path / "out", quick_jobs(tmp_path, 1)
     drive(jobs, InProcess(), ResultsFolder(out))
     put("link to a file", place := ResultsFolder(out).folder_of(jobs[0].digest) / OUTCOME_FILE)
@@ -70,7 +70,7 @@ def test_a_batch_refuses_a_result_that_status_refuses(tmp_path: Path, capsys: py
     assert place.is_symlink()
 
 
-def test_a_linked_folder_of_results_is_named_by_one_path(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_linked_folder_of_results_is_named_by_one_path(tmp_path, capsys):
     folder = ResultsFolder(tmp_path / "out")
     write(folder)
     folder.folder_of(DIGEST).rename(tmp_path / "theirs")
@@ -83,7 +83,7 @@ def test_a_linked_folder_of_results_is_named_by_one_path(tmp_path: Path, capsys:
     "name",
     ["/dev/zero", "../../elsewhere.json", "export/../calibration.json", "./calibration.json", "", "a//b", "a\\b"],
 )
-def test_an_outcome_that_lists_what_is_not_in_its_folder_is_none(name: str, tmp_path: Path) -> None:
+def test_an_outcome_that_lists_what_is_not_in_its_folder_is_none(name, tmp_path):
     folder = ResultsFolder(tmp_path)
     write(folder)
     place = folder.folder_of(DIGEST) / OUTCOME_FILE
@@ -98,7 +98,7 @@ def test_an_outcome_that_lists_what_is_not_in_its_folder_is_none(name: str, tmp_
 
 
 @pytest.mark.parametrize("below", ["", "export"])
-def test_a_folder_of_a_result_that_is_a_link_is_not_followed(below: str, tmp_path: Path) -> None:
+def test_a_folder_of_a_result_that_is_a_link_is_not_followed(below, tmp_path):
     folder = ResultsFolder(tmp_path / "out")
     write(folder)
     place = folder.folder_of(DIGEST) / below
@@ -112,7 +112,7 @@ def test_a_folder_of_a_result_that_is_a_link_is_not_followed(below: str, tmp_pat
     assert list((tmp_path / "theirs").iterdir())
 
 
-def test_results_behind_a_link_are_neither_read_nor_written(tmp_path: Path) -> None:
+def test_results_behind_a_link_are_neither_read_nor_written(tmp_path):
     (tmp_path / "theirs").mkdir()
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "results").symlink_to(tmp_path / "theirs")
@@ -125,7 +125,7 @@ def test_results_behind_a_link_are_neither_read_nor_written(tmp_path: Path) -> N
     assert list((tmp_path / "theirs").iterdir()) == []
 
 
-def test_the_folder_itself_may_be_a_link_of_the_users(tmp_path: Path) -> None:
+def test_the_folder_itself_may_be_a_link_of_the_users(tmp_path):
     (tmp_path / "large-disk").mkdir()
     (tmp_path / "out").symlink_to(tmp_path / "large-disk")
     write(ResultsFolder(tmp_path / "out"))
@@ -133,9 +133,7 @@ def test_the_folder_itself_may_be_a_link_of_the_users(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_digests_of_inputs_are_never_read_or_written_through_something_else(
-    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_digests_of_inputs_are_never_read_or_written_through_something_else(kind, tmp_path, monkeypatch):
     monkeypatch.setattr(inputs, "_SETTLED_NS", -(10**15))  # files of this moment count as settled
     (tmp_path / "out").mkdir()
     put(kind, tmp_path / "out" / "inputs.json")
@@ -147,7 +145,7 @@ def test_digests_of_inputs_are_never_read_or_written_through_something_else(
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_what_a_manifest_wants_is_never_read_or_written_through_something_else(kind: str, tmp_path: Path) -> None:
+def test_what_a_manifest_wants_is_never_read_or_written_through_something_else(kind, tmp_path):
     (tmp_path / "out" / "manifests").mkdir(parents=True)
     put(kind, tmp_path / "out" / "manifests" / "fleet.toml.json")
     plan = read_plans(tmp_path / "out")
@@ -164,9 +162,7 @@ def test_what_a_manifest_wants_is_never_read_or_written_through_something_else(k
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_summary_is_never_written_through_something_else(
-    kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_summary_is_never_written_through_something_else(kind, tmp_path, capsys):
     out = tmp_path / "out"
     write(ResultsFolder(out))
     put(kind, out / "summary.html")
@@ -177,9 +173,7 @@ def test_the_summary_is_never_written_through_something_else(
 
 
 @pytest.mark.parametrize("kind", KINDS[:3])
-def test_an_outcome_that_is_no_file_is_named_and_left_out(
-    kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_outcome_that_is_no_file_is_named_and_left_out(kind, tmp_path, capsys):
     folder = ResultsFolder(tmp_path / "out")
     write(folder)
     put(kind, folder.folder_of(DIGEST) / OUTCOME_FILE)

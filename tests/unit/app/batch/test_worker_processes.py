@@ -46,7 +46,7 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-def test_workers_killed_at_random_change_no_outcome_and_leave_nothing_behind(tmp_path: Path, temporary: Path) -> None:
+def test_workers_killed_at_random_change_no_outcome_and_leave_nothing_behind(tmp_path, temporary):
     jobs, random = quick_jobs(tmp_path, 30), np.random.default_rng(1)
     killed = []
 
@@ -75,7 +75,7 @@ def _sockets(processes: Sequence[psutil.Process]) -> set[tuple[object, ...]]:
     return found
 
 
-def test_nothing_listens_on_a_port_or_a_socket(tmp_path: Path) -> None:
+def test_nothing_listens_on_a_port_or_a_socket(tmp_path):
     this = psutil.Process()
     before, during, counts = _sockets([this]), set[tuple[object, ...]](), list[int]()
 
@@ -89,9 +89,7 @@ def test_nothing_listens_on_a_port_or_a_socket(tmp_path: Path) -> None:
     assert during <= before
 
 
-def test_a_job_that_kills_its_workers_fails_and_the_others_do_not(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_job_that_kills_its_workers_fails_and_the_others_do_not(tmp_path, monkeypatch):
     monkeypatch.setattr(driving, "run_once", dying_job)
     jobs = quick_jobs(tmp_path, 4)
     outcomes = drive(jobs, WorkerProcesses(2), ResultsFolder(tmp_path))
@@ -105,7 +103,7 @@ def test_a_job_that_kills_its_workers_fails_and_the_others_do_not(
     assert ResultsFolder(tmp_path).outcome(jobs[1].digest) is None  # it is run again next time
 
 
-def test_one_death_costs_its_own_call_one_more_run(tmp_path: Path) -> None:
+def test_one_death_costs_its_own_call_one_more_run(tmp_path):
     calls = [(str(tmp_path), name, int(name == "b")) for name in "abcd"]
     told: list[str] = []
     assert sorted(WorkerProcesses(2, told.append).run_all(dying, calls)) == list(enumerate("abcd"))
@@ -114,13 +112,13 @@ def test_one_death_costs_its_own_call_one_more_run(tmp_path: Path) -> None:
     assert "1 job was run again" in told[0]
 
 
-def test_what_workers_that_are_killed_had_in_temporary_files_is_removed(tmp_path: Path, temporary: Path) -> None:
+def test_what_workers_that_are_killed_had_in_temporary_files_is_removed(tmp_path, temporary):
     folders = {Path(made).parent for _, made in WorkerProcesses(2).run_all(temporary_file, [(1,), (2,)])}
     assert {one.parent for one in folders} == {temporary}
     assert list(temporary.iterdir()) == []
 
 
-def test_what_a_driver_that_was_killed_left_is_removed_by_the_next(temporary: Path) -> None:
+def test_what_a_driver_that_was_killed_left_is_removed_by_the_next(temporary):
     left = multiprocessing.get_context("spawn").Process(target=_killed_driver, args=(str(temporary),))
     left.start()
     left.join()
@@ -136,14 +134,14 @@ def _killed_driver(temporary: str) -> None:
         os.kill(os.getpid(), signal.SIGKILL)
 
 
-def test_workers_that_never_start_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_workers_that_never_start_are_told(monkeypatch):
     monkeypatch.setattr("cocalib.batch.worker_processes._MOST_FAILED_STARTS", 2)
     monkeypatch.setattr("cocalib.batch.worker_processes._work", failing)
     with pytest.raises(InputError, match="end as soon as they start; use --workers 1"):
         list(WorkerProcesses(1).run_all(squared, [(3,)]))
 
 
-def test_workers_that_are_killed_while_they_start_are_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_workers_that_are_killed_while_they_start_are_replaced(tmp_path, monkeypatch):
     monkeypatch.setattr("cocalib.batch.worker_processes._MOST_FAILED_STARTS", 1)
     monkeypatch.setattr("cocalib.batch.worker_processes._work", dying_start)
     monkeypatch.setenv("DYING_START", str(tmp_path))
@@ -151,12 +149,12 @@ def test_workers_that_are_killed_while_they_start_are_replaced(tmp_path: Path, m
     assert attempts(tmp_path, "start") == 3
 
 
-def test_what_a_function_raises_is_raised() -> None:
+def test_what_a_function_raises_is_raised():
     with pytest.raises(ValueError, match="not 7"):
         list(WorkerProcesses(2).run_all(failing, [(7,)]))
     assert multiprocessing.active_children() == []
 
 
-def test_nothing_starts_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nothing_starts_for_nothing(monkeypatch):
     monkeypatch.setattr("cocalib.batch.worker_processes._PROCESSES", None)
     assert list(WorkerProcesses(2).run_all(squared, [])) == []

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -98,7 +97,7 @@ def test_labels_are_read(tmp_path):
 @pytest.mark.parametrize(
     ("content", "words"), [(None, "cannot be read"), (b"\xff\xfe\0", "not text"), (b"{}", "schema")]
 )
-def test_labels_that_cannot_be_read_are_refused(tmp_path: Path, content, words):
+def test_labels_that_cannot_be_read_are_refused(tmp_path, content, words):
     path = tmp_path / "labels.json"
     if content is not None:
         path.write_bytes(content)

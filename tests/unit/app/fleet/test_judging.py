@@ -48,37 +48,37 @@ def moved(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_a_sound_fleet_has_nothing_wrong(sound: Path) -> None:
+def test_a_sound_fleet_has_nothing_wrong(sound):
     judged = judge(_truth(), read_fleet(sound))
     assert [one.of for one in judged] == [12, 0, 0, 0, 6, 12, 12]
     assert not any(one.wrong for one in judged)
 
 
-def test_a_remount_that_is_named_is_right(moved: Path) -> None:
+def test_a_remount_that_is_named_is_right(moved):
     truth = _truth(V002="remounted")
     assert _wrong(truth, moved) == {}
     assert "remounted" in judge(truth, read_fleet(moved))[1].named[0]
 
 
-def test_a_remount_that_is_not_named_is_missed(sound: Path) -> None:
+def test_a_remount_that_is_not_named_is_missed(sound):
     assert _wrong(_truth(V002="remounted"), sound) == {"remounts": 1}
 
 
-def test_a_remount_where_nothing_changed_is_false(moved: Path) -> None:
+def test_a_remount_where_nothing_changed_is_false(moved):
     found = _wrong(_truth(), moved)
     assert found["unchanged"] == 1
     assert found["of their kind"] == 1  # its last session only
 
 
-def test_the_mounting_of_a_wrong_radar_is_neither_changed_nor_unchanged(moved: Path) -> None:
+def test_the_mounting_of_a_wrong_radar_is_neither_changed_nor_unchanged(moved):
     assert _wrong(_truth(V002="mirrored radar"), moved) == {}
 
 
-def test_a_wrong_radar_that_looks_healthy_is_missed(sound: Path) -> None:
+def test_a_wrong_radar_that_looks_healthy_is_missed(sound):
     assert _wrong(_truth(V004="mirrored radar"), sound) == {"wrong radars": 1}
 
 
-def test_a_session_without_a_result_or_without_a_reason_is_not_accounted_for(tmp_path: Path) -> None:
+def test_a_session_without_a_result_or_without_a_reason_is_not_accounted_for(tmp_path):
     make_fleet(tmp_path, 2)
     make_result(tmp_path, "V000", "s2", status="failed")
     make_result(tmp_path, "V000", "s3", status="refused", reason="nothing was clicked")
@@ -87,13 +87,11 @@ def test_a_session_without_a_result_or_without_a_reason_is_not_accounted_for(tmp
     assert _wrong(truth, tmp_path) == {"accounted": 2, "trusted": 2}
 
 
-def test_a_broken_recording_has_to_fail(sound: Path) -> None:
+def test_a_broken_recording_has_to_fail(sound):
     assert _wrong(_truth(V001="broken recording"), sound) == {"spoilt": 2}
 
 
-def test_the_exit_code_says_whether_anything_is_wrong(
-    sound: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_exit_code_says_whether_anything_is_wrong(sound, tmp_path, capsys):
     pose = '"camera_from_radar": {"rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "translation_m": [0, 0, 0]}'
     rows = [
         f'{{"vehicle": "{one.vehicle}", "session": "{one.session}", "remounted": false, "fault": null, {pose}}}'

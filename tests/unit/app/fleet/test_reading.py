@@ -1,6 +1,5 @@
 """A fleet is what its results say: which count, in which order, what changed, and what cannot be read."""
 
-import random
 import shutil
 from collections.abc import Mapping
 from hashlib import sha256
@@ -44,14 +43,14 @@ def _write_plan(folder: Path, *names: tuple[str, str], digests: Mapping[tuple[st
     write_plan(folder, Path("fleet.toml"), jobs)
 
 
-def test_the_latest_run_of_a_session_counts_and_the_other_is_kept_as_superseded(folder: Path) -> None:
+def test_the_latest_run_of_a_session_counts_and_the_other_is_kept_as_superseded(folder):
     fleet = read_fleet(folder)
     assert [one.outcome.digest for one in fleet.superseded] == [digest_of("V001", "s0")]
     assert fleet.vehicles[1].sessions[0].outcome.digest == digest_of("V001", "s0", 2)
     assert [one.before.session for one in fleet.vehicles[1].transitions] == ["s0"]
 
 
-def test_the_result_counts_that_the_latest_batch_wanted_although_another_is_newer(folder: Path) -> None:
+def test_the_result_counts_that_the_latest_batch_wanted_although_another_is_newer(folder):
     wanted = {("V001", "s0"): digest_of("V001", "s0")}
     _write_plan(folder, ("V001", "s0"), digests=wanted)
     fleet = read_fleet(folder)
@@ -61,7 +60,7 @@ def test_the_result_counts_that_the_latest_batch_wanted_although_another_is_newe
     assert [one.outcome.digest for one in read_fleet(folder).superseded] == [digest_of("V001", "s0")]
 
 
-def test_what_a_manifest_names_without_a_result_is_missing_and_the_other_way_round_unlisted(folder: Path) -> None:
+def test_what_a_manifest_names_without_a_result_is_missing_and_the_other_way_round_unlisted(folder):
     assert read_fleet(folder).missing == read_fleet(folder).unlisted == ()
     _write_plan(folder, ("V000", "s0"), ("V000", "s7"), ("new", "s0"))
     (folder / "manifests" / "torn.toml.json").write_text("{")
@@ -72,7 +71,7 @@ def test_what_a_manifest_names_without_a_result_is_missing_and_the_other_way_rou
     assert fleet.manifests == ("fleet.toml",)
 
 
-def test_sessions_come_by_time_and_those_never_opened_after_the_one_before_them_in_the_manifest(folder: Path) -> None:
+def test_sessions_come_by_time_and_those_never_opened_after_the_one_before_them_in_the_manifest(folder):
     _write_plan(folder)
     assert [one.name for one in read_fleet(folder).vehicles[2].sessions] == ["s9", "s0", "s1"]
     _write_plan(folder, ("V002", "s0"), ("V002", "s9"), ("V002", "s1"))
@@ -81,13 +80,13 @@ def test_sessions_come_by_time_and_those_never_opened_after_the_one_before_them_
     assert [one.name for one in read_fleet(folder).vehicles[2].sessions] == ["earlier", "s0", "s9", "s1"]
 
 
-def test_a_result_of_an_impossible_time_is_named(folder: Path) -> None:
+def test_a_result_of_an_impossible_time_is_named(folder):
     make_result(folder, "V9", "s0", recorded_ns=2**64)
     (unread,) = read_fleet(folder).unread
     assert "states a time" in unread.reason
 
 
-def test_a_manifests_record_that_cannot_be_read_is_named(folder: Path) -> None:
+def test_a_manifests_record_that_cannot_be_read_is_named(folder):
     _write_plan(folder, ("V000", "s0"))
     (folder / "manifests" / "spoilt.json").write_text("garbage")
     (unread,) = read_fleet(folder).unread
@@ -95,9 +94,7 @@ def test_a_manifests_record_that_cannot_be_read_is_named(folder: Path) -> None:
     assert unread.reason.startswith("is no cocalib/batch-plan-1: ")
 
 
-def test_the_history_of_a_vehicle_whose_outcome_cannot_be_read_names_the_file(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_history_of_a_vehicle_whose_outcome_cannot_be_read_names_the_file(folder, capsys):
     make_result(folder, "V9", "s0")
     names = [("V000", "s0"), ("V9", "s0")]
     for name in names:
@@ -111,7 +108,7 @@ def test_the_history_of_a_vehicle_whose_outcome_cannot_be_read_names_the_file(
     assert f"'V9': session 's0': results/{digest_of('V9', 's0')}/outcome.json: " in capsys.readouterr().err
 
 
-def test_results_of_another_version_are_left_out_and_named(folder: Path) -> None:
+def test_results_of_another_version_are_left_out_and_named(folder):
     place = ResultsFolder(folder).folder_of(digest_of("V000", "s0")) / "outcome.json"
     place.write_text(place.read_text().replace("outcome-1", "outcome-2"))
     fleet = read_fleet(folder)
@@ -120,7 +117,7 @@ def test_results_of_another_version_are_left_out_and_named(folder: Path) -> None
     assert [one.name for one in fleet.vehicles[0].sessions] == ["s1"]
 
 
-def test_a_folder_of_nothing_but_foreign_results_is_refused(tmp_path: Path) -> None:
+def test_a_folder_of_nothing_but_foreign_results_is_refused(tmp_path):
     with pytest.raises(InputError, match="no results"):
         read_fleet(tmp_path)
     make_result(tmp_path, "V", "s")
@@ -129,7 +126,7 @@ def test_a_folder_of_nothing_but_foreign_results_is_refused(tmp_path: Path) -> N
         read_fleet(tmp_path)
 
 
-def test_a_calibration_that_was_changed_is_not_compared(folder: Path) -> None:
+def test_a_calibration_that_was_changed_is_not_compared(folder):
     place = ResultsFolder(folder).folder_of(digest_of("V000", "s1")) / "calibration.json"
     place.write_text(place.read_text() + " ")
     record = read_fleet(folder).vehicles[0].last
@@ -138,7 +135,7 @@ def test_a_calibration_that_was_changed_is_not_compared(folder: Path) -> None:
     assert record.outcome.status == "solved"
 
 
-def test_a_calibration_of_another_version_is_named_and_not_compared(folder: Path) -> None:
+def test_a_calibration_of_another_version_is_named_and_not_compared(folder):
     place = ResultsFolder(folder).folder_of(digest_of("V000", "s1"))
     given = (place / "calibration.json").read_text()
     text = given.replace("calibration-1", "calibration-2")
@@ -152,21 +149,21 @@ def test_a_calibration_of_another_version_is_named_and_not_compared(folder: Path
     assert "calibration-2" in record.pose_problem
 
 
-def test_an_outcome_in_the_wrong_folder_is_named(folder: Path) -> None:
+def test_an_outcome_in_the_wrong_folder_is_named(folder):
     results = folder / "results"
     shutil.copytree(results / digest_of("V000", "s0"), results / ("ab" * 16))
     assert [one.place for one in read_fleet(folder).unread] == [f"results/{'ab' * 16}/outcome.json"]
 
 
 @pytest.mark.parametrize("count", [1, 2])
-def test_small_fleets_are_told_too(tmp_path: Path, count: int) -> None:
+def test_small_fleets_are_told_too(tmp_path, count):
     make_fleet(tmp_path, count, 1)
     fleet = read_fleet(tmp_path)
     assert len(fleet.vehicles) == count
     assert all(one.transitions == () for one in fleet.vehicles)
 
 
-def test_a_result_that_is_still_being_written_is_none_yet(folder: Path) -> None:
+def test_a_result_that_is_still_being_written_is_none_yet(folder):
     (folder / "results" / ("cd" * 16)).mkdir()
     shutil.copytree(folder / "results" / digest_of("V000", "s0"), folder / "results" / ".unfinished")
     fleet = read_fleet(folder)
@@ -174,7 +171,7 @@ def test_a_result_that_is_still_being_written_is_none_yet(folder: Path) -> None:
     assert [one.name for one in fleet.vehicles] == ["V000", "V001", "V002"]
 
 
-def test_a_damaged_byte_is_told_and_changes_nothing_silently(folder: Path) -> None:
+def test_a_damaged_byte_is_told_and_changes_nothing_silently(folder):
     place = ResultsFolder(folder).folder_of(digest_of("V001", "s1")) / "outcome.json"
     damaged = bytearray(place.read_bytes())
     damaged[0] ^= 1
@@ -200,9 +197,7 @@ def _record(session: str, recorded_ns: int | None, place: int | None, *, run: st
 
 
 @given(_ROWS, st.randoms())
-def test_times_grow_and_the_order_of_arrival_does_not_matter(
-    given: list[tuple[int | None, int | None]], shuffle: random.Random
-) -> None:
+def test_times_grow_and_the_order_of_arrival_does_not_matter(given, shuffle):
     records = [_record(f"s{index}", time, place) for index, (time, place) in enumerate(given)]
     ordered = in_order(records)
     times = [one.outcome.recorded_ns for one in ordered if one.outcome.recorded_ns is not None]
@@ -212,12 +207,12 @@ def test_times_grow_and_the_order_of_arrival_does_not_matter(
 
 
 @given(st.lists(st.integers(0, 20), min_size=1, max_size=8, unique=True))
-def test_without_any_time_the_manifest_decides(places: list[int]) -> None:
+def test_without_any_time_the_manifest_decides(places):
     records = [_record(f"s{place}", None, place) for place in places]
     assert [one.place for one in in_order(records)] == sorted(places)
 
 
-def test_the_latest_run_of_a_session_counts() -> None:
+def test_the_latest_run_of_a_session_counts():
     runs = [
         _record("s0", 5, 0, run="2026-11-02T00:00:00+00:00"),
         _record("s0", 5, 0, run="2026-11-03T00:00:00+00:00"),

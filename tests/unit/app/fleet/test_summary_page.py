@@ -2,7 +2,6 @@
 
 import re
 import xml.etree.ElementTree as ElementTree
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -34,11 +33,11 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> FleetRecord:
     return read_fleet(folder)
 
 
-def test_the_same_results_give_the_same_bytes(fleet: FleetRecord) -> None:
+def test_the_same_results_give_the_same_bytes(fleet):
     assert summary_html(fleet) == summary_html(fleet)
 
 
-def test_hostile_names_stay_text(fleet: FleetRecord) -> None:
+def test_hostile_names_stay_text(fleet):
     page = _parsed(fleet)
     assert page.findall(f".//{_HTML}img") == []
     assert page.findall(f".//{_HTML}i") == []
@@ -50,17 +49,16 @@ def test_hostile_names_stay_text(fleet: FleetRecord) -> None:
     assert summary_html(fleet).count("</script") == 1
 
 
-def test_only_its_own_script_may_run_and_nothing_is_fetched(fleet: FleetRecord) -> None:
+def test_only_its_own_script_may_run_and_nothing_is_fetched(fleet):
     text = summary_html(fleet)
     policy = re.search(r'http-equiv="Content-Security-Policy" content="([^"]+)"', text)
-    assert policy is not None
     assert policy[1].startswith("default-src &#x27;none&#x27;;")
     assert "script-src &#x27;sha256-" in policy[1]
     assert not re.search(r'(?:src|href)="(?:https?:)?//', text)
     assert "@import" not in text
 
 
-def test_the_head_figures_count_what_is_in_the_tables(fleet: FleetRecord) -> None:
+def test_the_head_figures_count_what_is_in_the_tables(fleet):
     tiles = [_words(one) for one in _parsed(fleet).findall(f".//{_HTML}ul[@class='tiles']/{_HTML}li")]
     assert tiles == [
         "7vehicles",
@@ -74,7 +72,7 @@ def test_the_head_figures_count_what_is_in_the_tables(fleet: FleetRecord) -> Non
     ]
 
 
-def test_reports_are_linked_relative_to_the_page_and_vehicles_to_their_rows(fleet: FleetRecord) -> None:
+def test_reports_are_linked_relative_to_the_page_and_vehicles_to_their_rows(fleet):
     page = _parsed(fleet)
     links = [one.get("href", "") for one in page.iter(f"{_HTML}a")]
     assert f"results/{digest_of('V000', 's0', 1)}/report.html" in links
@@ -83,7 +81,7 @@ def test_reports_are_linked_relative_to_the_page_and_vehicles_to_their_rows(flee
     assert {link.removeprefix("#") for link in links if link.startswith("#")} <= ids
 
 
-def test_rows_say_what_they_are_sorted_by(fleet: FleetRecord) -> None:
+def test_rows_say_what_they_are_sorted_by(fleet):
     vehicles = _parsed(fleet).findall(f".//{_HTML}table[@class='sortable']")[0]
     heads = vehicles.findall(f"{_HTML}thead/{_HTML}tr/{_HTML}th")
     assert [one.get("aria-sort") for one in heads] == ["ascending", *["none"] * (len(heads) - 2), None]
@@ -96,22 +94,21 @@ def test_rows_say_what_they_are_sorted_by(fleet: FleetRecord) -> None:
         assert all(re.fullmatch(r"|-?[0-9.e+-]+", row[index].get("data-key", "missing")) for index in numbers)
 
 
-def test_a_drift_is_drawn_with_the_remount_as_a_cross(fleet: FleetRecord) -> None:
+def test_a_drift_is_drawn_with_the_remount_as_a_cross(fleet):
     rows = _parsed(fleet).findall(f".//{_HTML}table[@class='sortable']")[0].findall(f"{_HTML}tbody/{_HTML}tr")
     by_name = {_words(row[0]): row for row in rows}
     assert len(by_name["V000"].findall(f".//{_SVG}circle")) == 3
     assert len(by_name["V001"].findall(f".//{_SVG}circle")) == 2
     title = by_name["V001"].find(f".//{_SVG}title")
-    assert title is not None
     assert "remounted 1 time" in (title.text or "")
 
 
-def test_a_folder_without_results_is_told(tmp_path: Path) -> None:
+def test_a_folder_without_results_is_told(tmp_path):
     assert "There are no results yet" in _words(_parsed(FleetRecord(())))
 
 
 @pytest.mark.parametrize("count", [1, 2])
-def test_a_small_fleet_is_told(tmp_path: Path, count: int) -> None:
+def test_a_small_fleet_is_told(tmp_path, count):
     make_fleet(tmp_path, count, 2)
     words = _words(_parsed(read_fleet(tmp_path)))
     assert "Nothing: every vehicle's last session can be relied on." in words

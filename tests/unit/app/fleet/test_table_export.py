@@ -2,7 +2,6 @@
 
 import csv
 import io
-from pathlib import Path
 
 import pytest
 
@@ -21,7 +20,7 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> FleetRecord:
     return read_fleet(folder)
 
 
-def test_every_result_is_a_row_with_its_pose_and_change(fleet: FleetRecord) -> None:
+def test_every_result_is_a_row_with_its_pose_and_change(fleet):
     rows = list(csv.DictReader(io.StringIO(csv_bytes(fleet).decode())))
     assert [(row["vehicle"], row["session"], row["superseded"]) for row in rows] == [
         ("V000", "s0", "False"),
@@ -32,7 +31,6 @@ def test_every_result_is_a_row_with_its_pose_and_change(fleet: FleetRecord) -> N
         ("V000", "s0", "True"),
     ]
     last, change = fleet.vehicles[0].last, fleet.vehicles[0].transitions[-1]
-    assert last.pose is not None
     assert _numbers(rows[1]["covariance"]) == last.pose.covariance.ravel().tolist()
     assert _numbers(rows[1]["change_covariance"]) == change.covariance.ravel().tolist()
     assert _numbers(rows[1]["change"]) == change.change.tolist()
@@ -46,11 +44,11 @@ def _numbers(cell: str) -> list[float]:
     return [float(one) for one in cell.split()]
 
 
-def test_an_empty_fleet_is_a_table_without_rows() -> None:
+def test_an_empty_fleet_is_a_table_without_rows():
     assert len(csv_bytes(FleetRecord(())).splitlines()) == 1
 
 
-def test_a_text_that_a_spreadsheet_would_compute_is_escaped_and_numbers_stay(tmp_path: Path) -> None:
+def test_a_text_that_a_spreadsheet_would_compute_is_escaped_and_numbers_stay(tmp_path):
     make_result(tmp_path, "=HYPERLINK(1)", "-2", radar_serial="+cmd", camera_serial="@a", reason="-1+2")
     text = csv_bytes(read_fleet(tmp_path)).decode()
     (row,) = csv.DictReader(io.StringIO(text))

@@ -118,34 +118,31 @@ def watched(search: Search) -> Iterator[Watched]:
     made.job.close()
 
 
-def test_a_job_tells_how_far_it_is_and_ends_with_a_lens(search: Search, watched: Watched) -> None:
+def test_a_job_tells_how_far_it_is_and_ends_with_a_lens(search, watched):
     assert watched.job.snapshot.stage == "idle"
-    watched.job.start(Pictures(), BOARD, OPTIONS)  # type: ignore[arg-type]
+    watched.job.start(Pictures(), BOARD, OPTIONS)
     assert watched.job.snapshot.is_running
     search.allowed.release(3)
-    assert len(watched.until("searching", 3).progress.views) == 3  # type: ignore[union-attr]
+    assert len(watched.until("searching", 3).progress.views) == 3
     search.allowed.release(5)
     done = watched.until("done")
-    assert done.lens is not None
     assert done.lens.camera is CAMERA
     assert "choosing a lens model" in [one.doing for one in watched.seen]
     assert not done.is_running
 
 
-def test_only_one_calibration_runs_at_a_time(search: Search, watched: Watched) -> None:
-    watched.job.start(Pictures(), BOARD, OPTIONS)  # type: ignore[arg-type]
+def test_only_one_calibration_runs_at_a_time(search, watched):
+    watched.job.start(Pictures(), BOARD, OPTIONS)
     with pytest.raises(InputError, match="cancel it first"):
-        watched.job.start(Pictures(), BOARD, OPTIONS)  # type: ignore[arg-type]
+        watched.job.start(Pictures(), BOARD, OPTIONS)
     search.allowed.release(8)
     watched.until("done")
     assert len(search.known) == 1
 
 
 @pytest.mark.parametrize(("board", "is_same"), [(BOARD, True), (Board("checkerboard", 8, 6, 0.025), False)])
-def test_a_cancelled_search_goes_on_from_its_views_for_the_same_board_only(
-    search: Search, watched: Watched, board: Board, is_same: bool
-) -> None:
-    watched.job.start(Pictures(), BOARD, OPTIONS)  # type: ignore[arg-type]
+def test_a_cancelled_search_goes_on_from_its_views_for_the_same_board_only(search, watched, board, is_same):
+    watched.job.start(Pictures(), BOARD, OPTIONS)
     search.allowed.release(4)
     watched.until("searching", 4)
     watched.job.cancel()
@@ -153,43 +150,41 @@ def test_a_cancelled_search_goes_on_from_its_views_for_the_same_board_only(
     cancelled = watched.until("cancelled")
     assert cancelled.can_resume
     assert cancelled.problem == "", "a person wanted it"
-    watched.job.start(Pictures(), board, OPTIONS)  # type: ignore[arg-type]
+    watched.job.start(Pictures(), board, OPTIONS)
     search.allowed.release(8)
     watched.until("done")
     assert [one.index for one in search.known[1]] == ([0, 1, 2, 3] if is_same else [])
     assert search.searched[1] == ((0, 1, 2, 3) if is_same else ())
 
 
-def test_what_is_wrong_is_said_in_words_and_the_former_result_stays(search: Search, watched: Watched) -> None:
-    watched.job.start(Pictures(), BOARD, OPTIONS)  # type: ignore[arg-type]
+def test_what_is_wrong_is_said_in_words_and_the_former_result_stays(search, watched):
+    watched.job.start(Pictures(), BOARD, OPTIONS)
     search.allowed.release(8)
     former = watched.until("done").lens
     search.end = Unsolvable("no-board", "none of 8 pictures shows a checkerboard of 9 x 6", "film the board")
-    watched.job.start(Pictures(), BOARD, OPTIONS)  # type: ignore[arg-type]
+    watched.job.start(Pictures(), BOARD, OPTIONS)
     search.allowed.release(8)
     failed = watched.until("failed")
     assert (failed.problem, failed.hint) == (search.end.reason, "film the board")
     assert failed.lens is former
     search.error = RecordingError("frame 1 cannot be read")
-    watched.job.start(Pictures(), BOARD, OPTIONS)  # type: ignore[arg-type]
+    watched.job.start(Pictures(), BOARD, OPTIONS)
     search.allowed.release(8)
     watched.until("failed")
     assert watched.job.snapshot.problem == "frame 1 cannot be read"
 
 
-def test_an_unforeseen_error_ends_the_calibration_and_not_the_program(
-    search: Search, watched: Watched, monkeypatch: pytest.MonkeyPatch, tmp_path: Any
-) -> None:
+def test_an_unforeseen_error_ends_the_calibration_and_not_the_program(search, watched, monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     search.error = KeyError("a bug")
-    watched.job.start(Pictures(), BOARD, OPTIONS)  # type: ignore[arg-type]
+    watched.job.start(Pictures(), BOARD, OPTIONS)
     search.allowed.release(8)
     assert "KeyError" in watched.until("failed").problem
 
 
-def test_without_pictures_or_after_closing_nothing_is_started(search: Search, watched: Watched) -> None:
+def test_without_pictures_or_after_closing_nothing_is_started(search, watched):
     with pytest.raises(InputError, match="no pictures"):
-        watched.job.start(Pictures(0), BOARD, OPTIONS)  # type: ignore[arg-type]
+        watched.job.start(Pictures(0), BOARD, OPTIONS)
     watched.job.close()
     with pytest.raises(InputError, match="being closed"):
-        watched.job.start(Pictures(), BOARD, OPTIONS)  # type: ignore[arg-type]
+        watched.job.start(Pictures(), BOARD, OPTIONS)

@@ -1,7 +1,5 @@
 """Pictures of a board come from a recording, a video, a folder or files, in a stable order."""
 
-from pathlib import Path
-
 import cv2
 import numpy as np
 import pytest
@@ -15,7 +13,7 @@ def grey(value: int) -> np.ndarray:
     return np.full((48, 64, 3), value, dtype=np.uint8)
 
 
-def test_pictures_of_a_folder_need_no_times_and_are_in_the_order_of_their_numbers(tmp_path: Path) -> None:
+def test_pictures_of_a_folder_need_no_times_and_are_in_the_order_of_their_numbers(tmp_path):
     for number in (10, 2, 1):
         cv2.imwrite(str(tmp_path / f"shot{number}.png"), grey(number))
     (tmp_path / "notes.txt").write_text("nothing")
@@ -29,7 +27,7 @@ def test_pictures_of_a_folder_need_no_times_and_are_in_the_order_of_their_number
         assert pictures.digest() != before
 
 
-def test_a_video_needs_no_start_and_gives_its_frames_in_any_order(tmp_path: Path) -> None:
+def test_a_video_needs_no_start_and_gives_its_frames_in_any_order(tmp_path):
     path = tmp_path / "board.avi"
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 10.0, (64, 48))
     for value in range(0, 240, 8):
@@ -43,7 +41,7 @@ def test_a_video_needs_no_start_and_gives_its_frames_in_any_order(tmp_path: Path
         assert pictures.name(20) == "frame 21 (2.00 s)"
 
 
-def test_files_with_equal_names_are_told_apart_by_their_folders(tmp_path: Path) -> None:
+def test_files_with_equal_names_are_told_apart_by_their_folders(tmp_path):
     for folder in ("a", "b"):
         (tmp_path / folder).mkdir()
         cv2.imwrite(str(tmp_path / folder / "1.png"), grey(5))
@@ -51,7 +49,7 @@ def test_files_with_equal_names_are_told_apart_by_their_folders(tmp_path: Path) 
         assert [pictures.name(0), pictures.name(1)] == ["a/1.png", "b/1.png"]
 
 
-def test_a_file_that_is_no_picture_is_an_error_of_its_own(tmp_path: Path) -> None:
+def test_a_file_that_is_no_picture_is_an_error_of_its_own(tmp_path):
     (tmp_path / "broken.png").write_bytes(b"no picture")
     cv2.imwrite(str(tmp_path / "good.png"), grey(5))
     with open_pictures([tmp_path]) as pictures:

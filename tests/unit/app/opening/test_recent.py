@@ -19,7 +19,7 @@ def recording(tmp_path: Path, name: str) -> Path:
     return path
 
 
-def test_the_newest_is_first_and_each_is_listed_once(recent: RecentRecordings, tmp_path: Path) -> None:
+def test_the_newest_is_first_and_each_is_listed_once(recent, tmp_path):
     one, two = recording(tmp_path, "one.bag"), recording(tmp_path, "two.bag")
     recent.add([one], "one.bag", 3)
     recent.add([two, one], "two.bag", 0)
@@ -32,9 +32,7 @@ def test_the_newest_is_first_and_each_is_listed_once(recent: RecentRecordings, t
     assert recent.paths_of(rows[1].id) == (two, one)
 
 
-def test_what_does_not_exist_any_more_is_not_listed_and_cannot_be_chosen(
-    recent: RecentRecordings, tmp_path: Path
-) -> None:
+def test_what_does_not_exist_any_more_is_not_listed_and_cannot_be_chosen(recent, tmp_path):
     gone = recording(tmp_path, "gone.bag")
     recent.add([gone], "gone.bag", 1)
     (row,) = recent.rows()
@@ -43,7 +41,7 @@ def test_what_does_not_exist_any_more_is_not_listed_and_cannot_be_chosen(
     assert recent.paths_of(row.id) == ()
 
 
-def test_the_list_is_short_private_and_can_be_emptied(recent: RecentRecordings, tmp_path: Path) -> None:
+def test_the_list_is_short_private_and_can_be_emptied(recent, tmp_path):
     for number in range(25):
         recent.add([recording(tmp_path, f"{number}.bag")], f"{number}.bag", 0)
     assert len(recent.rows()) == 20
@@ -56,9 +54,7 @@ def test_the_list_is_short_private_and_can_be_emptied(recent: RecentRecordings, 
 
 
 @pytest.mark.parametrize("content", [b"", b"[", b'[{"paths":[]}]', b"\xff\xfe", b"[" * 100_000, b'{"paths":1}'])
-def test_a_damaged_list_counts_as_empty(
-    recent: RecentRecordings, tmp_path: Path, content: bytes, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_damaged_list_counts_as_empty(recent, tmp_path, content, caplog):
     (tmp_path / "state").mkdir()
     (tmp_path / "state" / "recent.json").write_bytes(content)
     assert recent.rows() == ()
@@ -67,9 +63,7 @@ def test_a_damaged_list_counts_as_empty(
     assert [row.name for row in recent.rows()] == ["a.bag"]
 
 
-def test_a_list_that_cannot_be_written_is_logged_and_nothing_else(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_list_that_cannot_be_written_is_logged_and_nothing_else(tmp_path, caplog):
     (tmp_path / "state").write_bytes(b"a file")
     RecentRecordings(tmp_path / "state").add([recording(tmp_path, "a.bag")], "a.bag", 0)
     assert "cannot be written" in caplog.text

@@ -27,7 +27,7 @@ def root(tmp_path: Path) -> RootFolder:
     return RootFolder(inside)
 
 
-def test_folders_and_recordings_are_listed_with_their_sizes(root: RootFolder) -> None:
+def test_folders_and_recordings_are_listed_with_their_sizes(root):
     listing = root.listing("")
     assert [(entry.name, entry.kind, entry.size_bytes) for entry in listing.entries] == [
         ("day one", "recording folder", 5),
@@ -42,7 +42,7 @@ def test_folders_and_recordings_are_listed_with_their_sizes(root: RootFolder) ->
     assert (below.path, below.parent) == ("day one", "")
 
 
-def test_an_empty_folder_says_so(root: RootFolder) -> None:
+def test_an_empty_folder_says_so(root):
     assert root.listing("day one/empty").note == "No recording and no folder here."
 
 
@@ -59,14 +59,14 @@ def test_an_empty_folder_says_so(root: RootFolder) -> None:
         "//x",
     ],
 )
-def test_a_path_that_leads_outside_is_refused_in_words(root: RootFolder, path: str) -> None:
+def test_a_path_that_leads_outside_is_refused_in_words(root, path):
     for use in (root.listing, root.resolve, lambda given: root.recordings([given])):
         with pytest.raises(InputError, match="only folders below"):
             use(path)
 
 
 @POSIX
-def test_links_are_followed_inside_and_refused_outside(root: RootFolder, tmp_path: Path) -> None:
+def test_links_are_followed_inside_and_refused_outside(root, tmp_path):
     (root.path / "also").symlink_to(root.path / "day one")
     (root.path / "out").symlink_to(tmp_path)
     (root.path / "out.bag").symlink_to(tmp_path / "secret.bag")
@@ -83,19 +83,19 @@ def test_links_are_followed_inside_and_refused_outside(root: RootFolder, tmp_pat
 
 
 @POSIX
-def test_a_root_that_is_a_link_is_resolved_first(root: RootFolder, tmp_path: Path) -> None:
+def test_a_root_that_is_a_link_is_resolved_first(root, tmp_path):
     (tmp_path / "link").symlink_to(root.path)
     assert RootFolder(tmp_path / "link").path == root.path
 
 
-def test_what_has_vanished_or_is_no_folder_is_named(root: RootFolder) -> None:
+def test_what_has_vanished_or_is_no_folder_is_named(root):
     with pytest.raises(InputError, match=r"gone\.bag: is not there any more"):
         root.recordings(["gone.bag"])
     with pytest.raises(InputError, match="is not a folder; choose it as a recording"):
         root.listing("day one/radar.bag")
 
 
-def test_a_folder_that_may_not_be_read_is_named(root: RootFolder, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_that_may_not_be_read_is_named(root, monkeypatch):
     def denied(_path: object) -> None:
         raise PermissionError(13, "Permission denied")
 
@@ -105,7 +105,7 @@ def test_a_folder_that_may_not_be_read_is_named(root: RootFolder, monkeypatch: p
 
 
 @POSIX
-def test_a_pipe_is_no_recording(root: RootFolder) -> None:
+def test_a_pipe_is_no_recording(root):
     os.mkfifo(root.path / "pipe.bag")
     assert "pipe.bag" not in [entry.name for entry in root.listing("").entries]
     with pytest.raises(InputError, match="named pipe"):
@@ -113,7 +113,7 @@ def test_a_pipe_is_no_recording(root: RootFolder) -> None:
 
 
 @pytest.mark.parametrize("name", ["absent", "file"])
-def test_a_root_must_be_a_folder(tmp_path: Path, name: str) -> None:
+def test_a_root_must_be_a_folder(tmp_path, name):
     (tmp_path / "file").write_bytes(b"")
     with pytest.raises(InputError, match="--root"):
         RootFolder(tmp_path / name)

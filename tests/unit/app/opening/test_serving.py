@@ -3,7 +3,6 @@
 import base64
 import json
 import sys
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -40,7 +39,7 @@ def until_closed(socket: ClientConnection) -> None:
         wanted(socket, "never")
 
 
-def test_a_page_chooses_a_recording_and_gives_its_camera_file(without_intrinsics: Path, tmp_path: Path) -> None:
+def test_a_page_chooses_a_recording_and_gives_its_camera_file(without_intrinsics, tmp_path):
     camera = (without_intrinsics / "camera.yaml").read_bytes()
     (without_intrinsics / "damaged.bag").write_bytes(b"GIF89a")
     with served_process("--root", without_intrinsics, "--on-problem", "ask", state=tmp_path) as server:
@@ -97,9 +96,7 @@ def test_a_page_chooses_a_recording_and_gives_its_camera_file(without_intrinsics
     assert [(entry["name"], entry["clicks"]) for entry in recent] == [("recording_csv", 1)]
 
 
-def test_while_the_page_asks_because_of_an_error_a_signal_ends_the_command_with_its_code(
-    without_intrinsics: Path, tmp_path: Path
-) -> None:
+def test_while_the_page_asks_because_of_an_error_a_signal_ends_the_command_with_its_code(without_intrinsics, tmp_path):
     with served_process(without_intrinsics / "recording_csv", "--radar-topic", "/nope", "--on-problem", "ask",
                         state=tmp_path) as server:  # fmt: skip
         with channel(server, come_in(server)) as socket:
@@ -110,7 +107,7 @@ def test_while_the_page_asks_because_of_an_error_a_signal_ends_the_command_with_
         assert server.stop()[0] == 2
 
 
-def test_what_cannot_be_used_is_left_out_of_the_next_answer(without_intrinsics: Path, tmp_path: Path) -> None:
+def test_what_cannot_be_used_is_left_out_of_the_next_answer(without_intrinsics, tmp_path):
     other = tmp_path / "other.cocalib-session"
     other.mkdir()
     (other / "journal.jsonl").write_text("not a session\n", encoding="utf-8")
@@ -134,7 +131,7 @@ def test_what_cannot_be_used_is_left_out_of_the_next_answer(without_intrinsics: 
     assert (other / "journal.jsonl").read_text(encoding="utf-8") == "not a session\n"
 
 
-def test_a_script_gets_the_error_and_its_code(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_script_gets_the_error_and_its_code(tmp_path, capsys):
     (tmp_path / "a.bag").write_bytes(b"GIF89a")
     assert run(["open", str(tmp_path / "a.bag"), "--no-browser", "--port", "0"]) == 2
     assert "a.bag" in capsys.readouterr().err

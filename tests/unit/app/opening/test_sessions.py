@@ -33,14 +33,14 @@ def facts(count: int, start: int = 0) -> RecordingFacts:
     return RecordingFacts(whole.name, whole.image_times[start:], whole.width_px, whole.height_px)
 
 
-def test_a_session_of_these_frames_is_continued(path: Path) -> None:
+def test_a_session_of_these_frames_is_continued(path):
     found = session_folder(Choice((path,)), facts(3)).path
     assert found == path.with_name("a.bag.cocalib-session")
     assert session_offer(Choice((path,)), facts(3), None).continues
     assert session_offer(Choice((path,)), facts(3), None).clicks == 2
 
 
-def test_a_session_of_other_frames_is_left_alone_and_its_clicks_that_fit_are_copied(path: Path) -> None:
+def test_a_session_of_other_frames_is_left_alone_and_its_clicks_that_fit_are_copied(path):
     other, folder = facts(2, start=1), path.with_name("a.bag.cocalib-session")
     assert not has_session_of(folder, other)
     with pytest.raises(SessionFileError, match="belongs to"):
@@ -54,16 +54,14 @@ def test_a_session_of_other_frames_is_left_alone_and_its_clicks_that_fit_are_cop
     assert "1 belong to frames that this recording does not have" in copied.about.message
 
 
-def test_a_new_session_of_the_same_frames_keeps_the_old_one_under_another_name(
-    path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_new_session_of_the_same_frames_keeps_the_old_one_under_another_name(path, capsys):
     folder = path.with_name("a.bag.cocalib-session")
     assert session_folder(Choice((path,), session_plan="new"), facts(3)).path == folder
     assert not folder.exists()
     assert str(path.with_name("a.bag.cocalib-session.1")) in capsys.readouterr().out
 
 
-def test_clicks_of_the_same_frames_are_copied_to_a_session_of_their_own(path: Path) -> None:
+def test_clicks_of_the_same_frames_are_copied_to_a_session_of_their_own(path):
     found = session_folder(Choice((path,), session_plan="copy"), facts(3)).path
     assert found == path.with_name("a.bag-2.cocalib-session")
     assert len(fitting_clicks(path.with_name("a.bag.cocalib-session"), facts(3)).clicks) == 2

@@ -24,7 +24,7 @@ def reports(state: Path) -> list[Path]:
     return sorted(state.glob("*"))
 
 
-def test_the_block_ends_with_a_line_and_a_private_report(state: Path) -> None:
+def test_the_block_ends_with_a_line_and_a_private_report(state):
     told: list[str] = []
     with error_boundary("a test", told.append):
         raise ZeroDivisionError("of\nnothing\x1b[2J")
@@ -40,7 +40,7 @@ def test_the_block_ends_with_a_line_and_a_private_report(state: Path) -> None:
     assert "\x1b" not in text
 
 
-def test_secrets_are_left_out(state: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_secrets_are_left_out(state, monkeypatch):
     monkeypatch.setattr(sys, "argv", ["cocalib", "open", "a.bag", "--token", "SECRET1", "--token=SECRET2"])
     report_of(ValueError("GET /?token=SECRET3&a=1 Cookie: cocalib-1=SECRET4"), "a test")
     (report,) = reports(state)
@@ -49,13 +49,13 @@ def test_secrets_are_left_out(state: Path, monkeypatch: pytest.MonkeyPatch) -> N
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt(), SystemExit(3), asyncio.CancelledError()])
-def test_an_end_that_is_wanted_passes(error: BaseException, state: Path) -> None:
+def test_an_end_that_is_wanted_passes(error, state):
     with pytest.raises(type(error)), error_boundary("a test", lambda line: None):
         raise error
     assert not reports(state)
 
 
-def test_the_same_error_is_saved_once_and_old_reports_go(state: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_same_error_is_saved_once_and_old_reports_go(state, monkeypatch):
     lines = set()
     for _ in range(3):
         with error_boundary("a loop", lines.add):
@@ -67,12 +67,12 @@ def test_the_same_error_is_saved_once_and_old_reports_go(state: Path, monkeypatc
     assert len(reports(state)) == 20
 
 
-def test_a_report_that_cannot_be_saved_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_report_that_cannot_be_saved_is_said(tmp_path, monkeypatch):
     (tmp_path / "cocalib").write_text("a file where the folder should be")
     assert "could not be saved" in report_of(LookupError("x"), "a test")
 
 
-def test_debugging_shows_the_traceback(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_debugging_shows_the_traceback(monkeypatch, capsys):
     report_of(LookupError("quiet"), "a test")
     assert capsys.readouterr().err == ""
     monkeypatch.setenv("COCALIB_DEBUG", "1")
@@ -80,9 +80,7 @@ def test_debugging_shows_the_traceback(monkeypatch: pytest.MonkeyPatch, capsys: 
     assert "LookupError: loud" in capsys.readouterr().err
 
 
-def test_a_command_with_a_bug_exits_with_its_own_code(
-    state: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_command_with_a_bug_exits_with_its_own_code(state, monkeypatch, capsys):
     def broken(*_: object, **__: object) -> None:
         raise RecursionError("too deep")
 
@@ -94,9 +92,7 @@ def test_a_command_with_a_bug_exits_with_its_own_code(
     assert str(reports(state)[0]) in line
 
 
-def test_a_thread_with_a_bug_prints_one_line(
-    state: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_thread_with_a_bug_prints_one_line(state, monkeypatch, capsys):
     monkeypatch.setattr(threading, "excepthook", threading.excepthook)
     report_thread_errors()
 
@@ -111,7 +107,7 @@ def test_a_thread_with_a_bug_prints_one_line(
     assert "solver" in reports(state)[0].read_text()
 
 
-def test_no_other_module_catches_every_exception(project_root: Path) -> None:
+def test_no_other_module_catches_every_exception(project_root):
     found = [
         str(path.relative_to(project_root))
         for folder in ("app", "calib_core")

@@ -17,5 +17,5 @@ from cocalib.platform.loopback import is_loopback
         ("x", False),
     ],
 )
-def test_loopback_is_recognised(host: str, expected: bool) -> None:
+def test_loopback_is_recognised(host, expected):
     assert is_loopback(host) is expected

@@ -26,7 +26,7 @@ except KeyboardInterrupt as interrupt:
 """
 
 
-def test_a_signal_that_comes_while_an_object_is_deleted_ends_the_program() -> None:
+def test_a_signal_that_comes_while_an_object_is_deleted_ends_the_program():
     done = subprocess.run([sys.executable, "-c", _ENDS], capture_output=True, text=True, timeout=60, check=True)
     assert done.stdout.strip() == "ended by 15"
     assert done.stderr == ""
@@ -50,12 +50,12 @@ print(faults())
 
 
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="the C library is not glibc")
-def test_the_c_library_takes_every_setting() -> None:
+def test_the_c_library_takes_every_setting():
     code = "import sys; from cocalib.platform.process import keep_freed_memory; sys.exit(not keep_freed_memory())"
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="the C library is not glibc")
-def test_pictures_reuse_the_memory_of_earlier_ones() -> None:
+def test_pictures_reuse_the_memory_of_earlier_ones():
     answer = subprocess.run([sys.executable, "-c", _FAULTS, "keep"], check=True, capture_output=True, text=True)
     assert int(answer.stdout) < 1000  # 20 pictures of two sizes are over 60 000 pages

@@ -1,7 +1,6 @@
 """Where the program's own files are."""
 
 import importlib.metadata
-from pathlib import Path
 
 import pytest
 
@@ -9,12 +8,12 @@ from cocalib.platform import resources
 from cocalib.platform.resources import InstallationError, sample_folder, static_folder, version
 
 
-def test_a_checkout_has_its_files_at_its_top(project_root: Path) -> None:
+def test_a_checkout_has_its_files_at_its_top(project_root):
     assert static_folder() == project_root / "static"
     assert sample_folder() == project_root / "sample_data"
 
 
-def test_an_installed_package_has_its_files_inside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_installed_package_has_its_files_inside(tmp_path, monkeypatch):
     package = tmp_path / "site-packages" / "cocalib"
     (package / "static").mkdir(parents=True)
     (tmp_path / "site-packages" / "static").mkdir()  # another package's
@@ -22,18 +21,18 @@ def test_an_installed_package_has_its_files_inside(tmp_path: Path, monkeypatch: 
     assert static_folder() == package / "static"
 
 
-def test_missing_files_are_reported_with_the_folders_searched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_files_are_reported_with_the_folders_searched(tmp_path, monkeypatch):
     monkeypatch.setattr(resources, "_PACKAGE_FOLDER", tmp_path / "site-packages" / "cocalib")
     with pytest.raises(InstallationError, match="the folder sample_data is neither in"):
         sample_folder()
 
 
-def test_the_version_is_the_installed_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_version_is_the_installed_one(monkeypatch):
     monkeypatch.setattr(importlib.metadata, "version", lambda name: {"cocalib": "1.2.3"}[name])
     assert version() == "1.2.3"
 
 
-def test_an_uninstalled_checkout_has_a_version_too(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_uninstalled_checkout_has_a_version_too(monkeypatch):
     def missing(name: str) -> str:
         raise importlib.metadata.PackageNotFoundError(name)
 

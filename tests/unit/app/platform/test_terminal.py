@@ -26,7 +26,7 @@ HOSTILE = {
 class Terminal(io.StringIO):
     """A terminal in memory."""
 
-    encoding = "utf-8"  # type: ignore[assignment]
+    encoding = "utf-8"
 
     def isatty(self) -> bool:
         return True
@@ -41,7 +41,7 @@ def terminal_of(monkeypatch: pytest.MonkeyPatch) -> Terminal:
 
 
 @pytest.mark.parametrize("text", HOSTILE.values(), ids=HOSTILE)
-def test_controls_are_shown_as_json_shows_them(text: str) -> None:
+def test_controls_are_shown_as_json_shows_them(text):
     shown = escaped(text)
     assert shown.isprintable()
     assert shown.encode()
@@ -49,16 +49,15 @@ def test_controls_are_shown_as_json_shows_them(text: str) -> None:
 
 
 @pytest.mark.parametrize("text", ["±1.2 µm → /radar/points\n\ttabbed", "Ümlaut, 雷达, 🚗", ""])
-def test_ordinary_text_is_unchanged(text: str) -> None:
+def test_ordinary_text_is_unchanged(text):
     assert escaped(text) == text
 
 
-def test_everything_that_is_printed_or_logged_is_escaped(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_everything_that_is_printed_or_logged_is_escaped(monkeypatch):
     terminal = terminal_of(monkeypatch)
     with escaped_output():
         print("out \x1b[31m")
         print("err \x1b[32m", file=sys.stderr)
-        assert logging.lastResort is not None
         logging.lastResort.handle(logging.makeLogRecord({"msg": "log \x1b[33m", "levelno": logging.WARNING}))
         traceback.print_exception(ValueError("an error \x1b[34m"))
         sys.stdout.writelines(["line \x1b[35m\n"])
@@ -68,7 +67,7 @@ def test_everything_that_is_printed_or_logged_is_escaped(monkeypatch: pytest.Mon
     assert sys.stdout is terminal, "the streams are put back"
 
 
-def test_json_stays_json_and_keeps_its_values(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_json_stays_json_and_keeps_its_values(monkeypatch):
     terminal = terminal_of(monkeypatch)
     value = {"topic": "a\x00\x1b\x7f\x9b\u202e\u2028é"}
     with escaped_output():
@@ -77,7 +76,7 @@ def test_json_stays_json_and_keeps_its_values(monkeypatch: pytest.MonkeyPatch) -
     assert all(character.isprintable() or character == "\n" for character in terminal.getvalue())
 
 
-def test_of_the_help_only_colours_pass(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_of_the_help_only_colours_pass(monkeypatch):
     terminal = terminal_of(monkeypatch)
     with escaped_output():
         with with_colours():
@@ -86,7 +85,7 @@ def test_of_the_help_only_colours_pass(monkeypatch: pytest.MonkeyPatch) -> None:
     assert terminal.getvalue() == "\x1b[1mbold\x1b[0m \\u001b[2J\n\\u001b[1m\n"
 
 
-def test_a_file_on_stdout_is_exact_in_a_pipe_and_escaped_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_on_stdout_is_exact_in_a_pipe_and_escaped_on_a_terminal(monkeypatch):
     terminal = terminal_of(monkeypatch)
     with escaped_output():
         print_exactly("\u202ex\n")
@@ -98,14 +97,14 @@ def test_a_file_on_stdout_is_exact_in_a_pipe_and_escaped_on_a_terminal(monkeypat
     assert pipe.getvalue() == "\u202ex\n"
 
 
-def test_a_progress_bar_draws_on_the_terminal_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_progress_bar_draws_on_the_terminal_itself(monkeypatch):
     terminal = terminal_of(monkeypatch)
     with escaped_output():
         assert terminal_stream(sys.stderr) is terminal
     assert terminal_stream(terminal) is terminal
 
 
-def test_a_terminal_without_the_character_does_not_stop_a_command(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_terminal_without_the_character_does_not_stop_a_command(monkeypatch):
     data = io.BytesIO()
     monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(data, encoding="ascii", write_through=True))
     with escaped_output():
@@ -114,7 +113,7 @@ def test_a_terminal_without_the_character_does_not_stop_a_command(monkeypatch: p
 
 
 @pytest.mark.parametrize("stream", ["stdout", "stderr"])
-def test_a_closed_output_does_not_stop_a_command(monkeypatch: pytest.MonkeyPatch, stream: str) -> None:
+def test_a_closed_output_does_not_stop_a_command(monkeypatch, stream):
     monkeypatch.setattr(sys, stream, None)
     with escaped_output():
         print("shown to nobody", file=getattr(sys, stream))

@@ -3,7 +3,6 @@
 import re
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,10 +26,10 @@ def _parsed(subject: ReportSubject) -> ElementTree.Element:
 
 
 def _words(subject: ReportSubject) -> str:
-    return " ".join("".join(_parsed(subject).find(f"{_HTML}body").itertext()).split())  # type: ignore[union-attr]
+    return " ".join("".join(_parsed(subject).find(f"{_HTML}body").itertext()).split())
 
 
-def test_the_same_inputs_give_the_same_bytes(project_root: Path) -> None:
+def test_the_same_inputs_give_the_same_bytes(project_root):
     full = replace(
         subject_for(project_root), recording=watched_recording(), judged=Judged(Evaluation(None, box_figures()))
     )
@@ -39,7 +38,7 @@ def test_the_same_inputs_give_the_same_bytes(project_root: Path) -> None:
     )
 
 
-def test_it_is_small_and_needs_nothing_from_elsewhere(project_root: Path) -> None:
+def test_it_is_small_and_needs_nothing_from_elsewhere(project_root):
     html = report_html(replace(subject_for(project_root), recording=watched_recording()))
     assert len(html.encode()) < 3_000_000
     addresses = re.findall(r'(?:href|src|url\(|action)="?([^"\s)]+)', html)
@@ -49,7 +48,7 @@ def test_it_is_small_and_needs_nothing_from_elsewhere(project_root: Path) -> Non
     assert "@import" not in html
 
 
-def test_the_numbers_are_those_of_the_calibration(project_root: Path) -> None:
+def test_the_numbers_are_those_of_the_calibration(project_root):
     subject = subject_for(project_root)
     page, pose = _parsed(subject), golden(project_root).camera_from_radar
     for name, expected in (("camera_from_radar", pose), ("radar_from_camera", pose.inverse())):
@@ -64,7 +63,7 @@ def test_the_numbers_are_those_of_the_calibration(project_root: Path) -> None:
     assert f"chi2 / degrees of freedom{plain(metrics.chi2)} / {metrics.degrees_of_freedom}" in words
 
 
-def test_every_drawing_and_table_can_be_heard(project_root: Path) -> None:
+def test_every_drawing_and_table_can_be_heard(project_root):
     page = _parsed(
         replace(
             subject_for(project_root), recording=watched_recording(), judged=Judged(Evaluation(None, box_figures()))
@@ -81,7 +80,7 @@ def test_every_drawing_and_table_can_be_heard(project_root: Path) -> None:
     assert levels.count("h1") == 1
 
 
-def test_text_of_a_recording_or_a_file_stays_text(project_root: Path) -> None:
+def test_text_of_a_recording_or_a_file_stays_text(project_root):
     evil = "<img src=x onerror=alert(1)>"
     warning = DataWarning("odd", evil, evil)
     calibration = golden(project_root)
@@ -100,7 +99,7 @@ def test_text_of_a_recording_or_a_file_stays_text(project_root: Path) -> None:
     assert not list(_parsed(subject).iter(f"{_HTML}img"))
 
 
-def test_what_is_said_of_the_vehicle_hides_nothing_else(project_root: Path) -> None:
+def test_what_is_said_of_the_vehicle_hides_nothing_else(project_root):
     plain = replace(
         subject_for(project_root), recording=watched_recording(topics=(("radar", "/r"), ("pictures", "/i")))
     )
@@ -132,7 +131,7 @@ def test_what_is_said_of_the_vehicle_hides_nothing_else(project_root: Path) -> N
     assert [one for one in facts(note) if one in stated] == stated
 
 
-def test_a_method_without_a_noise_model_gets_no_error_bars_and_no_map(project_root: Path) -> None:
+def test_a_method_without_a_noise_model_gets_no_error_bars_and_no_map(project_root):
     calibration = golden(project_root)
     options = replace(calibration.options, method="paper")
     unknown = np.full((6, 6), np.nan)
@@ -144,7 +143,7 @@ def test_a_method_without_a_noise_model_gets_no_error_bars_and_no_map(project_ro
     assert " ± " not in words.split("Cautions")[0].replace("Bars: ± two", "")
 
 
-def test_an_imported_calibration_is_not_judged(project_root: Path) -> None:
+def test_an_imported_calibration_is_not_judged(project_root):
     calibration = golden(project_root)
     file = subject_for(project_root).found.file
     assert file is not None
@@ -163,7 +162,7 @@ def test_an_imported_calibration_is_not_judged(project_root: Path) -> None:
     assert "Residuals" not in words
 
 
-def test_acc_comes_with_the_sentence_that_it_is_not_accuracy(project_root: Path) -> None:
+def test_acc_comes_with_the_sentence_that_it_is_not_accuracy(project_root):
     words = _words(
         replace(
             subject_for(project_root), recording=watched_recording(), judged=Judged(Evaluation(None, box_figures()))
@@ -182,7 +181,7 @@ def test_acc_comes_with_the_sentence_that_it_is_not_accuracy(project_root: Path)
     assert "roll 0.1 points; pitch 10.0 points, highest at +1 deg; yaw 38.0 points" in words
 
 
-def test_a_file_without_frames_with_returns_has_no_acc(project_root: Path) -> None:
+def test_a_file_without_frames_with_returns_has_no_acc(project_root):
     none = replace(box_figures(), acc=None, acc_without_zero_frames=None, chance=None, frames=(), classes=(), ranges=())
     words = _words(
         replace(subject_for(project_root), recording=watched_recording(), judged=Judged(Evaluation(None, none)))
@@ -190,20 +189,20 @@ def test_a_file_without_frames_with_returns_has_no_acc(project_root: Path) -> No
     assert "Acc is unknown: no frame has returns of targets." in words
 
 
-def test_a_recording_without_clicks_and_boxes_judges_nothing_and_the_report_says_so(project_root: Path) -> None:
+def test_a_recording_without_clicks_and_boxes_judges_nothing_and_the_report_says_so(project_root):
     idle = replace(subject_for(project_root), recording=watched_recording())
     assert "with radar.bag, in which there are no clicks or boxes to judge it by" in _words(idle)
     assert "judged on radar.bag" in _words(replace(idle, judged=Judged(Evaluation(None, box_figures()))))
 
 
-def test_files_are_named_once_with_all_that_they_are(project_root: Path) -> None:
+def test_files_are_named_once_with_all_that_they_are(project_root):
     subject = replace(subject_for(project_root), inputs=(FILE,), recording=watched_recording())
     words = _words(subject)
     assert words.count(FILE.sha256) == 1
     assert "this calibration, recording" in words
 
 
-def test_many_pairs_are_cut_to_those_with_the_largest_residuals(project_root: Path) -> None:
+def test_many_pairs_are_cut_to_those_with_the_largest_residuals(project_root):
     calibration = golden(project_root)
     one = calibration.pairs[0]
     many = tuple(replace(one, id=f"n{k}", projected_px=np.add(one.pixel_px, (k, 0.0))) for k in range(100))
@@ -215,29 +214,29 @@ def test_many_pairs_are_cut_to_those_with_the_largest_residuals(project_root: Pa
 
 
 @pytest.mark.parametrize("size", [0, 1, 2])
-def test_hardly_any_pairs_are_reported_without_failing(project_root: Path, size: int) -> None:
+def test_hardly_any_pairs_are_reported_without_failing(project_root, size):
     calibration = golden(project_root)
     assert "Answer" in _words(subject_for(project_root, replace(calibration, pairs=calibration.pairs[:size])))
 
 
-def test_pairs_behind_the_camera_have_no_residual(project_root: Path) -> None:
+def test_pairs_behind_the_camera_have_no_residual(project_root):
     calibration = golden(project_root)
     lost = tuple(replace(one, projected_px=np.full(2, np.nan)) for one in calibration.pairs)
     words = _words(subject_for(project_root, replace(calibration, pairs=lost)))
     assert "There are no residuals: no pair has a reprojection." in words
 
 
-def test_a_comparison_shows_the_figures_of_check(project_root: Path) -> None:
+def test_a_comparison_shows_the_figures_of_check(project_root):
     calibration = golden(project_root)
     moved = replace(calibration, camera_from_radar=calibration.camera_from_radar.perturbed(np.full(6, 0.01)))
     this, other = subject_for(project_root), subject_for(project_root, moved)
-    compared = compare(imported(other.found.file), this.found)  # type: ignore[arg-type]
+    compared = compare(imported(other.found.file), this.found)
     words = _words(replace(this, against=Against("other.json", (), compared)))
     for figure in compared.figures:
         assert f"{figure.label}{figure.text}" in words
 
 
-def test_limits_are_met_or_not_by_the_stated_error_and_there_is_room_to_sign(project_root: Path) -> None:
+def test_limits_are_met_or_not_by_the_stated_error_and_there_is_room_to_sign(project_root):
     subject = subject_for(project_root)
     stated = stated_error(golden(project_root))
     required = (f"max-deg={stated.rotation_deg}", f"max-cm={stated.position_cm * 0.99}")
@@ -251,12 +250,12 @@ def test_limits_are_met_or_not_by_the_stated_error_and_there_is_room_to_sign(pro
 
 
 @pytest.mark.parametrize("text", ["max-deg", "max-deg=0", "max-deg=nan", "deg=1", "max-cm=few"])
-def test_what_is_no_limit_is_refused(text: str) -> None:
+def test_what_is_no_limit_is_refused(text):
     with pytest.raises(InputError, match=f"--require {text}: give max-deg=NUMBER"):
         limits_met((text,), None)
 
 
-def test_the_returns_are_drawn_where_the_calibration_puts_them(project_root: Path) -> None:
+def test_the_returns_are_drawn_where_the_calibration_puts_them(project_root):
     subject = subject_for(project_root)
     camera = golden(project_root).camera
     picture = replace(watched_recording().picture, returns_px=((-0.5, -0.5), (camera.width_px - 0.5, 9.5)))

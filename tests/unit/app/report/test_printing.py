@@ -24,7 +24,7 @@ def nowhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_without_a_browser_the_message_says_what_to_do(nowhere: Path) -> None:
+def test_without_a_browser_the_message_says_what_to_do(nowhere):
     with pytest.raises(
         PrintingError, match="no browser found to print with; install Chromium or Chrome, set COCALIB_BROWSER"
     ):
@@ -32,19 +32,19 @@ def test_without_a_browser_the_message_says_what_to_do(nowhere: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["chromium", "google-chrome", "microsoft-edge", "brave-browser"])
-def test_a_browser_on_the_path_is_found(nowhere: Path, name: str) -> None:
+def test_a_browser_on_the_path_is_found(nowhere, name):
     browser = _program(nowhere / name, "exit 0")
     assert find_browser() == browser
 
 
-def test_the_browser_of_playwright_is_found(nowhere: Path) -> None:
+def test_the_browser_of_playwright_is_found(nowhere):
     folder = nowhere / "playwright" / "chromium-1200" / "chrome-linux"
     folder.mkdir(parents=True)
     browser = _program(folder / "chrome", "exit 0")
     assert find_browser() == browser
 
 
-def test_a_chosen_browser_that_is_no_program_is_refused(nowhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_chosen_browser_that_is_no_program_is_refused(nowhere, monkeypatch):
     monkeypatch.setenv("COCALIB_BROWSER", "/nowhere/browser")
     with pytest.raises(
         PrintingError, match=r"COCALIB_BROWSER=/nowhere/browser is not a program; correct it or unset it"
@@ -52,7 +52,7 @@ def test_a_chosen_browser_that_is_no_program_is_refused(nowhere: Path, monkeypat
         find_browser()
 
 
-def test_a_browser_that_prints_nothing_is_named_with_its_last_words(nowhere: Path) -> None:
+def test_a_browser_that_prints_nothing_is_named_with_its_last_words(nowhere):
     _program(nowhere / "chromium", "echo 'cannot open display' >&2; exit 3")
     with pytest.raises(
         PrintingError, match=r"printed no PDF \(exit code 3\): cannot open display; print the HTML file"
@@ -60,7 +60,7 @@ def test_a_browser_that_prints_nothing_is_named_with_its_last_words(nowhere: Pat
         print_pdf("<p>report</p>")
 
 
-def test_the_profile_and_the_page_are_deleted_afterwards(nowhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_profile_and_the_page_are_deleted_afterwards(nowhere, monkeypatch):
     temporary = nowhere / "temporary"
     temporary.mkdir()
     monkeypatch.setattr("tempfile.tempdir", str(temporary))

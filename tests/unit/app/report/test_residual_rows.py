@@ -1,7 +1,5 @@
 """Each sentence under a residual plot names what was planted, and nothing where nothing was."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 
@@ -32,12 +30,12 @@ def _place(rows: ResidualRows) -> str:
         ("time", time_sentence, "Residuals grow with time: "),
     ],
 )
-def test_a_planted_trend_is_named(planted: str, sentence: Callable[[ResidualRows], str], said: str) -> None:
+def test_a_planted_trend_is_named(planted, sentence, said):
     assert sentence(planted_rows(growing_with=planted)).startswith(said)
     assert sentence(planted_rows()).startswith("No trend ")
 
 
-def test_a_residual_that_shrinks_with_range_points_at_the_position() -> None:
+def test_a_residual_that_shrinks_with_range_points_at_the_position():
     rows = planted_rows(growing_with="range")
     turned = ResidualRows(
         rows.ids, rows.kinds, rows.points_radar_m * (25.0 / rows.ranges_m - 1.0)[:, None], rows.pixels_px,
@@ -48,12 +46,12 @@ def test_a_residual_that_shrinks_with_range_points_at_the_position() -> None:
     assert "camera's position" in range_sentence(turned)
 
 
-def test_a_shift_that_all_residuals_share_is_named_with_its_size() -> None:
+def test_a_shift_that_all_residuals_share_is_named_with_its_size():
     assert shift_sentence(planted_rows(shift_px=4.0)).startswith("The residuals lean together by (4")
     assert shift_sentence(planted_rows()).startswith("The residuals share no direction")
 
 
-def test_the_halves_in_a_sentence_are_those_of_the_data() -> None:
+def test_the_halves_in_a_sentence_are_those_of_the_data():
     rows = planted_rows(growing_with="range")
     middle = np.median(rows.ranges_m)
     near, far = (
@@ -62,31 +60,28 @@ def test_the_halves_in_a_sentence_are_those_of_the_data() -> None:
     assert f"{near:.3g} px (RMS) up to {middle:.3g} m and {far:.3g} px beyond" in range_sentence(rows)
 
 
-def test_a_trend_is_the_rank_correlation_with_its_probability() -> None:
+def test_a_trend_is_the_rank_correlation_with_its_probability():
     values = np.array([106.0, 86, 100, 101, 99, 103, 97, 113, 112, 110])
     lengths = np.array([7.0, 2, 27, 50, 28, 29, 20, 12, 6, 17])  # Wikipedia's example of Spearman's coefficient
     found = trend(values, lengths)
-    assert found is not None
     assert found.correlation == pytest.approx(-29 / 165)
     assert found.p_value == pytest.approx(0.627188, abs=1e-6)
 
 
-def test_equal_values_share_their_mean_rank() -> None:
+def test_equal_values_share_their_mean_rank():
     found = trend(np.array([1.0, 1, 2, 2, 3, 3, 4, 4]), np.array([1.0, 1, 2, 2, 3, 3, 4, 4]) * 5)
-    assert found is not None
     assert (found.correlation, found.p_value) == (pytest.approx(1.0), pytest.approx(0.0, abs=1e-9))
 
 
-def test_chance_alone_is_seldom_called_a_trend() -> None:
+def test_chance_alone_is_seldom_called_a_trend():
     rng = np.random.default_rng(1)
     named = 0
     for _ in range(400):
         found = trend(rng.uniform(size=20), rng.uniform(size=20))
-        assert found is not None
         named += found.p_value < 0.01
     assert named <= 12  # 4 expected; 12 would be four standard deviations
 
 
 @pytest.mark.parametrize("sentence", [range_sentence, azimuth_sentence, _place, time_sentence, shift_sentence])
-def test_few_pairs_show_no_trend_and_the_sentence_says_so(sentence: Callable[[ResidualRows], str]) -> None:
+def test_few_pairs_show_no_trend_and_the_sentence_says_so(sentence):
     assert sentence(planted_rows(n=5)) == "5 clicks are too few to show a trend; 8 or more are needed."

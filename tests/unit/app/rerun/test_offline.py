@@ -8,7 +8,6 @@ import http.client
 import subprocess
 import sys
 import threading
-from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
@@ -39,7 +38,7 @@ def without_rerun(*arguments: object) -> "subprocess.CompletedProcess[str]":
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
-def test_a_viewer_is_told_to_send_nothing_even_if_the_user_forces_it() -> None:
+def test_a_viewer_is_told_to_send_nothing_even_if_the_user_forces_it():
     environment = offline_environment(
         {"FORCE_RERUN_ANALYTICS": "1", "PATH": "/bin", "HTTPS_PROXY": "http://proxy:3128"}
     )
@@ -49,13 +48,13 @@ def test_a_viewer_is_told_to_send_nothing_even_if_the_user_forces_it() -> None:
     assert environment["PATH"] == "/bin"
 
 
-def test_commands_without_rerun_work_where_it_is_missing(project_root: Path) -> None:
+def test_commands_without_rerun_work_where_it_is_missing(project_root):
     answer = without_rerun("info", project_root / "sample_data" / "rooftop" / "radar.bag")
     assert answer.returncode == 0, answer.stderr
 
 
 @pytest.mark.parametrize("more", [(), ("--out", "view.rrd")], ids=["window", "file"])
-def test_commands_that_need_rerun_say_how_to_install_it(more: tuple[str, ...], tmp_path: Path) -> None:
+def test_commands_that_need_rerun_say_how_to_install_it(more, tmp_path):
     answer = without_rerun("show", tmp_path / "a.bag", "--calibration", tmp_path / "c.json", *more)
     assert answer.returncode == 2
     assert "needs rerun-sdk, which is not installed" in answer.stderr
@@ -63,14 +62,14 @@ def test_commands_that_need_rerun_say_how_to_install_it(more: tuple[str, ...], t
     assert "Traceback" not in answer.stderr
 
 
-def test_without_a_display_other_ways_are_named() -> None:
+def test_without_a_display_other_ways_are_named():
     with pytest.raises(InputError, match="cocalib show"):
         require_display({}, "linux")
     for environment, platform in (({"DISPLAY": ":0"}, "linux"), ({"WAYLAND_DISPLAY": "w"}, "linux"), ({}, "darwin")):
         require_display(environment, platform)
 
 
-def test_the_web_viewer_is_served_to_who_has_the_link_under_a_policy(tmp_path: Path) -> None:
+def test_the_web_viewer_is_served_to_who_has_the_link_under_a_policy(tmp_path):
     pytest.importorskip("rerun_cli", reason="there is no wheel of rerun-sdk for this machine")
     view = tmp_path / "view.rrd"
     view.write_bytes(b"RRF2" + bytes(1000))

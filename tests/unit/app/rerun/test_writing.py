@@ -64,7 +64,7 @@ def read(view: RecordedView, tmp_path_factory: pytest.TempPathFactory) -> Read:
     return Read(path)
 
 
-def test_pictures_are_the_recorded_bytes_at_their_recorded_times(read: Read, view: RecordedView) -> None:
+def test_pictures_are_the_recorded_bytes_at_their_recorded_times(read, view):
     blobs = read.column("radar/camera/picture", "EncodedImage:blob")
     assert list(blobs) == view.recording.image_times.tolist()
     for index, blob in enumerate(blobs.values()):
@@ -73,16 +73,15 @@ def test_pictures_are_the_recorded_bytes_at_their_recorded_times(read: Read, vie
     assert {kind.as_py()[0] for kind in kinds.values()} == {"image/jpeg"}
 
 
-def test_the_camera_stands_where_the_calibration_says(read: Read, view: RecordedView) -> None:
+def test_the_camera_stands_where_the_calibration_says(read, view):
     for entity, calibration in (("radar/camera", view.calibration), ("radar/against", view.against)):
-        assert calibration is not None
         pose = calibration.camera_from_radar.inverse()
         columns = np.array(read.one(entity, "Transform3D:mat3x3")[0]).reshape(3, 3)
         np.testing.assert_allclose(columns.T, pose.rotation, atol=1e-6)
         np.testing.assert_allclose(read.one(entity, "Transform3D:translation")[0], pose.translation_m, atol=1e-6)
 
 
-def test_the_frustum_has_the_camera_matrix_in_reruns_pixels(read: Read, view: RecordedView) -> None:
+def test_the_frustum_has_the_camera_matrix_in_reruns_pixels(read, view):
     matrix = np.array(read.one("radar/camera/picture", "Pinhole:image_from_camera")[0]).reshape(3, 3).T
     camera = view.calibration.camera
     np.testing.assert_allclose(matrix[:2, :2], camera.matrix_px[:2, :2], rtol=1e-6)
@@ -91,7 +90,7 @@ def test_the_frustum_has_the_camera_matrix_in_reruns_pixels(read: Read, view: Re
 
 
 @pytest.mark.parametrize("name", ["returns", "returns_against"])
-def test_returns_lie_where_the_lens_of_the_calibration_projects_them(read: Read, view: RecordedView, name: str) -> None:
+def test_returns_lie_where_the_lens_of_the_calibration_projects_them(read, view, name):
     calibration = view.calibration if name == "returns" else view.against
     assert calibration is not None
     points = read.column(f"radar/camera/picture/{name}", "Points2D:positions")
@@ -108,7 +107,7 @@ def test_returns_lie_where_the_lens_of_the_calibration_projects_them(read: Read,
     assert view.calibration.camera.is_distorted
 
 
-def test_the_radar_cloud_has_every_return_of_every_scan(read: Read, view: RecordedView) -> None:
+def test_the_radar_cloud_has_every_return_of_every_scan(read, view):
     clouds = read.column("radar/returns", "Points3D:positions")
     scans = view.recording.radar_scans()
     assert list(clouds) == scans.times_ns.tolist()
@@ -116,7 +115,7 @@ def test_the_radar_cloud_has_every_return_of_every_scan(read: Read, view: Record
     np.testing.assert_allclose(found, scans.points_radar_m, atol=1e-5)
 
 
-def test_residuals_over_time_are_those_of_the_pairs(read: Read, view: RecordedView) -> None:
+def test_residuals_over_time_are_those_of_the_pairs(read, view):
     residuals = read.column("metrics/residual_px", "Scalars:scalars")
     expected = {int(pair.image_time): pair.distance_px for pair in view.pairs if pair.image_time is not None}
     assert {time: value.as_py()[0] for time, value in residuals.items()} == pytest.approx(expected)
@@ -124,7 +123,7 @@ def test_residuals_over_time_are_those_of_the_pairs(read: Read, view: RecordedVi
     assert line == pytest.approx([view.calibration.metrics.aed_px] * 2)
 
 
-def test_a_click_is_shown_in_its_frame_only(read: Read, view: RecordedView) -> None:
+def test_a_click_is_shown_in_its_frame_only(read, view):
     clicked = {int(pair.image_time): pair for pair in view.pairs if pair.image_time is not None}
     clicks = read.column("radar/camera/picture/clicked_now/click", "Points2D:positions")
     assert set(clicks) == set(clicked)
@@ -136,7 +135,7 @@ def test_a_click_is_shown_in_its_frame_only(read: Read, view: RecordedView) -> N
     assert not cleared & set(clicked)
 
 
-def test_boxes_end_with_the_last_annotated_frame(read: Read, view: RecordedView) -> None:
+def test_boxes_end_with_the_last_annotated_frame(read, view):
     centres = read.column("radar/camera/picture/boxes", "Boxes2D:centers")
     counts = [len(centre.as_py()) for centre in centres.values()]
     assert [index for index, count in enumerate(counts) if count] == [3, 4]
@@ -145,18 +144,18 @@ def test_boxes_end_with_the_last_annotated_frame(read: Read, view: RecordedView)
     assert read.column("radar/camera/picture/boxes", "Boxes2D:labels")[time].as_py() == ["person-1"]
 
 
-def test_the_summary_is_plain_text_so_that_no_name_can_fetch_a_picture(read: Read, view: RecordedView) -> None:
+def test_the_summary_is_plain_text_so_that_no_name_can_fetch_a_picture(read, view):
     assert read.one("summary", "TextDocument:media_type") == ["text/plain"]
     text = read.one("summary", "TextDocument:text")[0]
     assert text == summary_text(view)
     assert "AED" in text
 
 
-def test_the_only_timeline_is_the_recorded_one(read: Read) -> None:
+def test_the_only_timeline_is_the_recorded_one(read):
     assert {name for chunk in read.chunks for name in chunk.timeline_names} == {"recorded"}
 
 
-def test_an_interrupted_file_leaves_the_old_one_and_nothing_else(view: RecordedView, tmp_path: Path) -> None:
+def test_an_interrupted_file_leaves_the_old_one_and_nothing_else(view, tmp_path):
     path = tmp_path / "view.rrd"
     path.write_bytes(b"old")
 
@@ -169,9 +168,7 @@ def test_an_interrupted_file_leaves_the_old_one_and_nothing_else(view: RecordedV
     assert path.read_bytes() == b"old"
 
 
-def test_a_disk_that_fills_up_is_noticed_before_the_writer_fails(
-    view: RecordedView, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_disk_that_fills_up_is_noticed_before_the_writer_fails(view, tmp_path, monkeypatch):
     free = iter([10**12, 10**12, 10**12, 5_000_000])
     monkeypatch.setattr(shutil, "disk_usage", lambda _path: SimpleNamespace(free=next(free)))
     with pytest.raises(InputError, match="disk is nearly full"):
@@ -179,7 +176,7 @@ def test_a_disk_that_fills_up_is_noticed_before_the_writer_fails(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_file_without_its_end_is_refused(view: RecordedView, tmp_path: Path) -> None:
+def test_a_file_without_its_end_is_refused(view, tmp_path):
     path = tmp_path / "view.rrd"
     write_view(view, path)
     whole = path.read_bytes()
@@ -188,6 +185,6 @@ def test_a_file_without_its_end_is_refused(view: RecordedView, tmp_path: Path) -
         _require_complete(path, path)
 
 
-def test_a_missing_folder_is_named(view: RecordedView, tmp_path: Path) -> None:
+def test_a_missing_folder_is_named(view, tmp_path):
     with pytest.raises(InputError, match="absent does not exist"):
         write_view(view, tmp_path / "absent" / "view.rrd")

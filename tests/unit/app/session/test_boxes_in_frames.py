@@ -46,7 +46,7 @@ def moving(first: int, count: int, start: BoxEdges, step_px: float, ended: str =
 BOX: BoxEdges = (100.0, 50.0, 140.0, 150.0)
 
 
-def test_a_box_is_carried_to_the_end_and_no_stretch_is_longer_than_the_limit() -> None:
+def test_a_box_is_carried_to_the_end_and_no_stretch_is_longer_than_the_limit():
     [stretch] = stretches_of(track((3, BOX)), FACTS)
     assert (stretch.start, stretch.last, stretch.is_cut) == (Start(3, BOX), 29, False)
     long = RecordingFacts("long", 33_000_000 * np.arange(2000), width_px=640, height_px=480)
@@ -59,7 +59,7 @@ def test_a_box_is_carried_to_the_end_and_no_stretch_is_longer_than_the_limit() -
     assert one.is_complete
 
 
-def test_drift_is_taken_out_evenly_up_to_the_next_stated_box() -> None:
+def test_drift_is_taken_out_evenly_up_to_the_next_stated_box():
     target: BoxEdges = (160.0, 60.0, 200.0, 160.0)  # followed to 150, 50: off by 10 in both directions
     [one] = carried_tracks([track((0, BOX), (10, target))], FACTS, moving(0, 10, BOX, 5.0))
     assert [box.frame for box in one.boxes] == [*range(11)]
@@ -70,7 +70,7 @@ def test_drift_is_taken_out_evenly_up_to_the_next_stated_box() -> None:
     assert one.note == ""
 
 
-def test_a_box_that_was_lost_goes_straight_to_the_next_stated_one() -> None:
+def test_a_box_that_was_lost_goes_straight_to_the_next_stated_one():
     target: BoxEdges = (200.0, 50.0, 240.0, 150.0)
     [one] = carried_tracks([track((0, BOX), (10, target))], FACTS, moving(0, 2, BOX, 2.0, ended="it is hidden"))
     assert [box.kind for box in one.boxes[:4]] == ["stated", "followed", "followed", "between"]
@@ -78,14 +78,14 @@ def test_a_box_that_was_lost_goes_straight_to_the_next_stated_one() -> None:
     assert one.at(6).confidence == 0.0
 
 
-def test_a_box_that_is_lost_says_where_and_why() -> None:
+def test_a_box_that_is_lost_says_where_and_why():
     [one] = carried_tracks([track((4, BOX))], FACTS, moving(4, 6, BOX, 2.0, ended="it leaves the picture"))
     assert one.boxes[-1].frame == 10
     assert "Ends in frame 11: it leaves the picture" in one.note
     assert one.at(11) is None
 
 
-def test_hidden_ends_a_box_until_it_is_stated_again() -> None:
+def test_hidden_ends_a_box_until_it_is_stated_again():
     again: BoxEdges = (300.0, 50.0, 340.0, 150.0)
     stated = track((0, BOX), (5, None), (12, again))
     [first, second] = stretches_of(stated, FACTS)
@@ -95,7 +95,7 @@ def test_hidden_ends_a_box_until_it_is_stated_again() -> None:
     assert one.note == ""
 
 
-def test_what_was_followed_before_a_correction_is_used_again() -> None:
+def test_what_was_followed_before_a_correction_is_used_again():
     followed = moving(0, 29, BOX, 5.0)
     target: BoxEdges = (150.0, 50.0, 190.0, 150.0)
     [one] = carried_tracks([track((0, BOX), (10, target))], FACTS, followed)
@@ -103,7 +103,7 @@ def test_what_was_followed_before_a_correction_is_used_again() -> None:
     assert not one.is_complete  # what follows the correction is yet to come
 
 
-def test_boxes_of_a_file_stay_in_their_frames_and_empty_frames_count() -> None:
+def test_boxes_of_a_file_stay_in_their_frames_and_empty_frames_count():
     loaded = track((2, BOX), (4, BOX), is_carried=False)
     carried = carried_tracks([loaded], FACTS)
     assert [box.frame for box in carried[0].boxes] == [2, 4]
@@ -125,7 +125,7 @@ def kept(found: Boxes) -> Boxes:
     return carried_boxes(carried_tracks(session.boxes, FACTS), session, FACTS)
 
 
-def test_boxes_and_empty_frames_of_our_own_file_come_back() -> None:
+def test_boxes_and_empty_frames_of_our_own_file_come_back():
     person = [Box(10.0 + frame, 20.0, 60.0 + frame, 200.0, "person", track="person-1") for frame in range(3)]
     car = Box(300.0, 200.0, 420.0, 260.0, "car", track="car-7")
     given = boxes(
@@ -138,14 +138,14 @@ def test_boxes_and_empty_frames_of_our_own_file_come_back() -> None:
     assert kept(found).frames == given.frames
 
 
-def test_boxes_without_tracks_are_objects_of_their_own() -> None:
+def test_boxes_without_tracks_are_objects_of_their_own():
     alone = tuple(Box(x, 20.0, x + 40.0, 120.0, "person") for x in (10.0, 100.0))
     session = apply(Session(), boxes_loaded(boxes(FrameBoxes(at(2), alone), FrameBoxes(at(3), alone)), FACTS), FACTS)
     assert [track.id for track in session.boxes] == ["b1", "b2", "b3", "b4"]
     assert session.next_box == 5
 
 
-def test_one_name_for_two_boxes_of_a_frame_or_for_two_classes_is_told_apart() -> None:
+def test_one_name_for_two_boxes_of_a_frame_or_for_two_classes_is_told_apart():
     same = (
         Box(10.0, 20.0, 60.0, 200.0, "person", track="7"),
         Box(200.0, 20.0, 260.0, 200.0, "person", track="7"),
@@ -156,7 +156,7 @@ def test_one_name_for_two_boxes_of_a_frame_or_for_two_classes_is_told_apart() ->
     assert sorted(track.label for track in loaded.tracks) == ["car", "person", "person"]
 
 
-def test_what_is_beyond_the_picture_is_cut_off_and_a_sliver_is_left_out() -> None:
+def test_what_is_beyond_the_picture_is_cut_off_and_a_sliver_is_left_out():
     cut = Box(-30.0, 400.0, 60.0, 900.0, "person", track="a")
     sliver = Box(-80.0, 100.0, 1.0, 200.0, "person", track="b")
     loaded = boxes_loaded(boxes(FrameBoxes(at(1), (cut, sliver)), FrameBoxes(at(2), (sliver,))), FACTS)
@@ -165,7 +165,7 @@ def test_what_is_beyond_the_picture_is_cut_off_and_a_sliver_is_left_out() -> Non
     assert loaded.empty_frames == (at(2),)
 
 
-def test_boxes_of_another_recording_and_other_files_are_refused_in_words() -> None:
+def test_boxes_of_another_recording_and_other_files_are_refused_in_words():
     elsewhere = boxes(FrameBoxes(TimeNs(1_500_000_000_000_000_000), (Box(10.0, 20.0, 60.0, 200.0, "person"),)))
     for data in (boxes_text(elsewhere).encode(), b"%PDF-1.4", b"", json.dumps({"schema": "cocalib/clicks-1"}).encode()):
         with pytest.raises(InputError):

@@ -44,20 +44,20 @@ def clicked(folder: Path, facts: RecordingFacts = FACTS, *, changed_at_s: float 
     return folder
 
 
-def test_a_recording_without_a_session_starts_one_next_to_it(home: Path) -> None:
+def test_a_recording_without_a_session_starts_one_next_to_it(home):
     found = find_session_folder([home / "drive.bag"], FACTS)
     assert found.path == home / "drive.bag.cocalib-session"
     assert found.warnings == ()
 
 
-def test_the_session_of_the_same_name_is_continued_without_a_word(home: Path) -> None:
+def test_the_session_of_the_same_name_is_continued_without_a_word(home):
     clicked(home / "other.bag.cocalib-session")
     folder = clicked(home / "drive.bag.cocalib-session")
     found = find_session_folder([home / "drive.bag"], FACTS)
     assert (found.path, found.warnings) == (folder, ())
 
 
-def test_a_renamed_recording_continues_its_session_and_says_so(home: Path) -> None:
+def test_a_renamed_recording_continues_its_session_and_says_so(home):
     folder = clicked(home / "drive.bag.cocalib-session")
     found = find_session_folder([home / "renamed.bag"], replace(FACTS, name="renamed.bag"))
     assert found.path == folder
@@ -70,16 +70,14 @@ def test_a_renamed_recording_continues_its_session_and_says_so(home: Path) -> No
     session_file.close()
 
 
-def test_a_moved_recording_continues_the_session_in_the_users_folder(
-    home: Path, tmp_path: Path, state_folder: Path
-) -> None:
+def test_a_moved_recording_continues_the_session_in_the_users_folder(home, tmp_path, state_folder):
     folder = clicked(state_folder / "drive.bag-12345678.cocalib-session")
     found = find_session_folder([home / "drive.bag"], FACTS)
     assert found.path == folder
     assert f"continuing the session in {folder}, which has the frames of drive.bag" in found.warnings[0].message
 
 
-def test_of_two_sessions_the_newest_is_continued_and_the_other_named(home: Path, state_folder: Path) -> None:
+def test_of_two_sessions_the_newest_is_continued_and_the_other_named(home, state_folder):
     old = clicked(home / "old.bag.cocalib-session", changed_at_s=1e9)
     new = clicked(state_folder / "new.bag.cocalib-session", changed_at_s=1.1e9)
     found = find_session_folder([home / "drive.bag"], FACTS)
@@ -98,27 +96,27 @@ def test_of_two_sessions_the_newest_is_continued_and_the_other_named(home: Path,
     ],
     ids=["other stamps", "other size", "shorter"],
 )
-def test_a_session_of_another_recording_is_not_taken(home: Path, other: RecordingFacts) -> None:
+def test_a_session_of_another_recording_is_not_taken(home, other):
     clicked(home / "drive.bag.cocalib-session")
     found = find_session_folder([home / "other.bag"], other)
     assert (found.path, found.warnings) == (home / "other.bag.cocalib-session", ())
 
 
-def test_a_new_recording_of_an_old_name_finds_its_own_session_elsewhere(home: Path, state_folder: Path) -> None:
+def test_a_new_recording_of_an_old_name_finds_its_own_session_elsewhere(home, state_folder):
     other = replace(FACTS, image_times=IMAGE_TIMES + 10**12)
     clicked(home / "drive.bag.cocalib-session", other)
     mine = clicked(state_folder / "drive.bag.cocalib-session")
     assert find_session_folder([home / "drive.bag"], FACTS).path == mine
 
 
-def test_a_recording_that_has_grown_keeps_its_session(home: Path) -> None:
+def test_a_recording_that_has_grown_keeps_its_session(home):
     clicked(home / "drive.bag.cocalib-session", replace(FACTS, image_times=IMAGE_TIMES[:10]))
     assert find_session_folder([home / "renamed.bag"], FACTS).warnings
     kept(home / "drive.bag.cocalib-session", place(40), facts=FACTS)
     assert clicks_in(home / "drive.bag.cocalib-session", FACTS) == [3.0, 40.0]
 
 
-def test_a_recording_without_pictures_is_known_by_its_scans(home: Path) -> None:
+def test_a_recording_without_pictures_is_known_by_its_scans(home):
     facts = RecordingFacts("radar.bag", NO_TIMES, 0, 0, radar_times=RADAR_TIMES[:30])
     kept(home / "radar.bag.cocalib-session", facts=facts)
     grown = replace(facts, radar_times=RADAR_TIMES)
@@ -128,7 +126,7 @@ def test_a_recording_without_pictures_is_known_by_its_scans(home: Path) -> None:
         refused(home / "radar.bag.cocalib-session", r"'radar.bag' \(30 radar scans, no frames from", other)
 
 
-def test_stamps_that_count_from_zero_prove_nothing_and_the_session_is_only_named(home: Path) -> None:
+def test_stamps_that_count_from_zero_prove_nothing_and_the_session_is_only_named(home):
     video = replace(FACTS, image_times=33_333_333 * np.arange(50))
     folder = clicked(home / "drive.bag.cocalib-session", video)
     found = find_session_folder([home / "renamed.bag"], video)
@@ -138,9 +136,7 @@ def test_stamps_that_count_from_zero_prove_nothing_and_the_session_is_only_named
     assert f"--session {folder}" in warning.hint
 
 
-def test_a_session_that_cannot_be_written_is_named_with_the_way_to_its_clicks(
-    home: Path, state_folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_session_that_cannot_be_written_is_named_with_the_way_to_its_clicks(home, state_folder, monkeypatch):
     folder = clicked(home / "drive.bag.cocalib-session")
     monkeypatch.setattr("cocalib.session.file.finding.is_writable", lambda place: False)
     found = find_session_folder([home / "drive.bag"], FACTS)
@@ -152,9 +148,7 @@ def test_a_session_that_cannot_be_written_is_named_with_the_way_to_its_clicks(
 @pytest.mark.skipif(
     not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root can give a folder to another user"
 )
-def test_another_users_session_next_to_the_recording_is_named(
-    home: Path, state_folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_another_users_session_next_to_the_recording_is_named(home, state_folder, monkeypatch):
     folder = clicked(home / "drive.bag.cocalib-session")
     os.chown(folder, 12345, -1)
     monkeypatch.setattr("cocalib.session.file.finding.is_writable", lambda place: state_folder in (place, place.parent))
@@ -166,7 +160,7 @@ def test_another_users_session_next_to_the_recording_is_named(
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows needs a right to make links")
-def test_a_link_is_not_followed_while_searching(home: Path, tmp_path: Path) -> None:
+def test_a_link_is_not_followed_while_searching(home, tmp_path):
     real = clicked(tmp_path / "elsewhere")
     (home / "drive.bag.cocalib-session").symlink_to(real)
     assert find_session_folder([home / "renamed.bag"], FACTS).path == home / "renamed.bag.cocalib-session"
@@ -175,7 +169,7 @@ def test_a_link_is_not_followed_while_searching(home: Path, tmp_path: Path) -> N
         open_session_file(found.path, FACTS)
 
 
-def test_a_session_whose_journal_lost_its_first_line_is_found_by_its_copy(home: Path) -> None:
+def test_a_session_whose_journal_lost_its_first_line_is_found_by_its_copy(home):
     folder = clicked(home / "drive.bag.cocalib-session")
     (folder / "journal.jsonl").write_bytes(b"no\n")
     assert find_session_folder([home / "renamed.bag"], FACTS).path == folder

@@ -83,7 +83,7 @@ def ids(session: Session) -> list[str]:
     ],
     ids=["placed", "older journal", "guess marked", "guess moved", "moved", "excluded", "included", "imported"],
 )
-def test_a_frames_only_click_is_what_the_last_event_made_it(events, expected: ReflectorClick) -> None:
+def test_a_frames_only_click_is_what_the_last_event_made_it(events, expected):
     session = session_of(*events)
     assert session.clicks == (expected,)
     assert session.clicks[0].counts is not expected.excluded
@@ -91,26 +91,26 @@ def test_a_frames_only_click_is_what_the_last_event_made_it(events, expected: Re
     assert not session_of(GUESSED).clicks[0].counts
 
 
-def test_a_frame_may_have_several_marks_and_imported_clicks_replace_those_of_their_frames_only() -> None:
+def test_a_frame_may_have_several_marks_and_imported_clicks_replace_those_of_their_frames_only():
     session = session_of(place(3), ClickPlaced(TIMES[3], (99.5, 88.25), "clicked"), place(4))
     assert [(click.id, click.u_px) for click in session.clicks] == [("c1", 3.0), ("c2", 99.5), ("c3", 4.0)]
     assert ids(apply(session, imported(4, "p1"), FACTS)) == ["c1", "c2", "p1"]
 
 
-def test_a_snapped_mark_has_its_own_sigma_and_loses_it_when_it_is_moved() -> None:
+def test_a_snapped_mark_has_its_own_sigma_and_loses_it_when_it_is_moved():
     session = session_of(place(3), ClickMoved("c1", (14.0, 21.0), "snapped", 0.3))
     assert (session.clicks[0].mark, session.clicks[0].sigma_px) == ("snapped", 0.3)
     assert apply(session, ClickMoved("c1", (15.0, 21.0)), FACTS).clicks[0].sigma_px is None
 
 
-def test_a_chosen_return_belongs_to_the_click_until_it_is_taken_back() -> None:
+def test_a_chosen_return_belongs_to_the_click_until_it_is_taken_back():
     chosen = ChosenReturn((20.0, -0.9, 0.1), TIMES[3], "/radar")
     session = session_of(place(3), ReturnChosen("c1", chosen))
     assert (session.clicks[0].chosen, session.revision) == (chosen, 2)
     assert apply(session, ReturnChosen("c1", None), FACTS).clicks == (PLACED,)
 
 
-def test_a_dismissed_placement_comes_back_by_undo_and_leaves_the_answer_valid() -> None:
+def test_a_dismissed_placement_comes_back_by_undo_and_leaves_the_answer_valid():
     dismissed = PlacementDismissed(TIMES[3], (5.0, 0.0, 0.0))
     history = history_of(place(1), Solved(1, NO_ANSWER), dismissed)
     assert history.present.dismissed == (DismissedPlacement(TIMES[3], (5.0, 0.0, 0.0)),)
@@ -120,7 +120,7 @@ def test_a_dismissed_placement_comes_back_by_undo_and_leaves_the_answer_valid() 
     assert apply(present, PlacementDismissed(TIMES[3], (5.0, 0.0, 0.0), dismissed=False), FACTS) is present
 
 
-def test_acknowledged_warnings_stay_so_when_clicks_are_undone() -> None:
+def test_acknowledged_warnings_stay_so_when_clicks_are_undone():
     present = history_of(place(1), WarningsAcknowledged(("few-pairs",)), Undo()).present
     assert present.acknowledged == ("few-pairs",)
     assert apply(present, WarningsAcknowledged(("few-pairs",), acknowledged=False), FACTS).acknowledged == ()
@@ -136,16 +136,16 @@ def test_acknowledged_warnings_stay_so_when_clicks_are_undone() -> None:
     ],
     ids=["removed", "undone", "imported", "imported a second time"],
 )
-def test_an_id_is_not_given_again(steps, expected: list[str]) -> None:
+def test_an_id_is_not_given_again(steps, expected):
     assert ids(history_of(*steps).present) == expected
 
 
-def test_the_id_of_a_box_that_was_undone_is_not_given_again() -> None:
+def test_the_id_of_a_box_that_was_undone_is_not_given_again():
     drawn = BoxDrawn(TIMES[3], (1.0, 1.0, 20.0, 30.0), "car")
     assert [box.id for box in history_of(drawn, Undo(), drawn).present.boxes] == ["b2"]
 
 
-def test_clearing_removes_the_clicks_and_the_answer_and_keeps_the_options() -> None:
+def test_clearing_removes_the_clicks_and_the_answer_and_keeps_the_options():
     options = CalibrationOptions(method="paper")
     cleared = session_of(place(3), OptionsChanged.of(options), Solved(2, NO_ANSWER), Cleared())
     assert (cleared.clicks, cleared.outcome, cleared.options) == ((), None, options)
@@ -165,7 +165,7 @@ def test_clearing_removes_the_clicks_and_the_answer_and_keeps_the_options() -> N
     ],
     ids=lambda event: type(event).__name__,
 )
-def test_an_event_that_changes_nothing_returns_the_same_objects(event) -> None:
+def test_an_event_that_changes_nothing_returns_the_same_objects(event):
     history = history_of(IntrinsicsChosen(CHOSEN), place(3))
     assert advance(history, event, FACTS) is history
     assert isinstance(event, Redo) or apply(history.present, event, FACTS) is history.present
@@ -193,7 +193,7 @@ def test_an_event_that_changes_nothing_returns_the_same_objects(event) -> None:
         (IntrinsicsChosen(replaced(CHOSEN, distortion=(1.0,))), "distortion coefficients"),
     ],
 )
-def test_an_event_that_does_not_fit_is_refused_with_a_clear_error(event, words: str) -> None:
+def test_an_event_that_does_not_fit_is_refused_with_a_clear_error(event, words):
     with pytest.raises(EventError) as refused:
         apply(session_of(place(3)), event, FACTS)
     assert words in str(refused.value)
@@ -201,31 +201,31 @@ def test_an_event_that_does_not_fit_is_refused_with_a_clear_error(event, words: 
 
 
 @pytest.mark.parametrize(("u_px", "v_px"), [(-0.5, -0.5), (639.5, 479.5)])
-def test_the_frame_reaches_half_a_pixel_beyond_its_outermost_pixel_centres(u_px: float, v_px: float) -> None:
+def test_the_frame_reaches_half_a_pixel_beyond_its_outermost_pixel_centres(u_px, v_px):
     assert session_of(ClickPlaced(TIMES[0], (u_px, v_px), "clicked")).clicks[0].u_px == u_px
 
 
-def test_options_out_of_range_are_refused() -> None:
+def test_options_out_of_range_are_refused():
     wrong = CalibrationOptions(noise=NoiseOptions(sigma_px=float("nan")))
     with pytest.raises(OptionError, match=r"noise\.sigma_px"):
         session_of(place(3), OptionsChanged.of(wrong))
 
 
-def test_edited_options_change_only_what_they_name() -> None:
+def test_edited_options_change_only_what_they_name():
     event = OptionsChanged({"noise": {"sigma_px": 3.5}})
     session = session_of(place(3), event)
     assert session.options == CalibrationOptions(noise=NoiseOptions(sigma_px=3.5))
     assert settled(event, session_of(place(3))) == OptionsChanged.of(session.options)
 
 
-def test_an_answer_stays_shown_while_a_newer_one_is_computed() -> None:
+def test_an_answer_stays_shown_while_a_newer_one_is_computed():
     session = session_of(place(3), Solved(1, NO_ANSWER))
     assert (session.outcome, session.is_solved, session.needs_solving) == (NO_ANSWER, True, False)
     session = apply(session, ClickMoved("c1", (1.0, 1.0)), FACTS)
     assert (session.outcome, session.is_solved, session.needs_solving) == (NO_ANSWER, False, True)
 
 
-def test_undo_reverts_the_last_change_and_redo_repeats_it_until_another_change() -> None:
+def test_undo_reverts_the_last_change_and_redo_repeats_it_until_another_change():
     start = history_of(place(1), ClickMoved("c1", (2.0, 2.0)))
     undone = advance(start, Undo(), FACTS)
     assert undone.present.clicks[0].u_px == 1.0
@@ -236,14 +236,14 @@ def test_undo_reverts_the_last_change_and_redo_repeats_it_until_another_change()
     assert advance(History(), Undo(), FACTS) == History()
 
 
-def test_an_answer_is_no_step_and_undo_brings_the_old_one_back_without_asking_again() -> None:
+def test_an_answer_is_no_step_and_undo_brings_the_old_one_back_without_asking_again():
     history = history_of(place(1), Solved(1, NO_ANSWER))
     assert (len(history.past), history.present.outcome) == (1, NO_ANSWER)
     present = history_of(place(1), Solved(1, NO_ANSWER), ClickMoved("c1", (2.0, 2.0)), Undo()).present
     assert (present.outcome, present.is_solved) == (NO_ANSWER, True)
 
 
-def test_chosen_intrinsics_are_solved_with_undone_and_redone_and_have_all_numbers_of_their_camera() -> None:
+def test_chosen_intrinsics_are_solved_with_undone_and_redone_and_have_all_numbers_of_their_camera():
     chosen = advance(History(), IntrinsicsChosen(CHOSEN), FACTS)
     assert (chosen.present.intrinsics, chosen.present.revision) == (CHOSEN, 1)
     undone = advance(chosen, Undo(), FACTS)
@@ -255,7 +255,7 @@ def test_chosen_intrinsics_are_solved_with_undone_and_redone_and_have_all_number
     assert ChosenIntrinsics.of(camera, CHOSEN.about) == CHOSEN
 
 
-def test_a_frame_is_found_by_its_exact_stamp_only() -> None:
+def test_a_frame_is_found_by_its_exact_stamp_only():
     assert FACTS.frame_at(TIMES[49]) == 49
     assert FACTS.frame_at(TimeNs(START_NS + 1)) is None
     assert RecordingFacts("empty", np.zeros(0, dtype=np.int64), 1, 1).frame_at(TimeNs(0)) is None

@@ -5,7 +5,6 @@ import os
 import re
 import shutil
 import stat
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -39,19 +38,19 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> Made:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "with_other"), [(JOURNAL, True), (JOURNAL, False), (COPY, True)])
-def test_no_single_bit_changes_a_session_silently(short: Made, folder: Path, name: str, with_other: bool) -> None:
+def test_no_single_bit_changes_a_session_silently(short, folder, name, with_other):
     counts = every_bit(short, folder, name=name, with_other=with_other)
     assert counts["silently changed"] == counts["continued"] == 0
     assert counts.total() == 8 * len(short.journal)
 
 
-def test_a_kill_at_any_byte_of_a_step_loses_nothing_that_was_confirmed(tmp_path: Path, folder: Path) -> None:
+def test_a_kill_at_any_byte_of_a_step_loses_nothing_that_was_confirmed(tmp_path, folder):
     counts = every_kill(made_session(12, tmp_path / "made"), folder)
     assert counts == {"continued": counts.total()}
     assert counts.total() > 2000
 
 
-def test_a_journal_cut_anywhere_is_told_and_a_copy_cut_anywhere_changes_nothing(short: Made, folder: Path) -> None:
+def test_a_journal_cut_anywhere_is_told_and_a_copy_cut_anywhere_changes_nothing(short, folder):
     counts = every_length(short, folder, name=JOURNAL)
     assert counts == {"continued and told": counts.total()}
     counts = every_length(short, folder, name=COPY)
@@ -70,9 +69,7 @@ def test_a_journal_cut_anywhere_is_told_and_a_copy_cut_anywhere_changes_nothing(
     ids=["removed", "exchanged", "repeated", "empty line", "inserted"],
 )
 @pytest.mark.parametrize("with_copy", [True, False])
-def test_lines_that_were_moved_are_noticed(
-    folder: Path, change: Callable[[list[bytes]], list[bytes]], with_copy: bool
-) -> None:
+def test_lines_that_were_moved_are_noticed(folder, change, with_copy):
     kept(folder, *map(place, range(1, 6)))
     (folder / JOURNAL).write_bytes(b"".join(line + b"\n" for line in change(lines_of(folder))))
     if not with_copy:
@@ -88,8 +85,8 @@ def test_lines_that_were_moved_are_noticed(
 @pytest.mark.parametrize("name", ["lock", JOURNAL, COPY])
 @pytest.mark.parametrize("kind", ["link", "link in an empty folder", "pipe", "folder", "hard link", "dangling link"])
 def test_what_is_no_plain_file_is_refused_without_waiting_and_what_it_leads_to_is_untouched(
-    tmp_path: Path, folder: Path, name: str, kind: str
-) -> None:
+    tmp_path, folder, name, kind
+):
     other = tmp_path / "other"
     if kind == "link in an empty folder":
         folder.mkdir()
@@ -116,7 +113,7 @@ def test_what_is_no_plain_file_is_refused_without_waiting_and_what_it_leads_to_i
 
 
 @POSIX
-def test_a_session_folder_that_is_a_link_is_refused(tmp_path: Path, folder: Path) -> None:
+def test_a_session_folder_that_is_a_link_is_refused(tmp_path, folder):
     kept(tmp_path / "real", place(1))
     before = files(tmp_path / "real")
     folder.symlink_to(tmp_path / "real")
@@ -133,16 +130,14 @@ def test_a_session_folder_that_is_a_link_is_refused(tmp_path: Path, folder: Path
 @POSIX
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root can give a file to another user")
 @pytest.mark.parametrize("name", ["", "lock", JOURNAL, COPY])
-def test_what_belongs_to_another_user_is_refused(folder: Path, name: str) -> None:
+def test_what_belongs_to_another_user_is_refused(folder, name):
     kept(folder, place(1))
     os.chown(folder / name, 12345, -1)
     refused(folder, r"belongs to user 12345, not to you \(user 0\)")
 
 
 @POSIX
-def test_a_link_put_in_place_of_the_copy_while_the_session_is_open_is_not_followed(
-    tmp_path: Path, folder: Path
-) -> None:
+def test_a_link_put_in_place_of_the_copy_while_the_session_is_open_is_not_followed(tmp_path, folder):
     target = tmp_path / "target"
     session_file = open_session_file(folder, FACTS)
     history = keep(session_file, *map(place, range(10)))
@@ -155,7 +150,7 @@ def test_a_link_put_in_place_of_the_copy_while_the_session_is_open_is_not_follow
 
 
 @pytest.mark.parametrize("change", ["cut", "longer", "replaced"])
-def test_a_step_is_refused_when_another_program_changed_the_journal(folder: Path, change: str) -> None:
+def test_a_step_is_refused_when_another_program_changed_the_journal(folder, change):
     session_file = open_session_file(folder, FACTS)
     history = keep(session_file, *map(place, (1, 2, 3)))
     journal = folder / JOURNAL
@@ -176,7 +171,7 @@ def test_a_step_is_refused_when_another_program_changed_the_journal(folder: Path
     assert clicks_in(folder) == [1.0, 2.0, 3.0]
 
 
-def test_a_journal_changed_in_place_is_noticed_at_the_end(folder: Path) -> None:
+def test_a_journal_changed_in_place_is_noticed_at_the_end(folder):
     session_file = open_session_file(folder, FACTS)
     keep(session_file, *map(place, (1, 2, 3)))
     with (folder / JOURNAL).open("r+b") as file:
@@ -191,8 +186,8 @@ def test_a_journal_changed_in_place_is_noticed_at_the_end(folder: Path) -> None:
 @POSIX
 @pytest.mark.parametrize("how", ["deleted", "moved", "replaced"])
 def test_a_folder_that_went_away_is_written_to_the_users_folder_and_found_again(
-    tmp_path: Path, folder: Path, own_state_folder: Path, how: str
-) -> None:
+    tmp_path, folder, own_state_folder, how
+):
     session_file = open_session_file(folder, FACTS)
     history = keep(session_file, *map(place, (1, 2, 3)))
     if how == "deleted":
@@ -225,9 +220,7 @@ FULL = OSError(errno.ENOSPC, "No space left on device")
 
 
 @POSIX
-def test_without_any_place_to_write_the_end_says_that_the_clicks_are_lost(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_any_place_to_write_the_end_says_that_the_clicks_are_lost(folder, monkeypatch):
     session_file = open_session_file(folder, FACTS)
     keep(session_file, place(1), place(2))
     shutil.rmtree(folder)
@@ -238,7 +231,7 @@ def test_without_any_place_to_write_the_end_says_that_the_clicks_are_lost(
     assert "No space left on device" in left.note
 
 
-def test_a_full_disk_at_the_end_costs_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_at_the_end_costs_nothing(folder, monkeypatch):
     session_file = open_session_file(folder, FACTS)
     keep(session_file, place(1), place(2))
     with monkeypatch.context() as patch:
@@ -248,7 +241,7 @@ def test_a_full_disk_at_the_end_costs_nothing(folder: Path, monkeypatch: pytest.
     assert clicks_in(folder) == [1.0, 2.0]
 
 
-def test_a_disk_that_cannot_even_truncate_stops_the_session(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_disk_that_cannot_even_truncate_stops_the_session(folder, monkeypatch):
     session_file = open_session_file(folder, FACTS)
     history = keep(session_file, place(1))
     with monkeypatch.context() as patch:
@@ -267,9 +260,7 @@ DEEP = b"[" * 100_000 + b"]" * 100_000
     "value", [DEEP, b'"\\ud800"', b"1e308", b"-1", b"NaN", b"9" * 400, b"null", b"{}"], ids=lambda value: value[:9]
 )
 @pytest.mark.parametrize("key", [b'"options":', b'"name":', b'"steps":', b'"pixel_px":', b'"recording":', b'"sec":'])
-def test_odd_content_with_right_checksums_is_refused_or_read_but_never_crashes(
-    folder: Path, key: bytes, value: bytes
-) -> None:
+def test_odd_content_with_right_checksums_is_refused_or_read_but_never_crashes(folder, key, value):
     kept(folder, place(1), OptionsChanged.of(CalibrationOptions(method="paper")))
     with_value = re.compile(re.escape(key) + rb"[^,\]}]*")
     lines, previous = [], ""
@@ -292,9 +283,7 @@ class Killed(BaseException):
 
 @pytest.mark.parametrize("survived", range(4))
 @pytest.mark.parametrize("kind", ["cut", "session-1"])
-def test_a_kill_between_the_writes_of_a_repair_loses_nothing(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, project_root: Path, kind: str, survived: int
-) -> None:
+def test_a_kill_between_the_writes_of_a_repair_loses_nothing(folder, monkeypatch, project_root, kind, survived):
     if kind == "cut":
         kept(folder, *map(place, (1, 2, 3)))
         (folder / JOURNAL).write_bytes(lines_of(folder)[0] + b"\n")
@@ -318,7 +307,7 @@ def test_a_kill_between_the_writes_of_a_repair_loses_nothing(
 
 
 @POSIX
-def test_session_files_are_as_open_to_others_as_the_user_wants(folder: Path) -> None:
+def test_session_files_are_as_open_to_others_as_the_user_wants(folder):
     before = os.umask(0o077)
     try:
         kept(folder, *map(place, range(10)))
@@ -332,15 +321,13 @@ def test_session_files_are_as_open_to_others_as_the_user_wants(folder: Path) -> 
     ("content", "why"),
     [(b"", "the file is empty"), (b"\0" * 5000, "it holds only zeros"), (b"[" * 5000, "it has no end")],
 )
-def test_a_journal_without_a_line_is_described_as_it_is(tmp_path: Path, content: bytes, why: str) -> None:
+def test_a_journal_without_a_line_is_described_as_it_is(tmp_path, content, why):
     (tmp_path / JOURNAL).write_bytes(content)
     refused(tmp_path, re.escape(f"line 1 is damaged ({why})"))
 
 
 @POSIX
-def test_a_journal_that_can_no_longer_be_written_is_not_called_closed(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_journal_that_can_no_longer_be_written_is_not_called_closed(folder, monkeypatch):
     session_file = open_session_file(folder, FACTS)
     history = keep(session_file, place(1), place(2))
     with monkeypatch.context() as patch:

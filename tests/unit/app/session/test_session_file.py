@@ -89,21 +89,21 @@ STEPS = (
 )
 
 
-def test_answers_are_not_journalled(tmp_path: Path) -> None:
+def test_answers_are_not_journalled(tmp_path):
     session_file = open_session_file(tmp_path, FACTS)
     with pytest.raises(TypeError, match="Solved is not journalled"):
         session_file.append(Solved(1, Unsolvable("a", "b", "c")), History())
     session_file.close()
 
 
-def test_a_session_comes_back_bit_for_bit_with_everything_that_can_be_undone_and_redone(tmp_path: Path) -> None:
+def test_a_session_comes_back_bit_for_bit_with_everything_that_can_be_undone_and_redone(tmp_path):
     history = kept(tmp_path / "s", *STEPS)
     found = restored(tmp_path / "s")
     assert (found.history, found.steps, found.note) == (history, len(STEPS), "")
     assert found.history.present.needs_solving
 
 
-def test_a_session_continues_where_it_stopped_and_its_journal_is_only_ever_appended_to(tmp_path: Path) -> None:
+def test_a_session_continues_where_it_stopped_and_its_journal_is_only_ever_appended_to(tmp_path):
     kept(tmp_path, place(1))
     before = files(tmp_path)[JOURNAL]
     kept(tmp_path, place(2))
@@ -114,9 +114,7 @@ def test_a_session_continues_where_it_stopped_and_its_journal_is_only_ever_appen
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
 @pytest.mark.parametrize("confirmed", [0, 9])
-def test_a_process_killed_outright_loses_nothing_that_was_confirmed(
-    tmp_path: Path, project_root: Path, confirmed: int
-) -> None:
+def test_a_process_killed_outright_loses_nothing_that_was_confirmed(tmp_path, project_root, confirmed):
     script = textwrap.dedent(
         f"""
         import os
@@ -153,7 +151,7 @@ def test_a_process_killed_outright_loses_nothing_that_was_confirmed(
     assert files(tmp_path)[JOURNAL] == files(tmp_path)[COPY]
 
 
-def test_a_half_written_last_line_is_dropped_and_reported(tmp_path: Path) -> None:
+def test_a_half_written_last_line_is_dropped_and_reported(tmp_path):
     history = kept(tmp_path, *STEPS[:3])
     whole = files(tmp_path)[JOURNAL]
     (tmp_path / JOURNAL).write_bytes(whole + b'{"n":4,"step":{"type":"cle')
@@ -178,9 +176,7 @@ def test_a_half_written_last_line_is_dropped_and_reported(tmp_path: Path) -> Non
         (0, b"", "line 1 is damaged"),
     ],
 )
-def test_a_damaged_journal_is_refused_without_its_copy_and_continued_with_it(
-    tmp_path: Path, line: int, text: bytes, words: str
-) -> None:
+def test_a_damaged_journal_is_refused_without_its_copy_and_continued_with_it(tmp_path, line, text, words):
     history = kept(tmp_path, *STEPS[:4])
     whole = files(tmp_path)[COPY]
     damage(tmp_path, line, text)
@@ -205,7 +201,7 @@ def continued(folder: Path, history: History) -> str:
     return warning.message
 
 
-def test_a_journal_that_is_cut_or_missing_and_a_copy_that_is_damaged_are_told(tmp_path: Path) -> None:
+def test_a_journal_that_is_cut_or_missing_and_a_copy_that_is_damaged_are_told(tmp_path):
     history = kept(tmp_path / "cut", *map(place, range(20)))
     (tmp_path / "cut" / JOURNAL).write_bytes(lines_of(tmp_path / "cut")[0] + b"\n")
     assert "the journal holds 0 steps, its copy 20" in continued(tmp_path / "cut", history)
@@ -222,7 +218,7 @@ def test_a_journal_that_is_cut_or_missing_and_a_copy_that_is_damaged_are_told(tm
     refused(tmp_path / "copy", "nothing of the session can be proven: line 1 is damaged")
 
 
-def test_what_one_file_has_lost_comes_from_the_other(tmp_path: Path) -> None:
+def test_what_one_file_has_lost_comes_from_the_other(tmp_path):
     history = kept(tmp_path, *STEPS[:6])
     damage(tmp_path, 2, b"")
     damage(tmp_path, 5, b"", COPY)
@@ -231,7 +227,7 @@ def test_what_one_file_has_lost_comes_from_the_other(tmp_path: Path) -> None:
     assert "in the copy, line 6 is damaged" in message
 
 
-def test_a_damaged_line_that_no_file_has_is_refused(tmp_path: Path) -> None:
+def test_a_damaged_line_that_no_file_has_is_refused(tmp_path):
     kept(tmp_path, *STEPS[:2])
     copy = files(tmp_path)[COPY]
     kept(tmp_path, *STEPS[2:5])
@@ -240,7 +236,7 @@ def test_a_damaged_line_that_no_file_has_is_refused(tmp_path: Path) -> None:
     refused(tmp_path, r"line 5 is damaged .*cocalib session repair")
 
 
-def test_a_copy_that_is_behind_is_brought_up_to_date_without_a_word(tmp_path: Path) -> None:
+def test_a_copy_that_is_behind_is_brought_up_to_date_without_a_word(tmp_path):
     history = kept(tmp_path, *STEPS[:5])
     whole = files(tmp_path)[JOURNAL]
     for length in (0, *range(whole.index(b"\n") + 1, len(whole), 97)):  # a copy without a first line is damaged
@@ -268,13 +264,13 @@ def reseal(folder: Path, line: int, content: bytes) -> None:
         (b'{"n":2,"step":{"type":"juggled"}}', "Invalid value 'juggled'"),
     ],
 )
-def test_a_step_that_this_version_does_not_understand_is_refused(tmp_path: Path, content: bytes, words: str) -> None:
+def test_a_step_that_this_version_does_not_understand_is_refused(tmp_path, content, words):
     kept(tmp_path, *STEPS[:2])
     reseal(tmp_path, 2, content)
     refused(tmp_path, words)
 
 
-def test_a_journal_of_another_version_is_refused_with_that_version_named(tmp_path: Path) -> None:
+def test_a_journal_of_another_version_is_refused_with_that_version_named(tmp_path):
     kept(tmp_path)
     head = taken_apart(lines_of(tmp_path)[0]).content
     reseal(tmp_path, 0, head.replace(b"cocalib/session-2", b"cocalib/session-9"))
@@ -282,7 +278,7 @@ def test_a_journal_of_another_version_is_refused_with_that_version_named(tmp_pat
 
 
 @pytest.mark.parametrize("fork", [False, True])
-def test_a_copy_of_another_journal_is_refused_until_a_person_decides(tmp_path: Path, fork: bool) -> None:
+def test_a_copy_of_another_journal_is_refused_until_a_person_decides(tmp_path, fork):
     kept(tmp_path / "a", *STEPS[:2])
     if fork:
         shutil.copytree(tmp_path / "a", tmp_path / "b")
@@ -311,7 +307,7 @@ def golden(project_root: Path) -> Path:
 
 
 @pytest.mark.parametrize("case", WITH_SNAPSHOT)
-def test_a_session_of_a_version_with_snapshots_is_opened(tmp_path: Path, golden: Path, case: str) -> None:
+def test_a_session_of_a_version_with_snapshots_is_opened(tmp_path, golden, case):
     steps, note, warning = WITH_SNAPSHOT[case]
     shutil.copytree(golden / "session-2" / case, tmp_path, dirs_exist_ok=True)
     before = files(tmp_path)
@@ -332,16 +328,12 @@ def test_a_session_of_a_version_with_snapshots_is_opened(tmp_path: Path, golden:
     assert (again.history, again.warnings) == (found.history, ())
 
 
-def test_a_session_of_a_version_with_snapshots_that_lost_a_confirmed_step_is_refused(
-    tmp_path: Path, golden: Path
-) -> None:
+def test_a_session_of_a_version_with_snapshots_that_lost_a_confirmed_step_is_refused(tmp_path, golden):
     shutil.copytree(golden / "session-2" / "damaged-at-the-end", tmp_path, dirs_exist_ok=True)
     refused(tmp_path, "line 34 is damaged")
 
 
-def test_a_session_of_the_earlier_version_is_opened_and_written_again_with_checksums(
-    tmp_path: Path, golden: Path
-) -> None:
+def test_a_session_of_the_earlier_version_is_opened_and_written_again_with_checksums(tmp_path, golden):
     shutil.copytree(golden / "session-1", tmp_path, dirs_exist_ok=True)
     before = files(tmp_path)
     history = History()
@@ -354,9 +346,7 @@ def test_a_session_of_the_earlier_version_is_opened_and_written_again_with_check
     assert restored(tmp_path).history == history
 
 
-def test_a_session_of_the_earlier_version_cut_to_its_first_line_gives_the_clicks_of_the_snapshot(
-    tmp_path: Path, golden: Path
-) -> None:
+def test_a_session_of_the_earlier_version_cut_to_its_first_line_gives_the_clicks_of_the_snapshot(tmp_path, golden):
     shutil.copytree(golden / "session-1", tmp_path, dirs_exist_ok=True)
     (tmp_path / JOURNAL).write_bytes(lines_of(tmp_path)[0] + b"\n")
     found = restored(tmp_path)
@@ -364,7 +354,7 @@ def test_a_session_of_the_earlier_version_cut_to_its_first_line_gives_the_clicks
     assert found.warnings[0].code == "session-damaged"
 
 
-def test_the_copy_has_every_step_when_it_is_confirmed(tmp_path: Path) -> None:
+def test_the_copy_has_every_step_when_it_is_confirmed(tmp_path):
     session_file = open_session_file(tmp_path, FACTS)
     history = History()
     for step in map(place, range(14)):
@@ -383,13 +373,13 @@ def test_the_copy_has_every_step_when_it_is_confirmed(tmp_path: Path) -> None:
         RecordingFacts("other", np.zeros(0, dtype=np.int64), 640, 480),
     ],
 )
-def test_a_session_of_another_recording_is_refused_with_a_clear_error(tmp_path: Path, other: RecordingFacts) -> None:
+def test_a_session_of_another_recording_is_refused_with_a_clear_error(tmp_path, other):
     kept(tmp_path, STEPS[0])
     words = r"the session belongs to 'drive' \(50 frames of 640 x 480 px from 1700000000\.123456789 s\)"
     refused(tmp_path, words, other)
 
 
-def test_radar_axes_that_changed_since_last_time_give_a_warning_and_harm_no_click(tmp_path: Path) -> None:
+def test_radar_axes_that_changed_since_last_time_give_a_warning_and_harm_no_click(tmp_path):
     kept(tmp_path / "without clicks")
     kept(tmp_path / "s", STEPS[0])
     turned = replace(FACTS, radar_axes="forward,right,up")
@@ -405,7 +395,7 @@ def test_radar_axes_that_changed_since_last_time_give_a_warning_and_harm_no_clic
     assert "start again with --radar-axes forward,right,up" in restored(tmp_path / "s").warnings[0].hint
 
 
-def test_a_session_that_is_open_elsewhere_is_refused_with_the_process_named_and_not_set_aside(tmp_path: Path) -> None:
+def test_a_session_that_is_open_elsewhere_is_refused_with_the_process_named_and_not_set_aside(tmp_path):
     session_file = open_session_file(tmp_path / "s", FACTS)
     refused(tmp_path / "s", rf"is already open in process {os.getpid()} on ")
     with pytest.raises(SessionFileError, match="is already open"):
@@ -414,7 +404,7 @@ def test_a_session_that_is_open_elsewhere_is_refused_with_the_process_named_and_
     assert clicks_in(tmp_path / "s") == []
 
 
-def test_a_refused_session_is_not_left_locked(tmp_path: Path) -> None:
+def test_a_refused_session_is_not_left_locked(tmp_path):
     kept(tmp_path, STEPS[0])
     good = files(tmp_path)[JOURNAL]
     (tmp_path / JOURNAL).write_bytes(b"no\n")
@@ -424,9 +414,7 @@ def test_a_refused_session_is_not_left_locked(tmp_path: Path) -> None:
     restored(tmp_path)
 
 
-def test_a_full_disk_refuses_the_step_and_leaves_the_journal_as_it_was(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_full_disk_refuses_the_step_and_leaves_the_journal_as_it_was(tmp_path, monkeypatch):
     session_file = open_session_file(tmp_path, FACTS)
     history = keep(session_file, STEPS[0])
     before = files(tmp_path)[JOURNAL]
@@ -448,7 +436,7 @@ def test_a_full_disk_refuses_the_step_and_leaves_the_journal_as_it_was(
     assert restored(tmp_path).history == history
 
 
-def test_a_closed_session_writes_into_no_other_file(tmp_path: Path) -> None:
+def test_a_closed_session_writes_into_no_other_file(tmp_path):
     session_file = open_session_file(tmp_path / "s", FACTS)
     session_file.close()
     with (tmp_path / "other").open("w+b") as other:
@@ -457,12 +445,12 @@ def test_a_closed_session_writes_into_no_other_file(tmp_path: Path) -> None:
         assert other.read() == b""
 
 
-def test_a_path_that_is_no_folder_is_refused_with_a_clear_error(tmp_path: Path) -> None:
+def test_a_path_that_is_no_folder_is_refused_with_a_clear_error(tmp_path):
     (tmp_path / "file").write_text("")
     refused(tmp_path / "file" / "s", r"cannot be created: .*; give another --session folder")
 
 
-def test_a_session_set_aside_is_renamed_with_the_next_free_number(tmp_path: Path) -> None:
+def test_a_session_set_aside_is_renamed_with_the_next_free_number(tmp_path):
     folder = tmp_path / "s"
     assert set_aside(folder) is None
     for number in (1, 2):
@@ -472,9 +460,7 @@ def test_a_session_set_aside_is_renamed_with_the_next_free_number(tmp_path: Path
     assert not folder.exists()
 
 
-def test_a_session_is_next_to_its_recording_or_in_the_state_folder(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_session_is_next_to_its_recording_or_in_the_state_folder(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "platform", "linux")
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     recording = tmp_path / "drive.bag"
@@ -498,9 +484,7 @@ def test_a_session_is_next_to_its_recording_or_in_the_state_folder(
         ("win32", "LOCALAPPDATA", "", "home/AppData/Local/cocalib"),
     ],
 )
-def test_the_state_folder_is_the_one_of_the_system(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, platform: str, variable: str, value: str, start: str
-) -> None:
+def test_the_state_folder_is_the_one_of_the_system(tmp_path, monkeypatch, platform, variable, value, start):
     monkeypatch.setattr(sys, "platform", platform)
     monkeypatch.setattr(Path, "home", lambda: tmp_path / "home")
     monkeypatch.setenv(variable, value)

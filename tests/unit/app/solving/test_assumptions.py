@@ -43,14 +43,12 @@ def solved(workspace: Workspace, clicks: str) -> Calibration:
     return workspace.session.outcome
 
 
-def test_a_deeply_nested_line_of_a_journal_names_no_columns(tmp_path: Path) -> None:
+def test_a_deeply_nested_line_of_a_journal_names_no_columns(tmp_path):
     (tmp_path / "journal.jsonl").write_text('{"step":{"type":"x","a":' + "[" * 100_000 + "\n")
     assert remembered_map(tmp_path) == ()
 
 
-def test_an_unconfirmed_assumption_is_in_the_view_the_status_and_the_file(
-    recording: Recording, project_root: Path, tmp_path: Path
-) -> None:
+def test_an_unconfirmed_assumption_is_in_the_view_the_status_and_the_file(recording, project_root, tmp_path):
     workspace = workspace_of(recording, tmp_path)
     clicks = (project_root / "sample_data" / "rooftop" / "clicks.json").read_text(encoding="utf-8")
     calibration = solved(workspace, clicks)
@@ -79,9 +77,7 @@ def test_an_unconfirmed_assumption_is_in_the_view_the_status_and_the_file(
     workspace.close()
 
 
-def test_the_confirmation_is_remembered_and_covers_only_what_was_confirmed(
-    recording: Recording, tmp_path: Path
-) -> None:
+def test_the_confirmation_is_remembered_and_covers_only_what_was_confirmed(recording, tmp_path):
     workspace = workspace_of(recording, tmp_path)
     first, second = (row.text for row in workspace.view.assumptions)
     workspace.dispatch(AssumptionsConfirmed((first,)))
@@ -95,7 +91,7 @@ def test_the_confirmation_is_remembered_and_covers_only_what_was_confirmed(
             (tmp_path / path).unlink()
 
 
-def test_the_map_is_remembered_for_the_next_opening(paths: tuple[Path, Path], tmp_path: Path) -> None:
+def test_the_map_is_remembered_for_the_next_opening(paths, tmp_path):
     assert remembered_map(tmp_path) == ()
     with open_recording(paths, RecordingOptions(map=STATED)) as recording:
         assert recording.assumptions == ()
@@ -109,14 +105,14 @@ def test_the_map_is_remembered_for_the_next_opening(paths: tuple[Path, Path], tm
         assert recording.column_map == STATED
 
 
-def test_a_session_of_a_damaged_journal_remembers_nothing_and_raises_nothing(tmp_path: Path) -> None:
+def test_a_session_of_a_damaged_journal_remembers_nothing_and_raises_nothing(tmp_path):
     (tmp_path / "journal.jsonl").write_bytes(
         b'\xff\xfe\n{"step": 3}\n[]\n{"step": {"type": "columns_mapped", "column_map": 3}}\n'
     )
     assert remembered_map(tmp_path) == ()
 
 
-def test_a_journal_that_is_a_pipe_or_a_link_is_not_opened_for_its_map(tmp_path: Path) -> None:
+def test_a_journal_that_is_a_pipe_or_a_link_is_not_opened_for_its_map(tmp_path):
     os.mkfifo(tmp_path / "journal.jsonl")
     assert remembered_map(tmp_path) == ()
     (tmp_path / "other").mkdir()
@@ -126,6 +122,6 @@ def test_a_journal_that_is_a_pipe_or_a_link_is_not_opened_for_its_map(tmp_path: 
     assert remembered_map(tmp_path / "other") == ()
 
 
-def test_facts_without_assumptions_have_none_unconfirmed(recording: Recording) -> None:
+def test_facts_without_assumptions_have_none_unconfirmed(recording):
     facts = RecordingFacts("bare", recording.image_times, 640, 480)
     assert facts.unconfirmed(Session()) == ()

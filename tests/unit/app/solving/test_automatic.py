@@ -39,18 +39,17 @@ def one_proposal() -> Proposals:
     return Proposals((Proposal(placement, TimeNs(9), candidate.pixel_px, 0.4, 0.99, (candidate,)),))
 
 
-def test_a_persons_click_stays_and_an_automatic_one_of_the_same_id_is_renamed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_persons_click_stays_and_an_automatic_one_of_the_same_id_is_renamed(monkeypatch):
     found(monkeypatch, ((), one_proposal()), AutomaticClicks((PLACED,), 0.97, "it fits"))
     placed = place_clicks(RECORDING, CAMERA, OPTIONS, confirmed=[PERSON])
     assert not isinstance(placed, Unsolvable)
     assert placed.clicks[0] == PERSON
-    assert placed.unconfirmed is not None
     assert placed.unconfirmed.ids == ("automatic-01-auto",)
     assert placed.unconfirmed.confidence == 0.97
     assert (placed.clicks[1].id, placed.clicks[1].u_px, placed.clicks[1].mark) == ("automatic-01-auto", 7.0, "snapped")
 
 
-def test_where_every_placement_is_clicked_nothing_is_unconfirmed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_where_every_placement_is_clicked_nothing_is_unconfirmed(monkeypatch):
     found(monkeypatch, ((), Proposals(())))
     placed = place_clicks(RECORDING, CAMERA, OPTIONS, confirmed=[PERSON])
     assert not isinstance(placed, Unsolvable)
@@ -58,7 +57,7 @@ def test_where_every_placement_is_clicked_nothing_is_unconfirmed(monkeypatch: py
 
 
 @pytest.mark.parametrize("at", ["search", "clicks"])
-def test_a_refusal_is_handed_on(monkeypatch: pytest.MonkeyPatch, at: str) -> None:
+def test_a_refusal_is_handed_on(monkeypatch, at):
     refusal = Unsolvable("not-confident", "chance would do nearly as well", "confirm some")
     found(monkeypatch, refusal if at == "search" else ((), one_proposal()), refusal)
     assert place_clicks(RECORDING, CAMERA, OPTIONS) is refusal
@@ -69,9 +68,7 @@ def test_a_refusal_is_handed_on(monkeypatch: pytest.MonkeyPatch, at: str) -> Non
     [(0.0, False, True, False), (1.0, False, True, True), (1.0, True, True, False), (1.0, False, False, False)],
     ids=["near", "far", "far-by-tape", "far-by-a-person"],
 )
-def test_a_camera_that_would_be_far_away_needs_a_tape_or_a_person(
-    away_m: float, measured: bool, nobody: bool, is_refused: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_camera_that_would_be_far_away_needs_a_tape_or_a_person(away_m, measured, nobody, is_refused, monkeypatch):
     """What is carried along beside the reflector looks like a camera that is mounted elsewhere."""
     simulated = simulate_pairs(20, rng=np.random.default_rng(8), noise="imaging")
     options = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.0), 2.0)))

@@ -66,14 +66,7 @@ def solved(recording: Recording, clicks: tuple[ReflectorClick, ...]) -> Calibrat
     ("lost", "leads"),
     [("none", False), ("one in a window", True), ("a few elsewhere", False), ("many elsewhere", True)],
 )
-def test_lost_returns_lead_the_verdict_where_they_can_matter(
-    tmp_path: Path,
-    recording: Recording,
-    clicks: tuple[ReflectorClick, ...],
-    solved: Calibration,
-    lost: str,
-    leads: bool,
-) -> None:
+def test_lost_returns_lead_the_verdict_where_they_can_matter(tmp_path, recording, clicks, solved, lost, leads):
     scans = recording.radar_scans()
     half_ns = round(half_window_s(CalibrationOptions()) * 1e9)
     reached = [np.abs(scans.times_ns - int(click.image_time)) <= half_ns for click in clicks]
@@ -102,9 +95,7 @@ def test_lost_returns_lead_the_verdict_where_they_can_matter(
 
 
 @pytest.mark.parametrize(("seed", "count"), [(7, 20), (100, 20), (108, 20), (114, 10), (115, 10)])
-def test_clicks_in_the_frames_of_other_placements_leave_nothing_to_rely_on(
-    recording: Recording, clicks: tuple[ReflectorClick, ...], seed: int, count: int
-) -> None:
+def test_clicks_in_the_frames_of_other_placements_leave_nothing_to_rely_on(recording, clicks, seed, count):
     pixels = [(click.u_px, click.v_px) for click in clicks[:count]]
     random.Random(seed).shuffle(pixels)
     mixed = [replace(one, u_px=u_px, v_px=v_px) for one, (u_px, v_px) in zip(clicks, pixels, strict=False)]
@@ -113,9 +104,7 @@ def test_clicks_in_the_frames_of_other_placements_leave_nothing_to_rely_on(
 
 
 @pytest.mark.parametrize(("share", "lost"), [(1.0, 0), (0.5, 9), (0.125, 18)])
-def test_a_recording_cut_off_leads_the_verdict_where_clicks_lost_their_returns(
-    sample: Path, tmp_path: Path, clicks: tuple[ReflectorClick, ...], share: float, lost: int
-) -> None:
+def test_a_recording_cut_off_leads_the_verdict_where_clicks_lost_their_returns(sample, tmp_path, clicks, share, lost):
     whole = (sample / "radar.bag").read_bytes()
     (tmp_path / "radar.bag").write_bytes(whole[: int(share * len(whole))])
     with open_recording([tmp_path / "radar.bag", sample / "camera.bag"]) as cut:
@@ -135,9 +124,7 @@ def test_a_recording_cut_off_leads_the_verdict_where_clicks_lost_their_returns(
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_right_clicks_alarm_nobody_in_any_order_and_a_wrong_one_is_named(
-    recording: Recording, clicks: tuple[ReflectorClick, ...], seed: int
-) -> None:
+def test_right_clicks_alarm_nobody_in_any_order_and_a_wrong_one_is_named(recording, clicks, seed):
     order = [clicks[place] for place in np.random.default_rng(seed).permutation(len(clicks))]
     for count in (5, 9, 12):
         outcome = solve_clicks(recording, order[:count], recording.camera(), CalibrationOptions())
@@ -154,14 +141,14 @@ def test_right_clicks_alarm_nobody_in_any_order_and_a_wrong_one_is_named(
     assert consistent == all(pair.inlier for pair in outcome.pairs), "neither does one that is left out look so"
 
 
-def test_without_intrinsics_the_answer_says_that_they_are_missing() -> None:
+def test_without_intrinsics_the_answer_says_that_they_are_missing():
     outcome = solve_clicks(Radar(), [CLICK], None, CalibrationOptions())
     assert isinstance(outcome, Unsolvable)
     assert outcome.code == "no-camera"
     assert "--camera" in outcome.hint
 
 
-def test_options_out_of_range_are_refused_here_too() -> None:
+def test_options_out_of_range_are_refused_here_too():
     wrong = CalibrationOptions(locating=LocatingOptions(window_s=-1.0))
     with pytest.raises(OptionError, match=r"locating\.window_s: -1 is out of range"):
         solve_clicks(Radar(), [CLICK], CAMERA, wrong)
@@ -169,7 +156,7 @@ def test_options_out_of_range_are_refused_here_too() -> None:
         solve_pairs(GivenPairs.read("{}", "pairs.json"), wrong)
 
 
-def test_scans_are_read_around_every_click_once_excluded_ones_too() -> None:
+def test_scans_are_read_around_every_click_once_excluded_ones_too():
     radar = Radar()
     later = replace(CLICK, id="c2", image_time=TimeNs(2 * 10**18), excluded=True)
     outcome = solve_clicks(radar, [later, CLICK, replace(CLICK, id="c3")], CAMERA, CalibrationOptions())
@@ -177,14 +164,12 @@ def test_scans_are_read_around_every_click_once_excluded_ones_too() -> None:
     assert isinstance(outcome, Unsolvable)
 
 
-def test_the_scans_read_reach_as_far_as_any_window_can() -> None:
+def test_the_scans_read_reach_as_far_as_any_window_can():
     options = CalibrationOptions(locating=LocatingOptions(window_s=10.0, max_time_gap_s=2.0))
     assert half_window_s(options) >= 10.0 / 2 + 2.0
 
 
-def test_reading_more_scans_than_needed_does_not_change_the_answer(
-    recording: Recording, clicks: tuple[ReflectorClick, ...], solved: Calibration
-) -> None:
+def test_reading_more_scans_than_needed_does_not_change_the_answer(recording, clicks, solved):
     everything = Radar(recording.radar_scans)
     outcome = solve_clicks(everything, clicks, recording.camera(), CalibrationOptions())
     assert isinstance(outcome, Calibration)
@@ -192,10 +177,8 @@ def test_reading_more_scans_than_needed_does_not_change_the_answer(
 
 
 @pytest.mark.parametrize("method", ["default", "paper"])
-def test_page_and_command_line_give_the_same_bytes(
-    tmp_path: Path, recording: Recording, clicks: tuple[ReflectorClick, ...], method: str
-) -> None:
-    options = CalibrationOptions(method=method)  # type: ignore[arg-type]
+def test_page_and_command_line_give_the_same_bytes(tmp_path, recording, clicks, method):
+    options = CalibrationOptions(method=method)
     by_command = solve_clicks(recording, clicks, recording.camera(), options)
     assert isinstance(by_command, Calibration)
     answered = threading.Event()
@@ -210,9 +193,7 @@ def test_page_and_command_line_give_the_same_bytes(
     assert calibration_text(by_page, recording) == calibration_text(by_command, recording)
 
 
-def test_a_preview_comes_first_and_the_answer_does_not_depend_on_it(
-    recording: Recording, clicks: tuple[ReflectorClick, ...], solved: Calibration
-) -> None:
+def test_a_preview_comes_first_and_the_answer_does_not_depend_on_it(recording, clicks, solved):
     camera, options = recording.camera(), CalibrationOptions()
     warned = replace(solved, warnings=(DataWarning("weak-geometry", "the pose is uncertain", "add placements"),))
     for previous in (None, warned):
@@ -229,7 +210,7 @@ def test_a_preview_comes_first_and_the_answer_does_not_depend_on_it(
     assert previews == []
 
 
-def test_the_text_says_what_went_in(sample: Path, recording: Recording, solved: Calibration) -> None:
+def test_the_text_says_what_went_in(sample, recording, solved):
     file = read_calibration(calibration_text(solved, recording))
     assert {row.name: row.sha256 for row in file.provenance.inputs} == {
         name: sha256((sample / name).read_bytes()).hexdigest() for name in ("camera.bag", "radar.bag")
@@ -240,7 +221,7 @@ def test_the_text_says_what_went_in(sample: Path, recording: Recording, solved: 
     assert (file.frames.radar, file.frames.camera) == (recording.radar_frame, recording.camera_frame)
 
 
-def test_the_text_says_what_the_user_specified_about_axes(sample: Path, solved: Calibration) -> None:
+def test_the_text_says_what_the_user_specified_about_axes(sample, solved):
     options = RecordingOptions(radar_axes="forward,right,up")
     with open_recording([sample / "camera.bag", sample / "radar.bag"], options) as recording:
         provenance = json.loads(calibration_text(solved, recording))["provenance"]
@@ -268,26 +249,22 @@ class Renamed:
         ("$(evil)", "c", ("radar", "camera_optical")),
     ],
 )
-def test_odd_frame_names_do_not_cost_the_calibration(
-    recording: Recording, solved: Calibration, radar_frame: str, camera_frame: str, names: tuple[str, str]
-) -> None:
+def test_odd_frame_names_do_not_cost_the_calibration(recording, solved, radar_frame, camera_frame, names):
     text = calibration_text(solved, Renamed(recording, radar_frame, camera_frame))
     frames = json.loads(text)["frames"]
     assert (frames["radar"], frames["camera"]) == names
 
 
-def test_the_recordings_own_camera_is_used_unless_a_file_is_given(tmp_path: Path, recording: Recording) -> None:
+def test_the_recordings_own_camera_is_used_unless_a_file_is_given(tmp_path, recording):
     assert camera_for(recording, None) is recording.camera()
     given = recording.camera()
-    assert given is not None
     other = Camera("pinhole", given.width_px, given.height_px, given.matrix_px * [[1.1], [1.1], [1.0]])
     (tmp_path / "camera.yaml").write_text(camera_info_text(other), encoding="utf-8")
     read = camera_for(recording, CameraFile.read(tmp_path / "camera.yaml"))
-    assert read is not None
     assert read.matrix_px == pytest.approx(other.matrix_px)
 
 
-def test_intrinsics_of_another_image_size_are_refused_with_both_sizes(tmp_path: Path, recording: Recording) -> None:
+def test_intrinsics_of_another_image_size_are_refused_with_both_sizes(tmp_path, recording):
     (tmp_path / "camera.yaml").write_text(
         camera_info_text(replace(CAMERA, width_px=123, height_px=45)), encoding="utf-8"
     )
@@ -296,8 +273,8 @@ def test_intrinsics_of_another_image_size_are_refused_with_both_sizes(tmp_path: 
 
 
 def test_a_camera_file_is_named_by_its_content_whether_it_came_by_its_path_or_was_dropped_on_the_page(
-    tmp_path: Path, recording: Recording, solved: Calibration
-) -> None:
+    tmp_path, recording, solved
+):
     given = recording.camera()
     assert given is not None
     data = camera_info_text(given).encode()
@@ -330,7 +307,7 @@ def pairs_text(solved: Calibration, count: int) -> str:
     )
 
 
-def test_a_file_of_pairs_is_solved_and_named_in_the_text(solved: Calibration) -> None:
+def test_a_file_of_pairs_is_solved_and_named_in_the_text(solved):
     text = pairs_text(solved, 20)
     outcome = solve_pairs(GivenPairs.read(text, "pairs.json"), CalibrationOptions())
     assert isinstance(outcome, Calibration)
@@ -338,7 +315,7 @@ def test_a_file_of_pairs_is_solved_and_named_in_the_text(solved: Calibration) ->
     assert [(row["name"], row["sha256"]) for row in inputs] == [("pairs.json", sha256(text.encode()).hexdigest())]
 
 
-def test_too_few_pairs_in_a_file_are_an_answer_and_no_file_of_pairs_is_an_error(solved: Calibration) -> None:
+def test_too_few_pairs_in_a_file_are_an_answer_and_no_file_of_pairs_is_an_error(solved):
     outcome = solve_pairs(GivenPairs.read(pairs_text(solved, 3), "pairs.json"), CalibrationOptions())
     assert isinstance(outcome, Unsolvable)
     with pytest.raises(InputError, match=r"pairs\.json"):
@@ -346,11 +323,9 @@ def test_too_few_pairs_in_a_file_are_an_answer_and_no_file_of_pairs_is_an_error(
 
 
 @pytest.mark.parametrize("method", ["default", "paper"])
-def test_clicks_outside_the_radar_recording_are_named_in_the_answer(
-    recording: Recording, clicks: tuple[ReflectorClick, ...], method: str
-) -> None:
+def test_clicks_outside_the_radar_recording_are_named_in_the_answer(recording, clicks, method):
     away = [replace(click, image_time=TimeNs(click.image_time + 10**12)) for click in clicks[:5]]
-    options = CalibrationOptions(method=method)  # type: ignore[arg-type]
+    options = CalibrationOptions(method=method)
     outcome = solve_clicks(recording, away, recording.camera(), options)
     assert isinstance(outcome, Unsolvable)
     assert [row.id for row in outcome.unpaired] == [click.id for click in away]

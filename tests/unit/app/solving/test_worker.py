@@ -4,10 +4,8 @@ import logging
 import threading
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
-import pytest
 
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
@@ -51,7 +49,7 @@ class Answers:
         return self.all[-1]
 
 
-def test_of_several_waiting_requests_only_the_newest_is_solved() -> None:
+def test_of_several_waiting_requests_only_the_newest_is_solved():
     gate, answers = Gate(), Answers()
     radar = Radar(gate)
     worker = SolverWorker(radar, CAMERA)
@@ -67,7 +65,7 @@ def test_of_several_waiting_requests_only_the_newest_is_solved() -> None:
     assert len(radar.asked) == 2
 
 
-def test_a_recording_that_cannot_be_read_is_reported_as_the_answer() -> None:
+def test_a_recording_that_cannot_be_read_is_reported_as_the_answer():
     def broken() -> RadarScans:
         raise RecordingError("radar.bag: chunk 7 is damaged; copy the file again")
 
@@ -80,9 +78,7 @@ def test_a_recording_that_cannot_be_read_is_reported_as_the_answer() -> None:
     assert (outcome.code, outcome.reason) == ("unreadable", "radar.bag: chunk 7 is damaged; copy the file again")
 
 
-def test_a_bug_in_the_program_is_logged_and_reported_and_the_worker_continues(
-    caplog: pytest.LogCaptureFixture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_bug_in_the_program_is_logged_and_reported_and_the_worker_continues(caplog, tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     faults = iter([True])
 
@@ -106,7 +102,7 @@ def test_a_bug_in_the_program_is_logged_and_reported_and_the_worker_continues(
     worker.close()
 
 
-def test_after_close_nothing_is_answered() -> None:
+def test_after_close_nothing_is_answered():
     gate, answers = Gate(), Answers()
     worker = SolverWorker(Radar(gate), CAMERA)
     worker.request(1, [CLICK], CalibrationOptions(), answers)
@@ -120,9 +116,7 @@ def test_after_close_nothing_is_answered() -> None:
     assert all(solved.revision == 1 for solved in answers.all)
 
 
-def test_the_preview_is_delivered_before_the_answer_and_the_next_one_starts_from_it(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_preview_is_delivered_before_the_answer_and_the_next_one_starts_from_it(monkeypatch):
     simulated = simulate_pairs(8, rng=np.random.default_rng(1))
     answer = calibrate_pairs(simulated.pairs, simulated.camera)
     assert isinstance(answer, Calibration)

@@ -12,7 +12,7 @@ from cocalib.view.contours import contour_lines, contour_maps
 COLUMNS, ROWS = np.linspace(0.0, 60.0, 31), np.linspace(0.0, 40.0, 21)
 
 
-def test_a_hill_has_one_closed_line_per_level_and_it_is_a_circle() -> None:
+def test_a_hill_has_one_closed_line_per_level_and_it_is_a_circle():
     u, v = np.meshgrid(COLUMNS, ROWS)
     heights = np.hypot(u - 30.0, v - 20.0)
     (line,) = contour_lines(COLUMNS, ROWS, heights, 12.3)
@@ -21,7 +21,7 @@ def test_a_hill_has_one_closed_line_per_level_and_it_is_a_circle() -> None:
     np.testing.assert_allclose(np.hypot(*(np.array(line) - (30.0, 20.0)).T), 12.3, atol=0.3)
 
 
-def test_a_line_ends_at_cells_without_values() -> None:
+def test_a_line_ends_at_cells_without_values():
     u, _ = np.meshgrid(COLUMNS, ROWS)
     heights = u.copy()
     heights[10, :] = np.nan
@@ -33,7 +33,7 @@ def test_a_line_ends_at_cells_without_values() -> None:
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(-0.9, 0.9))
-def test_every_point_of_a_line_has_its_value_and_every_crossing_is_drawn_once(seed: int, level: float) -> None:
+def test_every_point_of_a_line_has_its_value_and_every_crossing_is_drawn_once(seed, level):
     heights = np.random.default_rng(seed).uniform(-1.0, 1.0, (6, 7))
     columns, rows = np.arange(7.0) * 1000.0, np.arange(6.0) * 1000.0
     lines = list(contour_lines(columns, rows, heights, level))
@@ -49,7 +49,7 @@ def test_every_point_of_a_line_has_its_value_and_every_crossing_is_drawn_once(se
         assert min(abs(along_row - level), abs(along_column - level)) < 1e-3
 
 
-def test_a_calibration_has_labelled_lines_at_each_distance_and_says_where_it_extrapolates() -> None:
+def test_a_calibration_has_labelled_lines_at_each_distance_and_says_where_it_extrapolates():
     drawn = simulate_pairs(20, rng=np.random.default_rng(7))
     solved = calibrate_pairs(drawn.pairs, drawn.camera)
     assert isinstance(solved, Calibration)

@@ -31,7 +31,7 @@ def solve(drawn: SimulatedPairs, excluded: frozenset[str] = frozenset()) -> Cali
     return outcome
 
 
-def test_influence_orders_the_pairs_as_leaving_each_out_does(drawn: SimulatedPairs, solved: Calibration) -> None:
+def test_influence_orders_the_pairs_as_leaving_each_out_does(drawn, solved):
     inliers = [pair for pair in solved.pairs if pair.inlier]
     information = np.linalg.inv(solved.covariance)
     moved = []
@@ -47,7 +47,7 @@ def test_influence_orders_the_pairs_as_leaving_each_out_does(drawn: SimulatedPai
     assert int(np.argmax(stated)) in np.argsort(moved)[-3:]
 
 
-def test_held_out_distances_give_the_held_out_metric(solved: Calibration) -> None:
+def test_held_out_distances_give_the_held_out_metric(solved):
     held_out_px = {row.id: row.held_out_px for row in review_of(solved, 3).rows}
     agreeing = [held_out_px[pair.id] for pair in solved.pairs if pair.inlier]
 
@@ -56,7 +56,7 @@ def test_held_out_distances_give_the_held_out_metric(solved: Calibration) -> Non
     )
 
 
-def test_the_histogram_covers_the_agreeing_pairs_and_expects_all_of_them(solved: Calibration) -> None:
+def test_the_histogram_covers_the_agreeing_pairs_and_expects_all_of_them(solved):
     review = review_of(solved, 3)
     assert review.histogram is not None
     longest_px = max(pair.distance_px for pair in solved.pairs if pair.inlier)
@@ -67,21 +67,19 @@ def test_the_histogram_covers_the_agreeing_pairs_and_expects_all_of_them(solved:
     assert "95 % ellipse" in review.words
 
 
-def test_without_noise_model_nothing_is_expected(solved: Calibration) -> None:
+def test_without_noise_model_nothing_is_expected(solved):
     unknown = np.full((2, 2), np.nan)
     pairs = tuple(replace(pair, expected_covariance_px2=unknown) for pair in solved.pairs)
     review = review_of(replace(solved, pairs=pairs), 3)
 
-    assert review.histogram is not None
     assert review.histogram.expected == ()
     assert all(row.sigmas is None for row in review.rows)
     assert review_of(None, -1).rows == ()
 
 
-def test_a_pair_lists_all_its_candidates_and_says_which_one_it_uses(solved: Calibration) -> None:
+def test_a_pair_lists_all_its_candidates_and_says_which_one_it_uses(solved):
     for pair in solved.pairs:
         told = pair_review(solved, pair.id)
-        assert pair.measured is not None
         assert [row.chosen for row in told.candidates] == [
             i == pair.candidate for i in range(len(pair.measured.candidates))
         ]
@@ -89,7 +87,7 @@ def test_a_pair_lists_all_its_candidates_and_says_which_one_it_uses(solved: Cali
     assert "held out" in {fact.label for fact in told.facts}
 
 
-def test_a_pair_whose_return_the_pose_picked_against_the_radar_s_own_score_says_so(solved: Calibration) -> None:
+def test_a_pair_whose_return_the_pose_picked_against_the_radar_s_own_score_says_so(solved):
     told = [
         pair_review(solved, pair.id).why
         for pair in solved.pairs
@@ -100,7 +98,7 @@ def test_a_pair_whose_return_the_pose_picked_against_the_radar_s_own_score_says_
     assert all("though the radar alone prefers" in why for why in told)
 
 
-def test_a_calibration_compared_with_itself_differs_by_nothing(solved: Calibration) -> None:
+def test_a_calibration_compared_with_itself_differs_by_nothing(solved):
     both = compared(4, solution_of("now", solved), solution_of("again", solved))
 
     assert [row.text.split()[0] for row in both.rows[:5]] == ["0"] * 5
@@ -108,7 +106,7 @@ def test_a_calibration_compared_with_itself_differs_by_nothing(solved: Calibrati
     assert all(mark.a_px == mark.b_px for mark in both.marks)
 
 
-def test_the_page_and_the_check_command_state_the_same_figures(drawn: SimulatedPairs, solved: Calibration) -> None:
+def test_the_page_and_the_check_command_state_the_same_figures(drawn, solved):
     other = solve(drawn, frozenset({solved.pairs[0].id}))
     both = compared(4, solution_of("now", solved), solution_of("without", other))
     printed = check(imported(CalibrationFile(other)), against=imported(CalibrationFile(solved))).lines()
@@ -117,7 +115,7 @@ def test_the_page_and_the_check_command_state_the_same_figures(drawn: SimulatedP
         assert f"compared with the other: {row.label}: {row.text}" in printed
 
 
-def test_a_difference_is_judged_as_the_check_command_judges_it(solved: Calibration) -> None:
+def test_a_difference_is_judged_as_the_check_command_judges_it(solved):
     error = np.array([0.0, 0.0, 0.0, 0.0, 5.0 * np.sqrt(solved.covariance[4, 4]) + 0.05, 0.0])
     far = replace(solved, camera_from_radar=solved.camera_from_radar.perturbed(error))
     vague = replace(far, covariance=solved.covariance * 1e4)
@@ -126,12 +124,11 @@ def test_a_difference_is_judged_as_the_check_command_judges_it(solved: Calibrati
     for other, agree in ((far, False), (vague, True), (silent, False)):
         both = compared(4, solution_of("a", solved), solution_of("b", other))
         report = check(imported(CalibrationFile(other)), against=imported(CalibrationFile(solved)))
-        assert report.judgement is not None
         assert report.judgement.agree == agree
         assert both.verdict == sentence(f"the two {'agree' if agree else 'differ'}: {report.judgement.text}")
 
 
-def test_a_solution_without_pairs_draws_those_of_the_other(solved: Calibration) -> None:
+def test_a_solution_without_pairs_draws_those_of_the_other(solved):
     error = np.array([0.0, 0.0, 0.0, 0.0, 0.02, 0.0])
     from_file = replace(solved, camera_from_radar=solved.camera_from_radar.perturbed(error), pairs=())
     both = compared(4, solution_of("now", solved), solution_of("file", from_file))
@@ -140,7 +137,7 @@ def test_a_solution_without_pairs_draws_those_of_the_other(solved: Calibration) 
     assert any(mark.a_px != mark.b_px for mark in both.marks)
 
 
-def test_the_answer_before_the_last_change_is_found(solved: Calibration) -> None:
+def test_the_answer_before_the_last_change_is_found(solved):
     facts = RecordingFacts("drive", 10**9 * np.arange(1, 50), width_px=1920, height_px=1080)
     earlier = replace(solved)
     history = advance(History(), ClickPlaced(TimeNs(10**9), (10.0, 20.0), "clicked"), facts)
@@ -152,9 +149,8 @@ def test_the_answer_before_the_last_change_is_found(solved: Calibration) -> None
     assert previous_calibration(history) is earlier
 
 
-def test_a_return_chosen_by_hand_is_told_and_the_others_are_still_listed(solved: Calibration) -> None:
+def test_a_return_chosen_by_hand_is_told_and_the_others_are_still_listed(solved):
     pair = next(pair for pair in solved.pairs if pair.inlier and pair.measured is not None and pair.candidate == 0)
-    assert pair.measured is not None
     first, *rest = pair.measured.candidates
     chosen = ChosenReturn(tuple(first.position_radar_m.tolist()))
     by_hand = replace(pair, measured=replace(pair.measured, candidates=(first,), set_aside=tuple(rest), chosen=chosen))

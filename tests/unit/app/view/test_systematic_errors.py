@@ -41,7 +41,7 @@ def error(name: str, position: float, rotation: float, *, sigma: float = 0.02) -
     return SystematicErrorResult(name, 0.011, sigma, 0.02, True, position, rotation)
 
 
-def test_the_table_shows_what_matters_or_is_determined_the_largest_first(calibration: Calibration) -> None:
+def test_the_table_shows_what_matters_or_is_determined_the_largest_first(calibration):
     known = (
         error("range_scale", 0.01, 0.0),
         error("azimuth_scale", 0.0, 0.02, sigma=0.004),
@@ -58,7 +58,7 @@ def test_the_table_shows_what_matters_or_is_determined_the_largest_first(calibra
     assert words.endswith("would reduce it.")
 
 
-def test_axes_that_the_pairs_do_not_determine_share_a_row(calibration: Calibration) -> None:
+def test_axes_that_the_pairs_do_not_determine_share_a_row(calibration):
     axes = (error("reflector_right_m", 0.05, 0.0), error("reflector_down_m", 0.04, 0.01))
     (row,) = systematic_errors(replace(calibration, systematic_errors=axes)).rows
     assert (row.figure.label, row.position_percent, row.rotation_percent) == ("clicks off the phase centre", 9, 1)
@@ -69,7 +69,7 @@ def test_axes_that_the_pairs_do_not_determine_share_a_row(calibration: Calibrati
     ]
 
 
-def test_the_command_line_says_the_same_as_the_page(calibration: Calibration) -> None:
+def test_the_command_line_says_the_same_as_the_page(calibration):
     lines = summary_lines(calibration)
     assert [line.removeprefix("uncertainty: ") for line in lines if line.startswith("uncertainty: ")] == list(
         systematic_errors(calibration).sentences
@@ -78,7 +78,7 @@ def test_the_command_line_says_the_same_as_the_page(calibration: Calibration) ->
     assert assumed_figures(calibration) == ()
 
 
-def test_a_radar_without_elevation_shows_first_what_is_firm(flat: Calibration) -> None:
+def test_a_radar_without_elevation_shows_first_what_is_firm(flat):
     figures = {one.key: one.value for one in pose_figures(flat)}
     assert list(figures)[:4] == ["camera_x", "camera_y", "yaw", "picture"]
     assert [one.key for one in assumed_figures(flat)] == ["camera_z", "roll", "pitch"]
@@ -92,7 +92,7 @@ def test_a_radar_without_elevation_shows_first_what_is_firm(flat: Calibration) -
     assert firm_text(flat).endswith(" px")
 
 
-def test_the_summary_says_how_many_clicks_agree_and_at_how_many_placements(calibration: Calibration) -> None:
+def test_the_summary_says_how_many_clicks_agree_and_at_how_many_placements(calibration):
     count = len(calibration.pairs)
     lines = summary_lines(calibration)
     assert [" ".join(line.split()) for line in lines if line.startswith(("clicks that", "at placements"))] == [
@@ -101,7 +101,7 @@ def test_the_summary_says_how_many_clicks_agree_and_at_how_many_placements(calib
     ]
 
 
-def test_a_calibration_from_a_file_looks_the_same(calibration: Calibration, flat: Calibration) -> None:
+def test_a_calibration_from_a_file_looks_the_same(calibration, flat):
     for one in (calibration, flat):
         read = read_calibration(calibration_text(one)).calibration
         assert systematic_errors(read) == systematic_errors(one)
@@ -109,7 +109,7 @@ def test_a_calibration_from_a_file_looks_the_same(calibration: Calibration, flat
         assert str(read).partition("next")[0] == str(one).partition("next")[0]
 
 
-def test_the_papers_method_has_no_table() -> None:
+def test_the_papers_method_has_no_table():
     paper = solved(options=CalibrationOptions(method="paper"))
     assert not systematic_errors(paper).rows
     assert not systematic_errors(paper).sentences

@@ -1,7 +1,6 @@
 """The verdict on the page: its key, when it says done, and how many placements are left."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -25,7 +24,7 @@ def placement(start_s: int, x_m: float = 5.0) -> Placement:
     return Placement(**(others | values))
 
 
-def test_a_placement_is_left_until_it_is_clicked_or_dismissed() -> None:
+def test_a_placement_is_left_until_it_is_clicked_or_dismissed():
     found = [placement(1), placement(11), placement(21), placement(31)]
     history = advance(History(), ClickPlaced(TimeNs(12 * 10**9), (1.0, 1.0), "clicked"), FACTS)
     assert placements_left(history.present, found) == 3
@@ -35,25 +34,25 @@ def test_a_placement_is_left_until_it_is_clicked_or_dismissed() -> None:
     assert placements_left(history.present, None) is None
 
 
-def test_of_two_placements_at_once_only_the_dismissed_one_is_gone() -> None:
+def test_of_two_placements_at_once_only_the_dismissed_one_is_gone():
     history = advance(History(), PlacementDismissed(TimeNs(2 * 10**9), (5.0, 0.0, 0.0)), FACTS)
     assert placements_left(history.present, [placement(1), placement(1, 9.0)]) == 1
 
 
-def test_a_mark_that_nobody_has_touched_leaves_its_placement_to_be_clicked() -> None:
+def test_a_mark_that_nobody_has_touched_leaves_its_placement_to_be_clicked():
     click = ReflectorClick(TimeNs(2 * 10**9), "c1", 1.0, 1.0)
     assert placements_left(Session(clicks=(click,)), [placement(1)]) == 0
     assert placements_left(Session(clicks=(replace(click, excluded=True),)), [placement(1)]) == 0
     assert placements_left(Session(clicks=(replace(click, mark="untouched"),)), [placement(1)]) == 1
 
 
-def test_done_is_said_with_the_key_that_exports() -> None:
+def test_done_is_said_with_the_key_that_exports():
     row = verdict_row(Verdict("good", "0.3 deg, 3 cm (95 %)", DONE), Session(), None)
     assert (row.done, row.key, row.action) == (True, "E", f"{DONE}.")
     assert row.line == "good: within 0.3°, 3 cm (95 %)"
 
 
-def test_an_action_that_an_option_does_names_it() -> None:
+def test_an_action_that_an_option_does_names_it():
     for action, option in (("A tape-measured camera position would help most", "solving.camera_position"), (DONE, "")):
         assert verdict_row(Verdict("usable", "2 deg", action), Session(), None).option == option
     near = CalibrationOptions(gating=GatingOptions(max_range_m=1.0))
@@ -76,7 +75,7 @@ MIRRORED = DataWarning("mirrored-axes", "an axis is mirrored", "turn it round")
         (FIVE, (MIRRORED,), ""),
     ],
 )
-def test_few_pairs_that_agree_are_counted_and_what_is_wrong_is_said(pairs: Any, warnings: Any, line: str) -> None:
+def test_few_pairs_that_agree_are_counted_and_what_is_wrong_is_said(pairs, warnings, line):
     found = calibration(*pairs)
     row = shown(5, replace(found, warnings=warnings)).verdict
     assert row.early == (line != "")
@@ -91,6 +90,6 @@ def test_few_pairs_that_agree_are_counted_and_what_is_wrong_is_said(pairs: Any, 
         (CalibrationOptions(noise=NoiseOptions(sigma_px=0.1)), "click noise far below the default"),
     ],
 )
-def test_the_mark_is_not_blamed_for_the_method_or_the_options(options: CalibrationOptions, words: str) -> None:
+def test_the_mark_is_not_blamed_for_the_method_or_the_options(options, words):
     cause = disagreement(options)
     assert words in f"{cause.what}. {cause.action}"

@@ -75,15 +75,15 @@ FIVE = tuple(pair(f"c{number}") for number in range(1, 6))
     ("count", "status"),
     [(0, "4 more placements needed"), (1, "3 more placements needed"), (3, "1 more placement needed"), (4, "Solving…")],
 )
-def test_the_status_counts_down_to_the_first_solve(count: int, status: str) -> None:
+def test_the_status_counts_down_to_the_first_solve(count, status):
     assert view(clicked(count), FACTS).status == status
 
 
-def test_excluded_clicks_do_not_count_towards_the_first_solve() -> None:
+def test_excluded_clicks_do_not_count_towards_the_first_solve():
     assert view(clicked(4, ClickExcluded("c2", True)), FACTS).status == "1 more placement needed"
 
 
-def test_before_the_first_click_the_hint_says_what_to_do() -> None:
+def test_before_the_first_click_the_hint_says_what_to_do():
     seen = view(History(), FACTS)
     assert (seen.stage, seen.solving, seen.has_calibration, seen.solved_revision) == ("collecting", False, False, -1)
     assert "click the reflector's inner corner" in seen.hint
@@ -95,7 +95,7 @@ def agreeing(seen: View) -> tuple[str, str]:
     return seen.verdict.level, next(one.value for one in seen.metrics if one.key == "inliers")
 
 
-def test_a_solved_session_says_how_many_clicks_agree() -> None:
+def test_a_solved_session_says_how_many_clicks_agree():
     four_agree = (*FIVE[:4], pair("c5", inlier=False))
     assert agreeing(shown(5, calibration(*FIVE))) == ("coarse", "5 of 5")
     assert agreeing(shown(5, calibration(*four_agree))) == ("coarse", "4 of 5")
@@ -112,7 +112,7 @@ def measured_at(name: str, *positions: tuple[float, float, float], **more) -> Pa
 NEAR_M, BEHIND_M = (6.0, 0.5, 0.0), (7.2, 0.6, 0.0)
 
 
-def test_a_click_that_two_returns_fit_asks_for_one_of_them() -> None:
+def test_a_click_that_two_returns_fit_asks_for_one_of_them():
     asking = measured_at("c5", NEAR_M, BEHIND_M, inlier=False, outlier_probability=0.5, rival=1)
     seen = shown(5, calibration(*FIVE[:4], asking))
     assert "1 asks which return is right (C)" in seen.status
@@ -127,7 +127,7 @@ def test_a_click_that_two_returns_fit_asks_for_one_of_them() -> None:
     assert "as well" in offered.suggestion
 
 
-def test_a_return_that_the_camera_does_not_see_is_not_offered() -> None:
+def test_a_return_that_the_camera_does_not_see_is_not_offered():
     ahead_m, aside_m = (6.0, 0.5, 0.0), (1.0, 5.0, 0.0)
     outcome = calibration(*FIVE[:4], measured_at("c5", ahead_m, (7.0, 0.5, 0.0), aside_m))
     session = advance(clicked(5), Solved(5, outcome), FACTS).present
@@ -140,7 +140,7 @@ def test_a_return_that_the_camera_does_not_see_is_not_offered() -> None:
     assert len(click_candidates(session, only_aside.pairs[4].measured).rows) == 2  # the one in use is shown, too
 
 
-def test_clicks_that_changed_their_return_are_told_until_the_next_answer() -> None:
+def test_clicks_that_changed_their_return_are_told_until_the_next_answer():
     before, after = (calibration(*FIVE[:4], measured_at("c5", at)) for at in (NEAR_M, BEHIND_M))
     history = advance(clicked(5), Solved(5, before), FACTS)
     assert "changed" not in view(history, FACTS).status
@@ -154,18 +154,18 @@ def test_clicks_that_changed_their_return_are_told_until_the_next_answer() -> No
     assert "changed" not in view(advance(again, Solved(7, after), FACTS), FACTS).status
 
 
-def test_a_preview_that_the_answer_takes_back_changed_no_return() -> None:
+def test_a_preview_that_the_answer_takes_back_changed_no_return():
     before, preview = (calibration(*FIVE[:4], measured_at("c5", at)) for at in (NEAR_M, BEHIND_M))
     history = advance(advance(clicked(5), Solved(5, before), FACTS), ClickMoved("c1", (11.0, 20.0)), FACTS)
     history = advance(history, Solved(6, replace(preview, checking=True)), FACTS)
     assert "changed" not in view(advance(history, Solved(6, before), FACTS), FACTS).status
 
 
-def test_an_excluded_pair_is_not_among_those_that_could_agree() -> None:
+def test_an_excluded_pair_is_not_among_those_that_could_agree():
     assert agreeing(shown(5, calibration(*FIVE[:4], pair("c5", excluded=True)))) == ("coarse", "4 of 4")
 
 
-def test_an_unsolvable_session_shows_reason_and_hint() -> None:
+def test_an_unsolvable_session_shows_reason_and_hint():
     seen = shown(5, Unsolvable("no-pose", "only 3 of 5 pairs agree on any pose", "spread the placements"))
     assert (seen.stage, seen.status, seen.hint) == (
         "unsolvable",
@@ -175,17 +175,17 @@ def test_an_unsolvable_session_shows_reason_and_hint() -> None:
     assert not seen.has_calibration
 
 
-def test_what_more_clicks_cannot_fix_is_reported_from_the_first_click_on() -> None:
+def test_what_more_clicks_cannot_fix_is_reported_from_the_first_click_on():
     seen = shown(1, Unsolvable("no-camera", "the intrinsics are missing", "give --camera"))
     assert (seen.stage, seen.status) == ("unsolvable", "The intrinsics are missing.")
 
 
-def test_too_few_pairs_is_no_failure_while_clicks_are_collected() -> None:
+def test_too_few_pairs_is_no_failure_while_clicks_are_collected():
     seen = shown(2, Unsolvable("too-few-pairs", "2 of at least 4 pairs", "click more"))
     assert (seen.stage, seen.status) == ("collecting", "2 more placements needed")
 
 
-def test_clicks_that_the_radar_did_not_see_do_not_count_and_say_why() -> None:
+def test_clicks_that_the_radar_did_not_see_do_not_count_and_say_why():
     unseen = tuple(
         Unpaired(name, "no-scan", "the nearest radar scan is 9.00 s away", "check that both clocks agree")
         for name in ("c1", "c3")
@@ -199,7 +199,7 @@ def test_clicks_that_the_radar_did_not_see_do_not_count_and_say_why() -> None:
     assert "9.00 s away" in seen.clicks[0].note
 
 
-def test_figures_stay_while_a_newer_answer_is_computed() -> None:
+def test_figures_stay_while_a_newer_answer_is_computed():
     seen = shown(5, calibration(*FIVE), ClickMoved("c1", (11.0, 20.0)))
     assert (seen.stage, seen.status, seen.solving) == ("solving", "Solving…", True)
     assert seen.has_calibration
@@ -207,7 +207,7 @@ def test_figures_stay_while_a_newer_answer_is_computed() -> None:
     assert all(one.level != "none" for one in seen.metrics)
 
 
-def test_a_preview_is_shown_as_being_checked() -> None:
+def test_a_preview_is_shown_as_being_checked():
     pairs = [pair(f"c{k}", inlier=k > 1) for k in range(1, 6)]
     preview = calibration(*pairs, checking=True)
     drawn = shown(5, preview)
@@ -218,35 +218,34 @@ def test_a_preview_is_shown_as_being_checked() -> None:
     assert agreeing(checked) == ("coarse", "4 of 5")
 
 
-def test_the_view_says_what_can_be_undone_and_redone() -> None:
+def test_the_view_says_what_can_be_undone_and_redone():
     seen = view(clicked(2, Undo()), FACTS)
     assert (seen.can_undo, seen.can_redo) == (True, True)
     assert not view(clicked(1), FACTS).can_redo
 
 
-def test_a_row_says_where_the_click_is_before_any_answer() -> None:
+def test_a_row_says_where_the_click_is_before_any_answer():
     (row,) = view(clicked(1), FACTS).clicks
     assert (row.id, row.frame, row.image_time, row.u_px, row.v_px) == ("c1", 1, Stamp.of(TIMES[1]), 10.0, 20.0)
     assert (row.state, row.projected_px, row.residual_px, row.note) == ("pending", None, None, "")
 
 
-def test_a_row_of_a_solved_pair_carries_residual_position_and_ellipse() -> None:
+def test_a_row_of_a_solved_pair_carries_residual_position_and_ellipse():
     row = shown(5, calibration(*FIVE)).clicks[0]
     assert (row.state, row.projected_px, row.residual_px) == ("inlier", (13.0, 24.0), 5.0)
     assert row.range_m == pytest.approx(5.0)
     assert row.azimuth_deg == pytest.approx(53.1301, abs=1e-4)
     assert row.elevation_deg == pytest.approx(0.0)
-    assert row.ellipse is not None
     assert row.ellipse.semi_major_px == pytest.approx(3.0 * 2.447747, rel=0.005)
     assert row.outlier_probability == pytest.approx(0.01)
 
 
-def test_the_residual_follows_a_moved_click_at_once() -> None:
+def test_the_residual_follows_a_moved_click_at_once():
     row = shown(5, calibration(*FIVE), ClickMoved("c1", (13.0, 22.0))).clicks[0]
     assert row.residual_px == pytest.approx(2.0)
 
 
-def test_each_state_of_a_click_has_a_note() -> None:
+def test_each_state_of_a_click_has_a_note():
     outcome = calibration(
         pair("c1"),
         pair("c2", inlier=False),
@@ -266,13 +265,13 @@ def test_each_state_of_a_click_has_a_note() -> None:
     assert included.clicks[2].state == "pending"
 
 
-def test_a_radar_position_behind_the_camera_has_no_reprojection() -> None:
+def test_a_radar_position_behind_the_camera_has_no_reprojection():
     row = shown(1, calibration(pair("c1", inlier=False, projected_px=[NAN, NAN], outlier_probability=NAN))).clicks[0]
     assert (row.projected_px, row.residual_px, row.outlier_probability) == (None, None, None)
     assert "behind the camera" in row.note
 
 
-def test_every_figure_has_a_value_and_a_sentence_that_explains_it() -> None:
+def test_every_figure_has_a_value_and_a_sentence_that_explains_it():
     seen = shown(5, calibration(*FIVE))
     figures = {figure.key: figure for figure in (*seen.metrics, *seen.pose)}
     assert figures["aed"].value == "12.4"
@@ -285,7 +284,7 @@ def test_every_figure_has_a_value_and_a_sentence_that_explains_it() -> None:
     assert all(figure.hint.endswith(".") and len(figure.hint) > 20 for figure in figures.values())
 
 
-def test_smooth_angle_errors_of_the_radar_are_a_figure_if_correcting_them_helps() -> None:
+def test_smooth_angle_errors_of_the_radar_are_a_figure_if_correcting_them_helps():
     simulated = simulate_pairs(30, rng=np.random.default_rng(7), noise=NoiseOptions(2.0, 0.008, 0.1, 0.25))
     solved = calibrate_pairs(simulated.pairs, simulated.camera, CalibrationOptions())
     assert isinstance(solved, Calibration)
@@ -303,46 +302,46 @@ def test_smooth_angle_errors_of_the_radar_are_a_figure_if_correcting_them_helps(
     assert "radar_angle_map" in figure.hint
 
 
-def test_a_figure_that_was_not_computed_is_a_dash() -> None:
+def test_a_figure_that_was_not_computed_is_a_dash():
     metrics = Metrics(12.0, NAN, 13.0, n=1)
     figures = {figure.key: figure for figure in shown(5, calibration(*FIVE, metrics=metrics)).metrics}
     assert figures["cdsd"].value == figures["held_out_aed"].value == "–"
     assert figures["held_out_aed"].level == "plain"
 
 
-def test_a_pose_that_depends_on_single_pairs_stands_out() -> None:
+def test_a_pose_that_depends_on_single_pairs_stands_out():
     metrics = Metrics(2.0, 1.0, 2.1, n=5, held_out_aed_px=6.0)
     figures = {figure.key: figure for figure in shown(5, calibration(*FIVE, metrics=metrics)).metrics}
     assert figures["held_out_aed"].level == "warning"
     assert "depends on single pairs" in figures["held_out_aed"].hint
 
 
-def test_a_pose_without_covariance_is_shown_without_one() -> None:
+def test_a_pose_without_covariance_is_shown_without_one():
     seen = shown(5, calibration(*FIVE, covariance=np.full((6, 6), NAN)))
     assert [figure.value for figure in seen.pose] == ["5.00", "10.0", "30.0", "0", "0", "0"]
 
 
-def test_a_direction_is_a_word_and_not_a_sign() -> None:
+def test_a_direction_is_a_word_and_not_a_sign():
     seen = shown(5, calibration(*FIVE))
     assert [one.label for one in seen.pose][:3] == ["camera forward", "camera right", "camera up"]
     assert not any(one.value.startswith("-") for one in seen.pose)
     assert all(one.hint for one in (*seen.pose, *seen.metrics))
 
 
-def test_warnings_are_shown_as_sentences_and_the_first_is_the_next_thing_to_do() -> None:
+def test_warnings_are_shown_as_sentences_and_the_first_is_the_next_thing_to_do():
     seen = shown(5, calibration(*FIVE, warnings=(DataWarning("few-pairs", "only 5 pairs", "add placements"),)))
     assert seen.warnings == (DataWarning("few-pairs", "Only 5 pairs.", "Add placements."),)
     assert seen.hint == "Add placements."
 
 
-def test_the_residual_limit_is_the_usual_ellipse_or_ransacs_threshold() -> None:
+def test_the_residual_limit_is_the_usual_ellipse_or_ransacs_threshold():
     assert shown(5, calibration(*FIVE)).residual_limit_px == pytest.approx(3.0 * 2.447747, rel=0.005)
     blind = tuple(replace(row, expected_covariance_px2=np.full((2, 2), NAN)) for row in FIVE)
     assert shown(5, calibration(*blind)).residual_limit_px is None
     assert shown(5, calibration(*blind, options=CalibrationOptions(method="paper"))).residual_limit_px == 8.0
 
 
-def test_the_summary_for_the_command_line_has_the_same_figures_and_all_warnings() -> None:
+def test_the_summary_for_the_command_line_has_the_same_figures_and_all_warnings():
     outcome = calibration(
         *FIVE,
         warnings=(DataWarning("a", "b", "c"),),
@@ -368,7 +367,7 @@ def test_the_summary_for_the_command_line_has_the_same_figures_and_all_warnings(
         (NAN, "–"),
     ],
 )
-def test_a_plain_number_has_three_significant_digits(value: float, text: str) -> None:
+def test_a_plain_number_has_three_significant_digits(value, text):
     assert plain(value) == text
 
 
@@ -388,43 +387,39 @@ def test_a_plain_number_has_three_significant_digits(value: float, text: str) ->
         (NAN, 1.0, "–"),
     ],
 )
-def test_a_number_with_a_standard_deviation_has_the_digits_that_it_justifies(
-    value: float, sigma: float, text: str
-) -> None:
+def test_a_number_with_a_standard_deviation_has_the_digits_that_it_justifies(value, sigma, text):
     assert with_sigma(value, sigma) == text
 
 
-def test_an_ellipse_turns_with_its_covariance() -> None:
+def test_an_ellipse_turns_with_its_covariance():
     angle_rad = np.deg2rad(30.0)
     turn = np.array([[np.cos(angle_rad), -np.sin(angle_rad)], [np.sin(angle_rad), np.cos(angle_rad)]])
     ellipse, unknown = ellipses_of([turn @ np.diag([16.0, 1.0]) @ turn.T, np.full((2, 2), NAN)])
-    assert ellipse is not None
     assert ellipse.angle_rad == pytest.approx(angle_rad, abs=0.005)
     assert (ellipse.semi_major_px, ellipse.semi_minor_px) == pytest.approx((4 * 2.447747, 2.447747))
     assert unknown is None
 
 
-def test_marks_are_rounded_to_steps_that_cannot_be_seen() -> None:
+def test_marks_are_rounded_to_steps_that_cannot_be_seen():
     sharp, wide = pair("c1", projected_px=[13.123456, 24.0]), pair("c2", projected_px=[13.123456, 24.0])
     wide = replace(wide, expected_covariance_px2=np.eye(2) * 40.0**2)
     unknown = replace(pair("c3", projected_px=[13.123456, 24.0]), expected_covariance_px2=np.full((2, 2), NAN))
     drawn = reprojections((sharp, wide, unknown))
     assert [row.step_px for row in drawn.values()] == [0.0625, 0.25, 2.0**-7]
     for row in drawn.values():
-        assert row.projected_px is not None
         assert abs(row.projected_px[0] - 13.123456) <= row.step_px / 2
     assert drawn == reprojections(
         tuple(replace(one, projected_px=one.projected_px + 1e-4) for one in (sharp, wide, unknown))
     )
 
 
-def test_the_length_of_a_residual_is_right_to_its_last_decimal() -> None:
+def test_the_length_of_a_residual_is_right_to_its_last_decimal():
     wide = replace(pair("c1", projected_px=[13.87, 24.12]), expected_covariance_px2=np.eye(2) * 40.0**2)
     exact_px = float(np.hypot(*(wide.projected_px - wide.pixel_px)))
     assert reprojections((wide,))["c1"].distance_px == round(exact_px, 1)
 
 
-def test_ninety_five_percent_of_draws_lie_in_the_ellipse() -> None:
+def test_ninety_five_percent_of_draws_lie_in_the_ellipse():
     rng = np.random.default_rng(5)
     covariance = np.array([[9.0, 4.0], [4.0, 5.0]])
     (ellipse,) = ellipses_of([covariance])
@@ -440,7 +435,7 @@ def test_ninety_five_percent_of_draws_lie_in_the_ellipse() -> None:
     ("turn", "axis", "meaning"),
     [(0, [1.0, 0, 0], "tips to its right"), (1, [0, 1.0, 0], "looks down"), (2, [0, 0, 1.0], "looks left")],
 )
-def test_roll_pitch_and_yaw_are_turns_about_the_radar_axes(turn: int, axis: list[float], meaning: str) -> None:
+def test_roll_pitch_and_yaw_are_turns_about_the_radar_axes(turn, axis, meaning):
     radar_from_body = rotation_exp(0.1 * np.array(axis))
     camera_from_radar = RigidTransform(OPTICAL_FROM_BODY @ radar_from_body.T, np.zeros(3))
     expected = np.zeros(3)
@@ -450,7 +445,7 @@ def test_roll_pitch_and_yaw_are_turns_about_the_radar_axes(turn: int, axis: list
     assert {"tips to its right": left[2] > 0, "looks down": ahead[2] < 0, "looks left": ahead[1] > 0}[meaning]
 
 
-def test_the_sigmas_of_the_mounting_are_those_of_many_perturbed_poses() -> None:
+def test_the_sigmas_of_the_mounting_are_those_of_many_perturbed_poses():
     rng = np.random.default_rng(11)
     root = 1e-3 * rng.normal(size=(6, 6))
     covariance = root @ root.T
@@ -474,5 +469,5 @@ def test_the_sigmas_of_the_mounting_are_those_of_many_perturbed_poses() -> None:
         ("solving…", "Solving…"),
     ],
 )
-def test_a_phrase_becomes_a_sentence(phrase: str, text: str) -> None:
+def test_a_phrase_becomes_a_sentence(phrase, text):
     assert sentence(phrase) == text

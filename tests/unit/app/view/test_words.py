@@ -36,7 +36,7 @@ def words() -> str:
     return "\n\n".join("\n".join(_lines(name, seen)) for name, seen in _views()) + "\n"
 
 
-def test_the_words_of_the_views_are_those_that_were_kept() -> None:
+def test_the_words_of_the_views_are_those_that_were_kept():
     assert words() == KEPT.read_text(encoding="utf-8"), "run: python -m tests.unit.app.view.test_words"
 
 

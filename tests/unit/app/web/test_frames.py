@@ -53,18 +53,17 @@ def executor() -> Iterator[ThreadPoolExecutor]:
         yield pool
 
 
-def test_recorded_bytes_pass_through_untouched(executor: ThreadPoolExecutor) -> None:
+def test_recorded_bytes_pass_through_untouched(executor):
     pictures = Pictures(64, 48)
     frame = asyncio.run(FrameStore(pictures, 10, executor).get(3))
     assert frame.data is pictures.data
     assert frame.header == FrameHeader(3, 0, 64, 48, 1.0, "jpeg")
 
 
-def test_a_large_frame_is_halved_for_playing_and_a_small_one_is_not(executor: ThreadPoolExecutor) -> None:
+def test_a_large_frame_is_halved_for_playing_and_a_small_one_is_not(executor):
     large, small = Pictures(2000, 1500), Pictures(640, 480)
     halved = asyncio.run(FrameStore(large, 10, executor).get(0, "half"))
     picture = cv2.imdecode(np.frombuffer(halved.data, np.uint8), cv2.IMREAD_COLOR)
-    assert picture is not None
     assert picture.shape[:2] == (750, 1000)
     assert halved.header == FrameHeader(0, 0, 2000, 1500, 0.5, "jpeg")
     assert asyncio.run(FrameStore(small, 10, executor).get(0, "half")).data is small.data
@@ -73,7 +72,7 @@ def test_a_large_frame_is_halved_for_playing_and_a_small_one_is_not(executor: Th
 @pytest.mark.parametrize(
     ("size", "suffix"), [((2000, 1500), ".jpg"), ((640, 480), ".png"), ((5000, 40), ".jpg"), ((100, 80), ".png")]
 )
-def test_a_thumbnail_is_a_small_jpeg(executor: ThreadPoolExecutor, size: tuple[int, int], suffix: str) -> None:
+def test_a_thumbnail_is_a_small_jpeg(executor, size, suffix):
     thumbnail = asyncio.run(FrameStore(Pictures(*size, suffix=suffix), 10, executor).get(0, "thumbnail"))
     picture = cv2.imdecode(np.frombuffer(thumbnail.data, np.uint8), cv2.IMREAD_COLOR)
     assert picture is not None
@@ -81,7 +80,7 @@ def test_a_thumbnail_is_a_small_jpeg(executor: ThreadPoolExecutor, size: tuple[i
     assert picture.shape[1] == min(480, size[0])
 
 
-def test_concurrent_requests_share_one_read_off_the_event_loop(executor: ThreadPoolExecutor) -> None:
+def test_concurrent_requests_share_one_read_off_the_event_loop(executor):
     pictures = Pictures(64, 48)
 
     async def ask() -> None:
@@ -95,7 +94,7 @@ def test_concurrent_requests_share_one_read_off_the_event_loop(executor: ThreadP
     assert threading.get_ident() not in pictures.threads
 
 
-def test_the_loop_runs_on_while_a_frame_is_read(executor: ThreadPoolExecutor) -> None:
+def test_the_loop_runs_on_while_a_frame_is_read(executor):
     pictures = Pictures(64, 48)
     pictures.may_read.clear()
 
@@ -109,7 +108,7 @@ def test_the_loop_runs_on_while_a_frame_is_read(executor: ThreadPoolExecutor) ->
     asyncio.run(ask())
 
 
-def test_a_client_that_leaves_early_does_not_cancel_the_frame_for_others(executor: ThreadPoolExecutor) -> None:
+def test_a_client_that_leaves_early_does_not_cancel_the_frame_for_others(executor):
     pictures = Pictures(64, 48)
     pictures.may_read.clear()
 
@@ -125,7 +124,7 @@ def test_a_client_that_leaves_early_does_not_cancel_the_frame_for_others(executo
     assert pictures.read == [1]
 
 
-def test_playing_a_long_recording_keeps_few_of_its_frames(executor: ThreadPoolExecutor) -> None:
+def test_playing_a_long_recording_keeps_few_of_its_frames(executor):
     pictures = Pictures(64, 48)
     pictures.data += bytes(1 << 20)
 
@@ -138,7 +137,7 @@ def test_playing_a_long_recording_keeps_few_of_its_frames(executor: ThreadPoolEx
     asyncio.run(play())
 
 
-def test_the_memory_stays_within_the_budget_and_drops_the_oldest(executor: ThreadPoolExecutor) -> None:
+def test_the_memory_stays_within_the_budget_and_drops_the_oldest(executor):
     pictures = Pictures(64, 48)
     budget = 3 * len(pictures.data)
 
@@ -158,9 +157,7 @@ def test_the_memory_stays_within_the_budget_and_drops_the_oldest(executor: Threa
 @pytest.mark.parametrize(
     ("start", "step", "expected"), [(4, 1, [4, 5, 6]), (4, -1, [2, 3, 4]), (9, 1, [9]), (4, 0, [4])]
 )
-def test_prefetching_goes_in_the_direction_of_play_and_stops_at_the_end(
-    executor: ThreadPoolExecutor, start: int, step: int, expected: list[int]
-) -> None:
+def test_prefetching_goes_in_the_direction_of_play_and_stops_at_the_end(executor, start, step, expected):
     pictures = Pictures(64, 48)
 
     async def ask() -> None:
@@ -174,7 +171,7 @@ def test_prefetching_goes_in_the_direction_of_play_and_stops_at_the_end(
     assert sorted(pictures.read) == expected
 
 
-def test_a_broken_frame_is_an_error_only_when_it_is_requested(executor: ThreadPoolExecutor) -> None:
+def test_a_broken_frame_is_an_error_only_when_it_is_requested(executor):
     pictures = Pictures(64, 48)
 
     async def ask() -> None:
@@ -188,12 +185,12 @@ def test_a_broken_frame_is_an_error_only_when_it_is_requested(executor: ThreadPo
 
 
 @pytest.mark.parametrize("index", [-1, 10])
-def test_there_is_no_frame_outside_the_recording(executor: ThreadPoolExecutor, index: int) -> None:
+def test_there_is_no_frame_outside_the_recording(executor, index):
     with pytest.raises(IndexError):
         asyncio.run(FrameStore(Pictures(64, 48), 10, executor).get(index))
 
 
-def test_a_closed_store_leaves_nothing_pending_and_starts_nothing(executor: ThreadPoolExecutor) -> None:
+def test_a_closed_store_leaves_nothing_pending_and_starts_nothing(executor):
     pictures = Pictures(64, 48)
     pictures.may_read.clear()
 
@@ -212,9 +209,7 @@ def test_a_closed_store_leaves_nothing_pending_and_starts_nothing(executor: Thre
     assert 6 not in pictures.read
 
 
-def test_a_rectified_frame_is_made_with_the_intrinsics_of_the_moment_and_not_kept_for_others(
-    executor: ThreadPoolExecutor,
-) -> None:
+def test_a_rectified_frame_is_made_with_the_intrinsics_of_the_moment_and_not_kept_for_others(executor):
     def camera(k1: float) -> Camera:
         matrix = np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]])
         return Camera("plumb_bob", 640, 480, matrix, np.array([k1, 0, 0, 0]))
@@ -237,7 +232,7 @@ def test_a_rectified_frame_is_made_with_the_intrinsics_of_the_moment_and_not_kep
     asyncio.run(run())
 
 
-def test_intrinsics_of_another_size_rectify_nothing(executor: ThreadPoolExecutor) -> None:
+def test_intrinsics_of_another_size_rectify_nothing(executor):
     small = Camera("pinhole", 64, 48, np.array([[50.0, 0, 32], [0, 50, 24], [0, 0, 1]]))
     store = FrameStore(Pictures(640, 480), 10, executor, camera=lambda: small)
     with pytest.raises(InputError, match="64 x 48 px, and the picture has 640 x 480"):

@@ -5,7 +5,6 @@ import struct
 import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -84,13 +83,13 @@ FACTS = RecordingFacts("drive", 1_700_000_000_123_456_789 + 100_000_000 * np.ara
         ('{"type":"import_clicks","text":"{}","name":"a.json"}', ImportWanted("{}", "a.json")),
     ],
 )
-def test_every_message_of_the_page_is_understood_with_and_without_a_request(text: str, command) -> None:
+def test_every_message_of_the_page_is_understood_with_and_without_a_request(text, command):
     assert parse(text) == Incoming(command)
     assert parse(text[:-1] + ',"request":12}') == Incoming(command, 12)
     assert parse(text.encode()) == Incoming(command)
 
 
-def test_a_frame_is_asked_for_with_the_number_its_picture_will_carry() -> None:
+def test_a_frame_is_asked_for_with_the_number_its_picture_will_carry():
     assert parse('{"type":"frame","index":3,"request":9,"playing":true,"size":"half"}') == Incoming(
         FrameWanted(3, 9, playing=True, size="half")
     )
@@ -141,18 +140,18 @@ def test_a_frame_is_asked_for_with_the_number_its_picture_will_carry() -> None:
         ('{"type":"options_changed","options":[]}', "`$.options`"),
     ],
 )
-def test_what_is_not_understood_is_refused_with_a_clear_error(text: str, words: str) -> None:
+def test_what_is_not_understood_is_refused_with_a_clear_error(text, words):
     with pytest.raises(InputError) as refused:
         parse(text)
     assert words in str(refused.value)
 
 
-def test_an_option_that_does_not_exist_is_refused_with_the_nearest_one() -> None:
+def test_an_option_that_does_not_exist_is_refused_with_the_nearest_one():
     with pytest.raises(OptionError, match=r"did you mean 'noise\.sigma_px'\?"):
         parse('{"type":"options_changed","options":{"noise":{"sigma":1}}}')
 
 
-def test_a_message_that_is_too_long_or_too_deep_is_refused() -> None:
+def test_a_message_that_is_too_long_or_too_deep_is_refused():
     with pytest.raises(InputError, match="longer than 4 MB"):
         parse("x" * (MAX_TEXT_BYTES + 1))
     with pytest.raises(InputError, match="not JSON"):
@@ -160,7 +159,7 @@ def test_a_message_that_is_too_long_or_too_deep_is_refused() -> None:
 
 
 @given(st.one_of(st.text(max_size=200), st.binary(max_size=200)))
-def test_arbitrary_input_is_refused(text: str | bytes) -> None:
+def test_arbitrary_input_is_refused(text):
     with pytest.raises(CalibrationError):
         parse(text)
     assert request_of(text) is None or isinstance(request_of(text), int)
@@ -181,7 +180,7 @@ json_values = st.recursive(
         st.sampled_from(["id", "index", "request", "pixel_px", "image_time", "options", "clicks"]), json_values
     ),
 )
-def test_a_known_type_with_odd_fields_is_understood_or_refused(kind: str, fields: dict[str, object]) -> None:
+def test_a_known_type_with_odd_fields_is_understood_or_refused(kind, fields):
     try:
         parsed = parse(json.dumps({"type": kind, **fields}))
     except CalibrationError:
@@ -200,13 +199,11 @@ def test_a_known_type_with_odd_fields_is_understood_or_refused(kind: str, fields
         (b"\xff\xfe", None),
     ],
 )
-def test_the_number_of_a_refused_message_is_found_where_it_can_be(
-    text: str | bytes, request_number: int | None
-) -> None:
+def test_the_number_of_a_refused_message_is_found_where_it_can_be(text, request_number):
     assert request_of(text) == request_number
 
 
-def test_a_view_is_written_as_plain_json_with_its_type() -> None:
+def test_a_view_is_written_as_plain_json_with_its_type():
     history = advance(History(), ClickPlaced(TimeNs(int(FACTS.image_times[1])), (1.5, 2.5), "clicked"), FACTS)
     shown = view(history, FACTS)
     written = json.loads(encode(shown))
@@ -219,7 +216,7 @@ def test_a_view_is_written_as_plain_json_with_its_type() -> None:
 @pytest.mark.parametrize(
     ("name", "written"), [("drive\udcff.bag", "drive\\udcff.bag"), ("\ud800", "\\ud800"), ("é ✓", "é ✓")]
 )
-def test_a_name_that_is_not_unicode_is_written_as_an_escape(name: str, written: str) -> None:
+def test_a_name_that_is_not_unicode_is_written_as_an_escape(name, written):
     stamps = StampColumns.of(FACTS.image_times)
     sensors = (SensorNote("radar", name, about=(name,)),)
     note = RecordingNote(
@@ -232,7 +229,7 @@ def test_a_name_that_is_not_unicode_is_written_as_an_escape(name: str, written: 
 
 
 @given(st.text(st.characters()), st.text(st.characters(categories=["Cs"]), min_size=1))
-def test_no_text_keeps_a_message_from_being_sent(text: str, surrogates: str) -> None:
+def test_no_text_keeps_a_message_from_being_sent(text, surrogates):
     history = advance(History(), ClickPlaced(TimeNs(int(FACTS.image_times[1])), (1.5, 2.5), "clicked"), FACTS)
     before = view(history, FACTS)
     after = replace(before, status=text, clicks=(replace(before.clicks[0], note=text + surrogates),))
@@ -240,7 +237,7 @@ def test_no_text_keeps_a_message_from_being_sent(text: str, surrogates: str) -> 
     json.loads(encode(after).encode("utf-8"))
 
 
-def test_numbers_that_are_not_finite_become_null() -> None:
+def test_numbers_that_are_not_finite_become_null():
     seen = RadarReturn(1.0, 2.0, 3.0, float("nan"), float("inf"), True, 2.0, 1.0, 2.0, 0.0, 26.6, 41.8)
     overlay = Overlay(3, 5, (seen,), (OverlayGuess((4.0, 5.0), 6.0),))
     assert json.loads(encode(overlay)) == {
@@ -261,11 +258,11 @@ def test_numbers_that_are_not_finite_become_null() -> None:
         (Overlay(1, 2, None, ()), {"type": "overlay", "index": 1, "revision": 2, "returns": None, "guesses": []}),
     ],
 )
-def test_a_message_to_the_page_carries_its_type(message, written: dict[str, object]) -> None:
+def test_a_message_to_the_page_carries_its_type(message, written):
     assert json.loads(encode(message)) == written
 
 
-def test_a_recording_is_sent_with_every_nanosecond_and_every_option_described() -> None:
+def test_a_recording_is_sent_with_every_nanosecond_and_every_option_described():
     stamps = StampColumns.of(FACTS.image_times)
     note = RecordingNote(
         "d", "/r", "/i", 640, 480, True, stamps, Stamp(1, 2), stamps, (), (), SessionNote("/s", 0), "0.1"
@@ -275,7 +272,7 @@ def test_a_recording_is_sent_with_every_nanosecond_and_every_option_described() 
     assert [group["name"] for group in written["option_groups"]][:2] == ["", "gating"]
 
 
-def test_a_picture_travels_with_its_header_before_its_bytes() -> None:
+def test_a_picture_travels_with_its_header_before_its_bytes():
     message = encode_frame(FrameHeader(3, 9, 640, 480, 0.5, "jpeg"), b"\xff\xd8picture")
     (length,) = struct.unpack("<I", message[:4])
     assert json.loads(message[4 : 4 + length]) == {
@@ -290,12 +287,12 @@ def test_a_picture_travels_with_its_header_before_its_bytes() -> None:
     assert message[4 + length :] == b"\xff\xd8picture"
 
 
-def test_the_types_of_the_page_are_those_of_the_program(project_root: Path) -> None:
+def test_the_types_of_the_page_are_those_of_the_program(project_root):
     kept = (project_root / "static" / "messages.d.ts").read_text(encoding="utf-8")
     assert kept == declarations(), "run: python -m cocalib.web.messages > static/messages.d.ts"
 
 
-def test_the_types_of_the_page_are_printed_by_one_command(project_root: Path) -> None:
+def test_the_types_of_the_page_are_printed_by_one_command(project_root):
     command = [sys.executable, "-m", "cocalib.web.messages"]
     done = subprocess.run(command, cwd=project_root, capture_output=True, check=True, timeout=60)
     assert done.stdout.decode() == declarations()

@@ -34,7 +34,7 @@ def stretch(first: int, last: int) -> Stretch:
     return Stretch(Start(first, edges(WAY[first])), last)
 
 
-def test_a_box_is_followed_to_the_end_of_its_stretch_and_no_farther() -> None:
+def test_a_box_is_followed_to_the_end_of_its_stretch_and_no_farther():
     pictures = Pictures()
     work = follower(pictures)
     work.want([stretch(5, 20)])
@@ -47,7 +47,7 @@ def test_a_box_is_followed_to_the_end_of_its_stretch_and_no_farther() -> None:
     assert work.progress == (15, 15)
 
 
-def test_a_longer_stretch_goes_on_where_the_shorter_one_ended() -> None:
+def test_a_longer_stretch_goes_on_where_the_shorter_one_ended():
     pictures = Pictures()
     work = follower(pictures)
     work.want([stretch(0, 10)])
@@ -59,7 +59,7 @@ def test_a_longer_stretch_goes_on_where_the_shorter_one_ended() -> None:
     assert pictures.read[before:] == [11, 12, 13, 14]
 
 
-def test_the_last_of_those_wanted_comes_first_and_others_are_dropped() -> None:
+def test_the_last_of_those_wanted_comes_first_and_others_are_dropped():
     pictures = Pictures()
     work = follower(pictures)
     work.want([stretch(0, 30), stretch(40, 45)])
@@ -70,7 +70,7 @@ def test_the_last_of_those_wanted_comes_first_and_others_are_dropped() -> None:
     assert list(work.followed) == [Start(0, edges(WAY[0]))]
 
 
-def test_stopping_leaves_boxes_where_they_are() -> None:
+def test_stopping_leaves_boxes_where_they_are():
     work = follower(Pictures())
     work.want([stretch(0, 40)])
     for _ in range(3):
@@ -82,7 +82,7 @@ def test_stopping_leaves_boxes_where_they_are() -> None:
     assert "stopped" in found.ended
 
 
-def test_a_frame_that_cannot_be_decoded_ends_the_box_with_the_reason() -> None:
+def test_a_frame_that_cannot_be_decoded_ends_the_box_with_the_reason():
     work = follower(Pictures(broken=8))
     work.want([stretch(0, 40)])
     work.go_on(60.0)
@@ -91,7 +91,7 @@ def test_a_frame_that_cannot_be_decoded_ends_the_box_with_the_reason() -> None:
     assert "frame 9 cannot be decoded" in found.ended
 
 
-def test_boxes_of_halved_pictures_are_those_of_the_recorded_ones() -> None:
+def test_boxes_of_halved_pictures_are_those_of_the_recorded_ones():
     work = follower(Pictures(scale=0.5))
     left, top, right, bottom = (2 * (value + 0.5) - 0.5 for value in edges(WAY[0]))
     start = Start(0, (left, top, right, bottom))

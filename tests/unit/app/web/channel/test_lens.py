@@ -64,7 +64,7 @@ def found(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def at_desk(workspace: Workspace, visit: Callable[[LensDesk, list[Outgoing]], Any]) -> list[Outgoing]:
     """Run a visit at a desk; return what the pages were told."""
-    return visited(lambda tell: LensDesk(workspace, Frames(), tell), visit)  # type: ignore[arg-type]
+    return visited(lambda tell: LensDesk(workspace, Frames(), tell), visit)
 
 
 async def until_done(told: list[Outgoing]) -> LensState:
@@ -75,7 +75,7 @@ async def until_done(told: list[Outgoing]) -> LensState:
 
 
 @pytest.mark.usefixtures("found")
-def test_a_lens_is_calibrated_shown_used_and_saved(workspace: Workspace) -> None:
+def test_a_lens_is_calibrated_shown_used_and_saved(workspace):
     async def visit(desk: LensDesk, told: list[Outgoing]) -> None:
         with pytest.raises(InputError, match="no calibrated lens"):
             await desk.obey(LensUse())
@@ -85,7 +85,6 @@ def test_a_lens_is_calibrated_shown_used_and_saved(workspace: Workspace) -> None
         await desk.obey(WANTED)
         state = await until_done(told)
         assert (state.result, state.in_use, state.chosen) == (1, False, False)
-        assert state.intrinsics is not None
         assert state.intrinsics.about == "/camera_info", "nothing is used before the person says so"
         await desk.obey(LensUse())
         desk.follow()
@@ -99,9 +98,7 @@ def test_a_lens_is_calibrated_shown_used_and_saved(workspace: Workspace) -> None
 
     told = at_desk(workspace, visit)
     assert [type(one) for one in told].index(LensResult) < len(told) - 1
-    assert workspace.camera is not None
     np.testing.assert_array_equal(workspace.camera.parameters, FOUND.parameters)
-    assert workspace.camera_file is not None
     np.testing.assert_allclose(workspace.camera_file.camera().parameters, FOUND.parameters)
     workspace.undo()
     assert workspace.camera is GIVEN
@@ -118,7 +115,7 @@ def test_a_lens_is_calibrated_shown_used_and_saved(workspace: Workspace) -> None
         (LensCalibrate("aprilgrid", "6x6", 20.0, 0.0), "tag spacing 0: give the gap"),
     ],
 )
-def test_a_board_that_cannot_be_is_refused_in_words(workspace: Workspace, wanted: LensCalibrate, said: str) -> None:
+def test_a_board_that_cannot_be_is_refused_in_words(workspace, wanted, said):
     async def visit(desk: LensDesk, told: list[Outgoing]) -> None:
         with pytest.raises(InputError, match=said):
             await desk.obey(wanted)
@@ -128,7 +125,7 @@ def test_a_board_that_cannot_be_is_refused_in_words(workspace: Workspace, wanted
     at_desk(workspace, visit)
 
 
-def test_what_a_page_sends_becomes_a_request_and_what_it_is_told_is_json(workspace: Workspace) -> None:
+def test_what_a_page_sends_becomes_a_request_and_what_it_is_told_is_json(workspace):
     command = parse('{"type":"lens_calibrate","kind":"checkerboard","size":"9x6","square_mm":25,"request":4}').command
     assert command == WANTED
     with pytest.raises(InputError, match="lens_calibrate"):
@@ -172,7 +169,7 @@ LENS = CalibratedLens(
 )
 
 
-def test_intrinsics_are_shown_with_what_is_known_of_them() -> None:
+def test_intrinsics_are_shown_with_what_is_known_of_them():
     table = camera_table(CAMERA, "camera.yaml")
     assert [(row.label, row.value, row.unit) for row in table.parameters[:2]] == [
         ("fx", "500.0 ± 0.5", "px"),
@@ -185,7 +182,7 @@ def test_intrinsics_are_shown_with_what_is_known_of_them() -> None:
     assert not unknown.known
 
 
-def test_a_lens_is_shown_with_its_views_what_was_left_out_and_why() -> None:
+def test_a_lens_is_shown_with_its_views_what_was_left_out_and_why():
     shown = lens_result(4, LENS, "the board")
     assert [view.frame for view in shown.views] == [7, 9, 3], "the worst first"
     assert [(one.index, one.reason) for one in shown.left_out] == [(5, "blurred")]
@@ -196,14 +193,13 @@ def test_a_lens_is_shown_with_its_views_what_was_left_out_and_why() -> None:
     assert shown.choice == "pinhole: the others predict no better."
     assert shown.warnings[0].message == "The board is bent."
     assert len(shown.residuals) == 33, "of corners that were used"
-    assert shown.uncertainty is not None
     assert shown.uncertainty.sigma_px.shape == (16, 24)
     assert '"sigma_px":[[' in encode(shown)
     assert '"held_out_rms_px":null' in encode(shown), "what is not known is no number"
 
 
 @pytest.mark.parametrize(("frame", "count"), [(7, 12), (5, 0)])
-def test_the_corners_of_a_frame_are_those_of_its_view(frame: int, count: int) -> None:
+def test_the_corners_of_a_frame_are_those_of_its_view(frame, count):
     corners = view_corners(LENS, frame)
     assert len(corners) == count
     assert [one[4] for one in corners] == [number != 5 for number in range(count)]

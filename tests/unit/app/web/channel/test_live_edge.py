@@ -6,7 +6,6 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from calib_core.association.placements import Placement
 from calib_core.measurements import NS_PER_S, TimeNs
@@ -62,7 +61,6 @@ def follow(
     writer = SampleWriter(tmp_path / "drive.mcap")
     writer.write_until(10.0)
     recording = AwaitedRecording([tmp_path / "drive.mcap"]).look()
-    assert recording is not None
     facts = RecordingFacts("drive", recording.image_times, 960, 600)
     session_file = open_session_file(tmp_path / "session", facts)
     workspace = Workspace(facts, session_file.restored, session_file, NoSolver())
@@ -83,7 +81,7 @@ def follow(
     writer.stop()
 
 
-def test_every_frame_is_told_once_and_in_order(tmp_path: Path) -> None:
+def test_every_frame_is_told_once_and_in_order(tmp_path):
     async def story(writer: SampleWriter, pages: ToldPages, workspace: Workspace, recording: FollowedRecording) -> None:
         known = len(recording.image_times)
         for seconds in (12.0, 15.0, 25.0):
@@ -102,7 +100,7 @@ def test_every_frame_is_told_once_and_in_order(tmp_path: Path) -> None:
     follow(tmp_path, story)
 
 
-def test_in_the_end_the_placements_are_those_of_the_whole_recording(tmp_path: Path) -> None:
+def test_in_the_end_the_placements_are_those_of_the_whole_recording(tmp_path):
     async def story(writer: SampleWriter, pages: ToldPages, workspace: Workspace, recording: FollowedRecording) -> None:
         writer.write_until(60.0)
         await until(lambda: pages.survey is not None and len(pages.survey.rows) > 2)
@@ -112,19 +110,18 @@ def test_in_the_end_the_placements_are_those_of_the_whole_recording(tmp_path: Pa
             [window async for window in _windows(recording, pages)], recording.image_times, GatingOptions()
         )
         await until(lambda: pages.survey is not None and pages.survey.rows == whole.rows)
-        assert pages.survey is not None
         assert pages.survey.activity == whole.activity
 
     follow(tmp_path, story)
 
 
-async def _windows(recording: FollowedRecording, pages: ToldPages):  # type: ignore[no-untyped-def]
+async def _windows(recording: FollowedRecording, pages: ToldPages):
     await until(lambda: recording.is_complete)
     for window in recording.radar_windows():
         yield window
 
 
-def test_a_file_that_was_truncated_ends_the_following_in_words(tmp_path: Path) -> None:
+def test_a_file_that_was_truncated_ends_the_following_in_words(tmp_path):
     async def story(writer: SampleWriter, pages: ToldPages, workspace: Workspace, recording: FollowedRecording) -> None:
         workspace.dispatch(ClickPlaced(TimeNs(int(recording.image_times[0])), (1.0, 2.0), "clicked"))
         with (tmp_path / "drive.mcap").open("r+b") as file:
@@ -137,7 +134,7 @@ def test_a_file_that_was_truncated_ends_the_following_in_words(tmp_path: Path) -
     follow(tmp_path, story)
 
 
-def test_a_writer_that_stops_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_writer_that_stops_is_told(tmp_path, monkeypatch):
     monkeypatch.setattr("cocalib.web.channel.live_edge._QUIET_AFTER_S", 0.05)
 
     async def story(writer: SampleWriter, pages: ToldPages, workspace: Workspace, recording: FollowedRecording) -> None:
@@ -151,12 +148,12 @@ def test_a_writer_that_stops_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyP
     follow(tmp_path, story)
 
 
-def test_a_growing_survey_without_scans_is_empty() -> None:
+def test_a_growing_survey_without_scans_is_empty():
     survey = GrowingSurvey(GatingOptions()).survey(np.array([0, 10**9]))
     assert survey.rows == ()
 
 
-def test_placements_are_found_while_the_reflector_still_stands(project_root: Path) -> None:
+def test_placements_are_found_while_the_reflector_still_stands(project_root):
     """In steps of two seconds; the first is there for more than half of the recording so far, and is found later."""
     folder = project_root / "sample_data" / "rooftop"
     found: dict[int, float] = {}

@@ -41,7 +41,7 @@ def _open_meaning(file: Path, recording: Recording) -> OpenMeaning:
     return meaning
 
 
-def test_the_rows_are_the_likely_meanings_with_their_place(file: Path, sample: Recording) -> None:
+def test_the_rows_are_the_likely_meanings_with_their_place(file, sample):
     rows = meaning_rows(_open_meaning(file, sample))
     assert rows.name == "extrinsic.json"
     assert {row.meaning for row in rows.rows[:2]} == {"camera_from_radar,body,m", "radar_from_camera,body,m"}
@@ -49,18 +49,16 @@ def test_the_rows_are_the_likely_meanings_with_their_place(file: Path, sample: R
     assert all(row.score.endswith("%") and row.mounting.startswith("the camera looks") for row in rows.rows)
 
 
-def test_nothing_is_offered_without_such_a_calibration() -> None:
+def test_nothing_is_offered_without_such_a_calibration():
     assert meaning_rows(None).rows == ()
 
 
-def test_each_row_is_drawn_differently_over_a_frame(file: Path, sample: Recording) -> None:
+def test_each_row_is_drawn_differently_over_a_frame(file, sample):
     meaning = _open_meaning(file, sample)
     first, second = (
         cv2.imdecode(np.frombuffer(drawn_meaning(meaning, sample, f"number={number}&frame=40"), np.uint8), 1)
         for number in (0, 1)
     )
-    assert first is not None
-    assert second is not None
     assert first.shape == second.shape
     assert (np.abs(first.astype(int) - second.astype(int)).max(axis=2) > 60).sum() > 100
 
@@ -68,12 +66,12 @@ def test_each_row_is_drawn_differently_over_a_frame(file: Path, sample: Recordin
 @pytest.mark.parametrize(
     "query", ["", "number=99&frame=1", "number=0&frame=999999", "number=-1&frame=0", "number=x&frame=²"]
 )
-def test_what_does_not_exist_is_refused(file: Path, sample: Recording, query: str) -> None:
+def test_what_does_not_exist_is_refused(file, sample, query):
     with pytest.raises(InputError, match="no such meaning or frame"):
         drawn_meaning(_open_meaning(file, sample), sample, query)
 
 
-def test_the_picked_meaning_is_the_calibration(file: Path, sample: Recording) -> None:
+def test_the_picked_meaning_is_the_calibration(file, sample):
     shown = reference_from(file, sample.camera(), MeaningPick("radar_from_camera,body,m", "front.T"))
     assert isinstance(shown, Reference)
     camera_radar_m = shown.calibration.camera_from_radar.inverse().translation_m
@@ -82,7 +80,7 @@ def test_the_picked_meaning_is_the_calibration(file: Path, sample: Recording) ->
     assert any("picked by hand" in message for message in assumed)
 
 
-def test_what_is_shown_with_an_assumption_says_so_and_can_be_picked_again(file: Path, sample: Recording) -> None:
+def test_what_is_shown_with_an_assumption_says_so_and_can_be_picked_again(file, sample):
     camera = sample.camera()
     assert camera is not None
     pick = MeaningPick("radar_from_camera,body,rfu,m", "front.T")
@@ -93,7 +91,7 @@ def test_what_is_shown_with_an_assumption_says_so_and_can_be_picked_again(file: 
     assert "extrinsic.json does not state what its numbers mean; it is shown as if it carries" in warning.message
 
 
-def test_a_format_that_leaves_something_open_is_shown_with_what_was_assumed(tmp_path: Path, sample: Recording) -> None:
+def test_a_format_that_leaves_something_open_is_shown_with_what_was_assumed(tmp_path, sample):
     camera, path = sample.camera(), tmp_path / "calib.txt"
     assert camera is not None
     rows = " ".join(map(str, np.array([[0, -1, 0, 0], [0, 0, -1, 0.1], [1, 0, 0, 0]], float).ravel()))

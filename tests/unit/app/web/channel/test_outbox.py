@@ -17,7 +17,7 @@ from cocalib.web.messages import encode
 from tests.page_view import applied
 
 
-def test_an_item_that_comes_between_the_end_of_the_last_one_and_its_callback_is_processed() -> None:
+def test_an_item_that_comes_between_the_end_of_the_last_one_and_its_callback_is_processed():
     async def run() -> list[int]:
         done: list[int] = []
         finished = asyncio.get_running_loop().create_future()
@@ -73,7 +73,7 @@ def clicked(count: int) -> View:
 
 
 @given(st.lists(st.tuples(views, st.booleans()), min_size=1, max_size=8))
-def test_a_page_that_applies_changes_has_the_newest_view(steps: list[tuple[View, bool]]) -> None:
+def test_a_page_that_applies_changes_has_the_newest_view(steps):
     """The second of each pair says whether the page reads at this moment; a page that does not gets one change later."""
     feed = ViewFeed(NOTHING)
     shown: Shown | None = None
@@ -90,7 +90,7 @@ def test_a_page_that_applies_changes_has_the_newest_view(steps: list[tuple[View,
 
 
 @given(views, views)
-def test_rows_may_move_and_share_an_id(before: View, after: View) -> None:
+def test_rows_may_move_and_share_an_id(before, after):
     before = replace(before, clicks=(*before.clicks, *before.clicks[:1]))
     after = replace(after, clicks=(*before.clicks[1:4], *after.clicks, *before.clicks[:2]))
     feed = ViewFeed(before)
@@ -101,7 +101,7 @@ def test_rows_may_move_and_share_an_id(before: View, after: View) -> None:
     assert (applied(page, json.loads(change)) if change else page) == json.loads(encode(after))
 
 
-def test_a_click_costs_the_same_however_many_there_are() -> None:
+def test_a_click_costs_the_same_however_many_there_are():
     sizes = []
     for count in (10, 400):
         feed = ViewFeed(clicked(count))
@@ -112,7 +112,7 @@ def test_a_click_costs_the_same_however_many_there_are() -> None:
     assert sizes[1] < 1000
 
 
-def test_pages_at_different_views_each_get_their_own_change() -> None:
+def test_pages_at_different_views_each_get_their_own_change():
     feed = ViewFeed(clicked(1))
     first, early = feed.message(None)
     feed.take(clicked(2))
@@ -125,6 +125,6 @@ def test_pages_at_different_views_each_get_their_own_change() -> None:
         assert after.view == clicked(3)
 
 
-def test_rows_that_do_not_change_are_the_same_objects() -> None:
+def test_rows_that_do_not_change_are_the_same_objects():
     before, after = clicked(3), clicked(4)
     assert all(old is new for old, new in zip(before.clicks, after.clicks[:3], strict=True))

@@ -30,7 +30,7 @@ def delivered(outbox: Outbox, count: int) -> list[str | bytes]:
     return got
 
 
-def test_of_one_kind_only_the_newest_is_sent_and_answers_are_all_sent() -> None:
+def test_of_one_kind_only_the_newest_is_sent_and_answers_are_all_sent():
     outbox = Outbox()
     for message, kind in (
         ("v1", "view"),
@@ -44,7 +44,7 @@ def test_of_one_kind_only_the_newest_is_sent_and_answers_are_all_sent() -> None:
     assert delivered(outbox, 4) == ["done 1", "v2", "done 2", "f2"]
 
 
-def test_a_page_that_reads_nothing_is_given_up() -> None:
+def test_a_page_that_reads_nothing_is_given_up():
     outbox = Outbox()
     for number in range(2001):
         outbox.put(f"done {number}")
@@ -56,7 +56,7 @@ def test_a_page_that_reads_nothing_is_given_up() -> None:
         asyncio.run(outbox.deliver(never))
 
 
-def test_of_the_waiting_work_only_the_newest_is_done() -> None:
+def test_of_the_waiting_work_only_the_newest_is_done():
     worked: list[int] = []
 
     async def run() -> None:
@@ -80,7 +80,7 @@ def test_of_the_waiting_work_only_the_newest_is_done() -> None:
     assert worked == [1, 4]
 
 
-def test_work_that_fails_is_logged_and_the_next_is_done(caplog: pytest.LogCaptureFixture) -> None:
+def test_work_that_fails_is_logged_and_the_next_is_done(caplog):
     worked: list[str] = []
 
     async def run() -> None:
@@ -122,7 +122,7 @@ def recorded() -> RadarScans:
     return RadarScans.from_scans(scans)
 
 
-def test_the_survey_finds_the_reflector_and_a_frame_to_click_in() -> None:
+def test_the_survey_finds_the_reflector_and_a_frame_to_click_in():
     image_times = (np.arange(0, 10, 0.7) * 1e9).astype(np.int64)
     survey = survey_of([recorded()], image_times, GatingOptions())
     [row] = survey.rows
@@ -135,7 +135,7 @@ def test_the_survey_finds_the_reflector_and_a_frame_to_click_in() -> None:
     assert placements_at(None, int(5e9)) == ()
 
 
-def test_the_activity_counts_returns_per_scan() -> None:
+def test_the_activity_counts_returns_per_scan():
     image_times = np.array([0, int(10e9)], dtype=np.int64)
     activity = survey_of([recorded()], image_times, GatingOptions()).activity
     in_the_middle = activity.returns[int(5 / activity.step_s)]
@@ -144,12 +144,12 @@ def test_the_activity_counts_returns_per_scan() -> None:
     assert len(activity.returns) * activity.step_s == pytest.approx(10)
 
 
-def test_a_placement_that_no_frame_shows_is_not_offered() -> None:
+def test_a_placement_that_no_frame_shows_is_not_offered():
     image_times = np.array([0, int(9.9e9)], dtype=np.int64)
     assert survey_of([recorded()], image_times, GatingOptions()).rows == ()
 
 
-def test_a_survey_in_windows_and_in_stretches_finds_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_survey_in_windows_and_in_stretches_finds_the_same(monkeypatch):
     image_times = (np.arange(0, 10, 0.7) * 1e9).astype(np.int64)
     whole, scans = survey_of([recorded()], image_times, GatingOptions()), recorded()
     windows = [scans.between(TimeNs(int(s * 1e9)), TimeNs(int((s + 1) * 1e9) - 1)) for s in range(10)]
@@ -161,7 +161,7 @@ def test_a_survey_in_windows_and_in_stretches_finds_the_same(monkeypatch: pytest
     assert in_stretches.activity == whole.activity
 
 
-def test_a_survey_of_no_radar_is_empty() -> None:
+def test_a_survey_of_no_radar_is_empty():
     survey = survey_of([], np.array([0, int(1e9)], dtype=np.int64), GatingOptions())
     assert survey.rows == ()
     assert set(survey.activity.returns) == {0.0}
@@ -173,16 +173,15 @@ class Radar:
         return recorded().between(TimeNs(low), TimeNs(high))
 
 
-def test_the_scan_of_a_frame_is_the_nearest_one_and_none_when_none_is_near() -> None:
-    sight = RadarSight(Radar())  # type: ignore[arg-type]
+def test_the_scan_of_a_frame_is_the_nearest_one_and_none_when_none_is_near():
+    sight = RadarSight(Radar())
     found = sight.scan_at(TimeNs(int(4.96e9)))
-    assert found is not None
     assert found.time == pytest.approx(5.0e9, abs=1e3)
     assert len(found) == 2
     assert sight.scan_at(TimeNs(int(60e9))) is None
 
 
-def test_without_a_calibration_nothing_is_projected_into_the_picture() -> None:
+def test_without_a_calibration_nothing_is_projected_into_the_picture():
     overlay = overlay_of(3, Session(), scan(0, [[5, 0, 0]]), ())
     assert overlay.returns is None
     assert overlay.guesses == ()

@@ -25,13 +25,13 @@ def compared(recording: PictureRecording, busy: list[bool]) -> list[PictureChang
     async def run() -> None:
         with ThreadPoolExecutor(1) as executor:
             times = recording.image_times
-            await changes_of(recording, times, executor, told.append, lambda: bool(busy) and busy.pop())  # type: ignore[arg-type]
+            await changes_of(recording, times, executor, told.append, lambda: bool(busy) and busy.pop())
 
     asyncio.run(run())
     return told
 
 
-def test_a_person_who_walks_changes_the_picture_and_one_who_stands_does_not() -> None:
+def test_a_person_who_walks_changes_the_picture_and_one_who_stands_does_not():
     recording = PictureRecording([walker(100), walker(100), walker(100), walker(130), walker(160)])
     last = compared(recording, [])[-1]
     assert last.complete
@@ -41,7 +41,7 @@ def test_a_person_who_walks_changes_the_picture_and_one_who_stands_does_not() ->
     assert min(walking) > 50
 
 
-def test_pictures_are_compared_only_while_nobody_plays() -> None:
+def test_pictures_are_compared_only_while_nobody_plays():
     recording = PictureRecording([walker(100), walker(130)])
     busy = [True]
     told = compared(recording, busy)
@@ -49,7 +49,7 @@ def test_pictures_are_compared_only_while_nobody_plays() -> None:
     assert told[-1].complete
 
 
-def test_the_first_comparisons_span_the_recording_and_none_crosses_a_gap() -> None:
+def test_the_first_comparisons_span_the_recording_and_none_crosses_a_gap():
     moments = START + (np.concatenate([np.arange(0, 100, 0.1), np.arange(4000, 4100, 0.1)]) * NS_PER_S).astype(np.int64)
     order = comparison_order(moments)
     assert len(order) == len(set(order)) == 300

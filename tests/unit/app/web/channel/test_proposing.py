@@ -65,7 +65,7 @@ def at_desk(
     workspace: Workspace, visit: Callable[[ProposingDesk, list[Any]], Any], recording: object = None, *, on: bool = True
 ) -> list[Any]:
     """Run a visit at a desk; return what the pages were told."""
-    return visited(lambda tell: ProposingDesk(workspace, recording or Sensors(), tell, on=on), visit)  # type: ignore[arg-type]
+    return visited(lambda tell: ProposingDesk(workspace, recording or Sensors(), tell, on=on), visit)
 
 
 async def until(told: list[Any], holds: Callable[[ProposalNews], bool]) -> ProposalNews:
@@ -76,7 +76,7 @@ async def until(told: list[Any], holds: Callable[[ProposalNews], bool]) -> Propo
     return news
 
 
-def test_pages_are_told_the_proposals_with_their_placements_and_frames(workspace: Workspace) -> None:
+def test_pages_are_told_the_proposals_with_their_placements_and_frames(workspace):
     async def visit(desk: ProposingDesk, told: list[Any]) -> None:
         desk.surveyed(PLACEMENTS)
         news = await until(told, lambda one: one.progress.stage == "ready")
@@ -92,16 +92,14 @@ def test_pages_are_told_the_proposals_with_their_placements_and_frames(workspace
             ]
         gone = news.rows[0].placement
         position_m = tuple(float(value) for value in PLACEMENTS[gone].position_radar_m)
-        workspace.dispatch(PlacementDismissed(DRAWN.views[gone].image_time, position_m))  # type: ignore[arg-type]
+        workspace.dispatch(PlacementDismissed(DRAWN.views[gone].image_time, position_m))
         desk.follow()
         await until(told, lambda one: gone not in [row.placement for row in one.rows])
 
     at_desk(workspace, visit)
 
 
-def test_a_click_is_averaged_over_the_frames_of_its_placement(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_click_is_averaged_over_the_frames_of_its_placement(workspace, monkeypatch):
     views = tuple(replace(view, width_px=28.0) for view in DRAWN.views)
     monkeypatch.setattr("cocalib.proposing.find_proposals", lambda *_, **__: (views, None))
     time = views[1].image_time
@@ -125,7 +123,7 @@ def test_a_click_is_averaged_over_the_frames_of_its_placement(
     at_desk(workspace, visit, Cameras())
 
 
-def test_nothing_is_proposed_until_it_is_switched_on_and_again_once_it_is_off(workspace: Workspace) -> None:
+def test_nothing_is_proposed_until_it_is_switched_on_and_again_once_it_is_off(workspace):
     async def visit(desk: ProposingDesk, told: list[Any]) -> None:
         desk.surveyed(PLACEMENTS)
         desk.switch(ProposingSwitch(on=True))
@@ -137,7 +135,7 @@ def test_nothing_is_proposed_until_it_is_switched_on_and_again_once_it_is_off(wo
     at_desk(workspace, visit, on=False)
 
 
-def test_without_radar_scans_it_says_so(workspace: Workspace) -> None:
+def test_without_radar_scans_it_says_so(workspace):
     async def visit(desk: ProposingDesk, told: list[Any]) -> None:
         desk.surveyed(())
         desk.switch(ProposingSwitch(on=True))

@@ -48,7 +48,7 @@ def row(lasted_s: float = 6.0, azimuth_deg: float = 10.0, snr_db: float | None =
     return PlacementRow(0.0, lasted_s, 3, 5.0, 1.0, (5.0, 0.0, 0.0), azimuth_deg, snr_db, 12.0, note)
 
 
-def test_without_a_placement_the_3d_view_reaches_as_far_as_the_radar_sees() -> None:
+def test_without_a_placement_the_3d_view_reaches_as_far_as_the_radar_sees():
     far = RadarScans.from_scans(
         [scan(0.1 * n, [(8.0, 0.0, 0.0, 0.0, 10.0), (180.0, 30.0, 0.0, 0.0, 10.0)]) for n in range(6)]
     )
@@ -58,7 +58,7 @@ def test_without_a_placement_the_3d_view_reaches_as_far_as_the_radar_sees() -> N
     assert surveyed_extent(survey_of([scans], scans.times_ns, GatingOptions()), seen).range_m < 10.0
 
 
-def test_without_frames_a_placement_is_found_at_the_radars_own_moments() -> None:
+def test_without_frames_a_placement_is_found_at_the_radars_own_moments():
     scans = recorded()
     survey = survey_of([scans], scans.times_ns, GatingOptions())
     (found,) = survey.rows
@@ -74,26 +74,26 @@ def test_without_frames_a_placement_is_found_at_the_radars_own_moments() -> None
     )
 
 
-def test_a_reflector_that_does_not_stand_out_is_named() -> None:
+def test_a_reflector_that_does_not_stand_out_is_named():
     scans = recorded(reflector_db=13.0)
     (found,) = survey_of([scans], scans.times_ns, GatingOptions()).rows
     assert found.stands_out_db == -2.0
     assert found.note == "2 dB weaker than other returns"
 
 
-def test_a_recording_shorter_than_a_placement_is_not_searched(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_recording_shorter_than_a_placement_is_not_searched(monkeypatch):
     monkeypatch.setattr("cocalib.web.channel.radar_survey.find_placements", None)
     scans = recorded().between(TimeNs(0), TimeNs(NS_PER_S))
     assert survey_of([scans], scans.times_ns, GatingOptions()).rows == ()
 
 
-def test_a_short_placement_is_named() -> None:
+def test_a_short_placement_is_named():
     assert placement_note(2.1, None) == "lasted only 2.1 s"
     assert placement_note(6.0, 4.0) == "only 4 dB above other returns"
     assert placement_note(6.0, 20.0) == ""
 
 
-def test_the_summary_says_how_many_where_and_which_to_look_at() -> None:
+def test_the_summary_says_how_many_where_and_which_to_look_at():
     rows = [row(), row(azimuth_deg=-31.2, snr_db=41.0), row(2.1, 28.4, note="lasted only 2.1 s"), row(), row()]
     assert placement_summary(rows, 60.0) == (
         "5 placements found, 5.0 to 5.0 m, azimuth 31° right to 28° left; strongest: placement 2, 41 dB; "
@@ -107,14 +107,14 @@ def test_the_summary_says_how_many_where_and_which_to_look_at() -> None:
     assert placement_summary([], 0.4) == "The recording is 0.4 s long, too short for a placement of 2 s or longer"
 
 
-def test_few_placements_are_a_warning() -> None:
+def test_few_placements_are_a_warning():
     few, enough = (placement_figures([row()] * count, 7.0, 10.0)[0] for count in (3, 4))
     assert (few.value, few.level) == ("3", "warning")
     assert (enough.value, enough.level) == ("4", "good")
     assert placement_figures([], 0.0, NAN)[1].value == "–"
 
 
-def test_the_map_says_how_long_something_was_where() -> None:
+def test_the_map_says_how_long_something_was_where():
     total = RadarMapSum(GatingOptions())
     for start in range(0, 20, 5):
         total.add(recorded().between(TimeNs(start * NS_PER_S), TimeNs((start + 5) * NS_PER_S - 1)))
@@ -128,7 +128,7 @@ def test_the_map_says_how_long_something_was_where() -> None:
     assert found.low_db <= 15 <= 30 <= found.high_db + 0.5
 
 
-def test_a_radar_without_amplitude_has_a_map_without_amplitude() -> None:
+def test_a_radar_without_amplitude_has_a_map_without_amplitude():
     total = RadarMapSum(GatingOptions())
     total.add(RadarScans.from_scans([scan(time_s, [(5.0, 0.0, 0.0, 0.0, NAN)]) for time_s in range(5)]))
     found = total.total()
@@ -136,14 +136,14 @@ def test_a_radar_without_amplitude_has_a_map_without_amplitude() -> None:
     assert found.share == (1.0,)
 
 
-def test_equal_amplitudes_are_not_coloured() -> None:
+def test_equal_amplitudes_are_not_coloured():
     total = RadarMapSum(GatingOptions())
     total.add(RadarScans.from_scans([scan(time_s, [(5.0, 0.0, 0.0, 0.0, 1.0)]) for time_s in range(5)]))
     assert (total.total().snr_db, total.total().low_db) == ((), None)
 
 
-def test_returns_of_the_last_seconds_are_shown_with_their_age() -> None:
-    sight, now = RadarSight(Radar()), TimeNs(6 * NS_PER_S)  # type: ignore[arg-type]
+def test_returns_of_the_last_seconds_are_shown_with_their_age():
+    sight, now = RadarSight(Radar()), TimeNs(6 * NS_PER_S)
     trail = sight.trail(now, 2.0)
     assert (int(trail.times_ns[0]), int(trail.times_ns[-1])) == (4 * NS_PER_S, 6 * NS_PER_S)
     look = look_of(60, now, trail, GatingOptions())

@@ -71,7 +71,7 @@ def answers(session: Session, *requests: ReviewRequest, camera: Any = None) -> l
     return asyncio.run(ask())
 
 
-def test_now_and_the_method_in_use_are_the_same_answer(solved: Calibration) -> None:
+def test_now_and_the_method_in_use_are_the_same_answer(solved):
     session = Session(revision=3, outcome=solved, outcome_revision=3)
     (both,) = answers(session, CompareWanted("now", "default"))
 
@@ -93,7 +93,7 @@ def test_now_and_the_method_in_use_are_the_same_answer(solved: Calibration) -> N
         (CompareWanted("now", "paper"), "intrinsics are missing"),
     ],
 )
-def test_a_solution_that_does_not_exist_is_explained(solved: Calibration, request_: CompareWanted, words: str) -> None:
+def test_a_solution_that_does_not_exist_is_explained(solved, request_, words):
     guess = ReflectorClick(TimeNs(1), "c1", 1.0, 1.0, mark="untouched")
     (both,) = answers(Session(clicks=(guess,), revision=3, outcome=solved, outcome_revision=3), request_)
 
@@ -101,7 +101,7 @@ def test_a_solution_that_does_not_exist_is_explained(solved: Calibration, reques
     assert both["rows"] == []
 
 
-def test_without_an_answer_nothing_is_compared_and_nothing_drawn(solved: Calibration) -> None:
+def test_without_an_answer_nothing_is_compared_and_nothing_drawn(solved):
     for outcome in (None, replace(solved, checking=True)):
         (both,) = answers(Session(outcome=outcome), CompareWanted("now", "now"))
         assert "no checked calibration yet" in both["problem"]
@@ -110,7 +110,7 @@ def test_without_an_answer_nothing_is_compared_and_nothing_drawn(solved: Calibra
     assert (review["rows"], uncertainty["maps"]) == ([], [])
 
 
-def test_only_the_newest_of_several_requests_is_answered(solved: Calibration) -> None:
+def test_only_the_newest_of_several_requests_is_answered(solved):
     session = Session(revision=3, outcome=solved, outcome_revision=3)
     (both,) = answers(session, CompareWanted("now", "before"), CompareWanted("now", "default"))
 

@@ -40,7 +40,7 @@ def _ask(time: int, pixel_px: tuple[float, float]) -> Snapped:
     return asyncio.run(ask())
 
 
-def test_the_answer_is_the_apex_with_its_sigma() -> None:
+def test_the_answer_is_the_apex_with_its_sigma():
     u, v = _LOOK.apex_px + np.array([5.0, -4.0])
     answer = _ask(1_100_000_000, (u, v))
     assert answer.pixel_px == pytest.approx(_LOOK.apex_px, abs=0.5)
@@ -50,18 +50,18 @@ def test_the_answer_is_the_apex_with_its_sigma() -> None:
 
 
 @pytest.mark.parametrize("pixel_px", [(30.0, 30.0), (1e30, -1e30)])
-def test_no_corner_is_an_answer_with_a_reason(pixel_px: tuple[float, float]) -> None:
+def test_no_corner_is_an_answer_with_a_reason(pixel_px):
     answer = _ask(1_000_000_000, pixel_px)
     assert (answer.pixel_px, answer.sigma_px) == (None, None)
     assert answer.words.startswith("No corner found: ")
 
 
-def test_a_stamp_without_a_frame_is_refused() -> None:
+def test_a_stamp_without_a_frame_is_refused():
     with pytest.raises(InputError, match="no frame has the stamp 1050000000"):
         _ask(1_050_000_000, (100.0, 100.0))
 
 
-def test_the_message_of_a_page_is_understood_and_answered_by_its_type() -> None:
+def test_the_message_of_a_page_is_understood_and_answered_by_its_type():
     text = '{"type":"snap_wanted","image_time":{"sec":1,"nanosec":5},"pixel_px":[3.5,4],"id":null,"request":7}'
     incoming = parse(text)
     assert incoming.command == SnapWanted(TimeNs(1_000_000_005), (3.5, 4.0), None)

@@ -23,7 +23,7 @@ class Clock:
         return self.now
 
 
-def test_the_delay_grows_to_a_limit_and_is_forgotten() -> None:
+def test_the_delay_grows_to_a_limit_and_is_forgotten():
     clock = Clock()
     tries = Backoff(clock)
     delays = []
@@ -40,7 +40,7 @@ def test_the_delay_grows_to_a_limit_and_is_forgotten() -> None:
     assert tries.delay_s == 0
 
 
-def test_tries_take_turns_and_only_so_many_wait() -> None:
+def test_tries_take_turns_and_only_so_many_wait():
     async def run() -> tuple[list[bool], list[bool]]:
         tries = Backoff()
         for _ in range(30):
@@ -65,9 +65,7 @@ def server(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[RunningS
         yield running
 
 
-def test_wrong_tokens_are_slowed_down_and_an_admitted_page_is_not(
-    server: RunningServer, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_wrong_tokens_are_slowed_down_and_an_admitted_page_is_not(server, monkeypatch):
     slept: list[float] = []
     sleep = asyncio.sleep
 

@@ -27,13 +27,13 @@ class Door(Guard):
     def __init__(self, *, session: str = "a", clock: Clock | None = None, **changes: object) -> None:
         self.clock = clock or Clock()
         self.admissions = Admissions(session, self.clock)
-        super().__init__(self.admissions, **{"host": "127.0.0.1", **changes})  # type: ignore[arg-type]
+        super().__init__(self.admissions, **{"host": "127.0.0.1", **changes})
         self.value = self.admissions.admit()
         self.cookie = f"{self.admissions.cookie_name}={self.value}"
 
 
 def guard(**changes: object) -> Door:
-    return Door(**changes)  # type: ignore[arg-type]
+    return Door(**changes)
 
 
 def allowed(door: Guard, asked: Request) -> bool:
@@ -45,7 +45,7 @@ def status(verdict: object) -> int:
     return verdict.status
 
 
-def test_the_link_admits_once_and_its_cookie_stays_valid() -> None:
+def test_the_link_admits_once_and_its_cookie_stays_valid():
     door = guard()
     link = f"/?token={door.token}"
     admitted = door.check(request(link))
@@ -62,7 +62,7 @@ def test_the_link_admits_once_and_its_cookie_stays_valid() -> None:
     )
 
 
-def test_after_a_link_was_used_the_next_one_works() -> None:
+def test_after_a_link_was_used_the_next_one_works():
     door = guard()
     first = door.token
     door.check(request(f"/?token={first}"))
@@ -71,7 +71,7 @@ def test_after_a_link_was_used_the_next_one_works() -> None:
 
 
 @pytest.mark.parametrize("method", ["HEAD", "POST", "OPTIONS"])
-def test_only_opening_a_link_uses_it_up(method: str) -> None:
+def test_only_opening_a_link_uses_it_up(method):
     door = guard()
     link = f"/?token={door.token}"
     preview = Request(link, {"host": ["127.0.0.1:8080"]}, method)
@@ -79,7 +79,7 @@ def test_only_opening_a_link_uses_it_up(method: str) -> None:
     assert isinstance(door.check(request(link)), Admitted)
 
 
-def test_a_token_chosen_by_the_user_stays_valid() -> None:
+def test_a_token_chosen_by_the_user_stays_valid():
     door = guard(token="mine")
     assert isinstance(door.check(request("/?token=mine")), Admitted)
     assert isinstance(door.check(request("/?token=mine")), Admitted)
@@ -87,7 +87,7 @@ def test_a_token_chosen_by_the_user_stays_valid() -> None:
 
 
 @pytest.mark.parametrize("session", ["a", "b"])
-def test_a_cookie_is_for_one_server_only(session: str) -> None:
+def test_a_cookie_is_for_one_server_only(session):
     one, other = guard(session="a"), guard(session=session)
     assert allowed(one, request(cookie=one.cookie))
     assert status(other.check(request(cookie=one.cookie))) == 401
@@ -95,7 +95,7 @@ def test_a_cookie_is_for_one_server_only(session: str) -> None:
     assert status(other.check(request(cookie=stolen))) == 401
 
 
-def test_servers_of_different_sessions_do_not_overwrite_each_others_cookies() -> None:
+def test_servers_of_different_sessions_do_not_overwrite_each_others_cookies():
     one, other = guard(session="a"), guard(session="b")
     assert one.admissions.cookie_name != other.admissions.cookie_name
     both = f"{other.cookie}; {one.cookie}"
@@ -103,7 +103,7 @@ def test_servers_of_different_sessions_do_not_overwrite_each_others_cookies() ->
     assert allowed(other, request(cookie=both))
 
 
-def test_an_admission_ends_when_it_is_not_used() -> None:
+def test_an_admission_ends_when_it_is_not_used():
     door = guard()
     for _ in range(5):
         door.clock.now += MAX_IDLE_S - 1
@@ -114,7 +114,7 @@ def test_an_admission_ends_when_it_is_not_used() -> None:
     assert status(door.check(request(cookie=door.cookie))) == 401, "it has ended for good"
 
 
-def test_a_page_that_is_open_all_day_stays_admitted() -> None:
+def test_a_page_that_is_open_all_day_stays_admitted():
     door = guard()
     door.admissions.opened(door.value)
     door.clock.now += 30 * MAX_IDLE_S
@@ -126,7 +126,7 @@ def test_a_page_that_is_open_all_day_stays_admitted() -> None:
     assert status(door.check(request(cookie=door.cookie))) == 401
 
 
-def test_admissions_do_not_pile_up_and_open_pages_stay() -> None:
+def test_admissions_do_not_pile_up_and_open_pages_stay():
     door = guard(token="mine")
     door.admissions.opened(door.value)
     for _ in range(1000):
@@ -137,14 +137,14 @@ def test_admissions_do_not_pile_up_and_open_pages_stay() -> None:
 
 
 @pytest.mark.parametrize("value", ["", "0", "nonsense", "\u00e4", "\udce4", "="])
-def test_without_the_cookie_nothing_is_served(value: str) -> None:
+def test_without_the_cookie_nothing_is_served(value):
     door = guard()
     for cookie in (value, f"{door.admissions.cookie_name}={value}", f"other=1; {door.admissions.cookie_name}={value}"):
         assert status(door.check(request("/", cookie=cookie))) == 401
         assert status(door.check(request("/api/clicks.json", cookie=cookie))) == 401
 
 
-def test_a_token_does_not_open_a_websocket() -> None:
+def test_a_token_does_not_open_a_websocket():
     door = guard()
     opening = request(f"/ws?token={door.token}", upgrade="websocket", origin="http://127.0.0.1:8080")
     assert status(door.check(opening)) == 401
@@ -156,18 +156,18 @@ def test_a_token_does_not_open_a_websocket() -> None:
     ["evil.example", "evil.example:8080", "127.0.0.1.evil.example", "192.168.0.7:8080", "[::2]",
      "127.0.0.1:8080@evil.example", "127.0.0.1:evil.example", "[::1].evil.example", "[::1]@evil.example", "localhost:80:80"],
 )  # fmt: skip
-def test_a_foreign_host_name_is_not_answered(host: str) -> None:
+def test_a_foreign_host_name_is_not_answered(host):
     assert status(guard().check(request(host=host, cookie=guard().cookie))) == 421
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1:8080", "localhost:8080", "LOCALHOST:9000", "[::1]:8080", "127.0.0.1"])
-def test_names_of_this_machine_are_answered_under_any_port_for_tunnels(host: str) -> None:
+def test_names_of_this_machine_are_answered_under_any_port_for_tunnels(host):
     door = guard()
     assert allowed(door, request(host=host, cookie=door.cookie))
 
 
 @pytest.mark.parametrize("hosts", [[], ["127.0.0.1", "evil.example"]])
-def test_a_request_has_exactly_one_host(hosts: list[str]) -> None:
+def test_a_request_has_exactly_one_host(hosts):
     assert status(guard().check(Request("/", {"host": hosts, "cookie": [guard().cookie]}))) == 400
 
 
@@ -175,31 +175,31 @@ def test_a_request_has_exactly_one_host(hosts: list[str]) -> None:
 @pytest.mark.parametrize(
     "origin", ["http://evil.example", "http://127.0.0.1:9999", "http://localhost:8080", "null", ""]
 )
-def test_a_websocket_from_another_origin_or_none_is_refused(path: str, origin: str) -> None:
+def test_a_websocket_from_another_origin_or_none_is_refused(path, origin):
     opening = request(path, upgrade="websocket", origin=origin, cookie=guard().cookie)
     assert status(guard().check(opening)) == 403
 
 
-def test_a_websocket_of_our_own_page_is_let_in() -> None:
+def test_a_websocket_of_our_own_page_is_let_in():
     door = guard()
     opening = request("/ws", upgrade="WebSocket", origin="http://127.0.0.1:8080", cookie=door.cookie)
     assert allowed(door, opening)
 
 
-def test_a_plain_request_that_names_another_origin_is_refused() -> None:
+def test_a_plain_request_that_names_another_origin_is_refused():
     assert (
         status(guard().check(request("/api/clicks.json", origin="http://evil.example", cookie=guard().cookie))) == 403
     )
 
 
-def test_bound_to_the_network_it_answers_to_addresses_but_not_to_strange_names() -> None:
+def test_bound_to_the_network_it_answers_to_addresses_but_not_to_strange_names():
     door = guard(host="0.0.0.0", more_hosts=["bench.local"])
     assert allowed(door, request(host="192.168.0.7:8080", cookie=door.cookie))
     assert allowed(door, request(host="bench.local:8080", cookie=door.cookie))
     assert status(door.check(request(host="evil.example:8080", cookie=door.cookie))) == 421
 
 
-def test_only_tokens_that_may_be_guessed_wait_for_their_turn() -> None:
+def test_only_tokens_that_may_be_guessed_wait_for_their_turn():
     generated, chosen = guard(), guard(token="mine")
     assert not generated.tries_token(request("/"))
     assert generated.tries_token(request("/?token=wrong"))

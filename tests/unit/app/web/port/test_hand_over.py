@@ -32,11 +32,10 @@ class Opened:
         self.came.set()
 
 
-def test_the_link_is_in_a_private_file_and_not_in_the_address() -> None:
+def test_the_link_is_in_a_private_file_and_not_in_the_address():
     opened = Opened()
     given = HandOver("http://127.0.0.1:8080/?token=SECRET&x='\"", opened)
     assert opened.came.wait(20)
-    assert given.path is not None
     assert opened.addresses == [given.path.as_uri()]
     assert "SECRET" not in opened.addresses[0]
     assert given.path.stat().st_mode & 0o077 == 0
@@ -47,29 +46,27 @@ def test_the_link_is_in_a_private_file_and_not_in_the_address() -> None:
     given.discard()
 
 
-def test_a_folder_that_others_can_enter_is_not_used(runtime: Path) -> None:
+def test_a_folder_that_others_can_enter_is_not_used(runtime):
     (runtime / "cocalib").mkdir()
     (runtime / "cocalib").chmod(0o777)
     given = HandOver("http://127.0.0.1/?token=SECRET", Opened())
-    assert given.path is not None
     assert runtime / "cocalib" not in given.path.parents
     assert given.path.parent.stat().st_mode & 0o077 == 0
     given.discard()
     assert not given.path.parent.exists()
 
 
-def test_a_browser_from_a_snap_gets_a_file_that_it_can_read(runtime: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_browser_from_a_snap_gets_a_file_that_it_can_read(runtime, monkeypatch):
     monkeypatch.setattr(module, "_SNAPS", (str(runtime),))  # Path("/snap/bin", an absolute path) is that path
     monkeypatch.setattr(module.sys, "platform", "linux")
     monkeypatch.setattr(module.Path, "home", lambda: runtime)
     given = HandOver("http://127.0.0.1/?token=SECRET", Opened())
-    assert given.path is not None
     assert not any(part.startswith(".") for part in given.path.relative_to(runtime).parts)
     given.discard()
     assert not given.path.parent.exists()
 
 
-def test_where_no_file_can_be_written_nothing_is_opened(runtime: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_where_no_file_can_be_written_nothing_is_opened(runtime, monkeypatch):
     (runtime / "cocalib").write_text("a file where the folder should be")
     opened = Opened()
     given = HandOver("http://127.0.0.1/?token=SECRET", opened)
@@ -79,9 +76,7 @@ def test_where_no_file_can_be_written_nothing_is_opened(runtime: Path, monkeypat
 
 
 @pytest.mark.parametrize("used", [True, False])
-def test_the_file_goes_when_the_link_was_used_and_when_the_server_stops(
-    used: bool, runtime: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_file_goes_when_the_link_was_used_and_when_the_server_stops(used, runtime, monkeypatch):
     opened = Opened()
     monkeypatch.setattr("webbrowser.open", opened)
     service = Service(ServerOptions(port=0), Opening("a", "b"), lambda: None, let_in_after_s=0)

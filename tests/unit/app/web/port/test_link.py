@@ -25,7 +25,7 @@ def link() -> Iterator[Link]:
     made.close()
 
 
-def test_a_printed_link_can_be_used_before_the_server_runs(link: Link, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_printed_link_can_be_used_before_the_server_runs(link, capsys):
     link.announce()
     first = link.url
     assert capsys.readouterr().out == f"Open {first}\n"
@@ -45,7 +45,7 @@ def test_a_printed_link_can_be_used_before_the_server_runs(link: Link, capsys: p
 
 
 @pytest.mark.parametrize(("host", "status"), [("127.0.0.1", b"401"), ("evil.example", b"421")])
-def test_who_came_early_without_the_token_is_refused(host: str, status: bytes, link: Link) -> None:
+def test_who_came_early_without_the_token_is_refused(host, status, link):
     with socket.create_connection(("127.0.0.1", link.port), timeout=20) as early:
         early.sendall(f"GET / HTTP/1.1\r\nHost: {host}:{link.port}\r\n\r\n".encode())
         server = RunningServer(link, WaitingRoom())
@@ -53,18 +53,18 @@ def test_who_came_early_without_the_token_is_refused(host: str, status: bytes, l
     server.close()
 
 
-def test_a_taken_port_is_followed_by_the_next_free_one(link: Link) -> None:
+def test_a_taken_port_is_followed_by_the_next_free_one(link):
     with Link(ServerOptions(port=link.port)).listening or pytest.fail("not bound") as second:
         assert second.getsockname()[1] > link.port
 
 
-def test_the_last_port_has_no_next_one() -> None:
+def test_the_last_port_has_no_next_one():
     taken = listening_at("127.0.0.1", 65535)
     with taken, pytest.raises(AddressError, match="--port 65535: neither this port"):
         listening_at("127.0.0.1", 65535)
 
 
-def test_a_host_name_is_bound_by_the_server_to_all_of_its_addresses() -> None:
+def test_a_host_name_is_bound_by_the_server_to_all_of_its_addresses():
     named = Link(ServerOptions(host="localhost", port=0))
     assert not named.is_bound
     server = RunningServer(named, WaitingRoom())
@@ -73,7 +73,7 @@ def test_a_host_name_is_bound_by_the_server_to_all_of_its_addresses() -> None:
     server.close()
 
 
-def test_closing_the_link_frees_its_port(link: Link) -> None:
+def test_closing_the_link_frees_its_port(link):
     link.close()
     link.close()
     with pytest.raises(ConnectionRefusedError):

@@ -3,7 +3,6 @@
 import socket
 import sys
 from collections.abc import Generator, Iterator
-from pathlib import Path
 
 import pytest
 import websockets.http11
@@ -115,23 +114,19 @@ def status(answer: bytes) -> int:
 
 
 @pytest.mark.parametrize(("head", "wanted"), UNREADABLE.values(), ids=UNREADABLE)
-def test_a_request_that_cannot_be_read_is_answered(server: RunningServer, head: bytes, wanted: int) -> None:
+def test_a_request_that_cannot_be_read_is_answered(server, head, wanted):
     assert status(asked(server, head, rest=b"")) == wanted
 
 
 @pytest.mark.parametrize(("head", "wanted", "_admitted"), ODD.values(), ids=ODD)
-def test_an_odd_request_of_a_stranger_is_refused(
-    server: RunningServer, head: bytes, wanted: int, _admitted: int
-) -> None:
+def test_an_odd_request_of_a_stranger_is_refused(server, head, wanted, _admitted):
     answer = asked(server, head, rest=b"" if UPGRADE in head else b"hello")
     assert status(answer) == wanted
     assert b"Set-Cookie" not in answer
 
 
 @pytest.mark.parametrize(("head", "_stranger", "wanted"), ODD.values(), ids=ODD)
-def test_an_odd_request_of_an_admitted_browser_gets_its_status(
-    server: RunningServer, head: bytes, _stranger: int, wanted: int, cookie: str
-) -> None:
+def test_an_odd_request_of_an_admitted_browser_gets_its_status(server, head, _stranger, wanted, cookie):
     answer = asked(server, head, cookie, b"" if UPGRADE in head else b"hello")
     assert status(answer) == wanted
     assert b"Location" not in answer
@@ -146,13 +141,13 @@ def cookie(server: RunningServer) -> str:
     return come_in(server)
 
 
-def test_a_cookie_of_an_admitted_browser_is_renewed_by_each_answer(server: RunningServer, cookie: str) -> None:
+def test_a_cookie_of_an_admitted_browser_is_renewed_by_each_answer(server, cookie):
     answer = asked(server, b"GET /main.js HTTP/1.1\r\n" + HOST, cookie)
     assert f"Set-Cookie: {cookie}; Max-Age=".encode() in answer
 
 
 @pytest.mark.parametrize("method", [b"GET", b"HEAD", b"POST"])
-def test_a_client_that_sends_no_more_is_still_answered(server: RunningServer, cookie: str, method: bytes) -> None:
+def test_a_client_that_sends_no_more_is_still_answered(server, cookie, method):
     head = method + b" / HTTP/1.1\r\n" + HOST
     for cookies, wanted in ((b"", 401), (f"Cookie: {cookie}\r\n".encode(), 405 if method == b"POST" else 200)):
         with socket.create_connection(("127.0.0.1", server.port), timeout=20) as connection:
@@ -164,29 +159,27 @@ def test_a_client_that_sends_no_more_is_still_answered(server: RunningServer, co
         assert status(answer) == wanted
 
 
-def test_versions_are_not_told(server: RunningServer) -> None:
+def test_versions_are_not_told(server):
     assert b"websockets" not in asked(server, b"GET / HTTP/1.1\r\n" + HOST)
 
 
 @pytest.mark.parametrize("cut", [1, 3, 14, 15, 16, 40])
-def test_a_head_may_arrive_in_any_pieces(cut: int) -> None:
+def test_a_head_may_arrive_in_any_pieces(cut):
     whole = b"HEAD /a HTTP/1.1\r\n" + HOST + b"Content-Length: 3\r\n\r\nabc"
     for end in range(0, whole.index(b"\r\n\r\n") + 4, cut):
         assert read_head(whole[:end]) is None
     head = read_head(whole)
-    assert head is not None
     assert (head.method, head.fault) == ("HEAD", None)
     assert head.data == b"GET /a HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
 
 
-def test_what_follows_a_websockets_head_reaches_it() -> None:
+def test_what_follows_a_websockets_head_reaches_it():
     head = read_head(b"GET /ws/t HTTP/1.1\r\n" + HOST + UPGRADE + b"\r\n\x81\x00")
-    assert head is not None
     assert head.data.endswith(b"\r\n\r\n\x81\x00")
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no parents to reach")
-def test_no_answer_ever_holds_a_file_from_elsewhere(server: RunningServer, cookie: str, project_root: Path) -> None:
+def test_no_answer_ever_holds_a_file_from_elsewhere(server, cookie, project_root):
     secret = (project_root / "pyproject.toml").read_bytes()[:40]
     for dots in (b"..", b"%2e%2e", b"%2E.", b"%252e%252e", b"..%00", b"%c0%ae%c0%ae", b"..;", b"...", b"..%5c"):
         for slash in (b"/", b"%2f", b"%5c", b"\\", b"//"):
@@ -206,7 +199,7 @@ PIECES = st.sampled_from(
 
 @given(st.lists(st.one_of(PIECES, st.binary(max_size=5)), max_size=20).map(b"".join))
 @example(b"GET / HTTP/1.1\r\n" + HOST + b"\r\n")
-def test_websockets_can_read_every_head_that_it_is_given(received: bytes) -> None:
+def test_websockets_can_read_every_head_that_it_is_given(received):
     head = read_head(received)
     if head is None:
         return

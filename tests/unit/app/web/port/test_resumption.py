@@ -39,22 +39,22 @@ def proven(server: Resumption, ticket: Ticket, *, challenge: str | None = None, 
     )
 
 
-def test_a_ticket_outlives_the_server() -> None:
+def test_a_ticket_outlives_the_server():
     ticket = Resumption("a").ticket()
     assert proven(Resumption("a"), ticket)
 
 
-def test_a_ticket_is_for_one_session() -> None:
+def test_a_ticket_is_for_one_session():
     assert not proven(Resumption("b"), Resumption("a").ticket())
 
 
-def test_a_proof_made_for_another_port_is_refused() -> None:
+def test_a_proof_made_for_another_port_is_refused():
     """A server of another user on the port of ours cannot pass the page's proof on to ours on the next port."""
     server = Resumption("a")
     assert not proven(server, server.ticket(), origin="http://127.0.0.1:8081")
 
 
-def test_a_challenge_is_accepted_once_and_not_for_long() -> None:
+def test_a_challenge_is_accepted_once_and_not_for_long():
     now = [1_000_000.0]
     server = Resumption("a", wall=lambda: now[0])
     ticket, challenge = server.ticket(), server.challenge()
@@ -66,7 +66,7 @@ def test_a_challenge_is_accepted_once_and_not_for_long() -> None:
     assert not proven(server, ticket, challenge="made up")
 
 
-def test_a_ticket_has_an_end_that_cannot_be_moved() -> None:
+def test_a_ticket_has_an_end_that_cannot_be_moved():
     now = [1_000_000.0]
     server = Resumption("a", wall=lambda: now[0])
     ticket = server.ticket()
@@ -77,14 +77,14 @@ def test_a_ticket_has_an_end_that_cannot_be_moved() -> None:
 
 
 @pytest.mark.parametrize("name", ["", ".", "x.", "x.y", "x.٣", "x." + "9" * 400, "\udcff.1"])
-def test_nonsense_is_refused(name: str) -> None:
+def test_nonsense_is_refused(name):
     server = Resumption("a")
     assert not server.is_proven(ticket=name, challenge=server.challenge(), proof="\udcff", origin=ORIGIN)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX permissions")
 @pytest.mark.parametrize("kind", ["readable", "short", "link", "pipe"])
-def test_a_key_file_that_others_may_know_is_not_used(state: Path, kind: str) -> None:
+def test_a_key_file_that_others_may_know_is_not_used(state, kind):
     state.mkdir()
     key = state / "page.key"
     if kind == "pipe":
@@ -106,7 +106,7 @@ def serving(workspace: Workspace, recording: PictureRecording, port: int = 0) ->
     running.close()
 
 
-def test_a_page_comes_back_after_a_restart_but_its_cookie_alone_does_not(tmp_path: Path) -> None:
+def test_a_page_comes_back_after_a_restart_but_its_cookie_alone_does_not(tmp_path):
     recording = PictureRecording(grey_pictures(1))
     workspace = open_workspace(recording, camera=None, session_folder=tmp_path / "s", name="one grey")
     with serving(workspace, recording) as first:

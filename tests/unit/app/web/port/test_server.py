@@ -7,7 +7,6 @@ import re
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -48,9 +47,7 @@ def stamp(index: int) -> dict[str, int]:
     return {"sec": time // 10**9, "nanosec": time % 10**9}
 
 
-def test_the_page_and_its_parts_are_served_with_their_types_and_no_inline_script(
-    server: RunningServer, cookie: str, project_root: Path
-) -> None:
+def test_the_page_and_its_parts_are_served_with_their_types_and_no_inline_script(server, cookie, project_root):
     for path, kind in (
         ("/", "text/html"),
         ("/main.js", "text/javascript"),
@@ -67,7 +64,7 @@ def test_the_page_and_its_parts_are_served_with_their_types_and_no_inline_script
     assert page == (project_root / "static" / "index.html").read_bytes()
 
 
-def test_viser_still_starts_its_server_as_the_hook_expects(server: RunningServer, cookie: str) -> None:
+def test_viser_still_starts_its_server_as_the_hook_expects(server, cookie):
     import viser
 
     page = get(server, "/viser/tab1/", Cookie=cookie)
@@ -80,23 +77,23 @@ def test_viser_still_starts_its_server_as_the_hook_expects(server: RunningServer
     protocol: Any = f"viser-v{viser.__version__}"
     with connect(
         address, origin=server.origin, subprotocols=[protocol], additional_headers={"Cookie": cookie}
-    ) as socket:  # type: ignore[arg-type]
+    ) as socket:
         assert socket.subprotocol == protocol
         assert isinstance(socket.recv(timeout=20), bytes)
 
 
 @pytest.mark.parametrize("path", ["/ws/tab1", "/viser/tab1", "/viser"])
-def test_a_websocket_from_elsewhere_is_refused(server: RunningServer, cookie: str, path: str) -> None:
+def test_a_websocket_from_elsewhere_is_refused(server, cookie, path):
     address, origin = server.origin.replace("http", "ws") + path, "http://evil.example"
     with (
         pytest.raises(InvalidStatus) as refused,
-        connect(address, origin=origin, additional_headers={"Cookie": cookie}),  # type: ignore[arg-type]
+        connect(address, origin=origin, additional_headers={"Cookie": cookie}),
     ):
         pass
     assert refused.value.response.status_code == 403
 
 
-def test_a_websocket_without_the_cookie_is_refused(server: RunningServer) -> None:
+def test_a_websocket_without_the_cookie_is_refused(server):
     with pytest.raises(InvalidStatus) as refused, channel(server, "cocalib=no"):
         pass
     assert refused.value.response.status_code == 401
@@ -106,26 +103,26 @@ def test_a_websocket_without_the_cookie_is_refused(server: RunningServer) -> Non
     "path",
     ["/static/main.js", "/shell", "/shell/", "/state.js", "/viser/", "/viser/a/b/", "/api/", "/api/export/nothing"],
 )
-def test_no_other_path_exists(server: RunningServer, cookie: str, path: str) -> None:
+def test_no_other_path_exists(server, cookie, path):
     assert get(server, path, Cookie=cookie).status == 404
 
 
 @pytest.mark.parametrize("path", ["/", "/etc", "/ws"])
-def test_there_is_no_other_websocket(server: RunningServer, cookie: str, path: str) -> None:
+def test_there_is_no_other_websocket(server, cookie, path):
     with pytest.raises(InvalidStatus) as refused, channel(server, cookie, path):
         pass
     assert refused.value.response.status_code == 404
 
 
 @pytest.mark.parametrize("path", ["//evil.example/", "/\\evil.example/", "/%2F%2Fevil.example", "/..//evil.example"])
-def test_a_link_leads_to_the_page_and_nowhere_else(server: RunningServer, path: str) -> None:
+def test_a_link_leads_to_the_page_and_nowhere_else(server, path):
     answer = get(server, f"{path}?token={server.url.partition('=')[2]}")
     assert answer.headers["Refresh"] == "0; url=/"
     assert answer.headers["Location"] is None
     assert b"evil" not in answer.body
 
 
-def test_a_page_is_greeted_with_recording_and_view(server: RunningServer, cookie: str) -> None:
+def test_a_page_is_greeted_with_recording_and_view(server, cookie):
     with channel(server, cookie) as socket:
         socket.send('{"type":"hello"}')
         recording = wanted(socket, "recording")
@@ -138,7 +135,7 @@ def test_a_page_is_greeted_with_recording_and_view(server: RunningServer, cookie
         assert wanted(socket, "placements")["placements"] == []
 
 
-def test_a_click_reaches_the_other_tab_and_undo_takes_it_from_both(server: RunningServer, cookie: str) -> None:
+def test_a_click_reaches_the_other_tab_and_undo_takes_it_from_both(server, cookie):
     with channel(server, cookie, "/ws/tab1") as one, channel(server, cookie, "/ws/tab2") as two:
         pages = PageView(one), PageView(two)
         for socket, page in zip((one, two), pages, strict=True):
@@ -154,7 +151,7 @@ def test_a_click_reaches_the_other_tab_and_undo_takes_it_from_both(server: Runni
         assert wanted(two, "done")["request"] == 1
 
 
-def test_a_page_that_missed_a_change_gets_a_whole_view(server: RunningServer, cookie: str) -> None:
+def test_a_page_that_missed_a_change_gets_a_whole_view(server, cookie):
     with channel(server, cookie) as socket:
         socket.send('{"type":"hello"}')
         wanted(socket, "view")
@@ -177,9 +174,7 @@ def test_a_page_that_missed_a_change_gets_a_whole_view(server: RunningServer, co
         ({"type": "nonsense"}, "nonsense"),
     ],
 )
-def test_an_invalid_message_gets_an_error_and_the_channel_stays_open(
-    server: RunningServer, cookie: str, message: dict[str, Any], words: str
-) -> None:
+def test_an_invalid_message_gets_an_error_and_the_channel_stays_open(server, cookie, message, words):
     with channel(server, cookie) as socket:
         socket.send(json.dumps({**message, **({} if message["type"] == "frame" else {"request": 3})}))
         assert words in wanted(socket, "error")["message"]
@@ -187,7 +182,7 @@ def test_an_invalid_message_gets_an_error_and_the_channel_stays_open(
         assert wanted(socket, "done")["request"] == 4
 
 
-def test_a_frame_comes_as_its_header_and_the_recorded_bytes(server: RunningServer, cookie: str) -> None:
+def test_a_frame_comes_as_its_header_and_the_recorded_bytes(server, cookie):
     with channel(server, cookie) as socket:
         socket.send('{"type":"frame","index":3,"request":11}')
         while not isinstance(message := socket.recv(timeout=20), bytes):
@@ -198,13 +193,13 @@ def test_a_frame_comes_as_its_header_and_the_recorded_bytes(server: RunningServe
     assert message[4 + length :] == PictureRecording(grey_pictures(5)).image_bytes(3).data
 
 
-def test_a_frame_that_does_not_exist_is_refused_by_its_request(server: RunningServer, cookie: str) -> None:
+def test_a_frame_that_does_not_exist_is_refused_by_its_request(server, cookie):
     with channel(server, cookie) as socket:
         socket.send('{"type":"frame","index":77,"request":12}')
         assert wanted(socket, "error")["request"] == 12
 
 
-def test_a_page_that_stops_reading_does_not_slow_others(server: RunningServer, cookie: str) -> None:
+def test_a_page_that_stops_reading_does_not_slow_others(server, cookie):
     with channel(server, cookie, "/ws/stalled") as stalled, channel(server, cookie, "/ws/lively") as lively:
         for request in range(300):
             stalled.send(json.dumps({"type": "frame", "index": request % 5, "request": request}))
@@ -215,20 +210,20 @@ def test_a_page_that_stops_reading_does_not_slow_others(server: RunningServer, c
                 pass
 
 
-def test_without_a_calibration_its_download_says_what_is_missing(server: RunningServer, cookie: str) -> None:
+def test_without_a_calibration_its_download_says_what_is_missing(server, cookie):
     for path in ("/api/calibration.json", "/api/export/tf2"):
         answer = get(server, path, Cookie=cookie)
         assert answer.status == 409
         assert b"four placements" in answer.body
 
 
-def test_the_clicks_can_be_downloaded_at_any_time(server: RunningServer, cookie: str) -> None:
+def test_the_clicks_can_be_downloaded_at_any_time(server, cookie):
     answer = get(server, "/api/clicks.json", Cookie=cookie)
     assert json.loads(answer.body)["schema"] == "cocalib/clicks-1"
     assert answer.headers["Content-Disposition"] == 'attachment; filename="clicks.json"'
 
 
-def test_a_flood_of_greetings_leaves_other_pages_served(server: RunningServer, cookie: str) -> None:
+def test_a_flood_of_greetings_leaves_other_pages_served(server, cookie):
     with channel(server, cookie, "/ws/flood") as flood:
         for _ in range(20_000):
             flood.send('{"type":"hello"}')
@@ -242,9 +237,7 @@ def test_a_flood_of_greetings_leaves_other_pages_served(server: RunningServer, c
         assert greetings < 200, "20,000 were asked for"
 
 
-def test_a_flood_of_requests_for_the_whole_view_is_answered_seldom_and_by_the_newest(
-    server: RunningServer, cookie: str
-) -> None:
+def test_a_flood_of_requests_for_the_whole_view_is_answered_seldom_and_by_the_newest(server, cookie):
     with channel(server, cookie, "/ws/flood") as flood:
         views = 0
         for request in range(400):
@@ -255,7 +248,7 @@ def test_a_flood_of_requests_for_the_whole_view_is_answered_seldom_and_by_the_ne
         assert wanted(flood, "view")["type"] == "view", "the last request is answered too"
 
 
-def test_one_browser_opens_only_so_many_sockets(server: RunningServer) -> None:
+def test_one_browser_opens_only_so_many_sockets(server):
     full, other = come_in(server), come_in(server)
     with ExitStack() as pages:
         for number in range(MAX_SOCKETS):
@@ -273,9 +266,7 @@ def test_one_browser_opens_only_so_many_sockets(server: RunningServer) -> None:
         pass
 
 
-def test_an_internal_error_is_told_to_the_page_and_its_channel_stays_open(
-    server: RunningServer, cookie: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_internal_error_is_told_to_the_page_and_its_channel_stays_open(server, cookie, monkeypatch):
     def broken(*_: object) -> None:
         raise RecursionError("a bug")
 
@@ -290,9 +281,7 @@ def test_an_internal_error_is_told_to_the_page_and_its_channel_stays_open(
         assert wanted(socket, "done")["request"] == 6
 
 
-def test_an_internal_error_in_a_request_is_a_500_and_the_server_goes_on(
-    server: RunningServer, cookie: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_an_internal_error_in_a_request_is_a_500_and_the_server_goes_on(server, cookie, monkeypatch, caplog):
     def broken(*_: object) -> None:
         raise RecursionError("a bug")
 
@@ -304,7 +293,7 @@ def test_an_internal_error_in_a_request_is_a_500_and_the_server_goes_on(
 
 
 @pytest.mark.parametrize("half", ["\\ud800", "\\\\ud800", "\\udc00\\ud800"])
-def test_half_a_character_is_refused_and_the_channel_stays_open(server: RunningServer, cookie: str, half: str) -> None:
+def test_half_a_character_is_refused_and_the_channel_stays_open(server, cookie, half):
     clicks = '{\\"schema\\":\\"cocalib/clicks-1\\",\\"clicks\\":[{\\"id\\":\\"HALF\\",\\"image_time\\":{},\\"pixel_px\\":[1,1]}]}'
     with channel(server, cookie) as socket:
         for message in (
@@ -318,7 +307,7 @@ def test_half_a_character_is_refused_and_the_channel_stays_open(server: RunningS
         assert wanted(socket, "done")["request"] == 2
 
 
-def test_after_closing_no_connection_is_accepted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_after_closing_no_connection_is_accepted(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     recording = PictureRecording(grey_pictures(1))
     workspace = open_workspace(recording, camera=None, session_folder=tmp_path / "s", name="one grey")
@@ -335,9 +324,7 @@ def test_after_closing_no_connection_is_accepted(tmp_path: Path, monkeypatch: py
     assert (tmp_path / "cocalib" / "page.key").stat().st_mode & 0o077 == 0
 
 
-def test_failures_are_logged_but_disconnecting_clients_are_not(
-    server: RunningServer, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_failures_are_logged_but_disconnecting_clients_are_not(server, caplog):
     port = logging.getLogger("cocalib.port")
     for message, error in (
         ("opening handshake failed", ValueError("a port scan")),

@@ -66,9 +66,7 @@ def picture(socket: ClientConnection) -> tuple[Any, bytes]:
     return json.loads(message[4 : 4 + length]), message[4 + length :]
 
 
-def test_a_page_that_waits_sees_the_first_picture_and_is_greeted_once_the_recording_is_open(
-    workspace: Workspace, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_page_that_waits_sees_the_first_picture_and_is_greeted_once_the_recording_is_open(workspace, capsys):
     with service(lambda: RECORDING.image_bytes(0)) as opening:
         server = early(opening)
         assert capsys.readouterr().out.splitlines() == ["Opening long.bag", f"Open {server.url}"]
@@ -87,7 +85,7 @@ def test_a_page_that_waits_sees_the_first_picture_and_is_greeted_once_the_record
                 assert wanted(socket, "view")["clicks"] == []
 
 
-def test_while_opening_the_page_is_served_and_downloads_are_refused(workspace: Workspace) -> None:
+def test_while_opening_the_page_is_served_and_downloads_are_refused(workspace):
     with service() as opening:
         server = early(opening)
         assert get(server, "/").status == 401
@@ -102,7 +100,7 @@ def test_while_opening_the_page_is_served_and_downloads_are_refused(workspace: W
         assert get(server, "/api/clicks.json", Cookie=cookie).status == 200
 
 
-def test_messages_sent_while_waiting_are_handled_afterwards_in_order(workspace: Workspace) -> None:
+def test_messages_sent_while_waiting_are_handled_afterwards_in_order(workspace):
     sec, nanosec = divmod(START, 10**9)
     place = {"type": "click_placed", "image_time": {"sec": sec, "nanosec": nanosec}}
     with service() as opening:
@@ -118,7 +116,7 @@ def test_messages_sent_while_waiting_are_handled_afterwards_in_order(workspace: 
     )
 
 
-def test_a_page_that_disconnects_while_waiting_does_not_affect_others(workspace: Workspace) -> None:
+def test_a_page_that_disconnects_while_waiting_does_not_affect_others(workspace):
     with service() as opening:
         server = early(opening)
         cookie = come_in(server)
@@ -130,7 +128,7 @@ def test_a_page_that_disconnects_while_waiting_does_not_affect_others(workspace:
             assert wanted(stays, "recording")["name"] == "three greys"
 
 
-def test_a_page_that_sends_too_many_messages_while_waiting_is_disconnected() -> None:
+def test_a_page_that_sends_too_many_messages_while_waiting_is_disconnected():
     with service() as opening:
         server = early(opening)
         with channel(server, come_in(server)) as socket:
@@ -161,18 +159,16 @@ def _end_of(server: RunningServer, socket: ClientConnection, error: BaseExceptio
 
 
 @pytest.mark.parametrize("error", [RecordingError("no radar in it"), KeyboardInterrupt()])
-def test_an_end_while_opening_reaches_the_page_and_the_caller(error: BaseException) -> None:
+def test_an_end_while_opening_reaches_the_page_and_the_caller(error):
     with ExitStack() as pages, pytest.raises(type(error)):
         fail_to_open(error, pages)
 
 
-def test_an_error_of_another_kind_is_left_to_the_terminal() -> None:
+def test_an_error_of_another_kind_is_left_to_the_terminal():
     assert serving._problem_text(OSError(5, "Input/output error")).endswith("see the terminal for the reason.")
 
 
-def test_a_first_picture_that_cannot_be_read_does_no_harm(
-    workspace: Workspace, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_first_picture_that_cannot_be_read_does_no_harm(workspace, caplog):
     def broken() -> Any:
         raise ZeroDivisionError("odd")
 
@@ -185,9 +181,7 @@ def test_a_first_picture_that_cannot_be_read_does_no_harm(
     assert "odd" in caplog.text
 
 
-def test_a_recording_that_opens_at_once_is_served_without_an_opening_message(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_recording_that_opens_at_once_is_served_without_an_opening_message(workspace, monkeypatch, capsys):
     admit, started = RunningServer.admit, []
 
     def admit_look_and_stop(server: RunningServer, *opened: Any) -> None:
@@ -209,9 +203,7 @@ def test_a_recording_that_opens_at_once_is_served_without_an_opening_message(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows does not delete open files")
-def test_the_end_says_where_the_clicks_are_if_the_session_folder_was_deleted(
-    workspace: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_end_says_where_the_clicks_are_if_the_session_folder_was_deleted(workspace, tmp_path, monkeypatch):
     def click_delete_and_stop(*_: Any) -> None:
         workspace.dispatch(ClickPlaced(TimeNs(int(RECORDING.image_times[1])), (1.0, 1.0), "clicked"))
         shutil.rmtree(tmp_path / "session")
@@ -228,9 +220,7 @@ def test_the_end_says_where_the_clicks_are_if_the_session_folder_was_deleted(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows does not delete open files")
-def test_an_error_that_ends_the_program_does_not_hide_where_the_clicks_are(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_error_that_ends_the_program_does_not_hide_where_the_clicks_are(tmp_path, monkeypatch, capsys):
     def click_delete_and_fail(_: Service, workspace: Workspace, recording: Any) -> None:
         workspace.dispatch(ClickPlaced(TimeNs(int(recording.image_times[1])), (1.0, 1.0), "clicked"))
         shutil.rmtree(tmp_path / "session")
@@ -243,13 +233,13 @@ def test_an_error_that_ends_the_program_does_not_hide_where_the_clicks_are(
     assert "no port is free" in problem
 
 
-def test_an_immediate_error_starts_no_server(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_immediate_error_starts_no_server(monkeypatch):
     monkeypatch.setattr(serving, "RunningServer", None)
     with pytest.raises(RecordingError, match="empty"), service(let_in_after_s=LONG_S):
         raise RecordingError("empty")
 
 
-def test_a_port_that_cannot_be_bound_is_reported_before_anything_is_opened(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_port_that_cannot_be_bound_is_reported_before_anything_is_opened(monkeypatch):
     def taken(*_: object) -> None:
         raise OSError("no port is free")
 
@@ -258,9 +248,7 @@ def test_a_port_that_cannot_be_bound_is_reported_before_anything_is_opened(monke
         pytest.fail("opened anyway")
 
 
-def test_a_late_error_is_one_line_and_exit_code_2(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_late_error_is_one_line_and_exit_code_2(tmp_path, monkeypatch, capsys):
     link_is_out = threading.Event()
 
     def slow_and_wrong(*_: object, **_options: object) -> None:
@@ -277,9 +265,7 @@ def test_a_late_error_is_one_line_and_exit_code_2(
 
 
 @pytest.mark.parametrize("flag", ["--camera", "--calibration", "--clicks"])
-def test_a_named_file_that_is_missing_is_refused_before_anything_is_read(
-    flag: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_named_file_that_is_missing_is_refused_before_anything_is_read(flag, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("calib_core.recordings.open_recording", None)
     (tmp_path / "a.bag").write_bytes(b"")
     assert run(["open", str(tmp_path / "a.bag"), "--no-browser", flag, str(tmp_path / "absent")]) == 2
@@ -329,9 +315,7 @@ def stopped(running: subprocess.Popen[str], *, once_printed: str, by: signal.Sig
     [("default_int_handler", signal.SIGINT, 130), ("SIG_IGN", signal.SIGTERM, 143), ("SIG_IGN", signal.SIGHUP, 129)],
     ids=["SIGINT", "SIGTERM", "SIGHUP"],
 )
-def test_a_signal_while_opening_ends_the_program_quietly(
-    tmp_path: Path, sigint: str, sent: signal.Signals, code: int
-) -> None:
+def test_a_signal_while_opening_ends_the_program_quietly(tmp_path, sigint, sent, code):
     (tmp_path / "long.bag").write_bytes(b"")
     arguments = ["open", tmp_path / "long.bag", "--no-browser", "--port", 0]
     running = started(arguments, patch=SLOW_TO_OPEN, sigint=sigint)
@@ -357,9 +341,7 @@ SessionFile.close = close_slowly
     [(signal.SIGINT, signal.SIGTERM), (signal.SIGTERM, signal.SIGHUP), (signal.SIGHUP, signal.SIGINT)],
     ids=lambda sent: sent.name,
 )
-def test_a_signal_while_serving_closes_the_session_and_a_second_one_does_not_interrupt_that(
-    tmp_path: Path, first: signal.Signals, second: signal.Signals
-) -> None:
+def test_a_signal_while_serving_closes_the_session_and_a_second_one_does_not_interrupt_that(tmp_path, first, second):
     arguments = ["demo", "--no-browser", "--port", 0, "--session", tmp_path / "session"]
     sigint = "default_int_handler" if signal.SIGINT in (first, second) else "SIG_IGN"
     running = started(arguments, patch=SLOW_TO_CLOSE, sigint=sigint)
@@ -387,7 +369,7 @@ threading.Thread(target=raise_when_it_waits, daemon=True).start()
 
 
 @POSIX_SIGNALS
-def test_a_signal_that_does_not_wake_the_waiting_thread_is_noticed_soon(tmp_path: Path) -> None:
+def test_a_signal_that_does_not_wake_the_waiting_thread_is_noticed_soon(tmp_path):
     """Such as one that comes just before it waits."""
     arguments = ["demo", "--no-browser", "--port", 0, "--session", tmp_path / "session"]
     running = started(arguments, patch=SIGNAL_IN_ANOTHER_THREAD, sigint="SIG_IGN")
@@ -399,7 +381,7 @@ def test_a_signal_that_does_not_wake_the_waiting_thread_is_noticed_soon(tmp_path
 
 
 @POSIX_SIGNALS
-def test_a_signal_that_is_switched_off_stays_off(tmp_path: Path) -> None:
+def test_a_signal_that_is_switched_off_stays_off(tmp_path):
     """`nohup cocalib open` outlives its terminal."""
     arguments = ["demo", "--no-browser", "--port", 0, "--session", tmp_path / "session"]
     patch = f"signal.signal(signal.SIGHUP, signal.SIG_IGN)\n{PRINTS_WHEN_IT_SERVES}"
@@ -414,9 +396,7 @@ def test_a_signal_that_is_switched_off_stays_off(tmp_path: Path) -> None:
     assert "all clicks are saved" in out
 
 
-def test_a_large_recording_has_its_link_before_it_is_opened(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_large_recording_has_its_link_before_it_is_opened(tmp_path, monkeypatch, capsys):
     printed_before = []
 
     def look(*_: object, **_options: object) -> None:

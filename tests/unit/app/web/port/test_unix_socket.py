@@ -46,7 +46,7 @@ def got(path: Path, target: str, **headers: str) -> http.client.HTTPResponse:
     return answer
 
 
-def test_the_page_is_served_through_the_socket_and_to_its_owner_only(private: Path, tmp_path: Path) -> None:
+def test_the_page_is_served_through_the_socket_and_to_its_owner_only(private, tmp_path):
     path = private / "s"
     recording = PictureRecording(grey_pictures(1))
     with serving(recording, tmp_path / "session", name="one grey", port=9999, socket=path) as (running, _):
@@ -62,13 +62,13 @@ def test_the_page_is_served_through_the_socket_and_to_its_owner_only(private: Pa
     assert not path.exists()
 
 
-def test_a_socket_that_a_killed_server_left_is_replaced(private: Path) -> None:
+def test_a_socket_that_a_killed_server_left_is_replaced(private):
     listening_socket(private / "s").close()
     assert (private / "s").exists()
     listening_socket(private / "s").close()
 
 
-def test_a_path_that_is_taken_is_refused(private: Path) -> None:
+def test_a_path_that_is_taken_is_refused(private):
     (private / "file").write_text("precious")
     with pytest.raises(AddressError, match="not a socket"):
         listening_socket(private / "file")
@@ -81,13 +81,13 @@ def test_a_path_that_is_taken_is_refused(private: Path) -> None:
             listening_socket(private / "s")
 
 
-def test_a_folder_that_others_can_enter_is_refused(private: Path) -> None:
+def test_a_folder_that_others_can_enter_is_refused(private):
     private.chmod(0o755)
     with pytest.raises(AddressError, match="others can enter"):
         listening_socket(private / "s")
 
 
-def test_a_missing_folder_is_created_for_its_owner(private: Path) -> None:
+def test_a_missing_folder_is_created_for_its_owner(private):
     listening_socket(private / "new" / "s").close()
     assert (private / "new").stat().st_mode & 0o077 == 0
 
@@ -95,18 +95,18 @@ def test_a_missing_folder_is_created_for_its_owner(private: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "words"), [("a" * 200, "103 bytes"), ("a:b", "colon"), ("no/such/folder", "cannot be created")]
 )
-def test_a_path_that_cannot_be_used_is_refused(private: Path, name: str, words: str) -> None:
+def test_a_path_that_cannot_be_used_is_refused(private, name, words):
     with pytest.raises(AddressError, match=words):
         listening_socket(private / name)
 
 
-def test_a_system_without_unix_sockets_is_told(private: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_system_without_unix_sockets_is_told(private, monkeypatch):
     monkeypatch.delattr(socket, "AF_UNIX")
     with pytest.raises(AddressError, match="no Unix sockets"):
         listening_socket(private / "s")
 
 
-def test_the_printed_command_forwards_to_the_socket(private: Path) -> None:
+def test_the_printed_command_forwards_to_the_socket(private):
     words = shlex.split(forwarding_command(private / "a b", 8080))
     assert words[:3] == ["ssh", "-N", "-L"]
     assert words[3] == f"8080:{private / 'a b'}"
@@ -114,9 +114,7 @@ def test_the_printed_command_forwards_to_the_socket(private: Path) -> None:
 
 
 @pytest.mark.parametrize("arguments", [["--host", "0.0.0.0"], []])
-def test_the_command_refuses_what_cannot_be_served(
-    private: Path, arguments: list[str], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_refuses_what_cannot_be_served(private, arguments, capsys):
     private.chmod(0o755)
     assert run(["demo", "--no-browser", "--socket", str(private / "s"), *arguments]) == 2
     (line,) = capsys.readouterr().err.splitlines()

@@ -38,11 +38,11 @@ def server() -> Iterator[viser.ViserServer]:
     viser_hook.stop_viser(started)
 
 
-def test_viser_still_has_the_private_parts_that_are_used(server: viser.ViserServer) -> None:
+def test_viser_still_has_the_private_parts_that_are_used(server):
     assert viser_hook.missing_parts(server) == (), CHANGED
 
 
-def test_nobody_can_ask_viser_for_a_public_tunnel(server: viser.ViserServer) -> None:
+def test_nobody_can_ask_viser_for_a_public_tunnel(server):
     handled = {kind.__name__ for kind in server._websock_server._incoming_handlers}
     assert handled.isdisjoint({"ShareUrlRequest", "ShareUrlDisconnect"})
     assert handled != set(), CHANGED
@@ -66,20 +66,20 @@ def heard(*messages: object) -> list[bytes]:
     """Return what viser would receive of these messages."""
 
     async def run() -> list[bytes]:
-        connection, received = viser_hook.only_allowed(Spoken(*messages)), []  # type: ignore[arg-type]
+        connection, received = viser_hook.only_allowed(Spoken(*messages)), []
         assert connection.subprotocol == "viser"
         with contextlib.suppress(EOFError):
             while True:
                 received.append(await connection.recv())
         return received
 
-    return asyncio.run(run())  # type: ignore[arg-type]
+    return asyncio.run(run())
 
 
 CAMERA = msgspec.msgpack.encode({"type": "ViewerCameraMessage", "wxyz": [1, 0, 0, 0], "fov": 1.0})
 
 
-def test_only_the_camera_of_the_3d_view_is_heard() -> None:
+def test_only_the_camera_of_the_3d_view_is_heard():
     from viser import _messages
 
     known = _messages.Message._subclass_from_type_string()
@@ -104,15 +104,15 @@ def test_only_the_camera_of_the_3d_view_is_heard() -> None:
     ],
     ids=["unknown", "untyped", "list type", "list", "huge", "deep", "damaged", "empty", "text"],
 )
-def test_a_message_that_a_newer_viser_may_understand_is_dropped(message: object) -> None:
+def test_a_message_that_a_newer_viser_may_understand_is_dropped(message):
     assert heard(message, CAMERA, message) == [CAMERA]
 
 
-def test_a_client_that_has_left_has_no_address(server: viser.ViserServer) -> None:
+def test_a_client_that_has_left_has_no_address(server):
     assert viser_hook.path_of_client(server, 7) == ""
 
 
-def test_visers_page_runs_our_script_first_and_hides_its_panels() -> None:
+def test_visers_page_runs_our_script_first_and_hides_its_panels():
     page = viser_hook.client_page("../../space/pace.js").decode()
     head, _, rest = page.partition("</head>")
     scripts = re.findall(r"<script[^>]*>", page)
@@ -136,16 +136,14 @@ class StartedElsewhere:
 made: list[StartedElsewhere] = []
 
 
-def test_a_viser_that_starts_its_server_in_another_way_is_stopped_and_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_viser_that_starts_its_server_in_another_way_is_stopped_and_named(monkeypatch):
     monkeypatch.setattr(viser, "ViserServer", StartedElsewhere)
     with pytest.raises(InstallationError, match=rf"viser {viser.__version__} cannot be used: it does not start"):
         viser_hook.start_viser("127.0.0.1", 0, wrap_request=nobody, wrap_handler=unwrapped)
     assert made[-1].stopped
 
 
-def test_a_viser_without_a_part_is_stopped_and_the_part_is_named(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_viser_without_a_part_is_stopped_and_the_part_is_named(monkeypatch, capsys):
     started: list[viser.ViserServer] = []
     stop: Callable[[viser.ViserServer], None] = viser_hook.stop_viser
     monkeypatch.setattr(viser_hook, "stop_viser", lambda server: (started.append(server), stop(server)))

@@ -7,7 +7,6 @@ import socket
 import subprocess
 import sys
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 from websockets.asyncio import server as websocket_server
@@ -36,7 +35,7 @@ def kept(handler: SocketHandler) -> SocketHandler:
     return handler
 
 
-def test_serve_is_wrapped_inside_the_context_and_restored_afterwards() -> None:
+def test_serve_is_wrapped_inside_the_context_and_restored_afterwards():
     original = websocket_server.serve
     with wrapped_serve(lambda _given: serve_nobody, kept) as used:
         assert websocket_server.serve is not original
@@ -82,9 +81,7 @@ def ask(port: int) -> None:
 
 
 @pytest.mark.parametrize("client", [scan, leave, ask])
-def test_port_scans_and_disconnecting_clients_are_not_logged(
-    client: Callable[[int], None], caplog: pytest.LogCaptureFixture
-) -> None:
+def test_port_scans_and_disconnecting_clients_are_not_logged(client, caplog):
     assert [text for text in behaviour(client, caplog) if "listening" not in text] in (
         [],
         ["server closing", "server closed"],
@@ -106,7 +103,7 @@ def crowd(port: int) -> None:
             connection.close()
 
 
-def test_connections_that_ask_nothing_make_room_for_others(caplog: pytest.LogCaptureFixture) -> None:
+def test_connections_that_ask_nothing_make_room_for_others(caplog):
     behaviour(crowd, caplog)
 
 
@@ -128,7 +125,7 @@ asyncio.run(main())
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX limits")
-def test_a_server_without_free_descriptors_says_so_once_and_recovers() -> None:
+def test_a_server_without_free_descriptors_says_so_once_and_recovers():
     process = subprocess.Popen(
         [sys.executable, "-c", SHORT_OF_FILES], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
         text=True,
@@ -145,9 +142,7 @@ def test_a_server_without_free_descriptors_says_so_once_and_recovers() -> None:
     assert others == "", "said once"
 
 
-def test_what_the_event_loop_reports_is_one_line_with_a_report(
-    caplog: pytest.LogCaptureFixture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_the_event_loop_reports_is_one_line_with_a_report(caplog, tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     complaints = websockets_hook._Complaints()
     loop = asyncio.new_event_loop()
@@ -172,7 +167,7 @@ def ask_and_leave_before_the_answer(port: int) -> None:
 
 
 @pytest.mark.parametrize("client", [scan, ask_and_leave_before_the_answer])
-def test_a_connection_ends_with_its_answer_and_not_when_time_is_up(client: Callable[[int], None]) -> None:
+def test_a_connection_ends_with_its_answer_and_not_when_time_is_up(client):
     async def main() -> None:
         with wrapped_serve(lambda _given: serve_nobody, kept):
             async with websocket_server.serve(echo, "127.0.0.1", 0, close_timeout=600) as running:

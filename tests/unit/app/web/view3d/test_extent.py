@@ -5,13 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cocalib.web.messages import Viewpoint
 from cocalib.web.view3d.extent import UNKNOWN, Extent, extent_of, fitted_stand, ring_ranges_m
 
 NO_POINTS = np.zeros((0, 3))
 
 
-def test_two_ghosts_of_a_hundred_returns_do_not_stretch_a_room_but_a_far_reflector_does() -> None:
+def test_two_ghosts_of_a_hundred_returns_do_not_stretch_a_room_but_a_far_reflector_does():
     room = np.column_stack([np.linspace(1.0, 6.0, 198), np.linspace(-2.0, 2.0, 198), np.zeros(198)])
     ghosts = np.array([[180.0, 0.0, 0.0], [0.0, -190.0, 20.0]])
     points, weights = np.concatenate([room, ghosts]), np.ones(200)
@@ -22,13 +21,13 @@ def test_two_ghosts_of_a_hundred_returns_do_not_stretch_a_room_but_a_far_reflect
     assert reached.left_rad == pytest.approx(np.pi / 4)
 
 
-def test_what_was_seen_all_the_time_counts_more_than_what_was_seen_once() -> None:
+def test_what_was_seen_all_the_time_counts_more_than_what_was_seen_once():
     points = np.array([[5.0, 0.0, 0.0], [100.0, 0.0, 0.0]])
     assert extent_of(points, np.array([1.0, 0.001]), NO_POINTS).range_m == pytest.approx(5.5)
     assert extent_of(points, np.array([0.5, 0.5]), NO_POINTS).range_m == pytest.approx(110.0)
 
 
-def test_without_data_the_usual_extent_is_assumed() -> None:
+def test_without_data_the_usual_extent_is_assumed():
     assert extent_of(NO_POINTS, np.zeros(0), NO_POINTS) == UNKNOWN
     assert extent_of(np.full((1, 3), np.nan), np.ones(1), NO_POINTS) == UNKNOWN
 
@@ -44,12 +43,12 @@ def test_without_data_the_usual_extent_is_assumed() -> None:
         (2.0, (0.5, 1.0, 1.5, 2.0)),
     ],
 )
-def test_rings_reach_as_far_as_the_data(range_m: float, rings_m: tuple[float, ...]) -> None:
+def test_rings_reach_as_far_as_the_data(range_m, rings_m):
     assert ring_ranges_m(range_m) == pytest.approx(rings_m)
 
 
 @given(st.floats(0.5, 2000.0))
-def test_there_are_two_to_six_rings_and_the_last_holds_everything(range_m: float) -> None:
+def test_there_are_two_to_six_rings_and_the_last_holds_everything(range_m):
     rings_m = ring_ranges_m(range_m)
     assert 2 <= len(rings_m) <= 6
     assert rings_m[-1] >= range_m * (1 - 1e-6)
@@ -70,9 +69,7 @@ extents = st.builds(
 
 
 @given(extents, st.sampled_from(["behind", "above", "side"]), st.floats(0.4, 3.0))
-def test_from_every_viewpoint_all_of_the_data_is_in_sight_and_fills_the_view(
-    extent: Extent, viewpoint: Viewpoint, aspect: float
-) -> None:
+def test_from_every_viewpoint_all_of_the_data_is_in_sight_and_fills_the_view(extent, viewpoint, aspect):
     stand, angle_rad = fitted_stand(extent, viewpoint, 0.75, aspect), 0.75
     ahead = (stand.look_at_m - stand.position_m) / np.linalg.norm(stand.look_at_m - stand.position_m)
     right = np.cross(ahead, stand.up) / np.linalg.norm(np.cross(ahead, stand.up))

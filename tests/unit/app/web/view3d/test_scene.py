@@ -21,7 +21,7 @@ from cocalib.colours import residual_colours
 from cocalib.session import DismissedPlacement, History, RecordingFacts, Session
 from cocalib.view import Advice, view
 from cocalib.web.frames import Frame
-from cocalib.web.messages import FrameHeader, Viewpoint
+from cocalib.web.messages import FrameHeader
 from cocalib.web.radar_sight import Returns
 from cocalib.web.view3d.extent import UNKNOWN, Extent
 from cocalib.web.view3d.returns import Colouring
@@ -53,7 +53,7 @@ def calibration(*, off_px: float = 0.0) -> Calibration:
     return Calibration(camera_from_radar, np.full((6, 6), np.nan), CAMERA, metrics, pairs, (), (), CalibrationOptions())
 
 
-def test_a_ray_of_an_exact_click_ends_at_its_return() -> None:
+def test_a_ray_of_an_exact_click_ends_at_its_return():
     solved = calibration()
     rays = rays_to(solved, solved.pairs)
     assert rays[:, 1] == pytest.approx(np.array([pair.point_radar_m for pair in solved.pairs]), abs=1e-9)
@@ -61,7 +61,7 @@ def test_a_ray_of_an_exact_click_ends_at_its_return() -> None:
     assert rays[:, 0] == pytest.approx(np.broadcast_to(centre, (4, 3)), abs=1e-12)
 
 
-def test_a_ray_ends_at_the_true_position_of_its_return() -> None:
+def test_a_ray_ends_at_the_true_position_of_its_return():
     solved = calibration()
     errors = RadarErrors(azimuth_scale=0.02, elevation_scale=-0.01, range_bias_m=0.1)
     biased = tuple(replace(pair, point_radar_m=reported(errors, pair.point_radar_m)) for pair in solved.pairs)
@@ -76,12 +76,12 @@ def reported(errors: RadarErrors, point_radar_m: np.ndarray) -> np.ndarray:
     return cartesian_from_polar(polar)[0]
 
 
-def test_rings_are_at_their_ranges() -> None:
+def test_rings_are_at_their_ranges():
     ranges = polar_from_cartesian(range_rings((5.0, 10.0, 50.0)).reshape(-1, 3))[:, 0]
     assert set(np.round(ranges, 9)) == {5, 10, 50}
 
 
-def test_an_ellipsoid_holds_its_point_and_reaches_as_far_as_the_noise_says() -> None:
+def test_an_ellipsoid_holds_its_point_and_reaches_as_far_as_the_noise_says():
     point = np.array([[10.0, 0.0, 0.0]])
     shell = ellipsoids(
         point, NoiseOptions(sigma_range_m=0.1, sigma_azimuth_deg=1.0, sigma_elevation_deg=2.0), (1, 1, 2, 1)
@@ -91,7 +91,7 @@ def test_an_ellipsoid_holds_its_point_and_reaches_as_far_as_the_noise_says() -> 
     assert reach == pytest.approx(np.sqrt(7.8147) * np.array(sigma_m), rel=0.02)
 
 
-def test_small_residuals_are_blue_large_ones_red_and_unknown_ones_grey() -> None:
+def test_small_residuals_are_blue_large_ones_red_and_unknown_ones_grey():
     small, large, beyond, unknown = residual_colours(np.array([0.0, 10.0, 99.0, np.nan]), 10.0).astype(int)
     assert small[2] > small[0]
     assert large[0] > large[2]
@@ -99,7 +99,7 @@ def test_small_residuals_are_blue_large_ones_red_and_unknown_ones_grey() -> None
     assert np.ptp(unknown) < 30
 
 
-def test_the_nominal_camera_looks_along_the_radars_x_axis() -> None:
+def test_the_nominal_camera_looks_along_the_radars_x_axis():
     ahead, left, up = nominal_camera_from_radar() @ np.eye(3)
     assert ahead == pytest.approx([0, 0, 1])
     assert left == pytest.approx([-1, 0, 0])
@@ -113,7 +113,7 @@ class Drawn:
     def __init__(self, server: Any) -> None:
         self.camera = SimpleNamespace(position=(-5.0, 0.0, 3.6), image_width=1600, image_height=1000)
         client = SimpleNamespace(scene=server.scene, camera=self.camera, atomic=server.atomic, flush=server.flush)
-        self.scene = TabScene(client)  # type: ignore[arg-type]
+        self.scene = TabScene(client)
         self.node = server.scene.get_handle_by_name
 
     def names(self) -> list[str]:
@@ -161,7 +161,7 @@ def sight(outcome: Calibration | None = None, *, selected: str | None = None, in
     )
 
 
-def test_before_a_calibration_the_camera_stands_dimmed_at_the_radar_and_carries_the_picture(drawn: Drawn) -> None:
+def test_before_a_calibration_the_camera_stands_dimmed_at_the_radar_and_carries_the_picture(drawn):
     drawn.scene.show(sight())
     frustum = drawn.node("/camera")
     assert frustum.position == pytest.approx([0, 0, 0])
@@ -171,7 +171,7 @@ def test_before_a_calibration_the_camera_stands_dimmed_at_the_radar_and_carries_
     assert still != moving
 
 
-def test_with_a_calibration_the_camera_moves_to_its_place_and_the_pairs_appear(drawn: Drawn) -> None:
+def test_with_a_calibration_the_camera_moves_to_its_place_and_the_pairs_appear(drawn):
     drawn.scene.show(sight())
     dimmed = drawn.node("/camera").color
     solved = calibration(off_px=12.0)
@@ -185,7 +185,7 @@ def test_with_a_calibration_the_camera_moves_to_its_place_and_the_pairs_appear(d
     assert "/gap" not in drawn.names()
 
 
-def test_the_best_next_placement_is_ringed_until_no_more_are_needed(drawn: Drawn) -> None:
+def test_the_best_next_placement_is_ringed_until_no_more_are_needed(drawn):
     seen = sight(calibration())
     advice = Advice(NextPlacement(np.array([4.0, 3.0, 0.0]), np.array([10.0, 20.0]), 1.4, False), 5.0, "There.")
     drawn.scene.show(replace(seen, view=replace(seen.view, advice=advice)))
@@ -197,7 +197,7 @@ def test_the_best_next_placement_is_ringed_until_no_more_are_needed(drawn: Drawn
     assert "/next" not in drawn.names()
 
 
-def test_in_the_light_theme_nothing_is_white_on_white(drawn: Drawn) -> None:
+def test_in_the_light_theme_nothing_is_white_on_white(drawn):
     solved = calibration()
     drawn.scene.show(sight(solved, selected="c2"))
     dark = drawn.node("/camera").color
@@ -210,7 +210,7 @@ def test_in_the_light_theme_nothing_is_white_on_white(drawn: Drawn) -> None:
     assert np.asarray(drawn.node("/ray").colors).min() == 255
 
 
-def test_the_ring_of_the_next_place_is_level_and_half_gaps() -> None:
+def test_the_ring_of_the_next_place_is_level_and_half_gaps():
     segments = next_place(np.array([[6.0, -2.0, 0.4]]), radius_m=0.5)
     ring, plumb = segments[:-1], segments[-1]
     assert np.linalg.norm(ring - [6.0, -2.0, 0.4], axis=2) == pytest.approx(0.5)
@@ -219,21 +219,21 @@ def test_the_ring_of_the_next_place_is_level_and_half_gaps() -> None:
     assert plumb == pytest.approx(np.array([[6.0, -2.0, 0.15], [6.0, -2.0, 0.65]]))
 
 
-def test_after_an_undo_to_nothing_the_pairs_are_gone(drawn: Drawn) -> None:
+def test_after_an_undo_to_nothing_the_pairs_are_gone(drawn):
     drawn.scene.show(sight(calibration(), selected="c1"))
     drawn.scene.show(sight())
     assert drawn.names() == ["/returns_2", "/window"]
     assert drawn.node("/camera").position == pytest.approx([0, 0, 0])
 
 
-def test_the_page_can_tell_which_frame_the_3d_view_has_drawn(drawn: Drawn) -> None:
+def test_the_page_can_tell_which_frame_the_3d_view_has_drawn(drawn):
     drawn.scene.show(sight(index=312))
     assert drawn.node("/shown").position == pytest.approx((312, 313, 0))
     assert space_look(sight(index=312)).number == 313
 
 
 @pytest.mark.parametrize("viewpoint", ["behind", "above", "side"])
-def test_every_viewpoint_looks_at_what_lies_before_the_radar(drawn: Drawn, viewpoint: Viewpoint) -> None:
+def test_every_viewpoint_looks_at_what_lies_before_the_radar(drawn, viewpoint):
     drawn.scene.show(sight(calibration()))
     drawn.scene.look_from(viewpoint)
     direction = np.subtract(drawn.camera.look_at, drawn.camera.position)
@@ -242,7 +242,7 @@ def test_every_viewpoint_looks_at_what_lies_before_the_radar(drawn: Drawn, viewp
     assert cosine > 0.95
 
 
-def test_once_the_extent_is_known_the_viewpoint_fits_it_unless_the_user_has_moved_it(drawn: Drawn) -> None:
+def test_once_the_extent_is_known_the_viewpoint_fits_it_unless_the_user_has_moved_it(drawn):
     drawn.scene.show(sight())
     before = np.array(drawn.camera.position)
     road = Extent(200.0, 0.8, -0.8, -1.0, 4.0)
@@ -255,7 +255,7 @@ def test_once_the_extent_is_known_the_viewpoint_fits_it_unless_the_user_has_move
     assert drawn.camera.position == moved
 
 
-def test_a_placement_is_open_clicked_or_dismissed() -> None:
+def test_a_placement_is_open_clicked_or_dismissed():
     apart = [(5.0, 1.0, -0.5), (5.0, -4.0, 0.0), (8.0, -2.0, 0.3), (9.0, 0.0, 0.0)]
     spans = [(0, 500), (0, 500), (1000, 1500), (9000, 9500)]
     placements = tuple(
@@ -272,7 +272,7 @@ def test_a_placement_is_open_clicked_or_dismissed() -> None:
     assert [one.state for one in space_look(seen).placements] == list(seen.placement_states())
 
 
-def test_what_can_be_picked_is_where_the_lens_shows_it() -> None:
+def test_what_can_be_picked_is_where_the_lens_shows_it():
     solved = calibration()
     look = space_look(sight(solved, selected="c2"))
     assert look.projected
