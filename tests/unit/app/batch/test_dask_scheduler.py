@@ -4,7 +4,6 @@ import socket
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import numpy as np
@@ -112,70 +111,55 @@ def test_dask_that_is_not_installed_is_told(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "address",
-    ["tcp://127.0.0.1:8786", "tcp://localhost:1", "tcp://[::1]:8786", "tls://10.0.0.7:8786", "tls://head.example:8786"],
+    ("addresses", "words"),
+    [
+        ("tcp://127.0.0.1:8786 tcp://localhost:1 tcp://[::1]:8786 tls://10.0.0.7:8786 tls://head.example:8786", None),
+        (
+            "tcp://10.0.0.7:8786 tcp://head.example:8786 tcp://127.0.0.1.example:8786 tcp://[fe80::1]:1",
+            r"without TLS is refused.*run code.*tls://",
+        ),
+        (
+            " 8786 localhost:8786 http://127.0.0.1:8786 tcp://127.0.0.1 tcp://:8786 tcp://127.0.0.1:port "
+            "tcp://127.0.0.1:99999 tcp://[::1:8786 inproc://1/2 tcp://127.0.0.1:8786/x tcp://u@127.0.0.1:8786",
+            r"not an address of a Dask scheduler; write tcp://127\.0\.0\.1:8786",
+        ),
+    ],
+    ids=["good", "without TLS", "no address"],
 )
-def test_this_machine_and_tls_are_accepted(address):
-    assert checked_address(address) == address
+def test_this_machine_and_tls_are_accepted_and_nothing_else(addresses, words):
+    for address in addresses.split(" "):
+        if words is None:
+            assert checked_address(address) == address
+        else:
+            with pytest.raises(InputError, match=words):
+                checked_address(address)
+
+
+def test_another_dask_is_named_with_where_it_runs():
+    here, there = ({"packages": {"distributed": version}} for version in ("2026.8.0", "2026.1.0"))
+    same = {"client": here, "scheduler": here, "workers": {"tcp://127.0.0.1:1": here}}
+    assert dask_trouble(same) == ""
+    said = "runs Dask 2026.1.0 and this process 2026.8.0"
+    assert dask_trouble(same | {"scheduler": there}).startswith(f"the scheduler {said}; install")
+    workers = {"tcp://127.0.0.1:1": here, "tcp://127.0.0.1:2": there}
+    assert dask_trouble(same | {"workers": workers}).startswith(f"the worker at tcp://127.0.0.1:2 {said}")
 
 
 @pytest.mark.parametrize(
-    "address", ["tcp://10.0.0.7:8786", "tcp://head.example:8786", "tcp://127.0.0.1.example:8786", "tcp://[fe80::1]:1"]
+    ("answer", "trouble"),
+    [
+        ("0.1.0", ""),
+        (ConnectionRefusedError("closed"), ""),
+        ("9.9", "the worker at tcp://127.0.0.1:2 runs cocalib 9.9 and this is cocalib 0.1.0"),
+        (
+            ModuleNotFoundError("No module named 'app'"),
+            "the worker at tcp://127.0.0.1:2 has no cocalib (ModuleNotFoundError: No module named 'app'); "
+            "install cocalib[cluster] 0.1.0 where it runs",
+        ),
+    ],
+    ids=["equal", "went away", "older", "without"],
 )
-def test_another_machine_without_tls_is_refused_with_the_reason(address):
-    with pytest.raises(InputError, match=r"without TLS is refused.*run code.*tls://"):
-        checked_address(address)
-
-
-@pytest.mark.parametrize(
-    "address",
-    ["", "8786", "localhost:8786", "http://127.0.0.1:8786", "tcp://127.0.0.1", "tcp://:8786", "tcp://127.0.0.1:port",
-     "tcp://127.0.0.1:99999", "tcp://[::1:8786", "inproc://1/2", "tcp://127.0.0.1:8786/x", "tcp://u@127.0.0.1:8786"],
-)  # fmt: skip
-def test_what_is_no_address_is_refused_with_an_example(address):
-    with pytest.raises(InputError, match=r"not an address of a Dask scheduler; write tcp://127\.0\.0\.1:8786"):
-        checked_address(address)
-
-
-def _part(version: str) -> dict[str, Any]:
-    return {"packages": {"distributed": version}}
-
-
-def test_equal_versions_are_no_trouble():
-    part = _part("2026.8.0")
-    assert dask_trouble({"client": part, "scheduler": part, "workers": {"tcp://127.0.0.1:1": part}}) == ""
-    assert version_trouble("0.1.0", {"tcp://127.0.0.1:1": "0.1.0"}) == ""
-
-
-def test_a_scheduler_of_another_dask_is_named():
-    here, there = _part("2026.8.0"), _part("2026.1.0")
-    found = dask_trouble({"client": here, "scheduler": there, "workers": {"tcp://127.0.0.1:1": here}})
-    assert found.startswith("the scheduler runs Dask 2026.1.0 and this process 2026.8.0; install")
-
-
-def test_a_worker_of_another_dask_is_named():
-    here, there = _part("2026.8.0"), _part("2026.1.0")
-    found = dask_trouble(
-        {"client": here, "scheduler": here, "workers": {"tcp://127.0.0.1:1": here, "tcp://127.0.0.1:2": there}}
-    )
-    assert found.startswith("the worker at tcp://127.0.0.1:2 runs Dask 2026.1.0 and this process 2026.8.0")
-
-
-def test_a_worker_without_cocalib_is_named():
-    found = version_trouble(
-        "0.1.0", {"tcp://127.0.0.1:1": "0.1.0", "tcp://127.0.0.1:2": ModuleNotFoundError("No module named 'app'")}
-    )
-    assert found == (
-        "the worker at tcp://127.0.0.1:2 has no cocalib (ModuleNotFoundError: No module named 'app'); "
-        "install cocalib[cluster] 0.1.0 where it runs"
-    )
-
-
-def test_a_worker_that_went_away_is_no_trouble():
-    gone = ConnectionRefusedError("closed")
-    assert version_trouble("0.1.0", {"tcp://127.0.0.1:1": "0.1.0", "tcp://127.0.0.1:2": gone}) == ""
-
-
-def test_a_worker_of_another_cocalib_is_named():
-    found = version_trouble("0.1.0", {"tcp://127.0.0.1:2": "9.9"})
-    assert found.startswith("the worker at tcp://127.0.0.1:2 runs cocalib 9.9 and this is cocalib 0.1.0")
+def test_a_worker_of_another_cocalib_or_without_one_is_named(answer, trouble):
+    found = version_trouble("0.1.0", {"tcp://127.0.0.1:1": "0.1.0", "tcp://127.0.0.1:2": answer})
+    assert found.startswith(trouble)
+    assert bool(found) == bool(trouble)

@@ -28,14 +28,8 @@ def read_back(folder: Path) -> dict[tuple[str, str], ManifestRow]:
 
 
 def test_vehicles_and_sessions_are_folders(tmp_path):
-    lay(
-        tmp_path,
-        "van 7/spring/radar.bag",
-        "van 7/spring/camera.bag",
-        "van 7/autumn/drive.mcap",
-        "van 8/radar.bag",
-        "van 8/cam.bag",
-    )
+    bags = ("radar.bag", "camera.bag")
+    lay(tmp_path, *(f"van {place}/{bag}" for place in ("7/spring", "8") for bag in bags), "van 7/autumn/drive.mcap")
     found = read_back(tmp_path)
     assert set(found) == {("van 7", "spring"), ("van 7", "autumn"), ("van 8", "1")}
     assert {path.name for path in found["van 7", "spring"].recording} == {"radar.bag", "camera.bag"}
@@ -81,14 +75,8 @@ def test_a_manifest_elsewhere_names_whole_paths(tmp_path):
 
 
 def test_folders_of_pictures_and_tables_are_named_as_left_out(tmp_path):
-    lay(
-        tmp_path,
-        "van 1/drive.mcap",
-        "van 1/thumbs/1.png",
-        "van 2/frames/1.png",
-        "van 2/frames/2.png",
-        "van 2/radar.csv",
-    )
+    frames = ("frames/1.png", "frames/2.png", "radar.csv")
+    lay(tmp_path, "van 1/drive.mcap", "van 1/thumbs/1.png", *(f"van 2/{name}" for name in frames))
     text, count = first_manifest(tmp_path, tmp_path / "fleet.toml")
     assert count == 1
     left_out = [line for line in text.splitlines() if line.startswith("# left out: ")]

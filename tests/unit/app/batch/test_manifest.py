@@ -1,6 +1,5 @@
 """Manifests as a person writes them: every mistake is named with its place."""
 
-import re
 from pathlib import Path
 
 import pytest
@@ -31,6 +30,9 @@ auto = true
 vehicle_type = "lorry"
 options.noise.sigma_px = 3
 """
+
+
+ROW = '[[session]]\nvehicle = "a"\nrecording = "b.bag"\n'
 
 
 def rows_of(text: str, folder: Path, name: str = "fleet.toml") -> tuple[ManifestRow, ...]:
@@ -73,53 +75,41 @@ def test_an_absolute_path_stays_as_it_is(tmp_path):
         ("[defaults]\nauto = 3", "defaults.auto: expected bool, got int"),
         ("", "no session in it; add one, or let cocalib batch"),
         ("[[session", "not valid TOML: "),
-        ('[[session]]\nvehicle = "a/b"\nrecording = "b.bag"', "session 1 (a/b): vehicle: 'a/b' cannot be a name"),
-        ('[[session]]\nvehicle = "a"\nrecording = ".."', "session 1 (a): session: '..' cannot be a name"),
+        (ROW.replace('"a"', '"a/b"'), "session 1 (a/b): vehicle: 'a/b' cannot be a name"),
+        (ROW.replace("b.bag", ".."), "session 1 (a): session: '..' cannot be a name"),
+        (ROW.replace("b.", "b" * 121 + "."), "session 1 (a): session is 'bbbbbbbbbbbbbbbbbbbb…'; give 1 to 120"),
+        (f'{ROW}radar_serial = "R\\t1"', "session 1 (a): radar_serial is 'R\\t1'; give 1 to 120 printable characters"),
+        (f'{ROW}vehicle_type = " "', "session 1 (a): vehicle_type is ' '; give 1 to 120 printable characters"),
+        (f'{ROW}camera_serial = "{"x" * 121}"', "session 1: camera_serial: expected str of length <= 120"),
+        (ROW.replace('"b.bag"', "[]"), "session 1 (a): recording: names no file"),
         (
-            f'[[session]]\nvehicle = "a"\nrecording = "{"b" * 121}.bag"',
-            "session 1 (a): session is 'bbbbbbbbbbbbbbbbbbbb…'; give 1 to 120 printable characters",
-        ),
-        (
-            '[[session]]\nvehicle = "a"\nrecording = "b.bag"\nradar_serial = "R\\t1"',
-            "session 1 (a): radar_serial is 'R\\t1'; give 1 to 120 printable characters",
-        ),
-        (
-            '[[session]]\nvehicle = "a"\nrecording = "b.bag"\nvehicle_type = " "',
-            "session 1 (a): vehicle_type is ' '; give 1 to 120 printable characters",
-        ),
-        (
-            f'[[session]]\nvehicle = "a"\nrecording = "b.bag"\ncamera_serial = "{"x" * 121}"',
-            "session 1: camera_serial: expected str of length <= 120",
-        ),
-        ('[[session]]\nvehicle = "a"\nrecording = []', "session 1 (a): recording: names no file"),
-        (
-            '[[session]]\nvehicle = "a"\nrecording = "b.bag"\noptions.noise.sigmapx = 1',
+            f"{ROW}options.noise.sigmapx = 1",
             "session 1 (a): unknown option 'noise.sigmapx'; did you mean 'noise.sigma_px'?",
         ),
+        (f'{ROW}topics.radar_topc = "x"', "session 1: topics.radar_topc: unknown key; did you mean radar_topic?"),
+        (f'{ROW}exports = ["tf3"]', "session 1 (a): exports: unknown format 'tf3'; did you mean tf2?"),
         (
-            '[[session]]\nvehicle = "a"\nrecording = "b.bag"\ntopics.radar_topc = "x"',
-            "session 1: topics.radar_topc: unknown key; did you mean radar_topic?",
-        ),
-        (
-            '[[session]]\nvehicle = "a"\nrecording = "b.bag"\nexports = ["tf3"]',
-            "session 1 (a): exports: unknown format 'tf3'; did you mean tf2?",
-        ),
-        (
-            '[[session]]\nvehicle = "a"\nrecording = "b.bag"\ncamera_position_sigma_m = 0.1',
+            f"{ROW}camera_position_sigma_m = 0.1",
             "session 1 (a): camera_position_sigma_m: there is no camera_position_m",
         ),
+        (f"{ROW}camera_position_m = [0, 0, 5000]", "session 1 (a): camera_position_m: give metres"),
+        (f"{ROW}reflector_m = 24", "reflector_m"),
         (
-            '[[session]]\nvehicle = "a"\nrecording = "b.bag"\ncamera_position_m = [0, 0, 5000]',
-            "session 1 (a): camera_position_m: give metres",
-        ),
-        (
-            '[[session]]\nvehicle = "a"\nrecording = "b.bag"\n[[session]]\nvehicle = "A"\nrecording = "c/B.bag"',
+            f'{ROW}[[session]]\nvehicle = "A"\nrecording = "c/B.bag"',
             "session 1 and session 2 are both session 'B' of vehicle 'A'",
         ),
+        (
+            f'{ROW}[[session]]\nvehicle = "b"\nrecording = "x/../b.bag"',
+            "session 1 (a / b) and session 2 (b / b) have the same recording",
+        ),
+        (ROW[1:].replace("]]", "]"), "write [[session]], with two brackets"),
+        (ROW.replace('"a"', "17"), 'vehicle: 17 is no text; write it in quotes: vehicle = "17"'),
+        (f"{ROW}session = 2026-09-21", 'session: 2026-09-21 is no text; write it in quotes: session = "2026-09-21"'),
+        (ROW.replace('"a"', '"a "'), "leave out the spaces around it"),
     ],
 )
 def test_a_mistake_is_named_with_its_place(text, fault, tmp_path):
-    assert fault_of(text, tmp_path).startswith(fault)
+    assert fault in fault_of(text, tmp_path)
 
 
 def test_a_file_of_another_kind_is_refused(tmp_path):
@@ -127,48 +117,12 @@ def test_a_file_of_another_kind_is_refused(tmp_path):
         assert fault_of("a: 1", tmp_path, name).startswith("a manifest is a .toml file; cocalib batch FILE.toml --init")
     with pytest.raises(InputError, match=r"no such file; cocalib batch .*absent\.toml --init FOLDER writes one"):
         read_manifest(tmp_path / "absent.toml")
-    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(InputError, match="not a text file"):
-        read_manifest(tmp_path / "binary.toml")
+    for data, words in ((b"\xff\xfe\x00", "not a text file"), (ROW.encode() + b"# K\xe4fer", "save it as UTF-8")):
+        (tmp_path / "binary.toml").write_bytes(data)
+        with pytest.raises(InputError, match=words):
+            read_manifest(tmp_path / "binary.toml")
 
 
 def test_the_size_of_the_reflector_and_resized_pictures(tmp_path):
-    path = tmp_path / "fleet.toml"
-    path.write_text(
-        '[defaults]\nreflector_m = 0.3\n[[session]]\nvehicle = "a"\nrecording = "a.bag"\nrescale_camera = true\n'
-    )
-    (row,) = read_manifest(path).rows
+    (row,) = rows_of(f"[defaults]\nreflector_m = 0.3\n{ROW}rescale_camera = true\n", tmp_path)
     assert (row.reflector_m, row.rescale_camera) == (0.3, True)
-    path.write_text('[[session]]\nvehicle = "a"\nrecording = "a.bag"\nreflector_m = 24\n')
-    with pytest.raises(InputError, match="reflector_m"):
-        read_manifest(path)
-
-
-def test_another_encoding_is_named_with_what_to_do(tmp_path):
-    path = tmp_path / "fleet.toml"
-    path.write_bytes('[[session]]\nvehicle = "K\xe4fer"\n'.encode("latin-1"))
-    with pytest.raises(InputError, match="save it as UTF-8"):
-        read_manifest(path)
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ('[session]\nvehicle = "a"\nrecording = "a.bag"\n', r"write \[\[session\]\], with two brackets"),
-        (
-            '[[session]]\nvehicle = 17\nrecording = "a.bag"\n',
-            r'vehicle: 17 is no text; write it in quotes: vehicle = "17"',
-        ),
-        (
-            '[[session]]\nvehicle = "a"\nsession = 2026-09-21\nrecording = "a.bag"\n',
-            r'session: 2026-09-21 is no text; write it in quotes: session = "2026-09-21"',
-        ),
-        ('[[session]]\nvehicle = "a "\nrecording = "a.bag"\n', r"leave out the spaces around it"),
-        (
-            '[[session]]\nvehicle = "a"\nrecording = "a.bag"\n[[session]]\nvehicle = "b"\nrecording = "x/../a.bag"\n',
-            r"session 1 \(a / a\) and session 2 \(b / a\) have the same recording",
-        ),
-    ],
-)
-def test_slips_of_the_pen_are_told_with_what_to_write(tmp_path, text, words):
-    assert re.search(words, fault_of(text, tmp_path))

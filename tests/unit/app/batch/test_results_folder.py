@@ -21,16 +21,8 @@ def write(folder: ResultsFolder, *, is_final: bool = True, reason: str = "") -> 
         (unfinished / "calibration.json").write_text("{}")
         (unfinished / "export" / "tf2.sh").write_text("#!/bin/sh\n")
         (unfinished / LOG_FILE).write_text("12:00")
-        outcome = Outcome(
-            OUTCOME_SCHEMA,
-            DIGEST,
-            "van",
-            "1",
-            "solved",
-            reason=reason,
-            is_final=is_final,
-            files=listed_files(unfinished),
-        )
+        more = {"reason": reason, "is_final": is_final, "files": listed_files(unfinished)}
+        outcome = Outcome(OUTCOME_SCHEMA, DIGEST, "van", "1", "solved", **more)
         (unfinished / OUTCOME_FILE).write_text(outcome_text(outcome))
 
 
@@ -48,25 +40,26 @@ def test_a_result_is_listed_without_its_outcome_and_its_log(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "damage", ["changed", "missing", "outcome cut", "outcome empty", "of another job", "no folder"]
+    ("name", "damage"),
+    [
+        ("calibration.json", lambda text: "[]"),
+        ("export/tf2.sh", None),
+        (OUTCOME_FILE, lambda text: text[:-20]),
+        (OUTCOME_FILE, lambda text: ""),
+        (OUTCOME_FILE, lambda text: text.replace(DIGEST, DIGEST[::-1])),
+        ("", None),
+    ],
+    ids=["changed", "missing", "outcome cut", "outcome empty", "of another job", "no folder"],
 )
-def test_a_damaged_result_is_none_and_can_be_written_again(damage, tmp_path):
+def test_a_damaged_result_is_none_and_can_be_written_again(name, damage, tmp_path):
     folder = ResultsFolder(tmp_path)
     write(folder)
-    place = folder.folder_of(DIGEST)
-    text = (place / OUTCOME_FILE).read_text()
-    if damage == "changed":
-        (place / "calibration.json").write_text("[]")
-    elif damage == "missing":
-        (place / "export" / "tf2.sh").unlink()
-    elif damage == "outcome cut":
-        (place / OUTCOME_FILE).write_text(text[:-20])
-    elif damage == "outcome empty":
-        (place / OUTCOME_FILE).write_text("")
-    elif damage == "of another job":
-        (place / OUTCOME_FILE).write_text(text.replace(DIGEST, DIGEST[::-1]))
+    place = folder.folder_of(DIGEST) / name
+    if damage:
+        place.write_text(damage(place.read_text()))
     else:
-        place.rename(place.with_name("elsewhere"))
+        place.rename(tmp_path / "elsewhere")
+    if not name:
         place.write_text("a file of that name")
     assert folder.outcome(DIGEST) is None
     write(folder)

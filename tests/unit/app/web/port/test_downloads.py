@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,12 +30,11 @@ CLICKS = tuple(ReflectorClick(TimeNs(index), f"c{index}", 10.0, 10.0) for index 
 
 
 @pytest.fixture
-def ask(project_root: Path) -> Callable[[Session, str], Reply]:
-    def answer(session: Session, address: str) -> Reply:
+def ask(project_root: Path) -> Callable[..., Reply]:
+    def answer(session: Session, address: str, recording: PictureRecording | None = None) -> Reply:
         workspace: Any = SimpleNamespace(session=session, facts=SimpleNamespace(name="drive 7.mcap"), camera_file=None)
-        hub: Any = SimpleNamespace(survey=None)
-        routes = Routes(project_root / "static")
-        routes.admit(workspace, PictureRecording(grey_pictures(1)), hub)
+        routes, hub = Routes(project_root / "static"), SimpleNamespace(survey=None)
+        routes.admit(workspace, recording or PictureRecording(grey_pictures(1)), hub)
         return asyncio.run(routes.answer(address))
 
     return answer
@@ -55,17 +54,16 @@ def test_a_missing_calibration_is_explained(ask):
     refused = Unsolvable("mirrored", "the axes are mirrored", "swap left and right")
     solved = Session(CLICKS, revision=3, outcome=refused, outcome_revision=3)
     assert ask(solved, "/api/export/urdf").body == b"The axes are mirrored. Swap left and right.\n"
-    assert b"four placements" in ask(Session(), "/api/export/urdf").body
+    for path in ("/api/calibration.json", "/api/export/urdf"):
+        assert ask(Session(), path).status == 409
+        assert b"four placements" in ask(Session(), path).body
 
 
 @pytest.mark.parametrize("name", [form.name for form in FORMATS])
 def test_a_preview_reads_its_own_text_back(file, ask, name):
-    preview = json.loads(
-        ask(
-            Session(CLICKS, outcome=file.calibration, outcome_revision=0),
-            f"/api/preview/{name}{'?rectified=1' if format_named(name).is_for_rectified else ''}",
-        ).body
-    )
+    solved = Session(CLICKS, outcome=file.calibration, outcome_revision=0)
+    query = "?rectified=1" if format_named(name).is_for_rectified else ""
+    preview = json.loads(ask(solved, f"/api/preview/{name}{query}").body)
     assert preview["check_is_good"]
     assert preview["file_name"].startswith("drive_7_")
     assert preview["numbers"]
@@ -107,9 +105,8 @@ def test_a_refused_field_is_named_and_a_name_in_the_address_is_written(file, ask
     assert json.loads(ask(Session(), "/api/preview/tf2").body)["field"] is None
 
 
-def test_the_picture_of_the_check_point_is_the_frame_in_which_it_was_clicked(file, project_root):
-    pictures = [np.full((60, 80, 3), shade, dtype=np.uint8) for shade in (10, 90, 200)]
-    recording = PictureRecording(pictures)
+def test_the_picture_of_the_check_point_is_the_frame_in_which_it_was_clicked(file, ask):
+    recording = PictureRecording([np.full((60, 80, 3), shade, dtype=np.uint8) for shade in (10, 90, 200)])
     nearest = pair_of_check_point(file.calibration)
 
     def ask_at(stamp: int) -> Reply:
@@ -118,10 +115,7 @@ def test_the_picture_of_the_check_point_is_the_frame_in_which_it_was_clicked(fil
             for pair in file.calibration.pairs
         )
         session = Session(CLICKS, outcome=dataclasses.replace(file.calibration, pairs=pairs), outcome_revision=0)
-        workspace: Any = SimpleNamespace(session=session, facts=SimpleNamespace(name="drive 7.mcap"), camera_file=None)
-        routes, hub = Routes(project_root / "static"), SimpleNamespace(survey=None)
-        routes.admit(workspace, recording, cast(Any, hub))
-        return asyncio.run(routes.answer(f"/api/check_point_picture?{nearest}"))
+        return ask(session, f"/api/check_point_picture?{nearest}", recording)
 
     for index, stamp in enumerate(recording.image_times.tolist()):
         shown = ask_at(stamp)

@@ -32,10 +32,6 @@ class Door(Guard):
         self.cookie = f"{self.admissions.cookie_name}={self.value}"
 
 
-def guard(**changes: object) -> Door:
-    return Door(**changes)
-
-
 def allowed(door: Guard, asked: Request) -> bool:
     return isinstance(door.check(asked), Allowed)
 
@@ -46,7 +42,7 @@ def status(verdict: object) -> int:
 
 
 def test_the_link_admits_once_and_its_cookie_stays_valid():
-    door = guard()
+    door = Door()
     link = f"/?token={door.token}"
     admitted = door.check(request(link))
     assert isinstance(admitted, Admitted)
@@ -63,7 +59,7 @@ def test_the_link_admits_once_and_its_cookie_stays_valid():
 
 
 def test_after_a_link_was_used_the_next_one_works():
-    door = guard()
+    door = Door()
     first = door.token
     door.check(request(f"/?token={first}"))
     assert door.token != first
@@ -72,7 +68,7 @@ def test_after_a_link_was_used_the_next_one_works():
 
 @pytest.mark.parametrize("method", ["HEAD", "POST", "OPTIONS"])
 def test_only_opening_a_link_uses_it_up(method):
-    door = guard()
+    door = Door()
     link = f"/?token={door.token}"
     preview = Request(link, {"host": ["127.0.0.1:8080"]}, method)
     assert status(door.check(preview)) == 401
@@ -80,31 +76,28 @@ def test_only_opening_a_link_uses_it_up(method):
 
 
 def test_a_token_chosen_by_the_user_stays_valid():
-    door = guard(token="mine")
+    door = Door(token="mine")
     assert isinstance(door.check(request("/?token=mine")), Admitted)
     assert isinstance(door.check(request("/?token=mine")), Admitted)
     assert status(door.check(request("/?token=other"))) == 401
 
 
 @pytest.mark.parametrize("session", ["a", "b"])
-def test_a_cookie_is_for_one_server_only(session):
-    one, other = guard(session="a"), guard(session=session)
+def test_a_cookie_is_for_one_server_only_and_those_of_other_sessions_do_not_overwrite_it(session):
+    one, other = Door(session="a"), Door(session=session)
     assert allowed(one, request(cookie=one.cookie))
     assert status(other.check(request(cookie=one.cookie))) == 401
     stolen = f"{other.admissions.cookie_name}={one.value}"
     assert status(other.check(request(cookie=stolen))) == 401
-
-
-def test_servers_of_different_sessions_do_not_overwrite_each_others_cookies():
-    one, other = guard(session="a"), guard(session="b")
-    assert one.admissions.cookie_name != other.admissions.cookie_name
-    both = f"{other.cookie}; {one.cookie}"
-    assert allowed(one, request(cookie=both))
-    assert allowed(other, request(cookie=both))
+    if session == "b":
+        assert one.admissions.cookie_name != other.admissions.cookie_name
+        both = f"{other.cookie}; {one.cookie}"
+        assert allowed(one, request(cookie=both))
+        assert allowed(other, request(cookie=both))
 
 
 def test_an_admission_ends_when_it_is_not_used():
-    door = guard()
+    door = Door()
     for _ in range(5):
         door.clock.now += MAX_IDLE_S - 1
         assert allowed(door, request(cookie=door.cookie)), "each use renews it"
@@ -115,7 +108,7 @@ def test_an_admission_ends_when_it_is_not_used():
 
 
 def test_a_page_that_is_open_all_day_stays_admitted():
-    door = guard()
+    door = Door()
     door.admissions.opened(door.value)
     door.clock.now += 30 * MAX_IDLE_S
     assert allowed(door, request(cookie=door.cookie))
@@ -127,7 +120,7 @@ def test_a_page_that_is_open_all_day_stays_admitted():
 
 
 def test_admissions_do_not_pile_up_and_open_pages_stay():
-    door = guard(token="mine")
+    door = Door(token="mine")
     door.admissions.opened(door.value)
     for _ in range(1000):
         door.clock.now += 1
@@ -138,69 +131,58 @@ def test_admissions_do_not_pile_up_and_open_pages_stay():
 
 @pytest.mark.parametrize("value", ["", "0", "nonsense", "\u00e4", "\udce4", "="])
 def test_without_the_cookie_nothing_is_served(value):
-    door = guard()
+    door = Door()
     for cookie in (value, f"{door.admissions.cookie_name}={value}", f"other=1; {door.admissions.cookie_name}={value}"):
         assert status(door.check(request("/", cookie=cookie))) == 401
         assert status(door.check(request("/api/clicks.json", cookie=cookie))) == 401
 
 
 def test_a_token_does_not_open_a_websocket():
-    door = guard()
+    door = Door()
     opening = request(f"/ws?token={door.token}", upgrade="websocket", origin="http://127.0.0.1:8080")
     assert status(door.check(opening)) == 401
     assert isinstance(door.check(request(f"/?token={door.token}")), Admitted), "the attempt must not use up the token"
 
 
-@pytest.mark.parametrize(
-    "host",
-    ["evil.example", "evil.example:8080", "127.0.0.1.evil.example", "192.168.0.7:8080", "[::2]",
-     "127.0.0.1:8080@evil.example", "127.0.0.1:evil.example", "[::1].evil.example", "[::1]@evil.example", "localhost:80:80"],
-)  # fmt: skip
-def test_a_foreign_host_name_is_not_answered(host):
-    assert status(guard().check(request(host=host, cookie=guard().cookie))) == 421
+FOREIGN = ("evil.example", "evil.example:8080", "127.0.0.1.evil.example", "192.168.0.7:8080", "[::2]", "localhost:80:80",
+           "127.0.0.1:8080@evil.example", "127.0.0.1:evil.example", "[::1].evil.example", "[::1]@evil.example")  # fmt: skip
+OURS = ("127.0.0.1:8080", "localhost:8080", "LOCALHOST:9000", "[::1]:8080", "127.0.0.1")
 
 
-@pytest.mark.parametrize("host", ["127.0.0.1:8080", "localhost:8080", "LOCALHOST:9000", "[::1]:8080", "127.0.0.1"])
-def test_names_of_this_machine_are_answered_under_any_port_for_tunnels(host):
-    door = guard()
-    assert allowed(door, request(host=host, cookie=door.cookie))
+@pytest.mark.parametrize("host", [*FOREIGN, *OURS])
+def test_names_of_this_machine_are_answered_under_any_port_for_tunnels_and_no_others(host):
+    door = Door()
+    verdict = door.check(request(host=host, cookie=door.cookie))
+    assert isinstance(verdict, Allowed) if host in OURS else status(verdict) == 421
 
 
 @pytest.mark.parametrize("hosts", [[], ["127.0.0.1", "evil.example"]])
 def test_a_request_has_exactly_one_host(hosts):
-    assert status(guard().check(Request("/", {"host": hosts, "cookie": [guard().cookie]}))) == 400
+    assert status(Door().check(Request("/", {"host": hosts, "cookie": [Door().cookie]}))) == 400
 
 
 @pytest.mark.parametrize("path", ["/ws", "/viser/abc", "/"])
 @pytest.mark.parametrize(
     "origin", ["http://evil.example", "http://127.0.0.1:9999", "http://localhost:8080", "null", ""]
 )
-def test_a_websocket_from_another_origin_or_none_is_refused(path, origin):
-    opening = request(path, upgrade="websocket", origin=origin, cookie=guard().cookie)
-    assert status(guard().check(opening)) == 403
-
-
-def test_a_websocket_of_our_own_page_is_let_in():
-    door = guard()
-    opening = request("/ws", upgrade="WebSocket", origin="http://127.0.0.1:8080", cookie=door.cookie)
-    assert allowed(door, opening)
-
-
-def test_a_plain_request_that_names_another_origin_is_refused():
-    assert (
-        status(guard().check(request("/api/clicks.json", origin="http://evil.example", cookie=guard().cookie))) == 403
-    )
+def test_a_request_from_another_origin_is_refused_and_a_websocket_from_none(path, origin):
+    door = Door()
+    for upgrade in ("websocket", "WebSocket"):
+        assert status(door.check(request(path, upgrade=upgrade, origin=origin, cookie=door.cookie))) == 403
+        assert allowed(door, request(path, upgrade=upgrade, origin="http://127.0.0.1:8080", cookie=door.cookie))
+    plain = request(path, origin=origin, cookie=door.cookie)
+    assert allowed(door, plain) if not origin else status(door.check(plain)) == 403
 
 
 def test_bound_to_the_network_it_answers_to_addresses_but_not_to_strange_names():
-    door = guard(host="0.0.0.0", more_hosts=["bench.local"])
+    door = Door(host="0.0.0.0", more_hosts=["bench.local"])
     assert allowed(door, request(host="192.168.0.7:8080", cookie=door.cookie))
     assert allowed(door, request(host="bench.local:8080", cookie=door.cookie))
     assert status(door.check(request(host="evil.example:8080", cookie=door.cookie))) == 421
 
 
 def test_only_tokens_that_may_be_guessed_wait_for_their_turn():
-    generated, chosen = guard(), guard(token="mine")
+    generated, chosen = Door(), Door(token="mine")
     assert not generated.tries_token(request("/"))
     assert generated.tries_token(request("/?token=wrong"))
     assert not generated.tries_token(request(f"/?token={generated.token}"))

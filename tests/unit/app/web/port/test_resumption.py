@@ -5,19 +5,15 @@ import hmac
 import json
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from urllib.parse import urlencode
 
 import pytest
 
-from cocalib.web.port.link import ServerOptions
 from cocalib.web.port.resumption import Resumption, Ticket
-from cocalib.web.port.server import RunningServer, start
-from cocalib.workspace import Workspace, open_workspace
 from tests.picture_recording import PictureRecording, grey_pictures
 from tests.port_client import come_in, get
+from tests.serving import serving
 
 ORIGIN = "http://127.0.0.1:8080"
 
@@ -34,24 +30,16 @@ def signed(ticket: Ticket, challenge: str, origin: str = ORIGIN) -> str:
 
 def proven(server: Resumption, ticket: Ticket, *, challenge: str | None = None, origin: str = ORIGIN) -> bool:
     challenge = challenge or server.challenge()
-    return server.is_proven(
-        ticket=ticket.ticket, challenge=challenge, proof=signed(ticket, challenge, origin), origin=ORIGIN
-    )
+    proof = signed(ticket, challenge, origin)
+    return server.is_proven(ticket=ticket.ticket, challenge=challenge, proof=proof, origin=ORIGIN)
 
 
-def test_a_ticket_outlives_the_server():
+def test_a_ticket_outlives_the_server_and_is_for_one_session_and_one_port():
+    """A server of another user on the port of ours cannot pass the page's proof on to ours on the next port."""
     ticket = Resumption("a").ticket()
     assert proven(Resumption("a"), ticket)
-
-
-def test_a_ticket_is_for_one_session():
-    assert not proven(Resumption("b"), Resumption("a").ticket())
-
-
-def test_a_proof_made_for_another_port_is_refused():
-    """A server of another user on the port of ours cannot pass the page's proof on to ours on the next port."""
-    server = Resumption("a")
-    assert not proven(server, server.ticket(), origin="http://127.0.0.1:8081")
+    assert not proven(Resumption("b"), ticket)
+    assert not proven(Resumption("a"), ticket, origin="http://127.0.0.1:8081")
 
 
 def test_a_challenge_is_accepted_once_and_not_for_long():
@@ -99,21 +87,13 @@ def test_a_key_file_that_others_may_know_is_not_used(state, kind):
     assert not proven(Resumption("a"), Resumption("a").ticket())
 
 
-@contextmanager
-def serving(workspace: Workspace, recording: PictureRecording, port: int = 0) -> Iterator[RunningServer]:
-    running = start(workspace, recording, ServerOptions(port=port, no_browser=True, session="a"))
-    yield running
-    running.close()
-
-
 def test_a_page_comes_back_after_a_restart_but_its_cookie_alone_does_not(tmp_path):
-    recording = PictureRecording(grey_pictures(1))
-    workspace = open_workspace(recording, camera=None, session_folder=tmp_path / "s", name="one grey")
-    with serving(workspace, recording) as first:
+    recording, folder = PictureRecording(grey_pictures(1)), tmp_path / "s"
+    with serving(recording, folder, session="a") as (first, _):
         cookie, port = come_in(first), first.port
         assert get(first, "/api/ticket").status == 401
         ticket = Ticket(**json.loads(get(first, "/api/ticket", Cookie=cookie).body))
-    with serving(workspace, recording, port) as second:
+    with serving(recording, folder, session="a", port=port) as (second, _):
         assert second.port == port
         assert get(second, "/", Cookie=cookie).status == 401
         challenge = json.loads(get(second, "/api/challenge").body)["challenge"]
@@ -125,4 +105,3 @@ def test_a_page_comes_back_after_a_restart_but_its_cookie_alone_does_not(tmp_pat
         assert fresh != cookie
         assert get(second, "/", Cookie=fresh).status == 200
         assert get(second, f"/api/resume?{query}").status == 401, "the challenge is used up"
-    workspace.close()

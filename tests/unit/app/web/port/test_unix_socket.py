@@ -62,10 +62,12 @@ def test_the_page_is_served_through_the_socket_and_to_its_owner_only(private, tm
     assert not path.exists()
 
 
-def test_a_socket_that_a_killed_server_left_is_replaced(private):
-    listening_socket(private / "s").close()
-    assert (private / "s").exists()
-    listening_socket(private / "s").close()
+def test_a_socket_that_a_killed_server_left_is_replaced_and_a_missing_folder_created_for_its_owner(private):
+    for folder in (private, private / "new"):
+        listening_socket(folder / "s").close()
+        assert (folder / "s").exists()
+        assert folder.stat().st_mode & 0o077 == 0
+        listening_socket(folder / "s").close()
 
 
 def test_a_path_that_is_taken_is_refused(private):
@@ -81,26 +83,15 @@ def test_a_path_that_is_taken_is_refused(private):
             listening_socket(private / "s")
 
 
-def test_a_folder_that_others_can_enter_is_refused(private):
-    private.chmod(0o755)
-    with pytest.raises(AddressError, match="others can enter"):
-        listening_socket(private / "s")
-
-
-def test_a_missing_folder_is_created_for_its_owner(private):
-    listening_socket(private / "new" / "s").close()
-    assert (private / "new").stat().st_mode & 0o077 == 0
-
-
 @pytest.mark.parametrize(
     ("name", "words"), [("a" * 200, "103 bytes"), ("a:b", "colon"), ("no/such/folder", "cannot be created")]
 )
-def test_a_path_that_cannot_be_used_is_refused(private, name, words):
+def test_a_path_that_cannot_be_used_is_refused(private, name, words, monkeypatch):
     with pytest.raises(AddressError, match=words):
         listening_socket(private / name)
-
-
-def test_a_system_without_unix_sockets_is_told(private, monkeypatch):
+    private.chmod(0o755)
+    with pytest.raises(AddressError, match="others can enter"):
+        listening_socket(private / "s")
     monkeypatch.delattr(socket, "AF_UNIX")
     with pytest.raises(AddressError, match="no Unix sockets"):
         listening_socket(private / "s")

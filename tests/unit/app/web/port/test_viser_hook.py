@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import re
 from collections.abc import Callable, Iterator
-from typing import Any
+from types import SimpleNamespace
 
 import msgspec
 import pytest
@@ -122,25 +122,12 @@ def test_visers_page_runs_our_script_first_and_hides_its_panels():
     assert "<body" in rest, CHANGED
 
 
-class StartedElsewhere:
-    """A viser server that starts without websockets' `serve`."""
-
-    def __init__(self, **_options: Any) -> None:
-        self.stopped = False
-        made.append(self)
-
-    def stop(self) -> None:
-        self.stopped = True
-
-
-made: list[StartedElsewhere] = []
-
-
 def test_a_viser_that_starts_its_server_in_another_way_is_stopped_and_named(monkeypatch):
-    monkeypatch.setattr(viser, "ViserServer", StartedElsewhere)
+    stopped = []
+    monkeypatch.setattr(viser, "ViserServer", lambda **_: SimpleNamespace(stop=lambda: stopped.append(True)))
     with pytest.raises(InstallationError, match=rf"viser {viser.__version__} cannot be used: it does not start"):
         viser_hook.start_viser("127.0.0.1", 0, wrap_request=nobody, wrap_handler=unwrapped)
-    assert made[-1].stopped
+    assert stopped
 
 
 def test_a_viser_without_a_part_is_stopped_and_the_part_is_named(monkeypatch, capsys):

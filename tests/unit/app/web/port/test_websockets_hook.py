@@ -61,23 +61,32 @@ def behaviour(client: Callable[[int], None], caplog: pytest.LogCaptureFixture) -
     return [record.getMessage() for record in caplog.records if record.name.startswith(("cocalib", "websockets"))]
 
 
-def scan(port: int) -> None:
+def sent(port: int, text: bytes, *, to_the_end: bool = True, half_closed: bool = False) -> bytes:
+    """Send a request, and read the whole answer unless the client leaves before it."""
     with socket.create_connection(("127.0.0.1", port), timeout=10) as connection:
-        connection.sendall(b"\x16\x03\x01 no HTTP at all\r\n\r\n")
-        while connection.recv(1000):
-            pass
+        connection.sendall(text)
+        if half_closed:
+            connection.shutdown(socket.SHUT_WR)
+        return b"".join(iter(lambda: connection.recv(1000), b"")) if to_the_end else b""
+
+
+def scan(port: int) -> None:
+    sent(port, b"\x16\x03\x01 no HTTP at all\r\n\r\n")
 
 
 def leave(port: int) -> None:
-    with socket.create_connection(("127.0.0.1", port), timeout=10) as connection:
-        connection.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n")
+    sent(port, b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n", to_the_end=False)
+
+
+def ask_and_send_no_more(port: int) -> None:
+    assert sent(port, ASKED, half_closed=True).startswith(b"HTTP/1.1 426")
+
+
+ASKED = b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
 
 
 def ask(port: int) -> None:
-    with socket.create_connection(("127.0.0.1", port), timeout=10) as connection:
-        connection.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
-        while connection.recv(1000):
-            pass
+    sent(port, ASKED)
 
 
 @pytest.mark.parametrize("client", [scan, leave, ask])
@@ -159,14 +168,7 @@ def test_what_the_event_loop_reports_is_one_line_with_a_report(caplog, tmp_path,
     assert third == "something else"
 
 
-def ask_and_leave_before_the_answer(port: int) -> None:
-    with socket.create_connection(("127.0.0.1", port), timeout=10) as connection:
-        connection.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
-        connection.shutdown(socket.SHUT_WR)
-        assert connection.recv(1000).startswith(b"HTTP/1.1 426")
-
-
-@pytest.mark.parametrize("client", [scan, ask_and_leave_before_the_answer])
+@pytest.mark.parametrize("client", [scan, ask_and_send_no_more])
 def test_a_connection_ends_with_its_answer_and_not_when_time_is_up(client):
     async def main() -> None:
         with wrapped_serve(lambda _given: serve_nobody, kept):
