@@ -61,29 +61,6 @@ def test_what_is_done_is_not_done_again(fleet, capsys):
     assert solved.read_bytes() == first
 
 
-def test_a_first_manifest_is_never_written_over_another_file(fleet, capsys):
-    manifest = fleet / "fleet.toml"
-    manifest.write_text("mine", encoding="utf-8")
-    assert run(["batch", str(manifest), "--init", str(fleet)]) == 2
-    assert "exists already" in capsys.readouterr().err
-    assert manifest.read_text(encoding="utf-8") == "mine"
-    assert run(["batch", str(fleet / "fleet.csv"), "--init", str(fleet)]) == 2
-
-
-@pytest.mark.parametrize(
-    ("flags", "fault"),
-    [
-        (["--workers", "2", "--scheduler", "tcp://127.0.0.1:1"], "give one of them"),
-        (["--workers", "0"], "there must be at least 1"),
-        (["--scheduler", "tcp://10.0.0.7:8786"], "without TLS is refused"),
-    ],
-)
-def test_flags_that_contradict_each_other_are_refused(flags, fault, tmp_path, capsys):
-    (tmp_path / "fleet.toml").write_text('[[session]]\nvehicle = "a"\nrecording = "absent.bag"\n', encoding="utf-8")
-    assert run(["batch", str(tmp_path / "fleet.toml"), *flags]) == 2
-    assert fault in capsys.readouterr().err
-
-
 def test_what_the_last_batch_wanted_counts_and_what_it_lacks_is_named(fleet, capsys):
     manifest, out, clicks = fleet / "fleet.toml", fleet / "out", fleet / "van" / "clicked" / "clicks.json"
     row = 'recording = ["van/clicked/radar.bag", "van/clicked/camera.bag"]\nclicks = "van/clicked/clicks.json"\n'

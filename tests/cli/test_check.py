@@ -137,15 +137,6 @@ def test_a_file_without_a_camera_is_held_against_a_recording_through_its_intrins
     assert cocalib("check", wrong, *on_it).code == 1
 
 
-def test_a_recording_without_clicks_says_what_is_needed(cocalib, solved, tmp_path):
-    cocalib("export", solved, "--to", "opencv", "--out", tmp_path / "camera.yaml")
-
-    answer = cocalib("check", tmp_path / "camera.yaml", "--recording", solved.with_name("made.mcap"))
-
-    assert answer.code == 2
-    assert "give --clicks CLICKS.json" in answer.err
-
-
 def test_another_recording_of_the_same_name_is_said(cocalib, solved, made, clicks_file):
     solved.with_name("made.mcap").rename(solved.with_name("yesterday"))
     again = made(nan_scans=1)

@@ -58,6 +58,8 @@ def test_the_help_of_a_command_is_one_screen_with_flags_it_has(cocalib, command)
     flags = re.findall(r"^  (--[a-z-]+)", shown.out, re.MULTILINE)
     assert len(flags) <= 20
     assert {*flags} <= {*tyro_hook.flags_of(command.load()), "--help"}
+    assert "None" not in shown.out
+    assert "STR" not in shown.out, "every value has a name"
 
 
 @pytest.mark.parametrize("command", ["open", "solve"])

@@ -3,7 +3,6 @@
 import hashlib
 import json
 import os
-import re
 import threading
 import tomllib
 from functools import partial
@@ -24,13 +23,8 @@ from tests.corpus_calibrations.tools import TOOLS
 from tests.corpus_calibrations.truth import CAMERA_FROM_RADAR, SIZE
 
 
-@pytest.fixture
-def calibration(solved: Path) -> Path:
-    return solved
-
-
-def test_solve_finds_the_pose_the_recording_was_made_with(calibration):
-    document = json.loads(calibration.read_text())
+def test_solve_finds_the_pose_the_recording_was_made_with(solved):
+    document = json.loads(solved.read_text())
     truth = Made().camera_from_radar
     turned = np.array(document["camera_from_radar"]["rotation"]) @ truth.rotation.T
     assert np.rad2deg(rotation_angle_rad(turned)) < 0.1
@@ -54,12 +48,22 @@ def test_clicks_with_rounded_stamps_are_solved_at_their_frames_and_told(cocalib,
     )
 
 
-def test_solve_prints_the_same_bytes_for_shuffled_clicks(cocalib, clicks_file, calibration, tmp_path):
+def test_nan_returns_do_not_shift_the_clicks(solved, cocalib, made, clicks_file, tmp_path):
+    """The authors' script drops NaN rows from the radar list only; here each click keeps its returns."""
+    holed = tmp_path / "holed.json"
+    assert cocalib("solve", made("holed", nan_scans=3), "--clicks", clicks_file, "--out", holed).code == 0
+    pairs, holed_pairs = (json.loads(path.read_text())["pairs"] for path in (solved, holed))
+    assert [pair["id"] for pair in pairs] == [pair["id"] for pair in holed_pairs]
+    for pair, holed_pair in zip(pairs, holed_pairs, strict=True):
+        assert holed_pair["radar_m"] == pytest.approx(pair["radar_m"], abs=0.01)
+
+
+def test_solve_prints_the_same_bytes_for_shuffled_clicks(cocalib, clicks_file, solved, tmp_path):
     document = json.loads(clicks_file.read_text())
     document["clicks"].reverse()
     clicks_file.write_text(json.dumps(document))
     answer = cocalib("solve", tmp_path / "made.mcap", "--clicks", clicks_file)
-    assert (answer.code, answer.out) == (0, calibration.read_text())
+    assert (answer.code, answer.out) == (0, solved.read_text())
 
 
 def test_solve_refines_the_intrinsics_and_solves_its_file_again(cocalib, pairs_file, tmp_path):
@@ -78,12 +82,6 @@ def test_solve_refines_the_intrinsics_and_solves_its_file_again(cocalib, pairs_f
     assert cocalib("check", again, "--of", out).code == 0
 
 
-def test_a_method_of_older_versions_is_no_choice(cocalib, pairs_file):
-    answer = cocalib("solve", "--pairs", pairs_file(), "--method", "pmm")
-    assert answer.code == 2
-    assert "--method takes default or paper, not 'pmm'" in answer.err
-
-
 def test_a_calibration_by_a_method_of_older_versions_is_read_and_solved_again_by_another(cocalib, pairs_file, tmp_path):
     old, again = tmp_path / "old.json", tmp_path / "again.json"
     assert cocalib("solve", "--pairs", pairs_file(), "--out", old).code == 0
@@ -99,86 +97,34 @@ def test_a_calibration_by_a_method_of_older_versions_is_read_and_solved_again_by
     assert json.loads(again.read_text())["camera_from_radar"] == document["camera_from_radar"]
 
 
-def test_solve_names_the_pairs_that_disagree(cocalib, made, clicks_file, tmp_path):
-    document = json.loads(clicks_file.read_text())
-    document["clicks"][5]["pixel_px"][1] += 60.0
-    clicks_file.write_text(json.dumps(document))
-    answer = cocalib("solve", made(), "--clicks", clicks_file, "--out", tmp_path / "calibration.json")
-    assert answer.code == 0
-    (line,) = (line for line in answer.out.splitlines() if line.startswith("disagrees: "))
-    assert line.startswith("disagrees: c5: ")
-
-
-def test_info_names_topics_rates_and_choices(cocalib, made):
-    answer = cocalib("info", made())
-    assert answer.code == 0
-    for expected in ("/radar/points", "/camera/image/compressed", "/camera/camera_info", "made.mcap"):
-        assert expected in answer.out
-
-
-def test_info_as_json_is_one_document(cocalib, made):
-    answer = cocalib("info", made(), "--json")
-    assert answer.code == 0
-    topics = json.loads(answer.out)["topics"]
-    assert {topic["name"] for topic in topics} == {"/radar/points", "/camera/image/compressed", "/camera/camera_info"}
-
-
-def test_info_describes_a_recording_that_cannot_be_calibrated(cocalib, made):
-    answer = cocalib("info", made(with_radar=False))
-    assert answer.code == 0
-    assert "/camera/image/compressed" in answer.out
-    assert re.search(r"^radar +no readable topic", answer.out, re.MULTILINE)
-
-
-def test_export_writes_what_check_reads_back(cocalib, calibration, tmp_path):
-    out = tmp_path / "export.sh"
-    assert cocalib("export", calibration, "--to", "tf2", "--out", out).code == 0
-    answer = cocalib("check", out, "--against", calibration)
-    assert answer.code == 0, answer.out
-    refused = cocalib("import", out, "--out", tmp_path / "back.json")
-    assert refused.code == 2
-    assert "--camera FILE" in refused.err
-    assert not (tmp_path / "back.json").exists()
-
-
-def test_export_of_another_tools_file_says_how_to_convert_it(cocalib, calibration, tmp_path):
-    cocalib("export", calibration, "--to", "tf2", "--out", tmp_path / "old.sh")
-    refused = cocalib("export", tmp_path / "old.sh", "--to", "urdf")
-    assert refused.code == 2
-    assert "is tf2, not calibration-1" in refused.err
-    assert "cocalib import old.sh --out calibration.json" in refused.err
+def test_info_names_the_topics_as_text_and_as_json(cocalib, made):
+    names = {"/radar/points", "/camera/image/compressed", "/camera/camera_info"}
+    text, data = cocalib("info", made()), cocalib("info", made("again"), "--json")
+    assert [name for name in names if name not in text.out] == []
+    assert {topic["name"] for topic in json.loads(data.out)["topics"]} == names
 
 
 @pytest.mark.parametrize("command", [["export", "--to", "urdf"], ["import"]], ids=["export", "import"])
-def test_a_file_is_read_once_and_may_be_a_pipe(cocalib, calibration, tmp_path, command):
+def test_a_file_is_read_once_and_may_be_a_pipe(cocalib, solved, tmp_path, command):
     out = tmp_path / "out"
     reading, writing = os.pipe()
-    os.write(writing, calibration.read_bytes())
+    os.write(writing, solved.read_bytes())
     os.close(writing)
     try:
         answer = cocalib(command[0], f"/dev/fd/{reading}", *command[1:], "--out", out)
     finally:
         os.close(reading)
     assert answer.code == 0, answer.err
-    assert cocalib("check", out, "--against", calibration).code == 0
+    assert cocalib("check", out, "--against", solved).code == 0
 
 
-def test_export_without_out_prints_and_into_a_folder_names_itself(cocalib, calibration, tmp_path):
-    printed = cocalib("export", calibration, "--to", "urdf").out
+def test_export_without_out_prints_and_into_a_folder_names_itself(cocalib, solved, tmp_path):
+    printed = cocalib("export", solved, "--to", "urdf").out
     folder = tmp_path / "exports"
     folder.mkdir()
-    assert cocalib("export", calibration, "--to", "urdf", "--out", folder).code == 0
+    assert cocalib("export", solved, "--to", "urdf", "--out", folder).code == 0
     (written,) = folder.iterdir()
     assert written.read_text() == printed
-
-
-def test_import_converts_another_tools_file_to_a_calibration(cocalib, calibration, tmp_path):
-    other, back = tmp_path / "calib.txt", tmp_path / "back.json"
-    assert cocalib("export", calibration, "--to", "kitti", "--rectified", "--out", other).code == 0
-    assert cocalib("import", other, "--out", back, "--camera", calibration).code == 0
-    checked = cocalib("check", back, "--against", calibration)
-    assert checked.code == 0
-    assert "0 deg apart" in checked.out
 
 
 def test_import_takes_the_image_size_for_a_lens_without_one_and_the_file_beside_a_kitti_calibration(cocalib, tmp_path):
@@ -201,23 +147,23 @@ def test_import_takes_the_image_size_for_a_lens_without_one_and_the_file_beside_
         assert len(written.camera.distortion) == (5 if "lens" in file.holds_camera else 0)
 
 
-def test_camera_info_is_exported_and_read_by_the_camera_option(cocalib, calibration, tmp_path):
+def test_camera_info_is_exported_and_read_by_the_camera_option(cocalib, solved, tmp_path):
     info, back = tmp_path / "camera_info.yaml", tmp_path / "back.json"
-    written = cocalib("export", calibration, "--to", "camera-info", "--out", info)
+    written = cocalib("export", solved, "--to", "camera-info", "--out", info)
     assert written.code == 0
     assert "contains the camera only, without the pose" in written.err
     assert "no pose of a camera and a radar in it" in cocalib("check", info).err
     tf2 = tmp_path / "tf.sh"
-    assert cocalib("export", calibration, "--to", "tf2", "--out", tf2).code == 0
+    assert cocalib("export", solved, "--to", "tf2", "--out", tf2).code == 0
     assert cocalib("import", tf2, "--camera", info, "--out", back).code == 0
-    cameras = [read_calibration(path.read_text()).calibration.camera for path in (calibration, back)]
+    cameras = [read_calibration(path.read_text()).calibration.camera for path in (solved, back)]
     assert np.array_equal(cameras[0].matrix_px, cameras[1].matrix_px)
 
 
-def test_import_takes_the_camera_matrix_of_a_kitti_calibration(cocalib, calibration, tmp_path):
+def test_import_takes_the_camera_matrix_of_a_kitti_calibration(cocalib, solved, tmp_path):
     kitti, back = tmp_path / "calib" / "00000.txt", tmp_path / "back.json"
     kitti.parent.mkdir()
-    assert cocalib("export", calibration, "--to", "kitti", "--rectified", "--out", kitti).code == 0
+    assert cocalib("export", solved, "--to", "kitti", "--rectified", "--out", kitti).code == 0
     refused = cocalib("import", kitti, "--out", back)
     assert refused.code == 2
     assert "states the camera matrix but not the image size; give it with --image-size WIDTH HEIGHT" in refused.err
@@ -235,62 +181,28 @@ def test_import_takes_the_camera_matrix_of_a_kitti_calibration(cocalib, calibrat
 
 
 def test_a_format_without_a_place_for_distortion_is_written_for_rectified_pictures_with_the_maps_beside_it(
-    cocalib, calibration, tmp_path
+    cocalib, solved, tmp_path
 ):
     out = tmp_path / "calib.txt"
-    refused = cocalib("export", calibration, "--to", "kitti")
+    refused = cocalib("export", solved, "--to", "kitti")
     assert refused.code == 2
     assert "kitti comes with rectification.npz and needs a file or folder: --out calib.txt" in refused.err
-    written = cocalib("export", calibration, "--to", "kitti", "--out", out)
+    written = cocalib("export", solved, "--to", "kitti", "--out", out)
     assert written.code == 0
     assert f"written to {tmp_path / 'rectification.npz'}" in written.out
     assert "make them with the maps in rectification.npz" in written.err
     assert "say so with --rectified" in written.err
-    assert cocalib("check", out, "--against", calibration).code == 0
+    assert cocalib("check", out, "--against", solved).code == 0
     with np.load(tmp_path / "rectification.npz") as maps:
         matrix_px = maps["K_new"]
         assert maps["map_x"].shape == tuple(maps["image_size_px"][::-1])
     assert f"P2: {float(matrix_px[0, 0])!r} " in out.read_text()
 
-    written = cocalib("export", calibration, "--to", "kitti", "--rectified", "--out", out)
+    written = cocalib("export", solved, "--to", "kitti", "--rectified", "--out", out)
     assert written.code == 0
     assert "note: written for rectified pictures" in written.err
-    assert cocalib("check", out, "--against", calibration).code == 0
-    assert cocalib("export", calibration, "--to", "opencv", "--rectified").code == 2
-
-
-def test_export_poses_the_radar_in_the_kit(cocalib, calibration, tmp_path):
-    posed = cocalib(
-        "export", calibration, "--to", "autoware", "--parent-from-radar", *["1.5", "0", "0.25", "0", "0", "0", "1"]
-    )
-    assert "x: 1.5" in posed.out
-    (tmp_path / "kit.yaml").write_text(posed.out)
-    assert cocalib("check", tmp_path / "kit.yaml", "--against", calibration).code == 0
-    wrong = cocalib(
-        "export", calibration, "--to", "autoware", "--parent-from-radar", *["0", "0", "0", "0", "0", "0", "2"]
-    )
-    assert wrong.code == 2
-    assert "qw last" in wrong.err
-
-
-def test_a_bare_matrix_is_checked_as_import_reads_it_and_proven_by_pairs(cocalib, calibration, tmp_path):
-    matrix = np.eye(4)
-    matrix[:3, :3] = json.loads(calibration.read_text())["camera_from_radar"]["rotation"]
-    for name, given in (("camera_from_radar", matrix), ("radar_from_camera", np.linalg.inv(matrix))):
-        np.savetxt(tmp_path / "bare.txt", given)
-        unproven = cocalib("check", tmp_path / "bare.txt")
-        assert unproven.code == 3
-        assert f"({name},optical,m)" in unproven.out
-        assert "not proven" in unproven.out
-        assert cocalib("check", tmp_path / "bare.txt", "--pairs", calibration).code == 0
-
-
-def test_video_writes_the_camera_and_says_when_it_begins(cocalib, made, tmp_path):
-    pytest.importorskip("av", reason="the extra 'video' is not installed")
-    answer = cocalib("show", made(), "--out", tmp_path / "camera.mp4")
-    assert answer.code == 0, answer.err
-    assert re.search(r"camera\.mp4: \d+ frames, [\d.]+ s, from \d+\.\d{9} s", answer.out)
-    assert (tmp_path / "camera.mp4").stat().st_size > 1000
+    assert cocalib("check", out, "--against", solved).code == 0
+    assert cocalib("export", solved, "--to", "opencv", "--rectified").code == 2
 
 
 def test_the_demo_of_another_version_has_a_session_of_its_own(tmp_path, monkeypatch):
@@ -349,35 +261,9 @@ def test_a_table_of_pairs_is_solved_with_a_camera(cocalib, pairs_file, tmp_path)
     pairs, table = pairs_file(), tmp_path / "pairs.csv"
     rows = [(*pair["radar_m"], *pair["pixel_px"]) for pair in json.loads(pairs.read_text())["pairs"]]
     table.write_text("x_m,y_m,z_m,u_px,v_px\n" + "".join(f"{','.join(map(str, row))}\n" for row in rows))
-    refused = cocalib("solve", "--pairs", table)
-    assert refused.code == 2
-    assert "add --camera FILE" in refused.err
     assert cocalib("solve", "--pairs", table, "--camera", pairs, "--out", tmp_path / "a.json").code == 0
     names = [one["name"] for one in json.loads((tmp_path / "a.json").read_text())["provenance"]["inputs"]]
     assert names == ["pairs.csv", pairs.name]
-
-
-def test_options_of_a_recording_are_refused_for_pairs(cocalib, pairs_file, tmp_path):
-    pairs = pairs_file()
-    for option, words in (
-        (("--camera", pairs), "brings its own camera"),
-        (("--radar-axes", "up,up,up"), "do not apply to --pairs"),
-    ):
-        refused = cocalib("solve", "--pairs", pairs, *option)
-        assert (refused.code, refused.out) == (2, "")
-        assert words in refused.err
-    assert cocalib("solve", "--pairs", pairs_file(), "--out", tmp_path / "a.json").code == 0
-    refused = cocalib("solve", "--pairs", tmp_path / "a.json", "--set", "gating.max_range_m=8")
-    assert refused.code == 2
-    assert "gating.max_range_m chooses radar returns" in refused.err
-
-
-def test_output_that_cannot_be_a_file_is_refused_in_one_line(cocalib, pairs_file, tmp_path):
-    for out, words in ((tmp_path, "is a folder"), (tmp_path / "nowhere" / "a.json", "does not exist; create it")):
-        refused = cocalib("solve", "--pairs", pairs_file(), "--out", out)
-        assert refused.code == 2
-        assert words in refused.err
-        assert refused.err.count("\n") == 1
 
 
 def test_a_recording_toml_beside_the_recording_is_written_read_told_and_kept(cocalib, made, clicks_file, tmp_path):

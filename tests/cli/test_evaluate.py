@@ -156,50 +156,6 @@ def test_classes_are_chosen_and_renamed(cocalib, folder):
     assert "expected FROM=TO" in cocalib(*where, "--class-map", "person").err
 
 
-@pytest.mark.parametrize(
-    ("code", "extra", "said"),
-    [
-        (1, (), "nothing to judge right.txt by: no clicks"),
-        (2, ("--labels", "labels.json"), "--labels applies to boxes"),
-        (2, ("--boxes", "missing.json"), "missing.json"),
-        (2, ("--min-speed-mps", "-1"), "--min-speed-mps: is -1"),
-        (2, ("--max-time-gap-s", "99"), "--max-time-gap-s: is 99"),
-    ],
-)
-def test_bad_options_are_answered_in_words(cocalib, folder, code, extra, said):
-    answer = cocalib("evaluate", folder / "right.txt", folder / "street.mcap", *extra)
-    assert answer.code == code
-    assert said in answer.err
-    assert answer.err.count("\n") == 1
-
-
-def test_boxes_and_radar_without_common_stamps_are_refused(cocalib, folder, scene, tmp_path):
-    apart = written(tmp_path / "apart.mcap", scene, late_s=3600.0)
-    answer = cocalib("evaluate", folder / "right.txt", apart, "--boxes", folder / "boxes.json")
-
-    assert answer.code == 2
-    assert "no annotated frame is within 0.05 s of a radar scan" in answer.err
-
-
-def test_boxes_of_another_recording_are_refused(cocalib, folder, scene, tmp_path):
-    other = replace(
-        scene.boxes,
-        frames=tuple(replace(frame, image_time=TimeNs(frame.image_time + 10**13)) for frame in scene.boxes),
-    )
-    (tmp_path / "other.json").write_text(boxes_text(other))
-    answer = cocalib("evaluate", folder / "right.txt", folder / "street.mcap", "--boxes", tmp_path / "other.json")
-
-    assert answer.code == 2
-    assert "other.json" in answer.err
-
-
-def test_a_calibration_of_another_camera_is_refused(cocalib, folder, solved):
-    answer = cocalib("evaluate", solved, folder / "street.mcap", "--boxes", folder / "boxes.json")
-
-    assert answer.code == 2
-    assert "calibrated for pictures of 320 x 240 px, but the recording's camera has 1280 x 720 px" in answer.err
-
-
 def test_without_moving_returns_there_is_no_acc(cocalib, folder, scene, tmp_path):
     still = written(
         tmp_path / "still.mcap", replace(scene, scans=replace(scene.scans, doppler_mps=0 * scene.scans.doppler_mps))

@@ -105,45 +105,6 @@ def test_a_file_that_exists_is_overwritten_only_with_force(cocalib, sample, cali
     assert (tmp_path / "new.mcap").read_bytes()[1:5] == b"MCAP"
 
 
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        (("--to", "mcap"), "--recording RECORDING... --out NEW.mcap"),
-        (("--to", "tf2", "--force"), "are for --to mcap"),
-        (("--to", "mcap", "--recording", "{sample}", "--out", "new.bag"), "name it NAME.mcap"),
-        (("--to", "mcap", "--recording", "{sample}", "--out", "new.mcap", "--rectified"), "do not apply to --to mcap"),
-        (("--to", "mcap", "--recording", "nothing.bag", "--out", "new.mcap"), "no such file"),
-        (("--to", "mcap", "--recording", "{sample}", "--out", "no/folder/new.mcap"), "does not exist; create it"),
-    ],
-)
-def test_what_is_missing_or_does_not_belong_is_said(
-    changes, words, cocalib, sample, calibration, tmp_path, monkeypatch
-):
-    monkeypatch.chdir(tmp_path)
-    done = cocalib("export", calibration, *(one.format(sample=sample / "camera.bag") for one in changes))
-    assert (done.code, list(tmp_path.iterdir())) == (2, [])
-    assert words in done.err
-
-
-def test_folders_of_pictures_are_no_recording_to_write_again(cocalib, sample, calibration, tmp_path, jpeg_folder):
-    done = cocalib("export", calibration, "--to", "mcap", "--recording", jpeg_folder, "--out", tmp_path / "new.mcap")
-    assert done.code == 2
-    assert "is no ROS recording" in done.err
-    assert not (tmp_path / "new.mcap").exists()
-
-
-@pytest.fixture
-def jpeg_folder(cocalib, tmp_path):
-    import cv2
-    import numpy as np
-
-    folder = tmp_path / "pictures"
-    folder.mkdir()
-    for number in range(3):
-        cv2.imwrite(str(folder / f"17000000{number:02d}.000000.jpg"), np.full((720, 1280, 3), 90, dtype=np.uint8))
-    return folder
-
-
 class Full(io.RawIOBase):
     """A disk with room for some bytes."""
 
@@ -174,10 +135,6 @@ def test_nothing_half_written_stays(stop, cocalib, sample, calibration, tmp_path
     assert list(tmp_path.iterdir()) == []
     if isinstance(stop, OSError):
         assert "the disk is full: the new recording needs about" in done.err
-
-
-def test_list_names_it(cocalib):
-    assert "\nmcap " in cocalib("export").out
 
 
 @pytest.mark.parametrize("to", ["mcap", "tf2", "into"])

@@ -114,16 +114,3 @@ def test_results_of_another_version_are_named(cocalib, tmp_path):
     assert answer.code == 3
     assert re.search(r"note: results/\w+/outcome\.json is no cocalib/outcome-1", answer.err)
     assert "V000" in answer.out
-
-
-def test_a_vehicle_that_there_is_not_is_refused(cocalib, sound):
-    answer = cocalib("batch", "history", "V9", sound)
-    assert answer.code == 2
-    assert "no vehicle 'V9' among 6" in answer.err
-
-
-def test_a_folder_without_results_is_refused(cocalib, tmp_path):
-    for action in ("status", "summary"):
-        answer = cocalib("batch", action, tmp_path)
-        assert answer.code == 2
-        assert "no results" in answer.err

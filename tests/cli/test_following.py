@@ -42,4 +42,3 @@ def test_what_cannot_be_followed_is_refused_at_once(cocalib, tmp_path):
     answer = cocalib("open", "--follow", tmp_path / "radar.csv", "--no-browser", "--port", 0)
     assert answer.code == 2
     assert "radar.csv: cannot be followed" in answer.err
-    assert "no recording given" in cocalib("open", "--follow", "--no-browser").err

@@ -30,9 +30,6 @@ def test_a_pack_is_a_zip_or_the_files_in_a_folder(cocalib, calibration, tmp_path
         assert {path.relative_to(unpacked).as_posix(): path.read_bytes() for path in files} == members
     tested = subprocess.run([sys.executable, "-I", "-S", folder / "selftest.py"], capture_output=True, text=True)
     assert (tested.returncode, tested.stdout.splitlines()[-1][:4]) == (0, "PASS")
-    refused = cocalib("export", calibration, "--to", "pack")
-    assert refused.code == 2
-    assert "needs a file: --out radar_camera_pack.zip" in refused.err
 
 
 def test_a_pack_replaces_no_file_that_is_not_its_own(cocalib, calibration, tmp_path):
@@ -103,12 +100,3 @@ def test_all_formats_take_the_parent_and_the_rectified_pictures_where_they_apply
     assert answer.code == 0
     assert "kitti: written to" in answer.out
     assert "x: 1.5" in (tmp_path / "a" / "sensor_kit_calibration.yaml").read_text()
-
-
-def test_all_formats_need_a_folder(cocalib, calibration, tmp_path):
-    file = tmp_path / "file"
-    file.write_text("")
-    for flags in ([], ["--out", file], ["--out", file / "inside"]):
-        refused = cocalib("export", calibration, "--to", "all", *flags)
-        assert (refused.code, refused.out) == (2, "")
-        assert len(refused.err.splitlines()) == 1

@@ -67,15 +67,6 @@ def test_a_foreign_calibration_without_a_camera_takes_the_one_of_the_recording(g
     assert "Residuals at the clicks in radar.bag + camera.bag" in html
 
 
-def test_a_calibration_for_pictures_of_another_size_is_refused(golden, sample, tmp_path, capsys):
-    bags = [str(sample / "radar.bag"), str(sample / "camera.bag")]
-    assert run(["evaluate", str(golden), *bags, "--report", str(tmp_path / "out.html")]) == 2
-    assert (
-        "calibrated for pictures of 640 x 480 px, but the recording's camera has 960 x 600 px"
-        in capsys.readouterr().err
-    )
-
-
 def test_without_a_browser_the_html_is_written_and_the_pdf_is_refused(golden, tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("COCALIB_BROWSER", "/nowhere/browser")
     out, pdf = tmp_path / "out.html", tmp_path / "out.pdf"
@@ -83,11 +74,3 @@ def test_without_a_browser_the_html_is_written_and_the_pdf_is_refused(golden, tm
     assert "COCALIB_BROWSER=/nowhere/browser is not a program" in capsys.readouterr().err
     assert out.exists()
     assert not pdf.exists()
-
-
-def test_the_report_never_takes_the_place_of_the_calibration(golden, tmp_path, capsys):
-    calibration = tmp_path / "calibration.json"
-    calibration.write_bytes(golden.read_bytes())
-    assert run(["evaluate", str(calibration), "--report", str(calibration)]) == 2
-    assert "name it NAME.html" in capsys.readouterr().err
-    assert calibration.read_bytes() == golden.read_bytes()

@@ -88,12 +88,6 @@ def test_the_list_takes_recordings_and_shows_which_process_has_a_session_open(co
     session_file.close()
 
 
-def test_the_list_of_nothing_says_so(cocalib, tmp_path):
-    answer = cocalib("session", "list", tmp_path)
-    assert (answer.code, answer.out) == (0, "no sessions here or in your user folder\n")
-    assert cocalib("session", "list", tmp_path / "absent").code == 2
-
-
 @pytest.mark.skipif(os.name == "nt", reason="Windows needs a right to make links")
 def test_the_list_follows_no_link_and_prints_no_control_characters(cocalib, home, tmp_path):
     target = tmp_path / "target"
@@ -210,9 +204,3 @@ def test_what_proves_nothing_is_not_exported(cocalib, home, tmp_path):
         assert answer.code == 2
         assert "nothing of the session can be proven" in answer.err
     assert not (tmp_path / "clicks.json").exists()
-
-
-def test_a_folder_without_a_session_is_refused(cocalib, home):
-    assert "has no session next to it" in cocalib("session", "repair", home / "drive.bag").err
-    (home / "empty.cocalib-session").mkdir()
-    assert "holds no session" in cocalib("session", "repair", home / "empty.cocalib-session").err

@@ -9,7 +9,6 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection
 
-from cocalib.cli import run
 from tests.port_client import channel, come_in, get, wanted
 from tests.served_process import served_process
 
@@ -129,11 +128,3 @@ def test_what_cannot_be_used_is_left_out_of_the_next_answer(without_intrinsics, 
             assert opened(socket)["intrinsics"] == ""
         assert server.stop()[0] == 0
     assert (other / "journal.jsonl").read_text(encoding="utf-8") == "not a session\n"
-
-
-def test_a_script_gets_the_error_and_its_code(tmp_path, capsys):
-    (tmp_path / "a.bag").write_bytes(b"GIF89a")
-    assert run(["open", str(tmp_path / "a.bag"), "--no-browser", "--port", "0"]) == 2
-    assert "a.bag" in capsys.readouterr().err
-    assert run(["open", "--no-browser"]) == 2
-    assert "no recording given" in capsys.readouterr().err
