@@ -50,11 +50,10 @@ def test_a_box_is_carried_to_the_end_and_no_stretch_is_longer_than_the_limit():
     [stretch] = stretches_of(track((3, BOX)), FACTS)
     assert (stretch.start, stretch.last, stretch.is_cut) == (Start(3, BOX), 29, False)
     long = RecordingFacts("long", 33_000_000 * np.arange(2000), width_px=640, height_px=480)
-    [stretch] = stretches_of(BoxTrack("b1", "car", (BoxKeyframe(TimeNs(0), BOX),)), long)
+    car = BoxTrack("b1", "car", (BoxKeyframe(TimeNs(0), BOX),))
+    [stretch] = stretches_of(car, long)
     assert (stretch.last, stretch.is_cut) == (MOST_FRAMES, True)
-    [one] = carried_tracks(
-        [BoxTrack("b1", "car", (BoxKeyframe(TimeNs(0), BOX),))], long, moving(0, MOST_FRAMES, BOX, 0.1)
-    )
+    [one] = carried_tracks([car], long, moving(0, MOST_FRAMES, BOX, 0.1))
     assert f"after {MOST_FRAMES} frames" in one.note
     assert one.is_complete
 
@@ -70,19 +69,16 @@ def test_drift_is_taken_out_evenly_up_to_the_next_stated_box():
     assert one.note == ""
 
 
-def test_a_box_that_was_lost_goes_straight_to_the_next_stated_one():
+def test_a_box_that_is_lost_says_where_and_why_or_goes_straight_to_the_next_stated_one():
+    [one] = carried_tracks([track((4, BOX))], FACTS, moving(4, 6, BOX, 2.0, ended="it leaves the picture"))
+    assert one.boxes[-1].frame == 10
+    assert "Ends in frame 11: it leaves the picture" in one.note
+    assert one.at(11) is None
     target: BoxEdges = (200.0, 50.0, 240.0, 150.0)
     [one] = carried_tracks([track((0, BOX), (10, target))], FACTS, moving(0, 2, BOX, 2.0, ended="it is hidden"))
     assert [box.kind for box in one.boxes[:4]] == ["stated", "followed", "followed", "between"]
     assert one.at(6).edges_px == pytest.approx((152.0, 50.0, 192.0, 150.0))
     assert one.at(6).confidence == 0.0
-
-
-def test_a_box_that_is_lost_says_where_and_why():
-    [one] = carried_tracks([track((4, BOX))], FACTS, moving(4, 6, BOX, 2.0, ended="it leaves the picture"))
-    assert one.boxes[-1].frame == 10
-    assert "Ends in frame 11: it leaves the picture" in one.note
-    assert one.at(11) is None
 
 
 def test_hidden_ends_a_box_until_it_is_stated_again():
@@ -126,14 +122,10 @@ def kept(found: Boxes) -> Boxes:
 
 
 def test_boxes_and_empty_frames_of_our_own_file_come_back():
-    person = [Box(10.0 + frame, 20.0, 60.0 + frame, 200.0, "person", track="person-1") for frame in range(3)]
-    car = Box(300.0, 200.0, 420.0, 260.0, "car", track="car-7")
-    given = boxes(
-        FrameBoxes(at(0), (person[0],)),
-        FrameBoxes(at(1), (person[1], car)),
-        FrameBoxes(at(3), ()),
-        FrameBoxes(at(4), (person[2],)),
-    )
+    person = [(Box(10.0 + frame, 20.0, 60.0 + frame, 200.0, "person", track="person-1"),) for frame in range(3)]
+    car = (Box(300.0, 200.0, 420.0, 260.0, "car", track="car-7"),)
+    in_frames = {0: person[0], 1: (*person[1], *car), 3: (), 4: person[2]}
+    given = boxes(*(FrameBoxes(at(frame), found) for frame, found in in_frames.items()))
     found = read_sent_boxes(boxes_text(given).encode(), "boxes.json", FACTS)
     assert kept(found).frames == given.frames
 
@@ -146,11 +138,8 @@ def test_boxes_without_tracks_are_objects_of_their_own():
 
 
 def test_one_name_for_two_boxes_of_a_frame_or_for_two_classes_is_told_apart():
-    same = (
-        Box(10.0, 20.0, 60.0, 200.0, "person", track="7"),
-        Box(200.0, 20.0, 260.0, 200.0, "person", track="7"),
-        Box(400.0, 20.0, 460.0, 200.0, "car", track="7"),
-    )
+    places = ((10.0, 60.0, "person"), (200.0, 260.0, "person"), (400.0, 460.0, "car"))
+    same = tuple(Box(left, 20.0, right, 200.0, label, track="7") for left, right, label in places)
     loaded = boxes_loaded(boxes(FrameBoxes(at(0), same)), FACTS)
     assert len({track.id for track in loaded.tracks}) == 3
     assert sorted(track.label for track in loaded.tracks) == ["car", "person", "person"]

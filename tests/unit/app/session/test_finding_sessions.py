@@ -10,6 +10,7 @@ import pytest
 
 from cocalib.session import RecordingFacts
 from cocalib.session.file import SessionFileError, find_session_folder, open_session_file
+from cocalib.session.file.finding import FoundFolder
 from cocalib.session.file.journal import COPY, JOURNAL
 from tests.unit.app.session.drive import FACTS as DRIVE
 from tests.unit.app.session.drive import START_NS, clicks_in, kept, place, refused
@@ -44,37 +45,27 @@ def clicked(folder: Path, facts: RecordingFacts = FACTS, *, changed_at_s: float 
     return folder
 
 
-def test_a_recording_without_a_session_starts_one_next_to_it(home):
-    found = find_session_folder([home / "drive.bag"], FACTS)
-    assert found.path == home / "drive.bag.cocalib-session"
-    assert found.warnings == ()
-
-
-def test_the_session_of_the_same_name_is_continued_without_a_word(home):
+def test_the_session_of_the_same_name_is_started_and_continued_without_a_word(home):
+    folder = home / "drive.bag.cocalib-session"
+    assert find_session_folder([home / "drive.bag"], FACTS) == FoundFolder(folder)
     clicked(home / "other.bag.cocalib-session")
-    folder = clicked(home / "drive.bag.cocalib-session")
-    found = find_session_folder([home / "drive.bag"], FACTS)
-    assert (found.path, found.warnings) == (folder, ())
+    clicked(folder)
+    assert find_session_folder([home / "drive.bag"], FACTS) == FoundFolder(folder)
 
 
-def test_a_renamed_recording_continues_its_session_and_says_so(home):
-    folder = clicked(home / "drive.bag.cocalib-session")
-    found = find_session_folder([home / "renamed.bag"], replace(FACTS, name="renamed.bag"))
+@pytest.mark.parametrize("moved", [False, True])
+def test_a_renamed_or_moved_recording_continues_its_session_and_says_so(home, state_folder, moved):
+    name, place = ("drive.bag", state_folder) if moved else ("renamed.bag", home)
+    folder, facts = clicked(place / "drive.bag.cocalib-session"), replace(FACTS, name=name)
+    found = find_session_folder([home / name], facts)
     assert found.path == folder
     (warning,) = found.warnings
     assert warning.code == "session-of-other-name"
-    assert f"continuing the session of 'drive.bag' in {folder}" in warning.message
-    session_file = open_session_file(found.path, replace(FACTS, name="renamed.bag"), found.warnings)
+    assert str(folder) in warning.message
+    session_file = open_session_file(found.path, facts, found.warnings)
     assert session_file.restored.warnings == found.warnings
     assert len(session_file.restored.history.present.clicks) == 1
     session_file.close()
-
-
-def test_a_moved_recording_continues_the_session_in_the_users_folder(home, tmp_path, state_folder):
-    folder = clicked(state_folder / "drive.bag-12345678.cocalib-session")
-    found = find_session_folder([home / "drive.bag"], FACTS)
-    assert found.path == folder
-    assert f"continuing the session in {folder}, which has the frames of drive.bag" in found.warnings[0].message
 
 
 def test_of_two_sessions_the_newest_is_continued_and_the_other_named(home, state_folder):

@@ -5,7 +5,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from calib_core.calibration import calibrate_pairs
-from calib_core.results import Calibration
 from calib_core.synthetic import simulate_pairs
 from cocalib.view.contours import contour_lines, contour_maps
 
@@ -51,9 +50,7 @@ def test_every_point_of_a_line_has_its_value_and_every_crossing_is_drawn_once(se
 
 def test_a_calibration_has_labelled_lines_at_each_distance_and_says_where_it_extrapolates():
     drawn = simulate_pairs(20, rng=np.random.default_rng(7))
-    solved = calibrate_pairs(drawn.pairs, drawn.camera)
-    assert isinstance(solved, Calibration)
-    maps = contour_maps(solved)
+    maps = contour_maps(calibrate_pairs(drawn.pairs, drawn.camera).unwrap())
 
     assert [one.label for one in maps] == ["5 m", "20 m", "60 m"]
     assert all(one.contours and all(line.label.endswith(" px") for line in one.contours) for one in maps)

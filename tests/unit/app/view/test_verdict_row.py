@@ -25,18 +25,13 @@ def placement(start_s: int, x_m: float = 5.0) -> Placement:
 
 
 def test_a_placement_is_left_until_it_is_clicked_or_dismissed():
-    found = [placement(1), placement(11), placement(21), placement(31)]
+    found = [placement(1), placement(11), placement(21), placement(31), placement(31, 9.0)]
     history = advance(History(), ClickPlaced(TimeNs(12 * 10**9), (1.0, 1.0), "clicked"), FACTS)
-    assert placements_left(history.present, found) == 3
+    assert placements_left(history.present, found) == 4
     history = advance(history, PlacementDismissed(TimeNs(32 * 10**9), (5.0, 0.0, 0.0)), FACTS)
-    assert placements_left(history.present, found) == 2
+    assert placements_left(history.present, found) == 3, "of two placements at once only the dismissed one is gone"
     assert placements_left(history.present, ()) is None
     assert placements_left(history.present, None) is None
-
-
-def test_of_two_placements_at_once_only_the_dismissed_one_is_gone():
-    history = advance(History(), PlacementDismissed(TimeNs(2 * 10**9), (5.0, 0.0, 0.0)), FACTS)
-    assert placements_left(history.present, [placement(1), placement(1, 9.0)]) == 1
 
 
 def test_a_mark_that_nobody_has_touched_leaves_its_placement_to_be_clicked():

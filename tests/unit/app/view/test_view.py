@@ -71,22 +71,9 @@ def shown(count: int, outcome: Calibration | Unsolvable, *steps) -> View:
 FIVE = tuple(pair(f"c{number}") for number in range(1, 6))
 
 
-@pytest.mark.parametrize(
-    ("count", "status"),
-    [(0, "4 more placements needed"), (1, "3 more placements needed"), (3, "1 more placement needed"), (4, "Solving…")],
-)
-def test_the_status_counts_down_to_the_first_solve(count, status):
-    assert view(clicked(count), FACTS).status == status
-
-
-def test_excluded_clicks_do_not_count_towards_the_first_solve():
-    assert view(clicked(4, ClickExcluded("c2", True)), FACTS).status == "1 more placement needed"
-
-
-def test_before_the_first_click_the_hint_says_what_to_do():
+def test_before_the_first_click_the_hint_is_the_action_of_the_verdict():
     seen = view(History(), FACTS)
     assert (seen.stage, seen.solving, seen.has_calibration, seen.solved_revision) == ("collecting", False, False, -1)
-    assert "click the reflector's inner corner" in seen.hint
     assert (seen.verdict.level, seen.verdict.action) == ("nothing", seen.hint)
 
 
@@ -95,10 +82,11 @@ def agreeing(seen: View) -> tuple[str, str]:
     return seen.verdict.level, next(one.value for one in seen.metrics if one.key == "inliers")
 
 
-def test_a_solved_session_says_how_many_clicks_agree():
-    four_agree = (*FIVE[:4], pair("c5", inlier=False))
-    assert agreeing(shown(5, calibration(*FIVE))) == ("coarse", "5 of 5")
-    assert agreeing(shown(5, calibration(*four_agree))) == ("coarse", "4 of 5")
+@pytest.mark.parametrize(
+    ("more", "agree"), [({}, "5 of 5"), ({"inlier": False}, "4 of 5"), ({"excluded": True}, "4 of 4")]
+)
+def test_a_solved_session_says_how_many_clicks_agree(more, agree):
+    assert agreeing(shown(5, calibration(*FIVE[:4], pair("c5", **more)))) == ("coarse", agree)
 
 
 def measured_at(name: str, *positions: tuple[float, float, float], **more) -> PairResult:
@@ -110,112 +98,95 @@ def measured_at(name: str, *positions: tuple[float, float, float], **more) -> Pa
 
 
 NEAR_M, BEHIND_M = (6.0, 0.5, 0.0), (7.2, 0.6, 0.0)
+ASKING = measured_at("c5", NEAR_M, BEHIND_M, inlier=False, outlier_probability=0.5, rival=1)
 
 
 def test_a_click_that_two_returns_fit_asks_for_one_of_them():
-    asking = measured_at("c5", NEAR_M, BEHIND_M, inlier=False, outlier_probability=0.5, rival=1)
-    seen = shown(5, calibration(*FIVE[:4], asking))
-    assert "1 asks which return is right (C)" in seen.status
-    assert "7.2 m" in seen.clicks[4].note
-    assert "(C)" in seen.clicks[4].note
-    assert not any(line.startswith("disagrees") for line in summary_lines(calibration(*FIVE[:4], asking)))
-    outcome = calibration(*FIVE[:4], asking)
-    session = advance(clicked(5), Solved(5, outcome), FACTS).present
-    assert asking.measured is not None
-    offered = click_candidates(session, asking.measured)
+    outcome = calibration(*FIVE[:4], ASKING)
+    assert not any(line.startswith("disagrees") for line in summary_lines(outcome))
+    offered = click_candidates(advance(clicked(5), Solved(5, outcome), FACTS).present, ASKING.measured)
     assert offered.rows[offered.suggested].position_m == BEHIND_M
     assert "as well" in offered.suggestion
 
 
-def test_a_return_that_the_camera_does_not_see_is_not_offered():
+def test_a_return_that_the_camera_does_not_see_is_not_offered_unless_it_is_in_use():
     ahead_m, aside_m = (6.0, 0.5, 0.0), (1.0, 5.0, 0.0)
-    outcome = calibration(*FIVE[:4], measured_at("c5", ahead_m, (7.0, 0.5, 0.0), aside_m))
-    session = advance(clicked(5), Solved(5, outcome), FACTS).present
-    kept = outcome.pairs[4].measured
-    assert kept is not None
-    assert [row.position_m for row in click_candidates(session, kept).rows] == [ahead_m, (7.0, 0.5, 0.0)]
-    only_aside = calibration(*FIVE[:4], measured_at("c5", aside_m, ahead_m))
-    session = advance(clicked(5), Solved(5, only_aside), FACTS).present
-    assert only_aside.pairs[4].measured is not None
-    assert len(click_candidates(session, only_aside.pairs[4].measured).rows) == 2  # the one in use is shown, too
+    for returns_m, offered_m in (
+        ((ahead_m, (7.0, 0.5, 0.0), aside_m), [ahead_m, (7.0, 0.5, 0.0)]),
+        ((aside_m, ahead_m), [aside_m, ahead_m]),
+    ):
+        outcome = calibration(*FIVE[:4], measured_at("c5", *returns_m))
+        session = advance(clicked(5), Solved(5, outcome), FACTS).present
+        assert [row.position_m for row in click_candidates(session, outcome.pairs[4].measured).rows] == offered_m
 
 
 def test_clicks_that_changed_their_return_are_told_until_the_next_answer():
     before, after = (calibration(*FIVE[:4], measured_at("c5", at)) for at in (NEAR_M, BEHIND_M))
     history = advance(clicked(5), Solved(5, before), FACTS)
     assert "changed" not in view(history, FACTS).status
-    history = advance(
-        advance(history, ClickMoved("c1", (11.0, 20.0)), FACTS), Solved(6, replace(after, checking=True)), FACTS
-    )
+    preview = Solved(6, replace(after, checking=True))
+    history = advance(advance(history, ClickMoved("c1", (11.0, 20.0)), FACTS), preview, FACTS)
     assert view(history, FACTS).status.endswith("; 1 click changed its return")
+    assert "changed" not in view(advance(history, Solved(6, before), FACTS), FACTS).status, "it was taken back"
     history = advance(history, Solved(6, after), FACTS)
     assert view(history, FACTS).status.endswith("; 1 click changed its return")
     again = advance(history, ClickMoved("c1", (12.0, 20.0)), FACTS)
     assert "changed" not in view(advance(again, Solved(7, after), FACTS), FACTS).status
 
 
-def test_a_preview_that_the_answer_takes_back_changed_no_return():
-    before, preview = (calibration(*FIVE[:4], measured_at("c5", at)) for at in (NEAR_M, BEHIND_M))
-    history = advance(advance(clicked(5), Solved(5, before), FACTS), ClickMoved("c1", (11.0, 20.0)), FACTS)
-    history = advance(history, Solved(6, replace(preview, checking=True)), FACTS)
-    assert "changed" not in view(advance(history, Solved(6, before), FACTS), FACTS).status
-
-
-def test_an_excluded_pair_is_not_among_those_that_could_agree():
-    assert agreeing(shown(5, calibration(*FIVE[:4], pair("c5", excluded=True)))) == ("coarse", "4 of 4")
-
-
-def test_an_unsolvable_session_shows_reason_and_hint():
-    seen = shown(5, Unsolvable("no-pose", "only 3 of 5 pairs agree on any pose", "spread the placements"))
-    assert (seen.stage, seen.status, seen.hint) == (
-        "unsolvable",
-        "Only 3 of 5 pairs agree on any pose.",
-        "Spread the placements.",
-    )
-    assert not seen.has_calibration
-
-
-def test_what_more_clicks_cannot_fix_is_reported_from_the_first_click_on():
-    seen = shown(1, Unsolvable("no-camera", "the intrinsics are missing", "give --camera"))
-    assert (seen.stage, seen.status) == ("unsolvable", "The intrinsics are missing.")
-
-
-def test_too_few_pairs_is_no_failure_while_clicks_are_collected():
-    seen = shown(2, Unsolvable("too-few-pairs", "2 of at least 4 pairs", "click more"))
-    assert (seen.stage, seen.status) == ("collecting", "2 more placements needed")
-
-
-def test_clicks_that_the_radar_did_not_see_do_not_count_and_say_why():
-    unseen = tuple(
+UNSEEN = Unsolvable(
+    "too-few-pairs",
+    "3 of at least 4 pairs",
+    "click more",
+    tuple(
         Unpaired(name, "no-scan", "the nearest radar scan is 9.00 s away", "check that both clocks agree")
         for name in ("c1", "c3")
-    )
-    seen = shown(5, Unsolvable("too-few-pairs", "3 of at least 4 pairs", "click more", unseen))
-    assert (seen.stage, seen.status) == ("collecting", "1 more placement needed")
-    assert seen.hint == (
-        "2 of 5 clicks have no radar position: the nearest radar scan is 9.00 s away. Check that both clocks agree."
-    )
-    assert [row.state for row in seen.clicks] == ["unpaired", "pending", "unpaired", "pending", "pending"]
-    assert "9.00 s away" in seen.clicks[0].note
+    ),
+)
+EVERY_STATE = calibration(
+    pair("c1"),
+    pair("c2", inlier=False),
+    pair("c3", inlier=False, excluded=True),
+    unpaired=(Unpaired("c4", "no-scan", "the radar has no scan here", "click where both recordings overlap"),),
+)
+
+
+@pytest.mark.parametrize(
+    ("count", "outcome", "stage"),
+    [
+        (5, Unsolvable("no-pose", "only 3 of 5 pairs agree on any pose", "spread the placements"), "unsolvable"),
+        (1, Unsolvable("no-camera", "the intrinsics are missing", "give --camera"), "unsolvable"),
+        (2, Unsolvable("too-few-pairs", "2 of at least 4 pairs", "click more"), "collecting"),
+        (5, UNSEEN, "collecting"),
+    ],
+)
+def test_what_more_clicks_cannot_fix_is_a_failure_and_too_few_are_none(count, outcome, stage):
+    seen = shown(count, outcome)
+    assert (seen.stage, seen.has_calibration) == (stage, False)
+
+
+def test_each_click_has_its_state():
+    assert [row.state for row in shown(5, UNSEEN).clicks] == ["unpaired", "pending", "unpaired", "pending", "pending"]
+    seen = shown(5, EVERY_STATE, ClickExcluded("c3", True))
+    assert [row.state for row in seen.clicks] == ["inlier", "outlier", "excluded", "unpaired", "pending"]
+    included = shown(5, EVERY_STATE, ClickExcluded("c3", True), ClickExcluded("c3", False))
+    assert included.clicks[2].state == "pending"
 
 
 def test_figures_stay_while_a_newer_answer_is_computed():
-    seen = shown(5, calibration(*FIVE), ClickMoved("c1", (11.0, 20.0)))
-    assert (seen.stage, seen.status, seen.solving) == ("solving", "Solving…", True)
-    assert seen.has_calibration
+    seen = shown(5, calibration(*FIVE), ClickMoved("c1", (13.0, 22.0)))
+    assert (seen.stage, seen.solving, seen.has_calibration) == ("solving", True, True)
     assert seen.solved_revision == seen.revision - 1
     assert all(one.level != "none" for one in seen.metrics)
+    assert seen.clicks[0].residual_px == pytest.approx(2.0), "it follows a moved click at once"
 
 
 def test_a_preview_is_shown_as_being_checked():
-    pairs = [pair(f"c{k}", inlier=k > 1) for k in range(1, 6)]
-    preview = calibration(*pairs, checking=True)
-    drawn = shown(5, preview)
-    assert (drawn.checking, drawn.solving) == (True, True)
-    assert agreeing(drawn)[1] == "4 of 5"
-    checked = shown(5, replace(preview, checking=False))
-    assert (checked.checking, checked.solving) == (False, False)
-    assert agreeing(checked) == ("coarse", "4 of 5")
+    preview = calibration(*FIVE, checking=True)
+    for outcome in (preview, replace(preview, checking=False)):
+        seen = shown(5, outcome)
+        assert (seen.checking, seen.solving) == (outcome.checking, outcome.checking)
+        assert agreeing(seen)[1] == "5 of 5"
 
 
 def test_the_view_says_what_can_be_undone_and_redone():
@@ -240,31 +211,6 @@ def test_a_row_of_a_solved_pair_carries_residual_position_and_ellipse():
     assert row.outlier_probability == pytest.approx(0.01)
 
 
-def test_the_residual_follows_a_moved_click_at_once():
-    row = shown(5, calibration(*FIVE), ClickMoved("c1", (13.0, 22.0))).clicks[0]
-    assert row.residual_px == pytest.approx(2.0)
-
-
-def test_each_state_of_a_click_has_a_note():
-    outcome = calibration(
-        pair("c1"),
-        pair("c2", inlier=False),
-        pair("c3", inlier=False, excluded=True),
-        unpaired=(Unpaired("c4", "no-scan", "the radar has no scan here", "click where both recordings overlap"),),
-    )
-    history = clicked(5, ClickExcluded("c3", True))
-    history = advance(history, Solved(history.present.revision, outcome), FACTS)
-    rows = {row.id: row for row in view(history, FACTS).clicks}
-    assert [row.state for row in rows.values()] == ["inlier", "outlier", "excluded", "unpaired", "pending"]
-    assert rows["c2"].note.startswith(
-        "Disagrees with the other pairs (outlier probability 97 %): its radar position reprojects 5.00 px"
-    )
-    assert rows["c3"].note == "Excluded; its radar position reprojects 5.00 px from the click."
-    assert rows["c4"].note == "The radar has no scan here. Click where both recordings overlap."
-    included = view(advance(history, ClickExcluded("c3", False), FACTS), FACTS)
-    assert included.clicks[2].state == "pending"
-
-
 def test_a_radar_position_behind_the_camera_has_no_reprojection():
     row = shown(1, calibration(pair("c1", inlier=False, projected_px=[NAN, NAN], outlier_probability=NAN))).clicks[0]
     assert (row.projected_px, row.residual_px, row.outlier_probability) == (None, None, None)
@@ -286,34 +232,30 @@ def test_every_figure_has_a_value_and_a_sentence_that_explains_it():
 
 def test_smooth_angle_errors_of_the_radar_are_a_figure_if_correcting_them_helps():
     simulated = simulate_pairs(30, rng=np.random.default_rng(7), noise=NoiseOptions(2.0, 0.008, 0.1, 0.25))
-    solved = calibrate_pairs(simulated.pairs, simulated.camera, CalibrationOptions())
-    assert isinstance(solved, Calibration)
+    solved = calibrate_pairs(simulated.pairs, simulated.camera).unwrap()
     assert "radar_angles" not in {figure.key for figure in pose_figures(solved)}
     bent = []
     for pair in simulated.pairs:
         polar = polar_from_cartesian(pair.candidates[0].position_radar_m)
         polar[2] += np.deg2rad(1.5) * np.cos(9.0 * polar[1])
         bent.append(replace(pair, candidates=(candidate_at(cartesian_from_polar(polar), NoiseOptions()),)))
-    solved = calibrate_pairs(bent, simulated.camera, CalibrationOptions())
-    assert isinstance(solved, Calibration)
-    figure = pose_figures(solved)[-1]
+    figure = pose_figures(calibrate_pairs(bent, simulated.camera).unwrap())[-1]
     assert figure.key == "radar_angles"
     assert 0.5 < float(figure.value.removeprefix("up to ")) < 3.0
-    assert "radar_angle_map" in figure.hint
 
 
-def test_a_figure_that_was_not_computed_is_a_dash():
-    metrics = Metrics(12.0, NAN, 13.0, n=1)
+@pytest.mark.parametrize(
+    ("metrics", "cdsd", "held_out", "level"),
+    [
+        (Metrics(12.0, NAN, 13.0, n=1), "–", "–", "plain"),
+        (Metrics(2.0, 1.0, 2.1, n=5, held_out_aed_px=6.0), "1.00", "6.00", "warning"),
+    ],
+    ids=["not computed", "depends on single pairs"],
+)
+def test_a_figure_that_was_not_computed_is_a_dash_and_one_that_warns_stands_out(metrics, cdsd, held_out, level):
     figures = {figure.key: figure for figure in shown(5, calibration(*FIVE, metrics=metrics)).metrics}
-    assert figures["cdsd"].value == figures["held_out_aed"].value == "–"
-    assert figures["held_out_aed"].level == "plain"
-
-
-def test_a_pose_that_depends_on_single_pairs_stands_out():
-    metrics = Metrics(2.0, 1.0, 2.1, n=5, held_out_aed_px=6.0)
-    figures = {figure.key: figure for figure in shown(5, calibration(*FIVE, metrics=metrics)).metrics}
-    assert figures["held_out_aed"].level == "warning"
-    assert "depends on single pairs" in figures["held_out_aed"].hint
+    assert (figures["cdsd"].value, figures["held_out_aed"].value) == (cdsd, held_out)
+    assert figures["held_out_aed"].level == level
 
 
 def test_a_pose_without_covariance_is_shown_without_one():
@@ -325,13 +267,6 @@ def test_a_direction_is_a_word_and_not_a_sign():
     seen = shown(5, calibration(*FIVE))
     assert [one.label for one in seen.pose][:3] == ["camera forward", "camera right", "camera up"]
     assert not any(one.value.startswith("-") for one in seen.pose)
-    assert all(one.hint for one in (*seen.pose, *seen.metrics))
-
-
-def test_warnings_are_shown_as_sentences_and_the_first_is_the_next_thing_to_do():
-    seen = shown(5, calibration(*FIVE, warnings=(DataWarning("few-pairs", "only 5 pairs", "add placements"),)))
-    assert seen.warnings == (DataWarning("few-pairs", "Only 5 pairs.", "Add placements."),)
-    assert seen.hint == "Add placements."
 
 
 def test_the_residual_limit_is_the_usual_ellipse_or_ransacs_threshold():
@@ -355,20 +290,9 @@ def test_the_summary_for_the_command_line_has_the_same_figures_and_all_warnings(
     assert lines[-2:] == ("warning: B. C.", "unpaired: c9: No scan. Click elsewhere.")
 
 
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [
-        (12.4321, "12.4"),
-        (0.0314159, "0.0314"),
-        (1234.6, "1235"),
-        (99.96, "100"),
-        (0.0, "0"),
-        (-5.5, "-5.50"),
-        (NAN, "–"),
-    ],
-)
-def test_a_plain_number_has_three_significant_digits(value, text):
-    assert plain(value) == text
+def test_a_plain_number_has_three_significant_digits():
+    texts = {12.4321: "12.4", 0.0314159: "0.0314", 1234.6: "1235", 99.96: "100", 0.0: "0", -5.5: "-5.50", NAN: "–"}
+    assert {value: plain(value) for value in texts} == texts
 
 
 @pytest.mark.parametrize(
@@ -458,16 +382,7 @@ def test_the_sigmas_of_the_mounting_are_those_of_many_perturbed_poses():
     assert spread == pytest.approx(mounting.roll_pitch_yaw_sigma_rad, rel=0.05)
 
 
-@pytest.mark.parametrize(
-    ("phrase", "text"),
-    [
-        ("the end", "The end."),
-        ("Really?", "Really?"),
-        ("", ""),
-        ("/radar is odd", "/radar is odd."),
-        ("c14 suits", "c14 suits."),
-        ("solving…", "Solving…"),
-    ],
-)
-def test_a_phrase_becomes_a_sentence(phrase, text):
-    assert sentence(phrase) == text
+def test_a_phrase_becomes_a_sentence():
+    texts = {"the end": "The end.", "Really?": "Really?", "": "", "/radar is odd": "/radar is odd."}
+    texts |= {"c14 suits": "c14 suits.", "solving…": "Solving…"}
+    assert {phrase: sentence(phrase) for phrase in texts} == texts

@@ -79,19 +79,17 @@ def rotation_in(numbers, degrees):
     return Rotation.from_quat([float(numbers[name][0]) for name in ("qx", "qy", "qz", "qw")]).as_matrix()
 
 
-def test_the_words_name_the_frames_of_the_file_and_the_axes_of_the_camera():
-    turn, shift = np.eye(3), np.array([0.1, 0.2, 0.3])
-    optical, link, forward = (
-        pose_in_file(ImportedCalibration("other", WrittenPose("matrix", turn, shift, direction, axes)), NAMES)
-        for direction, axes in (
-            ("radar_from_camera", "optical"),
-            ("radar_from_camera", "link"),
-            ("camera_from_radar", "optical"),
-        )
-    )
-    assert "are the pose of 'front_camera_optical' (z forward) in 'front_radar'" in optical.words
-    assert "are the pose of 'front_camera_link' (x forward) in 'front_radar'" in link.words
-    assert "carry points from 'front_radar' to 'front_camera_optical'" in forward.words
+@pytest.mark.parametrize(
+    ("direction", "axes", "words"),
+    [
+        ("radar_from_camera", "optical", "are the pose of 'front_camera_optical' (z forward) in 'front_radar'"),
+        ("radar_from_camera", "link", "are the pose of 'front_camera_link' (x forward) in 'front_radar'"),
+        ("camera_from_radar", "optical", "carry points from 'front_radar' to 'front_camera_optical'"),
+    ],
+)
+def test_the_words_name_the_frames_of_the_file_and_the_axes_of_the_camera(direction, axes, words):
+    pose = WrittenPose("matrix", np.eye(3), np.array([0.1, 0.2, 0.3]), direction, axes)
+    assert words in pose_in_file(ImportedCalibration("other", pose), NAMES).words
 
 
 @pytest.mark.parametrize(
@@ -158,26 +156,14 @@ def test_a_file_for_rectified_pictures_names_both_pixels(file):
 
 
 def test_the_picture_is_that_of_the_pair_it_was_chosen_from(file):
-    assert file.check_point is not None
-    stamped = replace(
-        file,
-        calibration=replace(
-            file.calibration,
-            pairs=tuple(replace(pair, image_time=index) for index, pair in enumerate(file.calibration.pairs)),
-        ),
-    )
-    stamp = picture_of(stamped)
-    assert stamp is not None
+    pairs = tuple(replace(pair, image_time=index) for index, pair in enumerate(file.calibration.pairs))
+    stamped = replace(file, calibration=replace(file.calibration, pairs=pairs))
     errors = stamped.calibration.radar_errors
-    position = errors.corrected(stamped.calibration.pairs[stamp].point_radar_m[None])[0]
+    position = errors.corrected(pairs[picture_of(stamped)].point_radar_m[None])[0]
     np.testing.assert_allclose(position, file.check_point.radar_m, rtol=0, atol=1e-3)
     elsewhere = replace(stamped, check_point=CheckPoint(np.array([50.0, 1.0, 2.0]), np.array([5.0, 5.0])))
     assert picture_of(elsewhere) is None
-    made = export_preview(elsewhere, "opencv", "", "drive").check_point
-    assert made.pair == ""
-
-
-def test_a_calibration_without_a_check_point_says_nothing(file):
+    assert export_preview(elsewhere, "opencv", "", "drive").check_point.pair == ""
     assert export_preview(replace(file, check_point=None), "tf2", "", "drive").check_point is None
 
 
@@ -210,6 +196,8 @@ def test_what_cannot_be_used_is_refused_with_the_name_of_its_field(query, field,
     with pytest.raises(FieldError, match=words) as refused:
         fields_in(query, FrameNames())
     assert refused.value.field == field
+    fields = fields_in("", FrameNames("r", "c"))
+    assert (fields.frames, fields.parent_from_radar, fields.rectified) == (FrameNames("r", "c"), None, False)
 
 
 def test_a_lens_that_no_maps_can_rectify_asks_whether_the_pictures_are_rectified(file):
@@ -218,9 +206,3 @@ def test_a_lens_that_no_maps_can_rectify_asks_whether_the_pictures_are_rectified
     with pytest.raises(FieldError, match="no rectified picture") as refused:
         exported(distorted, "kitti", "")
     assert refused.value.field == "rectified"
-
-
-def test_no_query_leaves_the_calibration_s_own_names():
-    usual = FrameNames("r", "c")
-    fields = fields_in("", usual)
-    assert (fields.frames, fields.parent_from_radar, fields.rectified) == (usual, None, False)

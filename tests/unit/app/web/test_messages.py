@@ -56,6 +56,15 @@ from cocalib.web.messages import (
 )
 from cocalib.web.messages.typescript import declarations
 
+
+def stated(sec: str, nanosec: str = "0") -> str:
+    return f'{{"type":"click_placed","image_time":{{"sec":{sec},"nanosec":{nanosec}}},"pixel_px":[1,2]}}'
+
+
+def moved(pixel_px: str) -> str:
+    return f'{{"type":"click_moved","id":"c1","pixel_px":{pixel_px}}}'
+
+
 FACTS = RecordingFacts("drive", 1_700_000_000_123_456_789 + 100_000_000 * np.arange(3), width_px=640, height_px=480)
 
 
@@ -63,17 +72,11 @@ FACTS = RecordingFacts("drive", 1_700_000_000_123_456_789 + 100_000_000 * np.ara
     ("text", "command"),
     [
         ('{"type":"hello"}', Hello()),
-        (
-            '{"type":"click_placed","image_time":{"sec":1700000000,"nanosec":123456789},"pixel_px":[1.5,2]}',
-            ClickPlaced(TimeNs(1_700_000_000_123_456_789), (1.5, 2.0), "clicked"),
-        ),
-        ('{"type":"click_moved","id":"c1","pixel_px":[1.5,2.5]}', ClickMoved("c1", (1.5, 2.5))),
+        (stated("1700000000", "123456789"), ClickPlaced(TimeNs(1_700_000_000_123_456_789), (1.0, 2.0), "clicked")),
+        (moved("[1.5,2.5]"), ClickMoved("c1", (1.5, 2.5))),
         ('{"type":"click_removed","id":"c1"}', ClickRemoved("c1")),
         ('{"type":"click_excluded","id":"c1","excluded":true}', ClickExcluded("c1", True)),
-        (
-            '{"type":"options_changed","options":{"noise":{"sigma_px":3},"method":"paper"}}',
-            OptionsChanged({"noise": {"sigma_px": 3}, "method": "paper"}),
-        ),
+        ('{"type":"options_changed","options":{"method":"paper"}}', OptionsChanged({"method": "paper"})),
         ('{"type":"cleared"}', Cleared()),
         ('{"type":"undo"}', Undo()),
         ('{"type":"redo"}', Redo()),
@@ -99,63 +102,39 @@ def test_a_frame_is_asked_for_with_the_number_its_picture_will_carry():
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "not JSON"),
-        ("{", "not JSON"),
-        ("hello", "not JSON"),
+        *((text, "not JSON") for text in ("", "{", "hello", moved("[NaN,2]"), moved("[1e999,2]"))),
         ("[1]", "not a JSON object"),
         ("null", "not a JSON object"),
         ("{}", "unknown message type 'None'; known: click_placed"),
         ('{"type":"click_place"}', "unknown message type 'click_place'; did you mean 'click_placed'?"),
         ('{"type":["undo"]}', "unknown message type"),
-        (
-            '{"type":"undo","colour":"red"}',
-            "invalid message 'undo': Object contains unknown field `colour`",
-        ),
+        ('{"type":"undo","colour":"red"}', "invalid message 'undo': Object contains unknown field `colour`"),
         ('{"type":"click_removed"}', "missing required field `id`"),
         ('{"type":"click_removed","id":""}', "length >= 1"),
         ('{"type":"click_removed","id":5}', "Expected `str`, got `int` - at `$.id`"),
-        ('{"type":"click_moved","id":"c1","pixel_px":[1]}', "`$.pixel_px`"),
-        ('{"type":"click_moved","id":"c1","pixel_px":["1","2"]}', "`$.pixel_px[0]`"),
-        ('{"type":"click_moved","id":"c1","pixel_px":[null,2]}', "`$.pixel_px[0]`"),
-        ('{"type":"click_moved","id":"c1","pixel_px":[NaN,2]}', "not JSON"),
-        ('{"type":"click_moved","id":"c1","pixel_px":[1e999,2]}', "not JSON"),
+        (moved("[1]"), "`$.pixel_px`"),
+        (moved('["1","2"]'), "`$.pixel_px[0]`"),
+        (moved("[null,2]"), "`$.pixel_px[0]`"),
         ('{"type":"click_placed","image_time":1.7e9,"pixel_px":[1,2]}', "`$.image_time`"),
-        (
-            '{"type":"click_placed","image_time":{"sec":1,"nanosec":1000000000},"pixel_px":[1,2]}',
-            "in `nanosec` - at `$.image_time`",
-        ),
-        (
-            '{"type":"click_placed","image_time":{"sec":-1,"nanosec":0},"pixel_px":[1,2]}',
-            "in `sec` - at `$.image_time`",
-        ),
-        (
-            '{"type":"click_placed","image_time":{"sec":1e30,"nanosec":0},"pixel_px":[1,2]}',
-            "in `sec` - at `$.image_time`",
-        ),
+        (stated("1", "1000000000"), "in `nanosec` - at `$.image_time`"),
+        (stated("-1"), "in `sec` - at `$.image_time`"),
+        (stated("1e30"), "in `sec` - at `$.image_time`"),
         ('{"type":"undo","request":-1}', "invalid message 'undo'"),
         ('{"type":"undo","request":"1"}', "invalid message 'undo'"),
         ('{"type":"frame","index":-1,"request":1}', "`$.index`"),
         ('{"type":"frame","index":1}', "missing required field `request`"),
         ('{"type":"frame","index":1,"request":1,"size":"huge"}', "`$.size`"),
         ('{"type":"options_changed","options":[]}', "`$.options`"),
+        ('{"type":"options_changed","options":{"noise":{"sigma":1}}}', "did you mean 'noise.sigma_px'?"),
+        ("x" * (MAX_TEXT_BYTES + 1), "longer than 4 MB"),
+        ('{"type":"options_changed","options":' + '{"a":' * 100_000 + "1" + "}" * 100_001, "not JSON"),
     ],
+    ids=lambda value: value[:60],
 )
 def test_what_is_not_understood_is_refused_with_a_clear_error(text, words):
-    with pytest.raises(InputError) as refused:
+    with pytest.raises((InputError, OptionError)) as refused:
         parse(text)
     assert words in str(refused.value)
-
-
-def test_an_option_that_does_not_exist_is_refused_with_the_nearest_one():
-    with pytest.raises(OptionError, match=r"did you mean 'noise\.sigma_px'\?"):
-        parse('{"type":"options_changed","options":{"noise":{"sigma":1}}}')
-
-
-def test_a_message_that_is_too_long_or_too_deep_is_refused():
-    with pytest.raises(InputError, match="longer than 4 MB"):
-        parse("x" * (MAX_TEXT_BYTES + 1))
-    with pytest.raises(InputError, match="not JSON"):
-        parse('{"type":"options_changed","options":' + '{"a":' * 100_000 + "1" + "}" * 100_001)
 
 
 @given(st.one_of(st.text(max_size=200), st.binary(max_size=200)))
@@ -188,19 +167,10 @@ def test_a_known_type_with_odd_fields_is_understood_or_refused(kind, fields):
     assert isinstance(parsed, Incoming)
 
 
-@pytest.mark.parametrize(
-    ("text", "request_number"),
-    [
-        ('{"type":"clik","request":7}', 7),
-        ('{"type":"undo","request":"7"}', None),
-        ('{"type":"undo"}', None),
-        ("{", None),
-        ("[7]", None),
-        (b"\xff\xfe", None),
-    ],
-)
-def test_the_number_of_a_refused_message_is_found_where_it_can_be(text, request_number):
-    assert request_of(text) == request_number
+def test_the_number_of_a_refused_message_is_found_where_it_can_be():
+    assert request_of('{"type":"clik","request":7}') == 7
+    for text in ('{"type":"undo","request":"7"}', '{"type":"undo"}', "{", "[7]", b"\xff\xfe"):
+        assert request_of(text) is None
 
 
 def test_a_view_is_written_as_plain_json_with_its_type():
@@ -216,15 +186,14 @@ def test_a_view_is_written_as_plain_json_with_its_type():
 @pytest.mark.parametrize(
     ("name", "written"), [("drive\udcff.bag", "drive\\udcff.bag"), ("\ud800", "\\ud800"), ("é ✓", "é ✓")]
 )
-def test_a_name_that_is_not_unicode_is_written_as_an_escape(name, written):
-    stamps = StampColumns.of(FACTS.image_times)
-    sensors = (SensorNote("radar", name, about=(name,)),)
-    note = RecordingNote(
-        name, name, "/i", 640, 480, True, stamps, Stamp(1, 2), stamps, (), sensors, SessionNote(name, 0), "0.1"
-    )
+def test_a_recording_is_sent_with_every_nanosecond_and_a_name_that_is_not_unicode_as_an_escape(name, written):
+    stamps, sensors = StampColumns.of(FACTS.image_times), (SensorNote("radar", name, about=(name,)),)
+    session = SessionNote(name, 0)
+    note = RecordingNote(name, name, "/i", 640, 480, True, stamps, Stamp(1, 2), stamps, (), sensors, session, "0.1")
     sent = json.loads(encode(note).encode("utf-8"))
     assert (sent["name"], sent["sensors"][0]["topic"], sent["session"]["folder"]) == (written,) * 3
-    assert sent["frame_times"]["nanosec"] == [123456789, 223456789, 323456789]
+    assert sent["frame_times"] == {"sec": [1700000000] * 3, "nanosec": [123456789, 223456789, 323456789]}
+    assert [group["name"] for group in sent["option_groups"]][:2] == ["", "gating"]
     assert json.loads(encode(Problem(name, name)).encode("utf-8"))["message"] == written
 
 
@@ -239,14 +208,9 @@ def test_no_text_keeps_a_message_from_being_sent(text, surrogates):
 
 def test_numbers_that_are_not_finite_become_null():
     seen = RadarReturn(1.0, 2.0, 3.0, float("nan"), float("inf"), True, 2.0, 1.0, 2.0, 0.0, 26.6, 41.8)
-    overlay = Overlay(3, 5, (seen,), (OverlayGuess((4.0, 5.0), 6.0),))
-    assert json.loads(encode(overlay)) == {
-        "type": "overlay",
-        "index": 3,
-        "revision": 5,
-        "returns": [[1.0, 2.0, 3.0, None, None, True, 2.0, 1.0, 2.0, 0.0, 26.6, 41.8]],
-        "guesses": [[[4.0, 5.0], 6.0]],
-    }
+    sent = json.loads(encode(Overlay(3, 5, (seen,), (OverlayGuess((4.0, 5.0), 6.0),))))
+    returns = [[1.0, 2.0, 3.0, None, None, True, 2.0, 1.0, 2.0, 0.0, 26.6, 41.8]]
+    assert sent == {"type": "overlay", "index": 3, "revision": 5, "returns": returns, "guesses": [[[4.0, 5.0], 6.0]]}
 
 
 @pytest.mark.parametrize(
@@ -262,28 +226,11 @@ def test_a_message_to_the_page_carries_its_type(message, written):
     assert json.loads(encode(message)) == written
 
 
-def test_a_recording_is_sent_with_every_nanosecond_and_every_option_described():
-    stamps = StampColumns.of(FACTS.image_times)
-    note = RecordingNote(
-        "d", "/r", "/i", 640, 480, True, stamps, Stamp(1, 2), stamps, (), (), SessionNote("/s", 0), "0.1"
-    )
-    written = json.loads(encode(note))
-    assert written["frame_times"] == {"sec": [1700000000] * 3, "nanosec": [123456789, 223456789, 323456789]}
-    assert [group["name"] for group in written["option_groups"]][:2] == ["", "gating"]
-
-
 def test_a_picture_travels_with_its_header_before_its_bytes():
     message = encode_frame(FrameHeader(3, 9, 640, 480, 0.5, "jpeg"), b"\xff\xd8picture")
+    wanted = {"index": 3, "request": 9, "width_px": 640, "height_px": 480, "scale": 0.5, "format": "jpeg"}
     (length,) = struct.unpack("<I", message[:4])
-    assert json.loads(message[4 : 4 + length]) == {
-        "index": 3,
-        "request": 9,
-        "width_px": 640,
-        "height_px": 480,
-        "scale": 0.5,
-        "format": "jpeg",
-        "rectified": False,
-    }
+    assert json.loads(message[4 : 4 + length]) == wanted | {"rectified": False}
     assert message[4 + length :] == b"\xff\xd8picture"
 
 

@@ -70,25 +70,17 @@ def test_the_last_of_those_wanted_comes_first_and_others_are_dropped():
     assert list(work.followed) == [Start(0, edges(WAY[0]))]
 
 
-def test_stopping_leaves_boxes_where_they_are():
-    work = follower(Pictures())
+@pytest.mark.parametrize(("broken", "count", "words"), [(None, 3, "stopped"), (8, 7, "frame 9 cannot be decoded")])
+def test_stopping_and_a_frame_that_cannot_be_decoded_end_the_box_with_the_reason(broken, count, words):
+    work = follower(Pictures(broken=broken))
     work.want([stretch(0, 40)])
-    for _ in range(3):
+    for _ in range(3 if broken is None else 40):
         work.go_on(0.0)
     work.stop()
     assert work.is_done
     [found] = work.followed.values()
-    assert len(found.boxes) == 3
-    assert "stopped" in found.ended
-
-
-def test_a_frame_that_cannot_be_decoded_ends_the_box_with_the_reason():
-    work = follower(Pictures(broken=8))
-    work.want([stretch(0, 40)])
-    work.go_on(60.0)
-    [found] = work.followed.values()
-    assert len(found.boxes) == 7
-    assert "frame 9 cannot be decoded" in found.ended
+    assert len(found.boxes) == count
+    assert words in found.ended
 
 
 def test_boxes_of_halved_pictures_are_those_of_the_recorded_ones():

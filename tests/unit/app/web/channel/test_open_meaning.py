@@ -1,7 +1,6 @@
 """What the page is offered when a calibration does not state what its numbers mean."""
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
 import cv2
@@ -10,7 +9,7 @@ import pytest
 
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
-from calib_core.recordings import Recording, open_recording
+from calib_core.recordings import Recording
 from cocalib.hypothesis_sheet import OpenMeaning
 from cocalib.opening.choice import MeaningPick
 from cocalib.opening.opened import about_calibration, meaning_of, reference_from
@@ -22,10 +21,8 @@ POSE = RigidTransform(np.eye(3), [0.4, 0.1, -0.2])
 
 
 @pytest.fixture
-def sample(project_root: Path) -> Iterator[Recording]:
-    folder = project_root / "sample_data" / "rooftop"
-    with open_recording([folder / "radar.bag", folder / "camera.bag"]) as recording:
-        yield recording
+def sample(recording: Recording) -> Recording:
+    return recording
 
 
 @pytest.fixture

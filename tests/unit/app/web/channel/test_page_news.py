@@ -22,26 +22,17 @@ def delivered(outbox: Outbox, count: int) -> list[str | bytes]:
         if len(got) == count:
             raise EOFError
 
-    async def run() -> None:
-        with pytest.raises(EOFError):
-            await outbox.deliver(take)
-
-    asyncio.run(run())
+    with pytest.raises(EOFError):
+        asyncio.run(outbox.deliver(take))
     return got
 
 
 def test_of_one_kind_only_the_newest_is_sent_and_answers_are_all_sent():
     outbox = Outbox()
-    for message, kind in (
-        ("v1", "view"),
-        ("done 1", None),
-        ("v2", "view"),
-        ("f1", "frame"),
-        ("done 2", None),
-        ("f2", "frame"),
-    ):
-        outbox.put(message, kind=kind)
-    assert delivered(outbox, 4) == ["done 1", "v2", "done 2", "f2"]
+    for message in ("view 1", "done 1", "view 2", "frame 1", "done 2", "frame 2"):
+        kind = message.split()[0]
+        outbox.put(message, kind=None if kind == "done" else kind)
+    assert delivered(outbox, 4) == ["done 1", "view 2", "done 2", "frame 2"]
 
 
 def test_a_page_that_reads_nothing_is_given_up():
@@ -56,7 +47,7 @@ def test_a_page_that_reads_nothing_is_given_up():
         asyncio.run(outbox.deliver(never))
 
 
-def test_of_the_waiting_work_only_the_newest_is_done():
+def test_of_the_waiting_work_only_the_newest_is_done_and_work_that_fails_is_logged(caplog):
     worked: list[int] = []
 
     async def run() -> None:
@@ -66,6 +57,9 @@ def test_of_the_waiting_work_only_the_newest_is_done():
             worked.append(item)
             await going.wait()
             if item == 4:
+                worker.give(5)
+                raise ZeroDivisionError("bad work")
+            if item == 5:
                 ended.set()
 
         worker = NewestWins(work)
@@ -76,30 +70,9 @@ def test_of_the_waiting_work_only_the_newest_is_done():
         going.set()
         await ended.wait()
 
-    asyncio.run(run())
-    assert worked == [1, 4]
-
-
-def test_work_that_fails_is_logged_and_the_next_is_done(caplog):
-    worked: list[str] = []
-
-    async def run() -> None:
-        async def work(item: str) -> None:
-            if item == "bad":
-                raise ZeroDivisionError("bad work")
-            worked.append(item)
-
-        worker = NewestWins(work)
-        worker.give("bad")
-        for _ in range(5):
-            await asyncio.sleep(0)
-        worker.give("good")
-        for _ in range(5):
-            await asyncio.sleep(0)
-
     with caplog.at_level(logging.ERROR):
         asyncio.run(run())
-    assert worked == ["good"]
+    assert worked == [1, 4, 5]
     assert "bad work" in caplog.text
 
 
@@ -122,31 +95,26 @@ def recorded() -> RadarScans:
     return RadarScans.from_scans(scans)
 
 
-def test_the_survey_finds_the_reflector_and_a_frame_to_click_in():
+def test_the_survey_finds_the_reflector_and_a_frame_to_click_in_and_counts_returns_per_scan():
     image_times = (np.arange(0, 10, 0.7) * 1e9).astype(np.int64)
     survey = survey_of([recorded()], image_times, GatingOptions())
     [row] = survey.rows
     assert row.range_m == pytest.approx(np.sqrt(36 + 1 + 0.09), abs=0.05)
-    assert row.start_s == pytest.approx(3, abs=0.3)
-    assert row.end_s == pytest.approx(7, abs=0.3)
+    assert (row.start_s, row.end_s) == pytest.approx((3, 7), abs=0.3)
     assert row.frame == 7, "4.9 s is nearest to the middle"
     assert placements_at(survey, int(5e9)) == [survey.placements[0]]
     assert placements_at(survey, int(1e9)) == []
     assert placements_at(None, int(5e9)) == ()
+    activity = survey.activity
+    assert (activity.returns[0], activity.returns[int(5 / activity.step_s)]) == (1, 2)
+    assert len(activity.returns) * activity.step_s == pytest.approx(9.8, abs=activity.step_s)
 
 
-def test_the_activity_counts_returns_per_scan():
-    image_times = np.array([0, int(10e9)], dtype=np.int64)
-    activity = survey_of([recorded()], image_times, GatingOptions()).activity
-    in_the_middle = activity.returns[int(5 / activity.step_s)]
-    assert activity.returns[0] == 1
-    assert in_the_middle == 2
-    assert len(activity.returns) * activity.step_s == pytest.approx(10)
-
-
-def test_a_placement_that_no_frame_shows_is_not_offered():
-    image_times = np.array([0, int(9.9e9)], dtype=np.int64)
-    assert survey_of([recorded()], image_times, GatingOptions()).rows == ()
+def test_a_placement_that_no_frame_shows_is_not_offered_and_a_survey_of_no_radar_is_empty():
+    assert survey_of([recorded()], np.array([0, int(9.9e9)]), GatingOptions()).rows == ()
+    survey = survey_of([], np.array([0, int(1e9)], dtype=np.int64), GatingOptions())
+    assert survey.rows == ()
+    assert set(survey.activity.returns) == {0.0}
 
 
 def test_a_survey_in_windows_and_in_stretches_finds_the_same(monkeypatch):
@@ -159,12 +127,6 @@ def test_a_survey_in_windows_and_in_stretches_finds_the_same(monkeypatch):
     in_stretches = survey_of(windows, image_times, GatingOptions())
     assert [row.frame for row in in_stretches.rows] == [row.frame for row in whole.rows]
     assert in_stretches.activity == whole.activity
-
-
-def test_a_survey_of_no_radar_is_empty():
-    survey = survey_of([], np.array([0, int(1e9)], dtype=np.int64), GatingOptions())
-    assert survey.rows == ()
-    assert set(survey.activity.returns) == {0.0}
 
 
 class Radar:

@@ -58,27 +58,19 @@ def test_without_a_placement_the_3d_view_reaches_as_far_as_the_radar_sees():
     assert surveyed_extent(survey_of([scans], scans.times_ns, GatingOptions()), seen).range_m < 10.0
 
 
-def test_without_frames_a_placement_is_found_at_the_radars_own_moments():
-    scans = recorded()
+@pytest.mark.parametrize(
+    ("reflector_db", "stands_out_db", "note"), [(30.0, 15.0, ""), (13.0, -2.0, "2 dB weaker than other returns")]
+)
+def test_without_frames_a_placement_is_found_at_the_radars_own_moments(reflector_db, stands_out_db, note):
+    scans = recorded(reflector_db)
     survey = survey_of([scans], scans.times_ns, GatingOptions())
     (found,) = survey.rows
     assert found.frame == pytest.approx(70, abs=2), "7 s, the middle, is scan 70"
     assert found.range_m == pytest.approx(np.sqrt(36 + 9 + 0.09), abs=1e-6)
     assert found.azimuth_deg == pytest.approx(-26.57, abs=0.01)
     assert found.position_radar_m == (6.0, -3.0, -0.3)
-    assert (found.snr_db, found.stands_out_db) == (30.0, 15.0)
-    assert found.note == ""
-    assert survey.message.summary == (
-        "1 placement found, 6.7 to 6.7 m, azimuth 27° right to 27° right; a calibration needs at least 4; "
-        "strongest: placement 1, 30 dB"
-    )
-
-
-def test_a_reflector_that_does_not_stand_out_is_named():
-    scans = recorded(reflector_db=13.0)
-    (found,) = survey_of([scans], scans.times_ns, GatingOptions()).rows
-    assert found.stands_out_db == -2.0
-    assert found.note == "2 dB weaker than other returns"
+    assert (found.snr_db, found.stands_out_db, found.note) == (reflector_db, stands_out_db, note)
+    assert survey.message.summary.startswith("1 placement found, 6.7 to 6.7 m, azimuth 27° right to 27° right; ")
 
 
 def test_a_recording_shorter_than_a_placement_is_not_searched(monkeypatch):
@@ -87,22 +79,17 @@ def test_a_recording_shorter_than_a_placement_is_not_searched(monkeypatch):
     assert survey_of([scans], scans.times_ns, GatingOptions()).rows == ()
 
 
-def test_a_short_placement_is_named():
+def test_the_summary_says_how_many_where_and_which_to_look_at():
     assert placement_note(2.1, None) == "lasted only 2.1 s"
     assert placement_note(6.0, 4.0) == "only 4 dB above other returns"
     assert placement_note(6.0, 20.0) == ""
-
-
-def test_the_summary_says_how_many_where_and_which_to_look_at():
     rows = [row(), row(azimuth_deg=-31.2, snr_db=41.0), row(2.1, 28.4, note="lasted only 2.1 s"), row(), row()]
     assert placement_summary(rows, 60.0) == (
         "5 placements found, 5.0 to 5.0 m, azimuth 31° right to 28° left; strongest: placement 2, 41 dB; "
         "placement 3 lasted only 2.1 s"
     )
-    assert (
-        placement_summary([row(snr_db=None)] * 5, 60.0)
-        == "5 placements found, 5.0 to 5.0 m, azimuth 10° left to 10° left"
-    )
+    quiet = placement_summary([row(snr_db=None)] * 5, 60.0)
+    assert quiet == "5 placements found, 5.0 to 5.0 m, azimuth 10° left to 10° left"
     assert placement_summary([], 60.0).startswith("No placement found")
     assert placement_summary([], 0.4) == "The recording is 0.4 s long, too short for a placement of 2 s or longer"
 
@@ -128,18 +115,13 @@ def test_the_map_says_how_long_something_was_where():
     assert found.low_db <= 15 <= 30 <= found.high_db + 0.5
 
 
-def test_a_radar_without_amplitude_has_a_map_without_amplitude():
+@pytest.mark.parametrize("amplitude_db", [NAN, 1.0], ids=["none", "equal"])
+def test_a_radar_without_differing_amplitudes_has_a_map_without_amplitude(amplitude_db):
     total = RadarMapSum(GatingOptions())
-    total.add(RadarScans.from_scans([scan(time_s, [(5.0, 0.0, 0.0, 0.0, NAN)]) for time_s in range(5)]))
+    total.add(RadarScans.from_scans([scan(time_s, [(5.0, 0.0, 0.0, 0.0, amplitude_db)]) for time_s in range(5)]))
     found = total.total()
-    assert (found.snr_db, found.low_db, found.high_db) == ((), None, None)
+    assert (found.snr_db, found.low_db) == ((), None)
     assert found.share == (1.0,)
-
-
-def test_equal_amplitudes_are_not_coloured():
-    total = RadarMapSum(GatingOptions())
-    total.add(RadarScans.from_scans([scan(time_s, [(5.0, 0.0, 0.0, 0.0, 1.0)]) for time_s in range(5)]))
-    assert (total.total().snr_db, total.total().low_db) == ((), None)
 
 
 def test_returns_of_the_last_seconds_are_shown_with_their_age():

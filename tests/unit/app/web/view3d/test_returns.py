@@ -66,13 +66,10 @@ def test_colours_differ_and_the_legend_says_what_they_mean(colour, low, high, wo
     assert (legend.title, legend.low, legend.high) == words
 
 
-def test_old_returns_fade_into_the_background():
+def test_old_returns_fade_into_the_background_and_those_without_doppler_or_snr_are_grey():
     rule = Colouring("speed", EXTENT, None, 1.0, light=False)
     new, old = (rule.of(returns((5, 0, 0, 0, NAN), age_s=age_s), 2.0)[0].astype(int) for age_s in (0.0, 2.0))
     assert np.abs(new - BACKGROUND[False]).sum() > 2 * np.abs(old - BACKGROUND[False]).sum()
-
-
-def test_a_return_without_doppler_or_snr_is_grey():
     for colour in ("doppler", "amplitude"):
         drawn = Colouring(colour, EXTENT, (10.0, 40.0), 4.0, light=False).of(returns((5, 0, 0, NAN, NAN)), 0.0)
         assert np.ptp(drawn[0].astype(int)) < 40

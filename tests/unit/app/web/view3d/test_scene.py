@@ -53,20 +53,14 @@ def calibration(*, off_px: float = 0.0) -> Calibration:
     return Calibration(camera_from_radar, np.full((6, 6), np.nan), CAMERA, metrics, pairs, (), (), CalibrationOptions())
 
 
-def test_a_ray_of_an_exact_click_ends_at_its_return():
+@pytest.mark.parametrize("errors", [RadarErrors(), RadarErrors(0.02, -0.01, 0.1)], ids=["none", "of the radar"])
+def test_a_ray_of_an_exact_click_ends_at_the_true_position_of_its_return(errors):
     solved = calibration()
-    rays = rays_to(solved, solved.pairs)
-    assert rays[:, 1] == pytest.approx(np.array([pair.point_radar_m for pair in solved.pairs]), abs=1e-9)
-    centre = solved.camera_from_radar.inverse().translation_m
-    assert rays[:, 0] == pytest.approx(np.broadcast_to(centre, (4, 3)), abs=1e-12)
-
-
-def test_a_ray_ends_at_the_true_position_of_its_return():
-    solved = calibration()
-    errors = RadarErrors(azimuth_scale=0.02, elevation_scale=-0.01, range_bias_m=0.1)
     biased = tuple(replace(pair, point_radar_m=reported(errors, pair.point_radar_m)) for pair in solved.pairs)
     rays = rays_to(replace(solved, pairs=biased, radar_errors=errors), biased)
     assert rays[:, 1] == pytest.approx(np.array([pair.point_radar_m for pair in solved.pairs]), abs=1e-9)
+    centre = solved.camera_from_radar.inverse().translation_m
+    assert rays[:, 0] == pytest.approx(np.broadcast_to(centre, (4, 3)), abs=1e-12)
 
 
 def reported(errors: RadarErrors, point_radar_m: np.ndarray) -> np.ndarray:
@@ -171,7 +165,7 @@ def test_before_a_calibration_the_camera_stands_dimmed_at_the_radar_and_carries_
     assert still != moving
 
 
-def test_with_a_calibration_the_camera_moves_to_its_place_and_the_pairs_appear(drawn):
+def test_with_a_calibration_the_camera_moves_to_its_place_and_the_pairs_appear_until_an_undo_to_nothing(drawn):
     drawn.scene.show(sight())
     dimmed = drawn.node("/camera").color
     solved = calibration(off_px=12.0)
@@ -183,6 +177,9 @@ def test_with_a_calibration_the_camera_moves_to_its_place_and_the_pairs_appear(d
     assert len(drawn.node("/chosen").points) == 4
     drawn.scene.show(sight(solved))
     assert "/gap" not in drawn.names()
+    drawn.scene.show(sight())
+    assert drawn.names() == ["/returns_2", "/window"]
+    assert drawn.node("/camera").position == pytest.approx([0, 0, 0])
 
 
 def test_the_best_next_placement_is_ringed_until_no_more_are_needed(drawn):
@@ -217,13 +214,6 @@ def test_the_ring_of_the_next_place_is_level_and_half_gaps():
     assert ring[..., 2] == pytest.approx(0.4)
     assert np.linalg.norm(ring[:, 1] - ring[:, 0], axis=1).sum() == pytest.approx(np.pi * 0.5, rel=0.01)
     assert plumb == pytest.approx(np.array([[6.0, -2.0, 0.15], [6.0, -2.0, 0.65]]))
-
-
-def test_after_an_undo_to_nothing_the_pairs_are_gone(drawn):
-    drawn.scene.show(sight(calibration(), selected="c1"))
-    drawn.scene.show(sight())
-    assert drawn.names() == ["/returns_2", "/window"]
-    assert drawn.node("/camera").position == pytest.approx([0, 0, 0])
 
 
 def test_the_page_can_tell_which_frame_the_3d_view_has_drawn(drawn):
