@@ -25,9 +25,7 @@ from tests.street_recording import StreetRecording, reference_calibration
 
 @pytest.fixture(scope="module")
 def solved(recording: Recording, clicks: tuple[ReflectorClick, ...]) -> Calibration:
-    outcome = solve_clicks(recording, clicks, recording.camera(), CalibrationOptions())
-    assert isinstance(outcome, Calibration)
-    return outcome
+    return solve_clicks(recording, clicks, recording.camera(), CalibrationOptions()).unwrap()
 
 
 def figures_of(rows: object) -> dict[str, str]:
@@ -42,14 +40,12 @@ def shown(solved: Calibration, recording: Recording, clicks: tuple[ReflectorClic
 
 def test_the_residuals_on_the_page_are_those_of_evaluate(recording, clicks, solved):
     judged = evaluate_recording(solved, recording, clicks=clicks).residuals
-    assert judged is not None
-    page = figures_of(shown(solved, recording, clicks, None).metrics)
-    assert page["aed"] == plain(judged.metrics.aed_px)
-    assert page["cdsd"] == plain(judged.metrics.cdsd_px)
-    assert page["rms"] == plain(judged.metrics.rms_px)
-    assert page["held_out_aed"] == plain(judged.metrics.held_out_aed_px)
+    page, metrics = figures_of(shown(solved, recording, clicks, None).metrics), judged.metrics
+    for key, value in {"aed": metrics.aed_px, "cdsd": metrics.cdsd_px, "rms": metrics.rms_px}.items():
+        assert page[key] == plain(value)
+    assert page["held_out_aed"] == plain(metrics.held_out_aed_px)
     assert page["inliers"] == f"{judged.inliers.sum()} of {len(judged.ids)}"
-    assert judged.metrics.aed_px == pytest.approx(solved.metrics.aed_px, rel=1e-12)
+    assert metrics.aed_px == pytest.approx(solved.metrics.aed_px, rel=1e-12)
 
 
 def test_the_comparison_on_the_page_is_that_of_check(recording, clicks, solved):
@@ -83,9 +79,5 @@ def test_acc_on_the_page_is_that_of_the_core():
     assert [row.axis for row in panel.sensitivity] == ["roll", "pitch", "yaw"]
     assert all(row.values[1] == f"{100 * core.acc:.1f} %" for row in panel.sensitivity)
     assert "not accuracy" in panel.caution
-    assert json.loads(encode(shown_panel(panel)))["acc"]["figures"][0]["key"] == "acc"
-
-
-def shown_panel(panel):
     facts = RecordingFacts("street", np.arange(3) * 10**8, 1280, 720)
-    return view(History(), facts, acc=panel)
+    assert json.loads(encode(view(History(), facts, acc=panel)))["acc"]["figures"][0]["key"] == "acc"

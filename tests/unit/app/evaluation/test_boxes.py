@@ -30,23 +30,14 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Recording]:
         yield opened
 
 
-def test_a_file_is_read_for_the_frames_of_the_recording(recording, tmp_path):
+def test_a_file_is_read_for_the_frames_of_the_recording_and_refused_for_pictures_of_another_size(recording, tmp_path):
     path = tmp_path / "boxes.json"
     path.write_text(boxes_text(Boxes((FRAME,), "anything", (64, 48))), encoding="utf-8")
-
     assert find_boxes(str(path), recording) == Boxes((FRAME,), "boxes.json", (64, 48))
-
-
-def test_a_file_for_pictures_of_another_size_is_refused(recording, tmp_path):
-    path = tmp_path / "boxes.json"
+    assert len(find_boxes("/boxes", recording)) == 3, "of a topic"
     path.write_text(boxes_text(Boxes((FRAME,), "anything", (1920, 1080))), encoding="utf-8")
-
     with pytest.raises(InputError, match="made on pictures of 1920 x 1080 px, the recorded ones have 64 x 48"):
         find_boxes(str(path), recording)
-
-
-def test_a_topic_is_read(recording):
-    assert len(find_boxes("/boxes", recording)) == 3
 
 
 def test_the_word_moving_looks_at_the_pictures(recording):
@@ -86,21 +77,14 @@ def test_keyframes_give_no_acc_and_say_how_far_apart_they_are():
     assert "1.5 times farther apart" in found.warnings[0].message
 
 
-def test_labels_are_read(tmp_path):
+def test_labels_are_read_or_refused_in_words(tmp_path):
     labels = ReturnLabels((LabelledScan(TimeNs(5), ("", "p1")),), "labels.json")
     path = tmp_path / "labels.json"
-    path.write_text(labels_text(labels), encoding="utf-8")
-
-    assert find_labels(path) == labels
-
-
-@pytest.mark.parametrize(
-    ("content", "words"), [(None, "cannot be read"), (b"\xff\xfe\0", "not text"), (b"{}", "schema")]
-)
-def test_labels_that_cannot_be_read_are_refused(tmp_path, content, words):
-    path = tmp_path / "labels.json"
-    if content is not None:
-        path.write_bytes(content)
-
-    with pytest.raises(InputError, match=words):
+    with pytest.raises(InputError, match="cannot be read"):
         find_labels(path)
+    path.write_text(labels_text(labels), encoding="utf-8")
+    assert find_labels(path) == labels
+    for content, words in ((b"\xff\xfe\0", "not text"), (b"{}", "schema")):
+        path.write_bytes(content)
+        with pytest.raises(InputError, match=words):
+            find_labels(path)

@@ -157,29 +157,23 @@ def test_a_cancelled_search_goes_on_from_its_views_for_the_same_board_only(searc
     assert search.searched[1] == ((0, 1, 2, 3) if is_same else ())
 
 
-def test_what_is_wrong_is_said_in_words_and_the_former_result_stays(search, watched):
-    watched.job.start(Pictures(), BOARD, OPTIONS)
-    search.allowed.release(8)
-    former = watched.until("done").lens
+def test_what_is_wrong_is_said_in_words_and_the_former_result_stays(search, watched, monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+
+    def ended(stage: LensStage) -> LensSnapshot:
+        watched.job.start(Pictures(), BOARD, OPTIONS)
+        search.allowed.release(8)
+        return watched.until(stage)
+
+    former = ended("done").lens
     search.end = Unsolvable("no-board", "none of 8 pictures shows a checkerboard of 9 x 6", "film the board")
-    watched.job.start(Pictures(), BOARD, OPTIONS)
-    search.allowed.release(8)
-    failed = watched.until("failed")
+    failed = ended("failed")
     assert (failed.problem, failed.hint) == (search.end.reason, "film the board")
     assert failed.lens is former
     search.error = RecordingError("frame 1 cannot be read")
-    watched.job.start(Pictures(), BOARD, OPTIONS)
-    search.allowed.release(8)
-    watched.until("failed")
-    assert watched.job.snapshot.problem == "frame 1 cannot be read"
-
-
-def test_an_unforeseen_error_ends_the_calibration_and_not_the_program(search, watched, monkeypatch, tmp_path):
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    assert ended("failed").problem == "frame 1 cannot be read"
     search.error = KeyError("a bug")
-    watched.job.start(Pictures(), BOARD, OPTIONS)
-    search.allowed.release(8)
-    assert "KeyError" in watched.until("failed").problem
+    assert "KeyError" in ended("failed").problem, "it ends the calibration and not the program"
 
 
 def test_without_pictures_or_after_closing_nothing_is_started(search, watched):

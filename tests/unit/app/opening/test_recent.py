@@ -54,16 +54,12 @@ def test_the_list_is_short_private_and_can_be_emptied(recent, tmp_path):
 
 
 @pytest.mark.parametrize("content", [b"", b"[", b'[{"paths":[]}]', b"\xff\xfe", b"[" * 100_000, b'{"paths":1}'])
-def test_a_damaged_list_counts_as_empty(recent, tmp_path, content, caplog):
+def test_a_damaged_list_counts_as_empty_and_one_that_cannot_be_written_is_logged(recent, tmp_path, content, caplog):
     (tmp_path / "state").mkdir()
     (tmp_path / "state" / "recent.json").write_bytes(content)
     assert recent.rows() == ()
     assert "cannot be read" in caplog.text
     recent.add([recording(tmp_path, "a.bag")], "a.bag", 0)
     assert [row.name for row in recent.rows()] == ["a.bag"]
-
-
-def test_a_list_that_cannot_be_written_is_logged_and_nothing_else(tmp_path, caplog):
-    (tmp_path / "state").write_bytes(b"a file")
-    RecentRecordings(tmp_path / "state").add([recording(tmp_path, "a.bag")], "a.bag", 0)
+    RecentRecordings(tmp_path / "a.bag").add([tmp_path / "a.bag"], "a.bag", 0)
     assert "cannot be written" in caplog.text

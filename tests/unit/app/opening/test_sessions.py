@@ -54,14 +54,11 @@ def test_a_session_of_other_frames_is_left_alone_and_its_clicks_that_fit_are_cop
     assert "1 belong to frames that this recording does not have" in copied.about.message
 
 
-def test_a_new_session_of_the_same_frames_keeps_the_old_one_under_another_name(path, capsys):
+def test_a_new_session_of_the_same_frames_keeps_the_old_one_under_another_name_or_copies_its_clicks(path, capsys):
     folder = path.with_name("a.bag.cocalib-session")
+    copy = session_folder(Choice((path,), session_plan="copy"), facts(3)).path
+    assert copy == path.with_name("a.bag-2.cocalib-session")
+    assert len(fitting_clicks(folder, facts(3)).clicks) == 2
     assert session_folder(Choice((path,), session_plan="new"), facts(3)).path == folder
     assert not folder.exists()
     assert str(path.with_name("a.bag.cocalib-session.1")) in capsys.readouterr().out
-
-
-def test_clicks_of_the_same_frames_are_copied_to_a_session_of_their_own(path):
-    found = session_folder(Choice((path,), session_plan="copy"), facts(3)).path
-    assert found == path.with_name("a.bag-2.cocalib-session")
-    assert len(fitting_clicks(path.with_name("a.bag.cocalib-session"), facts(3)).clicks) == 2

@@ -27,12 +27,10 @@ def test_missing_files_are_reported_with_the_folders_searched(tmp_path, monkeypa
         sample_folder()
 
 
-def test_the_version_is_the_installed_one(monkeypatch):
+def test_the_version_is_the_installed_one_and_an_uninstalled_checkout_has_one_too(monkeypatch):
     monkeypatch.setattr(importlib.metadata, "version", lambda name: {"cocalib": "1.2.3"}[name])
     assert version() == "1.2.3"
 
-
-def test_an_uninstalled_checkout_has_a_version_too(monkeypatch):
     def missing(name: str) -> str:
         raise importlib.metadata.PackageNotFoundError(name)
 

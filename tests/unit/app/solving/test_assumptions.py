@@ -11,7 +11,7 @@ import pytest
 from calib_core.interchange import read_calibration
 from calib_core.recordings import Recording, RecordingOptions, open_recording
 from calib_core.results import Calibration
-from cocalib.session import AssumptionsConfirmed, ColumnsMapped, RecordingFacts, Session
+from cocalib.session import AssumptionsConfirmed, ColumnsMapped
 from cocalib.session.file import remembered_map
 from cocalib.solving.solving import GivenPairs, calibration_text, calibration_text_of_pairs, solve_pairs
 from cocalib.workspace import Workspace, open_workspace
@@ -41,11 +41,6 @@ def solved(workspace: Workspace, clicks: str) -> Calibration:
     end()
     assert isinstance(workspace.session.outcome, Calibration)
     return workspace.session.outcome
-
-
-def test_a_deeply_nested_line_of_a_journal_names_no_columns(tmp_path):
-    (tmp_path / "journal.jsonl").write_text('{"step":{"type":"x","a":' + "[" * 100_000 + "\n")
-    assert remembered_map(tmp_path) == ()
 
 
 def test_an_unconfirmed_assumption_is_in_the_view_the_status_and_the_file(recording, project_root, tmp_path):
@@ -105,14 +100,15 @@ def test_the_map_is_remembered_for_the_next_opening(paths, tmp_path):
         assert recording.column_map == STATED
 
 
-def test_a_session_of_a_damaged_journal_remembers_nothing_and_raises_nothing(tmp_path):
-    (tmp_path / "journal.jsonl").write_bytes(
-        b'\xff\xfe\n{"step": 3}\n[]\n{"step": {"type": "columns_mapped", "column_map": 3}}\n'
-    )
-    assert remembered_map(tmp_path) == ()
+DAMAGED = b'\xff\xfe\n{"step": 3}\n[]\n{"step": {"type": "columns_mapped", "column_map": 3}}\n'
 
 
-def test_a_journal_that_is_a_pipe_or_a_link_is_not_opened_for_its_map(tmp_path):
+@pytest.mark.parametrize("content", [DAMAGED, b'{"step":{"type":"x","a":' + b"[" * 100_000 + b"\n", None])
+def test_a_journal_that_is_damaged_a_pipe_or_a_link_remembers_nothing(tmp_path, content):
+    if content is not None:
+        (tmp_path / "journal.jsonl").write_bytes(content)
+        assert remembered_map(tmp_path) == ()
+        return
     os.mkfifo(tmp_path / "journal.jsonl")
     assert remembered_map(tmp_path) == ()
     (tmp_path / "other").mkdir()
@@ -120,8 +116,3 @@ def test_a_journal_that_is_a_pipe_or_a_link_is_not_opened_for_its_map(tmp_path):
     (tmp_path / "elsewhere").write_text(json.dumps(step) + "\n")
     (tmp_path / "other" / "journal.jsonl").symlink_to(tmp_path / "elsewhere")
     assert remembered_map(tmp_path / "other") == ()
-
-
-def test_facts_without_assumptions_have_none_unconfirmed(recording):
-    facts = RecordingFacts("bare", recording.image_times, 640, 480)
-    assert facts.unconfirmed(Session()) == ()

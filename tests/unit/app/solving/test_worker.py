@@ -49,7 +49,7 @@ class Answers:
         return self.all[-1]
 
 
-def test_of_several_waiting_requests_only_the_newest_is_solved():
+def test_of_several_waiting_requests_only_the_newest_is_solved_and_none_after_the_end():
     gate, answers = Gate(), Answers()
     radar = Radar(gate)
     worker = SolverWorker(radar, CAMERA)
@@ -61,6 +61,7 @@ def test_of_several_waiting_requests_only_the_newest_is_solved():
     while answers.wait().revision != 5:
         pass
     worker.close()
+    worker.request(6, [CLICK], CalibrationOptions(), answers)
     assert [solved.revision for solved in answers.all] == [1, 5]
     assert len(radar.asked) == 2
 
@@ -74,7 +75,6 @@ def test_a_recording_that_cannot_be_read_is_reported_as_the_answer():
     worker.request(1, [CLICK], CalibrationOptions(), answers)
     outcome = answers.wait().outcome
     worker.close()
-    assert isinstance(outcome, Unsolvable)
     assert (outcome.code, outcome.reason) == ("unreadable", "radar.bag: chunk 7 is damaged; copy the file again")
 
 
@@ -102,25 +102,10 @@ def test_a_bug_in_the_program_is_logged_and_reported_and_the_worker_continues(ca
     worker.close()
 
 
-def test_after_close_nothing_is_answered():
-    gate, answers = Gate(), Answers()
-    worker = SolverWorker(Radar(gate), CAMERA)
-    worker.request(1, [CLICK], CalibrationOptions(), answers)
-    assert gate.entered.wait(60)
-    worker.request(2, [CLICK], CalibrationOptions(), answers)
-    gate.open.set()
-    worker.close()
-    count = len(answers.all)
-    worker.request(3, [CLICK], CalibrationOptions(), answers)
-    assert len(answers.all) == count
-    assert all(solved.revision == 1 for solved in answers.all)
-
-
 def test_the_preview_is_delivered_before_the_answer_and_the_next_one_starts_from_it(monkeypatch):
     simulated = simulate_pairs(8, rng=np.random.default_rng(1))
-    answer = calibrate_pairs(simulated.pairs, simulated.camera)
-    assert isinstance(answer, Calibration)
-    started_from: list[Calibration | None] = []
+    answer = calibrate_pairs(simulated.pairs, simulated.camera).unwrap()
+    started_from = []
 
     def steps(*_: object, previous: Calibration | None, **__: object) -> Iterator[Calibration]:
         started_from.append(previous)
@@ -135,8 +120,6 @@ def test_the_preview_is_delivered_before_the_answer_and_the_next_one_starts_from
         answers.wait()
         answers.wait()
     worker.close()
-    outcomes = [
-        (solved.revision, isinstance(solved.outcome, Calibration) and solved.outcome.checking) for solved in answers.all
-    ]
+    outcomes = [(solved.revision, solved.outcome.checking) for solved in answers.all]
     assert outcomes == [(1, True), (1, False), (2, True), (2, False)]
     assert started_from == [None, answer]
