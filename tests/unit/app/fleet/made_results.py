@@ -18,8 +18,6 @@ from calib_core.synthetic.simulated_pairs import simulate_pairs
 from cocalib.batch.outcome import OUTCOME_SCHEMA, Outcome, OutcomeFile, OutcomeRun, outcome_text
 from cocalib.batch.results_folder import OUTCOME_FILE, ResultsFolder
 
-__all__ = ["DAY_NS", "FIRST_NS", "calibration", "digest_of", "make_fleet", "make_result", "session_error"]
-
 DAY_NS = 86_400_000_000_000
 FIRST_NS = 1_790_000_000_000_000_000
 _RUN = datetime(2026, 9, 21, 12, tzinfo=UTC)
@@ -31,9 +29,7 @@ _AS_IT_IS = np.zeros(6)
 def calibration() -> Calibration:
     """Return a calibration from 24 simulated pairs."""
     simulated = simulate_pairs(24, rng=np.random.default_rng(3), noise="imaging")
-    found = calibrate_pairs(simulated.pairs, simulated.camera)
-    assert isinstance(found, Calibration)
-    return found
+    return calibrate_pairs(simulated.pairs, simulated.camera).unwrap()
 
 
 def session_error(rng: np.random.Generator) -> np.ndarray:
@@ -119,15 +115,6 @@ def make_fleet(
             error = mounting + session_error(rng)
             if index == sessions - 1:
                 error = error + (moved or {}).get(name, _AS_IT_IS)
-            made.append(
-                make_result(
-                    folder,
-                    name,
-                    f"s{index}",
-                    error=error,
-                    vehicle_type="van",
-                    radar_serial=f"R-{name}",
-                    recorded_ns=FIRST_NS + index * DAY_NS,
-                )
-            )
+            more = {"vehicle_type": "van", "radar_serial": f"R-{name}", "recorded_ns": FIRST_NS + index * DAY_NS}
+            made.append(make_result(folder, name, f"s{index}", error=error, **more))
     return made

@@ -54,28 +54,23 @@ def test_a_sound_fleet_has_nothing_wrong(sound):
     assert not any(one.wrong for one in judged)
 
 
-def test_a_remount_that_is_named_is_right(moved):
-    truth = _truth(V002="remounted")
-    assert _wrong(truth, moved) == {}
-    assert "remounted" in judge(truth, read_fleet(moved))[1].named[0]
-
-
-def test_a_remount_that_is_not_named_is_missed(sound):
-    assert _wrong(_truth(V002="remounted"), sound) == {"remounts": 1}
-
-
-def test_a_remount_where_nothing_changed_is_false(moved):
-    found = _wrong(_truth(), moved)
-    assert found["unchanged"] == 1
-    assert found["of their kind"] == 1  # its last session only
-
-
-def test_the_mounting_of_a_wrong_radar_is_neither_changed_nor_unchanged(moved):
-    assert _wrong(_truth(V002="mirrored radar"), moved) == {}
-
-
-def test_a_wrong_radar_that_looks_healthy_is_missed(sound):
-    assert _wrong(_truth(V004="mirrored radar"), sound) == {"wrong radars": 1}
+@pytest.mark.parametrize(
+    ("is_moved", "faults", "wrong"),
+    [
+        (True, {"V002": "remounted"}, {}),
+        (False, {"V002": "remounted"}, {"remounts": 1}),
+        (True, {}, {"unchanged": 1, "of their kind": 1}),
+        (True, {"V002": "mirrored radar"}, {}),
+        (False, {"V004": "mirrored radar"}, {"wrong radars": 1}),
+        (False, {"V001": "broken recording"}, {"spoilt": 2}),
+    ],
+    ids=["named", "missed", "false", "of a wrong radar", "wrong radar that looks healthy", "broken has to fail"],
+)
+def test_each_kind_of_mistake_is_found_where_it_is_made(sound, moved, is_moved, faults, wrong):
+    truth, folder = _truth(**faults), moved if is_moved else sound
+    assert _wrong(truth, folder) == wrong
+    if "remounted" in faults.values() and is_moved:
+        assert "remounted" in judge(truth, read_fleet(folder))[1].named[0]
 
 
 def test_a_session_without_a_result_or_without_a_reason_is_not_accounted_for(tmp_path):
@@ -85,10 +80,6 @@ def test_a_session_without_a_result_or_without_a_reason_is_not_accounted_for(tmp
     more = tuple(TrueSession("V000", name, False, None, _POSE) for name in ("s2", "s3", "s4"))
     truth = FleetTruth((*_truth(2).sessions, *more))
     assert _wrong(truth, tmp_path) == {"accounted": 2, "trusted": 2}
-
-
-def test_a_broken_recording_has_to_fail(sound):
-    assert _wrong(_truth(V001="broken recording"), sound) == {"spoilt": 2}
 
 
 def test_the_exit_code_says_whether_anything_is_wrong(sound, tmp_path, capsys):

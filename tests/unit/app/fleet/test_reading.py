@@ -17,7 +17,7 @@ from cocalib.batch.outcome import OUTCOME_SCHEMA, Outcome, OutcomeRun
 from cocalib.batch.plan import write_plan
 from cocalib.batch.results_folder import ResultsFolder
 from cocalib.cli import run
-from cocalib.fleet.reading import current_and_superseded, in_order, read_fleet
+from cocalib.fleet.reading import in_order, read_fleet
 from cocalib.fleet.records import SessionRecord
 from tests.unit.app.fleet.made_results import DAY_NS, FIRST_NS, digest_of, make_fleet, make_result
 
@@ -80,18 +80,26 @@ def test_sessions_come_by_time_and_those_never_opened_after_the_one_before_them_
     assert [one.name for one in read_fleet(folder).vehicles[2].sessions] == ["earlier", "s0", "s9", "s1"]
 
 
-def test_a_result_of_an_impossible_time_is_named(folder):
+def test_what_cannot_be_read_is_left_out_and_named(folder):
+    results = folder / "results"
+    shutil.copytree(results / digest_of("V000", "s0"), results / ("ab" * 16))
     make_result(folder, "V9", "s0", recorded_ns=2**64)
-    (unread,) = read_fleet(folder).unread
-    assert "states a time" in unread.reason
-
-
-def test_a_manifests_record_that_cannot_be_read_is_named(folder):
-    _write_plan(folder, ("V000", "s0"))
+    _write_plan(folder, ("V001", "s0"))
     (folder / "manifests" / "spoilt.json").write_text("garbage")
-    (unread,) = read_fleet(folder).unread
-    assert unread.place == "manifests/spoilt.json"
-    assert unread.reason.startswith("is no cocalib/batch-plan-1: ")
+    other, damaged = (results / digest_of(*name) / "outcome.json" for name in (("V000", "s0"), ("V001", "s1")))
+    other.write_text(other.read_text().replace("outcome-1", "outcome-2"))
+    damaged.write_bytes(bytes([damaged.read_bytes()[0] ^ 1]) + damaged.read_bytes()[1:])
+    fleet = read_fleet(folder)
+    reasons = {one.place: one.reason for one in fleet.unread}
+    assert set(reasons) == {
+        "manifests/spoilt.json",
+        f"results/{'ab' * 16}/outcome.json",
+        *(f"results/{digest_of(*name)}/outcome.json" for name in (("V9", "s0"), ("V000", "s0"), ("V001", "s1"))),
+    }
+    assert reasons["manifests/spoilt.json"].startswith("is no cocalib/batch-plan-1: ")
+    assert "states a time" in reasons[f"results/{digest_of('V9', 's0')}/outcome.json"]
+    assert "outcome-1" in reasons[f"results/{digest_of('V000', 's0')}/outcome.json"]
+    assert [one.name for one in fleet.vehicles[0].sessions] == ["s1"]
 
 
 def test_the_history_of_a_vehicle_whose_outcome_cannot_be_read_names_the_file(folder, capsys):
@@ -108,15 +116,6 @@ def test_the_history_of_a_vehicle_whose_outcome_cannot_be_read_names_the_file(fo
     assert f"'V9': session 's0': results/{digest_of('V9', 's0')}/outcome.json: " in capsys.readouterr().err
 
 
-def test_results_of_another_version_are_left_out_and_named(folder):
-    place = ResultsFolder(folder).folder_of(digest_of("V000", "s0")) / "outcome.json"
-    place.write_text(place.read_text().replace("outcome-1", "outcome-2"))
-    fleet = read_fleet(folder)
-    assert [one.place for one in fleet.unread] == [f"results/{digest_of('V000', 's0')}/outcome.json"]
-    assert "outcome-1" in fleet.unread[0].reason
-    assert [one.name for one in fleet.vehicles[0].sessions] == ["s1"]
-
-
 def test_a_folder_of_nothing_but_foreign_results_is_refused(tmp_path):
     with pytest.raises(InputError, match="no results"):
         read_fleet(tmp_path)
@@ -126,33 +125,19 @@ def test_a_folder_of_nothing_but_foreign_results_is_refused(tmp_path):
         read_fleet(tmp_path)
 
 
-def test_a_calibration_that_was_changed_is_not_compared(folder):
-    place = ResultsFolder(folder).folder_of(digest_of("V000", "s1")) / "calibration.json"
-    place.write_text(place.read_text() + " ")
-    record = read_fleet(folder).vehicles[0].last
-    assert record.pose is None
-    assert "is not the file that the outcome lists" in record.pose_problem
-    assert record.outcome.status == "solved"
-
-
-def test_a_calibration_of_another_version_is_named_and_not_compared(folder):
+@pytest.mark.parametrize("listed", [False, True])
+def test_a_calibration_that_was_changed_or_of_another_version_is_named_and_not_compared(folder, listed):
     place = ResultsFolder(folder).folder_of(digest_of("V000", "s1"))
-    given = (place / "calibration.json").read_text()
+    given, outcome = ((place / name).read_text() for name in ("calibration.json", "outcome.json"))
     text = given.replace("calibration-1", "calibration-2")
     (place / "calibration.json").write_text(text)
-    outcome = (place / "outcome.json").read_text()
-    (place / "outcome.json").write_text(
-        outcome.replace(sha256(given.encode()).hexdigest(), sha256(text.encode()).hexdigest())
-    )
+    if listed:
+        before, after = (sha256(content.encode()).hexdigest() for content in (given, text))
+        (place / "outcome.json").write_text(outcome.replace(before, after))
     record = read_fleet(folder).vehicles[0].last
     assert record.pose is None
-    assert "calibration-2" in record.pose_problem
-
-
-def test_an_outcome_in_the_wrong_folder_is_named(folder):
-    results = folder / "results"
-    shutil.copytree(results / digest_of("V000", "s0"), results / ("ab" * 16))
-    assert [one.place for one in read_fleet(folder).unread] == [f"results/{'ab' * 16}/outcome.json"]
+    assert ("calibration-2" if listed else "is not the file that the outcome lists") in record.pose_problem
+    assert record.outcome.status == "solved"
 
 
 @pytest.mark.parametrize("count", [1, 2])
@@ -171,29 +156,13 @@ def test_a_result_that_is_still_being_written_is_none_yet(folder):
     assert [one.name for one in fleet.vehicles] == ["V000", "V001", "V002"]
 
 
-def test_a_damaged_byte_is_told_and_changes_nothing_silently(folder):
-    place = ResultsFolder(folder).folder_of(digest_of("V001", "s1")) / "outcome.json"
-    damaged = bytearray(place.read_bytes())
-    damaged[0] ^= 1
-    place.write_bytes(bytes(damaged))
-    assert [one.place for one in read_fleet(folder).unread] == [f"results/{digest_of('V001', 's1')}/outcome.json"]
-
-
 _TIMES = st.none() | st.integers(0, 20)
 _ROWS = st.lists(st.tuples(_TIMES, st.none() | st.integers(0, 20)), min_size=1, max_size=8)
 
 
 def _record(session: str, recorded_ns: int | None, place: int | None, *, run: str = "") -> SessionRecord:
-    outcome = Outcome(
-        OUTCOME_SCHEMA,
-        run or "d",
-        "V",
-        session,
-        "solved",
-        recorded_ns=recorded_ns,
-        run=OutcomeRun("host", run, 1.0) if run else None,
-    )
-    return SessionRecord(outcome, place)
+    more = {"recorded_ns": recorded_ns, "run": OutcomeRun("host", run, 1.0) if run else None}
+    return SessionRecord(Outcome(OUTCOME_SCHEMA, run or "d", "V", session, "solved", **more), place)
 
 
 @given(_ROWS, st.randoms())
@@ -210,14 +179,3 @@ def test_times_grow_and_the_order_of_arrival_does_not_matter(given, shuffle):
 def test_without_any_time_the_manifest_decides(places):
     records = [_record(f"s{place}", None, place) for place in places]
     assert [one.place for one in in_order(records)] == sorted(places)
-
-
-def test_the_latest_run_of_a_session_counts():
-    runs = [
-        _record("s0", 5, 0, run="2026-11-02T00:00:00+00:00"),
-        _record("s0", 5, 0, run="2026-11-03T00:00:00+00:00"),
-        _record("s1", 6, 1, run="2026-11-01T00:00:00+00:00"),
-    ]
-    current, superseded = current_and_superseded(runs)
-    assert {one.outcome.digest for one in current} == {"2026-11-03T00:00:00+00:00", "2026-11-01T00:00:00+00:00"}
-    assert superseded == [runs[0]]

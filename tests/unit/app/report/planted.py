@@ -15,17 +15,6 @@ from cocalib.report.making import subject_of
 from cocalib.report.residual_rows import ResidualRows
 from cocalib.report.subject import Against, Judged, Picture, ReportSubject, Watched
 
-__all__ = [
-    "FILE",
-    "SIZE_PX",
-    "box_figures",
-    "fullest_subject",
-    "golden",
-    "planted_rows",
-    "subject_for",
-    "watched_recording",
-]
-
 SIZE_PX = (640, 480)
 _N = 60
 _UPRIGHT_PX = (480, 800)
@@ -117,19 +106,13 @@ def box_figures() -> BoxFigures:
 
 def fullest_subject(project_root: Path) -> ReportSubject:
     """Return as much as a report can be about: many pairs, warnings, files, boxes, an upright picture, another calibration."""
-    calibration = golden(project_root)
+    calibration, rng = golden(project_root), np.random.default_rng(2)
     width_px, height_px = _UPRIGHT_PX
     camera = Camera("pinhole", width_px, height_px, np.array([[500.0, 0, 240], [0, 500, 400], [0, 0, 1]]))
-    rng = np.random.default_rng(2)
-    one = calibration.pairs[0]
+    places = rng.uniform((0, 0), _UPRIGHT_PX, (80, 2))
     pairs = tuple(
-        replace(
-            one,
-            id=f"c{k}",
-            pixel_px=(place := rng.uniform((0, 0), _UPRIGHT_PX)),
-            projected_px=place + rng.normal(0, 4, 2),
-        )
-        for k in range(80)
+        replace(calibration.pairs[0], id=f"c{k}", pixel_px=place, projected_px=place + rng.normal(0, 4, 2))
+        for k, place in enumerate(places)
     )
     long = (
         "the residuals of the pairs at the left edge are twice as long as the noise of clicks and radar explains, " * 2
@@ -139,14 +122,11 @@ def fullest_subject(project_root: Path) -> ReportSubject:
     full = replace(calibration, camera=camera, pairs=pairs, warnings=warnings, unpaired=unpaired)
     subject = subject_for(project_root, full)
     files = tuple(InputFile(f"part_{k}.bag", 10**9 + k, f"{k:064x}") for k in range(40))
-    frame = np.full((height_px, width_px, 3), 200, np.uint8)
-    jpeg = cv2.imencode(".jpg", frame)[1].tobytes()
-    seen = watched_recording(
-        inputs=files, warnings=warnings, picture=Picture(jpeg, "the frame at 1.000000000 s", ((9.0, 9.0), (99.0, 40.0)))
-    )
+    jpeg = cv2.imencode(".jpg", np.full((height_px, width_px, 3), 200, np.uint8))[1].tobytes()
+    picture = Picture(jpeg, "the frame at 1.000000000 s", ((9.0, 9.0), (99.0, 40.0)))
+    seen = watched_recording(inputs=files, warnings=warnings, picture=picture)
     moved = replace(full, camera_from_radar=full.camera_from_radar.perturbed(np.full(6, 0.01)))
-    against = Against(
-        "other.json", (FILE,), compare(subject_for(project_root, moved).found, subject.found), (long,) * 4
-    )
+    compared = compare(subject_for(project_root, moved).found, subject.found)
+    against = Against("other.json", (FILE,), compared, (long,) * 4)
     judged = Judged(Evaluation(None, replace(box_figures(), rule=long)))
     return replace(subject, recording=seen, judged=judged, against=against, inputs=(FILE,))

@@ -1,5 +1,7 @@
 """Each sentence under a residual plot names what was planted, and nothing where nothing was."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -37,11 +39,7 @@ def test_a_planted_trend_is_named(planted, sentence, said):
 
 def test_a_residual_that_shrinks_with_range_points_at_the_position():
     rows = planted_rows(growing_with="range")
-    turned = ResidualRows(
-        rows.ids, rows.kinds, rows.points_radar_m * (25.0 / rows.ranges_m - 1.0)[:, None], rows.pixels_px,
-        rows.projected_px, rows.times_s, rows.expected_px, rows.held_out_px, rows.outlier_probability, rows.influence,
-        solved_from=True,
-    )  # fmt: skip
+    turned = replace(rows, points_radar_m=rows.points_radar_m * (25.0 / rows.ranges_m - 1.0)[:, None])
     assert range_sentence(turned).startswith("Residuals shrink with range: ")
     assert "camera's position" in range_sentence(turned)
 

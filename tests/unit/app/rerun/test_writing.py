@@ -149,9 +149,6 @@ def test_the_summary_is_plain_text_so_that_no_name_can_fetch_a_picture(read, vie
     text = read.one("summary", "TextDocument:text")[0]
     assert text == summary_text(view)
     assert "AED" in text
-
-
-def test_the_only_timeline_is_the_recorded_one(read):
     assert {name for chunk in read.chunks for name in chunk.timeline_names} == {"recorded"}
 
 
@@ -176,15 +173,12 @@ def test_a_disk_that_fills_up_is_noticed_before_the_writer_fails(view, tmp_path,
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_file_without_its_end_is_refused(view, tmp_path):
+def test_a_file_without_its_end_and_a_missing_folder_are_refused(view, tmp_path):
     path = tmp_path / "view.rrd"
     write_view(view, path)
     whole = path.read_bytes()
     path.write_bytes(whole[: len(whole) // 2])
     with pytest.raises(InputError, match="could not be written completely"):
         _require_complete(path, path)
-
-
-def test_a_missing_folder_is_named(view, tmp_path):
     with pytest.raises(InputError, match="absent does not exist"):
         write_view(view, tmp_path / "absent" / "view.rrd")
