@@ -51,8 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     measured = read_measured()
     if not given.rewrite:
         write_pictures(_ROOT / "docs" / "pictures" / "paper", measured, FITTED)
-    text = page(measured, FITTED, read_fit(), command="make paper")
-    (_ROOT / "docs" / "paper-experiments.md").write_text(text, encoding="utf-8")
+    (_ROOT / "docs" / "paper-experiments.md").write_text(page(measured, FITTED, read_fit()), encoding="utf-8")
     print(table(measured))
     return 0
 

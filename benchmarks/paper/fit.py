@@ -9,7 +9,7 @@ prediction. `python -m benchmarks.paper --fit` writes both to fit.json; the best
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -18,7 +18,7 @@ import numpy as np
 
 from benchmarks.paper.judgement import CHOSEN_ROW, PAPER
 from benchmarks.paper.rows import MOST_GROSS, Figures, figures_of, measure, with_gross_errors
-from benchmarks.paper.settings import FIT_SEEDS, Settings, ppm_options, session
+from benchmarks.paper.settings import FIT_SEEDS, Settings, other_rig, session
 from calib_core.results import Calibration
 
 AZIMUTHS_DEG = (0.4, 0.5, 0.6, 0.7, 0.8)
@@ -55,17 +55,15 @@ def mismatch_of(rows: Mapping[str, tuple[float, float]]) -> float:
 def fit(pool: Executor, seeds: Sequence[int] = FIT_SEEDS, report: Callable[[str], None] = print) -> Fit:
     """Try every place of both grids."""
     places = []
-    for azimuth_deg, elevation_deg, corners in itertools.product(AZIMUTHS_DEG, ELEVATIONS_DEG, CORNERS):
-        settings = Settings(azimuth_deg, elevation_deg, corners)
-        found = pool.map(partial(measure, settings=settings, datasets=("d1", "d2")), seeds)
-        rows = [{name: one.rows[name] for name in FITTED_ROWS if name in one.rows} for one in found]
-        places.append(_place((azimuth_deg, elevation_deg, corners), rows))
+    for place in itertools.product(AZIMUTHS_DEG, ELEVATIONS_DEG, CORNERS):
+        found = pool.map(partial(measure, settings=Settings(*place), datasets=("d1", "d2")), seeds)
+        places.append(_place(place, [one.rows for one in found], FITTED_ROWS))
         report(str(places[-1]))
     places.sort(key=lambda one: one.mismatch)
     azimuth_deg, elevation_deg, number = places[0].settings
     best = Settings(azimuth_deg, elevation_deg, int(number))
     by_seed = list(pool.map(partial(_gross, settings=best), seeds))
-    gross = [_place(key, [{CHOSEN_ROW: one[key]} for one in by_seed if key in one]) for key in by_seed[0]]
+    gross = [_place(key, [{CHOSEN_ROW: one[key]} for one in by_seed if key in one], [CHOSEN_ROW]) for key in by_seed[0]]
     return Fit(tuple(places), tuple(sorted(gross, key=lambda one: one.mismatch)))
 
 
@@ -80,20 +78,13 @@ def read_fit(path: Path = _FILE) -> Fit:
 
 
 def _gross(seed: int, settings: Settings) -> dict[tuple[float, ...], Figures]:
-    other = session("d3", seed, settings).other_camera
-    assert other is not None, "D3 has a second camera"
-    found: dict[tuple[float, ...], Figures] = {}
-    for count, by_m in itertools.product(range(1, MOST_GROSS + 1), GROSS_M):
-        outcome = with_gross_errors(other, replace(settings, gross_m=by_m), count, ppm_options(settings))
-        if isinstance(outcome, Calibration):
-            found[count, by_m] = figures_of(outcome)
-    return found
+    other = other_rig(session("d3", seed, settings))
+    tried = itertools.product(range(1, MOST_GROSS + 1), GROSS_M)
+    outcomes = ((place, with_gross_errors(other, *place)) for place in tried)
+    return {place: figures_of(outcome) for place, outcome in outcomes if isinstance(outcome, Calibration)}
 
 
-def _place(settings: tuple[float, ...], seeds: Sequence[Mapping[str, Figures]]) -> Place:
-    rows = {}
-    for name in seeds[0]:
-        figures = [(one[name].aed_px, one[name].cdsd_px) for one in seeds if name in one]
-        aed_px, cdsd_px = np.median(figures, axis=0).round(2).tolist()
-        rows[name] = (aed_px, cdsd_px)
+def _place(settings: tuple[float, ...], seeds: Sequence[Mapping[str, Figures]], names: Sequence[str]) -> Place:
+    figures = {name: [(one[name].aed_px, one[name].cdsd_px) for one in seeds if name in one] for name in names}
+    rows = {name: tuple(np.median(some, axis=0).round(2).tolist()) for name, some in figures.items()}
     return Place(settings, rows, round(mismatch_of(rows), 4))

@@ -1,15 +1,16 @@
 """Acc of people, a robot car and cars, and what could make Acc of cars as low as the paper's."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from benchmarks.paper.rows import by_mounting, calibrated, with_gross_errors
-from benchmarks.paper.settings import Settings, ppm_options, session, under
-from calib_core.evaluation import BoxFigures, CountedReturns, counted_returns, judged_by_boxes, moving_targets
+from benchmarks.paper.settings import Settings, other_rig, session, under
+from calib_core.camera import Camera
+from calib_core.evaluation import BoxFigures, TargetTrack, counted_returns, judged_by_boxes, moving_targets
+from calib_core.geometry import RigidTransform
 from calib_core.measurements import NS_PER_S, Box, Boxes, RadarScans, ReturnLabels, TimeNs
-from calib_core.results import Calibration
 from calib_core.synthetic import PRESETS, PresetName, SimulatedRecording, simulate
 from calib_core.synthetic.annotations import true_boxes, true_labels
 
@@ -50,26 +51,25 @@ def recording_of(preset: PresetName, seed: int, settings: Settings, **changed: o
     return recording.other_camera or recording
 
 
-def calibrations_of(preset: PresetName, seed: int, settings: Settings) -> tuple[Calibration, Calibration]:
-    """Return the calibrations by PPM and by PMM that a recording is judged with."""
+def poses_of(preset: PresetName, seed: int, settings: Settings) -> tuple[Camera, RigidTransform, RigidTransform]:
+    """Return the lens of a recording, and the poses by PPM and by PMM that it is judged with."""
     if preset == "robot":
-        other = session("d3", seed, settings).other_camera
-        assert other is not None, "D3 has a second camera"
-        ppm = with_gross_errors(other, settings, settings.gross_pairs, ppm_options(settings))
-        return ppm.unwrap(), by_mounting(other, other_rig=True)
+        other = other_rig(session("d3", seed, settings))
+        ppm = with_gross_errors(other, settings.gross_pairs, settings.gross_m).unwrap()
+        return ppm.camera, ppm.camera_from_radar, by_mounting(other, other_rig=True)
     first = session("d1", seed, settings)
-    return calibrated(first, settings).unwrap(), by_mounting(first)
+    ppm = calibrated(first).unwrap()
+    return ppm.camera, ppm.camera_from_radar, by_mounting(first)
 
 
 def judged_by_both(
     preset: PresetName, seed: int, settings: Settings, *, labelled: bool = False
 ) -> tuple[BoxFigures, BoxFigures]:
     """Return the figures of PPM and PMM on true boxes, by the radar's own targets or by labels."""
-    ppm, pmm = calibrations_of(preset, seed, settings)
-    recording = recording_of(preset, seed, settings)
-    labels = true_labels(recording) if labelled else None
-    returns = _returns(ppm, _scans(recording), true_boxes(recording), labels)
-    return _judged(ppm, returns), _judged(pmm, returns)
+    camera, ppm, pmm = poses_of(preset, seed, settings)
+    scans, boxes, labels = _seen(recording_of(preset, seed, settings))
+    returns = counted_returns(camera, scans, boxes, labels if labelled else moving_targets(scans))
+    return judged_by_boxes(ppm, camera, returns), judged_by_boxes(pmm, camera, returns)
 
 
 def acc_of(preset: PresetName, seed: int, settings: Settings) -> Acc:
@@ -82,46 +82,34 @@ def acc_of(preset: PresetName, seed: int, settings: Settings) -> Acc:
 
 def assumptions_of(seed: int, settings: Settings) -> dict[str, float]:
     """Return Acc of cars at 20 to 60 m with one assumption changed, by labels except where the labels are what changes."""
-    ppm, _ = calibrations_of("cars-far", seed, settings)
-    recording = recording_of("cars-far", seed, settings)
-    scans, boxes, labels = _scans(recording), true_boxes(recording), true_labels(recording)
-
-    def acc(scans: RadarScans = scans, boxes: Boxes = boxes, labels: ReturnLabels | None = labels) -> float:
-        return _judged(ppm, _returns(ppm, scans, boxes, labels)).acc or 0.0
-
-    def acc_at(preset: PresetName, **changed: object) -> float:
-        other = recording_of(preset, seed, settings, **changed)
-        return acc(_scans(other), true_boxes(other), true_labels(other))
-
-    farther = {"traffic": replace(PRESETS["cars-far"].traffic, nearest_m=60.0, farthest_m=100.0)}
-    changed: dict[str, Callable[[], float]] = {
-        f"box size: {100 * _SHRUNK:.0f} % of the car's width and height, as of a tight detector": lambda: acc(
-            boxes=_shrunk(boxes)
+    camera, ppm, _ = poses_of("cars-far", seed, settings)
+    scans, boxes, labels = _seen(recording_of("cars-far", seed, settings))
+    farther = replace(PRESETS["cars-far"].traffic, nearest_m=60.0, farthest_m=100.0)
+    changed: Mapping[str, tuple[RadarScans, Boxes, ReturnLabels | Sequence[TargetTrack]]] = {
+        f"box size: {100 * _SHRUNK:.0f} % of the car's width and height, as of a tight detector": (
+            scans,
+            _shrunk(boxes),
+            labels,
         ),
-        "range: 60 to 100 m instead of 20 to 60": lambda: acc_at("cars-far", **farther),
-        f"speed times latency: boxes {_LATE_S:g} s later than the returns": lambda: acc(boxes=_late(boxes)),
-        f"side returns: {100 * _SIDE_SHARE:.0f} % of the returns {_SIDE_M:g} m beside the car": lambda: acc(
-            _beside(scans, labels, seed)
+        "range: 60 to 100 m instead of 20 to 60": _seen(recording_of("cars-far", seed, settings, traffic=farther)),
+        f"speed times latency: boxes {_LATE_S:g} s later than the returns": (scans, _late(boxes), labels),
+        f"side returns: {100 * _SIDE_SHARE:.0f} % of the returns {_SIDE_M:g} m beside the car": (
+            _beside(scans, labels, seed),
+            boxes,
+            labels,
         ),
-        "the radar's resolution of a car: an AWR1843 instead of an imaging radar": lambda: acc_at(
-            "cars-far", radar="awr1843"
+        "the radar's resolution of a car: an AWR1843 instead of an imaging radar": _seen(
+            recording_of("cars-far", seed, settings, radar="awr1843")
         ),
-        "labels: the radar's own targets instead": lambda: acc(labels=None),
+        "labels: the radar's own targets instead": (scans, boxes, moving_targets(scans)),
     }
-    return {what: measure() for what, measure in changed.items()}
+    return {
+        what: judged_by_boxes(ppm, camera, counted_returns(camera, *seen)).acc or 0.0 for what, seen in changed.items()
+    }
 
 
-def _scans(recording: SimulatedRecording) -> RadarScans:
-    return RadarScans.from_scans(list(recording.scans()))
-
-
-def _returns(calibration: Calibration, scans: RadarScans, boxes: Boxes, labels: ReturnLabels | None) -> CountedReturns:
-    """Return what counts by the rule of `cocalib evaluate`; of the calibration only the lens enters."""
-    return counted_returns(calibration.camera, scans, boxes, moving_targets(scans) if labels is None else labels)
-
-
-def _judged(calibration: Calibration, returns: CountedReturns) -> BoxFigures:
-    return judged_by_boxes(calibration.camera_from_radar, calibration.camera, returns)
+def _seen(recording: SimulatedRecording) -> tuple[RadarScans, Boxes, ReturnLabels]:
+    return RadarScans.from_scans(list(recording.scans())), true_boxes(recording), true_labels(recording)
 
 
 def _shrunk(boxes: Boxes) -> Boxes:

@@ -14,17 +14,17 @@ from benchmarks.paper.rows import (
     by_checkerboard,
     by_mounting,
     calibrated,
-    measured_pairs,
     points_and_pixels,
+    projected_by,
     with_gross_errors,
 )
-from benchmarks.paper.settings import SEED_SETS, Dataset, Settings, options_of, ppm_options
+from benchmarks.paper.settings import SEED_SETS, Dataset, Settings, options_of, other_rig
 from calib_core.arrays import Flags, Indices, Points2
 from calib_core.evaluation import BoxFigures
 from calib_core.measurements import Box
 from calib_core.results import Calibration
 from calib_core.results.metrics import aed, cdsd, distances
-from calib_core.synthetic import PresetName, SimulatedRecording, simulate, simulate_scans
+from calib_core.synthetic import PresetName, SimulatedRecording, SimulatedScans, simulate, simulate_scans
 from calib_core.synthetic.annotations import true_boxes
 from calib_core.synthetic.recording import SimulatedPictures
 
@@ -119,48 +119,44 @@ def _figure(title: str, panels: Sequence[Panel]) -> str:
 
 
 def _d1(seed: int, settings: Settings) -> list[Panel]:
-    recording, ppm = _solved("d1", seed, settings)
-    pmm = by_mounting(simulate_scans(recording.options), measured_pairs(ppm))
-    return _clicked(recording, [("(A) PPM+D1", ppm), ("(B) PMM+D1", pmm)])
+    recording, simulated, ppm = _solved("d1", seed, settings)
+    at_px = projected_by(by_mounting(simulated), ppm)
+    return _clicked(recording, ppm, {"(A) PPM+D1": projected_by(None, ppm), "(B) PMM+D1": at_px})
 
 
 def _d2(seed: int, settings: Settings) -> list[Panel]:
-    recording, ppm = _solved("d2", seed, settings)
-    pairs = measured_pairs(ppm)
-    matrix = by_checkerboard(simulate_scans(recording.options), pairs)
-    at_px = matrix.project(points_and_pixels(pairs)[0], ppm.camera)
-    results = tuple(replace(one, projected_px=at) for one, at in zip(ppm.pairs, at_px, strict=True))
-    return _clicked(recording, [("(A) PPM+D2", ppm), ("(B) CCM+D2", replace(ppm, pairs=results))])
+    recording, simulated, ppm = _solved("d2", seed, settings)
+    at_px = projected_by(by_checkerboard(simulated, ppm)[0], ppm)
+    return _clicked(recording, ppm, {"(A) PPM+D2": projected_by(None, ppm), "(B) CCM+D2": at_px})
 
 
 def _d3(seed: int, settings: Settings) -> list[Panel]:
-    recording, same = _solved("d3", seed, settings)
-    simulated, other = simulate_scans(recording.options).other_camera, recording.other_camera
-    assert simulated is not None, "D3 has a second camera"
+    recording, simulated, same = _solved("d3", seed, settings)
+    other = recording.other_camera
     assert other is not None, "D3 has a second camera"
-    apart = with_gross_errors(simulated, settings, settings.gross_pairs, ppm_options(settings)).unwrap()
+    apart = with_gross_errors(other_rig(simulated), settings.gross_pairs, settings.gross_m).unwrap()
     wrong = f"{settings.gross_pairs} radar positions wrong by {settings.gross_m:g} m"
     return [
-        *_clicked(recording, [("(A) same rig", same)]),
-        *_clicked(other, [(f"(B) other rig, {wrong}", apart)]),
+        *_clicked(recording, same, {"(A) same rig": projected_by(None, same)}),
+        *_clicked(other, apart, {f"(B) other rig, {wrong}": projected_by(None, apart)}),
     ]
 
 
-def _solved(dataset: Dataset, seed: int, settings: Settings) -> tuple[SimulatedRecording, Calibration]:
+def _solved(dataset: Dataset, seed: int, settings: Settings) -> tuple[SimulatedRecording, SimulatedScans, Calibration]:
     options = options_of(dataset, seed, settings)
-    return simulate(options), calibrated(simulate_scans(options), settings).unwrap()
+    simulated = simulate_scans(options)
+    return simulate(options), simulated, calibrated(simulated).unwrap()
 
 
-def _clicked(recording: SimulatedRecording, calibrations: Sequence[tuple[str, Calibration]]) -> list[Panel]:
-    """Draw clicks and projections on the frame of the first click."""
+def _clicked(recording: SimulatedRecording, ppm: Calibration, shown: Mapping[str, Points2]) -> list[Panel]:
+    """Draw the clicks of a calibration and where some method projects their radar positions, on the frame of the first click."""
     first = recording.clicks[0].image_time
     frame = int(np.searchsorted(recording.stage.frame_times.header_ns, first))
-    pixels = np.array([pair.pixel_px for pair in calibrations[0][1].pairs])
+    _, pixels = points_and_pixels(ppm)
     view = _view_around(pixels, recording, least=0.3)
     back = _background(recording, frame, view)
     panels = []
-    for title, one in calibrations:
-        at = np.array([pair.projected_px for pair in one.pairs])
+    for title, at in shown.items():
         marks = [_line(a, b, view) for a, b in zip(pixels, at, strict=True)]
         marks += [_dot(a, _CLICK, view) for a in pixels] + [_dot(b, _AT, view) for b in at]
         lengths = distances(at, pixels)

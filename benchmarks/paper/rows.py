@@ -5,14 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.paper.settings import Dataset, Settings, ppm_options, session
+from benchmarks.paper.settings import PPM, Dataset, Settings, other_rig, session
 from calib_core.arrays import Points2, Points3
 from calib_core.association.pairing import pair_clicks
 from calib_core.calibration import calibrate, calibrate_pairs
-from calib_core.geometry import RigidTransform, rotation_log
+from calib_core.geometry import RigidTransform, mounting_rotation, rotation_log
 from calib_core.measurements import Pair, Unsolvable
-from calib_core.options import CalibrationOptions, CameraPositionPrior, MountingOptions, SolvingOptions
-from calib_core.paper.other_methods import CheckerboardMatrix, calibrate_by_mounting, register_on_checkerboard, swapped
+from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
 from calib_core.results.metrics import aed, cdsd, distances
 from calib_core.synthetic import SimulatedScans
@@ -22,13 +21,7 @@ MOST_GROSS = 4
 
 @dataclass(frozen=True, slots=True)
 class Figures:
-    """One row for one seed.
-
-    Attributes:
-        aed_px: over all pairs.
-        cdsd_px: likewise.
-        outside: share of the clicked radar positions that the pose puts outside the picture.
-    """
+    """One row for one seed: AED and CDSD over all pairs, and the share of clicked radar positions outside the picture."""
 
     aed_px: float
     cdsd_px: float
@@ -73,32 +66,38 @@ class Seed:
     gross: tuple[Gross, ...] = ()
 
 
-def calibrated(simulated: SimulatedScans, settings: Settings) -> Calibration | Unsolvable:
-    """Calibrate a simulated data set by the paper's method."""
-    return calibrate(simulated.clicks, simulated.scans, simulated.camera, ppm_options(settings))
+def calibrated(simulated: SimulatedScans) -> Calibration | Unsolvable:
+    """Calibrate a simulated data set by the paper's method (PPM)."""
+    return calibrate(simulated.clicks, simulated.scans, simulated.camera, PPM)
 
 
-def by_mounting(simulated: SimulatedScans, pairs: Sequence[Pair] = (), *, other_rig: bool = False) -> Calibration:
-    """Return what tape measure and protractor say (PMM): nominal rotation and measured offset, judged on pairs."""
+def by_mounting(simulated: SimulatedScans, *, other_rig: bool = False) -> RigidTransform:
+    """Return camera_from_radar by tape measure and protractor (PMM): nominal rotation and measured offset."""
     rig, other = simulated.stage.options.rig, simulated.stage.options.other_camera
     offset_m, yaw_deg = (other.offset_m, other.yaw_deg) if other_rig else (rig.camera_offset_m, 0.0)
-    options = CalibrationOptions(
-        method="paper",
-        mounting=MountingOptions(yaw_deg=yaw_deg),
-        solving=SolvingOptions(camera_position=CameraPositionPrior(offset_m)),
-    )
-    return calibrate_by_mounting(pairs, simulated.camera, options)
+    rotation = mounting_rotation(0.0, 0.0, yaw_deg)
+    return RigidTransform(rotation, -rotation @ np.array(offset_m))
 
 
-def by_checkerboard(simulated: SimulatedScans, pairs: Sequence[Pair]) -> CheckerboardMatrix:
-    """Return CCM's matrix from D2: of each pair, the corner nearest to the click, which the camera knows exactly."""
+def by_checkerboard(simulated: SimulatedScans, on_board: Calibration) -> tuple[np.ndarray, tuple[float, float]]:
+    """Return CCM's matrix (3, 4), [R | t] of P_c = [R | t] P_r (paper, equation 1), with the conditions that a seed keeps.
+
+    Its twelve numbers are found by linear least squares; none says that R is a rotation. P_c is the corner of the board
+    nearest to the click, which the camera knows exactly. The corners lie in a plane, so the matrix maps every radar
+    position into that plane: it is singular but for rounding.
+    """
     board = simulated.stage.scene.board
     assert board is not None, "D2 has a checkerboard"
     corners_m = simulated.stage.rig.camera_from_world @ board.corners_m
-    corners_px = simulated.camera.project(corners_m)
-    _, pixels_px = points_and_pixels(pairs)
-    nearest = np.linalg.norm(corners_px[None] - pixels_px[:, None], axis=2).argmin(axis=1)
-    return register_on_checkerboard(points_and_pixels(pairs)[0], corners_m[nearest])
+    points, pixels_px = points_and_pixels(on_board)
+    off_px = simulated.camera.project(corners_m)[None] - pixels_px[:, None]
+    rows = _homogeneous(points)
+    solution = np.linalg.lstsq(rows, corners_m[np.linalg.norm(off_px, axis=2).argmin(axis=1)], rcond=None)[0]
+    return solution.T, (float(np.linalg.cond(rows)), float(np.linalg.cond(solution.T[:, :3])))
+
+
+def _homogeneous(points_m: Points3) -> np.ndarray:
+    return np.hstack([points_m, np.ones((len(points_m), 1))])
 
 
 def measured_pairs(calibration: Calibration) -> list[Pair]:
@@ -106,61 +105,61 @@ def measured_pairs(calibration: Calibration) -> list[Pair]:
     return [one.measured for one in calibration.pairs if one.measured is not None]
 
 
-def points_and_pixels(pairs: Sequence[Pair]) -> tuple[Points3, Points2]:
-    """Return the most plausible radar position and the click of each pair."""
-    points = np.array([pair.candidates[0].position_radar_m for pair in pairs])
-    return points, np.array([pair.pixel_px for pair in pairs])
+def points_and_pixels(calibration: Calibration) -> tuple[Points3, Points2]:
+    """Return radar position and click of each pair."""
+    points = np.array([pair.point_radar_m for pair in calibration.pairs])
+    return points, np.array([pair.pixel_px for pair in calibration.pairs])
+
+
+def projected_by(pose: RigidTransform | np.ndarray | None, of: Calibration) -> Points2:
+    """Return where a pose, or CCM's matrix, puts the radar positions of a calibration; without one, its own pose."""
+    if pose is None:
+        return np.array([pair.projected_px for pair in of.pairs])
+    points, _ = points_and_pixels(of)
+    return of.camera.project(pose @ points if isinstance(pose, RigidTransform) else _homogeneous(points) @ pose.T)
+
+
+def figures_of(calibration: Calibration, pose: RigidTransform | np.ndarray | None = None) -> Figures:
+    """Judge a calibration, or another pose or CCM's matrix on its pairs."""
+    projected_px = projected_by(pose, calibration)
+    lengths = distances(projected_px, points_and_pixels(calibration)[1])
+    lengths = lengths[np.isfinite(lengths)]
+    return Figures(aed(lengths), cdsd(lengths), 1.0 - float(calibration.camera.in_image(projected_px).mean()))
 
 
 def measure(seed: int, settings: Settings, datasets: Sequence[Dataset] = ("d1", "d2", "d3")) -> Seed:
     """Simulate data sets, D1 among them, and compute the rows that they give."""
     found = {dataset: session(dataset, seed, settings) for dataset in datasets}
-    solved = {dataset: calibrated(simulated, settings) for dataset, simulated in found.items()}
-    rows = {
-        f"PPM+{dataset.upper()}": figures_of(one) for dataset, one in solved.items() if isinstance(one, Calibration)
-    }
-    conditions, first, second = None, solved["d1"], solved.get("d2")
-    if isinstance(first, Calibration):
-        mounted = by_mounting(found["d1"], measured_pairs(first))
-        rows["PMM+D1"] = figures_of(mounted)
-        rows["PPM+D1+T_m"] = figures_of(swapped(first, mounted))
-        rows["PMM+D1+T_c"] = figures_of(swapped(mounted, first))
-        if isinstance(second, Calibration):
-            matrix = by_checkerboard(found["d2"], measured_pairs(second))
-            conditions = matrix.problem_condition, matrix.condition
-            rows["CCM+D2"] = matrix_figures(matrix, second)
-            rows["CCM+D1"] = matrix_figures(matrix, first)
+    outcomes = {dataset: calibrated(simulated) for dataset, simulated in found.items()}
+    solved = {dataset: one for dataset, one in outcomes.items() if isinstance(one, Calibration)}
+    rows = {f"PPM+{dataset.upper()}": figures_of(one) for dataset, one in solved.items()}
+    conditions = None
+    if first := solved.get("d1"):
+        mounted, own = by_mounting(found["d1"]), first.camera_from_radar
+        rows["PMM+D1"] = figures_of(first, mounted)
+        rows["PPM+D1+T_m"] = figures_of(first, RigidTransform(own.rotation, mounted.translation_m))
+        rows["PMM+D1+T_c"] = figures_of(first, RigidTransform(mounted.rotation, own.translation_m))
+        if second := solved.get("d2"):
+            matrix, conditions = by_checkerboard(found["d2"], second)
+            rows["CCM+D2"], rows["CCM+D1"] = figures_of(second, matrix), figures_of(first, matrix)
     gross: tuple[Gross, ...] = ()
     if settings.gross_pairs and "d3" in found:
-        gross = gross_errors(found["d3"], settings)
+        gross = _gross_errors(other_rig(found["d3"]), settings)
         for one in gross:
-            if (one.count, one.method) == (settings.gross_pairs, "paper"):
+            if (one.count, one.method) == (settings.gross_pairs, PPM.method):
                 rows["PPM+DR+D3"] = one.figures
     return Seed(rows, conditions, gross)
 
 
-def gross_errors(simulated: SimulatedScans, settings: Settings) -> tuple[Gross, ...]:
-    """Solve DR+D3, the clicks in the second camera's pictures, with 0 to 4 grossly wrong radar positions, by both methods."""
-    other = simulated.other_camera
-    assert other is not None, "D3 has a second camera"
-    found = []
-    for options in (ppm_options(settings), CalibrationOptions()):
-        for count in range(MOST_GROSS + 1):
-            outcome = with_gross_errors(other, settings, count, options)
-            if isinstance(outcome, Calibration):
-                found.append(_gross(outcome, other, count))
-    return tuple(found)
-
-
 def with_gross_errors(
-    other: SimulatedScans, settings: Settings, count: int, options: CalibrationOptions
+    other: SimulatedScans, count: int, by_m: float, options: CalibrationOptions = PPM
 ) -> Calibration | Unsolvable:
     """Calibrate with some radar positions displaced by a fixed distance in random horizontal directions."""
     if options.method == "paper":
         pairs = measured_pairs(calibrate(other.clicks, other.scans, other.camera, options).unwrap())
     else:
         pairs = list(pair_clicks(other.clicks, other.scans, options).pairs)
-    return calibrate_pairs(displaced(pairs, count, settings.gross_m, other.stage.options.seed), other.camera, options)
+    return calibrate_pairs(displaced(pairs, count, by_m, other.stage.options.seed), other.camera, options)
 
 
 def displaced(pairs: Sequence[Pair], count: int, by_m: float, seed: int) -> list[Pair]:
@@ -178,37 +177,21 @@ def _moved(pair: Pair, by_m: float, turn_rad: float) -> Pair:
     return replace(pair, candidates=candidates)
 
 
+def _gross_errors(other: SimulatedScans, settings: Settings) -> tuple[Gross, ...]:
+    """Solve DR+D3 with 0 to 4 grossly wrong radar positions, by both methods."""
+    tried = [(count, options) for options in (PPM, CalibrationOptions()) for count in range(MOST_GROSS + 1)]
+    outcomes = ((count, with_gross_errors(other, count, settings.gross_m, options)) for count, options in tried)
+    return tuple(_gross(one, other, count) for count, one in outcomes if isinstance(one, Calibration))
+
+
 def _gross(outcome: Calibration, other: SimulatedScans, count: int) -> Gross:
-    true = other.camera_from_radar
-    off = outcome.camera_from_radar @ true.inverse()
+    found, true = outcome.camera_from_radar, other.camera_from_radar
     return Gross(
         count,
         outcome.options.method,
         figures_of(outcome),
-        float(np.rad2deg(np.linalg.norm(rotation_log(off.rotation)))),
-        float(np.linalg.norm(_centre(outcome.camera_from_radar) - _centre(true))),
+        float(np.rad2deg(np.linalg.norm(rotation_log((found @ true.inverse()).rotation)))),
+        float(np.linalg.norm(found.inverse().translation_m - true.inverse().translation_m)),
         sum(pair.inlier for pair in outcome.pairs),
         len(outcome.pairs),
     )
-
-
-def _centre(camera_from_radar: RigidTransform) -> np.ndarray:
-    return camera_from_radar.inverse().translation_m
-
-
-def figures_of(outcome: Calibration) -> Figures:
-    """Return AED and CDSD over all pairs, and the share outside the picture."""
-    projected = np.array([pair.projected_px for pair in outcome.pairs])
-    return _figures(projected, np.array([pair.pixel_px for pair in outcome.pairs]), outcome)
-
-
-def matrix_figures(matrix: CheckerboardMatrix, judged_on: Calibration) -> Figures:
-    """Return the figures of CCM's matrix on the pairs of a calibration."""
-    points, pixels = points_and_pixels(measured_pairs(judged_on))
-    return _figures(matrix.project(points, judged_on.camera), pixels, judged_on)
-
-
-def _figures(projected_px: Points2, pixels_px: Points2, of: Calibration) -> Figures:
-    lengths = distances(projected_px, pixels_px)
-    lengths = lengths[np.isfinite(lengths)]
-    return Figures(aed(lengths), cdsd(lengths), 1.0 - float(of.camera.in_image(projected_px).mean()))

@@ -4,13 +4,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
-from calib_core.options import CalibrationOptions, PaperOptions
+from calib_core.options import CalibrationOptions
 from calib_core.synthetic import PRESETS, PresetName, SimulatedScans, SimulationOptions, simulate_scans
 
 Dataset: TypeAlias = Literal["d1", "d2", "d3"]
 SEED_SETS: Sequence[Sequence[int]] = (range(401, 421), range(421, 441))
 """Of the table: two sets that nothing was fitted on, and that were not looked at before the settings were final."""
 FIT_SEEDS: Sequence[int] = range(101, 107)
+PPM = CalibrationOptions(method="paper")
 _USUAL_EDGE_M = SimulationOptions().reflector_edge_m
 
 
@@ -31,7 +32,6 @@ class Settings:
         outshone_share: share of those errors' variance that comes from clutter below the reflector: a larger reflector,
             whose echo grows with the fourth power of its edge, outshines it. The rest is multipath, which grows with it.
         click_sigma_px: standard deviation of a click, per axis [px].
-        ransac_threshold_px: of Algorithm 1.
     """
 
     constant_azimuth_deg: float
@@ -45,7 +45,6 @@ class Settings:
     distortion: bool = True
     outshone_share: float = 0.5
     click_sigma_px: float = 0.7
-    ransac_threshold_px: float = 8.0
 
 
 FITTED = Settings(constant_azimuth_deg=0.7, constant_elevation_deg=0.4, board_corners=12, gross_pairs=3, gross_m=4.0)
@@ -99,6 +98,7 @@ def session(dataset: Dataset, seed: int, settings: Settings) -> SimulatedScans:
     return simulate_scans(options_of(dataset, seed, settings))
 
 
-def ppm_options(settings: Settings) -> CalibrationOptions:
-    """Return the options of the paper's method."""
-    return CalibrationOptions(method="paper", paper=PaperOptions(ransac_threshold_px=settings.ransac_threshold_px))
+def other_rig(d3: SimulatedScans) -> SimulatedScans:
+    """Return DR+D3: the same scans with the clicks in the second camera's pictures."""
+    assert d3.other_camera is not None, "D3 has a second camera"
+    return d3.other_camera

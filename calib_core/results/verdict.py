@@ -305,7 +305,7 @@ not hold; it rests on an assumption, so it cannot be called good; nothing."""
 _CODES: dict[Consequence, tuple[str, ...]] = {
     "contradictory": (
         "behind-camera",
-        "outside-picture",
+        "outside-picture",  # in files of earlier versions only
         "mirrored-axes",
         "units-suspected",
         "pixels-suspected",
@@ -320,7 +320,7 @@ _CODES: dict[Consequence, tuple[str, ...]] = {
         "lost-returns",
         "rests-on-fleet-prior",
         "off-its-kind",
-        "swapped-parts",
+        "swapped-parts",  # likewise
         "many-outliers",
         "intrinsics-suspected",
         "clock-bias-suspected",

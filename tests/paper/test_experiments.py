@@ -11,10 +11,8 @@ import pytest
 from benchmarks.paper.fit import AZIMUTHS_DEG, CORNERS, ELEVATIONS_DEG, FITTED_ROWS, mismatch_of, read_fit
 from benchmarks.paper.judgement import PAPER, Judged, differing, judged, row_judgement
 from benchmarks.paper.page import page, read_measured, write_measured
-from benchmarks.paper.rows import Figures, Seed, displaced, measured_pairs, with_gross_errors
-from benchmarks.paper.settings import FIT_SEEDS, FITTED, SEED_SETS, Dataset, options_of, ppm_options, session
-from calib_core.calibration import calibrate
-from calib_core.options import CalibrationOptions
+from benchmarks.paper.rows import Figures, Seed, calibrated, displaced, measured_pairs, with_gross_errors
+from benchmarks.paper.settings import FIT_SEEDS, FITTED, PPM, SEED_SETS, Dataset, options_of, other_rig, session
 from calib_core.synthetic import SimulatedScans, simulate, simulate_scans, write_recording
 from cocalib.cli import run as cocalib
 
@@ -28,19 +26,19 @@ def recorded(dataset: Dataset, folder: Path) -> SimulatedScans:
     return simulate_scans(options)
 
 
-def solved(folder: Path, options: CalibrationOptions, camera: str = "camera") -> dict[str, float]:
+def solved(folder: Path, camera: str = "camera") -> dict[str, float]:
     """Solve by the command and return the metrics of the file."""
     out, clicks = folder / "calibration.json", folder / ("clicks.json" if camera == "camera" else "clicks_2.json")
     bags = [folder / "radar.bag", folder / "camera.bag"]
     topic = f"/{camera}/image_raw/compressed"
-    arguments = ["solve", *bags, "--clicks", clicks, "--out", out, "--method", options.method, "--image-topic", topic]
+    arguments = ["solve", *bags, "--clicks", clicks, "--out", out, "--method", PPM.method, "--image-topic", topic]
     assert cocalib([str(one) for one in arguments]) in (0, 3)  # of five placements, the paper's pose may be far off
     return json.loads(out.read_text())["metrics"]
 
 
 def agrees(folder: Path, simulated: SimulatedScans, camera: str = "camera") -> None:
-    alone = calibrate(simulated.clicks, simulated.scans, simulated.camera, ppm_options(SMALL)).unwrap()
-    found = solved(folder, ppm_options(SMALL), camera)
+    alone = calibrated(simulated).unwrap()
+    found = solved(folder, camera)
     assert found["n"] == alone.metrics.n == 5
     assert found["aed_px"] == pytest.approx(alone.metrics.aed_px, abs=0.02)
 
@@ -54,9 +52,8 @@ def test_both_cameras_of_the_aisle_are_solved_from_one_recording(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     simulated = recorded("d3", tmp_path)
-    assert simulated.other_camera is not None
     agrees(tmp_path, simulated)
-    agrees(tmp_path, simulated.other_camera, "camera_2")
+    agrees(tmp_path, other_rig(simulated), "camera_2")
     bags = [str(tmp_path / "radar.bag"), str(tmp_path / "camera.bag")]
     capsys.readouterr()
     assert cocalib(["info", *bags]) == 0
@@ -135,9 +132,7 @@ def test_figures_that_two_sets_judge_differently_are_named_with_the_reason() -> 
 
 def test_gross_errors_are_of_the_stated_number_and_size_and_never_behind_the_radar() -> None:
     settings = dataclasses.replace(FITTED, placements=8)
-    other = session("d3", 1, settings).other_camera
-    assert other is not None
-    without = with_gross_errors(other, settings, 0, ppm_options(settings)).unwrap()
+    without = with_gross_errors(other_rig(session("d3", 1, settings)), 0, 4.0).unwrap()
     pairs = measured_pairs(without)
     moved = displaced(pairs, 3, 4.0, seed=1)
     off_m = np.array(
@@ -155,7 +150,7 @@ def test_the_figures_of_a_run_come_back_from_their_file(tmp_path: Path) -> None:
 
 def test_the_documented_page_is_what_the_last_run_measured(project_root: Path) -> None:
     documented = (project_root / "docs" / "paper-experiments.md").read_text(encoding="utf-8")
-    assert documented == page(read_measured(), FITTED, read_fit(), command="make paper")
+    assert documented == page(read_measured(), FITTED, read_fit())
     assert "{" not in documented
     assert all(f"\n| {name} | " in documented for name in PAPER)
 

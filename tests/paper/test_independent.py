@@ -1,4 +1,4 @@
-"""AED, CDSD and CCM computed once more from the paper's formulas alone, in plain Python, without our code."""
+"""AED, CDSD, PMM, CCM and the swaps computed once more from the paper's formulas alone, in plain Python, without our code."""
 
 import math
 from collections.abc import Sequence
@@ -6,15 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from benchmarks.paper.rows import (
-    Figures,
-    by_checkerboard,
-    calibrated,
-    figures_of,
-    matrix_figures,
-    measured_pairs,
-    points_and_pixels,
-)
+from benchmarks.paper.rows import Figures, by_checkerboard, calibrated, figures_of, measure, points_and_pixels
 from benchmarks.paper.settings import FITTED, SEED_SETS, Dataset, session
 from calib_core.results import Calibration
 from calib_core.synthetic import SimulatedScans
@@ -76,7 +68,7 @@ def solved(system: list[list[float]]) -> list[float]:
 
 def solved_set(dataset: Dataset) -> tuple[SimulatedScans, Calibration]:
     simulated = session(dataset, SEED_SETS[0][0], FITTED)
-    return simulated, calibrated(simulated, FITTED).unwrap()
+    return simulated, calibrated(simulated).unwrap()
 
 
 @pytest.fixture(scope="module")
@@ -95,7 +87,7 @@ def lens_of(calibration: Calibration) -> tuple[list[float], list[float]]:
 
 
 def again(matrix: Sequence[Point], calibration: Calibration) -> tuple[float, float]:
-    points, clicked = points_and_pixels(measured_pairs(calibration))
+    points, clicked = points_and_pixels(calibration)
     lens, distortion = lens_of(calibration)
     projected = [pixel_of(matrix, point, lens, distortion) for point in points.tolist()]
     return aed_and_cdsd(projected, clicked.tolist())
@@ -116,8 +108,7 @@ def test_ccm_is_least_squares_for_twelve_numbers_on_its_own_board_and_on_d1(
     d1: Calibration, d2: tuple[SimulatedScans, Calibration]
 ) -> None:
     simulated, on_board = d2
-    pairs = measured_pairs(on_board)
-    points, clicked = points_and_pixels(pairs)
+    points, clicked = points_and_pixels(on_board)
     board = simulated.stage.scene.board
     assert board is not None
     corners = (simulated.stage.rig.camera_from_world @ board.corners_m).tolist()
@@ -126,7 +117,20 @@ def test_ccm_is_least_squares_for_twelve_numbers_on_its_own_board_and_on_d1(
     seen = [pixel_of(identity, corner, lens, distortion) for corner in corners]
     nearest = [min(range(len(seen)), key=lambda k: math.dist(seen[k], click)) for click in clicked.tolist()]
     matrix = twelve_numbers(points.tolist(), [corners[k] for k in nearest])
-    ours = by_checkerboard(simulated, pairs)
-    assert both(matrix_figures(ours, on_board)) == pytest.approx(again(matrix, on_board), rel=1e-6)
-    assert both(matrix_figures(ours, d1)) == pytest.approx(again(matrix, d1), rel=1e-3)
-    assert ours.condition > 1e9
+    ours, (_, condition) = by_checkerboard(simulated, on_board)
+    assert both(figures_of(on_board, ours)) == pytest.approx(again(matrix, on_board), rel=1e-6)
+    assert both(figures_of(d1, ours)) == pytest.approx(again(matrix, d1), rel=1e-3)
+    assert condition > 1e9
+
+
+def test_pmm_looks_along_the_radar_and_the_swaps_take_its_parts(d1: Calibration) -> None:
+    """The camera is 4.5 cm above the radar and looks where it looks: x right, y down, z forward of x forward, y left, z up."""
+    axes, offset = [(0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)], (0.0, 0.045, 0.0)
+    pose, rows = d1.camera_from_radar, measure(SEED_SETS[0][0], FITTED, ["d1"]).rows
+    for name, rotation, translation in (
+        ("PMM+D1", axes, offset),
+        ("PPM+D1+T_m", pose.rotation.tolist(), offset),
+        ("PMM+D1+T_c", axes, pose.translation_m.tolist()),
+    ):
+        matrix = [(*row, shift) for row, shift in zip(rotation, translation, strict=True)]
+        assert both(rows[name]) == pytest.approx(again(matrix, d1), rel=1e-6)

@@ -8,6 +8,7 @@ import pytest
 from calib_core.geometry import (
     RigidTransform,
     matrix_from_quaternion_wxyz,
+    mounting_rotation,
     quaternion_wxyz_from_matrix,
     rotation_angle_rad,
     rotation_exp,
@@ -22,6 +23,20 @@ def test_a_transform_moves_points_from_source_to_target() -> None:
     camera_from_radar = RigidTransform(QUARTER_ABOUT_Z, np.array([10.0, 0.0, 0.0]))
     points_camera = camera_from_radar @ np.array([[1.0, 0.0, 0.0], [0.0, 2.0, 3.0]])
     np.testing.assert_allclose(points_camera, [[10.0, 1.0, 0.0], [8.0, 0.0, 3.0]])
+
+
+@pytest.mark.parametrize(
+    ("roll_pitch_yaw_deg", "seen_m", "optical"),
+    [
+        ((0.0, 0.0, 90.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),  # looks left: what is left is ahead
+        ((0.0, 30.0, 0.0), (np.cos(np.pi / 6), 0.0, -0.5), (0.0, 0.0, 1.0)),  # looks down
+        ((90.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, -1.0, 0.0)),  # its head to the right: right is up, and up is -y
+    ],
+)
+def test_mounting_angles_turn_the_camera_as_they_say(
+    roll_pitch_yaw_deg: tuple[float, float, float], seen_m: tuple[float, ...], optical: tuple[float, ...]
+) -> None:
+    assert mounting_rotation(*roll_pitch_yaw_deg) @ np.array(seen_m) == pytest.approx(optical, abs=1e-12)
 
 
 def test_a_mirrored_rotation_is_refused_and_the_message_says_so() -> None:
