@@ -106,7 +106,7 @@ def _box_lines(figures: BoxFigures) -> list[str]:
     rows.append(f"  by range [m]: {', '.join(_share(one) for one in figures.ranges if one.returns)}")
     zero = sum(1 for frame in figures.frames if frame.returns and not frame.inside)
     rows.append(
-        f"  {_count(zero, 'frame')} of 0 % {'is' if zero == 1 else 'are'} kept; without, as in the paper, "
+        f"  {_count(zero, 'frame')} of 0 % {'is' if zero == 1 else 'are'} kept; without, as the paper's published script counts, "
         f"{_percent(figures.acc_without_zero_frames)}"
     )
     rows.append(

@@ -49,7 +49,7 @@ def test_acc_comes_with_its_error_its_sensitivity_and_the_warning_not_to_take_it
     assert lines[0] == "Acc: 60.0 % +- 3.0 % (2 frames, 4 returns of 2 moving targets, 1 of them with boxes)"
     assert lines[1].strip().startswith("Acc under yaw")
     assert lines[2].strip() == NOT_ACCURACY
-    assert "  1 frame of 0 % is kept; without, as in the paper, 80.0 %" in lines
+    assert "  1 frame of 0 % is kept; without, as the paper's published script counts, 80.0 %" in lines
 
 
 def test_without_a_counting_frame_there_is_no_acc():
