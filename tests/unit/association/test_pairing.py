@@ -11,7 +11,14 @@ from benchmarks.accuracy.scenes import Windows, draw_windows
 from calib_core.association.clustering import candidate_at, candidates_of, clusters_of, window_around
 from calib_core.association.exclusive_returns import exclusive_rows, shared_returns
 from calib_core.association.gating import static_returns
-from calib_core.association.pairing import background_windows, balanced_pairs, find_companion, pair_clicks, scores_of
+from calib_core.association.pairing import (
+    background_windows,
+    balanced_pairs,
+    find_companion,
+    half_window_s,
+    pair_clicks,
+    scores_of,
+)
 from calib_core.calibration import calibrate
 from calib_core.measurements import (
     NS_PER_S,
@@ -78,6 +85,21 @@ def test_a_pair_carries_the_stamp_of_the_nearest_scan() -> None:
     (pair,) = pair_clicks([click("a", 0.52)], scans_at([0.0, 0.5, 1.0]), CalibrationOptions()).pairs
     assert pair.radar_time == round(0.5 * NS_PER_S)
     assert pair.candidates[0].scans == 3
+
+
+@pytest.mark.parametrize("window_s", [3.0, 8.0])
+def test_the_scans_read_around_a_click_are_all_that_matter_however_far_away_the_nearest_is(window_s: float) -> None:
+    options = replace(OPTIONS, locating=replace(OPTIONS.locating, window_s=window_s))
+    for times_s in (
+        np.arange(0.0, 10.05, 0.1),
+        np.arange(12.9, 23.0, 0.1),
+    ):  # it ends, or begins, 1.45 s from the click
+        one, scans = click("a", 11.45), scans_at(times_s.tolist())
+        reach_ns = round(half_window_s(options) * NS_PER_S)
+        around = scans.between(TimeNs(one.image_time - reach_ns), TimeNs(one.image_time + reach_ns))
+        assert len(around) < len(scans)
+        (read,), (whole,) = (pair_clicks([one], some, options).pairs for some in (around, scans))
+        assert read.candidates[0].scans == whole.candidates[0].scans > 5.0 * window_s
 
 
 def test_clicks_of_one_placement_share_every_scan_of_their_windows() -> None:

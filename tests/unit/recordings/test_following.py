@@ -142,6 +142,26 @@ def test_a_frame_that_comes_late_does_not_move_the_others(tmp_path, container_ro
 
 
 @pytest.mark.parametrize("container", ["mcap"])
+def test_the_camera_that_was_chosen_stays_although_another_gets_more_frames(tmp_path, container_ros, plain, jpeg):
+    rows = [row for row in plain(container_ros, jpeg, n=60) if row[0] != "/camera/camera_info"]
+    stamps = [rows[90][1] + 15_000_000 * number for number in range(80)]
+    rows += [("/aside/image/compressed", stamp, container_ros.compressed(stamp, jpeg)) for stamp in stamps]
+    rows.sort(key=lambda row: row[1])
+    finished = write_in_chunks(tmp_path / "whole", container_ros, rows, "mcap", per_chunk=3)
+    growing = tmp_path / "drive.mcap"
+    replay = Replay(finished, growing)
+    replay.write_up_to(len(replay) // 3)
+    recording = opened(growing)
+    replay.finish()
+    recording.grow()
+    with open_recording(finished) as whole:
+        assert whole.image_topic == "/aside/image/compressed"
+    assert recording.image_topic == "/camera/image/compressed"
+    assert len(recording.image_times) == 60
+    recording.close()
+
+
+@pytest.mark.parametrize("container", ["mcap"])
 def test_a_clock_that_would_be_chosen_otherwise_is_told_at_the_end(tmp_path, container_ros, plain, jpeg):
     rows = plain(container_ros, jpeg, n=60)
     lost = [number for number, row in enumerate(rows) if row[0] == "/camera/image/compressed"][40:]

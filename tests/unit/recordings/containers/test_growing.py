@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 
 from calib_core.errors import RecordingError
 from calib_core.recordings.containers.following import FollowedFiles
+from calib_core.recordings.containers.mcap.records import DATA_END, MAGIC, MESSAGE, walk
 from calib_core.recordings.containers.opening import open_sources
+from calib_core.recordings.containers.positioned_reads import MemoryStretch
 from tests.unit.recordings.containers.growing_files import LoggedDatabase, Replay, messages_of, write_in_chunks
 from tests.unit.recordings.containers.mcap_writing import mcap
 
@@ -170,6 +172,19 @@ def test_an_open_chunk_of_the_ros_recorder_is_waited_for(finished, tmp_path):
     growing.write_bytes(whole)
     files.grow()
     assert messages_of(files.sources) == opened(finished)
+    files.close()
+
+
+@pytest.mark.parametrize("container", ["mcap-unchunked"])
+def test_a_message_is_found_as_soon_as_its_last_byte_is_written(finished, tmp_path):
+    growing = tmp_path / "growing.mcap"
+    files, replay = FollowedFiles([growing]), Replay(finished, growing)
+    for kind, start, size in walk(MemoryStretch(finished.read_bytes()), len(MAGIC)):
+        if kind == DATA_END:
+            break
+        replay.write_up_to(start + size)
+        assert files.grow() == (kind == MESSAGE)
+    replay.kill()
     files.close()
 
 
