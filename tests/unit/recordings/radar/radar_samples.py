@@ -272,14 +272,14 @@ def continental(ros: Any) -> Sample:
             range=r,
             range_rate=v,
             rcs=-5,
-            **{**good, "invalid_azimuth": i == 2},
+            **{**good, "invalid_azimuth": i == 2, "invalid_range_rate": i == 1},
         )
         for i, (az, el, r, v) in enumerate(rows.tolist())
     ]
     message = ros.new("continental_msgs/msg/DetectionList", header=ros.header(START_NS), detections=elements)
     points = cartesian_from_polar(rows[:, [2, 0, 1]])
     points[2] = np.nan
-    return Sample([message], points, rows[:, 3], np.full(3, -5.0))
+    return Sample([message], points, np.array([0.5, np.nan, 1.0]), np.full(3, -5.0))
 
 
 _OBJECT = """\

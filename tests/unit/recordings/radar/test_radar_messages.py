@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.radar import cartesian_from_polar
 from calib_core.recordings import RecordingOptions, open_recording
-from calib_core.recordings.radar.columns import plan_columns
 from calib_core.recordings.radar.message_layouts.single_returns import first_of_scans
 
 START_NS = 1_700_000_000 * NS_PER_S
@@ -173,37 +172,6 @@ def test_a_polar_cloud_with_its_own_noise_is_converted(ros, write):
     np.testing.assert_array_equal(scan.doppler_mps, points["range_rate"])
 
 
-def test_angles_are_not_used_if_there_are_positions():
-    """The sign of CARLA's azimuth is opposite to that of its y."""
-    plan = plan_columns(["x", "y", "z", "Range", "Velocity", "AzimuthAngle", "ElevationAngle"])
-    assert (plan.position, plan.polar, plan.doppler) == (("x", "y", "z"), False, "Velocity")
-
-
-@pytest.mark.parametrize(
-    ("names", "doppler", "amplitude"),
-    [
-        ("x y z intensity velocity range bearing doppler_bin", "velocity", "intensity"),
-        ("x y z snr_db v_doppler_mps noise_db range", "v_doppler_mps", "snr_db"),
-        ("x y z v r RCS azimuth elevation", "v", "RCS"),
-        ("x y z radial_speed power rcs noise snr azimuth_angle elevation_angle range", "radial_speed", "snr"),
-        ("x y z doppler", "doppler", None),
-        ("x y z Doppler Power", "Doppler", "Power"),
-        ("x y z range_rate rcs", "range_rate", "rcs"),
-    ],
-)
-def test_the_columns_of_known_drivers_are_recognised(names, doppler, amplitude):
-    plan = plan_columns(names.split())
-    assert (plan.position, plan.doppler, plan.amplitude) == (("x", "y", "z"), doppler, amplitude)
-    assert plan.looks_like_radar
-
-
-def test_speed_along_the_line_of_sight_comes_from_velocity_components(ros, write):
-    points = np.zeros(2, dtype=[(name, "<f4") for name in ("x", "y", "z", "vx", "vy")])
-    points["x"], points["y"], points["vx"], points["vy"] = [3, 0], [4, 2], [1, 5], [2, -1]
-    with opened(write, ros, [ros.cloud(START_NS, points)]) as recording:
-        np.testing.assert_allclose(recording.radar_scans().doppler_mps, [(3 + 8) / 5, -1.0])
-
-
 def test_an_inconsistent_cloud_counts_as_empty_with_a_warning(ros, write, cloud_points):
     good, bad = ros.cloud(START_NS, cloud_points()), ros.cloud(START_NS + 10**8, cloud_points())
     bad.width = 1000
@@ -229,32 +197,6 @@ def test_a_radar_is_chosen_over_a_lidar_and_a_lidar_alone_gives_a_warning(ros, w
         assert recording.warnings == ()
     with open_recording(path, RecordingOptions(radar_topic="/lidar/points"), require=("radar",)) as recording:
         assert [warning.code for warning in recording.warnings] == ["looks-like-lidar"]
-
-
-def test_a_radar_without_elevation_gives_a_warning(ros, write, cloud_points):
-    points = cloud_points(3)
-    points["z"] = 0.0
-    with opened(write, ros, [ros.cloud(START_NS, points)]) as recording:
-        assert [warning.code for warning in recording.warnings] == ["flat-radar"]
-
-
-def test_the_older_cloud_with_named_channels_is_read(ros, write):
-    channel = ros.store.types["sensor_msgs/msg/ChannelFloat32"]
-    point = ros.store.types["geometry_msgs/msg/Point32"]
-    message = ros.new(
-        "sensor_msgs/msg/PointCloud",
-        header=ros.header(START_NS),
-        points=[point(x=1.0, y=2.0, z=3.0), point(x=4.0, y=5.0, z=6.0)],
-        channels=[
-            channel(name="Doppler", values=np.array([0.5, -0.5], dtype=np.float32)),
-            channel(name="Power", values=np.array([20.0, 30.0], dtype=np.float32)),
-        ],
-    )
-    with opened(write, ros, [message]) as recording:
-        scan = recording.radar_scans().scan(0)
-    np.testing.assert_array_equal(scan.points_radar_m, [[1, 2, 3], [4, 5, 6]])
-    np.testing.assert_array_equal(scan.doppler_mps, [0.5, -0.5])
-    np.testing.assert_array_equal(scan.snr_db, [20, 30])
 
 
 # -- lists
@@ -356,29 +298,6 @@ def test_without_numbers_scans_are_separated_by_pauses(counts, same_stamp):
     times = [scan * 50_000_000 + (0 if same_stamp else 100_000 * k) for scan, n in enumerate(counts) for k in range(n)]
     first = first_of_scans(np.array(times, dtype=np.int64))
     assert first.tolist() == np.concatenate([[0], np.cumsum(counts)[:-1]]).tolist()
-
-
-def test_grouping_nothing_gives_nothing():
-    assert first_of_scans(np.zeros(0, dtype=np.int64)).tolist() == []
-    assert first_of_scans(np.array([5])).tolist() == [0]
-
-
-def test_returns_flagged_as_invalid_keep_their_row_without_a_value(ros, write):
-    kind = ros.define(
-        "continental_msgs/msg/Detection",
-        "float32 azimuth_angle\nbool invalid_azimuth\nfloat32 range\nfloat32 range_rate\nbool invalid_range_rate\n",
-    )
-    ros.define("continental_msgs/msg/DetectionList", "Header header\ncontinental_msgs/Detection[] detections\n")
-    flags = [(False, False), (True, False), (False, True)]
-    detections = [
-        ros.new(kind, azimuth_angle=0.0, invalid_azimuth=a, range=2.0, range_rate=0.5, invalid_range_rate=r)
-        for a, r in flags
-    ]
-    message = ros.new("continental_msgs/msg/DetectionList", header=ros.header(START_NS), detections=detections)
-    with opened(write, ros, [message]) as recording:
-        scan = recording.radar_scans().scan(0)
-    np.testing.assert_array_equal(scan.points_radar_m, [[2, 0, 0], [np.nan] * 3, [2, 0, 0]])
-    np.testing.assert_array_equal(scan.doppler_mps, [0.5, 0.5, np.nan])
 
 
 def test_big_endian_messages_are_read(ros2, write, cloud_points, monkeypatch, plain, jpeg):

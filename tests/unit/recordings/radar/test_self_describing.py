@@ -239,17 +239,3 @@ def test_a_message_without_a_stamp_at_its_start_is_read_by_its_receive_times(ros
         assert recording.radar_times.tolist() == [START_NS + i * 10**8 for i in range(3)]
         found = recording.radar_scans().scan(0).points_radar_m
     np.testing.assert_allclose(np.hypot(found[:, 0], found[:, 1]), 5.0 + np.arange(30), rtol=1e-6)
-
-
-def test_a_decoded_message_is_read_although_its_type_is_named_packets(ros, write) -> None:
-    kind = ros.define(
-        "vendor_msgs/msg/Point", "float32 f_x\nfloat32 f_y\nfloat32 f_vrad\nfloat32 f_rcs\nfloat32 f_var_x\n"
-    )
-    outer = ros.define("vendor_msgs/msg/RadarPackets", "Header header\nvendor_msgs/Point[] s_points\n")
-    points = [ros.new(kind, f_x=4.0 + k, f_y=k - 3.0, f_vrad=0.5, f_rcs=3.0, f_var_x=0.1) for k in range(8)]
-    message = ros.new(outer, header=ros.header(START_NS), s_points=points)
-    with opened(write(ros, [("/front", START_NS, message)])) as recording:
-        scan = recording.radar_scans().scan(0)
-        assert "axes" in [one.key for one in recording.assumptions]
-    np.testing.assert_allclose(scan.points_radar_m[:, :2], [[4.0 + k, k - 3.0] for k in range(8)])
-    np.testing.assert_allclose(scan.doppler_mps, 0.5)

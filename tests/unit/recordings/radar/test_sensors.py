@@ -325,12 +325,6 @@ def test_a_cloud_with_doppler_is_no_lidar_whatever_its_topic_and_size(tmp_path: 
         assert [warning.code for warning in recording.warnings] == []
 
 
-def test_a_cloud_without_any_speed_still_looks_like_a_lidar(tmp_path: Path) -> None:
-    dense = clouds("/cloud", targets(7, 5200), seed=1, scans=6, names=("x", "y", "z", "intensity"))
-    with opened(bag(tmp_path, dense)) as recording:
-        assert [warning.code for warning in recording.warnings] == ["looks-like-lidar"]
-
-
 def test_info_shows_the_radars_with_their_figures(tmp_path: Path) -> None:
     path = bag(tmp_path, *near_and_far(targets(7, 60)), clouds("/left", targets(8, 8), seed=2, frame="left"))
     with opened(path) as recording:
