@@ -3,24 +3,14 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.corpus_layouts import clouds, data_sets, files, messages, odd_messages
+from tests.corpus_layouts import clouds, data_sets, files, messages
 from tests.corpus_layouts.truth import Truth
 
-LAYOUTS: dict[str, Callable[[Path], Truth]] = {
+LAYOUTS: dict[str, Callable[[Path], Truth]] = messages.TARGET_LISTS | {
     layout.__name__: layout
     for layout in (
-        messages.vendor_structs,
-        messages.packets_with_comments,
-        messages.polar_without_comments,
-        messages.scaled_integers,
-        messages.right_forward_comment,
-        messages.integers_with_a_least_bit,
         messages.nested_twice,
         messages.arrays_side_by_side,
-        odd_messages.angle_from_the_zenith,
-        odd_messages.bare_millimetres,
-        odd_messages.elevation_downwards,
-        odd_messages.cylindrical,
         clouds.odd_big_endian_cloud,
         clouds.cloud_of_integers,
         clouds.points_beside_a_lidar,
