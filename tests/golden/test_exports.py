@@ -5,9 +5,7 @@ tvec -0.00115773 -0.0608874 -0.01496503. Expected numbers are given to the digit
 """
 
 import io
-import json
 import shlex
-import xml.etree.ElementTree as ElementTree
 import zipfile
 
 import numpy as np
@@ -38,11 +36,6 @@ EIGHT = {"atol": 6e-9, "rtol": 0}
 
 def text_of(file: CalibrationFile, name: str) -> str:
     return export(file, name, rectified=format_named(name).is_for_rectified).data.decode()
-
-
-def origin_of(joint: ElementTree.Element) -> tuple[list[float], list[float]]:
-    origin = joint.find("origin")
-    return [float(n) for n in origin.get("xyz", "").split()], [float(n) for n in origin.get("rpy", "").split()]
 
 
 def yaml_of(text: str) -> dict:
@@ -109,30 +102,6 @@ def test_the_python_launch_file_is_a_node_with_these_arguments(file, monkeypatch
     assert built["arguments"][-4:] == ["--frame-id", "radar", "--child-frame-id", "camera_optical"]
 
 
-def test_urdf_hangs_the_optical_frame_on_the_body_frame(file):
-    robot = ElementTree.fromstring(text_of(file, "urdf"))
-
-    assert [link.get("name") for link in robot.findall("link")] == ["radar", "camera_link", "camera_optical"]
-    body, optical = robot.findall("joint")
-    body_xyz, body_rpy = origin_of(body)
-    optical_xyz, optical_rpy = origin_of(optical)
-    np.testing.assert_allclose(body_xyz, RADAR_FROM_CAMERA_M, **SIX)
-    np.testing.assert_allclose(body_rpy, LINK_RPY_RAD, **SIX)
-    np.testing.assert_allclose(Rotation.from_euler("xyz", body_rpy).as_quat(), LINK_QUATERNION_XYZW, **SIX)
-    assert optical_xyz == [0, 0, 0]
-    np.testing.assert_allclose(optical_rpy, [-1.570796, 0, -1.570796], **SIX)
-    whole = Rotation.from_euler("xyz", body_rpy) * Rotation.from_euler("xyz", optical_rpy)
-    np.testing.assert_allclose(whole.as_euler("xyz"), RPY_RAD, **SIX)
-
-
-def test_autoware_gets_the_body_frame_in_the_kit(file):
-    kit = yaml_of(text_of(file, "autoware"))["sensor_kit_base_link"]
-
-    assert kit["radar"] == dict.fromkeys(("x", "y", "z", "roll", "pitch", "yaw"), 0.0)
-    camera = [kit["camera_link"][key] for key in ("x", "y", "z", "roll", "pitch", "yaw")]
-    np.testing.assert_allclose(camera, RADAR_FROM_CAMERA_M + LINK_RPY_RAD, **SIX)
-
-
 def test_kalibr_gets_the_matrix_and_four_coefficients(file):
     cam0 = yaml_of(text_of(file, "kalibr"))["cam0"]
 
@@ -182,19 +151,6 @@ def test_the_second_camera_of_kitti_is_posed_with_its_offset():
     np.testing.assert_allclose(
         camera.project(found.camera_from_radar @ point_m[None, :3])[0], [column / scale, row / scale], atol=1e-9
     )
-
-
-def test_nuscenes_gets_w_first_and_the_camera_in_ego(file):
-    archive = zipfile.ZipFile(io.BytesIO(export(file, "nuscenes", rectified=True).data))
-    radar, camera = json.loads(archive.read("calibrated_sensor.json"))
-    sensors = {record["token"]: record for record in json.loads(archive.read("sensor.json"))}
-    assert [sensors[record["sensor_token"]]["modality"] for record in (radar, camera)] == ["radar", "camera"]
-    assert [sensors[record["sensor_token"]]["channel"] for record in (radar, camera)] == ["radar", "camera_optical"]
-
-    assert radar["camera_intrinsic"] == []
-    np.testing.assert_allclose(camera["translation"], RADAR_FROM_CAMERA_M, **SIX)
-    np.testing.assert_allclose(camera["rotation"], [0.480758, -0.536832, 0.529679, -0.447351], **SIX)
-    assert camera["camera_intrinsic"][0] == [554.4203610, 0.0, 299.0464167]
 
 
 def test_opencv_reads_its_file_and_projects_the_check_point(file, tmp_path):

@@ -1,6 +1,5 @@
 """Laws of the files: what is written reads back, the same input gives the same bytes, and bad input is only ever refused."""
 
-import dataclasses
 import json
 import math
 import string
@@ -22,7 +21,6 @@ from calib_core.interchange import (
     check,
     export,
     format_named,
-    imported,
     read_any,
     read_calibration,
     read_camera,
@@ -244,30 +242,6 @@ def test_any_json_is_read_or_refused_in_one_line(content, schema):
         refused = refusal(read, text, "file")
         assert not refused or refused.startswith("file: ")
         assert "\n" not in refused
-
-
-@settings(max_examples=30, deadline=None)
-@given(pose=poses(), edit=st.sampled_from(["direction", "axes", "translation", "rotation"]))
-def test_a_slip_is_never_missed(pose, edit):
-    file = file_of(pose, CAMERA)
-    right = imported(file)
-    changes = {
-        "direction": {"direction": "radar_from_camera"},
-        "axes": {"axes": "link"},
-        "translation": {"translation_m": right.pose.translation_m * 1000},
-        "rotation": {"rotation": right.pose.rotation.T},
-    }
-    wrong = dataclasses.replace(right, pose=dataclasses.replace(right.pose, **changes[edit]), file=None)
-    point = right.check_point.radar_m[None]
-    moved_m = np.linalg.norm(wrong.camera_from_radar @ point - right.camera_from_radar @ point)
-    assume(moved_m > 0.05)
-
-    report = check(wrong, against=right)
-
-    explained = [result for result in report.results if result.level == "error"]
-    assert not report.ok
-    assert explained
-    assert all(result.code not in ("check-point-missed", "disagrees") for result in explained)
 
 
 @settings(max_examples=25, deadline=None)

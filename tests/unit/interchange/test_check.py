@@ -53,20 +53,15 @@ def codes(text: str | bytes, against: CalibrationFile | None = None) -> list[str
     return [result.code for result in report.results if result.level == "error"]
 
 
-def test_a_transposed_rotation_is_found(file):
-    content = json.loads(write_calibration(file))
-    content["camera_from_radar"]["rotation"] = np.transpose(content["camera_from_radar"]["rotation"]).tolist()
-
-    found = codes(json.dumps(content))
-
-    assert found[:2] == ["contradiction", "contradiction"]
-    assert "transposed-rotation" in found
-
-
-@pytest.mark.parametrize("name", ["json", "kalibr", "opencv", "kitti", "matrix", "matlab"])
+@pytest.mark.parametrize("name", ["json", "kalibr", "opencv", "kitti", "matrix", "matlab", "numpy"])
 def test_a_left_handed_rotation_is_refused_in_every_format_of_matrices(file, name):
     first_row = file.calibration.camera_from_radar.rotation[0]
-    if name == "matlab":
+    if name == "numpy":
+        arrays = dict(np.load(io.BytesIO(kept_file(name))))
+        arrays["camera_from_radar"][0] *= -1
+        np.savez(buffer := io.BytesIO(), **arrays)
+        data = buffer.getvalue()
+    elif name == "matlab":
         data = export(file, name).data
         for number in first_row.tolist():
             data = data.replace(np.float64(number).tobytes(), np.float64(-number).tobytes())
@@ -79,16 +74,6 @@ def test_a_left_handed_rotation_is_refused_in_every_format_of_matrices(file, nam
 
     with pytest.raises(InputError, match=r"file: .*left-handed.*an axis is mirrored"):
         read_any(data, "file")
-
-
-def test_a_left_handed_rotation_in_an_npz_is_refused():
-    arrays = dict(np.load(io.BytesIO(kept_file("numpy"))))
-    arrays["camera_from_radar"][0] *= -1
-    buffer = io.BytesIO()
-    np.savez(buffer, **arrays)
-
-    with pytest.raises(InputError, match=r"file: .*left-handed.*an axis is mirrored"):
-        read_any(buffer.getvalue(), "file")
 
 
 def test_numbers_changed_without_a_known_slip_are_reported_as_such(file):
@@ -109,16 +94,6 @@ def test_pairs_that_were_changed_after_solving_are_found(file):
     content = json.loads(write_calibration(file))
     content["metrics"]["aed_px"] = 0.1
     assert codes(json.dumps(content)) == ["metrics-disagree"]
-
-
-def test_a_bare_matrix_that_looks_sideways_is_a_warning_with_a_guess(file):
-    rows = np.linalg.inv(file.calibration.camera_from_radar.as_matrix())
-    report = check(read_any("\n".join(" ".join(map(repr, row)) for row in rows.tolist())))
-
-    assert report.ok
-    (result,) = report.results
-    assert (result.level, result.code) == ("warning", "looks-elsewhere")
-    assert "the direction is swapped" in result.hint
 
 
 def test_a_camera_that_lies_on_its_side_is_doubtful_where_its_axes_are_assumed():

@@ -51,13 +51,6 @@ def test_a_file_without_the_key_was_clicked_if_it_has_solved_pairs_and_assumed_i
     assert read_calibration(json.dumps(content)).rests_on == "imported_assumed"
 
 
-@pytest.mark.parametrize("level", ["clicked", "imported_proven", "imported_assumed"])
-def test_the_level_is_kept_in_calibration_1(file, level):
-    text = write_calibration(dataclasses.replace(file, evidence=level))
-    assert json.loads(text)["evidence"] == level
-    assert read_calibration(text).rests_on == level
-
-
 def test_an_unknown_level_is_refused(golden_text):
     content = json.loads(golden_text) | {"evidence": "certain"}
     with pytest.raises(InputError, match="evidence"):
@@ -95,11 +88,6 @@ def test_a_bare_matrix_is_assumed_and_a_check_point_proves_a_file(file):
     camera = file.calibration.camera
     assert adopt(read_any(bare(file)), "m.txt", camera=camera).rests_on == "imported_assumed"
     assert adopt(read_any(text_of(file, "tf2")), "t.sh", camera=camera).rests_on == "imported_proven"
-
-
-def test_an_inverted_matrix_is_doubtful_and_assumed(file):
-    adopted = adoption(read_any(bare(file, inverse=True)), "m.txt", camera=file.calibration.camera)
-    assert (adopted.report.verdict, adopted.file.rests_on) == ("doubtful", "imported_assumed")
 
 
 def test_what_was_assumed_stays_assumed_through_a_check_point_of_its_own(file):

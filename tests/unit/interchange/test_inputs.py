@@ -219,14 +219,6 @@ def test_what_is_unknown_is_null_and_never_nan(golden_text):
     assert again["pairs"][0]["distance_px"] is None
 
 
-def test_a_mirrored_rotation_is_refused(golden_text):
-    content = json.loads(golden_text)
-    content["camera_from_radar"]["rotation"][0] = [-x for x in content["camera_from_radar"]["rotation"][0]]
-
-    with pytest.raises(InputError, match=r"camera_from_radar\.rotation: .*left-handed.*axis is mirrored"):
-        read_calibration(json.dumps(content))
-
-
 def test_transforms_that_disagree_are_refused(golden_text):
     content = json.loads(golden_text)
     content["camera_from_radar"]["quaternion_wxyz"].reverse()
@@ -359,11 +351,6 @@ def test_a_calibration_keeps_which_candidates_are_alternatives(solved: Calibrati
         assert [one.alternative_of for one in pair.measured.candidates] == [0, 0]
     again = solve_again(read).unwrap()
     assert calibration_text(again) == text
-
-
-def test_candidates_without_alternatives_have_no_such_key() -> None:
-    simulated = simulate_pairs(rng=np.random.default_rng(3))
-    assert "alternative_of" not in calibration_text(calibrate_pairs(simulated.pairs, simulated.camera).unwrap())
 
 
 def test_the_provenance_names_all_topics_of_the_radar_and_why_it_was_used(solved: Calibration) -> None:

@@ -10,7 +10,6 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from calib_core.interchange.syntax.zip_archives import unpack
 from calib_core.radar import RadarErrors
 
 DRIVER = """
@@ -112,12 +111,3 @@ def test_the_npz_holds_the_same_tables(corrected, angle_map, unpacked) -> None:
     np.testing.assert_array_equal(arrays["sigma_azimuth_rad"], angle_map.sigma_rad[:, :, 0])
     np.testing.assert_array_equal(arrays["sigma_elevation_rad"], angle_map.sigma_rad[:, :, 1])
     assert (arrays["aed_px"], arrays["corrected_aed_px"]) == (22.9, 2.04)
-
-
-def test_without_a_map_there_is_no_file_of_one(golden) -> None:
-    from calib_core.interchange import export
-
-    members = unpack(export(golden, "pack").data, source="pack")
-
-    assert not any("angle_map" in name for name in members)
-    assert b"angle_map,none" in members["radar_correction.csv"]

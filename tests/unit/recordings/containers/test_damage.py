@@ -2,8 +2,6 @@
 
 import os
 import random
-import shutil
-import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,24 +13,7 @@ from calib_core.errors import RecordingError
 from calib_core.recordings import open_recording
 from calib_core.recordings.containers.compression import unpack, unpack_message
 from tests.unit.recordings.containers.damage import KINDS, outcomes
-
-
-def crashed(write, ros2, rows, folder) -> Path:
-    """Leave what a killed recorder leaves: a database whose rows are still in the -wal file."""
-    path = write(ros2, rows, "db3")
-    with sqlite3.connect(path) as database:
-        found = database.execute("SELECT topic_id, timestamp, data FROM messages ORDER BY id").fetchall()
-        database.execute("DELETE FROM messages")
-    database.execute("PRAGMA journal_mode=WAL")
-    database.execute("PRAGMA wal_autocheckpoint=0")
-    with database:
-        database.executemany("INSERT INTO messages (topic_id, timestamp, data) VALUES (?, ?, ?)", found)
-    folder.mkdir()
-    for suffix in ("", "-wal"):
-        shutil.copy(f"{path}{suffix}", folder / f"left.db3{suffix}")
-    database.close()
-    assert (folder / "left.db3-wal").stat().st_size > 1000
-    return folder / "left.db3"
+from tests.unit.recordings.containers.malformed import FRAMES, Kit, db3_with_a_log_left_over
 
 
 @contextmanager
@@ -50,30 +31,26 @@ def only_readable(folder: Path) -> Iterator[None]:
         folder.chmod(0o755)
 
 
-def test_messages_in_a_write_ahead_log_are_read(ros2, write, plain, jpeg, tmp_path):
-    with open_recording(crashed(write, ros2, plain(ros2, jpeg), tmp_path / "crashed")) as recording:
-        assert len(recording.image_times) == len(recording.radar_times) == 20
-
-
 @pytest.mark.skipif(not hasattr(os, "geteuid"), reason="rights of folders are those of POSIX")
-def test_a_write_ahead_log_is_read_from_a_read_only_folder(ros2, write, plain, jpeg):
+def test_a_write_ahead_log_is_read_from_a_read_only_folder(jpeg):
     with TemporaryDirectory() as name:
         Path(name).chmod(0o755)
-        path = crashed(write, ros2, plain(ros2, jpeg), Path(name) / "crashed")
-        before = {file.name: file.read_bytes() for file in path.parent.iterdir()}
+        (Path(name) / "crashed").mkdir()
+        path = db3_with_a_log_left_over(Kit(Path(name) / "crashed", jpeg))
+        before = {file.name: file.read_bytes() for file in path.parent.glob("left*")}
         with open_recording(path):
             pass  # loads every module, which the user nobody may not be allowed to read
-        for file in set(path.parent.iterdir()) - {path.parent / each for each in before}:
+        for file in set(path.parent.glob("left*")) - {path.parent / each for each in before}:
             file.unlink()
         with only_readable(path.parent):
             with pytest.raises(PermissionError):
                 (path.parent / "new").touch()
             with open_recording(path) as recording:
-                assert len(recording.image_times) == len(recording.radar_times) == 20
-                assert len(recording.image_bytes(19).data) == len(jpeg)
+                assert len(recording.image_times) == len(recording.radar_times) == FRAMES
+                assert recording.image_bytes(19).data == jpeg
                 (file,) = recording.fingerprint()
                 assert file.name == "left.db3"
-        assert {file.name: file.read_bytes() for file in path.parent.iterdir()} == before
+        assert {file.name: file.read_bytes() for file in path.parent.glob("left*")} == before
 
 
 @pytest.mark.parametrize("kind", ["bz2", "lz4", "zstd"])

@@ -120,13 +120,6 @@ def folder_of(folder: Path, names: list[str]) -> Path:
     return folder
 
 
-def test_a_folder_of_dated_pictures_has_sound_stamps(tmp_path) -> None:
-    names = names_of(TEN_HZ, lambda n, m: f"img_{m:%Y-%m-%d_%H-%M-%S}-{m.microsecond:06d}.jpg")
-    with open_recording(folder_of(tmp_path / "camera", names), require=("image",)) as recording:
-        assert recording.image_times.tolist() == [epoch_ns(moment) for moment in TEN_HZ]
-        assert (recording.warnings, recording.assumptions) == ((), ())
-
-
 def test_pictures_whose_digits_are_open_are_an_assumption(tmp_path) -> None:
     names = names_of(TEN_HZ, lambda n, m: f"{m:%Y%m%d_%H%M%S}_{n:06d}.png")
     folder = folder_of(tmp_path / "camera", names)
@@ -150,15 +143,6 @@ def test_local_times_are_moved_by_the_given_zone(tmp_path) -> None:
     folder = folder_of(tmp_path / "camera", names)
     with open_recording(folder, RecordingOptions(time_zone="+02:00"), require=("image",)) as recording:
         assert recording.image_times[0] == MOMENT_NS - 7200 * NS_PER_S
-
-
-def test_a_list_of_times_and_names_as_in_tum_data_sets_is_read(tmp_path) -> None:
-    folder = folder_of(tmp_path / "rgb", ["a.png", "b.png"])
-    (tmp_path / "rgb.txt").write_text(
-        "# color images\n# timestamp filename\n1305031102.175304 rgb/b.png\n1305031102.211214 rgb/a.png\n"
-    )
-    with open_recording(folder, require=("image",)) as recording:
-        assert recording.image_times.tolist() == [1305031102175304000, 1305031102211214000]
 
 
 def test_a_folder_without_any_readable_picture_is_refused(tmp_path) -> None:

@@ -1,7 +1,6 @@
 """Folders of pictures and radar files, radar CSV and videos as recordings."""
 
 import json
-import struct
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -238,48 +237,6 @@ def test_a_picture_of_another_size_in_a_folder_is_skipped_and_told(tmp_path) -> 
 
 
 # -- radar files
-NUSCENES_HEAD = """\
-# .PCD v0.7 - Point Cloud Data file format
-VERSION 0.7
-FIELDS x y z dyn_prop id rcs vx vy vx_comp vy_comp is_quality_valid ambig_state x_rms y_rms invalid_state pdh0 vx_rms vy_rms
-SIZE 4 4 4 1 2 4 4 4 4 4 1 1 1 1 1 1 1 1
-TYPE F F F I I F F F F F I I I I I I I I
-COUNT 1 1 1 1 1 1 1 1 1 1 1 1 1 1 1 1 1 1
-WIDTH {n}
-HEIGHT 1
-VIEWPOINT 0 0 0 1 0 0 0
-POINTS {n}
-DATA binary
-"""
-
-
-def nuscenes(path: Path, rows: np.ndarray) -> None:
-    """Write x, y, rcs, vx, vy rows."""
-    body = b"".join(
-        struct.pack("<fffbhfffffbbbbbbbb", x, y, 0, 1, 7, rcs, vx, vy, 0, 0, *[1] * 8) for x, y, rcs, vx, vy in rows
-    )
-    path.parent.mkdir(exist_ok=True)
-    path.write_bytes(NUSCENES_HEAD.format(n=len(rows)).encode() + body)
-
-
-def test_a_nuscenes_radar_folder_is_a_radar(tmp_path) -> None:
-    rng = np.random.default_rng(2)
-    scans = [rng.uniform(1, 9, (n, 5)).astype(np.float32) for n in (4, 7)]
-    for number, rows in enumerate(scans):
-        nuscenes(tmp_path / "RADAR_FRONT" / f"n015__RADAR_FRONT__{1_700_000_000_000_000 + 77_000 * number}.pcd", rows)
-    with open_recording(tmp_path / "RADAR_FRONT", require=("radar",)) as recording:
-        assert recording.radar_topic == "/RADAR_FRONT/radar"
-        assert recording.radar_times.tolist() == [START_NS, START_NS + 77_000_000]
-        assert [warning.code for warning in recording.warnings] == ["flat-radar"]
-        found = recording.radar_scans()
-        text = describe(recording)
-        assert (
-            "nuScenes radar: position from x, y, z (forward, left, up); speed from vx, vy; amplitude from rcs" in text
-        )
-    rows = np.concatenate(scans).astype(np.float64)
-    np.testing.assert_array_equal(found.points_radar_m, np.stack([rows[:, 0], rows[:, 1], 0 * rows[:, 0]], axis=1))
-    np.testing.assert_allclose(found.doppler_mps, (rows[:, :2] * rows[:, 3:]).sum(1) / np.hypot(rows[:, 0], rows[:, 1]))
-    np.testing.assert_array_equal(found.snr_db, rows[:, 2])
 
 
 def test_an_ascii_pcd_is_read_and_a_compressed_one_is_explained(tmp_path) -> None:
@@ -557,18 +514,6 @@ def test_view_of_delft_brings_its_camera_and_names_its_pose(tmp_path, inner) -> 
     assert "numbered-files" in codes
     if inner == ".":
         assert "velodyne (3 lidar clouds, which this program does not use)" in text
-
-
-def test_sums_of_scans_beside_the_scans_are_not_the_radar(tmp_path) -> None:
-    root = view_of_delft(tmp_path / "view_of_delft")
-    for number in range(3):
-        floats_bin(root / "radar_5frames" / "training" / "velodyne" / f"{number:05}.bin", 60, 7)
-    with open_recording(root) as recording:
-        assert recording.radar_topic == "/velodyne/radar"
-        assert np.diff(recording.radar_scans().first_return).tolist() == [5, 6, 7]
-        assert "radar_5frames (sums of several scans of radar, which are used one by one)" in describe(recording)
-    with open_recording([root / "radar_5frames", root / "radar" / "training" / "image_2"]) as recording:
-        assert np.diff(recording.radar_scans().first_return).tolist() == [60, 60, 60]
 
 
 def test_intrinsics_that_differ_between_frames_are_told(tmp_path) -> None:

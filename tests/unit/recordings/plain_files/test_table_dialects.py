@@ -390,21 +390,6 @@ def test_tables_with_one_scan_each_are_stamped_by_their_names(tmp_path) -> None:
     np.testing.assert_allclose(found.points_radar_m, T.points_m)
 
 
-def test_numbered_scans_have_the_times_of_the_pictures_with_their_numbers(tmp_path) -> None:
-    import cv2
-
-    per_scan(tmp_path / "radar", [f"{number:06d}.csv" for number in range(3)])
-    (tmp_path / "camera").mkdir()
-    for number, (time, _) in enumerate(scans()):
-        name = f"frame_{number:06d}_{time // NS_PER_S}.{time % NS_PER_S:09d}.png"
-        cv2.imwrite(str(tmp_path / "camera" / name), np.zeros((8, 8, 3), np.uint8))
-    with open_recording(tmp_path) as recording:
-        np.testing.assert_array_equal(recording.radar_times, np.unique(T.times_ns))
-        np.testing.assert_array_equal(recording.image_times, recording.radar_times)
-        (warning,) = recording.warnings
-    assert "those of the files of camera with the same numbers" in warning.message
-
-
 @pytest.mark.parametrize("word", ["objects", "clusters", "hits", "dets"])
 def test_a_list_of_json_may_have_any_common_word_for_returns(tmp_path, word) -> None:
     lines = [

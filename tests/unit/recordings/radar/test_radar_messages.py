@@ -52,35 +52,6 @@ def opened(write, ros, messages, *, topic="/radar", step_ns=100_000_000, **optio
 # -- clouds
 
 
-def test_a_cloud_with_padding_mixed_types_and_padded_rows_is_read(ros, write):
-    dtype = np.dtype(
-        {
-            "names": ["id", "x", "y", "z", "v", "rcs"],
-            "formats": ["<u2", "<f4", "<f8", "<i2", "<f4", "i1"],
-            "offsets": [0, 4, 12, 21, 24, 29],
-            "itemsize": 33,
-        }
-    )
-    points = np.zeros(6, dtype=dtype)
-    points["x"], points["y"], points["z"] = np.arange(6) + 2.5, -np.arange(6) * 0.125, np.arange(6) - 3
-    points["v"], points["rcs"] = 0.5 * np.arange(6), np.arange(6) - 20
-    with opened(write, ros, [ros.cloud(START_NS, points, padding=7, height=2)]) as recording:
-        scan = recording.radar_scans().scan(0)
-    np.testing.assert_array_equal(scan.points_radar_m, np.stack([points["x"], points["y"], points["z"]], axis=1))
-    np.testing.assert_array_equal(scan.doppler_mps, points["v"])
-    np.testing.assert_array_equal(scan.snr_db, points["rcs"])
-
-
-def test_a_big_endian_cloud_is_read(ros, write, cloud_points):
-    points = cloud_points(4)
-    swapped = points.astype(np.dtype([(name, ">f4") for name in points.dtype.names]))
-    with opened(write, ros, [ros.cloud(START_NS, swapped), ros.cloud(START_NS + 10**8, swapped)]) as recording:
-        scans = recording.radar_scans()
-    for number in range(2):
-        np.testing.assert_array_equal(scans.scan(number).points_radar_m[:, 0], points["x"])
-        np.testing.assert_array_equal(scans.scan(number).snr_db, points["snr"])
-
-
 def test_clouds_whose_layout_changes_are_each_read_by_their_own(ros, write, cloud_points):
     wide = cloud_points(5)
     narrow = wide[["x", "y", "z"]].astype([("x", "<f8"), ("y", "<f8"), ("z", "<f8")])
@@ -181,22 +152,6 @@ def test_an_inconsistent_cloud_counts_as_empty_with_a_warning(ros, write, cloud_
         (warning,) = recording.warnings
         assert warning.code == "unreadable-messages"
         assert "1 radar messages could not be read and count as empty; the first is number 1" in warning.message
-
-
-def test_a_radar_is_chosen_over_a_lidar_and_a_lidar_alone_gives_a_warning(ros, write, cloud_points):
-    lidar = np.zeros(6000, dtype=[("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("intensity", "<f4")])
-    lidar["z"] = np.arange(6000)
-    rows = [
-        (topic, START_NS + i * 10**8, ros.cloud(START_NS + i * 10**8, points))
-        for i in range(4)
-        for topic, points in (("/lidar/points", lidar), ("/front", cloud_points()))
-    ]
-    path = write(ros, rows, name="both")
-    with open_recording(path, require=("radar",)) as recording:
-        assert recording.radar_topic == "/front"
-        assert recording.warnings == ()
-    with open_recording(path, RecordingOptions(radar_topic="/lidar/points"), require=("radar",)) as recording:
-        assert [warning.code for warning in recording.warnings] == ["looks-like-lidar"]
 
 
 # -- lists
