@@ -25,11 +25,12 @@ from calib_core.fleet import (
 from calib_core.fleet.deviation import deviation, quantile
 from calib_core.fleet.mounting_scatter import SharedTape, coordinates, pose_from_coordinates
 from calib_core.fleet.mountings import Mounting
-from calib_core.fleet.random_effects import PRIOR_VECTORS, RandomEffects, random_effects
+from calib_core.fleet.random_effects import PRIOR_VECTORS, random_effects
 from calib_core.fleet.session_pose import SessionPose
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import Unsolvable
 from calib_core.options import CameraPositionPrior
+from tests.unit.fleet.test_mountings import EQUAL, EXACT, estimated, squared_of_new
 
 NARROW, FINE, COARSE = Spread(0.005, 0.3), Accuracy(0.001, 0.05), Accuracy(0.07, 0.6)
 WRONG = pose_from_coordinates(np.array([0.3, -0.1, 0.0, 0.0, 0.1, 0.3]), NOMINAL)
@@ -200,22 +201,9 @@ def test_measured_positions_that_differ_less_than_their_sigma_are_one_measuremen
 # Mean and scatter of vectors with known covariances: truth by simulation, and how often a further one is covered.
 
 
-EQUAL = np.full(6, 0.005)
 UNEQUAL = np.array([0.01, 0.003, 0.001, 0.001, 0.01, 0.003])
 WHOLE = 5.0
-EXACT, ROUGH = 1e-7 * np.eye(6), np.diag(np.repeat([1e-4, 1e-4], 3))
-
-
-def estimated(count: int, sigma: np.ndarray, error: np.ndarray, rng: np.random.Generator) -> RandomEffects:
-    vectors = sigma * rng.standard_normal((count, 6)) + rng.multivariate_normal(np.zeros(6), error, count)
-    return random_effects(vectors, np.repeat(error[None], count, axis=0))
-
-
-def squared_of_new(
-    effects: RandomEffects, sigma: np.ndarray, rng: np.random.Generator, count: int = 1000
-) -> np.ndarray:
-    away = sigma * rng.standard_normal((count, 6)) - effects.mean
-    return np.asarray(np.einsum("ni,ij,nj->n", away, np.linalg.inv(effects.covariance), away))
+ROUGH = np.diag(np.repeat([1e-4, 1e-4], 3))
 
 
 def covered(count: int, fleets: int, sigma: np.ndarray, error: np.ndarray) -> float:

@@ -89,15 +89,16 @@ def test_grey_images_become_grey_pictures(ros, write):
         np.testing.assert_array_equal(recording.image(0), np.repeat(grey[:, :, None], 3, axis=2))
 
 
+@pytest.mark.parametrize(
+    ("bits", "levels", "shown"), [(8, (200, 120, 40), (200, 120, 40)), (16, (4095, 2048, 0), (255, 128, 0))]
+)
 @pytest.mark.parametrize("pattern", ["rggb", "bggr", "gbrg", "grbg"])
-def test_bayer_patterns_give_the_right_colours(ros1, write, pattern):
-    colour = {"r": 200, "g": 120, "b": 40}
-    tile = np.array(
-        [[colour[pattern[0]], colour[pattern[1]]], [colour[pattern[2]], colour[pattern[3]]]], dtype=np.uint8
-    )
-    message = ros1.image(START_NS, np.tile(tile, (12, 16)), f"bayer_{pattern}8")
-    with opened(write, ros1, message) as recording:
-        np.testing.assert_array_equal(recording.image(0)[4:-4, 4:-4].reshape(-1, 3), [[40, 120, 200]] * (16 * 24))
+def test_bayer_patterns_give_the_right_colours(ros1, write, pattern, bits, levels, shown):
+    colour = dict(zip("rgb", levels, strict=True))
+    tile = np.array([colour[letter] for letter in pattern], dtype=f"<u{bits // 8}").reshape(2, 2)
+    rows = np.tile(tile, (12, 16)).view(np.uint8)
+    with opened(write, ros1, ros1.image(START_NS, rows, f"bayer_{pattern}{bits}", width=32)) as recording:
+        np.testing.assert_array_equal(recording.image(0)[4:-4, 4:-4].reshape(-1, 3), [shown[::-1]] * (16 * 24))
 
 
 @pytest.mark.parametrize(("encoding", "order"), [("yuv422", "uyvy"), ("yuv422_yuy2", "yuyv")])
@@ -142,15 +143,6 @@ def test_colour_of_16_bits_keeps_its_order_of_channels(ros1, write, encoding, va
     with opened(write, ros1, message) as recording:
         blue, green, red = recording.image(0)[2, 2].astype(int)
     assert blue < green < red == 255
-
-
-@pytest.mark.parametrize("pattern", ["rggb", "bggr", "gbrg", "grbg"])
-def test_bayer_patterns_of_16_bits_give_the_right_colours(ros1, write, pattern) -> None:
-    colour = {"r": 4095, "g": 2048, "b": 0}
-    tile = np.array([[colour[pattern[0]], colour[pattern[1]]], [colour[pattern[2]], colour[pattern[3]]]], dtype="<u2")
-    rows = np.tile(tile, (12, 16)).view(np.uint8)
-    with opened(write, ros1, ros1.image(START_NS, rows, f"bayer_{pattern}16", width=32)) as recording:
-        np.testing.assert_array_equal(recording.image(0)[4:-4, 4:-4].reshape(-1, 3), [[0, 128, 255]] * (16 * 24))
 
 
 def test_a_png_of_16_bit_grey_that_says_mono16_is_stretched(ros, write) -> None:
@@ -344,30 +336,23 @@ def test_unusable_intrinsics_are_none_with_a_warning(ros, write, changes, code):
     assert "--camera FILE" in warnings[0].hint
 
 
-def test_a_region_of_interest_moves_the_principal_point(ros, write):
-    info = ros.camera_info(region=(100, 50, 320, 200))
-    camera, codes, _ = camera_of(write, ros, info, size=(320, 200))
-    np.testing.assert_array_equal(camera.matrix_px, [[500, 0, 219.5], [0, 510, 189.5], [0, 0, 1]])
-    assert (camera.width_px, camera.height_px, codes) == (320, 200, [])
-
-
-def test_binning_keeps_pixel_centres_in_place(ros, write):
-    """The middle of the sensor is the middle of the binned image: (640 - 1) / 2 becomes (320 - 1) / 2."""
-    camera, codes, _ = camera_of(write, ros, ros.camera_info(binning_x=2, binning_y=2), size=(320, 240))
-    np.testing.assert_array_equal(camera.matrix_px, [[250, 0, 159.5], [0, 255, 119.5], [0, 0, 1]])
-    assert codes == []
-
-
-def test_intrinsics_of_a_resized_image_are_scaled_with_a_warning(ros, write):
-    camera, codes, _ = camera_of(write, ros, ros.camera_info(), size=(320, 240))
-    np.testing.assert_allclose(camera.matrix_px, [[250, 0, 159.5], [0, 255, 119.5], [0, 0, 1]])
-    assert codes == ["camera-scaled"]
-
-
-def test_a_rectified_image_uses_the_projection_matrix(ros, write):
-    camera, codes, _ = camera_of(write, ros, ros.camera_info(), topic="/camera/image_rect_color")
-    assert (camera.model, codes) == ("pinhole", [])
-    np.testing.assert_allclose(camera.matrix_px, [[450, 0, 319.5 * 0.9], [0, 459, 239.5 * 0.9], [0, 0, 1]])
+@pytest.mark.parametrize(
+    ("info", "published", "focal_px", "centre_px", "codes"),
+    [
+        ({"region": (100, 50, 320, 200)}, {"size": (320, 200)}, (500, 510), (219.5, 189.5), []),
+        # the middle of the sensor is the middle of the binned image: (640 - 1) / 2 becomes (320 - 1) / 2
+        ({"binning_x": 2, "binning_y": 2}, {"size": (320, 240)}, (250, 255), (159.5, 119.5), []),
+        ({}, {"size": (320, 240)}, (250, 255), (159.5, 119.5), ["camera-scaled"]),
+        ({}, {"topic": "/camera/image_rect_color"}, (450, 459), (319.5 * 0.9, 239.5 * 0.9), []),
+    ],
+    ids=["a region", "binned", "resized", "rectified"],
+)
+def test_the_camera_is_that_of_the_published_pixels(ros, write, info, published, focal_px, centre_px, codes):
+    camera, found, _ = camera_of(write, ros, ros.camera_info(**info), **published)
+    np.testing.assert_allclose(camera.matrix_px[[0, 1], [0, 1]], focal_px)
+    np.testing.assert_allclose(camera.matrix_px[:2, 2], centre_px)
+    assert ((camera.width_px, camera.height_px), found) == (published.get("size", (640, 480)), codes)
+    assert camera.model == ("pinhole" if "topic" in published else "plumb_bob")
 
 
 def test_intrinsics_that_change_during_the_recording_give_a_warning(ros, write):

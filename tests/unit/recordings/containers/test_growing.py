@@ -1,5 +1,6 @@
 """Files that are still being written: every complete message is found once, and nothing else."""
 
+import os
 import random
 import shutil
 from pathlib import Path
@@ -88,53 +89,26 @@ def test_pieces_of_any_size_give_the_index_of_the_finished_file(finished, tmp_pa
     files.close()
 
 
-def test_a_truncated_file_is_refused_and_what_was_read_stays(finished, tmp_path):
-    growing = tmp_path / f"cut{finished.suffix}"
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda path: os.truncate(path, path.stat().st_size // 2), "truncated to"),
+        (lambda path: path.write_bytes(bytes(2 * path.stat().st_size)), "overwritten"),
+        (lambda path: shutil.copyfile(path, path.with_name("other")).replace(path), "replaced by another file"),
+        (lambda path: path.rename(path.with_name("elsewhere")), "no longer there"),
+    ],
+    ids=["truncated", "overwritten", "replaced", "moved away"],
+)
+def test_a_file_that_does_not_grow_as_it_should_is_refused_and_what_was_read_stays(finished, tmp_path, change, words):
+    growing = tmp_path / f"growing{finished.suffix}"
     files, replay = FollowedFiles([growing]), Replay(finished, growing)
     replay.write_up_to(len(replay) // 2)
     files.grow()
     replay.kill()
-    with growing.open("r+b") as file:
-        file.truncate(len(replay) // 4)
-    with pytest.raises(RecordingError, match="truncated to"):
+    change(growing)
+    with pytest.raises(RecordingError, match=words):
         files.grow()
     assert any(len(source.index(channel.id)) for source in files.sources for channel in source.channels)
-    files.close()
-
-
-def test_a_file_overwritten_in_place_is_refused(finished, tmp_path):
-    growing = tmp_path / f"over{finished.suffix}"
-    files, replay = FollowedFiles([growing]), Replay(finished, growing)
-    replay.write_up_to(len(replay) // 2)
-    files.grow()
-    replay.kill()
-    growing.write_bytes(bytes(len(replay)))
-    with pytest.raises(RecordingError, match="overwritten"):
-        files.grow()
-    files.close()
-
-
-def test_a_file_replaced_by_another_is_refused(finished, tmp_path):
-    growing = tmp_path / f"swap{finished.suffix}"
-    shutil.copyfile(finished, growing)
-    files = FollowedFiles([growing])
-    files.grow()
-    other = tmp_path / "other"
-    shutil.copyfile(finished, other)
-    other.replace(growing)
-    with pytest.raises(RecordingError, match="replaced by another file"):
-        files.grow()
-    files.close()
-
-
-def test_a_file_that_is_moved_away_is_refused(finished, tmp_path):
-    growing = tmp_path / f"away{finished.suffix}"
-    shutil.copyfile(finished, growing)
-    files = FollowedFiles([growing])
-    files.grow()
-    growing.rename(tmp_path / "elsewhere")
-    with pytest.raises(RecordingError, match="no longer there"):
-        files.grow()
     files.close()
 
 
