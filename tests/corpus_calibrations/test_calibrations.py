@@ -31,23 +31,10 @@ def readings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Reading]:
     return {name: read(calibration, folders[name]) for name, calibration in CALIBRATIONS.items()}
 
 
-def test_no_file_is_read_wrong_and_every_pose_between_a_radar_and_a_camera_is_read(
-    readings: dict[str, Reading],
-) -> None:
-    print("\n".join(f"{name:32} {reading.outcome:8} {reading.why}" for name, reading in readings.items()))
-    outcomes = [reading.outcome for reading in readings.values()]
-    print({outcome: outcomes.count(outcome) for outcome in ("right", "refused", "wrong")})
-    due = [name for name, calibration in CALIBRATIONS.items() if not calibration.refused]
-
-    assert len(readings) >= 38
-    assert outcomes.count("wrong") == 0
-    assert [name for name in due if readings[name].outcome != "right"] == []
-    assert outcomes.count("right") >= 32
-
-
 @pytest.mark.parametrize("name", CALIBRATIONS)
 def test_a_file_is_read_right_or_refused_with_what_to_do(readings: dict[str, Reading], name: str) -> None:
     calibration, reading = CALIBRATIONS[name], readings[name]
+    print(f"{name:32} {reading.outcome:8} {reading.why}")
 
     if calibration.refused:
         assert reading.outcome == "refused"

@@ -26,14 +26,8 @@ def test_nine_of_ten_layouts_are_read_right(truths, readings):
         for name, reading in readings.items()
     ]
     assert len(outcomes) >= 20
-    assert "wrong" not in [reading.outcome for reading in readings.values()]
+    assert {name: reading.why for name, reading in readings.items() if reading.outcome == "wrong"} == {}
     assert sum(outcome.startswith("right") for outcome in outcomes) >= 0.9 * len(outcomes)
-
-
-@pytest.mark.parametrize("name", LAYOUTS)
-def test_no_layout_is_misread_without_a_stated_assumption(readings, name):
-    reading = readings[name]
-    assert reading.outcome != "wrong", reading.why
 
 
 def test_saying_what_a_layout_leaves_open_makes_it_right(truths):

@@ -1,8 +1,4 @@
-"""Recordings broken in every known way, built from an intact one.
-
-Each case takes a Kit and returns the path to open. All of them are built by
-`python -m tests.unit.recordings.containers.malformed FOLDER`.
-"""
+"""Recordings broken in every known way, built from an intact one. Each case takes a Kit and returns the path to open."""
 
 import bz2
 import gzip
@@ -10,7 +6,6 @@ import re
 import shutil
 import sqlite3
 import struct
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -18,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import lz4.frame
-import numpy as np
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2.storage_mcap import zstd
 
@@ -501,20 +495,3 @@ CASES |= {
     "db3_with_a_damaged_page_beside_its_metadata": lambda kit: edit(kit.db3(), damage_a_page).parent,
 }
 """What takes one step; the others are functions."""
-
-
-def main() -> int:
-    """Build all cases below a folder."""
-    import cv2
-
-    pixels = np.random.default_rng(3).integers(0, 255, (48, 64, 3), dtype=np.uint8)
-    jpeg = cv2.imencode(".jpg", cv2.GaussianBlur(pixels, (5, 5), 0))[1].tobytes()
-    for name, build in CASES.items():
-        folder = Path(sys.argv[1]) / name
-        folder.mkdir(parents=True)
-        print(build(Kit(folder, jpeg)))
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
