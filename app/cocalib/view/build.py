@@ -273,18 +273,22 @@ def _shown_verdict(session: Session, facts: RecordingFacts, placements: Sequence
 
 
 def verdict_row(verdict: Verdict, session: Session, placements: Sequence[Placement] | None) -> VerdictRow:
-    """Return the verdict for the page; as long as only more pairs are missing, how many there are."""
+    """Return the verdict for the page; as long as only more pairs are missing, how many there are, and how far they lead."""
     left = placements_left(session, placements)
-    early = "" if verdict.level in ("good", "usable") else _early_line(session)
+    early = (
+        ""
+        if verdict.level in ("good", "usable")
+        else _early_line(session) or (left != 0 and _large_so_far(verdict, session))
+    )
     return VerdictRow(
         level=verdict.level,
-        line=early or with_degree_signs(verdict.line),
+        line=with_degree_signs(early or verdict.line),
         action=sentence(verdict.action),
         assumes=f"Assuming {verdict.assumes}." if verdict.assumes else "",
         key="N" if early and left else _key(verdict, session, left),
         option=_option(verdict, session),
         done=_is_done(verdict),
-        early=early != "",
+        early=bool(early),
     )
 
 
@@ -309,6 +313,14 @@ def _early_line(session: Session) -> str:
         return ""
     seems = "two answers fit so far" if "two-poses" in grave else "looks consistent"
     return f"{len(used)} of {SURE_PAIRS} pairs, {seems}"
+
+
+def _large_so_far(verdict: Verdict, session: Session) -> str:
+    """Return how many pairs agree, and how large the error still is; "" if a pair does not agree, or something else is wrong."""
+    pairs = [pair for pair in getattr(session.outcome, "pairs", ()) if not pair.excluded]
+    level, only_size, error = verdict.line.partition("uncertain to ")
+    agree = level == "coarse: " and only_size and all(pair.inlier for pair in pairs)
+    return f"{len(pairs)} pairs agree: so far within {error}" if agree else ""
 
 
 def _is_done(verdict: Verdict) -> bool:

@@ -77,6 +77,20 @@ def test_few_pairs_that_agree_are_counted_and_what_is_wrong_is_said(pairs, warni
     assert row.line == line or not row.early
 
 
+def test_an_error_that_is_large_for_want_of_pairs_is_no_alarm_while_placements_are_left() -> None:
+    eight = tuple(pair(f"c{number}") for number in range(1, 9))
+    coarse = Verdict("coarse", "uncertain to 4 deg, 40 cm (95 %)", "Click the 3 placements that are left")
+    more = [placement(1), placement(11)]
+    clicked = tuple(ReflectorClick(TimeNs(s * 10**9), f"c{s}", 1.0, 1.0) for s in (2, 12))
+    odd = (*eight, pair("c9", inlier=False))
+    agreeing, apart = (Session(clicks=clicked[:1], outcome=calibration(*some)) for some in (eight, odd))
+    row = verdict_row(coarse, agreeing, more)
+    assert (row.early, row.line) == (True, "8 pairs agree: so far within 4°, 40 cm (95 %)")
+    assert not verdict_row(coarse, apart, more).early
+    assert not verdict_row(replace(coarse, reason=f"a warning; {coarse.reason}"), agreeing, more).early
+    assert not verdict_row(coarse, replace(agreeing, clicks=clicked), more).early
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
