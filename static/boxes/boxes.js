@@ -1,7 +1,7 @@
 /** Boxes around objects: which ones the frame on screen has, which one is selected, and how they are drawn. */
 
 import { toDevice, viewport } from "../picture/geometry.js";
-import { ink } from "../shell/colours.js";
+import { ink, smallFont, smallPx } from "../shell/colours.js";
 import { emit, state } from "../shell/state.js";
 
 /** @typedef {import("../messages.js").BoxTrackRow} Track */
@@ -136,11 +136,11 @@ function drawBox(pen, box, held) {
 /** The name of a box above it, or inside where there is no room. @param {CanvasRenderingContext2D} pen @param {Shown} box @param {number} left @param {number} top @param {string} colour */
 function drawName(pen, box, left, top, colour) {
   const { ratio } = viewport;
-  pen.font = `${11 * ratio}px ${getComputedStyle(document.body).fontFamily}`;
+  pen.font = smallFont(ratio);
   pen.textAlign = "left";
   pen.textBaseline = "alphabetic";
   const words = [box.id, box.label].filter(Boolean).join(" ");
-  const high = 15 * ratio;
+  const high = (smallPx() + 4) * ratio;
   const y = top - high < 0 ? top + high : top;
   const wide = pen.measureText(words).width + 8 * ratio;
   pen.fillStyle = "rgb(0 0 0 / 62%)";

@@ -4,7 +4,7 @@
  */
 
 import { toCss, toDevice, viewport } from "../picture/geometry.js";
-import { ink } from "../shell/colours.js";
+import { ink, smallFont, smallPx } from "../shell/colours.js";
 import { toast } from "../shell/notices.js";
 import { send } from "../shell/socket.js";
 import { emit, on, selectedClick, stampOf, state } from "../shell/state.js";
@@ -66,13 +66,13 @@ export function drawCandidates(pen) {
     if (!row.used) ring(pen, x, y, suggested);
     const [bx, by] = badge(row).map((value) => value * ratio);
     pen.beginPath();
-    pen.arc(bx, by, RADIUS * 0.85 * ratio, 0, 2 * Math.PI);
+    pen.arc(bx, by, RADIUS * 0.85 * (smallPx() / 11) * ratio, 0, 2 * Math.PI);
     pen.fillStyle = row.used ? ink.ring : suggested ? ink.guess : "rgb(20 26 32 / 85%)";
     pen.fill();
     pen.lineWidth = ratio;
     pen.strokeStyle = ink.guess;
     pen.stroke();
-    pen.font = `600 ${10 * ratio}px ${getComputedStyle(document.body).fontFamily}`;
+    pen.font = smallFont(0.9 * ratio, "600");
     pen.textAlign = "center";
     pen.textBaseline = "middle";
     pen.fillStyle = row.used || suggested ? "#10161c" : "#ffffff";

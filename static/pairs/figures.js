@@ -1,7 +1,7 @@
 /** The top of the panel: how good the answer is; and on the page Check the metrics and the pose. All in the server's text. */
 
 import { make } from "../shell/notices.js";
-import { onPainted, state } from "../shell/state.js";
+import { named, onPainted, state } from "../shell/state.js";
 
 /** @typedef {import("../messages.js").Figure} Figure */
 const figures = /** @type {HTMLElement} */ (document.getElementById("figures"));
@@ -41,7 +41,7 @@ function draw() {
   assumedHead.hidden = assumedTable.hidden = view.pose_assumed.length === 0;
   assumedTable.replaceChildren(...view.pose_assumed.map(row));
   drawSystematic(view.systematic_errors);
-  adviceLine.textContent = view.advice?.words ?? "";
+  adviceLine.textContent = named(view.advice?.words ?? "");
   assumedLine.textContent = view.verdict.assumes;
   drawReference(view);
 }
@@ -134,7 +134,8 @@ function drawVerdict() {
   box.hidden = !view || state.looking;
   if (!view || state.looking) return;
   box.classList.toggle("stale", view.solving && view.has_calibration);
-  const { level, line, early, assumes } = view.verdict;
+  const { level, early, assumes } = view.verdict;
+  const line = named(view.verdict.line);
   const aed = view.metrics.find((figure) => figure.key === "aed");
   const text = JSON.stringify([level, line, early, assumes, aed]);
   if (text === drawn) return;

@@ -7,7 +7,7 @@ import { proposalAdvice, proposalWords, silentWords } from "../proposals/words.j
 import { act, actionNamed } from "../shell/actions.js";
 import { make } from "../shell/notices.js";
 import { openOption } from "../shell/options.js";
-import { clickIn, clicks, isDismissed, isOffered, on, placementAt, placementsAt, state } from "../shell/state.js";
+import { clickIn, clicks, isDismissed, isOffered, named, nameOf, on, placementAt, placementsAt, state } from "../shell/state.js";
 import { goToPair } from "./pairs.js";
 
 const guide = /** @type {HTMLElement} */ (document.getElementById("guide"));
@@ -38,7 +38,7 @@ function drawGuide() {
   guide.classList.toggle("act", words.act);
   if (guide.dataset.said === JSON.stringify(words.text)) return; // said once
   guide.dataset.said = JSON.stringify(words.text);
-  guide.replaceChildren(...words.text.map((word) => (typeof word === "string" ? make("span", "", word) : keyPart(word))));
+  guide.replaceChildren(...words.text.map((word) => (typeof word === "string" ? make("span", "", named(word)) : keyPart(word))));
 }
 
 /** What to show before there is a frame. @returns {Advice|null} */
@@ -102,7 +102,7 @@ function outlierWords(click) {
   if (!click.note.startsWith("Disagrees")) return [click.note]; // the method or an option sets the pair aside: the note says which
   const carried = state.placements.length > 0 && !placementsAt(click.frame).length ? " Was the reflector being carried?" : "";
   const others = state.candidates?.click === click.id && state.candidates.rows.length > 1;
-  return [`${click.id} disagrees with the other pairs. Is the mark on the inner corner?${carried}`, ...(others ? [{ key: "C", label: "another return", action: "next-candidate" }] : []), EXCLUDE];
+  return [`#${nameOf(click.id)} disagrees with the other pairs. Is the mark on the inner corner?${carried}`, ...(others ? [{ key: "C", label: "another return", action: "next-candidate" }] : []), EXCLUDE];
 }
 
 /** The next thing to do: the verdict's action, with its key; null when there is nothing to say. @returns {Words|null} */
@@ -113,13 +113,13 @@ function nextAction() {
   const guesses = clicks().filter((click) => click.state === "untouched").length;
   if (guesses && !state.placements.some(isOffered)) return [`${guesses} ${guesses > 1 ? "marks are guesses" : "mark is a guess"} and ${guesses > 1 ? "do" : "does"} not count: move ${guesses > 1 ? "each" : "it"} to the inner corner`];
   const by = option === POSITION.option ? [POSITION] : [];
-  const leftOut = clicks().filter((click) => click.state === "outlier").map(({ id }) => id);
+  const leftOut = clicks().filter((click) => click.state === "outlier").map(({ id }) => `#${nameOf(id)}`);
   if (done) return ["Done.", { key: "E", label: "export", action: "export" }, ...(leftOut.length ? [`Left out: ${leftOut.join(", ")}`, SHOW] : by.length ? ["Better:", ...by] : [])];
   if (option === RANGE.option) return BEYOND;
   if (key === "N" && view.clicks.length && !state.placements.some(isOffered)) return null; // the last one is on its way
   if (key === "N") return [{ key, label: proposalAdvice(), action: "next-placement" }];
-  const named = view.verdict.level === "contradictory" ? view.clicks.find(({ id }) => new RegExp(`\\b${id}\\b`).test(action)) : undefined;
-  if (named) return [action, { key: "", label: `show ${named.id}`, pair: named.id }];
+  const met = view.verdict.level === "contradictory" ? view.clicks.find(({ id }) => new RegExp(`\\b${id}\\b`).test(action)) : undefined;
+  if (met) return [action, { key: "", label: `show #${nameOf(met.id)}`, pair: met.id }];
   if (key === "J") return [action, SHOW];
   if (view.clicks.length) return [action, ...by];
   if (!state.placementsKnown) return ["Looking for the places where the reflector stood. You can click meanwhile"];

@@ -4,7 +4,7 @@ import { comeTo } from "../picture/arriving.js";
 import { toggleExcluded } from "../picture/clicking.js";
 import { LARGE_PX, residualColour } from "../shell/colours.js";
 import { make } from "../shell/notices.js";
-import { clicks, onPainted, select, stampKey, state } from "../shell/state.js";
+import { clicks, named, nameOf, onPainted, select, stampKey, state } from "../shell/state.js";
 import { candidatesOf, choose } from "./candidates.js";
 
 /** @typedef {import("../messages.js").ClickRow} Click */
@@ -16,7 +16,7 @@ const count = /** @type {HTMLElement} */ (document.getElementById("pair-count"))
 const sorting = { key: "frame", descending: false };
 /** @type {{key: "frame"|"residual_px"|"range_m"|null, label: string, hint: string}[]} */
 const COLUMNS = [
-  { key: null, label: "Click", hint: "" },
+  { key: null, label: "Place", hint: "Number of the placement, as in the timeline." },
   { key: "frame", label: "Time", hint: "Time since the first frame. Click to sort." },
   { key: "range_m", label: "Range", hint: "Distance from the radar to the reflector. Click to sort." },
   { key: "residual_px", label: "Residual", hint: "Distance between the click and the reprojection of its radar position. Click to sort." },
@@ -151,7 +151,10 @@ function drawCandidateRows() {
     choices.replaceChildren(cell);
     choices.dataset.drawn = text;
   }
-  if (owner.nextElementSibling !== choices) owner.after(choices);
+  if (owner.nextElementSibling === choices) return;
+  owner.after(choices);
+  choices.scrollIntoView({ block: "nearest" });
+  owner.scrollIntoView({ block: "nearest" });
 }
 
 /** @param {import("../messages.js").CandidateRow} row @param {number} index */
@@ -202,12 +205,12 @@ function line(click) {
   act.type = "checkbox";
   const guess = click.state === "untouched";
   act.checked = !excluded && !guess;
-  act.setAttribute("aria-label", `Use ${click.id} in the calibration`);
+  act.setAttribute("aria-label", `Use ${nameOf(click.id)} in the calibration`);
   act.dataset.hint = guess ? "A guess: it does not count until it is moved to the reflector. Click to exclude it (X)" : excluded ? "Excluded. Click to include it again (X)" : "Used in the calibration. Click to exclude it (X)";
   act.dataset.act = "exclude";
   const range = click.range_m === null ? "–" : `${click.range_m.toFixed(1)} m`;
   const row = make("tr", `row ${click.state}`, [
-    make("td", "", [make("span", "name", [glyph(click.state, colour), click.id])]),
+    make("td", "", [make("span", "name", [glyph(click.state, colour), nameOf(click.id)])]),
     make("td", "", `${(state.seconds[click.frame] ?? 0).toFixed(2)} s`),
     make("td", "", range),
     make("td", "bar", [make("span", "meter", [make("i", "", [bar]), make("span", "", residual)])]),
@@ -231,11 +234,11 @@ const word = (click) => ({ unpaired: "no return", pending: "…", untouched: "gu
 /** @param {Click} click */
 function explain(click) {
   const how = { clicked: "click", moved: "moved mark", snapped: "mark on the corner found in the picture", untouched: "guess" }[click.mark];
-  const lines = [`${click.id}: ${how} at ${click.u_px.toFixed(1)}, ${click.v_px.toFixed(1)} px`];
+  const lines = [`${nameOf(click.id)}: ${how} at ${click.u_px.toFixed(1)}, ${click.v_px.toFixed(1)} px`];
   if (click.projected_px) lines.push(`reprojected at ${click.projected_px.map((value) => value.toFixed(1)).join(", ")} px`);
   if (click.sigma_px !== null) lines.push(`its own standard deviation: ${click.sigma_px.toFixed(2)} px`);
   if (click.range_m !== null) lines.push(`radar: ${click.range_m.toFixed(2)} m, ${toSide(click.azimuth_deg, "left", "right")}, ${toSide(click.elevation_deg, "up", "down")}${click.chosen ? ", chosen by you" : ""}`);
-  if (click.note) lines.push(click.note);
+  if (click.note) lines.push(named(click.note));
   return lines.join("\n");
 }
 

@@ -1,6 +1,6 @@
 /** Scatter plot of the residuals: how far right (du) and down (dv) each reprojection is from its click. An off-centre cloud indicates a bias. */
 
-import { ink, residualColour, themeColour } from "../shell/colours.js";
+import { ink, residualColour, smallFont, themeColour } from "../shell/colours.js";
 import { make } from "../shell/notices.js";
 import { clicks, onPainted, select, state } from "../shell/state.js";
 import { goTo, pause } from "../time/player.js";
@@ -65,7 +65,7 @@ function draw() {
   pen.lineTo(side - 6, half);
   pen.stroke();
   pen.fillStyle = themeColour("faint");
-  pen.font = `11px ${themeColour("face")}`;
+  pen.font = smallFont();
   pen.textAlign = "right";
   pen.fillText(`${most} px`, side - 5, 14); // in the corner, where no mark is
   const shown = clicks().filter((click) => click.projected_px);

@@ -9,7 +9,7 @@ import { showPage } from "../shell/layout.js";
 import { icon, make, toast } from "../shell/notices.js";
 import { notes, openAgain } from "../shell/opening.js";
 import { send } from "../shell/socket.js";
-import { on, onPainted, state } from "../shell/state.js";
+import { named, on, onPainted, state } from "../shell/state.js";
 
 /** @typedef {import("../messages.js").DataWarning} WarningRow */
 /** @typedef {import("../messages.js").AssumptionRow} AssumptionRow */
@@ -75,7 +75,7 @@ function drawList(list, rows, acknowledged, first) {
 /** @param {WarningRow} warning @param {boolean} read */
 function row(warning, read) {
   /** @type {HTMLElement[]} */
-  const inside = [make("div", "hint", warning.hint)];
+  const inside = [make("div", "hint", named(warning.hint))];
   if (TO_PICK.includes(warning.code)) {
     const pick = make("button", "pick", "Pick a meaning…");
     pick.onclick = openMeanings;
@@ -99,7 +99,7 @@ function row(warning, read) {
 
 /** A line that unfolds. @param {string} code @param {string} className @param {string} line @param {HTMLElement[]} inside */
 function folded(code, className, line, inside) {
-  const made = make("details", className, [make("summary", "", [icon("warning"), make("span", "", line)]), ...inside]);
+  const made = make("details", className, [make("summary", "", [icon("warning"), make("span", "", named(line))]), ...inside]);
   made.dataset.code = code;
   made.open = openCodes.has(code);
   made.ontoggle = () => (made.open ? openCodes.add(code) : openCodes.delete(code));

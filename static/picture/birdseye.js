@@ -3,7 +3,7 @@
  * with its controls and the table of placements.
  */
 
-import { ink, themeColour } from "../shell/colours.js";
+import { ink, smallFont, themeColour } from "../shell/colours.js";
 import { hideTip, make, showTip } from "../shell/notices.js";
 import { emit, on, placementAt, state } from "../shell/state.js";
 import { goTo, pause, tellCursor } from "../time/player.js";
@@ -108,7 +108,7 @@ function drawGrid() {
   const [ox, oy] = toCanvas(0, 0);
   pen.strokeStyle = themeColour("line");
   pen.fillStyle = themeColour("faint");
-  pen.font = `11px ${themeColour("face")}`;
+  pen.font = smallFont();
   pen.lineWidth = 1;
   for (let range = step; range < farthest && range < 60 * step; range += step) {
     pen.beginPath();
@@ -166,7 +166,7 @@ function drawPlacements() {
     pen.strokeStyle = placement === here ? themeColour("ink") : colour;
     pen.stroke();
     pen.setLineDash([]);
-    pen.font = `600 11px ${getComputedStyle(document.body).fontFamily}`;
+    pen.font = smallFont(1, "600");
     pen.fillStyle = placement === here ? themeColour("ink") : colour;
     text(String(index + 1), px + RING, py - RING + 2, "left");
   });

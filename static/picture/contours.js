@@ -1,5 +1,6 @@
 /** The uncertainty in the picture: lines on which a point at some distance may be this many pixels away from its drawn place. */
 
+import { smallFont } from "../shell/colours.js";
 import { make } from "../shell/notices.js";
 import { tell } from "../shell/socket.js";
 import { emit, on, state } from "../shell/state.js";
@@ -123,7 +124,7 @@ function labelPlace(line, taken) {
 
 /** @param {CanvasRenderingContext2D} pen @param {string} words @param {[number, number]} at */
 function label(pen, words, [x, y]) {
-  pen.font = `600 ${11 * viewport.ratio}px ${getComputedStyle(document.body).fontFamily}`;
+  pen.font = smallFont(viewport.ratio, "600");
   pen.textAlign = "center";
   pen.textBaseline = "middle";
   const half = pen.measureText(words).width / 2 + 5 * viewport.ratio;

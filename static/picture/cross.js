@@ -4,7 +4,7 @@
  */
 
 import { shownOffer } from "../proposals/proposals.js";
-import { ink } from "../shell/colours.js";
+import { ink, smallFont } from "../shell/colours.js";
 import { toast } from "../shell/notices.js";
 import { clickIn, clicksIn, emit, isOffered, on, placementsAt, state } from "../shell/state.js";
 import { leaveLive } from "../time/player.js";
@@ -185,7 +185,7 @@ export function drawCross(pen) {
     pen.lineTo(right, y);
   }
   pen.stroke();
-  pen.font = `600 ${11 * ratio}px ${getComputedStyle(document.body).fontFamily}`;
+  pen.font = smallFont(ratio, "600");
   pen.textAlign = "left";
   pen.textBaseline = "top";
   DIGITS.forEach((digit, index) => {

@@ -1,6 +1,6 @@
 /** The loupe: the picture around a point, magnified 4 to 16 times, with a cross centred on the point to a fraction of a pixel. */
 
-import { ink } from "../shell/colours.js";
+import { ink, smallFont, smallPx } from "../shell/colours.js";
 import { clickIn, on, state } from "../shell/state.js";
 import { viewport } from "./geometry.js";
 
@@ -151,11 +151,11 @@ function line(x, y, toX, toY) {
 
 /** How much it magnifies, and the keys that change it. @param {number} side */
 function drawCaption(side) {
-  const height = 15 * viewport.ratio;
+  const height = (smallPx() + 4) * viewport.ratio;
   pen.fillStyle = "rgb(0 0 0 / 62%)";
   pen.fillRect(0, side - height, side, height);
   pen.fillStyle = "#fff";
-  pen.font = `${10 * viewport.ratio}px ${getComputedStyle(canvas).fontFamily}`;
+  pen.font = smallFont(viewport.ratio);
   pen.textBaseline = "middle";
   pen.textAlign = "left";
   pen.fillText(`${kept.magnifies}×   [  ]`, 6 * viewport.ratio, side - height / 2);

@@ -4,7 +4,7 @@
  */
 
 import { drawBoxedReturns, drawBoxes } from "../boxes/boxes.js";
-import { ink, residualColour } from "../shell/colours.js";
+import { ink, residualColour, smallFont, smallPx } from "../shell/colours.js";
 import { make } from "../shell/notices.js";
 import { clicks, clicksIn, emit, isOffered, on, placementsAt, state } from "../shell/state.js";
 import { toCss, toDevice, viewport, zoom } from "./geometry.js";
@@ -88,7 +88,7 @@ function drawAdvice(pen, advice) {
     pen.lineTo(x, y + high);
     pen.closePath();
   }, [4 * viewport.ratio, 3.5 * viewport.ratio]);
-  pen.font = `${11 * viewport.ratio}px ${getComputedStyle(document.body).fontFamily}`;
+  pen.font = smallFont(viewport.ratio);
   pen.textAlign = "center";
   pen.lineWidth = 3 * viewport.ratio;
   pen.strokeStyle = ink.edge;
@@ -172,10 +172,11 @@ export function outlined(pen, colour, width, path, dashes = [], edge = 2) {
   pen.setLineDash(dashes);
   pen.beginPath();
   path();
-  pen.lineWidth = (width + edge) * viewport.ratio;
+  const thick = (viewport.ratio * smallPx()) / 11;
+  pen.lineWidth = (width + edge) * thick;
   pen.strokeStyle = ink.edge;
   pen.stroke();
-  pen.lineWidth = width * viewport.ratio;
+  pen.lineWidth = width * thick;
   pen.strokeStyle = colour;
   pen.stroke();
   pen.setLineDash([]);

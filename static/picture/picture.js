@@ -3,7 +3,7 @@
  * those who do not see it.
  */
 
-import { clicksIn, emit, isClicked, on, placementAt, state } from "../shell/state.js";
+import { clicksIn, emit, isClicked, named, nameOf, on, placementAt, state } from "../shell/state.js";
 import * as geometry from "./geometry.js";
 
 const { viewport } = geometry;
@@ -168,7 +168,7 @@ function placementWords(index) {
 /** @param {number} index @returns {string[]} */
 function markWords(index) {
   const here = clicksIn(index);
-  if (here.length) return here.flatMap((click) => [oneMark(click), click.note]);
+  if (here.length) return here.flatMap((click) => [oneMark(click), named(click.note)]);
   const guess = state.overlay?.index === index ? state.overlay.guesses[0]?.[0] : undefined;
   return [guess ? `No mark in this frame; the reflector is expected at column ${guess[0].toFixed(0)}, row ${guess[1].toFixed(0)}` : "No mark in this frame"];
 }
@@ -178,7 +178,7 @@ function oneMark(click) {
   const residual = click.residual_px === null ? "" : `, ${click.residual_px.toFixed(1)} px from where the radar expects it`;
   const guessed = click.mark === "untouched" ? "a guess that does not count" : (STATES[click.state] ?? click.state);
   const selected = click.id !== "" && click.id === state.selected ? ", selected" : "";
-  return `Mark ${click.id} at column ${click.u_px.toFixed(1)}, row ${click.v_px.toFixed(1)}${selected}: ${guessed}${residual}`;
+  return `Mark ${nameOf(click.id)} at column ${click.u_px.toFixed(1)}, row ${click.v_px.toFixed(1)}${selected}: ${guessed}${residual}`;
 }
 
 /** @param {number} count @param {string} one @param {string} many */

@@ -2,7 +2,7 @@
 
 import { toDevice, viewport } from "../picture/geometry.js";
 import { cross, outlined } from "../picture/marks.js";
-import { ink } from "../shell/colours.js";
+import { ink, smallFont, smallPx } from "../shell/colours.js";
 import { shownOffer } from "./proposals.js";
 
 /** A ring of this many standard deviations contains 95 %. */
@@ -23,7 +23,7 @@ export function drawProposal(pen) {
   const radius = Math.max(3 * ratio, RING * offer.place.sigma_px * scale);
   const gap = Math.max(4 * ratio, radius + 2 * ratio, CLEAR * offer.row.width_px * scale);
   outlined(pen, ink.guess, 1.2, () => pen.arc(x, y, radius, 0, 2 * Math.PI), [], 1.6);
-  outlined(pen, ink.click, 1.8, () => cross(pen, x, y, gap + 18 * ratio, gap), [4 * ratio, 3 * ratio]);
+  outlined(pen, ink.click, 1.8, () => cross(pen, x, y, gap + 1.6 * smallPx() * ratio, gap), [4 * ratio, 3 * ratio]);
 }
 
 /** @param {CanvasRenderingContext2D} pen @param {import("../messages.js").ProposalPlace} place @param {number} number */
@@ -34,10 +34,10 @@ function drawOther(pen, place, number) {
   outlined(pen, ink.guess, 1, () => pen.arc(x, y, 3 * ratio, 0, 2 * Math.PI), [2 * ratio, 2 * ratio], 1.4);
   const [bx, by] = [x + 11 * ratio, y - 11 * ratio];
   pen.beginPath();
-  pen.arc(bx, by, RADIUS * ratio, 0, 2 * Math.PI);
+  pen.arc(bx, by, RADIUS * (smallPx() / 11) * ratio, 0, 2 * Math.PI);
   pen.fillStyle = "rgb(20 26 32 / 75%)";
   pen.fill();
-  pen.font = `600 ${10 * ratio}px ${getComputedStyle(document.body).fontFamily}`;
+  pen.font = smallFont(0.9 * ratio, "600");
   [pen.textAlign, pen.textBaseline] = ["center", "middle"];
   pen.fillStyle = "#ffffff";
   pen.fillText(String(number), bx, by + 0.5 * ratio);

@@ -3,7 +3,7 @@
 import { toDevice, viewport } from "../picture/geometry.js";
 import { make, toast } from "../shell/notices.js";
 import { tell } from "../shell/socket.js";
-import { clicksIn, emit, on, state } from "../shell/state.js";
+import { clicksIn, emit, nameOf, on, state } from "../shell/state.js";
 import { visible } from "./review.js";
 
 /** @typedef {import("../messages.js").CompareWanted["a"]} Kind */
@@ -107,7 +107,7 @@ function drawMenus() {
 function toggledLabel() {
   const click = state.view?.clicks.find((one) => one.id === state.selected);
   if (!click) return "without the selected pair";
-  return `${click.state === "excluded" ? "with" : "without"} ${click.id}`;
+  return `${click.state === "excluded" ? "with" : "without"} ${nameOf(click.id)}`;
 }
 
 /** Ask for the comparison, once per answer and choice. */

@@ -3,7 +3,7 @@
  * to it with the arrow keys, tells the owner, which highlights the same pairs in every plot.
  */
 
-import { themeColour } from "../shell/colours.js";
+import { smallFont, themeColour } from "../shell/colours.js";
 import { hideTip, make, showTip } from "../shell/notices.js";
 
 /** @typedef {"agreeing"|"outlier"|"excluded"|"untouched"} Kind */
@@ -100,7 +100,7 @@ export class Plot {
   drawAxes(width, height) {
     const { pen, content } = this;
     const [floor, right] = [height - EDGE.bottom, width - EDGE.right];
-    pen.font = `10px ${getComputedStyle(document.body).fontFamily}`;
+    pen.font = smallFont();
     pen.lineWidth = 1;
     pen.textBaseline = "alphabetic";
     for (const [axis, upright] of /** @type {[Axis, boolean][]} */ ([[content.x, false], [content.y, true]])) {

@@ -3,7 +3,7 @@
 import { comeTo } from "../picture/arriving.js";
 import { make } from "../shell/notices.js";
 import { tell } from "../shell/socket.js";
-import { clicks, on, select, state } from "../shell/state.js";
+import { clicks, named, nameOf, on, select, state } from "../shell/state.js";
 import { Plot } from "./plots.js";
 
 /** @typedef {import("../messages.js").ClickRow} Click */
@@ -114,7 +114,7 @@ function drawAll() {
   pending = 0;
   if (!visible()) return;
   highlight.selected = state.selected;
-  wordsLine.textContent = review?.words ?? "";
+  wordsLine.textContent = named(review?.words ?? "");
   drawFilters();
   drawPlots();
   drawPair();
@@ -304,8 +304,8 @@ function pairParts(pair) {
   const scroll = make("div", "review-scroll", [make("table", "review-candidates", [make("thead", "", [head]), make("tbody", "", lines)])]);
   scroll.tabIndex = 0; // a narrow panel scrolls it
   scroll.setAttribute("role", "region");
-  scroll.setAttribute("aria-label", `Returns that ${pair.id} may use`);
-  return [make("h2", "", `Pair ${pair.id}`), make("p", "", pair.why), make("dl", "", facts), ...(pair.candidates.length ? [scroll] : [])];
+  scroll.setAttribute("aria-label", `Returns that ${nameOf(pair.id)} may use`);
+  return [make("h2", "", `Pair ${nameOf(pair.id)}`), make("p", "", named(pair.why)), make("dl", "", facts), ...(pair.candidates.length ? [scroll] : [])];
 }
 
 /** Limits of an axis, a little beyond its values. @param {number[]} values */
@@ -321,7 +321,7 @@ function told(row) {
   const { click } = row;
   const side = (/** @type {number|null} */ angle, /** @type {string} */ plus, /** @type {string} */ minus) => `${Math.abs(angle ?? 0).toFixed(1)}° ${(angle ?? 0) >= 0 ? plus : minus}`;
   const more = [row.heldOut === null ? "" : `held out ${digits(row.heldOut)} px`, row.influence === null ? "" : `influence ${digits(row.influence)} σ`];
-  return [`${click.id}: ${digits(row.length)} px`, `${click.range_m?.toFixed(1)} m, ${side(click.azimuth_deg, "left", "right")}`, ...more.filter(Boolean)].join(" · ");
+  return [`${nameOf(click.id)}: ${digits(row.length)} px`, `${click.range_m?.toFixed(1)} m, ${side(click.azimuth_deg, "left", "right")}`, ...more.filter(Boolean)].join(" · ");
 }
 
 /** Three significant digits. @param {number} value */

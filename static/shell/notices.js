@@ -1,7 +1,7 @@
 /** Notices: toasts for errors, the banner for a lost connection, and explanations of figures and controls. */
 
 import { toCss } from "../picture/geometry.js";
-import { clickIn, on, state } from "./state.js";
+import { clickIn, named, on, state } from "./state.js";
 
 const toasts = /** @type {HTMLElement} */ (document.getElementById("toasts"));
 const banner = /** @type {HTMLElement} */ (document.getElementById("banner"));
@@ -20,7 +20,7 @@ let explained = null;
 export function toast(message, hint = "", about = "") {
   const text = toasts.querySelector(".toast span")?.textContent;
   if (text === message) return;
-  const box = make("div", "toast", [make("span", "", message), hint ? make("small", "", hint) : ""]);
+  const box = make("div", "toast", [make("span", "", named(message)), hint ? make("small", "", named(hint)) : ""]);
   box.dataset.about = about;
   const close = make("button", "", "×");
   close.setAttribute("aria-label", "Close");
@@ -104,7 +104,7 @@ function offer(target, x) {
   tipTimer = window.setTimeout(() => explain(owner, x), TIP_MS);
 }
 
-/** Show the explanation of an element below it, or above where there is no room, so that it never covers the element. @param {HTMLElement} owner @param {number} x */
+/** Show the explanation of an element below it, or above where there is no room, of a row beside the table: it covers neither the element nor the next rows. @param {HTMLElement} owner @param {number} x */
 function explain(owner, x) {
   if (!owner.isConnected) return;
   hideTip();
@@ -113,8 +113,9 @@ function explain(owner, x) {
   tip.hidden = false;
   const [box, around] = [tip.getBoundingClientRect(), owner.getBoundingClientRect()];
   const below = around.bottom + TIP_GAP + box.height <= innerHeight;
-  tip.style.left = `${Math.max(6, Math.min(x + 8, innerWidth - box.width - 8))}px`;
-  tip.style.top = `${below ? around.bottom + TIP_GAP : Math.max(0, around.top - TIP_GAP - box.height)}px`;
+  const beside = owner.closest(".pairs tbody") !== null && around.left > box.width + 6;
+  tip.style.left = `${beside ? around.left - box.width - TIP_GAP : Math.max(6, Math.min(x + 8, innerWidth - box.width - 8))}px`;
+  tip.style.top = beside ? `${Math.min(around.top, innerHeight - box.height - TIP_GAP)}px` : `${below ? around.bottom + TIP_GAP : Math.max(0, around.top - TIP_GAP - box.height)}px`;
   if (owner.hasAttribute("aria-describedby")) return;
   owner.setAttribute("aria-describedby", tip.id);
   explained = owner;

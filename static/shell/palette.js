@@ -6,7 +6,7 @@ import { ACTIONS, keyNames, reasonAgainst } from "./actions.js";
 import { make } from "./notices.js";
 import { openOption, optionRows } from "./options.js";
 import { fitOf } from "./searching.js";
-import { clicks, isClicked, select, state } from "./state.js";
+import { clicks, isClicked, nameOf, select, state } from "./state.js";
 
 const KEPT = "cocalib-recent";
 const MOST_RECENT = 6;
@@ -25,7 +25,7 @@ let chosen = 0;
 
 export function startPalette() {
   field.type = "text";
-  field.placeholder = "Search for an action or an option, or type placement 7, pair c3, frame 120, time 12.5";
+  field.placeholder = "Search for an action or an option, or type placement 7, pair 3, frame 120, time 12.5";
   field.spellcheck = false;
   field.autocomplete = "off";
   const attributes = { role: "combobox", "aria-label": "Search for an action, a placement, a pair or an option", "aria-expanded": "true", "aria-controls": "palette-found", "aria-autocomplete": "list" };
@@ -206,9 +206,9 @@ function pairs() {
     return {
       id: `pair:${click.id}`,
       group: "Pair",
-      words: `Pair ${click.id}`,
+      words: `Pair ${nameOf(click.id)}`,
       detail: [`${(state.seconds[click.frame] ?? 0).toFixed(1)} s`, click.range_m === null ? "" : `${click.range_m.toFixed(1)} m`, residual].filter(Boolean).join(", "),
-      also: `click mark ${click.id.replace(/\D/g, "")} ${click.state}`,
+      also: `click mark ${click.state}`,
       reason: "",
       run: () => {
         comeTo(click.frame);
@@ -228,14 +228,14 @@ function options() {
 
 /** A placement or pair that was typed but is not there. @param {string} query @returns {Entry[]} */
 function missing(query) {
-  const typed = /^(placement|pair)\s*c?(\d+)$/i.exec(query.trim());
+  const typed = /^(placement|pair)\s*(\d+)$/i.exec(query.trim());
   if (!typed) return [];
   const [isPair, number] = [typed[1].toLowerCase() === "pair", Number(typed[2])];
-  const known = isPair ? clicks().some((click) => click.id === `c${number}`) : number >= 1 && number <= state.placements.length;
+  const known = isPair ? clicks().some((click) => nameOf(click.id) === typed[2]) : number >= 1 && number <= state.placements.length;
   if (known) return [];
   const many = isPair ? clicks().length : state.placements.length;
   const reason = `There ${many === 1 ? "is 1" : `are ${many || "no"}`} ${isPair ? "pair" : "placement"}${many === 1 ? "" : "s"}`;
-  return [{ id: "missing", group: isPair ? "Pair" : "Placement", words: isPair ? `Pair c${number}` : `Placement ${number}`, reason, run: () => {} }];
+  return [{ id: "missing", group: isPair ? "Pair" : "Placement", words: `${isPair ? "Pair" : "Placement"} ${number}`, reason, run: () => {} }];
 }
 
 /** Frames and times that were typed: "frame 300", "time 12.5", "12.5 s", or only a number. @param {string} query @returns {Entry[]} */

@@ -72,6 +72,7 @@ function callWaiting() {
 /** Notify the listeners of a topic. @param {Topic} topic */
 export function emit(topic) {
   if (topic === "view" || topic === "recording") derived = null;
+  if (topic === "placements" || !derived) names = null;
   for (const listener of listeners.get(topic) ?? []) listener();
 }
 
@@ -171,6 +172,24 @@ export function clicksOf(placement) {
   }
   return found;
 }
+
+/** What clicks with an id are called. @type {Map<string, string>|null} */
+let names = null;
+
+/** What a click is called on the page: the number of its placement, with a letter if there are several; its id where there is no placement. @param {string} id @returns {string} */
+export function nameOf(id) {
+  if (!names) {
+    const found = (names = new Map());
+    state.placements.forEach((placement, index) => {
+      const own = clicksOf(placement).filter((click) => !found.has(click.id));
+      own.forEach((click, place) => found.set(click.id, `${index + 1}${own.length > 1 ? String.fromCharCode(97 + (place % 26)) : ""}`));
+    });
+  }
+  return names.get(id) ?? id;
+}
+
+/** Words of the server, with the clicks called as on the page. @param {string} words */
+export const named = (words) => words.replace(/\bc\d+\b/g, (id) => (nameOf(id) === id ? id : `#${nameOf(id)}`));
 
 /** Whether a placement has a click, also one that is excluded or does not count. @param {Placement} placement */
 export const isClicked = (placement) => clicksOf(placement).length > 0;

@@ -7,7 +7,7 @@ import { toDevice, viewport, zoom } from "../picture/geometry.js";
 import { fit } from "../picture/picture.js";
 import { searchWords } from "../proposals/proposals.js";
 import { icon, make } from "./notices.js";
-import { on, onPainted, state } from "./state.js";
+import { named, on, onPainted, state } from "./state.js";
 
 /** @param {string} id */
 const get = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
@@ -54,8 +54,8 @@ function drawStatus() {
   const opening = state.opening;
   const found = state.looking ? [state.placementSummary].filter(Boolean) : null;
   const words = found?.length ? found : opening || !view ? [opening?.problem || opening?.doing || "Opening the recording…"] : [...followWords(), doingWords(view)].filter(Boolean);
-  get("status-text").textContent = words.join("  ·  ");
-  get("status-text").dataset.hint = words.join("\n");
+  get("status-text").textContent = named(words.join("  ·  "));
+  get("status-text").dataset.hint = named(words.join("\n"));
   const undo = /** @type {HTMLButtonElement} */ (get("undo"));
   const redo = /** @type {HTMLButtonElement} */ (get("redo"));
   undo.disabled = state.looking || !view?.can_undo;

@@ -3,8 +3,8 @@
  * Camera view, the page's own picture with the returns in front of it, projected by the server through the same lens.
  */
 
-import { ink, themeColour } from "../shell/colours.js";
-import { clicks, on, state } from "../shell/state.js";
+import { ink, smallFont, smallPx, themeColour } from "../shell/colours.js";
+import { clicks, nameOf, on, state } from "../shell/state.js";
 import { spaceOptions } from "./options.js";
 import { drawAgain, hookInto, projection, shownThere } from "./viser_hook.js";
 
@@ -12,7 +12,10 @@ import { drawAgain, hookInto, projection, shownThere } from "./viser_hook.js";
 const pane = /** @type {HTMLElement} */ (document.getElementById("space"));
 export const layer = document.createElement("canvas");
 const pen = /** @type {CanvasRenderingContext2D} */ (layer.getContext("2d"));
-const [LABEL_HIGH, RING, DOT] = [15, 8, 3.8];
+const [RING, DOT] = [8, 3.8];
+/** Where words about a point stand, the preferred place first [CSS px]. */
+const BESIDE = [[0, -16], [0, 18], [-70, 0], [70, 0]];
+const labelHigh = () => smallPx() + 4;
 /** So many looks are kept until the 3D view has drawn them. */
 const MOST_LOOKS = 8;
 
@@ -106,7 +109,7 @@ export function pickable() {
   look.window.forEach(([seen], index) => add("window", index, placeReturn(place, seen), `return ${seen.slice(6, 9)}`, () => describeReturn(seen)));
   look.placements.forEach(({ position_m, pixel_px, state: known }, index) =>
     add("placement", index, place(position_m, pixel_px), `placement ${index}`, () => `Placement ${index + 1}: ${describePlace(position_m)}${known === "open" ? ", not clicked yet" : `, ${known}`}`));
-  look.reflectors.forEach(({ id, position_m, pixel_px }, index) => add("reflector", index, place(position_m, pixel_px), `reflector ${id}`, () => `Reflector of ${id}: ${describePlace(position_m)}${residualOf(id)}`));
+  look.reflectors.forEach(({ id, position_m, pixel_px }, index) => add("reflector", index, place(position_m, pixel_px), `reflector ${id}`, () => `Reflector of ${nameOf(id)}: ${describePlace(position_m)}${residualOf(id)}`));
   candidates().forEach((row, index) => add("candidate", index, place(row.position_m, [row.u_px, row.v_px]), `candidate ${row.position_m}`, () => describeCandidate(row)));
   return (items = made);
 }
@@ -168,11 +171,14 @@ function drawLook(look, place, board) {
     const at = place(row.position_m, [row.u_px, row.v_px]);
     if (at) ring(at[0], at[1], row.used ? RING + 2 : RING, themeColour(row.used ? "attention" : "ink"), row.used ? 2 : 1.2, row.used ? [] : [3, 2]);
   }
-  pen.font = `600 11px ${themeColour("face")}`;
+  pen.font = smallFont(1, "600");
+  board.taken.push([board.width - 7 * smallPx(), 0, board.width, 3.5 * smallPx()]); // the button of the viewpoints
   for (const { words, position_m, kind } of look.labels) {
     const reflector = kind === "selected" ? look.reflectors.find(({ id }) => id === state.selected) : undefined;
     const at = place(position_m, reflector?.pixel_px ?? null);
-    if (at) label(board, words, at[0], at[1] - 16, kind === "selected" ? "ink" : "accent");
+    if (!at) continue;
+    const said = kind === "selected" ? words.replace(/^c\d+/, nameOf) : words;
+    BESIDE.some(([dx, dy]) => label(board, said, at[0] + dx, at[1] + dy, kind === "selected" ? "ink" : "accent"));
   }
   look.placements.forEach(({ position_m, pixel_px, state: known }, index) => {
     const at = place(position_m, pixel_px);
@@ -182,9 +188,9 @@ function drawLook(look, place, board) {
   });
   if (spaceOptions.camera) return;
   const words = (/** @type {number} */ range) => `${Number(range.toPrecision(3))} m`;
-  pen.font = `11px ${themeColour("face")}`;
+  pen.font = smallFont();
   const project = (/** @type {readonly number[]} */ point) => place(point, null);
-  const size = (/** @type {number} */ range) => /** @type {[number, number]} */ ([pen.measureText(words(range)).width + 8, LABEL_HIGH]);
+  const size = (/** @type {number} */ range) => /** @type {[number, number]} */ ([pen.measureText(words(range)).width + 8, labelHigh()]);
   for (const { range, x, y } of ringPlaces(look.rings_m, look.ground_m, project, board, size)) write(words(range), x, y, "muted");
 }
 
@@ -242,9 +248,11 @@ function ring(x, y, radius, colour, width, dashes = []) {
   pen.setLineDash([]);
 }
 
-/** Write words if there is room. @param {Board} board @param {string} words @param {number} x @param {number} y @param {string} colour */
+/** Write words if there is room. @param {Board} board @param {string} words @param {number} x @param {number} y @param {string} colour @returns {boolean} whether there was */
 function label(board, words, x, y, colour) {
-  if (board.take(x, y, pen.measureText(words).width + 6, LABEL_HIGH)) write(words, x, y, colour);
+  const free = board.take(x, y, pen.measureText(words).width + 6, labelHigh());
+  if (free) write(words, x, y, colour);
+  return free;
 }
 
 /** Upright words on a veil, centred at a point. @param {string} words @param {number} x @param {number} y @param {string} colour */
@@ -252,7 +260,7 @@ function write(words, x, y, colour) {
   const wide = pen.measureText(words).width + 6;
   pen.fillStyle = themeColour("veil");
   pen.beginPath();
-  pen.roundRect(x - wide / 2, y - LABEL_HIGH / 2, wide, LABEL_HIGH, 3);
+  pen.roundRect(x - wide / 2, y - labelHigh() / 2, wide, labelHigh(), 3);
   pen.fill();
   pen.fillStyle = themeColour(colour);
   pen.textAlign = "center";

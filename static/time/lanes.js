@@ -4,9 +4,9 @@
  */
 
 import { confidences } from "../proposals/proposals.js";
-import { ink, residualColour, themeColour } from "../shell/colours.js";
+import { ink, residualColour, smallFont, smallPx, themeColour } from "../shell/colours.js";
 import { clicks, emit, isLookedAt, on, state } from "../shell/state.js";
-import { drawGaps, drawRuler, pixelsPerSecond, RULER, text } from "./ruler.js";
+import { drawGaps, drawRuler, pixelsPerSecond, RULER } from "./ruler.js";
 
 export const lanes = { left: 74, right: 14, gap: 4, bottom: 5 };
 /** Returns per slice of time, from the server; empty until known. @type {{step_s: number, returns: number[]}} */
@@ -20,7 +20,7 @@ const MUCH = 12;
 const NAMES = { placements: "Placements", clicks: "Clicks", radar: "Radar", picture: "Picture" };
 /** A dismissed placement is one at this place and time [m]. */
 const SAME_PLACE_M = 0.75;
-/** A timeline of this height has larger text [CSS px]. */
+/** A timeline of this height has a higher lane for the picture [CSS px]. */
 const LARGE = 140;
 
 /** @typedef {CanvasRenderingContext2D} Ink */
@@ -51,7 +51,7 @@ export function drawLanes(pen, width, height, axis, pointer) {
   pen.clearRect(0, 0, width, height);
   if (!state.seconds.length) return;
   const boxes = laneBoxes(height);
-  [text.px, lanes.left] = height >= LARGE ? [14, 96] : [11, 74];
+  lanes.left = 6.7 * smallPx();
   pen.save();
   pen.beginPath();
   pen.rect(lanes.left - 8, 0, width - lanes.left + 8, height);
@@ -76,7 +76,7 @@ export function drawLanes(pen, width, height, axis, pointer) {
 
 /** @param {Ink} pen @param {Boxes} boxes */
 function drawNames(pen, boxes) {
-  pen.font = `${text.px}px ${getComputedStyle(document.body).fontFamily}`;
+  pen.font = smallFont();
   pen.textAlign = "left";
   pen.textBaseline = "middle";
   pen.fillStyle = themeColour("muted");
@@ -132,7 +132,7 @@ function drawPlacement(pen, placement, sure, { top, bottom }, axis) {
     pen.fillRect(left + 1, bottom - 3, Math.max(2, (wide - 2) * sure), 3);
   }
   if (wide < 15 || height < 9) return;
-  pen.font = `600 ${text.px - 0.5}px ${getComputedStyle(document.body).fontFamily}`;
+  pen.font = smallFont(1, "600");
   [pen.textAlign, pen.textBaseline] = ["center", "middle"];
   pen.fillStyle = themeColour("ink");
   pen.fillText(`${state.placements.indexOf(placement) + 1}${placement.note && wide >= 28 ? " !" : ""}`, middle, (top + bottom) / 2 + 0.5);
@@ -203,7 +203,7 @@ const barWidth = (axis, step_s) => Math.ceil(pixelsPerSecond(axis) * step_s) - (
 /** @param {Ink} pen @param {import("../messages.js").ClickRow} click @param {number} x @param {{top: number, bottom: number}} box */
 function drawStem(pen, click, x, { top, bottom }) {
   const limit = state.view?.residual_limit_px ?? 20;
-  const size = Math.min(text.px / 3, (bottom - top) / 3);
+  const size = Math.min(smallPx() / 3, (bottom - top) / 3);
   const room = bottom - top - size - 1;
   const least = Math.min(6, room);
   const tall = click.residual_px === null ? least : Math.min(room, Math.max(least, (click.residual_px / (1.5 * limit)) * room));

@@ -3,19 +3,17 @@
  * recording go in, drawn seconds come out; the way is strictly monotone, so it has an exact way back, also inside a gap.
  */
 
-import { themeColour } from "../shell/colours.js";
+import { smallFont, smallPx, themeColour } from "../shell/colours.js";
 
 /** @typedef {CanvasRenderingContext2D} Ink */
 /** @typedef {import("./lanes.js").Axis} Axis */
 
 /** Height of the ruler [CSS px]. */
 export const RULER = 17;
-/** Size of the text in the timeline [CSS px]. */
-export const text = { px: 11 };
 
 /** Ticks and times; each stretch after a folded gap begins with its own time. @param {Ink} pen @param {number} left @param {number} width @param {number} height @param {Axis} axis */
 export function drawRuler(pen, left, width, height, axis) {
-  pen.font = `${text.px}px ${themeColour("face")}`;
+  pen.font = smallFont();
   pen.textBaseline = "middle";
   pen.textAlign = "center";
   const stretches = axis.folding.stretches.filter(({ from, to }) => to >= axis.from_s && from <= axis.to_s);
@@ -92,7 +90,7 @@ export function drawGaps(pen, height, axis) {
 
 /** @param {Ink} pen @param {string} words @param {number} left @param {number} right @param {number} height */
 function drawLength(pen, words, left, right, height) {
-  pen.font = `${text.px}px ${getComputedStyle(document.body).fontFamily}`;
+  pen.font = smallFont();
   pen.textAlign = "center";
   pen.textBaseline = "middle";
   const long = pen.measureText(words).width + 6;
@@ -101,7 +99,7 @@ function drawLength(pen, words, left, right, height) {
   pen.translate((left + right) / 2, (height + RULER) / 2);
   if (!lying) pen.rotate(-Math.PI / 2);
   pen.fillStyle = themeColour("ground");
-  pen.fillRect(-long / 2, -text.px / 1.5, long, text.px * 1.33);
+  pen.fillRect(-long / 2, -smallPx() / 1.5, long, smallPx() * 1.33);
   pen.fillStyle = themeColour("muted");
   pen.fillText(words, 0, 0.5);
 }

@@ -1,7 +1,7 @@
 /** The timeline: where a pointer is in time, and what is there; click to go there, wheel or two fingers to zoom. lanes.js draws it. */
 
 import { hideTip, showTip } from "../shell/notices.js";
-import { clicks, on, onPainted, state } from "../shell/state.js";
+import { clicks, nameOf, on, onPainted, state } from "../shell/state.js";
 import { changes, drawLanes, fateOf, laneBoxes, lanes } from "./lanes.js";
 import { jump, nearestIndex } from "./player.js";
 import { foldingOf, gapsOf, lengthWords, toFolded, toSeconds as unfolded } from "./ruler.js";
@@ -138,7 +138,7 @@ const FATES = { clicked: "clicked", open: "not clicked yet", dismissed: "dismiss
 function aboutTime(seconds, event) {
   const lines = [`${seconds.toFixed(2)} s`];
   const click = stemNear(event.offsetX, REACH);
-  if (click) lines.push(`${click.id} · ${click.residual_px === null ? click.state : `${click.residual_px.toFixed(1)} px`}`);
+  if (click) lines.push(`${nameOf(click.id)} · ${click.residual_px === null ? click.state : `${click.residual_px.toFixed(1)} px`}`);
   const number = state.placements.findIndex((placement) => placement.start_s <= seconds && seconds <= placement.end_s);
   if (number >= 0) {
     const placement = state.placements[number];

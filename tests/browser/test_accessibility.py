@@ -118,7 +118,7 @@ def test_the_picture_and_its_marks_are_told_in_words(page: Driver, truth: Any) -
     page.load_sample(truth, 5)
     words = page.page.locator("#picture-words")
     expect(words).to_contain_text("Placement 5 of 20")
-    expect(words).to_contain_text("c5 at column")
+    expect(words).to_contain_text("5 at column")
     expect(words).to_contain_text("agrees with the others")
     expect(words).to_contain_text("4 marks in other frames")
     assert page.page.locator("#marks").get_attribute("aria-describedby") == "picture-words"
@@ -126,7 +126,7 @@ def test_the_picture_and_its_marks_are_told_in_words(page: Driver, truth: Any) -
     expect(words).to_contain_text("Placement 6 of 20")
     expect(words).to_contain_text("the reflector is expected at column")
     page.press("p", "x")
-    expect(words).to_contain_text("c5 at column")
+    expect(words).to_contain_text("5 at column")
     expect(words).to_contain_text("excluded")
     for name, low, high in (("Width of the picture", 30, 90), ("Height of the 3D view", 20, 60)):
         divider = page.page.get_by_role("separator", name=name)

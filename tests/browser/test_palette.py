@@ -56,7 +56,7 @@ def test_the_palette_goes_to_placements_pairs_frames_times_and_options(page: Dri
     page.load_sample(truth, 2)
     for query, arrived in (
         ("placement 7", "__cocalib.state.shown.index === __cocalib.state.placements[6].frame"),
-        ("pair c2", "__cocalib.state.selected === 'c2'"),
+        ("pair 2", "__cocalib.state.selected === 'c2'"),
         ("frame 100", "__cocalib.state.shown.index === 99"),
         ("12.5 s", "Math.abs(__cocalib.state.seconds[__cocalib.state.shown.index] - 12.5) < 0.5"),
         ("click uncertainty", "document.activeElement.id === 'option-noise-sigma_px'"),
@@ -70,7 +70,7 @@ def test_the_palette_goes_to_placements_pairs_frames_times_and_options(page: Dri
     opened(page)
     recent = found(page, "")
     assert recent[0] == "Maximum Doppler speed" or "speed" in recent[0].lower()
-    assert recent[1:4] == ["Click uncertainty", "Pair c2", "Placement 7"]
+    assert recent[1:4] == ["Click uncertainty", "Pair 2", "Placement 7"]
 
 
 def test_the_help_and_the_keys_come_from_the_same_table(page: Driver) -> None:
