@@ -2,6 +2,7 @@
 
 import { boxing } from "../boxes/boxes.js";
 import { boxAdvice } from "../boxes/evaluating.js";
+import { comeTo } from "../picture/arriving.js";
 import { saidWords } from "../proposals/proposals.js";
 import { proposalAdvice, proposalWords, silentWords } from "../proposals/words.js";
 import { act, actionNamed } from "../shell/actions.js";
@@ -12,7 +13,7 @@ import { goToPair } from "./pairs.js";
 
 const guide = /** @type {HTMLElement} */ (document.getElementById("guide"));
 
-/** A key and what it does; with an action it can be pressed here too, a pair is gone to, and an option opened. @typedef {{key: string, label: string, action?: string, pair?: string, option?: string}} Key */
+/** A key and what it does; with an action it can be pressed here too, a pair or a frame is gone to, and an option opened. @typedef {{key: string, label: string, action?: string, pair?: string, frame?: number, option?: string}} Key */
 /** Text with keys in between. @typedef {(string|Key)[]} Words */
 /** What the line says; `act` if something is to be done in this frame. @typedef {{text: Words, act: boolean}} Advice */
 
@@ -21,12 +22,12 @@ export function startGuide() {
 }
 
 /** The focus stays where it is. @param {Key} key */
-function keyPart({ key, label, action, pair, option }) {
+function keyPart({ key, label, action, pair, frame, option }) {
   const parts = [...(key ? [make("kbd", "key", key)] : []), label];
-  if (!action && !pair && !option) return make("span", "", parts);
+  if (!action && !pair && !option && frame === undefined) return make("span", "", parts);
   const button = make("button", "do", parts);
   button.onmousedown = (event) => event.preventDefault();
-  button.onclick = () => (pair ? goToPair(pair) : option ? openOption(option) : act(actionNamed(action ?? "")));
+  button.onclick = () => (pair ? goToPair(pair) : frame !== undefined ? comeTo(frame) : option ? openOption(option) : act(actionNamed(action ?? "")));
   return button;
 }
 
@@ -121,7 +122,8 @@ function nextAction() {
   const met = view.verdict.level === "contradictory" ? view.clicks.find(({ id }) => new RegExp(`\\b${id}\\b`).test(action)) : undefined;
   if (met) return [action, { key: "", label: `show #${nameOf(met.id)}`, pair: met.id }];
   if (key === "J") return [action, SHOW];
-  if (view.clicks.length) return [action, ...by];
+  const edge = action.includes("edges of the picture") ? state.placements.filter(isOffered).sort((a, b) => Math.abs(b.azimuth_deg) - Math.abs(a.azimuth_deg))[0] : undefined;
+  if (view.clicks.length) return [action, ...by, ...(edge ? [{ key: "", label: `show placement ${state.placements.indexOf(edge) + 1}`, frame: edge.frame }] : [])];
   if (!state.placementsKnown) return ["Looking for the places where the reflector stood. You can click meanwhile"];
   return state.placements.length ? [action] : [`${state.placementSummary}. ${action}`];
 }

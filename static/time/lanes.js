@@ -5,7 +5,7 @@
 
 import { confidences } from "../proposals/proposals.js";
 import { ink, residualColour, smallFont, smallPx, themeColour } from "../shell/colours.js";
-import { clicks, emit, isLookedAt, on, state } from "../shell/state.js";
+import { clicks, emit, isDismissed, isLookedAt, on, state } from "../shell/state.js";
 import { drawGaps, drawRuler, pixelsPerSecond, RULER } from "./ruler.js";
 
 export const lanes = { left: 74, right: 14, gap: 4, bottom: 5 };
@@ -18,8 +18,6 @@ const MUCH = 12;
 /** @typedef {"placements"|"clicks"|"radar"|"picture"} LaneName */
 /** @typedef {Record<LaneName, {top: number, bottom: number}>} Boxes */
 const NAMES = { placements: "Placements", clicks: "Clicks", radar: "Radar", picture: "Picture" };
-/** A dismissed placement is one at this place and time [m]. */
-const SAME_PLACE_M = 0.75;
 /** A timeline of this height has a higher lane for the picture [CSS px]. */
 const LARGE = 140;
 
@@ -87,20 +85,7 @@ function drawNames(pen, boxes) {
 }
 
 /** What became of a placement. @param {import("../messages.js").PlacementRow} placement @returns {"clicked"|"dismissed"|"open"} */
-export function fateOf(placement) {
-  if (isLookedAt(placement)) return "clicked";
-  return dismissals().some(({ seconds, at }) => placement.start_s <= seconds && seconds <= placement.end_s && apart(at, placement.position_radar_m) < SAME_PLACE_M) ? "dismissed" : "open";
-}
-
-/** The dismissed placements, each with its time [s]. */
-function dismissals() {
-  const first = state.recording?.frame_times;
-  if (!first?.sec.length) return [];
-  return (state.view?.dismissed ?? []).map(({ time, position_m }) => ({ seconds: time.sec - first.sec[0] + (time.nanosec - first.nanosec[0]) * 1e-9, at: position_m }));
-}
-
-/** @param {number[]} a @param {number[]} b */
-const apart = (a, b) => Math.hypot(...a.map((value, axis) => value - b[axis]));
+export const fateOf = (placement) => (isLookedAt(placement) ? "clicked" : isDismissed(placement) ? "dismissed" : "open");
 
 /**
  * Clicked = solid, not clicked = hollow and dashed, dismissed = a line with a cross.

@@ -317,10 +317,11 @@ def _early_line(session: Session) -> str:
 
 def _large_so_far(verdict: Verdict, session: Session) -> str:
     """Return how many pairs agree, and how large the error still is; "" if a pair does not agree, or something else is wrong."""
-    pairs = [pair for pair in getattr(session.outcome, "pairs", ()) if not pair.excluded]
     level, only_size, error = verdict.line.partition("uncertain to ")
-    agree = level == "coarse: " and only_size and all(pair.inlier for pair in pairs)
-    return f"{len(pairs)} pairs agree: so far within {error}" if agree else ""
+    if not isinstance(session.outcome, Calibration) or level != "coarse: " or not only_size:
+        return ""
+    pairs = [pair for pair in session.outcome.pairs if not pair.excluded]
+    return f"{len(pairs)} pairs agree: so far within {error}" if all(pair.inlier for pair in pairs) else ""
 
 
 def _is_done(verdict: Verdict) -> bool:
