@@ -130,7 +130,7 @@ def _shaped(numbers: np.ndarray | None, rows: Any, columns: Any) -> np.ndarray |
 
 _MAGIC = b"\x93NUMPY"
 _HEADER = re.compile(
-    r"\{'descr': '([<>|=][fiub][1248])', 'fortran_order': (True|False), 'shape': \(([\d, ]{0,60})\), ?\}\s*"
+    r"\{'descr': '([<>|=](?:f[248]|[iu][1248]|b1))', 'fortran_order': (True|False), 'shape': \(([\d, ]{0,60})\), ?\}\s*"
 )
 
 
