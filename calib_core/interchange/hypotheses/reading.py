@@ -64,6 +64,7 @@ class UnstatedFile:
             radars = [pose.place for pose in self.poses if pose.hints.names_radar]
             for few in (places, radars, [one for one in radars or places if one in self.beside]):
                 if len(few) == 1:
+                    self._refuse_common_frame(few[0])
                     return self.poses[places.index(few[0])]
             raise InputError(f"{self.source}: contains {len(places)} poses; choose one with --pose NAME: {named}")
         below = [one for one in places if place in (one, *one.split("."))]
@@ -72,6 +73,20 @@ class UnstatedFile:
         if place not in places:
             raise InputError(f"{self.source}: no pose at {place!r}; there is one at {named}")
         return self.poses[places.index(place)]
+
+    def _refuse_common_frame(self, place: str) -> None:
+        """Refuse the pose of a radar if a camera has one, too.
+
+        Raises:
+            InputError: it has.
+        """
+        camera = next((pose.place for pose in self.poses if pose.place in self.beside), place)
+        if place not in self.beside and camera != place:
+            raise InputError(
+                f"{self.source}: {place} and {camera} are the poses of a radar and of a camera in a frame that both share, if "
+                "they carry points into it; camera_from_radar is then inverse(camera) @ radar: write that 4x4 matrix to a file "
+                "and import it, or take one as it is with --pose NAME"
+            )
 
 
 def read_unstated(content: str | bytes, source: str = "calibration") -> UnstatedFile | None:
@@ -122,8 +137,11 @@ def _hinted_by_name(pose: FoundPose, stem: str) -> FoundPose:
 
 def _around(place: str, values: object) -> object:
     """Return the innermost object around a place such as sensors.front.T."""
-    for key in place.split(".")[:-1]:
-        values = values.get(key) if isinstance(values, dict) else None
+    for key in place.replace("[", ".").replace("]", "").split(".")[:-1]:
+        if isinstance(values, list) and key.isdecimal() and int(key) < len(values):
+            values = values[int(key)]
+        else:
+            values = values.get(key) if isinstance(values, dict) else None
     return values
 
 

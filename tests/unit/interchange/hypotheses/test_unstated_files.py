@@ -149,6 +149,21 @@ def test_of_several_radars_that_with_a_camera_matrix_is_read_and_with_its_camera
     assert as_imported(file, file.pose_at("radar_rear"), hypotheses_of(pose)[0], by_hand=True).camera is None
 
 
+def test_the_poses_of_radar_and_camera_in_a_third_frame_are_not_taken_for_one_another() -> None:
+    """As Astyx has them: the radar's is the identity, and the camera's stands with its matrix."""
+    matrix = {"K": [[900, 0, 640], [0, 900, 360], [0, 0, 1]]}
+    poses = [
+        ("camera_front", matrix | {"T_to_ref_COS": MATRIX.tolist()}),
+        ("radar", {"T_to_ref_COS": np.eye(4).tolist()}),
+    ]
+    sensors = [{"sensor_uid": name, "calib_data": data} for name, data in poses]
+    file = read_unstated(json.dumps({"sensors": sensors}), "000000.json")
+    with pytest.raises(InputError, match=r"inverse\(camera\) @ radar"):
+        file.pose_at(None)
+    camera = file.pose_at("sensors[0].calib_data.T_to_ref_COS")
+    assert as_imported(file, camera, hypotheses_of(camera)[0], by_hand=True).matrix_px[0, 0] == 900.0
+
+
 def test_each_radar_of_a_mapping_is_a_pose_of_its_own() -> None:
     text = json.dumps(
         {"R_left": POSE.rotation.tolist(), "t_left": TRANSLATION, "R_right": np.eye(3).tolist(), "t_right": [1, 2, 3]}
