@@ -1,4 +1,4 @@
-"""The intrinsics that data sets publish beside their pictures: KITTI, View-of-Delft and nuScenes."""
+"""The intrinsics that data sets publish beside their pictures: KITTI, View-of-Delft, nuScenes and Astyx."""
 
 import json
 import re
@@ -62,7 +62,8 @@ def camera_beside(folder: Path, files: Sequence[Path], picture_size_px: tuple[in
         picture_size_px: of the first; None if it cannot be read.
     """
     try:
-        return _of_kitti_frames(folder, files) or _of_raw_kitti(folder, picture_size_px) or _of_nuscenes(folder, files)
+        found = _of_kitti_frames(folder, files) or _of_raw_kitti(folder, picture_size_px)
+        return found or _of_nuscenes(folder, files) or _of_astyx(folder, files)
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None  # a file of that name but of another form is not a data set's calibration
 
@@ -170,6 +171,16 @@ def _of_nuscenes(folder: Path, files: Sequence[Path]) -> FolderCamera | None:
         mine = used or mine
     pose = f"its pose: records of {folder.name} and of the radar in {tables}, each in the car's frame"
     return FolderCamera(tables, np.array(mine[0]["camera_intrinsic"], dtype=np.float64), np.zeros(0), None, pose, doubt)
+
+
+def _of_astyx(folder: Path, files: Sequence[Path]) -> FolderCamera | None:
+    """Read the sensor with the folder's name from calibration/NUMBER.json beside it."""
+    file = folder.parent / "calibration" / f"{files[0].stem}.json"
+    if not file.is_file() or file.stat().st_size > _MAX_BYTES:
+        return None
+    sensors = {row["sensor_uid"]: row["calib_data"] for row in json.loads(file.read_text(encoding="utf-8"))["sensors"]}
+    pose = f"its pose: T_to_ref_COS of the radar and of {folder.name} in {file}: inverse(camera) @ radar"
+    return FolderCamera(file, np.array(sensors[folder.name]["K"], dtype=np.float64), np.zeros(0), None, pose)
 
 
 def _tokens_of(path: Path, names: set[str]) -> dict[str, None]:

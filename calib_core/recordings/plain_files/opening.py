@@ -11,7 +11,13 @@ from calib_core.errors import RecordingError
 from calib_core.measurements import DataWarning
 from calib_core.recordings.containers.sources import Assumption
 from calib_core.recordings.plain_files.pictures import PICTURE_SUFFIXES, open_picture_folder
-from calib_core.recordings.plain_files.radar_scans import is_lidar_bin, open_bin_folder, open_pcd_folder
+from calib_core.recordings.plain_files.radar_scans import (
+    is_lidar_bin,
+    is_lidar_pcd,
+    is_named_lidar,
+    open_bin_folder,
+    open_pcd_folder,
+)
 from calib_core.recordings.plain_files.source import PlainOptions, PlainSource
 from calib_core.recordings.plain_files.tables.opening import (
     TABLE_SUFFIXES,
@@ -349,8 +355,8 @@ def _add_leaf(folder: Path, kinds: dict[str, list[Path]], contents: Contents) ->
     except RecordingError as error:
         contents.refused.append((folder, str(error).removeprefix(f"{folder}: ")))
         return
-    lidar = files[0].name.endswith(".pcd.bin") or (files[0].suffix.lower() == ".bin" and is_lidar_bin(files))
-    if lidar:
+    lidar = {".bin": is_lidar_bin, ".pcd": is_lidar_pcd}.get(files[0].suffix.lower(), lambda _: False)
+    if files[0].name.endswith(".pcd.bin") or lidar(files):
         contents.refused.append((folder, f"{len(files)} {_LIDAR}"))
     else:
         contents.sources.append((folder, files))
@@ -372,7 +378,8 @@ def _add_files(
     ]
     is_nuscenes = folder.name.startswith("v1.0-")
     alike: dict[str, list[Path]] = {}
-    for file in tables if not is_nuscenes else []:
+    used = not is_nuscenes and not _is_refused(folder, files, tables, contents)
+    for file in tables if used else []:
         alike.setdefault(re.sub(r"\d+", "#", file.name), []).append(file)
     for group in alike.values():
         fault = table_fault(group[0], options) if len(group) > 1 else ""
@@ -386,6 +393,18 @@ def _add_files(
         suffix = file.suffix.lower()
         if suffix in VIDEO_SUFFIXES:
             contents.sources.append((file, ()))
+
+
+def _is_refused(folder: Path, files: Sequence[Path], tables: Sequence[Path], contents: Contents) -> bool:
+    """Return whether a folder's name says that its tables are a lidar's, or its other files a radar's; it is named then."""
+    if tables and is_named_lidar(folder):
+        contents.refused.append((folder, f"{len(tables)} {_LIDAR}"))
+    elif files and not tables and "radar" in folder.name.lower():
+        what = f"{len(files)} {files[0].suffix} files, of no form that is read"
+        contents.refused.append((folder, f"{what}; give a table, .pcd or .bin of returns for each scan"))
+    else:
+        return False
+    return True
 
 
 def _add_tables(group: Sequence[Path], contents: Contents, options: PlainOptions) -> None:

@@ -1,5 +1,6 @@
 """Read radar returns from one file per scan: .pcd as nuScenes has them, and the .bin files of data sets."""
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -11,6 +12,7 @@ from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import TimeNs
 from calib_core.recordings.plain_files.file_stamps import StampedFiles, stamp_files
 from calib_core.recordings.plain_files.source import PlainOptions, PlainSource, cloud_channel, cloud_message, topic_of
+from calib_core.recordings.radar.columns import names_a_speed
 
 _FRAME = "radar"
 _MAX_BYTES = 1 << 28
@@ -20,6 +22,7 @@ _KINDS = {"F": "f", "I": "i", "U": "u"}
 _FARTHEST_M, _FASTEST_MPS, _LOUDEST_DB = 500.0, 150.0, 200.0
 _SAMPLED_FILES, _SAMPLED_BYTES = 20, 7 * 8 * 4 * 256  # whole returns of every layout
 _ENOUGH = 0.95
+_LIDAR_NAME = re.compile(r"(?:^|[_-])(?:lidar|ouster|os[0-2]|vlp|hdl|hesai|pandar|livox)(?:[_-]|\d|$)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,6 +152,21 @@ def _open(folder: Path, stamped: StampedFiles, what: str, points: Callable[[Path
         names=stamped.names,
         times_from=stamped.times_from,
     )
+
+
+def is_named_lidar(folder: Path) -> bool:
+    """Return whether the name of a folder is that of a lidar; velodyne is not, since data sets put radars there, too."""
+    return _LIDAR_NAME.search(folder.name.lower()) is not None
+
+
+def is_lidar_pcd(files: Sequence[Path]) -> bool:
+    """Return whether .pcd files are a lidar's: no speed, and numbers of its lasers, or a folder of its name."""
+    with files[0].open("rb") as file:
+        fields = next(
+            (line.split()[1:] for line in file.read(_HEAD_BYTES).split(b"\n") if line.startswith(b"FIELDS")), []
+        )
+    names = [name.decode("utf-8", "replace") for name in fields]
+    return not names_a_speed(names) and ("ring" in names or is_named_lidar(files[0].parent))
 
 
 def is_lidar_bin(files: Sequence[Path]) -> bool:
