@@ -420,6 +420,23 @@ class DataWarning:
 
 
 @dataclass(frozen=True, slots=True)
+class Cuboid:
+    """The box in space around an object, upright, in the camera frame.
+
+    Attributes:
+        centre_camera_m: x, y, z of its middle.
+        length_m: along its heading.
+        width_m: across it.
+        heading_rad: of its length about the vertical, from straight ahead, positive to the left.
+    """
+
+    centre_camera_m: tuple[float, float, float]
+    length_m: float
+    width_m: float
+    heading_rad: float
+
+
+@dataclass(frozen=True, slots=True)
 class Box:
     """A rectangle around one object in one frame; pixel (0, 0) is the centre of the top-left pixel.
 
@@ -431,7 +448,7 @@ class Box:
         label: the object's class, such as "person"; "" if the source states none.
         score: the detector's confidence, 0 to 1; 1 for a box drawn by a person.
         track: the same for boxes of one object in several frames; "" if the source does not follow objects.
-        range_m: from the camera to the middle of the object's cuboid; None if the source has none.
+        cuboid: around the same object; None if the source has none.
     """
 
     left_px: float
@@ -441,7 +458,7 @@ class Box:
     label: str = ""
     score: float = 1.0
     track: str = ""
-    range_m: float | None = None
+    cuboid: Cuboid | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,17 @@ import numpy as np
 
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, rotation_exp
-from calib_core.measurements import Box, Boxes, FrameBoxes, LabelledScan, RadarScan, RadarScans, ReturnLabels, TimeNs
+from calib_core.measurements import (
+    Box,
+    Boxes,
+    Cuboid,
+    FrameBoxes,
+    LabelledScan,
+    RadarScan,
+    RadarScans,
+    ReturnLabels,
+    TimeNs,
+)
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 
 START_NS = 1_700_000_000_000_000_000
@@ -51,6 +61,7 @@ def street(
     seed: int = 1,
     with_doppler: bool = True,
     with_names: bool = False,
+    with_cuboids: bool = False,
     ego_mps: tuple[float, float] = (0.0, 0.0),
     label: str = "person",
 ) -> Street:
@@ -62,6 +73,7 @@ def street(
         seed: of the noise and the walks.
         with_doppler: whether the radar measures it.
         with_names: whether the boxes say who is in them.
+        with_cuboids: whether the boxes have cuboids.
         ego_mps: velocity of both sensors over ground; what stands still passes by, the people keep pace.
         label: class of the boxes.
     """
@@ -81,7 +93,7 @@ def street(
         scan, who = _scan(time, where, velocity, passed, np.array(ego_mps), rng, with_doppler)
         scans.append(scan)
         labels.append(LabelledScan(time, who))
-        frames.append(FrameBoxes(TimeNs(time + 12_000_000), _boxes(where, label, with_names)))
+        frames.append(FrameBoxes(TimeNs(time + 12_000_000), _boxes(where, label, with_names, with_cuboids)))
     return Street(
         RadarScans.from_scans(scans),
         Boxes(tuple(frames), "boxes.json", (1280, 720)),
@@ -131,7 +143,12 @@ def _scan(
     return RadarScan(time, cartesian_from_polar(polar), speeds, nothing, np.full((len(points), 3), np.nan)), tuple(who)
 
 
-def _boxes(where: np.ndarray, label: str, with_names: bool) -> tuple[Box, ...]:
+def _cuboid(place: np.ndarray) -> Cuboid:
+    right_m, down_m, ahead_m = (TRUE_POSE @ np.array([[*place, 0.0]]))[0].tolist()
+    return Cuboid((right_m, down_m, ahead_m), 0.6, 0.6, 0.3)
+
+
+def _boxes(where: np.ndarray, label: str, with_names: bool, with_cuboids: bool) -> tuple[Box, ...]:
     found = []
     for number, place in enumerate(where):
         corners = np.array([[place[0], place[1] + y, z] for y in (-0.3, 0.3) for z in (-0.9, 0.9)])
@@ -149,6 +166,7 @@ def _boxes(where: np.ndarray, label: str, with_names: bool) -> tuple[Box, ...]:
                 sides[1][1],
                 label,
                 track=f"person-{number}" if with_names else "",
+                cuboid=_cuboid(place) if with_cuboids else None,
             )
         )
     return tuple(found)

@@ -23,6 +23,7 @@ from calib_core.boxes.formats.box_format import BoxFile, BoxFormat, FileBoxes, F
 from calib_core.boxes.formats.coco import COCO
 from calib_core.boxes.formats.cvat import CVAT
 from calib_core.boxes.formats.kitti import KITTI_OBJECTS, KITTI_TRACKS
+from calib_core.boxes.formats.nuscenes import NUSCENES
 from calib_core.boxes.formats.openlabel import OPENLABEL
 from calib_core.boxes.formats.own import OWN
 from calib_core.boxes.formats.yolo import YOLO
@@ -33,7 +34,7 @@ from calib_core.measurements import Box, Boxes, FrameBoxes, TimeNs
 from calib_core.recordings.box_topics import frames_of_stamps
 from calib_core.recordings.plain_files.file_stamps import times_in_names
 
-BOX_FORMATS: tuple[BoxFormat, ...] = (OWN, OPENLABEL, COCO, CVAT, KITTI_TRACKS, KITTI_OBJECTS, YOLO)
+BOX_FORMATS: tuple[BoxFormat, ...] = (OWN, OPENLABEL, NUSCENES, COCO, CVAT, KITTI_TRACKS, KITTI_OBJECTS, YOLO)
 
 
 def read_boxes(
@@ -54,7 +55,7 @@ def read_boxes(
     Raises:
         InputError: it cannot be read, is of no known format, or belongs to another recording.
     """
-    file = load_box_file(Path(path), image_size_px=image_size_px)
+    file = replace(load_box_file(Path(path), image_size_px=image_size_px), image_names=tuple(image_names))
     for known in BOX_FORMATS:
         if known.recognizes(file):
             found = known.read(file)

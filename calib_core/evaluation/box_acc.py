@@ -103,12 +103,14 @@ def judged_by_boxes(
         acc_standard_error=error,
         acc_without_zero_frames=float(above.mean()) if len(above) else None,
         frames=_frames(counted, inside),
-        classes=_classes(counted, inside),
+        classes=_named(counted.labels, counted, inside),
+        objects=_named(counted.targets, counted, inside),
         ranges=_ranges(counted, inside),
         sensitivity=_sensitivity(points_camera_m, camera, counted, error, progress) if len(shares) else (),
         chance=_chance(points_camera_m, camera, counted) if len(shares) else None,
         rule=counted.rule,
         source=counted.source,
+        by_cuboid=counted.by_cuboid,
         groups=groups,
         area_chance=_area_chance(counted, camera) if len(shares) else None,
         targets=counted.found_targets,
@@ -254,11 +256,12 @@ def _told(counted: CountedReturns) -> Indices:
     return np.flatnonzero((returns > 0) | (counted.box_counts > 0))
 
 
-def _classes(counted: CountedReturns, inside: Flags) -> tuple[ClassFigure, ...]:
-    labels = np.array(counted.labels, dtype=object)
+def _named(names: Sequence[str], counted: CountedReturns, inside: Flags) -> tuple[ClassFigure, ...]:
+    """Return Acc by the names of the returns (n,): their classes, or their targets."""
+    of_return = np.array(names, dtype=object)
     figures = []
-    for label in sorted(set(counted.labels), key=lambda name: (not name, name)):
-        own = labels == label
+    for label in sorted(set(names), key=lambda name: (not name, name)):
+        own = of_return == label
         shares, rows = _shares(inside[own], counted.frames[own])
         figures.append(ClassFigure(label, float(shares.mean()), len(rows), int(own.sum()), int(inside[own].sum())))
     return tuple(figures)

@@ -9,6 +9,8 @@ range. Both are found from all targets and boxes together: the angle is the one 
 target is then given the box track that it meets best over the life that both share, the longest agreement first, and in each
 frame a target has at most one box and a box at most one target. What the radar follows in parts, such as the two ends of a car,
 joins the part that is matched.
+
+Where the boxes have cuboids, nothing has to move and no frame has to follow another: a return belongs to the cuboid it is in.
 """
 
 from collections.abc import Sequence
@@ -16,11 +18,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib_core.arrays import Flags, Indices, Points3, TimesNs, Values, frozen_array
+from calib_core.arrays import Flags, Indices, Points3, TimesNs, Values, Vector3, frozen_array
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.evaluation.target_tracking import TargetTrack
-from calib_core.measurements import NS_PER_S, Box, Boxes, RadarScans, ReturnLabels
+from calib_core.evaluation.moving_returns import TargetOptions
+from calib_core.evaluation.target_tracking import TargetTrack, sigma_polar
+from calib_core.measurements import NS_PER_S, Box, Boxes, Cuboid, RadarScans, ReturnLabels
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,7 +98,7 @@ class BoxTable:
         labels: (b,) the classes.
         tracks: (b,) equal numbers are one object in several frames.
         names: (b,) what their source calls the objects; "" if it does not follow them.
-        range_m: (b,) from the camera to the object; NaN if the source does not tell.
+        cuboids: (b, 5) middle ahead and to the left of the camera, length, width [m], heading [rad]; NaN without one.
     """
 
     times_ns: TimesNs
@@ -104,12 +107,13 @@ class BoxTable:
     labels: tuple[str, ...]
     tracks: Indices
     names: tuple[str, ...]
-    range_m: Values
+    cuboids: np.ndarray
 
     def __post_init__(self) -> None:
         count = len(self.labels)
         object.__setattr__(self, "times_ns", frozen_array(self.times_ns, (None,), dtype=np.int64))
         object.__setattr__(self, "boxes_px", frozen_array(self.boxes_px, (count, 4)))
+        object.__setattr__(self, "cuboids", frozen_array(self.cuboids, (count, 5)))
         for name in ("frames", "tracks"):
             object.__setattr__(self, name, frozen_array(getattr(self, name), (count,), dtype=np.int64))
 
@@ -151,6 +155,7 @@ class CountedReturns:
         bearings: how the two sensors see the same target; None if nothing shows it.
         rule: which returns count and how they were matched, in one sentence.
         source: of the boxes.
+        by_cuboid: whether the targets are whatever has a cuboid, not what the radar followed.
     """
 
     image_times: TimesNs
@@ -166,6 +171,7 @@ class CountedReturns:
     bearings: Bearings | None
     rule: str
     source: str
+    by_cuboid: bool = False
 
     def __post_init__(self) -> None:
         n, count = len(self.labels), len(self.image_times)
@@ -180,7 +186,7 @@ def counted_returns(
     camera: Camera,
     scans: RadarScans,
     boxes: Boxes,
-    found: Sequence[TargetTrack] | ReturnLabels,
+    found: Sequence[TargetTrack] | ReturnLabels | None,
     *,
     classes: Sequence[str] = (),
     max_gap_s: float | None = None,
@@ -191,7 +197,8 @@ def counted_returns(
         camera: the lens.
         scans: of the recording; followed targets need only their stamps.
         boxes: of the same recording.
-        found: the targets that the radar followed, or the true origin of each return, which then decides.
+        found: the targets that the radar followed, or the true origin of each return, which then decides; None takes the returns
+            in the boxes' cuboids.
         classes: count only targets whose boxes are of these classes; all if empty.
         max_gap_s: longest time between a frame and its scan; None takes half the period of the scans.
 
@@ -205,6 +212,8 @@ def counted_returns(
     if isinstance(found, ReturnLabels):
         sightings = labelled_sightings(scans, found, boxes.times_ns, scans_of_frames)
         matches = match_by_name(sightings, table, camera)
+    elif found is None:
+        sightings, matches = returns_in_cuboids(scans, table, scans_of_frames, camera)
     else:
         sightings = tracked_sightings(found, scans_of_frames)
         matches = match_by_bearing(sightings, table, camera)
@@ -229,11 +238,12 @@ def counted_returns(
         matched_targets=len(boxed),
         bearings=matches.bearings,
         rule=_rule(
-            isinstance(found, ReturnLabels),
+            found,
             longest_gap_s(scans.times_ns) if max_gap_s is None else max_gap_s,
             float(np.isnan(sides[of_return]).any(axis=1).mean()) if len(of_return) else 0.0,
         ),
         source=boxes.source,
+        by_cuboid=found is None,
     )
 
 
@@ -259,11 +269,17 @@ def renamed_classes(boxes: Boxes, names: dict[str, str]) -> Boxes:
     return replace(boxes, frames=frames)
 
 
-def _rule(labelled: bool, gap_s: float, boxless: float) -> str:
+def _rule(found: Sequence[TargetTrack] | ReturnLabels | None, gap_s: float, boxless: float) -> str:
     in_time = (
         f"each annotated frame with the scan nearest to it by the recorded stamps, at most {1000.0 * gap_s:.3g} ms away"
     )
-    if labelled:
+    if found is None:
+        return (
+            f"{in_time}; each return counts that is inside a cuboid, seen from above and grown by twice the radar's noise, for "
+            "the box of that cuboid; how the camera is turned and placed against the radar is found from all cuboids and returns "
+            "together, without the calibration"
+        )
+    if isinstance(found, ReturnLabels):
         return f"{in_time}; the labels say which returns belong to which box; those of targets without a box count as outside"
     return (
         f"{in_time}; returns of moving targets that the radar followed over three scans or more; each target has one box "
@@ -348,11 +364,16 @@ def tracked_sightings(targets: Sequence[TargetTrack], scans_of_frames: Indices) 
     points = np.concatenate([np.zeros((0, 3)), *(one.points_radar_m for one in targets)])
     order = np.argsort(scans, kind="stable")
     low, high = (np.searchsorted(scans[order], scans_of_frames, side=side) for side in ("left", "right"))
-    counts = np.where(scans_of_frames >= 0, high - low, 0)
-    frames = np.repeat(np.arange(len(scans_of_frames)), counts)
-    within = np.arange(len(frames)) - np.repeat(np.cumsum(counts) - counts, counts)
-    rows = order[np.repeat(low, counts) + within]
+    frames, places = _spans(low, np.where(scans_of_frames >= 0, high, low))
+    rows = order[places]
     return _sightings(tuple(one.id for one in targets), frames, owner[rows], points[rows])
+
+
+def _spans(low: Indices, high: Indices) -> tuple[Indices, Indices]:
+    """Return the numbers of several spans one after the other (n,), and before them which span each is in (n,)."""
+    counts = high - low
+    own = np.repeat(np.arange(len(counts)), counts)
+    return own, np.repeat(low - np.cumsum(counts) + counts, counts) + np.arange(len(own))
 
 
 def labelled_sightings(
@@ -441,8 +462,15 @@ def box_table(boxes: Boxes) -> BoxTable:
     every = [box for frame in boxes for box in frame.boxes]
     sides = np.array([[getattr(box, side) for side in _SIDES] for box in every]).reshape(-1, 4)
     labels, names = tuple(box.label for box in every), tuple(box.track for box in every)
-    range_m = np.array([np.nan if box.range_m is None else box.range_m for box in every])
-    return BoxTable(boxes.times_ns, frames, sides, labels, _tracks(frames, every, sides), names, range_m)
+    cuboids = np.array([_from_above(box.cuboid) for box in every]).reshape(-1, 5)
+    return BoxTable(boxes.times_ns, frames, sides, labels, _tracks(frames, every, sides), names, cuboids)
+
+
+def _from_above(cuboid: Cuboid | None) -> tuple[float, ...]:
+    if cuboid is None:
+        return (np.nan,) * 5
+    right_m, _, ahead_m = cuboid.centre_camera_m
+    return ahead_m, -right_m, cuboid.length_m, cuboid.width_m, cuboid.heading_rad
 
 
 @dataclass(slots=True)
@@ -524,6 +552,7 @@ _STEP_RAD = np.deg2rad(0.5)
 _MOST_VOTES = 20_000
 _ROUNDS = 3
 _PART_M = 5.0  # between the ranges of parts of one target, or of a target and its cuboid
+_SIGHTINGS_AT_ONCE = 50_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -582,6 +611,96 @@ def match_by_bearing(sightings: Sightings, table: BoxTable, camera: Camera) -> M
     return _matches(sightings, boxes, bearings if len(chosen) else None, camera)
 
 
+_STANDARD_DEVIATIONS = 2.0  # that a cuboid is grown by
+_SEARCHED = ((np.deg2rad(4.0), np.deg2rad(0.25)), (_MOST_PARALLAX_M, 0.25), (_MOST_PARALLAX_M, 0.25))
+_AWAY_RAD = np.deg2rad([*range(-90, -15, 5), *range(20, 95, 5)])
+_ABOVE_CHANCE = 2.2
+_LEAST_IN_CUBOIDS = 20
+
+
+def returns_in_cuboids(
+    scans: RadarScans, table: BoxTable, scans_of_frames: Indices, camera: Camera
+) -> tuple[Sightings, Matches]:
+    """Collect the returns inside cuboids at the annotated frames, all as seen from above; no pose enters.
+
+    How the camera is turned and placed against the radar is what puts most returns into cuboids. If a camera that is turned away
+    puts nearly as many there, nothing is known, and there are none.
+
+    Args:
+        scans: around the frames.
+        table: the boxes with their cuboids.
+        scans_of_frames: (f,) the scan of each frame; -1 for none.
+        camera: the lens.
+    """
+    known = np.maximum(scans_of_frames, 0)
+    low, high = scans.first_return[known], scans.first_return[known + 1]
+    frames, rows = _spans(low, np.where(scans_of_frames >= 0, high, low))
+    kept = np.isfinite(scans.points_radar_m[rows]).all(axis=1)
+    frames, rows = frames[kept], rows[kept]
+    points = scans.points_radar_m[rows]
+    sigma, range_m = sigma_polar(scans, TargetOptions())[rows], np.hypot(*points[:, :2].T)
+    each = np.arange(len(rows))
+    single = Sightings((), frames, each, np.arctan2(points[:, 1], points[:, 0]), range_m, each, points)
+    meetings = _meetings(single, table, camera)
+    meetings = meetings.some(np.isfinite(table.cuboids[meetings.boxes, 0]))
+    grown_m = (_STANDARD_DEVIATIONS * np.hypot(sigma[:, 0], range_m * sigma[:, 1]))[meetings.sightings]
+    planar, cuboids = points[meetings.sightings, :2], table.cuboids[meetings.boxes]
+    none = _sightings((), each[:0], each[:0], points[:0]), Matches(each[:0], np.zeros(0, dtype=np.bool_), None)
+    if not len(planar):
+        return none
+    place = _placed(meetings, planar, cuboids, grown_m)
+    outside_m = _outside_m(place, planar, cuboids)
+    inside = np.flatnonzero(outside_m <= grown_m)
+    away = [
+        np.unique(meetings.sightings[_outside_m(place + turn * np.eye(3)[0], planar, cuboids) <= grown_m])
+        for turn in _AWAY_RAD
+    ]
+    if len(np.unique(meetings.sightings[inside])) < max(_LEAST_IN_CUBOIDS, _ABOVE_CHANCE * max(map(len, away))):
+        return none
+    order = inside[np.lexsort((outside_m[inside], meetings.sightings[inside]))]
+    own = order[np.unique(meetings.sightings[order], return_index=True)[1]]
+    rows, boxes = meetings.sightings[own], meetings.boxes[own]
+    names = [""] * (int(table.tracks.max()) + 1)
+    for box in np.unique(boxes).tolist():
+        names[table.tracks[box]] = table.names[box] or f"{table.labels[box] or 'object'}-{table.tracks[box]}"
+    found = _sightings(tuple(names), frames[rows], table.tracks[boxes], points[rows])
+    key = len(names) * frames[rows] + table.tracks[boxes]
+    of_sighting = boxes[np.unique(key, return_index=True)[1]]
+    return found, Matches(
+        of_sighting, np.ones(len(of_sighting), dtype=np.bool_), Bearings(float(place[0]), float(place[2]))
+    )
+
+
+def _placed(meetings: _Meetings, planar: np.ndarray, cuboids: np.ndarray, grown_m: Values) -> Vector3:
+    """Return the turn of the camera [rad] and the radar's place ahead and to the left of it [m] with most returns in cuboids."""
+    first = np.flatnonzero(np.diff(meetings.sightings, prepend=-1))
+    place = np.array([_turn(meetings), 0.0, 0.0])
+    most = np.array([np.inf, _MOST_PARALLAX_M, _MOST_PARALLAX_M])
+    for axis, (reach, step) in [*enumerate(_SEARCHED)] * _ROUNDS:
+        tried = place + np.arange(-reach, reach + step / 2, step)[:, None] * np.eye(3)[axis]
+        tried = np.clip(tried, -most, most)
+        agreement = [np.maximum(1.0 - _outside_m(one, planar, cuboids) / grown_m, 0.0) for one in tried]
+        votes = np.array([np.maximum.reduceat(one, first).sum() for one in agreement])
+        best = np.flatnonzero(votes >= votes.max() - 1e-9)
+        place = tried[best[len(best) // 2]]
+    return np.asarray(place)
+
+
+def _outside_m(place: np.ndarray, planar: np.ndarray, cuboids: np.ndarray) -> Values:
+    """Return how far returns (m, 2) are outside cuboids (m, 5), seen from above (m,) [m]; 0 inside.
+
+    Args:
+        place: of the radar, as `_placed` finds it.
+        planar: x and y of the returns in the radar frame.
+        cuboids: as in a BoxTable.
+    """
+    turn_rad, ahead_m, left_m = place
+    off = (planar[:, 0] + 1j * planar[:, 1]) * np.exp(1j * turn_rad) + (ahead_m + 1j * left_m)
+    off = (off - (cuboids[:, 0] + 1j * cuboids[:, 1])) * np.exp(-1j * cuboids[:, 4])
+    along_m = np.maximum(np.abs(off.real) - 0.5 * cuboids[:, 2], 0.0)
+    return np.asarray(np.hypot(along_m, np.maximum(np.abs(off.imag) - 0.5 * cuboids[:, 3], 0.0)))
+
+
 def match_by_name(sightings: Sightings, table: BoxTable, camera: Camera) -> Matches:
     """Match sightings and boxes of the same name, as labels of a simulation give them."""
     meetings = _meetings(sightings, table, camera)
@@ -608,16 +727,26 @@ def _matches(sightings: Sightings, boxes: Indices, bearings: Bearings | None, ca
 
 
 def _meetings(sightings: Sightings, table: BoxTable, camera: Camera) -> _Meetings:
-    low, high = (np.searchsorted(table.frames, sightings.frames, side=side) for side in ("left", "right"))
-    counts = high - low
-    own = np.repeat(np.arange(len(sightings.frames)), counts)
-    boxes = np.repeat(low, counts) + np.arange(len(own)) - np.repeat(np.cumsum(counts) - counts, counts)
-    near = ~(np.abs(sightings.range_m[own] - table.range_m[boxes]) > _PART_M)
-    own, boxes = own[near], boxes[near]
+    own, boxes = _in_one_frame(sightings, table)
     middle, half = _middles(table, camera)
     inverse_range = 1.0 / np.maximum(sightings.range_m[own], 0.5)
     tolerance = _TOLERANCE_RAD + half[boxes] + _TOLERANCE_M * inverse_range
     return _Meetings(own, boxes, _wrapped(middle[boxes] - sightings.azimuth_rad[own]), inverse_range, tolerance)
+
+
+def _in_one_frame(sightings: Sightings, table: BoxTable) -> tuple[Indices, Indices]:
+    """Return every sighting with every box of its frame, but for boxes whose cuboid is at another range: (m,) of each."""
+    low, high = (np.searchsorted(table.frames, sightings.frames, side=side) for side in ("left", "right"))
+    range_m, reach_m = np.hypot(*table.cuboids[:, :2].T), _PART_M + 0.5 * np.hypot(*table.cuboids[:, 2:4].T)
+    found = [(np.zeros(0, dtype=np.int64),) * 2]
+    for start in range(0, len(low), _SIGHTINGS_AT_ONCE):
+        part = slice(start, start + _SIGHTINGS_AT_ONCE)
+        own, boxes = _spans(low[part], high[part])
+        own += start
+        near = ~(np.abs(sightings.range_m[own] - range_m[boxes]) > reach_m[boxes])
+        found.append((own[near], boxes[near]))
+    owns, others = zip(*found, strict=True)
+    return np.concatenate(owns), np.concatenate(others)
 
 
 def _middles(table: BoxTable, camera: Camera) -> tuple[Values, Values]:

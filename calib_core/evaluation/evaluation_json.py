@@ -1,5 +1,6 @@
 """An evaluation as JSON with documented keys (docs/evaluation.md)."""
 
+import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
@@ -109,10 +110,8 @@ def _boxes(figures: BoxFigures) -> dict[str, Any]:
             {"axis": one.axis, "angles_deg": list(one.angles_deg), "acc": list(one.acc), "flat": one.is_flat}
             for one in figures.sensitivity
         ],
-        "classes": [
-            {"label": one.label, "acc": one.acc, "frames": one.frames, "returns": one.returns, "inside": one.inside}
-            for one in figures.classes
-        ],
+        "classes": [dataclasses.asdict(one) for one in figures.classes],
+        "objects": [dataclasses.asdict(one) for one in figures.objects],
         "by_range_m": [
             {"low": one.low_m, "high": one.high_m, "returns": one.returns, "inside": one.inside}
             for one in figures.ranges

@@ -178,11 +178,11 @@ class Share:
 
 @dataclass(frozen=True, slots=True)
 class ClassFigure:
-    """Acc of one class.
+    """Acc of one class, or of one target.
 
     Attributes:
-        label: the class; "" for the returns of targets that no box was found for.
-        acc: the mean share over the frames with returns of this class, 0 to 1; None without any.
+        label: the class, "" for the returns of targets that no box was found for; or the target.
+        acc: the mean share over the frames with returns of it, 0 to 1; None without any.
         frames: number of those frames.
         returns: number of those returns.
         inside: how many are within their target's box.
@@ -240,9 +240,11 @@ class BoxFigures:
         source: of the boxes.
         groups: number of groups of neighbouring frames that the standard error comes from.
         area_chance: mean share of the picture that a target's box covers: what returns at random pixels would score.
-        targets: number of moving targets that were found.
+        targets: number of targets that were found.
         matched_targets: number of them that have boxes.
         returns: every return that counts; None in a file.
+        objects: by target.
+        by_cuboid: whether the targets are whatever has a cuboid, not what the radar followed.
     """
 
     acc: float | None
@@ -260,6 +262,8 @@ class BoxFigures:
     targets: int = 0
     matched_targets: int = 0
     returns: BoxedReturns | None = None
+    objects: tuple[ClassFigure, ...] = ()
+    by_cuboid: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,6 +9,7 @@ NOT_ACCURACY = (
     "by its residuals and error bars"
 )
 _NAMED = 5
+_LEAST_RETURNS = 3  # of a target that is named
 _CLEARLY_HIGHER = 0.005
 
 
@@ -40,13 +41,17 @@ def acc_sentence(figures: BoxFigures) -> str:
     counting = sum(1 for frame in figures.frames if frame.returns)
     returns = sum(frame.returns for frame in figures.frames)
     if figures.acc is None:
-        return "Acc: none, because no frame has a return of a moving target"
+        return f"Acc: none, because no frame has a return of a {_noun(figures)}"
     error = figures.acc_standard_error
     plus_minus = f" +- {100.0 * error:.1f} %" if np.isfinite(error) else ", standard error unknown"
     return (
         f"Acc: {100.0 * figures.acc:.1f} %{plus_minus} ({_count(counting, 'frame')}, {_count(returns, 'return')} of "
-        f"{_count(figures.targets, 'moving target')}, {figures.matched_targets} of them with boxes)"
+        f"{_count(figures.targets, _noun(figures))}, {figures.matched_targets} of them with boxes)"
     )
+
+
+def _noun(figures: BoxFigures) -> str:
+    return "labelled object" if figures.by_cuboid else "moving target"
 
 
 def sensitivity_sentences(figures: BoxFigures) -> tuple[str, ...]:
@@ -103,6 +108,12 @@ def _box_lines(figures: BoxFigures) -> list[str]:
         f"  {one.label or 'without a box'}: {_percent(one.acc)} ({_count(one.frames, 'frame')}, {_count(one.returns, 'return')})"
         for one in figures.classes
     ]
+    worst = sorted((one for one in figures.objects if one.returns >= _LEAST_RETURNS), key=lambda one: one.acc or 0.0)
+    if len(worst) > 1:
+        shares = (f"{one.label} {_percent(one.acc)} ({_count(one.returns, 'return')})" for one in worst[:_NAMED])
+        rows.append(
+            f"  by {_noun(figures)}, the lowest first: {', '.join(shares)}{', ...' if len(worst) > _NAMED else ''}"
+        )
     rows.append(f"  by range [m]: {', '.join(_share(one) for one in figures.ranges if one.returns)}")
     zero = sum(1 for frame in figures.frames if frame.returns and not frame.inside)
     rows.append(

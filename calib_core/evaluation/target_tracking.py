@@ -56,7 +56,7 @@ def target_clusters(scans: RadarScans, options: TargetOptions) -> TargetClusters
         options: the spacing of a target's returns, and the noise where the message gives none.
     """
     polar = polar_from_cartesian(scans.points_radar_m)
-    sigma = _sigma_polar(scans, options)
+    sigma = sigma_polar(scans, options)
     of_return = _labels(scans, polar, sigma, options.spacing_m)
     count = int(of_return.max(initial=-1)) + 1
     sizes = np.bincount(of_return, minlength=count).astype(np.float64)
@@ -72,7 +72,8 @@ def target_clusters(scans: RadarScans, options: TargetOptions) -> TargetClusters
     )
 
 
-def _sigma_polar(scans: RadarScans, options: TargetOptions) -> Points3:
+def sigma_polar(scans: RadarScans, options: TargetOptions) -> Points3:
+    """Return the standard deviations (n, 3) of range [m], azimuth and elevation [rad]: those stated, else the usual ones."""
     usual = np.array(
         [options.sigma_range_m, np.deg2rad(options.sigma_azimuth_deg), np.deg2rad(options.sigma_elevation_deg)]
     )

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 __all__ = ["FRAMES", "Finding", "Source", "check_sources"]
 
 FRAMES = frozenset(
-    {"base", "board", "body", "camera", "child", "ego", "kit", "lidar", "link", "map", "optical", "parent"}
+    {"base", "board", "body", "camera", "child", "ego", "kit", "lidar", "link", "map", "object", "optical", "parent"}
     | {"radar", "reflector", "rig", "sensor", "source", "target", "vehicle", "world"}
 )
 GENERIC_FRAMES = frozenset({"child", "parent", "sensor", "source", "target"})

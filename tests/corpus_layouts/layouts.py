@@ -25,5 +25,9 @@ LAYOUTS: dict[str, Callable[[Path], Truth]] = messages.TARGET_LISTS | {
         data_sets.view_of_delft,
         data_sets.kitti_raw_drive,
         data_sets.nuscenes_mini,
+        data_sets.tj4dradset,
+        data_sets.radiate,
+        data_sets.astyx,
+        data_sets.k_radar,
     )
 }

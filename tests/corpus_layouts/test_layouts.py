@@ -1,8 +1,14 @@
 """Layouts of recordings, opened as a user does: nine of ten are read right, none is misread without a stated assumption."""
 
+import numpy as np
 import pytest
 
+from calib_core.errors import InputError
+from calib_core.evaluation.box_acc import judged_by_boxes
+from calib_core.geometry import RigidTransform
 from calib_core.recordings import describe, open_recording
+from cocalib.evaluation.boxes import find_boxes
+from cocalib.evaluation.evaluating import evidence_in
 from tests.corpus_layouts.layouts import LAYOUTS
 from tests.corpus_layouts.reading import Reading, read
 from tests.corpus_layouts.truth import Truth
@@ -24,6 +30,7 @@ def test_nine_of_ten_layouts_are_read_right(truths, readings):
     outcomes = [
         read(truths[name], truths[name].stated).outcome if truths[name].stated else reading.outcome
         for name, reading in readings.items()
+        if len(truths[name].image_times_ns)
     ]
     assert len(outcomes) >= 20
     assert {name: reading.why for name, reading in readings.items() if reading.outcome == "wrong"} == {}
@@ -48,3 +55,47 @@ def test_a_refused_layout_names_what_was_looked_at(readings):
     for name, reading in readings.items():
         if reading.outcome == "refused":
             assert "looked at and not used" in reading.why, f"{name}: {reading.why}"
+
+
+@pytest.mark.parametrize(
+    ("name", "what"),
+    [
+        ("radiate", "velo_lidar (12 lidar clouds"),
+        ("k_radar", "os2-64 (10 lidar clouds"),
+        ("k_radar", "radar_zyx_cube (10 .mat files, of no form that is read"),
+    ],
+)
+def test_sets_without_returns_are_refused_and_their_lidars_are_no_radars(readings, name, what):
+    assert readings[name].outcome == "refused"
+    assert what in readings[name].why
+
+
+@pytest.mark.parametrize(
+    ("name", "labels", "position_m"),
+    [
+        ("view_of_delft", "lidar/training/label_2", (0.05, 1.2, -0.4)),
+        ("tj4dradset", "label_2", (0.02, 0.6, -0.1)),
+        ("nuscenes_mini", "v1.0-mini", (0.0, 1.0, 1.7)),
+    ],
+)
+def test_the_published_pose_is_right_and_a_turned_one_wrong_by_the_cuboids_of_a_set(truths, name, labels, position_m):
+    ahead = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
+    turn = np.array([[np.cos(0.2), 0.0, np.sin(0.2)], [0.0, 1.0, 0.0], [-np.sin(0.2), 0.0, np.cos(0.2)]])
+    with open_recording(list(truths[name].paths)) as recording:
+        boxes = find_boxes(str(truths[name].paths[0] / labels), recording)
+        camera = recording.camera()
+        found = evidence_in(recording, camera, boxes=boxes)
+    assert {warning.code for warning in found.warnings} <= {"boxes-note"}
+    right = judged_by_boxes(RigidTransform(ahead, np.array(position_m)), camera, found.returns)
+    turned = judged_by_boxes(RigidTransform(turn @ ahead, turn @ np.array(position_m)), camera, found.returns)
+    assert right.acc > 0.8
+    assert turned.acc < 0.1
+    assert len(right.objects) >= 30
+
+
+def test_labels_of_a_form_that_is_not_read_are_refused(truths):
+    with (
+        open_recording(list(truths["astyx"].paths)) as recording,
+        pytest.raises(InputError, match="no known file of boxes"),
+    ):
+        find_boxes(str(truths["astyx"].paths[0] / "groundtruth_obj3d"), recording)

@@ -61,7 +61,7 @@ class Truth:
     Attributes:
         paths: what the user opens.
         returns: every return of the radar that should be used.
-        image_times_ns: (m,) times of the frames; frame k has the grey grey_of_frame(k * frame_step).
+        image_times_ns: (m,) times of the frames; frame k has the grey grey_of_frame(k * frame_step); empty without returns.
         has_camera: whether the layout states CAMERA.
         position_tolerance_m: what the layout's number types lose.
         time_tolerance_ns: what the layout's times lose.

@@ -22,15 +22,20 @@ _COCO = {
     ],
     "categories": [{"id": 2, "name": "person"}],
 }
+_LENS = {"width_px": 640, "height_px": 480, "camera_matrix_3x4": [500, 0, 320, 0, 0, 500, 240, 0, 0, 0, 1, 0]}
+_POSE = [0, 0, 1, 1, -1, 0, 0, 0, 0, -1, 0, 2, 0, 0, 0, 1]
+_CUBOID = {"val": [11, 1, 1, 0, 0, 0, 1, 4, 2, 1.5], "coordinate_system": "v"}
 _OPENLABEL = {
     "openlabel": {
         "objects": {"o1": {"type": "person"}},
-        "streams": {"c": {"stream_properties": {"intrinsics_pinhole": {"width_px": 640, "height_px": 480}}}},
+        "streams": {"c": {"stream_properties": {"intrinsics_pinhole": _LENS}}},
+        "coordinate_systems": {"v": {"parent": ""}, "c": {"parent": "v", "pose_wrt_parent": {"matrix4x4": _POSE}}},
         "frames": {
             "0": {
                 "objects": {"o1": {"object_data": {"bbox": [{"val": [100, 100, 20, 40]}], "rbbox": []}}},
                 "frame_properties": {"timestamp": "2023-11-14T22:13:20.3Z", "streams": {"c": {"uri": "0.png"}}},
-            }
+            },
+            "1": {"objects": {"o1": {"object_data": {"cuboid": [_CUBOID]}}}, "frame_properties": {"timestamp": "1"}},
         },
     }
 }

@@ -142,7 +142,7 @@ def evidence_in(
         return Evidence(pairs, unpaired, None, lost)
     _require_camera(boxes, camera)
     lost = (*lost, *_taken(boxes, options.classes))
-    if labels is not None:
+    if labels is not None or _have_cuboids(boxes):
         reach_s = options.max_gap_s or longest_gap_s(recording.radar_times)
         scans = recording.radar_scans_around(boxes.times_ns.tolist(), reach_s + 1e-3)
         returns = counted_returns(
@@ -255,6 +255,12 @@ def _require_camera(boxes: Boxes, camera: Camera) -> None:
         )
 
 
+def _have_cuboids(boxes: Boxes) -> bool:
+    """Return whether most boxes have a cuboid, so that no target has to be followed."""
+    with_one = [box.cuboid is not None for frame in boxes for box in frame.boxes]
+    return 2 * sum(with_one) > len(with_one)
+
+
 def _lost(unpaired: Sequence[Unpaired]) -> tuple[DataWarning, ...]:
     """Warn that clicks gave no residual."""
     if not unpaired:
@@ -288,13 +294,22 @@ def _too_sparse(radar_times: TimesNs, boxes: Boxes) -> tuple[DataWarning, ...]:
                     "sparse-frames",
                     f"{what} are {times_farther:.3g} times farther apart ({apart_s:.3g} s) than targets can be followed, "
                     "so there is no Acc",
-                    "give the whole recording in place of its keyframes, and boxes with a track for each object; or --labels",
+                    "give boxes with cuboids, for which no target is followed, or --labels; or the whole recording in place of "
+                    "its keyframes, and boxes with a track for each object",
                 ),
             )
     return ()
 
 
 def _about(returns: CountedReturns) -> tuple[DataWarning, ...]:
+    if not len(returns.frames) and returns.by_cuboid:
+        return (
+            DataWarning(
+                "no-target-in-a-box",
+                "no direction of the camera puts clearly more returns into the cuboids than others do, so there is no Acc",
+                "are the cuboids of this recording, in the axes of its camera, and on one clock with the radar?",
+            ),
+        )
     if not len(returns.frames):
         return (
             DataWarning(

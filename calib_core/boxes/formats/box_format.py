@@ -1,13 +1,18 @@
 """What a format of boxes is: how its files are recognised and read, what they state of a frame, and checks of their numbers."""
 
+import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 from xml.etree.ElementTree import Element
 
+import numpy as np
+
+from calib_core.arrays import Matrix33
 from calib_core.errors import InputError
-from calib_core.measurements import Box, TimeNs
+from calib_core.geometry import RigidTransform, matrix_from_quaternion_wxyz
+from calib_core.measurements import Box, Cuboid, TimeNs
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +61,7 @@ class BoxFile:
         root: of XML; None for anything else.
         members: the text files of a folder or archive, or a single text file, by their path with forward slashes.
         image_size_px: width and height of the recorded pictures, for formats that count in shares of them; None if unknown.
+        image_names: of the recorded frames' files without suffix, for sets of several cameras; none if they are not files.
     """
 
     source: str
@@ -63,6 +69,7 @@ class BoxFile:
     root: Element | None = None
     members: Mapping[str, str] = field(default_factory=dict)
     image_size_px: tuple[int, int] | None = None
+    image_names: Sequence[str] = ()
 
     @property
     def mapping(self) -> Mapping[str, Any]:
@@ -90,12 +97,13 @@ HALF_PX = 0.5
 _LARGEST = 1e9
 
 
-def finite_number(value: Any, place: str) -> float:
+def finite_number(value: Any, place: str, *, most: float = _LARGEST) -> float:
     """Return a number of a file.
 
     Args:
         value: a number, or text with one.
         place: where it is, with the file's name.
+        most: its largest size.
 
     Raises:
         InputError: it is none, or not finite.
@@ -105,21 +113,32 @@ def finite_number(value: Any, place: str) -> float:
             number = float(value)
         except (ValueError, OverflowError):
             number = math.nan
-        if math.isfinite(number) and abs(number) <= _LARGEST:
+        if math.isfinite(number) and abs(number) <= most:
             return number
     raise InputError(f"{place}: expected a number, found {str(value)[:40]!r}; correct it")
 
 
-def whole_number(value: Any, place: str) -> int:
+def numbers(values: Any, count: int, place: str) -> list[float]:
+    """Return a list of a file with this many numbers.
+
+    Raises:
+        InputError: it is none.
+    """
+    if not isinstance(values, list) or len(values) != count:
+        raise InputError(f"{place}: expected a list of {count} numbers; correct it")
+    return [finite_number(value, place) for value in values]
+
+
+def whole_number(value: Any, place: str, *, most: float = _LARGEST) -> int:
     """Return a whole number of a file, such as that of a frame.
 
     Raises:
         InputError: it is none.
     """
-    number = finite_number(value, place)
+    number = finite_number(value, place, most=most)
     if not number.is_integer():
         raise InputError(f"{place}: expected a whole number, found {str(value)[:40]!r}; correct it")
-    return int(number)
+    return value if isinstance(value, int) else int(number)
 
 
 def score_of(value: Any) -> float:
@@ -187,3 +206,69 @@ def rotated_box(
     half_v_px = (width_px * sine + height_px * cosine) / 2
     edges = (u_px - half_u_px, v_px - half_v_px, u_px + half_u_px, v_px + half_v_px)
     return edge_box(edges, place, label=label, score=score, track=track)
+
+
+_NEAREST_M = 0.1  # that a corner may be ahead of the camera
+
+
+def stated_pose(turn: np.ndarray, translation_m: Sequence[float], place: str) -> RigidTransform:
+    """Return a pose of a file.
+
+    Args:
+        turn: a quaternion (w, x, y, z), or a rotation matrix (3, 3).
+        translation_m: x, y, z.
+        place: where it is, with the file's name.
+
+    Raises:
+        InputError: it is no rotation.
+    """
+    try:
+        rotation = matrix_from_quaternion_wxyz(turn) if turn.ndim == 1 else turn
+        return RigidTransform(rotation, np.array(translation_m))
+    except ValueError as error:
+        raise InputError(f"{place}: {error}; correct it") from None
+
+
+def cuboid_of(camera_from_object: RigidTransform, size_m: Sequence[float]) -> Cuboid:
+    """Return a cuboid as an evaluation takes it.
+
+    Args:
+        camera_from_object: of its middle; its x is along its length.
+        size_m: length, width and height.
+    """
+    ahead = camera_from_object.rotation[:, 0]
+    right_m, down_m, ahead_m = camera_from_object.translation_m.tolist()
+    return Cuboid((right_m, down_m, ahead_m), size_m[0], size_m[1], math.atan2(-ahead[0], ahead[2]))
+
+
+def cuboid_box(
+    camera_from_object: RigidTransform,
+    size_m: Sequence[float],
+    matrix_px: Matrix33,
+    image_size_px: tuple[int, int],
+    *,
+    label: str,
+    track: str,
+) -> Box | None:
+    """Make the box around a cuboid in an undistorted picture; None if it is not in it, or reaches behind the camera.
+
+    Args:
+        camera_from_object: of its middle; its x is along its length.
+        size_m: length, width and height.
+        matrix_px: K.
+        image_size_px: width and height.
+        label: the class.
+        track: the object.
+    """
+    corners = camera_from_object @ (0.5 * np.array(size_m) * list(itertools.product((-1.0, 1.0), repeat=3)))
+    if corners[:, 2].min() <= _NEAREST_M:
+        return None
+    pixels = (corners @ matrix_px.T)[:, :2] / corners[:, 2:]
+    low, high = (
+        np.maximum(pixels.min(axis=0), -HALF_PX),
+        np.minimum(pixels.max(axis=0), np.array(image_size_px) - HALF_PX),
+    )
+    if not (low < high).all():
+        return None
+    cuboid = cuboid_of(camera_from_object, size_m)
+    return Box(float(low[0]), float(low[1]), float(high[0]), float(high[1]), label, track=track, cuboid=cuboid)

@@ -1,7 +1,7 @@
 """KITTI: label_02/NNNN.txt of the tracking benchmark, or a folder label_2 with one file per picture.
 
-Its boxes are pixel indices counted from 0, so they are ours without a shift. Regions marked DontCare are left out. Of the
-cuboid (height, width, length, the middle of its floor in the camera's axes, heading) the range is kept: a heading changes none.
+Its boxes are pixel indices counted from 0, so they are ours without a shift. Regions marked DontCare are left out. A cuboid is
+height, width, length, the middle of its floor in the camera's axes, and the turn about y that takes the camera's x to its length.
 """
 
 import math
@@ -19,7 +19,7 @@ from calib_core.boxes.formats.box_format import (
     whole_number,
 )
 from calib_core.errors import InputError
-from calib_core.measurements import Box
+from calib_core.measurements import Box, Cuboid
 
 _OBJECT_COLUMNS = (15, 16)  # the last, of results, is the score
 _TRACK_COLUMNS = (17, 18)
@@ -109,11 +109,12 @@ def _box(label: str, columns: list[str], score: list[str], place: str, track: st
     """Make a box of the columns from its left edge to its heading."""
     for value in score:
         finite_number(value, place)
-    height_m, _, _, x_m, y_m, z_m = (finite_number(value, place) for value in columns[4:10])
-    range_m = math.hypot(x_m, y_m - 0.5 * height_m, z_m) if height_m > 0.0 and z_m > _UNKNOWN_M else None
+    height_m, width_m, length_m, x_m, y_m, z_m, turn_rad = (finite_number(value, place) for value in columns[4:11])
+    cuboid = Cuboid((x_m, y_m - 0.5 * height_m, z_m), length_m, width_m, 0.5 * math.pi - turn_rad)
+    has_one = min(height_m, width_m, length_m) > 0.0 and z_m > _UNKNOWN_M
     confidence = score_of(score[0]) if score else 1.0
     box = edge_box(columns[:4], place, label=label, score=confidence, track=track, shift_px=0.0)
-    return replace(box, range_m=range_m)
+    return replace(box, cuboid=cuboid if has_one else None)
 
 
 KITTI_OBJECTS = BoxFormat("KITTI label_2", _recognizes_objects, _read_objects)

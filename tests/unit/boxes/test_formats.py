@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from calib_core.boxes import boxes_text, labels_text, read_boxes, read_labels
 from calib_core.boxes.formats.own import own_boxes
 from calib_core.errors import InputError
-from calib_core.measurements import Box, Boxes, FrameBoxes, LabelledScan, ReturnLabels, TimeNs
+from calib_core.measurements import Box, Boxes, Cuboid, FrameBoxes, LabelledScan, ReturnLabels, TimeNs
 
 START_NS = 1_700_000_000_000_000_000
 TIMES = START_NS + 100_000_000 * np.arange(10)
@@ -192,6 +192,7 @@ def test_cvat_images_are_found_by_name_and_turned_boxes_are_enclosed(tmp_path):
 
 
 KITTI_3D = "1.8 0.5 1.2 1.0 1.6 9.0 0.1"
+CUBOID = Cuboid((1.0, pytest.approx(0.7), 9.0), 1.2, 0.5, math.pi / 2 - 0.1)
 
 
 def test_kitti_tracks_keep_pixels_and_count_frames_between_as_empty(tmp_path):
@@ -203,9 +204,7 @@ def test_kitti_tracks_keep_pixels_and_count_frames_between_as_empty(tmp_path):
     found = only_boxes(read(write(tmp_path, "0004.txt", "\n".join(lines))))
 
     assert list(found) == [1, 2, 3]
-    assert found[1] == (
-        Box(100.0, 50.0, 140.0, 150.0, "Pedestrian", track="4", range_m=pytest.approx(math.hypot(1.0, 0.7, 9.0))),
-    )
+    assert found[1] == (Box(100.0, 50.0, 140.0, 150.0, "Pedestrian", track="4", cuboid=CUBOID),)
     assert found[2] == ()
 
 
@@ -214,7 +213,7 @@ def test_kitti_objects_are_one_file_per_picture(tmp_path):
     write(tmp_path, "label_2/000004.txt", "Van 0 0 -10 1.0 2.0 3.0 4.0 -1 -1 -1 -1000 -1000 -1000 -10")
 
     found = only_boxes(read(tmp_path))
-    assert found[0] == (Box(100.0, 50.0, 140.0, 150.0, "Car", 0.25, range_m=pytest.approx(math.hypot(1.0, 0.7, 9.0))),)
+    assert found[0] == (Box(100.0, 50.0, 140.0, 150.0, "Car", 0.25, cuboid=CUBOID),)
     assert found[4] == (Box(1.0, 2.0, 3.0, 4.0, "Van"),)
 
 
@@ -236,8 +235,111 @@ def test_openlabel_with_cuboids_alone_is_refused_not_read_as_empty(tmp_path):
     data["cuboid"] = [{"name": "shape", "val": [9, 1, 0, 0, 0, 0, 1, 4, 2, 1.5]}]
     assert only_boxes(read(write(tmp_path, "both.json", json.dumps(content))))[0]
     del data["bbox"]
-    with pytest.raises(InputError, match="has cuboids and no bbox"):
+    with pytest.raises(InputError, match="has a cuboid and no bbox"):
         read(write(tmp_path, "cuboids.json", json.dumps(content)))
+
+
+@pytest.mark.parametrize("form", ["matrix", "quaternion"])
+def test_openlabel_cuboids_are_carried_to_the_camera_and_into_its_picture(tmp_path, form):
+    """The vehicle's x is ahead and z up; the camera is 1 m ahead of its origin and 2 m up, and looks ahead."""
+    content = openlabel()
+    root = content["openlabel"]
+    lens = {"width_px": 640, "height_px": 480, "camera_matrix_3x4": [500, 0, 320, 0, 0, 500, 240, 0, 0, 0, 1, 0]}
+    matrix = [0, 0, 1, 1, -1, 0, 0, 0, 0, -1, 0, 2, 0, 0, 0, 1]
+    pose = {"matrix4x4": matrix}
+    if form == "quaternion":
+        pose = {"quaternion": [-0.5, 0.5, -0.5, 0.5], "translation": [1, 0, 2]}
+    root["coordinate_systems"] = {
+        "vehicle": {"type": "local_cs", "parent": "", "children": ["Camera"]},
+        "Camera": {"type": "sensor_cs", "parent": "vehicle", "children": [], "pose_wrt_parent": pose},
+    }
+    root["streams"] = {"Camera": {"type": "camera", "stream_properties": {"intrinsics_pinhole": lens}}}
+    data = root["frames"]["0"]["objects"]["obj-1"]["object_data"]
+    values = [11, 1, 1, 0, 0, math.sin(0.25), math.cos(0.25), 4, 2, 1.5]  # turned by 0.5 rad to the left
+    data["cuboid"] = [{"name": "shape", "val": values, "coordinate_system": "vehicle"}]
+    cuboid = Cuboid((pytest.approx(-1.0), pytest.approx(1.0), pytest.approx(10.0)), 4.0, 2.0, pytest.approx(0.5))
+    drawn = only_boxes(read(write(tmp_path, "both.json", content)))[0]
+    assert [(box.left_px, box.cuboid) for box in drawn] == [(99.5, cuboid)]
+
+    del data["bbox"]
+    (box,) = only_boxes(read(write(tmp_path, "cuboids.json", content)))[0]
+    corners = np.array([[x, y] for x in (-2.0, 2.0) for y in (-1.0, 1.0)])
+    ahead = 10.0 + corners @ [math.cos(0.5), -math.sin(0.5)]
+    left = 1.0 + corners @ [math.sin(0.5), math.cos(0.5)]
+    assert (box.left_px, box.right_px) == pytest.approx(
+        (320 - 500 * (left / ahead).max(), 320 - 500 * (left / ahead).min())
+    )
+    assert (box.top_px, box.bottom_px) == pytest.approx(
+        (240 + 500 * 0.25 / ahead.max(), 240 + 500 * 1.75 / ahead.min())
+    )
+    assert (box.label, box.track, box.cuboid) == ("person", "obj-1", cuboid)
+
+
+def nuscenes(folder: Path, **changed: Any) -> Path:
+    """Write the tables of one keyframe of two cameras, with one car 10 m ahead of the vehicle, which drives north at (5, 50)."""
+    poses = {"translation": [1, 0, 2], "rotation": [0.5, -0.5, 0.5, -0.5]}
+    lens = [[500, 0, 320], [0, 500, 240], [0, 0, 1]]
+    picture = {"sample_token": "s", "ego_pose_token": "e", "calibrated_sensor_token": "c", "is_key_frame": True}
+    picture |= {"timestamp": 1_700_000_000_200_000, "width": 640, "height": 480}
+    half = math.sqrt(0.5)
+    tables = {
+        "sample_data": [
+            picture | {"token": "front", "filename": "samples/CAM_FRONT/n__CAM_FRONT__1700000000200000.jpg"},
+            picture | {"token": "back", "filename": "samples/CAM_BACK/n__CAM_BACK__1700000000200000.jpg"},
+            picture | {"token": "sweep", "filename": "sweeps/CAM_FRONT/x.jpg", "is_key_frame": False},
+            {"token": "radar", "filename": "samples/RADAR_FRONT/r.pcd", "is_key_frame": True, "width": 0},
+        ],
+        "calibrated_sensor": [{"token": "c", "sensor_token": "k", "camera_intrinsic": lens, **poses}],
+        "ego_pose": [{"token": "e", "translation": [5, 50, 0], "rotation": [half, 0, 0, half]}],
+        "sample_annotation": [
+            {
+                "token": "a",
+                "sample_token": "s",
+                "instance_token": "i",
+                "translation": [4, 61, 1],
+                "rotation": [half, 0, 0, half],
+                "size": [2, 4, 1.5],
+            }
+        ],
+        "instance": [{"token": "i", "category_token": "v"}],
+        "category": [{"token": "v", "name": "vehicle.car"}],
+    }
+    for name, rows in (tables | changed).items():
+        write(folder, f"v1.0-mini/{name}.json", rows)
+    return folder
+
+
+def test_nuscenes_cuboids_are_carried_from_the_map_into_the_pictures_of_the_recorded_camera(tmp_path):
+    names = [f"n__CAM_FRONT__{time // 1000}" for time in TIMES]
+    found = only_boxes(read_boxes(nuscenes(tmp_path), image_times=TIMES, image_size_px=SIZE, image_names=names))
+    assert list(found) == [2]
+    (box,) = found[2]
+    middle = (pytest.approx(-1.0), pytest.approx(1.0), pytest.approx(10.0))
+    assert box.cuboid == Cuboid(middle, 4.0, 2.0, pytest.approx(0.0))
+    edges = (320 - 500 * 2 / 8, 240 + 500 * 0.25 / 12, 320.0, 240 + 500 * 1.75 / 8)
+    assert (box.left_px, box.top_px, box.right_px, box.bottom_px) == pytest.approx(edges)
+    assert (box.label, box.track) == ("vehicle.car", "i")
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"category": {}}, "category.json: expected a list of rows"),
+        ({"instance": []}, "names a row of instance.json that is not there"),
+        ({"ego_pose": [{"token": "e", "translation": [5, 50, 0], "rotation": [0, 0, 0, 0]}]}, "not a rotation"),
+        ({"calibrated_sensor": [{"token": "c", "translation": [0] * 3, "rotation": [1, 0, 0, 0]}]}, "camera_intrinsic"),
+        ({"sample_data": []}, "none of its 0 pictures of keyframes is a recorded frame"),
+    ],
+)
+def test_nuscenes_tables_that_do_not_fit_are_refused(tmp_path, changed, words):
+    names = [f"n__CAM_FRONT__{time // 1000}" for time in TIMES]
+    with pytest.raises(InputError, match=words):
+        read_boxes(nuscenes(tmp_path, **changed), image_times=TIMES, image_size_px=SIZE, image_names=names)
+
+
+def test_one_table_of_nuscenes_alone_says_to_give_its_folder(tmp_path):
+    with pytest.raises(InputError, match="give the folder with all tables"):
+        read(nuscenes(tmp_path) / "v1.0-mini" / "sample_annotation.json")
 
 
 def test_openlabel_boxes_are_given_by_their_centre(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.evaluation import box_figures, counted_returns, moving_targets, renamed_classes
-from calib_core.evaluation.box_acc import grouped_error
+from calib_core.evaluation.box_acc import grouped_error, judged_by_boxes
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import (
     NS_PER_S,
@@ -244,6 +244,29 @@ def test_the_radars_own_targets_give_about_what_the_truth_gives():
     assert by_truth.acc is not None
     assert by_radar.acc is not None
     assert abs(by_truth.acc - by_radar.acc) < 2.0 * np.hypot(by_truth.acc_standard_error, by_radar.acc_standard_error)
+
+
+def keyframes(boxes: Boxes, step: int = 20) -> Boxes:
+    return dataclasses.replace(boxes, frames=boxes.frames[::step])
+
+
+@pytest.mark.parametrize("seed", range(1, 6))
+def test_returns_in_cuboids_give_about_what_the_truth_gives_on_keyframes(seed):
+    scene = street(people=3, seconds=60.0, seed=seed, with_names=True, with_cuboids=True)
+    boxes = keyframes(scene.boxes)
+    by_cuboid = counted_returns(CAMERA, scene.scans, boxes, None)
+    acc = judged_by_boxes(TRUE_POSE, CAMERA, by_cuboid).acc
+    by_labels = box_figures(TRUE_POSE, CAMERA, scene.scans, boxes, labels=scene.labels).acc
+    assert by_cuboid.bearings.turn_rad == pytest.approx(np.deg2rad(6.0), abs=np.deg2rad(2.0))
+    assert acc == pytest.approx(by_labels, abs=0.06)
+    assert judged_by_boxes(turned(TRUE_POSE, 1, 10.0), CAMERA, by_cuboid).acc < 0.1
+
+
+def test_cuboids_of_another_recording_give_no_figure():
+    scene, other = (street(people=3, seconds=60.0, seed=seed, with_cuboids=True) for seed in (1, 7))
+    counted = counted_returns(CAMERA, scene.scans, keyframes(other.boxes), None)
+    assert not len(counted.frames)
+    assert counted.bearings is None
 
 
 def test_the_standard_error_takes_neighbouring_frames_together():

@@ -7,7 +7,7 @@ import pytest
 
 from calib_core.camera import Camera
 from calib_core.evaluation.counted_returns import Sightings, box_table, frame_scans, longest_gap_s, match_by_bearing
-from calib_core.measurements import NS_PER_S, Box, Boxes, FrameBoxes, TimeNs
+from calib_core.measurements import NS_PER_S, Box, Boxes, Cuboid, FrameBoxes, TimeNs
 
 SCANS = np.array([0, 100, 200, 300, 700], dtype=np.int64) * 1_000_000
 
@@ -116,7 +116,10 @@ def test_a_target_far_from_the_cuboid_of_a_box_is_not_its_own():
     given = boxes(ACROSS)
     behind = sightings((ACROSS, np.full(FRAMES, 40.0)), (ACROSS + 1.0, FAR))
     assert matched(behind, given)[0] == {"o0"}
-    frames = [replace(one, boxes=tuple(replace(box, range_m=21.0) for box in one.boxes)) for one in given]
+    frames = [
+        replace(one, boxes=tuple(replace(box, cuboid=Cuboid((0.0, 0.0, 21.0), 0.5, 0.5, 0.0)) for box in one.boxes))
+        for one in given
+    ]
     assert matched(behind, replace(given, frames=tuple(frames))) == {0: {""}, 1: {"o0"}}
 
 

@@ -1,0 +1,115 @@
+"""nuScenes: the tables of one version, such as v1.0-mini, with a cuboid for each object of a keyframe.
+
+A cuboid is in the axes of the map; the vehicle's and the camera's poses of a picture carry it there. Pictures are undistorted.
+"""
+
+from collections.abc import Mapping
+from pathlib import PurePosixPath
+from typing import Any
+
+import numpy as np
+
+from calib_core.boxes.formats.box_format import (
+    BoxFile,
+    BoxFormat,
+    FileBoxes,
+    FileFrame,
+    cuboid_box,
+    numbers,
+    stated_pose,
+    whole_number,
+)
+from calib_core.errors import InputError
+from calib_core.geometry import RigidTransform
+from calib_core.interchange.syntax.strict_json import json_value
+from calib_core.measurements import TimeNs
+
+_ANNOTATIONS = "sample_annotation"
+_Row = Mapping[str, Any]
+
+
+def _recognizes(file: BoxFile) -> bool:
+    first = file.value[0] if isinstance(file.value, list) and file.value else None
+    alone = isinstance(first, dict) and {"sample_token", "instance_token"} <= first.keys()
+    return alone or any(PurePosixPath(name).name == f"{_ANNOTATIONS}.json" for name in file.members)
+
+
+def _read(file: BoxFile) -> FileBoxes:
+    tables = {
+        name: _table(file, name)
+        for name in (_ANNOTATIONS, "sample_data", "calibrated_sensor", "ego_pose", "instance", "category")
+    }
+    of_sample: dict[Any, list[_Row]] = {}
+    for row in tables[_ANNOTATIONS].values():
+        of_sample.setdefault(row.get("sample_token"), []).append(row)
+    keyframes = [row for row in tables["sample_data"].values() if row.get("is_key_frame") and row.get("width")]
+    recorded = set(file.image_names)
+    shown = [row for row in keyframes if _stem(row) in recorded]
+    if not shown:
+        raise InputError(
+            f"{file.source}: none of its {len(keyframes)} pictures of keyframes is a recorded frame; open the set's own "
+            "pictures, such as samples/CAM_FRONT"
+        )
+    frames, sizes = [], set()
+    for picture in shown:
+        place = f"{file.source}: sample_data {picture.get('token')}"
+        size = (whole_number(picture["width"], place), whole_number(picture.get("height"), place))
+        sensor = _row(tables, "calibrated_sensor", picture.get("calibrated_sensor_token"), place)
+        vehicle = _row(tables, "ego_pose", picture.get("ego_pose_token"), place)
+        camera_from_map = (_pose(vehicle, place) @ _pose(sensor, place)).inverse()
+        lens = sensor.get("camera_intrinsic")
+        rows = lens if isinstance(lens, list) and len(lens) == 3 else [[]]
+        matrix_px = np.array([numbers(row, 3, f"{place}: camera_intrinsic") for row in rows])
+        boxes = []
+        for found in of_sample.get(picture.get("sample_token"), ()):
+            where = f"{file.source}: {_ANNOTATIONS} {found.get('token')}"
+            width_m, length_m, height_m = numbers(found.get("size"), 3, f"{where}: size")
+            instance = _row(tables, "instance", found.get("instance_token"), where)
+            label = str(_row(tables, "category", instance.get("category_token"), where).get("name", ""))
+            camera_from_object = camera_from_map @ _pose(found, where)
+            name = str(found.get("instance_token"))
+            boxes.append(
+                cuboid_box(camera_from_object, (length_m, width_m, height_m), matrix_px, size, label=label, track=name)
+            )
+        stamp = TimeNs(1000 * whole_number(picture.get("timestamp"), f"{place}: timestamp", most=1e18))
+        frames.append(FileFrame(tuple(box for box in boxes if box), stamp=stamp, name=_stem(picture)))
+        sizes.add(size)
+    return FileBoxes(tuple(frames), image_size_px=next(iter(sizes)) if len(sizes) == 1 else None)
+
+
+def _stem(picture: _Row) -> str:
+    return PurePosixPath(str(picture.get("filename"))).stem
+
+
+def _table(file: BoxFile, name: str) -> dict[Any, _Row]:
+    """Return the rows of a table by their tokens.
+
+    Raises:
+        InputError: it is not there, or is no table.
+    """
+    found = [member for member in file.members if PurePosixPath(member).name == f"{name}.json"]
+    if len(found) != 1:
+        raise InputError(
+            f"{file.source}: expected one table {name}.json, found {len(found)}; give the folder with all tables of one version"
+        )
+    rows = json_value(file.members[found[0]], source=f"{file.source}/{found[0]}")
+    if not isinstance(rows, list) or not all(
+        isinstance(row, dict) and isinstance(row.get("token"), str) for row in rows
+    ):
+        raise InputError(f"{file.source}/{found[0]}: expected a list of rows with a token each; is it the right file?")
+    return {row["token"]: row for row in rows}
+
+
+def _row(tables: Mapping[str, Mapping[Any, _Row]], name: str, token: Any, place: str) -> _Row:
+    row = tables[name].get(token) if isinstance(token, str) else None
+    if row is None:
+        raise InputError(f"{place}: names a row of {name}.json that is not there; give the tables of one version")
+    return row
+
+
+def _pose(row: _Row, place: str) -> RigidTransform:
+    turn = np.array(numbers(row.get("rotation"), 4, f"{place}: rotation"))
+    return stated_pose(turn, numbers(row.get("translation"), 3, f"{place}: translation"), place)
+
+
+NUSCENES = BoxFormat("nuScenes tables", _recognizes, _read)
