@@ -40,7 +40,7 @@ $(VENV)/.bench: requirements/bench.txt $(VENV)/.dev
 demo: env  ## Open the sample recording in the browser.
 	$(BIN)/cocalib demo
 
-docs: $(VENV)/.docs  ## Build the documentation as a site, in site/: offline and strict.
+docs: $(VENV)/.docs  ## Build the documentation as a site in app/cocalib/site, which the page serves under Help: offline and strict.
 	$(BIN)/python docs/make_site.py
 
 check: dev  ## Check style, types, layers, frame names, spelling.
@@ -91,4 +91,4 @@ lock: dev  ## Update all pins, with hashes and without index URLs (needs uv).
 	@sh .ci/lock
 
 clean:  ## Remove the files created by make and the tests.
-	rm -rf $(VENV) $(VENV)-lowest $(VENV)-newest .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache dist site
+	rm -rf $(VENV) $(VENV)-lowest $(VENV)-newest .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache dist app/cocalib/site

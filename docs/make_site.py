@@ -90,6 +90,7 @@ def _assemble(folder: Path) -> None:
         shutil.copytree(docs / name, folder / name)
     for name in ("CITATION.cff", "LICENSE", "pyproject.toml"):
         shutil.copy(_ROOT / name, folder / name)
+    shutil.copy(_ROOT / "static" / "icon.svg", folder / "icon.svg")
 
 
 def main() -> int:
@@ -97,13 +98,14 @@ def main() -> int:
     from sphinx.application import Sphinx
 
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=_ROOT / "site")
+    parser.add_argument("--out", type=Path, default=_ROOT / "app" / "cocalib" / "site")
     out = parser.parse_args().out
     settings = {
         "project": "cocalib",
         "html_title": "cocalib",
         "extensions": ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"],
         "html_theme": "alabaster",
+        "html_favicon": "icon.svg",
         "html_copy_source": False,
         "html_use_index": False,
         "html_show_sourcelink": False,

@@ -50,8 +50,12 @@ function build() {
   title.id = "help-title";
   title.tabIndex = -1;
   title.autofocus = true;
+  const docs = make("a", "", "documentation");
+  docs.href = "/docs/";
+  docs.target = "_blank";
   dialog.replaceChildren(
     title,
+    make("p", "note", ["For everything else there is the ", docs, "."]),
     close,
     make("div", "groups", [...groups, part("Mouse", MOUSE.map(([hand, does]) => [[hand], does]))]),
     make("h3", "", "Marks in the picture"),

@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import expect
 
+from cocalib.platform.resources import site_folder
 from tests.browser.driving import Driver
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
@@ -101,6 +102,26 @@ def test_the_help_and_the_keys_come_from_the_same_table(page: Driver) -> None:
     chosen = page.page.locator('#palette .entry[aria-selected="true"]')
     expect(chosen).to_have_count(1)
     assert page.page.get_attribute("#palette input", "aria-activedescendant") == chosen.get_attribute("id")
+
+
+@pytest.mark.skipif(site_folder() is None, reason="the documentation is not built: make docs")
+def test_the_help_leads_to_the_documentation_and_its_search(page: Driver) -> None:
+    page.press("?")
+    with page.page.context.expect_page() as opening:
+        page.page.get_by_role("link", name="documentation").click()
+    docs, complaints = opening.value, []
+    docs.on(
+        "console", lambda message: complaints.append(message.text) if message.type in ("error", "warning") else None
+    )
+    docs.on("pageerror", lambda error: complaints.append(str(error)))
+    for name in ("", "tour.html", "commands.html", "paper-experiments.html"):
+        docs.goto(f"{page.page.url.split('?')[0]}docs/{name}")
+        expect(docs.locator("h1").first).to_be_visible()
+        assert docs.evaluate("[...document.images].every((image) => image.naturalWidth)")
+    docs.locator("input[name=q]").first.fill("drift")
+    docs.keyboard.press("Enter")
+    expect(docs.locator("#search-results a", has_text="Drift").first).to_be_visible()
+    assert complaints == []
 
 
 def test_what_needs_pictures_is_refused_with_the_reason(

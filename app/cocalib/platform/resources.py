@@ -26,6 +26,12 @@ def static_folder() -> Path:
     return _folder("static")
 
 
+def site_folder() -> Path | None:
+    """Return the folder of the documentation, as `make docs` writes it into the package; None if that was not done."""
+    folder = _PACKAGE_FOLDER / "site"
+    return folder if folder.is_dir() else None
+
+
 def sample_folder() -> Path:
     """Return the folder of the sample recordings: inside the installed package, or at the top of a checkout.
 

@@ -40,6 +40,8 @@ _TYPES = {
     ".svg": "image/svg+xml",
     ".json": "application/json",
     ".jpg": "image/jpeg",
+    ".png": "image/png",
+    **dict.fromkeys(("", ".cff", ".toml", ".txt"), "text/plain; charset=utf-8"),
 }
 _PICTURE_TYPES = {"jpeg": "image/jpeg", "png": "image/png"}
 _ALWAYS = (
@@ -54,6 +56,7 @@ _OWN_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; "
     "frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
 )
+_SITE_POLICY = _OWN_POLICY.replace("form-action 'none'", "form-action 'self'")  # the search of the documentation
 _VISER_POLICY = (
     "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:; worker-src blob: data: 'self'; base-uri 'none'; "
     "form-action 'none'; frame-ancestors 'self'"
@@ -142,10 +145,15 @@ def landing(set_cookie: str) -> Reply:
 class Routes:
     """Answers GET requests by path; every path that is served is listed explicitly."""
 
-    def __init__(self, static: Path) -> None:
-        files = (path for path in static.rglob("*") if path.suffix in _TYPES and path.is_file())
-        self._files = {f"/{path.relative_to(static).as_posix()}": path for path in files}
-        self._files["/"] = self._files[f"/{_PAGE}"]
+    def __init__(self, static: Path, site: Path | None = None) -> None:
+        self._files: dict[str, Callable[[str], Reply]] = {
+            f"/{name}": partial(_file, path) for name, path in _served(static).items()
+        }
+        self._files[f"/{_PAGE}"] = self._files["/"] = partial(_page, static / _PAGE)
+        self._files["/docs/"] = lambda _query: refusal(404, "Not installed; in a checkout, make docs builds it.")
+        if site is not None:
+            pages = {name: partial(_file, path, policy=_SITE_POLICY) for name, path in _served(site).items()}
+            self._files |= {f"/docs/{name}": make for name, make in {**pages, "": pages[_PAGE]}.items()}
         self._made: Mapping[str, Callable[[str], Reply]] | None = None
 
     def admit(self, workspace: Workspace, recording: Recording, hub: Surveyor) -> None:
@@ -165,11 +173,8 @@ class Routes:
         path, _, query = address.partition("?")
         if path.startswith("/api/") and self._made is None:
             return refusal(503, "The recording is still being opened; try again in a moment.")
-        make = self._made.get(path) if self._made is not None else None
-        if path in self._files:
-            file = self._files[path]
-            make = lambda _query: _page(file) if file.name == _PAGE else _file(file)  # noqa: E731
-        elif _VISER_PAGE.fullmatch(path):
+        make = self._files.get(path) or (self._made.get(path) if self._made is not None else None)
+        if _VISER_PAGE.fullmatch(path):
             make = lambda _query: _viser_page()  # noqa: E731
         if make is None:
             return refusal(404, "Not found.")
@@ -295,11 +300,17 @@ class _Downloads:
         return _reply(msgspec.json.encode(self._hub.picture_changes), _TYPES[".json"])
 
 
-def _file(path: Path) -> Reply:
-    return _reply(path.read_bytes(), _TYPES[path.suffix])
+def _served(folder: Path) -> dict[str, Path]:
+    """Return the files of a folder that browsers ask for, by their names with slashes."""
+    files = (path for path in folder.rglob("*") if path.suffix in _TYPES and path.is_file())
+    return {path.relative_to(folder).as_posix(): path for path in files}
 
 
-def _page(path: Path) -> Reply:
+def _file(path: Path, _query: str = "", *, policy: str = _OWN_POLICY) -> Reply:
+    return _reply(path.read_bytes(), _TYPES[path.suffix], policy=policy)
+
+
+def _page(path: Path, _query: str) -> Reply:
     page = with_preloaded_modules(path.read_text(encoding="utf-8"), path.parent)
     return _reply(page.encode(), _TYPES[path.suffix])
 

@@ -14,7 +14,7 @@ from websockets.http11 import Request, Response
 
 from calib_core.recordings import EncodedImage, Recording
 from cocalib.platform.error_boundary import error_boundary
-from cocalib.platform.resources import static_folder
+from cocalib.platform.resources import site_folder, static_folder
 from cocalib.web.channel.channel import Channel, Socket
 from cocalib.web.channel.desk import Desk
 from cocalib.web.channel.hub import Hub
@@ -48,7 +48,7 @@ class RunningServer:
         self._openings = 0
         self._pages: set[ServerConnection] = set()
         self._room = room
-        self._routes = Routes(static_folder())
+        self._routes = Routes(static_folder(), site_folder())
         self._entrance = Entrance(
             link.admissions, link.guard, self._routes, Resumption(options.session), link.direct_origin
         )

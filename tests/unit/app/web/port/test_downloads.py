@@ -40,6 +40,26 @@ def ask(project_root: Path) -> Callable[..., Reply]:
     return answer
 
 
+def test_the_documentation_is_served_with_its_search_and_says_where_it_comes_from(project_root, tmp_path):
+    (tmp_path / "_static").mkdir()
+    (tmp_path / "index.html").write_text("<title>docs</title>")
+    (tmp_path / "_static" / "search.js").write_text("1;")
+    (tmp_path / "objects.inv").write_text("not for browsers")
+
+    def answer(address: str, site: Path | None = tmp_path) -> Reply:
+        return asyncio.run(Routes(project_root / "static", site).answer(address))
+
+    page = answer("/docs/")
+    assert page.body == b"<title>docs</title>"
+    assert "form-action 'self'" in dict(page.headers)["Content-Security-Policy"]
+    assert b"<title>cocalib" in answer("/").body
+    assert answer("/docs/_static/search.js").status == 200
+    for outside in ("/docs/objects.inv", "/docs/../index.html", "/docs/%2e%2e/secret"):
+        assert answer(outside).status == 404
+    missing = answer("/docs/", None)
+    assert (missing.status, b"make docs" in missing.body) == (404, True)
+
+
 def test_a_calibration_of_an_older_revision_cannot_be_downloaded(file, ask):
     solved = Session(CLICKS, revision=7, outcome=file.calibration, outcome_revision=7)
     changed = dataclasses.replace(solved, revision=8)
