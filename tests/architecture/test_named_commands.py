@@ -26,6 +26,8 @@ OTHER_PROGRAMS = {f"--{name}" for name in (*_TRANSFORM_PUBLISHER, *_RERUN, *_CHR
 """Options of other programs that ours names or starts."""
 
 _COMMAND = re.compile(r"(?<![\w/.-])(?<!import )cocalib[ \t]+(?P<command>[a-z][\w-]*)(?P<rest>[^\n`;()]*)")
+_OTHER_LINE = re.compile(r"\b(python|pytest|make|pip|g\+\+|docker|podman|ssh)\b|^--(own|alone|only|refining)\b")
+"""Lines of other programs, and of our own measurements."""
 _FLAG = re.compile(r"(?<![\w-])--[a-z][a-z0-9.-]*[a-z0-9]")
 
 FLAGS = {name: {*flags_of(command.load()), "--help"} for name, command in COMMANDS.items()}
@@ -99,7 +101,16 @@ def test_the_pages_name_commands_that_exist(page: str, project_root: Path) -> No
     path = project_root / page
     for file in sorted(path.glob("*.md")) if path.is_dir() else [path]:
         text = file.read_text(encoding="utf-8").replace(".venv/bin/cocalib", "cocalib")
-        assert [each for code in code_of(text) for each in unknown_names(code, prose=set())] == [], file.name
+        ours = [code for code in code_of(text) if not _OTHER_LINE.search(code)]
+        assert [each for code in ours for each in unknown_names(code, prose=set())] == [], file.name
+        if page in ("README.md", "docs"):
+            assert {flag for code in ours for flag in _FLAG.findall(code)} <= ANY_FLAG | OTHER_PROGRAMS, file.name
+
+
+def test_what_a_user_must_know_stays_little(project_root: Path) -> None:
+    assert len(COMMANDS) == 13
+    assert len({flag for flags in FLAGS.values() for flag in flags} - {"--help"}) <= 110
+    assert len((project_root / "README.md").read_text(encoding="utf-8").splitlines()) <= 90
 
 
 _REMARK = re.compile(r"( \.\.\.)?(\s{3,}\S.*|\s+#.*|)$")
