@@ -136,11 +136,11 @@ def pose_by_sqpnp_ransac(
 
 
 def pose_of_smaller_error(iterative: ScoredPose | None, sqpnp: ScoredPose | None) -> ScoredPose | None:
-    """Algorithm 1, line 9: take the pose with the smaller mean reprojection error; of two equal ones, the iterative."""
+    """Algorithm 1, line 9: take the pose with the smaller mean reprojection error; of two equal ones, as printed, SQPnP's."""
     if iterative is None or sqpnp is None:
         return iterative or sqpnp
     first, second = (np.inf if np.isnan(pose.mean_error_px) else pose.mean_error_px for pose in (iterative, sqpnp))
-    return iterative if first <= second else sqpnp
+    return iterative if first < second else sqpnp
 
 
 def refined_on_all_pairs(

@@ -315,7 +315,7 @@ def test_algorithm_1_line_9_takes_the_smaller_mean_error() -> None:
     assert pose_of_smaller_error(small, large) is small
     assert pose_of_smaller_error(large, small) is small
     first, second = scored(3.0), scored(3.0)
-    assert pose_of_smaller_error(first, second) is first
+    assert pose_of_smaller_error(first, second) is second  # "if err_it < err_sq", else SQPnP
 
 
 def test_algorithm_1_line_9_takes_the_only_one_there_is() -> None:
