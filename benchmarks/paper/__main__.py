@@ -9,10 +9,10 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from benchmarks.paper.fit import fit, read_fit, write_fit
+from benchmarks.paper.fit import FIT_FILE, fit, read_fit, write_lines
 from benchmarks.paper.judgement import differing
 from benchmarks.paper.moving import MOVING, acc_of, assumptions_of
-from benchmarks.paper.page import Measured, page, read_measured, table, write_measured
+from benchmarks.paper.page import MEASURED_FILE, Measured, page, read_measured, table
 from benchmarks.paper.pictures import write_pictures
 from benchmarks.paper.rows import Seed, measure
 from benchmarks.paper.settings import FITTED, SEED_SETS, Settings
@@ -44,10 +44,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser.parse_args(arguments)
     with ProcessPoolExecutor(max_workers=given.workers) as pool:
         if given.fit:
-            write_fit(fit(pool))
+            write_lines(FIT_FILE, fit(pool), "settings")
             return 0
         if not (given.rewrite or given.pictures):
-            write_measured(_measured(pool, given.seeds))
+            write_lines(MEASURED_FILE, _measured(pool, given.seeds), "rows")
     measured = read_measured()
     if not given.rewrite:
         write_pictures(_ROOT / "docs" / "pictures" / "paper", measured, FITTED)

@@ -7,7 +7,7 @@ prediction. `python -m benchmarks.paper --fit` writes both to fit.json; the best
 """
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
@@ -26,7 +26,7 @@ ELEVATIONS_DEG = (0.2, 0.4, 0.6, 0.8, 1.0)
 CORNERS = (12, 20, 30)
 GROSS_M = (1.0, 2.0, 3.0, 4.0, 6.0)
 FITTED_ROWS = ("PPM+D1", "PPM+D2", "CCM+D2")
-_FILE = Path(__file__).with_name("fit.json")
+FIT_FILE = Path(__file__).with_name("fit.json")
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,13 +52,13 @@ def mismatch_of(rows: Mapping[str, tuple[float, float]]) -> float:
     return float(np.square(logs).sum())
 
 
-def fit(pool: Executor, seeds: Sequence[int] = FIT_SEEDS, report: Callable[[str], None] = print) -> Fit:
+def fit(pool: Executor, seeds: Sequence[int] = FIT_SEEDS) -> Fit:
     """Try every place of both grids."""
     places = []
     for place in itertools.product(AZIMUTHS_DEG, ELEVATIONS_DEG, CORNERS):
         found = pool.map(partial(measure, settings=Settings(*place), datasets=("d1", "d2")), seeds)
         places.append(_place(place, [one.rows for one in found], FITTED_ROWS))
-        report(str(places[-1]))
+        print(places[-1], flush=True)
     places.sort(key=lambda one: one.mismatch)
     azimuth_deg, elevation_deg, number = places[0].settings
     best = Settings(azimuth_deg, elevation_deg, int(number))
@@ -67,14 +67,15 @@ def fit(pool: Executor, seeds: Sequence[int] = FIT_SEEDS, report: Callable[[str]
     return Fit(tuple(places), tuple(sorted(gross, key=lambda one: one.mismatch)))
 
 
-def write_fit(found: Fit, path: Path = _FILE) -> None:
-    """Write the places, one to a line."""
-    path.write_bytes(msgspec.json.encode(found).replace(b'{"settings"', b'\n{"settings"') + b"\n")
-
-
-def read_fit(path: Path = _FILE) -> Fit:
+def read_fit() -> Fit:
     """Read the places that the last fit wrote."""
-    return msgspec.json.decode(path.read_bytes(), type=Fit)
+    return msgspec.json.decode(FIT_FILE.read_bytes(), type=Fit)
+
+
+def write_lines(path: Path, value: object, first_key: str) -> None:
+    """Write a value as JSON, each object that begins with a key on a line of its own."""
+    start = f'{{"{first_key}"'.encode()
+    path.write_bytes(msgspec.json.encode(value).replace(start, b"\n" + start) + b"\n")
 
 
 def _gross(seed: int, settings: Settings) -> dict[tuple[float, ...], Figures]:

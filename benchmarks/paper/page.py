@@ -1,7 +1,7 @@
 """Write docs/paper-experiments.md."""
 # ruff: noqa: E501 - a row of a Markdown table is one line
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,12 +10,11 @@ import numpy as np
 
 from benchmarks.paper.fit import AZIMUTHS_DEG, CORNERS, ELEVATIONS_DEG, FITTED_ROWS, GROSS_M, Fit, Place, mismatch_of
 from benchmarks.paper.judgement import CHOSEN_ROW, PAPER, Judged, differing, judged, verdict
-from benchmarks.paper.moving import ACC_OF_PAPER, MOVING, Acc
-from benchmarks.paper.rows import MOST_GROSS, Gross, Seed
+from benchmarks.paper.moving import MOVING, Acc
+from benchmarks.paper.rows import MOST_GROSS, Seed
 from benchmarks.paper.settings import FIT_SEEDS, PPM, SEED_SETS, Settings, session
 
-_FILE = Path(__file__).with_name("measured.json")
-_SHOWN = ("PPM+D1", "PMM+D1", "CCM+D2", "PPM+D2", "CCM+D1", "PPM+D1+T_m", "PMM+D1+T_c", "PPM+D3")
+MEASURED_FILE = Path(__file__).with_name("measured.json")
 _PLACES = 8
 _SCRIPT_FOCAL_PX = 554.0  # in the authors' published script
 
@@ -39,25 +38,25 @@ class Measured:
     assumptions: tuple[dict[str, float], ...]
 
 
-def write_measured(measured: Measured, path: Path = _FILE) -> None:
-    """Write the figures of a run, a seed to a line, so that the page can be written again without measuring again."""
-    path.write_bytes(msgspec.json.encode(measured).replace(b'{"rows"', b'\n{"rows"') + b"\n")
-
-
-def read_measured(path: Path = _FILE) -> Measured:
-    """Read the figures of the last run."""
-    return msgspec.json.decode(path.read_bytes(), type=Measured)
+def read_measured() -> Measured:
+    """Read the figures of the last run, from which the page can be written without measuring again."""
+    return msgspec.json.decode(MEASURED_FILE.read_bytes(), type=Measured)
 
 
 def table(measured: Measured) -> str:
     """Return Table I: the paper's figures, ours of both sets of seeds, and the judgement of both."""
-    rows = [_table_row(name, measured.sets) for name in PAPER]
-    return _lines(["| row | paper: AED / CDSD | our AED | our CDSD | judgement |", "|---|---|---|---|---|", *rows])
+    rows = []
+    for name, (aed, cdsd) in PAPER.items():
+        both = [judged(name, seeds) for seeds in measured.sets]
+        ours = ["<br>".join(_spread(one[i]) for one in both) for i in range(2)]
+        rows.append([name, f"{aed:.2f} / {cdsd:.2f}", *ours, verdict(name, measured.sets)])
+    return _table(["row", "paper: AED / CDSD", "our AED", "our CDSD", "judgement"], rows)
 
 
 def page(measured: Measured, settings: Settings, fit: Fit) -> str:
     """Return the page in Markdown, of figures measured with the settings of a fit."""
-    seeds, differ, cars = [*measured.sets[0], *measured.sets[1]], differing(*measured.sets), measured.accs["cars-far"]
+    differ = "\n".join(f"- {one}" for one in differing(*measured.sets))
+    seeds, cars = [*measured.sets[0], *measured.sets[1]], measured.accs["cars-far"]
     conditions = np.array([seed.conditions for seed in seeds if seed.conditions is not None])
     outside = np.array([seed.rows["CCM+D1"].outside for seed in seeds if "CCM+D1" in seed.rows])
     return f"""# The paper's experiments
@@ -79,9 +78,9 @@ log-normal distribution fitted to them, the first set above the second. AED and 
 {table(measured)}
 
 A figure is *reproduced* if the paper's value lies in our range and our median is within 25 % of it; *compatible* if it lies in our range, but that range is
-wider than a factor of 2; *order of magnitude* if it is wider than a factor of 10. The two sets give the same judgement of {18 - len(differ)} of 18 figures. The others:
+wider than a factor of 2; *order of magnitude* if it is wider than a factor of 10. The two sets give the same judgement of {18 - len(differing(*measured.sets))} of 18 figures. The others:
 
-{_lines(f"- {one}" for one in differ)}
+{differ}
 
 PPM+D1, PPM+D2 and CCM+D2 were fitted, so that they agree is no evidence. PMM+D1 and PMM+D1+T_c follow from an assumed mounting error, drawn for each seed; that
 is why they are ranges. They rest on the size of the picture too: with the focal length of the authors' published script, {_SCRIPT_FOCAL_PX:.0f} px, PMM+D1 would be
@@ -122,11 +121,11 @@ elevation, which a placement keeps as long as the reflector stands there, and th
 table does not use, and writes `benchmarks/paper/fit.json`. The mismatch is the sum of squared logarithms of our AED and CDSD over the paper's. Seeds cannot tell
 the first places apart: on the two sets of the table, the best one has a mismatch of {" and ".join(f"{_mismatch(some):.3f}" for some in measured.sets)}. What the second one gives is in the table of other choices below. The best of {len(fit.places)} places:
 
-{_fit_table(fit.places, ("azimuth [deg]", "elevation [deg]", "corners"), FITTED_ROWS)}
+{_fit_table(fit.places, ("azimuth [deg]", "elevation [deg]", "corners"))}
 
 With the best of them, 1 to {MOST_GROSS} wrong pairs and errors of {_listed(GROSS_M)} m were then tried for PPM+DR+D3. This is no fit of a setting, but the choice of an assumption for one row:
 
-{_fit_table(fit.gross, ("wrong pairs", "by [m]"), (CHOSEN_ROW,))}
+{_fit_table(fit.gross, ("wrong pairs", "by [m]"))}
 
 ## What the paper does not say
 
@@ -151,9 +150,7 @@ Azimuths are interpolated. There is nobody in the scene, and nothing echoes but 
 other choices give, median AED in px over the first {len(measured.others["nothing"])} seeds, without fitting again; compare with the first line, not with
 Table I:
 
-| changed | {" | ".join(_SHOWN)} |
-|{"---|" * (len(_SHOWN) + 1)}
-{_lines(_other_row(what, some) for what, some in measured.others.items())}
+{_others_table(measured.others)}
 
 Here the fit's second place is elevation 0.2 deg and 20 corners.
 
@@ -165,15 +162,11 @@ returns belong to a target is decided by the radar's own targets, as on a real r
 frames of 0 % count; the authors' published script drops them. If their figure comes from it, it compares with the first of our columns. Median and range over
 {len(cars)} seeds.
 
-| what moves | paper | Acc, frames of 0 % dropped | kept | by labels | PMM, kept | PPM less PMM, points |
-|---|---|---|---|---|---|---|
-{_lines(_acc_row(name, what, measured.accs[name]) for name, what in MOVING.items())}
+{_acc_table(measured.accs)}
 
 The paper's 66 % for cars is below ours. Six assumptions, one changed at a time, of cars at 20 to 60 m; Acc by labels, frames of 0 % kept:
 
-| changed | Acc | points |
-|---|---|---|
-{_lines(_assumption_rows(measured.assumptions, cars))}
+{_assumptions_table(measured.assumptions, cars)}
 
 Alone, a tight box or a longer range would bring Acc down to the paper's 66 % or below; which of them held there, the paper does not say, so its figure stays
 unexplained. Our boxes are true, the paper's come from a detector.
@@ -230,13 +223,6 @@ def _board_px(settings: Settings) -> float:
     return float(np.linalg.norm(pixels[7] - pixels[0]))
 
 
-def _table_row(name: str, sets: Sequence[Sequence[Seed]]) -> str:
-    aed, cdsd = PAPER[name]
-    both = [judged(name, seeds) for seeds in sets]
-    ours = ["<br>".join(_spread(one[i]) for one in both) for i in range(2)]
-    return f"| {name} | {aed:.2f} / {cdsd:.2f} | {ours[0]} | {ours[1]} | {verdict(name, sets)} |"
-
-
 def _spread(one: Judged) -> str:
     return f"{_px(one.median_px)} ({_px(one.low_px)} to {_px(one.high_px)}), {one.judgement}"
 
@@ -246,36 +232,26 @@ def _px(value: float) -> str:
 
 
 def _gross_table(seeds: Sequence[Seed]) -> str:
-    rows = [
-        "| wrong pairs | paper's: AED / CDSD [px] | pose off | default's: AED / CDSD [px] | pose off | pairs that it rejects |",
-        "|---|---|---|---|---|---|",
-    ]
+    rows = []
     for count in range(MOST_GROSS + 1):
-        paper, default = (
-            [one for seed in seeds for one in seed.gross if (one.count, one.method) == (count, method)]
-            for method in ("paper", "default")
-        )
-        rejected = np.median([one.pairs - one.agreeing for one in default])
-        pairs = int(np.median([one.pairs for one in default]))
-        cells = [*_gross_cells(paper), *_gross_cells(default), f"{rejected:.0f}"]
-        rows.append(f"| {count} of {pairs} | {' | '.join(cells)} |")
-    return _lines(rows)
+        cells: list[str] = []
+        for method in ("paper", "default"):
+            found = [one for seed in seeds for one in seed.gross if (one.count, one.method) == (count, method)]
+            aed, cdsd = np.median([(one.figures.aed_px, one.figures.cdsd_px) for one in found], axis=0)
+            rotation, position = np.median([(one.rotation_deg, one.position_m) for one in found], axis=0)
+            cells += [f"{aed:.1f} / {cdsd:.1f}", f"{rotation:.1f} deg, {position:.2f} m"]
+        pairs, rejected = np.median([(one.pairs, one.pairs - one.agreeing) for one in found], axis=0)
+        rows.append([f"{count} of {pairs:.0f}", *cells, f"{rejected:.0f}"])
+    head = "wrong pairs|paper's: AED / CDSD [px]|pose off|default's: AED / CDSD [px]|pose off|pairs that it rejects"
+    return _table(head.split("|"), rows)
 
 
-def _gross_cells(found: Sequence[Gross]) -> tuple[str, str]:
-    aed, cdsd, rotation, position = np.median(
-        [(one.figures.aed_px, one.figures.cdsd_px, one.rotation_deg, one.position_m) for one in found], axis=0
-    )
-    return f"{aed:.1f} / {cdsd:.1f}", f"{rotation:.1f} deg, {position:.2f} m"
-
-
-def _fit_table(places: Sequence[Place], names: Sequence[str], rows: Sequence[str]) -> str:
-    head = [*names, *(f"{row}: AED / CDSD" for row in rows), "mismatch"]
-    lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
+def _fit_table(places: Sequence[Place], names: Sequence[str]) -> str:
+    rows = []
     for place in places[:_PLACES]:
-        figures = [f"{place.rows[row][0]:.2f} / {place.rows[row][1]:.2f}" for row in rows]
-        lines.append(f"| {' | '.join([*(f'{one:g}' for one in place.settings), *figures, f'{place.mismatch:.3f}'])} |")
-    return _lines(lines)
+        figures = [f"{aed:.2f} / {cdsd:.2f}" for aed, cdsd in place.rows.values()]
+        rows.append([*(f"{one:g}" for one in place.settings), *figures, f"{place.mismatch:.3f}"])
+    return _table([*names, *(f"{row}: AED / CDSD" for row in places[0].rows), "mismatch"], rows)
 
 
 def _mismatch(seeds: Sequence[Seed]) -> float:
@@ -283,26 +259,30 @@ def _mismatch(seeds: Sequence[Seed]) -> float:
     return mismatch_of({name: (aed.median_px, cdsd.median_px) for name, (aed, cdsd) in both})
 
 
-def _other_row(what: str, seeds: Sequence[Seed]) -> str:
-    cells = []
-    for name in _SHOWN:
-        values = [seed.rows[name].aed_px for seed in seeds if name in seed.rows]
-        cells.append(_px(float(np.median(values))) if values else "-")
-    return f"| {what} | {' | '.join(cells)} |"
+def _others_table(others: Mapping[str, Sequence[Seed]]) -> str:
+    names, rows = [name for name in PAPER if name != CHOSEN_ROW], []
+    for what, seeds in others.items():
+        found = [[seed.rows[name].aed_px for seed in seeds if name in seed.rows] for name in names]
+        rows.append([what, *(_px(float(np.median(some))) if some else "-" for some in found)])
+    return _table(["changed", *names], rows)
 
 
-def _acc_row(name: str, what: str, seeds: Sequence[Acc]) -> str:
-    columns = [(one.dropped, one.ppm, one.labelled, one.pmm, one.ppm - one.pmm) for one in seeds]
-    *cells, ahead = [_percent(column) for column in zip(*columns, strict=True)]
-    return f"| {what} | {ACC_OF_PAPER.get(name, '')} | {' | '.join(cells)} | {ahead.replace(' %', '')} |"
+def _acc_table(accs: Mapping[str, Sequence[Acc]]) -> str:
+    rows = []
+    for name, (what, paper) in MOVING.items():
+        columns = [(one.dropped, one.ppm, one.labelled, one.pmm, one.ppm - one.pmm) for one in accs[name]]
+        *cells, ahead = [_percent(column) for column in zip(*columns, strict=True)]
+        rows.append([what, paper, *cells, ahead.replace(" %", "")])
+    head = "what moves|paper|Acc, frames of 0 % dropped|kept|by labels|PMM, kept|PPM less PMM, points"
+    return _table(head.split("|"), rows)
 
 
-def _assumption_rows(seeds: Sequence[dict[str, float]], before: Sequence[Acc]) -> list[str]:
+def _assumptions_table(seeds: Sequence[dict[str, float]], before: Sequence[Acc]) -> str:
     rows = []
     for what in seeds[0]:
         change = np.median([100 * (seed[what] - one.labelled) for seed, one in zip(seeds, before, strict=True)])
-        rows.append(f"| {what} | {_percent([seed[what] for seed in seeds])} | {change:+.0f} |")
-    return rows
+        rows.append([what, _percent([seed[what] for seed in seeds]), f"{change:+.0f}"])
+    return _table(["changed", "Acc", "points"], rows)
 
 
 def _percent(values: Sequence[float]) -> str:
@@ -314,8 +294,9 @@ def _named(seeds: Sequence[int]) -> str:
     return f"{seeds[0]} to {seeds[-1]}"
 
 
-def _lines(rows: Iterable[str]) -> str:
-    return "\n".join(rows)
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [f"| {' | '.join(cells)} |" for cells in (head, *rows)]
+    return "\n".join([lines[0], "|---" * len(head) + "|", *lines[1:]])
 
 
 def _listed(values: Sequence[float]) -> str:

@@ -4,6 +4,7 @@ import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from benchmarks.paper.rows import (
     by_checkerboard,
     by_mounting,
     calibrated,
+    figures_of,
     points_and_pixels,
     projected_by,
     with_gross_errors,
@@ -21,9 +23,9 @@ from benchmarks.paper.rows import (
 from benchmarks.paper.settings import SEED_SETS, Dataset, Settings, options_of, other_rig
 from calib_core.arrays import Flags, Indices, Points2
 from calib_core.evaluation import BoxFigures
-from calib_core.measurements import Box
+from calib_core.geometry import RigidTransform
+from calib_core.measurements import Box, TimeNs
 from calib_core.results import Calibration
-from calib_core.results.metrics import aed, cdsd, distances
 from calib_core.synthetic import PresetName, SimulatedRecording, SimulatedScans, simulate, simulate_scans
 from calib_core.synthetic.annotations import true_boxes
 from calib_core.synthetic.recording import SimulatedPictures
@@ -38,21 +40,17 @@ _HEIGHT = _WIDTH * 9 // 16
 _FAR_M = 40.0
 _WIDE_PX = 1000.0
 """Of wider views every other pixel is traced, which takes most of the time."""
+View: TypeAlias = tuple[float, float, float, float]
+"""The part of a picture that is shown: left, top, width and height in its pixels."""
 
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """One picture of a figure.
-
-    Attributes:
-        title: below the figure's.
-        inside: SVG in its own units.
-        view: left, top, width and height of what is shown, in these units.
-    """
+    """One picture of a figure: its title, SVG in units of its own, and what of it is shown."""
 
     title: str
     inside: str
-    view: tuple[float, float, float, float]
+    view: View
 
 
 def write_pictures(folder: Path, measured: Measured, settings: Settings) -> None:
@@ -64,8 +62,8 @@ def write_pictures(folder: Path, measured: Measured, settings: Settings) -> None
     d3 = _typical_of(measured, "PPM+D3", CHOSEN_ROW)
     seeds = {preset: _nearest_to_medians(_accs(measured, preset)) for preset in MOVING}
     figures = {
-        "fig-2": (f"Fig. 2, simulated: D1, seed {d1} ({clicked})", _d1(d1, settings)),
-        "fig-3": (f"Fig. 3, simulated: D2, seed {d2} ({clicked})", _d2(d2, settings)),
+        "fig-2": (f"Fig. 2, simulated: D1, seed {d1} ({clicked})", _on_own_rig("d1", d1, settings)),
+        "fig-3": (f"Fig. 3, simulated: D2, seed {d2} ({clicked})", _on_own_rig("d2", d2, settings)),
         "fig-4": (f"Fig. 4, simulated: D3, the aisle, seed {d3} ({clicked})", _d3(d3, settings)),
         "fig-5": (f"Fig. 5, simulated: (a) PPM, (b) PMM ({moving})", _real_world(seeds, settings)),
         "fig-6": ("Fig. 6, simulated: frames by their Acc, frames of 0 % included", _histograms(seeds, settings)),
@@ -118,16 +116,11 @@ def _figure(title: str, panels: Sequence[Panel]) -> str:
     return "\n".join([*parts, "</svg>"]) + "\n"
 
 
-def _d1(seed: int, settings: Settings) -> list[Panel]:
-    recording, simulated, ppm = _solved("d1", seed, settings)
-    at_px = projected_by(by_mounting(simulated), ppm)
-    return _clicked(recording, ppm, {"(A) PPM+D1": projected_by(None, ppm), "(B) PMM+D1": at_px})
-
-
-def _d2(seed: int, settings: Settings) -> list[Panel]:
-    recording, simulated, ppm = _solved("d2", seed, settings)
-    at_px = projected_by(by_checkerboard(simulated, ppm)[0], ppm)
-    return _clicked(recording, ppm, {"(A) PPM+D2": projected_by(None, ppm), "(B) CCM+D2": at_px})
+def _on_own_rig(dataset: Dataset, seed: int, settings: Settings) -> list[Panel]:
+    recording, simulated, ppm = _solved(dataset, seed, settings)
+    other, pose = ("PMM", by_mounting(simulated)) if dataset == "d1" else ("CCM", by_checkerboard(simulated, ppm)[0])
+    name = dataset.upper()
+    return _clicked(recording, ppm, {f"(A) PPM+{name}": None, f"(B) {other}+{name}": pose})
 
 
 def _d3(seed: int, settings: Settings) -> list[Panel]:
@@ -137,8 +130,8 @@ def _d3(seed: int, settings: Settings) -> list[Panel]:
     apart = with_gross_errors(other_rig(simulated), settings.gross_pairs, settings.gross_m).unwrap()
     wrong = f"{settings.gross_pairs} radar positions wrong by {settings.gross_m:g} m"
     return [
-        *_clicked(recording, same, {"(A) same rig": projected_by(None, same)}),
-        *_clicked(other, apart, {f"(B) other rig, {wrong}": projected_by(None, apart)}),
+        *_clicked(recording, same, {"(A) same rig": None}),
+        *_clicked(other, apart, {f"(B) other rig, {wrong}": None}),
     ]
 
 
@@ -148,20 +141,20 @@ def _solved(dataset: Dataset, seed: int, settings: Settings) -> tuple[SimulatedR
     return simulate(options), simulated, calibrated(simulated).unwrap()
 
 
-def _clicked(recording: SimulatedRecording, ppm: Calibration, shown: Mapping[str, Points2]) -> list[Panel]:
-    """Draw the clicks of a calibration and where some method projects their radar positions, on the frame of the first click."""
-    first = recording.clicks[0].image_time
-    frame = int(np.searchsorted(recording.stage.frame_times.header_ns, first))
+def _clicked(
+    recording: SimulatedRecording, ppm: Calibration, poses: Mapping[str, RigidTransform | np.ndarray | None]
+) -> list[Panel]:
+    """Draw the clicks of a calibration and where poses put their radar positions, on the frame of the first click."""
     _, pixels = points_and_pixels(ppm)
     view = _view_around(pixels, recording, least=0.3)
-    back = _background(recording, frame, view)
+    back = _background(recording, recording.clicks[0].image_time, view)
     panels = []
-    for title, at in shown.items():
+    for title, pose in poses.items():
+        at, figures = projected_by(pose, ppm), figures_of(ppm, pose)
         marks = [_line(a, b, view) for a, b in zip(pixels, at, strict=True)]
         marks += [_dot(a, _CLICK, view) for a in pixels] + [_dot(b, _AT, view) for b in at]
-        lengths = distances(at, pixels)
-        figures = f"AED {aed(lengths):.1f}, CDSD {cdsd(lengths):.1f} px"
-        panels.append(Panel(f"{title}: {figures}", back + "".join(marks), view))
+        said = f"{title}: AED {figures.aed_px:.1f}, CDSD {figures.cdsd_px:.1f} px"
+        panels.append(Panel(said, back + "".join(marks), view))
     return panels
 
 
@@ -188,7 +181,7 @@ def _moving(
     time = both[0].frames[number].image_time
     (shown,) = (frame for frame in true_boxes(recording) if frame.image_time == time)
     view = _view_around(found[0].boxes_px[own & far & boxed].reshape(-1, 2), recording, least=0.25)
-    back = _background(recording, int(np.searchsorted(recording.stage.frame_times.header_ns, time)), view)
+    back = _background(recording, time, view)
     panels = []
     for letter, one in zip("ab", found, strict=True):
         inside, at = one.inside[own], one.pixels_px[own]
@@ -245,9 +238,7 @@ def _histogram(title: str, figures: BoxFigures) -> Panel:
     return Panel(f"{title}, {len(shares)} frames", "".join(parts), (0.0, 0.0, float(_WIDTH), float(_HEIGHT)))
 
 
-def _view_around(
-    pixels_px: Points2, recording: SimulatedRecording, *, least: float
-) -> tuple[float, float, float, float]:
+def _view_around(pixels_px: Points2, recording: SimulatedRecording, *, least: float) -> View:
     """Return the part of the picture around some pixels: left, top, width, height; at least a share of its width."""
     camera = recording.camera
     low, high = pixels_px.min(axis=0), pixels_px.max(axis=0)
@@ -259,7 +250,7 @@ def _view_around(
     return float(corner[0]), float(corner[1]), float(size[0]), float(size[1])
 
 
-def _background(recording: SimulatedRecording, frame: int, view: tuple[float, float, float, float]) -> str:
+def _background(recording: SimulatedRecording, time: TimeNs, view: View) -> str:
     """Return the part of a frame that is shown as an SVG image, a JPEG."""
     import cv2
 
@@ -267,6 +258,7 @@ def _background(recording: SimulatedRecording, frame: int, view: tuple[float, fl
     left, top, wide, high = (round(value / binning) * binning for value in view)
     camera = recording.camera.windowed((left, top), (wide, high), (binning, binning))
     stage = replace(recording.stage, rig=replace(recording.stage.rig, camera=camera))
+    frame = int(np.searchsorted(stage.frame_times.header_ns, time))
     pixels = SimulatedPictures(replace(recording, stage=stage)).image(frame)
     good, data = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, 78])
     assert good, "OpenCV encodes every 8-bit picture"
@@ -275,20 +267,20 @@ def _background(recording: SimulatedRecording, frame: int, view: tuple[float, fl
     return f'<image {at} preserveAspectRatio="none" href="data:image/jpeg;base64,{encoded}"/>'
 
 
-def _dot(at_px: np.ndarray, colour: str, view: tuple[float, float, float, float]) -> str:
+def _dot(at_px: np.ndarray, colour: str, view: View) -> str:
     unit = view[2] / _WIDTH
     where = f'cx="{at_px[0]:.1f}" cy="{at_px[1]:.1f}" r="{4.0 * unit:.2f}"'
     width = f'stroke-width="{0.8 * unit:.2f}"'
     return f'<circle {where} fill="{colour}" stroke="#fff" {width}/>' if np.isfinite(at_px).all() else ""
 
 
-def _line(a_px: np.ndarray, b_px: np.ndarray, view: tuple[float, float, float, float]) -> str:
+def _line(a_px: np.ndarray, b_px: np.ndarray, view: View) -> str:
     (x, y), (u, v) = a_px, b_px
     line = f'<path d="M{x:.1f} {y:.1f}L{u:.1f} {v:.1f}" stroke="#fff" stroke-width="{1.5 * view[2] / _WIDTH:.2f}"/>'
     return line if np.isfinite([a_px, b_px]).all() else ""
 
 
-def _outline(box: Box, view: tuple[float, float, float, float]) -> str:
+def _outline(box: Box, view: View) -> str:
     size = f'width="{box.right_px - box.left_px:.1f}" height="{box.bottom_px - box.top_px:.1f}"'
     style = f'fill="none" stroke="{_BOX}" stroke-width="{2.0 * view[2] / _WIDTH:.2f}"'
     return f'<rect x="{box.left_px:.1f}" y="{box.top_px:.1f}" {size} {style}/>'

@@ -58,12 +58,9 @@ def options_of(dataset: Dataset, seed: int, settings: Settings) -> SimulationOpt
     reflector stands at corners of the checkerboard, nowhere else.
     """
     preset: PresetName = f"paper-{dataset}"  # type: ignore[assignment]
-    options = PRESETS[preset]
-    weaker = (_USUAL_EDGE_M / options.reflector_edge_m) ** 4
-    share = (1.0 - settings.outshone_share + settings.outshone_share * weaker) ** 0.5
     on_board = dataset == "d2"
     return replace(
-        under(options, seed, settings, share),
+        under(PRESETS[preset], seed, settings),
         placements=0 if on_board else settings.placements,
         board_corners=settings.board_corners if on_board else 0,
         person=False,
@@ -73,8 +70,10 @@ def options_of(dataset: Dataset, seed: int, settings: Settings) -> SimulationOpt
     )
 
 
-def under(options: SimulationOptions, seed: int, settings: Settings, share: float = 1.0) -> SimulationOptions:
-    """Return options with the sensors of the settings; `share` scales the constant errors."""
+def under(options: SimulationOptions, seed: int, settings: Settings) -> SimulationOptions:
+    """Return options with the sensors of the settings; a larger reflector outshines a part of the constant errors."""
+    weaker = (_USUAL_EDGE_M / options.reflector_edge_m) ** 4
+    share = (1.0 - settings.outshone_share + settings.outshone_share * weaker) ** 0.5
     defects = replace(
         options.defects,
         constant_azimuth_deg=share * settings.constant_azimuth_deg,

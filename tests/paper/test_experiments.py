@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.paper.fit import AZIMUTHS_DEG, CORNERS, ELEVATIONS_DEG, FITTED_ROWS, mismatch_of, read_fit
+from benchmarks.paper.fit import AZIMUTHS_DEG, CORNERS, ELEVATIONS_DEG, FITTED_ROWS, mismatch_of, read_fit, write_lines
 from benchmarks.paper.judgement import PAPER, Judged, differing, judged, row_judgement
-from benchmarks.paper.page import page, read_measured, write_measured
+from benchmarks.paper.page import MEASURED_FILE, page, read_measured
 from benchmarks.paper.rows import Figures, Seed, calibrated, displaced, measured_pairs, with_gross_errors
 from benchmarks.paper.settings import FIT_SEEDS, FITTED, PPM, SEED_SETS, Dataset, options_of, other_rig, session
 from calib_core.synthetic import SimulatedScans, simulate, simulate_scans, write_recording
@@ -144,8 +144,8 @@ def test_gross_errors_are_of_the_stated_number_and_size_and_never_behind_the_rad
 
 
 def test_the_figures_of_a_run_come_back_from_their_file(tmp_path: Path) -> None:
-    write_measured(read_measured(), tmp_path / "measured.json")
-    assert read_measured(tmp_path / "measured.json") == read_measured()
+    write_lines(tmp_path / "measured.json", read_measured(), "rows")
+    assert (tmp_path / "measured.json").read_bytes() == MEASURED_FILE.read_bytes()
 
 
 def test_the_documented_page_is_what_the_last_run_measured(project_root: Path) -> None:
