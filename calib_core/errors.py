@@ -9,6 +9,9 @@ CalibrationError
  └── UnsolvableError      a calibration was requested that the data cannot give
 """
 
+from collections.abc import Iterable
+from difflib import get_close_matches
+
 
 class CalibrationError(Exception):
     """Any input this package rejects; the message is one line and can be shown as it is."""
@@ -46,3 +49,10 @@ class UnsolvableError(CalibrationError):
     def __init__(self, code: str, reason: str, hint: str) -> None:
         super().__init__(f"no calibration: {reason}; {hint}")
         self.code, self.reason, self.hint = code, reason, hint
+
+
+def meant(word: str, known: Iterable[str], these: str = "known:") -> str:
+    """Return which known word an unknown one probably means, or else all that are known."""
+    names = list(known)
+    near = get_close_matches(word[:80], names, n=1) or get_close_matches(word[:80].lower(), names, n=1)
+    return f"did you mean {near[0]}?" if near else f"{these} {', '.join(names)}"

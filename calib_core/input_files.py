@@ -3,6 +3,7 @@
 import os
 import select
 import stat
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,25 @@ _SHELL_PIPES = ("/dev/fd/", "/proc/self/fd/", "/dev/stdin")
 """Where a shell puts what `<(command)` writes: there is a writer, so reading it ends."""
 _PIPE = "a named pipe (FIFO)"
 _WRITER_TIMEOUT_S = 5.0
+_MAX_TEXT_BYTES = 64 << 20
+_BEGINNINGS = {
+    b"#ROSBAG": "a recording; give it as RECORDING, or with --recording",
+    b"\x89MCAP": "a recording; give it as RECORDING, or with --recording",
+    b"SQLite format 3": "a recording; give it as RECORDING, or with --recording",
+    b"PK": "an archive; unpack it",
+    b"\x89PNG": "a picture",
+    b"\xff\xd8\xff": "a picture",
+}
+_USES = {
+    "calibration-1": "give it as CALIBRATION, before the recording; to solve it again: cocalib solve --pairs FILE",
+    "clicks-1": "solve them with their recording: cocalib solve RECORDING --clicks FILE",
+    "pairs-1": "solve them without a recording: cocalib solve --pairs FILE",
+    "proposals-1": "confirm them on the page, or copy the clicks that you have looked at into a clicks-1 file",
+    "boxes-1": "give it with --boxes FILE",
+    "labels-1": "give it with --labels FILE",
+    "board-views-1": "give it with cocalib intrinsics --views FILE",
+}
+"""What our own files are for, by their schema."""
 
 
 def special_kind(path: Path) -> str | None:
@@ -30,29 +50,78 @@ def special_kind(path: Path) -> str | None:
     return "a socket" if stat.S_ISSOCK(mode) else "a device"
 
 
-def read_input(path: Path, *, max_bytes: int, is_what: str) -> bytes:
+def no_such(path: Path, *, if_missing: str = "") -> str:
+    """Say that there is nothing of this name, and what to do: unless told, the name in its folder that looks like it."""
+    try:
+        near = get_close_matches(
+            path.name, [] if if_missing else [one.name for one in path.parent.iterdir()], n=1, cutoff=0.75
+        )
+    except OSError:
+        near = []
+    step = f"did you mean {name_text(path.with_name(near[0]))}?" if near else if_missing or "check the path"
+    return f"{name_text(path)}: no such file or folder; {step}"
+
+
+def other_kind(schema: object, wanted: str) -> str:
+    """Say that a file is another one of ours than the one wanted, and what it is for; "" if it is not known to be ours."""
+    use = _USES.get(str(schema).removeprefix("cocalib/"))
+    return f"this is a {schema} file, not {wanted}; {use}" if use else ""
+
+
+def read_input(path: Path, *, max_bytes: int, is_what: str, if_missing: str = "") -> bytes:
     """Read a small file whole; a pipe that somebody writes to, such as the shell's `<(command)`, may be read too, once.
 
     Args:
         path: the file.
         max_bytes: larger files are refused.
         is_what: what it should be, such as "a file of clicks", for the error message.
+        if_missing: what to do then; by default, the name that looks like it.
 
     Raises:
-        InputError: it is a device or a socket, a pipe that nobody writes to, or too large.
-        OSError: it cannot be read.
+        InputError: it is missing, a folder, a device or a socket, a pipe that nobody writes to, unreadable, or too large.
     """
-    kind = special_kind(path)
-    if kind is not None and kind != _PIPE:
-        raise InputError(f"{path}: is {kind}, not {is_what}; give a regular file")
-    if kind == _PIPE and not str(path).startswith(_SHELL_PIPES):
-        data = _read_pipe(path, max_bytes + 1)
-    else:
-        with path.open("rb") as file:
-            data = file.read(max_bytes + 1)
+    try:
+        kind = special_kind(path)
+        if kind is not None and kind != _PIPE:
+            raise InputError(f"{path}: is {kind}, not {is_what}; give a regular file")
+        if kind == _PIPE and not str(path).startswith(_SHELL_PIPES):
+            data = _read_pipe(path, max_bytes + 1)
+        else:
+            with path.open("rb") as file:
+                data = file.read(max_bytes + 1)
+    except FileNotFoundError:
+        raise InputError(no_such(path, if_missing=if_missing)) from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: is a folder, not {is_what}; name a file in it") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}; check its permissions") from None
     if len(data) > max_bytes:
         raise InputError(f"{path}: larger than {max_bytes >> 20} MB, too large for {is_what}; is it the right file?")
     return data
+
+
+def read_text(
+    path: Path, *, is_what: str = "a file of clicks or pairs", max_bytes: int = _MAX_TEXT_BYTES, if_missing: str = ""
+) -> str:
+    """Read a small text file; the arguments and errors are those of `read_input`.
+
+    Raises:
+        InputError: it cannot be read, or is not text.
+    """
+    data = read_input(path, max_bytes=max_bytes, is_what=is_what, if_missing=if_missing)
+    try:
+        return file_text(data)
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: {no_text(data, is_what)}") from None
+
+
+def no_text(data: bytes, wanted: str) -> str:
+    """Say that a file is not text, and what it is by its first bytes."""
+    kind = next((kind for beginning, kind in _BEGINNINGS.items() if data.startswith(beginning)), "")
+    is_what, _, step = kind.partition("; ")
+    if not kind:
+        return f"not a text file in UTF-8; give {wanted}, or save it as UTF-8"
+    return f"not a text file but {is_what}; {step or f'give {wanted}'}"
 
 
 def _read_pipe(path: Path, size: int) -> bytes:

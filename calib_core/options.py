@@ -355,7 +355,7 @@ def checked_options(options: CalibrationOptions) -> CalibrationOptions:
             if not (math.isfinite(number) and low <= number <= high):
                 raise OptionError(
                     f"option {name}: {number:g} is out of range; allowed: {low:g} to {high:g}{_unit_after(name)}"
-                    + (f". In centimetres? Then give {number / 100:g}" if _may_be_centimetres(name, number) else "")
+                    + _other_units(name, number)
                 )
         _check_type(leaf, value)
     if options.gating.min_range_m >= options.gating.max_range_m:
@@ -473,10 +473,13 @@ def _unit_after(path: str) -> str:
     return f" {unit}" if unit else ""
 
 
-def _may_be_centimetres(path: str, number: float) -> bool:
-    """Return whether a length that is out of range is within it if it was given in centimetres."""
-    low, high = RANGES[path]
-    return unit_of_name(path) == "m" and number > high and low <= number / 100 <= high
+def _other_units(name: str, number: float) -> str:
+    """Say what a length that is out of range would be if it was given in centimetres or millimetres; "" if it is no such."""
+    low, high = RANGES[name]
+    if unit_of_name(name) != "m" or number <= high or not low <= number / 1000 <= high:
+        return ""
+    metres = f" or {number / 100:g}" if number / 100 <= high else ""
+    return f". Give metres: {number / 1000:g}{metres}, if it is in millimetres{' or centimetres' if metres else ''}"
 
 
 RANGES: Mapping[str, tuple[float, float]] = dict(_ranges())

@@ -115,7 +115,7 @@ def changed_options(options: CalibrationOptions, changes: Sequence[OptionChange]
     groups: dict[str, dict[str, Any]] = {"": {}}
     for change in changes:
         if change.path not in option_fields():
-            raise _unknown(change.path)
+            raise unknown_option(change.path, sorted(option_fields()))
         group, _, name = change.path.rpartition(".")
         groups.setdefault(group, {})[name] = change.value
     ungrouped = groups.pop("")
@@ -181,17 +181,18 @@ def _changes(tree: object, prefix: str) -> Iterator[OptionChange]:
             except msgspec.ValidationError as error:
                 raise OptionError(f"option {path}: {str(error)[:1].lower()}{str(error)[1:]}") from error
         else:
-            raise _unknown(path)
+            raise unknown_option(path, sorted(option_fields()))
 
 
-def _unknown(path: str) -> OptionError:
-    known = sorted(option_fields())
-    near = difflib.get_close_matches(path, known, n=1)
-    if not near:
-        by_name = {name.rpartition(".")[2]: name for name in known}
-        near = [by_name[name] for name in difflib.get_close_matches(path.rpartition(".")[2], by_name, n=1)]
-    advice = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(known)}"
-    return OptionError(f"unknown option '{path[:80]}'; {advice}")
+def unknown_option(path: str, known: Sequence[str]) -> OptionError:
+    """Return the error for a name that no option has, with the nearest one, be it in another group."""
+    by_end = {name.rpartition(".")[2]: name for name in known}
+    ends = difflib.get_close_matches(path.rpartition(".")[2], by_end, n=1)
+    near = difflib.get_close_matches(path, known, n=1) or [by_end[end] for end in ends]
+    groups = ", ".join(dict.fromkeys(name.partition(".")[0] for name in known))
+    return OptionError(
+        f"unknown option '{path[:80]}'; " + (f"did you mean {near[0]}?" if near else f"known groups: {groups}")
+    )
 
 
 def _label(name: str) -> str:

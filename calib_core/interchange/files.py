@@ -5,7 +5,7 @@ from typing import TypeAlias
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.input_files import file_text, read_input
+from calib_core.input_files import read_text
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames, Provenance, VehicleNote
 from calib_core.interchange.cameras.files import read_camera_file
 from calib_core.interchange.check import report as reports
@@ -21,8 +21,6 @@ from calib_core.options import NoiseOptions
 from calib_core.results import Calibration
 
 PathLike: TypeAlias = str | Path
-
-_MAX_TEXT_BYTES = 64 << 20
 
 
 def read_camera(path: PathLike, *, image_size_px: tuple[int, int] | None = None) -> Camera:
@@ -181,13 +179,7 @@ def _imported(calibration: PathLike | Calibration | CalibrationFile) -> Imported
 
 
 def _text(path: PathLike) -> str:
-    file = Path(path)
-    try:
-        return file_text(read_input(file, max_bytes=_MAX_TEXT_BYTES, is_what="one of cocalib's files"))
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read ({error.strerror or error}); check the path") from None
-    except UnicodeDecodeError as error:
-        raise InputError(f"{file}: not a text file (byte {error.start} is not UTF-8); check the path") from None
+    return read_text(Path(path), is_what="one of cocalib's files")
 
 
 def _write(path: PathLike, text: str) -> None:

@@ -1,6 +1,5 @@
 """Read a calibration in any known format, and make a calibration-1 file of it with what it rests on."""
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
@@ -10,7 +9,7 @@ import numpy as np
 from calib_core.arrays import Matrix66
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.input_files import read_input
+from calib_core.input_files import no_text, other_kind, read_input
 from calib_core.interchange.calibration_file import (
     CalibrationFile,
     Evidence,
@@ -21,7 +20,7 @@ from calib_core.interchange.calibration_file import (
 from calib_core.interchange.check.pair_residuals import CheckPairs
 from calib_core.interchange.check.report import CheckReport, check
 from calib_core.interchange.format import TRUTH_FORMAT, ImportedCalibration
-from calib_core.interchange.formats.registry import FORMATS, is_ours, reader_of, readers
+from calib_core.interchange.formats.registry import is_ours, reader_of, readers
 from calib_core.interchange.formats.statement import stated_origin
 from calib_core.interchange.syntax.content import Content, readings
 from calib_core.interchange.trees.frame_choice import WantedFrames
@@ -33,12 +32,7 @@ from calib_core.results import Calibration, DataWarning, Metrics
 
 _MAX_BYTES = 256 * 1024 * 1024
 _MAX_BESIDE_BYTES = 1024 * 1024
-_ONLY_READ = (
-    "tf_echo, Foxglove, direct_visual_lidar_calibration, easy_handeye, OpenLABEL, "
-    "Scale, Segments.ai, Autoware.AI, TUM, npz"
-)
-_TITLES = ", ".join(re.split("[:,]", known.title)[0] for known in FORMATS if known.reads is not None)
-_KNOWN = f"known: {_TITLES}, {_ONLY_READ}"
+_KNOWN = "docs/formats.md lists what is read"
 
 _OF_FOLDERS = ("calib_velo_to_cam.txt", "images.txt")  # of KITTI and COLMAP, read with the file beside it
 _OF_TREES = (
@@ -52,7 +46,6 @@ _OF_TREES = (
 )
 _DEPTH = 4
 _MOST_FILES = 300
-_OTHERS = "; a pose that states nothing: cocalib import FILE lists what its numbers may mean"
 
 
 def read_any_file(path: str | Path, frames: WantedFrames | None = None) -> ImportedCalibration:
@@ -146,7 +139,7 @@ def files_beside(path: str | Path) -> Mapping[str, bytes]:
             continue
         try:
             found[name] = read_input(file, max_bytes=_MAX_BESIDE_BYTES, is_what="a calibration")
-        except (OSError, InputError):
+        except InputError:
             continue
     return found
 
@@ -157,11 +150,7 @@ def calibration_bytes(path: str | Path) -> bytes:
     Raises:
         InputError: it cannot be read, or is too large for a calibration.
     """
-    file = Path(path)
-    try:
-        return read_input(file, max_bytes=_MAX_BYTES, is_what="a calibration")
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read ({error.strerror or error}); check the path") from None
+    return read_input(Path(path), max_bytes=_MAX_BYTES, is_what="a calibration")
 
 
 def read_any(
@@ -227,7 +216,7 @@ def _with_origin(found: ImportedCalibration, content: Content) -> ImportedCalibr
 def _refusal(content: Content, source: str) -> InputError:
     """Return the error for a file that no format recognizes, with what is in it."""
     if content.syntax == "bytes":
-        return InputError(f"{source}: neither text nor an archive; if it is text, save it as UTF-8; if not, {_KNOWN}")
+        return InputError(f"{source}: {no_text(content.data, 'a calibration')}; {_KNOWN}")
     if content.syntax == "xml" and content.value is None:
         return InputError(f"{source}: XML with <{content.root.tag}>; expected OpenCV's <opencv_storage>")
     if content.syntax == "mcap":
@@ -238,8 +227,11 @@ def _refusal(content: Content, source: str) -> InputError:
     value = content.value
     kind = "a list" if isinstance(value, list) else "text" if isinstance(value, str) else "one value"
     found = ", ".join(map(str, list(value)[:12])) if isinstance(value, dict) else kind
+    if isinstance(value, dict) and (ours := other_kind(value.get("schema"), "a calibration")):
+        return InputError(f"{source}: {ours}")
     return InputError(
-        f"{source}: no pose of a camera and a radar in it (found {found or 'nothing'}); {_KNOWN}{_OTHERS}"
+        f"{source}: no pose of a camera and a radar in it that says what it means (found {found or 'nothing'}); give "
+        "intrinsics with --camera FILE; of another pose, cocalib import FILE lists what its numbers may mean"
     )
 
 

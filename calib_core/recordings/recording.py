@@ -13,7 +13,7 @@ import numpy as np
 from calib_core.arrays import TimesNs
 from calib_core.camera import Camera
 from calib_core.errors import InputError, RecordingError
-from calib_core.input_files import name_text, special_kind
+from calib_core.input_files import name_text, no_such, special_kind
 from calib_core.measurements import Boxes, DataWarning, RadarScans, TimeNs
 from calib_core.recordings.assembly import Assembly, assemble
 from calib_core.recordings.box_topics import boxes_in_topic
@@ -480,7 +480,7 @@ def require_files(paths: Sequence[Path]) -> tuple[Path, ...]:
         raise RecordingError("no recording given; name one or more .bag, .mcap, .db3 files or bag folders")
     for path in paths:
         if not path.exists():
-            raise RecordingError(f"{path}: no such file or folder; check the path")
+            raise RecordingError(no_such(path))
         if (kind := special_kind(path)) is not None:
             raise RecordingError(
                 f"{path}: is {kind}; a recording must be a regular file or a folder: save it to a file first"

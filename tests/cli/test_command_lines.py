@@ -52,10 +52,25 @@ _TABLE = [
     ),
     (2, "solve made.mcap --clicks outside.json --out o.json", "320 x 240"),
     (2, "solve made.mcap --clicks no-list.json --out o.json", "no-list.json: clicks"),
+    (2, "solve made.mcap --clicks click.json", "click.json: no such file or folder; did you mean clicks.json?"),
+    (2, "solve made.mcap --clicks good.json", "a cocalib/calibration-1 file, not cocalib/clicks-1; give it as CALIB"),
+    (2, "solve made.mcap --clicks made.mcap/made.mcap.mcap", "not a text file but a recording; give it as RECORDING"),
+    (2, "solve made.mcap --clicks nothing", "nothing: is a folder, not a file of clicks or pairs; name a file in it"),
+    (2, "solve made.mcap --clicks empty", "empty: the file is empty"),
+    (2, "solve made.mcap --clicks clicks.json --camera word.yaml", "found no keys"),
+    (2, "solve made.mcap --clicks clicks.json --out clicks.json", "holds something else, which is not overwritten"),
+    (0, "solve made.mcap --clicks clicks.json --camera bare.yaml --out o.json", "bare.yaml states no distortion"),
+    (
+        2,
+        "solve --pairs commas.csv --camera camera.yaml",
+        "'5,0;1,0;0,1;100,5;90,0' is not a pair; write decimal points",
+    ),
+    (2, "solve --pairs camera.yaml --camera camera.yaml", "its first line 'image_width: 320' does not name x and y"),
     (2, "solve a.bag --clicsk=b.json", "unknown option --clicsk; did you mean --clicks"),
     (2, "solve a.bag --propose --auto", "--propose solves nothing: give a recording"),
     (2, "solve a.bag --json", "--json applies with --propose only"),
-    (2, "solve a.bag --camera-position-m 0 1 up", "--camera-position-m takes X Y Z"),
+    (2, "solve a.bag --camera-position-m 0 1 4cm", "takes X Y Z, plain numbers without units, not '0 1 4cm'"),
+    (2, "solve a.bag --propose --camera-position-m 3 2 110", "Give metres: 0.11 or 1.1, if it is in mill"),
     (2, "solve a.bag --camera-position-by eye", "--camera-position-by"),
     (2, "solve a.bag --vehicle a/b", "--vehicle: 'a/b' cannot be a name; give one without slashes"),
     (2, "solve a.bag --session-name ..", "--session-name: '..' cannot be a name"),
@@ -73,7 +88,11 @@ _TABLE = [
     (2, "solve made.mcap --propose --clicks stray.json", "has the stamp of no frame"),
     (2, "solve a.bag --propose --set noise.sigmapx=3", "unknown option 'noise.sigmapx'; did you mean noise.sigma_px?"),
     (2, "solve a.bag --propose --set noise=3", "unknown option 'noise'"),
-    (2, "solve a.bag --propose --set noise.sigma_px=many", "option noise.sigma_px: expected `float`"),
+    (
+        2,
+        "solve a.bag --propose --set noise.sigma_px=many",
+        "option noise.sigma_px: takes a number with a decimal",
+    ),
     (2, "solve a.bag --propose --set noise.sigma_px=0", "option noise.sigma_px: 0 is out of range"),
     (2, "solve a.bag --propose --set noise.sigma_px", "--set noise.sigma_px: give NAME=VALUE"),
     (3, "solve --pairs good-pairs.json --method paper --out o.json --require usable", "next: "),
@@ -99,6 +118,7 @@ _TABLE = [
     (2, "evaluate", "CALIBRATION is missing; see cocalib evaluate --help"),
     (2, "evaluate good.json", "evaluate needs a recording, or --report FILE.html"),
     (2, "evaluate good.json absent.mcap", "absent.mcap"),
+    (2, "evaluate made.mcap good.json", "not a recording; give it as CALIBRATION, before the recording"),
     (2, "evaluate good.json --boxes b.json --report a.html", "apply with a RECORDING only; give it after the"),
     (2, "evaluate /nowhere.json --report a.html", "/nowhere.json: "),
     (2, "evaluate good.json --report /nowhere/report.html", "/nowhere/report.html: cannot be written: "),
@@ -113,12 +133,14 @@ _TABLE = [
     (3, "evaluate bare.txt made.mcap --clicks clicks.json --no-held-out --require usable", ""),
     (3, "evaluate contradictory.json --report o.html", ""),
     (0, "check good.json", "ok: "),
-    (0, "check good.json --against good.json", "0 deg apart"),
+    (0, "check good.json --against good.json", "note: a file is checked against itself"),
     (0, "check contradictory.json --of contradictory.json", "ok: the pose is that calibration's"),
     (1, "check good.json --against turned.txt", "DIFFERS: "),
     (1, "check turned.txt --against good.json --recording made.mcap", ""),
     (2, "check", "CALIBRATION is missing; see cocalib check --help"),
     (2, "check absent.json", "absent.json"),
+    (2, "check made.mcap/made.mcap.mcap --against good.json", "not a text file but a recording; give it as RECORDING"),
+    (2, "check camera.yaml", "give intrinsics with --camera FILE"),
     (2, "check empty", "empty"),
     (2, "check a.json --max-deg 1", "are limits for --against FILE"),
     (2, "check a.json --clicks clicks.json", "give it with --recording RECORDING"),
@@ -159,7 +181,12 @@ _TABLE = [
         "tf.sh: is tf2, not calibration-1; convert it first: cocalib import tf.sh --out calibration.json",
     ),
     (2, "export absent.json --to tf2", "absent.json"),
-    (2, "export a.json --to urdff", "urdf"),
+    (2, "export a.json --to URDF", "did you mean urdf?"),
+    (2, "export a.json --format tf2", "unknown option --format; did you mean --to?"),
+    (2, "export clicks.json --to tf2", "a cocalib/clicks-1 file, not a calibration; solve them with their recording"),
+    (2, "export good.json --to urdf --out good.json", "holds something else, which is not overwritten"),
+    (2, "export good.json --to urdf --out word.yaml", "holds something else, which is not overwritten"),
+    *((0, f"export good.json --to {to} --out {to}", "") for to in 2 * ("urdf", "matlab", "matrix", "colmap")),
     (2, "export a.json --to tf1-launch", "format 'tf1-launch' went in 0.1: use tf2 or tf2-launch-py"),
     (
         2,
@@ -278,7 +305,9 @@ _TABLE = [
     (2, "demo --no-browser --host 203.0.113.5", "203.0.113.5"),
     (2, "demo --no-browser --token ''", "empty"),
     (2, "bogus", "unknown command 'bogus'; known: demo, open"),
-    (2, "infos a.bag", "did you mean 'info'?"),
+    (2, "calibrate a.bag", "unknown command 'calibrate'; did you mean solve?"),
+    (2, "convert a.json", "unknown command 'convert'; did you mean export?"),
+    (2, "infos a.bag", "did you mean info?"),
     (2, "--json info", "unknown option --json; give a command first: demo, open"),
 ]
 
@@ -359,6 +388,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory, project_root: Path) -> Path
         f"{size}\ndistortion_model: plumb_bob\ncamera_matrix: {{rows: 3, cols: 3, data: {matrix.ravel().tolist()}}}\n"
         f"distortion_coefficients: {{rows: 1, cols: 4, data: {_MADE.camera.distortion.tolist()}}}\n"
     )
+    (path / "bare.yaml").write_text(f"{size}\ncamera_matrix: {{rows: 3, cols: 3, data: {matrix.ravel().tolist()}}}\n")
+    (path / "word.yaml").write_text("hello")
+    (path / "commas.csv").write_text("x;y;z;u;v\n5,0;1,0;0,1;100,5;90,0\n")
     body = (pose.inverse() @ RigidTransform(OPTICAL_FROM_LINK, np.zeros(3))).as_matrix()
     (path / "unclear.json").write_text(json.dumps({"calibration": {"radar": {"T": body.tolist()}}}))
     (path / "rig.json").write_text(json.dumps(dict.fromkeys(("front", "rear"), pose.as_matrix().tolist())))

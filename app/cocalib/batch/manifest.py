@@ -10,13 +10,13 @@ import msgspec
 from msgspec import Meta, Struct
 
 from calib_core.errors import CalibrationError, InputError
+from calib_core.input_files import read_text
 from calib_core.interchange import format_named
 from calib_core.interchange.calibration_file import MOST_CHARACTERS, require_label, require_name
 from calib_core.interchange.syntax.strict_json import checked
 from calib_core.options import CalibrationOptions, CameraPositionPrior
 from calib_core.recordings import RecordingOptions
 from cocalib.option_changes import options_from_tree
-from cocalib.platform.files import read_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +149,6 @@ def _text(path: Path) -> str:
         is_what="a manifest",
         max_bytes=_MOST_BYTES,
         if_missing=f"cocalib batch {path} --init FOLDER writes one",
-        if_no_text="save it as UTF-8",
     )
 
 

@@ -10,9 +10,8 @@ import shlex
 import signal
 import sys
 from collections.abc import Sequence
-from difflib import get_close_matches
 
-from calib_core.errors import CalibrationError, InputError, NoAnswerError
+from calib_core.errors import CalibrationError, InputError, NoAnswerError, meant
 from cocalib.cli.commands import COMMANDS, PROGRAM, Command, overview
 from cocalib.cli.exit_codes import NO_ANSWER
 from cocalib.cli.old_names import OLD_NAMES, OldName
@@ -115,9 +114,12 @@ def _help(command: Command, *, everything: bool) -> int:
     return 0
 
 
+_MEANT = {"calibrate": "solve", "convert": "export", "gui": "open", "run": "open", "view": "show", "verify": "check"}
+"""What people call a command, and its name."""
+
+
 def _unknown(first: str) -> str:
     """Say that the first argument is not a command, and suggest one."""
     if first.startswith("-"):
         return f"unknown option {first.split('=')[0]}; give a command first: {', '.join(COMMANDS)}"
-    near = get_close_matches(first, COMMANDS, n=1)
-    return f"unknown command '{first}'; " + (f"did you mean '{near[0]}'?" if near else f"known: {', '.join(COMMANDS)}")
+    return f"unknown command '{first}'; {meant(_MEANT.get(first, first), COMMANDS)}"

@@ -6,13 +6,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from calib_core.input_files import read_text
 from calib_core.interchange.own.board_views_json import read_board_views, write_board_views
 from calib_core.intrinsics import Board, BoardSearch, SearchProgress
 from calib_core.measurements import Unsolvable
 from cocalib.cli.output import write_whole
 from cocalib.intrinsics.picture_sources import OpenPictures
 from cocalib.intrinsics.resumed_search import ResumedSearch
-from cocalib.platform.files import read_text
 from cocalib.platform.terminal import terminal_stream
 
 _DEFAULT_VIEWS = Path("board-views.json")
@@ -27,7 +27,7 @@ def search_for(pictures: OpenPictures, board: Board, name: str, views: Path | No
     """
     search = ResumedSearch(pictures, board, name)
     if views is not None and views.exists():
-        search.resume(read_board_views(read_text(views), str(views)), file=str(views))
+        search.resume(read_board_views(read_text(views, is_what="a file of board views"), str(views)), file=str(views))
         print(f"{views}: {search.looked_at} of {len(pictures)} pictures have been searched", file=sys.stderr)
     return search
 

@@ -87,6 +87,12 @@ class Check:
         """
         if not self.calibration:
             raise InputError("CALIBRATION is missing; see cocalib check --help")
+        if any(
+            other and one.exists() and other.exists() and one.samefile(other)
+            for one in self.calibration
+            for other in (self.against, self.of)
+        ):
+            print("note: a file is checked against itself, which proves nothing", file=sys.stderr)
         limited = any(limit is not None for limit in (self.max_deg, self.max_cm, self.max_px, self.max_sigma))
         if limited and self.against is None:
             raise InputError("--max-deg, --max-cm, --max-px and --max-sigma are limits for --against FILE; give it too")

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 import tyro
 
 from calib_core.errors import InputError, NoAnswerError
+from calib_core.input_files import read_text
 from cocalib.cli.flags import MORE, File, called
 from cocalib.cli.output import progress_bar, told_clicks_at_frames
 from cocalib.cli.recording_flags import Recorded, RecordedFlags, TopicFlags
 from cocalib.cli.tree_flags import FrameFlags, Frames
-from cocalib.platform.files import read_text
 
 if TYPE_CHECKING:
     from calib_core.camera import Camera

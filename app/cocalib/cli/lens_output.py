@@ -3,12 +3,11 @@
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from difflib import get_close_matches
 from pathlib import Path
 from typing import TextIO
 
 from calib_core.camera import Camera
-from calib_core.errors import InputError
+from calib_core.errors import InputError, meant
 from calib_core.intrinsics import (
     MODEL_ERRORS_UNSEEN,
     BoardSearch,
@@ -166,9 +165,7 @@ def require_format(to: str | None) -> None:
     from calib_core.interchange import CAMERA_FORMATS
 
     if to is not None and to not in CAMERA_FORMATS:
-        near = get_close_matches(to, CAMERA_FORMATS, n=1)
-        known = f"did you mean {near[0]}?" if near else f"known: {', '.join(CAMERA_FORMATS)}"
-        raise InputError(f"--to {to}: no such format for intrinsics; {known}")
+        raise InputError(f"--to {to}: no such format for intrinsics; {meant(to, CAMERA_FORMATS)}")
 
 
 def size_of(text: str) -> tuple[int, int]:

@@ -8,7 +8,6 @@ import tomllib
 import typing
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass, replace
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias, TypeVar
 
@@ -16,7 +15,8 @@ import msgspec
 import tyro
 
 from calib_core.errors import InputError, OptionError
-from cocalib.platform.files import read_text
+from calib_core.input_files import read_text
+from cocalib.option_changes import unknown_option
 
 Settings: TypeAlias = Annotated[
     tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE", help_behavior_hint=""), tyro.conf.UseAppendAction
@@ -42,7 +42,7 @@ def with_named(options: Named, settings: Sequence[str], file: Path | None = None
     tree: dict[str, Any] = {}
     if file is not None:
         try:
-            tree = tomllib.loads(read_text(file))
+            tree = tomllib.loads(read_text(file, is_what="a TOML file of options"))
         except tomllib.TOMLDecodeError as error:
             raise InputError(f"{file}: not TOML: {str(error)[:1].lower()}{str(error)[1:]}") from None
     for text in settings:
@@ -113,7 +113,7 @@ def _changed(options: Named, tree: Mapping[str, Any], prefix: str, known: Sequen
         path = f"{prefix}{name}"
         present = getattr(options, name, None) if name in hints else None
         if name not in hints or (is_dataclass(hints[name]) and not isinstance(value, Mapping)):
-            raise _unknown(path, known)
+            raise unknown_option(path, known)
         if present is not None and is_dataclass(present) and isinstance(value, Mapping):
             changed[name] = _changed(present, value, f"{path}.", known)
             continue
@@ -125,17 +125,7 @@ def _changed(options: Named, tree: Mapping[str, Any], prefix: str, known: Sequen
         try:
             changed[name] = msgspec.convert(value, hints[name], strict=not typed)
         except msgspec.ValidationError as error:
-            raise OptionError(f"option {path}: {str(error)[:1].lower()}{str(error)[1:]}") from None
+            wanted = {float: "a number with a decimal point", int: "a whole number"}.get(hints[name])
+            reason = f"takes {wanted}, not {value!r}" if wanted else f"{str(error)[:1].lower()}{str(error)[1:]}"
+            raise OptionError(f"option {path}: {reason}") from None
     return replace(options, **changed)  # type: ignore[type-var]
-
-
-def _unknown(path: str, known: Sequence[str]) -> OptionError:
-    by_end = {name.rpartition(".")[2]: name for name in known}
-    near = get_close_matches(path, known, n=1) or [
-        by_end[end] for end in get_close_matches(path.rpartition(".")[2], by_end, n=1)
-    ]
-    groups = dict.fromkeys(name.partition(".")[0] for name in known)
-    return OptionError(
-        f"unknown option '{path[:80]}'; "
-        + (f"did you mean {near[0]}?" if near else f"known groups: {', '.join(groups)}")
-    )

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from calib_core.errors import InputError
+from calib_core.input_files import no_such, read_text
 from calib_core.options import CalibrationOptions
 from cocalib.cli.flags import MORE, File, Folder, Switch
 from cocalib.cli.recording_flags import CameraFlags, GivenCamera, OptionFlags, Options, Recordings, TopicFlags, Topics
 from cocalib.cli.serving_flags import ServingFlags
-from cocalib.platform.files import read_text
 
 if TYPE_CHECKING:
     from cocalib.opening import Choice
@@ -94,4 +94,4 @@ def _require_given(*files: Path | None) -> None:
     """
     for path in files:
         if path is not None and not path.exists():
-            raise InputError(f"{path}: no such file; check the path")
+            raise InputError(no_such(path))

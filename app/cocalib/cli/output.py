@@ -1,5 +1,6 @@
 """Shared by the commands: reading and writing files, what is printed to stderr, progress."""
 
+import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -41,13 +42,23 @@ def write_whole(path: Path, content: str | bytes, *, again: bool = False) -> Non
         again: it is a file that was read and changed: it keeps its mode and owner, and a read-only one is refused.
 
     Raises:
-        InputError: the folder is missing or not writable.
+        InputError: the folder is missing or not writable, or holds a file of this name and of another kind.
     """
+    data = content.encode("utf-8") if isinstance(content, str) else content
     try:
-        write = files.rewrite_whole if again else files.write_whole
-        write(path, content.encode("utf-8") if isinstance(content, str) else content)
+        if not again and path.is_file() and (old := path.read_bytes()) and _kind(old) != _kind(data):
+            raise InputError(
+                f"{path}: holds something else, which is not overwritten; choose another name, or remove it"
+            )
+        (files.rewrite_whole if again else files.write_whole)(path, data)
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+def _kind(data: bytes) -> bytes:
+    """Return what tells kinds of output apart: our JSON by its schema, our other texts by our name, the rest by how it begins."""
+    schema = re.search(rb'"schema": ?"(cocalib/[\w-]+)"', data[:200])
+    return schema[1] if schema else b"cocalib" if b"cocalib" in data and b"\0" not in data else data[:4]
 
 
 @contextmanager

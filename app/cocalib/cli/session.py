@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from calib_core.errors import InputError
+from calib_core.input_files import no_such
 from cocalib.cli.flags import File, Switch, called
 from cocalib.cli.output import write_whole
 
@@ -64,7 +65,7 @@ class Session:
 
         for place in self.place:
             if not place.exists():
-                raise InputError(f"{place}: no such file or folder; check the path")
+                raise InputError(no_such(place))
         found = session_summaries(self.place or (Path(),))
         if self.json:
             import msgspec

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from calib_core.errors import InputError
+from calib_core.input_files import read_text
 from cocalib.cli.flags import File, Switch, called
 from cocalib.cli.output import progress_bar, told_clicks_at_frames
 from cocalib.cli.recording_flags import CameraFlags, GivenCamera, Recorded, RecordedFlags
-from cocalib.platform.files import read_text
 
 if TYPE_CHECKING:
     from cocalib.recorded_view import RecordedView

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
+from calib_core.input_files import read_text
 from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
@@ -27,7 +28,6 @@ from cocalib.cli.recording_flags import (
     VehicleFlags,
     checked_reflector_m,
 )
-from cocalib.platform.files import read_text
 from cocalib.platform.terminal import print_exactly
 from cocalib.view import summary_lines
 
@@ -235,6 +235,8 @@ class Solve:
 
     def _deliver(self, calibration: Calibration, text: str) -> int:
         code = exit_code(verdict_on(calibration), None, self.require)
+        if self.camera.camera is not None and not len(calibration.camera.distortion):
+            print(f"note: {self.camera.camera} states no distortion: the lens is taken to have none", file=sys.stderr)
         if self.out is None:
             print_exactly(text)
             return code

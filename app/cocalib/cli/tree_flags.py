@@ -183,7 +183,8 @@ def _tree_of(paths: Sequence[Path]) -> "FrameTree":
             joints.append(Joint.posed(transform.parent, transform.child, written, place))
     if recordings and not joints:
         raise InputError(
-            f"{recordings[0]}: has no /tf_static and no /tf; give the file with the frames, such as the URDF"
+            f"{recordings[0]}: a recording without /tf_static and /tf holds no calibration; give the file that does, and "
+            "the recording to judge it on after it (evaluate) or with --recording (check)"
         )
     return joined_tree(files, joints)
 

@@ -198,8 +198,9 @@ def _fault(event: Any) -> Fault | None:
             choices = event.choices if len(given) == len(event.choices) else sorted(given)
             return WrongChoice(_argument(event.argument), event.value, tuple(choices))
         case "InstantiationFailure" if event.argument is not None:
-            typed = re.search(r"'([^']*)'$", event.message)
-            return BadValue(_argument(event.argument), typed[1] if typed else None)
+            typed = re.search(r"'([^']*)'$|instantiated from \[(.*?)\]", event.message)
+            words = typed and (typed[1] if typed[2] is None else typed[2].replace("', '", " ").strip("'"))
+            return BadValue(_argument(event.argument), words)
     return None
 
 

@@ -29,6 +29,8 @@ _GONE = {
     "engine": "use --workers 1 for none, --scheduler ADDRESS for dask",
 }
 """Options and values that are gone, each with what replaces it."""
+_MEANT = {"format": "--to", "o": "--out", "file": "--out", "intrinsics": "--camera", "extrinsics": "--calibration"}
+"""What people call an option, and its name."""
 _NUMBERS = {"INT": "a whole number", "FLOAT": "a number"}
 
 
@@ -72,9 +74,10 @@ def _reason(fault: Fault, kind: type[Runnable]) -> str:
             return f"{argument.name} takes {_alternatives(choices)}, not '{value}'"
         case BadValue(argument, typed):
             what = _NUMBERS.get(argument.value, argument.value)
-            if typed is not None and argument.value in _NUMBERS:
-                return f"{argument.name} takes {what}, not '{typed}'"
-            return f"{argument.name} takes {what}; the given value is invalid"
+            only = "" if argument.value in _NUMBERS else ", plain numbers without units"
+            return f"{argument.name} takes {what}{only}" + (
+                f", not '{typed}'" if typed else "; the given value is invalid"
+            )
 
 
 def _typed(argument: Argument) -> str:
@@ -94,6 +97,7 @@ def _unknown(token: str, kind: type[Runnable]) -> str:
     if flag.removeprefix("--") in _GONE:
         return f"{flag} went in 0.1: {_GONE[flag.removeprefix('--')]}"
     known = sorted({"--help", *flags_of(kind)})
-    near = [other for other in known if flag.strip("-") and other.endswith(flag.lstrip("-"))]
+    near = [other for other in known if other == _MEANT.get(flag.lstrip("-"))]
+    near = near or [other for other in known if flag.strip("-") and other.endswith(flag.lstrip("-"))]
     near = near or get_close_matches(flag, known, n=2)
     return f"unknown option {token.split('=')[0]}" + (f"; did you mean {_alternatives(near[:3])}?" if near else "")

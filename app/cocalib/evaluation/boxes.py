@@ -5,7 +5,7 @@ from pathlib import Path
 
 from calib_core.boxes import MOVING, changed_boxes, read_boxes, read_labels
 from calib_core.errors import InputError, MessageError
-from calib_core.input_files import file_text, read_input
+from calib_core.input_files import read_text
 from calib_core.measurements import Boxes, ReturnLabels
 from calib_core.recordings import Recording
 
@@ -59,13 +59,7 @@ def find_labels(path: Path) -> ReturnLabels:
     Raises:
         InputError: it cannot be read.
     """
-    try:
-        text = file_text(read_input(path, max_bytes=_MAX_LABELS_BYTES, is_what="a file of labels"))
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: not text (byte {error.start} is not UTF-8); give a file of labels") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}; check the path") from None
-    return read_labels(text, path.name)
+    return read_labels(read_text(path, max_bytes=_MAX_LABELS_BYTES, is_what="a file of labels"), path.name)
 
 
 def _image_size_px(recording: Recording) -> tuple[int, int] | None:

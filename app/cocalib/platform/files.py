@@ -1,4 +1,4 @@
-"""Files that a user names: small texts are read; what is written is whole, so that a reader never finds a part of it."""
+"""Files that a user names: what is written is whole, so that a reader never finds a part of it."""
 
 import errno
 import os
@@ -10,10 +10,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from calib_core.errors import InputError
-from calib_core.input_files import file_text, read_input
-
-_MAX_TEXT_BYTES = 64 * 1024 * 1024
 _PATIENCE_S = 2.0
 
 
@@ -138,34 +134,3 @@ def _sync_folder(folder: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
-
-
-def read_text(
-    path: Path,
-    *,
-    is_what: str = "a file of clicks or pairs",
-    max_bytes: int = _MAX_TEXT_BYTES,
-    if_missing: str = "check the path",
-    if_no_text: str = "",
-) -> str:
-    """Read a text file.
-
-    Args:
-        path: the file.
-        is_what: for messages.
-        max_bytes: a larger one is refused.
-        if_missing: what to do then.
-        if_no_text: what to do then; "" says nothing.
-
-    Raises:
-        InputError: it is missing, a folder, a pipe or a device, unreadable, too large or not text.
-    """
-    try:
-        return file_text(read_input(path, max_bytes=max_bytes, is_what=is_what))
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file; {if_missing}") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except UnicodeDecodeError as error:
-        hint = f"; {if_no_text}" if if_no_text else ""
-        raise InputError(f"{path}: not a text file (byte {error.start} is not UTF-8){hint}") from error

@@ -7,10 +7,10 @@ import numpy as np
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
+from calib_core.input_files import read_text
 from calib_core.interchange.own.clicks_json import ClicksFile, read_clicks_file
 from calib_core.measurements import ReflectorClick, TimeNs, time_parts
 from calib_core.recordings import Recording
-from cocalib.platform.files import read_text
 from cocalib.session.click_stamps import ClicksAtFrames, clicks_at_frames
 
 

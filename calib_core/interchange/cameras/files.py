@@ -1,15 +1,14 @@
 """Read a camera from the file formats in common use, and write it in them."""
 
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
 from calib_core.camera import Camera
-from calib_core.errors import InputError
-from calib_core.input_files import file_text, read_input
+from calib_core.errors import InputError, meant
+from calib_core.input_files import file_text, no_text, read_input
 from calib_core.interchange.cameras.camera_format import CameraFormat, FoundCamera
 from calib_core.interchange.cameras.colmap import COLMAP_CAMERAS
 from calib_core.interchange.cameras.fields import find_cameras
@@ -80,10 +79,7 @@ class CameraFile:
         if not file.exists() and "#" in str(path):
             head, _, name = str(path).rpartition("#")
             file = Path(head)
-        try:
-            return cls(str(file), read_input(file, max_bytes=_MAX_BYTES, is_what="a camera file"), name, rescale)
-        except OSError as error:
-            raise InputError(f"{file}: cannot be read ({error.strerror or error}); check the path") from None
+        return cls(str(file), read_input(file, max_bytes=_MAX_BYTES, is_what="a camera file"), name, rescale)
 
     def camera(self, *, image_size_px: tuple[int, int] | None = None) -> Camera:
         """Return the camera.
@@ -102,7 +98,7 @@ class CameraFile:
             try:
                 text = file_text(self.data)
             except UnicodeDecodeError:
-                raise InputError(f"{self.source}: not a text file; {_LOOKED_FOR}") from None
+                raise InputError(f"{self.source}: {no_text(self.data, 'a camera file')}; {_LOOKED_FOR}") from None
             camera = read_camera(text, self.source, name=self.name, image_size_px=image_size_px)
         return self._rescaled(camera, image_size_px) if self.rescale and image_size_px else camera
 
@@ -148,7 +144,7 @@ def _keyed(text: str, *, source: str) -> tuple[FoundCamera, ...]:
     content = _load(text, source=source)
     cameras = find_cameras(content, source=source) if isinstance(content, dict) else ()
     if not cameras:
-        found = ", ".join(map(str, list(content)[:12])) if isinstance(content, dict) else type(content).__name__
+        found = ", ".join(map(str, list(content)[:12])) if isinstance(content, dict) else "no keys, such as fx: 500"
         raise InputError(f"{source}: no camera in it: {_LOOKED_FOR}; found {found or 'nothing'}")
     return cameras
 
@@ -214,7 +210,5 @@ def camera_content(camera: Camera, to: str, name: str = "camera") -> str | bytes
         InputError: there is no such format, or it cannot store this camera.
     """
     if to not in CAMERA_FORMATS:
-        near = get_close_matches(to, CAMERA_FORMATS, n=1)
-        known = f"did you mean {near[0]}?" if near else f"known: {', '.join(CAMERA_FORMATS)}"
-        raise InputError(f"no format {to!r} for intrinsics; {known}")
+        raise InputError(f"no format {to!r} for intrinsics; {meant(to, CAMERA_FORMATS)}")
     return CAMERA_FORMATS[to].write(camera, name)

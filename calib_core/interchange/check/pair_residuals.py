@@ -11,7 +11,7 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.estimation.pair_results import averaged_distances_px
 from calib_core.geometry import RigidTransform
-from calib_core.input_files import file_text, read_input
+from calib_core.input_files import read_text
 from calib_core.interchange.check.pixel_differences import LOST_TEXT, far_outside, lenses_of, shown
 from calib_core.interchange.check.slips import CheckResult, explain, explained, rounding_of
 from calib_core.interchange.format import ImportedCalibration, WrittenPose
@@ -77,12 +77,7 @@ def read_check_pairs_file(path: Path) -> CheckPairs:
     Raises:
         InputError: the file cannot be read, is neither, or contains fewer than four pairs.
     """
-    try:
-        text = file_text(read_input(path, max_bytes=_MAX_BYTES, is_what="a file of pairs"))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror or error}); check the path") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: not a text file; give pairs-1 or calibration-1 JSON") from None
+    text = read_text(path, max_bytes=_MAX_BYTES, is_what="pairs-1 or calibration-1 JSON")
     return read_check_pairs(text, str(path))
 
 

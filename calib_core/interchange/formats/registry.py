@@ -6,11 +6,10 @@ Formats of other installed packages (entry points cocalib.formats) are checked w
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from functools import cache
 from typing import Any
 
-from calib_core.errors import CalibrationError, InputError
+from calib_core.errors import CalibrationError, InputError, meant
 from calib_core.interchange.format import Format, ImportedCalibration, Reads
 from calib_core.interchange.formats.apollo import APOLLO
 from calib_core.interchange.formats.autoware import AUTOWARE
@@ -136,12 +135,7 @@ def format_named(name: str) -> Format:
     if name in _GONE:
         raise InputError(f"format {name!r} went in 0.1: use {_GONE[name]}; its files are still read")
     names = [known.name for known in written_formats()]
-    near = [_OTHER_NAMES[name]] if name in _OTHER_NAMES else get_close_matches(name, names, n=1)
-    raise InputError(
-        f"unknown format {name!r}; did you mean {near[0]}?"
-        if near
-        else f"unknown format {name!r}; known: {', '.join(names)}"
-    )
+    raise InputError(f"unknown format {name!r}; {meant(_OTHER_NAMES.get(name, name), names)}")
 
 
 def _written() -> Iterator[Format]:

@@ -110,14 +110,21 @@ def read_pairs_table(
     rows = [(number, cells) for number, cells in enumerate(_cells(text), 1) if cells]
     columns: Sequence[str] = (*_TABLE_COLUMNS, "id")
     if rows and not _is_number(rows[0][1][0]):
-        columns = _named_columns(rows.pop(0)[1], source)
+        columns = _named_columns(rows.pop(0)[1], f"{source}: its first line '{text.strip().splitlines()[0][:80]}'")
     if not rows:
         raise InputError(f"{source}: has no rows; {_TABLE_HINT}")
     numbers, ids = [], []
     for line, cells in rows:
         row = dict(zip(columns, cells, strict=False))
         if len(cells) > len(columns) or not all(_is_number(row.get(name, "")) for name in _TABLE_COLUMNS):
-            raise InputError(f"{source}: line {line}: '{','.join(cells)}' is not a pair; {_TABLE_HINT}")
+            commas = (
+                "write decimal points, not commas; "
+                if any(_is_number(one.replace(",", ".")) for one in cells if "," in one)
+                else ""
+            )
+            raise InputError(
+                f"{source}: line {line}: '{text.splitlines()[line - 1]}' is not a pair; {commas}{_TABLE_HINT}"
+            )
         numbers.append([float(row[name]) for name in _TABLE_COLUMNS])
         ids.append(row.get("id") or f"pair-{len(numbers)}")
     values = np.array(numbers)
@@ -153,13 +160,11 @@ def _cells(text: str) -> list[list[str]]:
     return [[cell.strip() for cell in cells] for cells in split]
 
 
-def _named_columns(names: Sequence[str], source: str) -> Sequence[str]:
+def _named_columns(names: Sequence[str], line: str) -> Sequence[str]:
     columns = [name.lower().removesuffix("_px").removesuffix("_m") for name in names]
     missing = [name for name in _TABLE_COLUMNS if columns.count(name) != 1]
     if missing:
-        raise InputError(
-            f"{source}: its first line '{','.join(names)}' does not name {' and '.join(missing)} once; {_TABLE_HINT}"
-        )
+        raise InputError(f"{line} does not name {' and '.join(missing)} once; {_TABLE_HINT}")
     return columns
 
 

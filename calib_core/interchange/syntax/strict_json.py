@@ -7,14 +7,14 @@ import re
 import types
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from difflib import get_close_matches
 from functools import cache
 from types import MappingProxyType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import msgspec
 
-from calib_core.errors import InputError
+from calib_core.errors import InputError, meant
+from calib_core.input_files import other_kind
 from calib_core.json_forms import form_of, from_json, to_json
 
 Document = TypeVar("Document")
@@ -48,7 +48,8 @@ def document_in(content: Mapping[str, Any], document: type[Document], *, source:
     wanted = _schema_of(document)
     found = content.get("schema")
     if found != wanted:
-        raise InputError(f"{source}: schema: expected {wanted!r}, found {_shown(found)}; give a file of that format")
+        reason = f"schema: expected {wanted!r}, found {_shown(found)}; give a file of that format"
+        raise InputError(f"{source}: {other_kind(found, wanted) or reason}")
     return checked(content, document, source=source)
 
 
@@ -108,6 +109,8 @@ def json_value(text: str, *, source: str) -> Any:
         return content
     except json.JSONDecodeError as error:
         where = f"line {error.lineno}, column {error.colno}"
+        if not error.doc.strip():
+            raise InputError(f"{source}: the file is empty; was it copied completely?") from None
         if error.pos >= len(error.doc.rstrip()):
             raise InputError(
                 f"{source}: {where}: not JSON: the file ends too early; was it copied completely?"
@@ -182,8 +185,7 @@ def _fault_of_text(value: str, annotation: Any) -> str:
 
 
 def _unknown_word(what: str, word: str, known: list[str], these: str) -> str:
-    near = get_close_matches(word, known, n=1, cutoff=0.6)
-    return f"{what}; did you mean {near[0]}?" if near else f"{what}; {these} {', '.join(known)}"
+    return f"{what}; {meant(word, known, these)}"
 
 
 def _variants(annotation: Any) -> list[Any]:

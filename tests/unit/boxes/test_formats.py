@@ -392,7 +392,7 @@ def test_files_that_cannot_be_these_frames_are_refused(tmp_path, content, words)
 
 def test_folders_without_boxes_and_damaged_archives_are_refused(tmp_path):
     for path, words in (
-        (tmp_path / "missing.json", "cannot be read"),
+        (tmp_path / "missing.json", "no such file or folder"),
         (tmp_path, "has no file of boxes"),
         (write(tmp_path, "damaged.zip", "PK\x03\x04 and nothing else"), "a damaged zip archive"),
     ):

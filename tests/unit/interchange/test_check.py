@@ -200,10 +200,10 @@ def test_the_pixel_uncertainty_is_what_scattered_poses_show(file):
         ("", "the file is empty"),
         ("no pose at all", "found text"),
         ("Größe: 1".encode("latin-1"), "save it as UTF-8"),
-        ("hello: world", "no pose of a camera and a radar in it .found hello"),
+        ("hello: world", "no pose of a camera and a radar in it .*found hello"),
         ("{}", "no pose of a camera and a radar in it"),
         ("[]", "0 records with camera_intrinsic"),
-        (b"\xff\xfe\x00", "neither text nor an archive"),
+        (b"\xff\xfe\x00", "not a text file in UTF-8; give a calibration"),
         (b"PK\x03\x04broken", "a damaged zip archive"),
         (b"MATLAB 5.0 MAT-file", "not a mat file of level 5; save it with -v7 or -v6"),
         ("1 0 0 0\n0 1 0 0\n", "expected 12 or 16 finite numbers, found 8"),
@@ -301,7 +301,7 @@ def test_a_file_is_read_by_its_path(file, tmp_path):
         written = export(file, known.name, rectified=known.is_for_rectified)
         (tmp_path / written.file_name).write_bytes(written.data)
         assert read_any_file(tmp_path / written.file_name).format == known.name
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="no such file or folder"):
         read_any_file(tmp_path / "absent")
 
 

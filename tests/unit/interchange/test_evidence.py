@@ -256,7 +256,7 @@ def test_an_mcap_file_that_is_a_recording_or_damaged_is_refused_in_words() -> No
     other = data.replace(b"foxglove.FrameTransforms", b"std_msgs/FrameTransforms")
     for content, words in (
         (other, "MCAP without foxglove.FrameTransforms .found std_msgs/FrameTransforms"),
-        (data.replace(b"\x04\x00\x00\x00json", b"\x04\x00\x00\x00ros1"), "neither text nor an archive"),
+        (data.replace(b"\x04\x00\x00\x00json", b"\x04\x00\x00\x00ros1"), "not a text file but a recording"),
         (data[:200], "damaged MCAP file"),
     ):
         with pytest.raises(InputError, match=words):

@@ -94,12 +94,15 @@ def test_a_fault_in_a_pair_is_named_with_its_place_and_what_to_do(change, words)
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "line 1, column 1: not JSON"),
+        ("", "the file is empty"),
         ("[1]", "expected an object in braces, found a list"),
         ('{"schema": "cocalib/pairs-1",}', "line 1, column 30: not JSON"),
         ('{"schema": "cocalib/pairs-1", "a": 1, "a": 2}', "the key 'a' appears twice in one object"),
         ("[" * 100_000, "nested too deeply"),
-        ('{"schema": "cocalib/clicks-1"}', "schema: expected 'cocalib/pairs-1', found \"cocalib/clicks-1\""),
+        (
+            '{"schema": "cocalib/clicks-1"}',
+            "this is a cocalib/clicks-1 file, not cocalib/pairs-1; solve them with their recording: cocalib solve",
+        ),
         ('{"pairs": []}', "schema: expected 'cocalib/pairs-1', found none"),
         (pairs_text(camera=None), "camera: missing; add it"),
         (

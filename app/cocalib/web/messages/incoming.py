@@ -1,6 +1,5 @@
 """What a page may send: text in, commands out."""
 
-import difflib
 from dataclasses import dataclass
 from typing import Annotated, Literal, TypeAlias, get_args
 
@@ -8,7 +7,7 @@ import msgspec
 from msgspec import Meta
 from msgspec.structs import replace
 
-from calib_core.errors import InputError
+from calib_core.errors import InputError, meant
 from calib_core.json_forms import from_json
 from calib_core.measurements import TimeNs
 from cocalib.option_changes import changes_from_tree
@@ -253,9 +252,7 @@ def _kind(fields: object) -> str:
     kind = fields.get("type")
     if isinstance(kind, str) and kind in _TYPES:
         return kind
-    near = difflib.get_close_matches(str(kind)[:80], _TYPES, n=1)
-    advice = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(_TYPES)}"
-    raise InputError(f"unknown message type '{str(kind)[:80]}'; {advice}")
+    raise InputError(f"unknown message type '{str(kind)[:80]}'; {meant(str(kind), _TYPES)}")
 
 
 def _checked(command: Message) -> Message:

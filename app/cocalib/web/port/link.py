@@ -116,6 +116,8 @@ class Link:
         if options.socket is not None:
             print("On the machine with the browser, run:")
             print(f"  {forwarding_command(options.socket, self.port)}")
+        if options.port and options.socket is None and self.port != options.port:
+            print(f"Port {options.port} is taken; this is port {self.port}.")
         print(f"Open {self.url}", flush=True)
         if not options.no_browser and options.socket is None:
             self._hand_over = HandOver(self.url, opener)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from calib_core.errors import RecordingError
+from calib_core.input_files import other_kind
 from calib_core.recordings.plain_files.tables.text_tables import TableRows
 from calib_core.recordings.plain_files.tables.times import TimeReader
 
@@ -43,14 +44,6 @@ class JsonTable:
         return self.sample[0] if self.sample else ()
 
 
-_USES = {
-    "calibration-1": "; give it with the recording: cocalib open RECORDING --calibration FILE",
-    "clicks-1": "; give it with the recording: cocalib open RECORDING --clicks FILE",
-    "pairs-1": "; solve it without a recording: cocalib solve --pairs FILE",
-}
-"""What our own files are for, by their schema."""
-
-
 def open_json_table(path: Path) -> JsonTable:
     """Find the fields of a JSON file's returns.
 
@@ -60,9 +53,7 @@ def open_json_table(path: Path) -> JsonTable:
     first = list(islice(_rows(path), _SAMPLED_ROWS))
     schema = first[0][1].get("schema", "") if first else ""
     if schema.startswith("cocalib/"):
-        raise RecordingError(
-            f"{path}: this is a {schema} file, not a recording{_USES.get(schema.partition('/')[2], '')}"
-        )
+        raise RecordingError(f"{path}: {other_kind(schema, 'a recording') or f'this is a {schema} file'}")
     names = tuple(dict.fromkeys(name for _, row in first for name in row))
     if not names:
         raise RecordingError(

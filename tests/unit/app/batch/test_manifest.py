@@ -84,7 +84,7 @@ def test_an_absolute_path_stays_as_it_is(tmp_path):
         (ROW.replace('"b.bag"', "[]"), "session 1 (a): recording: names no file"),
         (
             f"{ROW}options.noise.sigmapx = 1",
-            "session 1 (a): unknown option 'noise.sigmapx'; did you mean 'noise.sigma_px'?",
+            "session 1 (a): unknown option 'noise.sigmapx'; did you mean noise.sigma_px?",
         ),
         (f'{ROW}topics.radar_topc = "x"', "session 1: topics.radar_topc: unknown key; did you mean radar_topic?"),
         (f'{ROW}exports = ["tf3"]', "session 1 (a): exports: unknown format 'tf3'; did you mean tf2?"),
@@ -115,7 +115,9 @@ def test_a_mistake_is_named_with_its_place(text, fault, tmp_path):
 def test_a_file_of_another_kind_is_refused(tmp_path):
     for name in ("fleet.yaml", "fleet.csv"):
         assert fault_of("a: 1", tmp_path, name).startswith("a manifest is a .toml file; cocalib batch FILE.toml --init")
-    with pytest.raises(InputError, match=r"no such file; cocalib batch .*absent\.toml --init FOLDER writes one"):
+    with pytest.raises(
+        InputError, match=r"no such file or folder; cocalib batch .*absent\.toml --init FOLDER writes one"
+    ):
         read_manifest(tmp_path / "absent.toml")
     for data, words in ((b"\xff\xfe\x00", "not a text file"), (ROW.encode() + b"# K\xe4fer", "save it as UTF-8")):
         (tmp_path / "binary.toml").write_bytes(data)

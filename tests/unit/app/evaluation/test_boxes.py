@@ -80,11 +80,11 @@ def test_keyframes_give_no_acc_and_say_how_far_apart_they_are():
 def test_labels_are_read_or_refused_in_words(tmp_path):
     labels = ReturnLabels((LabelledScan(TimeNs(5), ("", "p1")),), "labels.json")
     path = tmp_path / "labels.json"
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="no such file or folder"):
         find_labels(path)
     path.write_text(labels_text(labels), encoding="utf-8")
     assert find_labels(path) == labels
-    for content, words in ((b"\xff\xfe\0", "not text"), (b"{}", "schema")):
+    for content, words in ((b"\xff\xfe\0", "not a text file"), (b"{}", "schema")):
         path.write_bytes(content)
         with pytest.raises(InputError, match=words):
             find_labels(path)

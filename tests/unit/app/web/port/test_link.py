@@ -53,9 +53,12 @@ def test_who_came_early_without_the_token_is_refused(host, status, link):
     server.close()
 
 
-def test_a_taken_port_is_followed_by_the_next_free_one_if_there_is_one(link):
-    with Link(ServerOptions(port=link.port)).listening or pytest.fail("not bound") as second:
-        assert second.getsockname()[1] > link.port
+def test_a_taken_port_is_followed_by_the_next_free_one_if_there_is_one(link, capsys):
+    second = Link(ServerOptions(port=link.port, no_browser=True))
+    second.announce()
+    assert second.port > link.port
+    assert capsys.readouterr().out.startswith(f"Port {link.port} is taken; this is port {second.port}.\nOpen ")
+    second.close()
     with listening_at("127.0.0.1", 65535), pytest.raises(AddressError, match="--port 65535: neither this port"):
         listening_at("127.0.0.1", 65535)
 
