@@ -17,6 +17,7 @@ from calib_core.recordings.assembly import Assembly, assemble
 from calib_core.recordings.camera.image_stream import ImageStream
 from calib_core.recordings.containers.following import FollowedFiles
 from calib_core.recordings.recording import Recording
+from calib_core.recordings.recording_file import RecordingFile, with_recording_file
 from calib_core.recordings.selection import RecordingOptions
 
 _ENOUGH_MESSAGES, _ENOUGH_S = 20, 3.0
@@ -48,12 +49,12 @@ class AwaitedRecording:
         options: topics and clock.
 
     Raises:
-        RecordingError: one of the paths cannot be followed.
+        RecordingError: one of the paths cannot be followed, or what a recording.toml beside them states is wrong.
     """
 
     def __init__(self, paths: Sequence[Path], options: RecordingOptions | None = None) -> None:
         self._paths = tuple(paths)
-        self._options = options or RecordingOptions()
+        self._options, self._file = with_recording_file(self._paths, options or RecordingOptions())
         self._files = FollowedFiles(self._paths)
         self._begun = 0
         self.missing = ""
@@ -76,7 +77,7 @@ class AwaitedRecording:
         assembly = self._assembly(complete=complete)
         if assembly is None:
             return None
-        return FollowedRecording(self._paths, self._files, assembly, self._options)
+        return FollowedRecording(self._paths, self._files, assembly, self._options, self._file)
 
     def _assembly(self, *, complete: bool) -> Assembly | None:
         """Assemble what is there; None if it is not enough yet."""
@@ -120,9 +121,14 @@ class FollowedRecording(Recording):
     """
 
     def __init__(
-        self, paths: tuple[Path, ...], files: FollowedFiles, assembly: Assembly, options: RecordingOptions
+        self,
+        paths: tuple[Path, ...],
+        files: FollowedFiles,
+        assembly: Assembly,
+        options: RecordingOptions,
+        file: RecordingFile | None,
     ) -> None:
-        super().__init__(paths, files.sources, assembly)
+        super().__init__(paths, files.sources, assembly, file=file)
         self._files = files
         self._options = replace(
             options,

@@ -162,6 +162,18 @@ def test_the_camera_that_was_chosen_stays_although_another_gets_more_frames(tmp_
 
 
 @pytest.mark.parametrize("container", ["mcap"])
+def test_what_recording_toml_states_is_followed(tmp_path, container_ros, plain, jpeg):
+    rows = plain(container_ros, jpeg, n=50)
+    path = write_in_chunks(tmp_path / "drive", container_ros, rows, "mcap", per_chunk=7)
+    path.with_name("recording.toml").write_text('clock = "receive"\n')
+    recording = opened(path)
+    assert (recording.image_clock, recording.radar_clock) == ("receive", "receive")
+    assert recording.recording_file == 'using recording.toml: clock = "receive"'
+    assert "recording.toml" in [file.name for file in recording.fingerprint()]
+    recording.close()
+
+
+@pytest.mark.parametrize("container", ["mcap"])
 def test_a_clock_that_would_be_chosen_otherwise_is_told_at_the_end(tmp_path, container_ros, plain, jpeg):
     rows = plain(container_ros, jpeg, n=60)
     lost = [number for number, row in enumerate(rows) if row[0] == "/camera/image/compressed"][40:]
