@@ -670,6 +670,17 @@ def test_what_a_folder_holds_and_nobody_reads_is_named(tmp_path) -> None:
         assert words in warning.message
 
 
+def test_a_picture_that_is_no_file_is_named(tmp_path) -> None:
+    for number in range(3):
+        picture(tmp_path / "camera" / f"{START_NS + number}.png", (8, 8))
+    (tmp_path / "camera" / f"{START_NS + 9}.png").mkdir()
+    (tmp_path / "radar.csv").write_text(f"time_ns,x_m,y_m\n{START_NS},3,1\n")
+    with open_recording(tmp_path) as recording:
+        assert len(recording.image_times) == 3
+        (warning,) = (one for one in recording.warnings if one.code == "unused-files")
+    assert f"{START_NS + 9}.png (a broken link, a pipe or a folder)" in warning.message
+
+
 def test_a_long_list_of_unused_files_is_cut(tmp_path) -> None:
     picture(tmp_path / "camera" / f"{START_NS}.png", (8, 8))
     for number in range(20):
