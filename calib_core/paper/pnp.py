@@ -42,39 +42,6 @@ class RansacSolution:
         object.__setattr__(self, "inliers", frozen_array(self.inliers, (None,), dtype=np.bool_))
 
 
-def project_points(points_radar_m: Points3, camera_from_radar: RigidTransform, camera: Camera) -> Points2:
-    """Project by OpenCV's own code: (n, 2) [px]. Unlike Camera.project it also mirrors points behind the camera into the image.
-
-    Args:
-        points_radar_m: (n, 3).
-        camera_from_radar: the pose.
-        camera: any model that OpenCV has a function for; OpenCV does not support skew.
-
-    Raises:
-        ValueError: the camera matrix has skew, or OpenCV does not have the lens model.
-    """
-    import cv2
-
-    if camera.matrix_px[0, 1] != 0.0 or camera.matrix_px[1, 0] != 0.0:
-        raise ValueError("OpenCV cannot project through a camera matrix with skew")
-    if camera.lens.opencv is None:
-        raise ValueError(f"OpenCV cannot project through the lens model {camera.model}")
-    points = np.ascontiguousarray(points_radar_m, dtype=np.float64).reshape(-1, 1, 3)
-    if not len(points):
-        return np.zeros((0, 2))
-    rotation_vector = rotation_log(camera_from_radar.rotation).reshape(3, 1)
-    translation = np.array(camera_from_radar.translation_m).reshape(3, 1)
-    if camera.lens.opencv == "fisheye.projectPoints":
-        pixels, _ = cv2.fisheye.projectPoints(
-            points, rotation_vector, translation, np.array(camera.matrix_px), np.array(camera.distortion)
-        )
-    else:
-        pixels, _ = cv2.projectPoints(
-            points, rotation_vector, translation, np.array(camera.matrix_px), np.array(camera.distortion)
-        )
-    return np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
-
-
 def spans_a_plane(points_radar_m: Points3) -> bool:
     """Return whether points (n, 3) span more than a point or a line; a rotation about a line cannot be observed."""
     points = np.asarray(points_radar_m, dtype=np.float64).reshape(-1, 3)

@@ -16,7 +16,7 @@ from calib_core.lens_models.brown_conrady import project_distorted, unproject_di
 from calib_core.lens_models.lens_model import LensModel, NameElsewhere, TypicalLens
 from calib_core.lens_models.registry import LENS_MODELS
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
-from calib_core.paper.pnp import project_points, solve_pnp_ransac
+from calib_core.paper.pnp import solve_pnp_ransac
 from calib_core.recordings import open_recording
 from calib_core.synthetic import SimulationOptions, simulate, simulate_pairs, typical_camera, write_recording
 
@@ -110,12 +110,10 @@ def test_pairs_clicked_through_it_are_solved(camera: Camera) -> None:
     assert in_sigmas < np.sqrt(calibration.covariance_quantile)
 
 
-def test_opencv_solves_it_from_undistorted_points_and_does_not_project_through_it(camera: Camera) -> None:
+def test_opencv_solves_it_from_undistorted_points(camera: Camera) -> None:
     simulated = simulate_pairs(20, rng=np.random.default_rng(3), noise="none", camera=camera)
     solution = solve_pnp_ransac(simulated.points_radar_m, simulated.pixels_px, camera, threshold_px=1.0)
     assert solution.inliers.all()
-    with pytest.raises(ValueError, match="OpenCV cannot project through the lens model division"):
-        project_points(simulated.points_radar_m, solution.camera_from_radar, camera)
 
 
 def test_files_and_formats_that_have_a_name_for_it_store_it(camera: Camera, file: CalibrationFile) -> None:
