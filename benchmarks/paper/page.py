@@ -64,7 +64,7 @@ def page(measured: Measured, settings: Settings, fit: Fit) -> str:
 Written by `make paper`, measured on {measured.date}; do not edit. Everything is simulated: the authors' recordings are not published. Each row is a
 session of scans and clicks that went through the whole path: windows around the clicks, radar positions, pose. `tests/paper/test_experiments.py`
 shows for PPM, on 5 placements and pictures of 480 px, that recordings with pictures, read back from bags and solved by `cocalib solve`, give the same AED, and an
-independent script in `tests/paper/test_independent.py` computes AED, CDSD and CCM from the paper's formulas alone.
+independent script in `tests/paper/test_independent.py` computes AED, CDSD, PMM, CCM and the swaps from the paper's formulas alone.
 
 PPM is the paper's method ([line by line](paper.md), `--method paper`), PMM the mounting, CCM the checkerboard (both in
 `benchmarks/paper/rows.py`). T_m is the measured translation, T_c that of PPM. D1 is a rooftop, D2 a checkerboard with the reflector
