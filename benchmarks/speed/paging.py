@@ -100,7 +100,7 @@ def _compared(scratch: Path) -> Table:
         f"The sample with its 20 pairs and the 3D view next to the picture, in Chromium; {_ROUNDS} rounds of both versions "
         f"in turn, in each {_CLICKS} marks dragged by 6 px as soon as the page is there, while this version looks for proposals, "
         f"and {_STEPS} frames stepped. From the pointer's release to the painted picture: medians (95th percentiles). "
-        "The earlier version shows its answer in one step.",
+        "The earlier version shows its answer in one step. Alone: `python -m benchmarks.speed.paging`.",
         (
             _against("click to mark", before["mark"], now["mark"], 1.0),
             _against("click to the preview's overlay, against the answer's", before["answer"], now["preview"], 0.8),
@@ -191,4 +191,5 @@ def _tab_megabytes() -> float:
 
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as folder:
-        print("\n".join(section(_compared(Path(folder)))))
+        for table in measure_page(Path(folder)):
+            print("\n".join(section(table)))

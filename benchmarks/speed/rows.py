@@ -2,14 +2,13 @@
 
 import os
 import platform
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
-import numpy as np
-
-__all__ = ["Row", "Table", "page", "section", "spread"]
+__all__ = ["Row", "Table", "page", "section"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,8 +17,8 @@ class Row:
 
     Attributes:
         what: what was measured.
-        figure: the measured value as text, with its unit.
-        ratio: compared with another measurement in the same run; "" if there is none.
+        figure: the measured value as text, with its unit; it is printed while measuring, and depends on the machine.
+        ratio: compared with another measurement in the same run; "" if there is none. Only ratios and aims are kept.
         aim: the value to reach; "" if there is none.
         met: whether the aim is met.
     """
@@ -40,17 +39,12 @@ class Table:
     rows: tuple[Row, ...]
 
 
-def spread(values_ms: Sequence[float]) -> str:
-    """Format times as their median and 95th percentile."""
-    return f"{np.median(values_ms):.0f} ms (p95 {np.percentile(values_ms, 95):.0f})"
-
-
 def page(tables: Sequence[Table], *, command: str) -> str:
     """Return the page in Markdown, with the command that measured it."""
     lines = [
         "# Speed",
         "",
-        f"Written by `{command}`. Machine: {_machine()}. Read times as ratios within this one run.",
+        f"Written by `{command}`. Machine: {_machine()}. Ratios within this one run.",
     ]
     for table in tables:
         lines += ["", *section(table)]
@@ -58,9 +52,12 @@ def page(tables: Sequence[Table], *, command: str) -> str:
 
 
 def section(table: Table) -> list[str]:
-    """Return the lines of one table in Markdown, under its heading."""
-    head = [f"## {table.title}", "", table.how, "", "| what | measured | ratio | aim |", "|---|---|---|---|"]
-    return [*head, *(f"| {row.what} | {row.figure} | {row.ratio} | {_aim(row)} |" for row in table.rows)]
+    """Return the ratios of one table in Markdown, under its heading; the figures are printed."""
+    for row in table.rows:
+        print(f"{row.what}: {row.figure}", file=sys.stderr)
+    head = [f"## {table.title}", "", table.how, "", "| what | ratio | aim |", "|---|---|---|"]
+    rows = [f"| {row.what} | {row.ratio} | {_aim(row)} |" for row in table.rows if row.ratio or row.aim]
+    return [*head, *rows]
 
 
 def _aim(row: Row) -> str:

@@ -7,7 +7,7 @@ import { setRectified } from "../picture/rectified.js";
 import { saveFile } from "../shell/asking.js";
 import { themeColour } from "../shell/colours.js";
 import { closeSheet, showPage } from "../shell/layout.js";
-import { make, toast } from "../shell/notices.js";
+import { make, shape, toast } from "../shell/notices.js";
 import { send, tell } from "../shell/socket.js";
 import { emit, on, onPainted, state } from "../shell/state.js";
 import { goTo } from "../time/player.js";
@@ -282,26 +282,13 @@ function angleRow(row) {
 
 /** The curve of one axis, from 0 to 100 %, with a line at 0 deg. @param {Row} row */
 function curve(row) {
-  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
-  svg.setAttribute("viewBox", `0 0 ${WIDE} ${HIGH}`);
-  svg.setAttribute("role", "img");
-  svg.setAttribute("aria-label", row.words);
   const [low, high] = [row.angles_deg[0], row.angles_deg[row.angles_deg.length - 1]];
   const at = (/** @type {number} */ angle, /** @type {number} */ percent) => [3 + ((WIDE - 6) * (angle - low)) / (high - low || 1), HIGH - 3 - ((HIGH - 6) * percent) / 100];
   const path = row.angles_deg.map((angle, index) => at(angle, row.acc_percent[index]).map((value) => value.toFixed(1)).join(" ")).join("L");
   const [middle] = at(0, 0);
-  svg.append(
-    stroke(`M${middle} 2V${HIGH - 2}`, themeColour("line-strong")),
-    stroke(`M${path}`, themeColour(row.is_flat ? "attention" : "accent"), 1.6),
-  );
-  return svg;
-}
-
-/** @param {string} path @param {string} colour @param {number} [width] */
-function stroke(path, colour, width = 1) {
-  const line = document.createElementNS("http://www.w3.org/2000/svg", "path");
-  for (const [name, value] of Object.entries({ d: path, fill: "none", stroke: colour, "stroke-width": String(width) })) line.setAttribute(name, value);
-  return line;
+  const stroke = (/** @type {string} */ d, /** @type {string} */ colour, width = 1) => shape("path", { d, fill: "none", stroke: themeColour(colour), "stroke-width": width });
+  const lines = [stroke(`M${middle} 2V${HIGH - 2}`, "line-strong"), stroke(`M${path}`, row.is_flat ? "attention" : "accent", 1.6)];
+  return shape("svg", { viewBox: `0 0 ${WIDE} ${HIGH}`, role: "img", "aria-label": row.words }, lines);
 }
 
 /** @param {import("../messages.js").DataWarning} one */

@@ -4,10 +4,10 @@
  */
 
 import { ask, BROKE_OFF, content, saveFile } from "../shell/asking.js";
-import { icon, make, toast } from "../shell/notices.js";
+import { icon, make, shape, toast } from "../shell/notices.js";
 import { send } from "../shell/socket.js";
 import { on, state } from "../shell/state.js";
-import { frameDrawing, IDENTITY, nameFields, parentFields, rectifiedBox, shape } from "./fields.js";
+import { frameDrawing, IDENTITY, nameFields, parentFields, rectifiedBox } from "./fields.js";
 import { drawFormats, focusFormats, formatColumn } from "./list.js";
 
 /** @typedef {import("./list.js").Format} Format */

@@ -3,7 +3,7 @@
  * drawing of the axes with the direction of the file's transform.
  */
 
-import { make } from "../shell/notices.js";
+import { make, shape } from "../shell/notices.js";
 
 /** @typedef {Record<string, any>} Preview ExportPreview of app/cocalib/web/channel/export_preview.py */
 const TYPING_MS = 250;
@@ -123,7 +123,6 @@ export function rectifiedBox(changed) {
   return { box, row: make("div", "rectified", [label]) };
 }
 
-const NS = "http://www.w3.org/2000/svg";
 const WIDTH = 280;
 const HEIGHT = 168;
 const RADAR = [72, 72];
@@ -202,11 +201,4 @@ function titled(words) {
   const title = shape("title", {});
   title.textContent = words;
   return title;
-}
-
-/** @param {string} name @param {Record<string, string|number>} attributes */
-export function shape(name, attributes) {
-  const element = document.createElementNS(NS, name);
-  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, String(value));
-  return element;
 }

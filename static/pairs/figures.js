@@ -1,6 +1,6 @@
 /** The top of the panel: how good the answer is; and on the page Check the metrics and the pose. All in the server's text. */
 
-import { make } from "../shell/notices.js";
+import { make, shape } from "../shell/notices.js";
 import { named, onPainted, state } from "../shell/state.js";
 
 /** @typedef {import("../messages.js").Figure} Figure */
@@ -145,19 +145,8 @@ function drawVerdict() {
   const words = line.startsWith(level) ? [make("strong", "", level), line.slice(level.length)] : [line];
   const told = aed && view.clicks.filter((click) => click.state === "inlier").length >= TELLING ? [make("span", "aed", [make("small", "", "AED "), `${aed.value} ${aed.unit}`])] : [];
   for (const one of told) one.dataset.hint = aed?.hint;
-  box.replaceChildren(shape(early ? "nothing" : level), make("p", "line", words), ...told);
+  box.replaceChildren(sign(early ? "nothing" : level), make("p", "line", words), ...told);
 }
 
 /** @param {VerdictRow["level"]} level */
-function shape(level) {
-  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
-  svg.setAttribute("viewBox", "0 0 16 16");
-  svg.setAttribute("aria-hidden", "true");
-  for (const [number, outline] of SHAPES[level].entries()) {
-    const path = document.createElementNS("http://www.w3.org/2000/svg", "path");
-    path.setAttribute("d", outline);
-    path.setAttribute("class", number ? "sign" : "body");
-    svg.append(path);
-  }
-  return svg;
-}
+const sign = (level) => shape("svg", { viewBox: "0 0 16 16", "aria-hidden": "true" }, SHAPES[level].map((d, number) => shape("path", { d, class: number ? "sign" : "body" })));

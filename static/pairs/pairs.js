@@ -3,7 +3,7 @@
 import { comeTo } from "../picture/arriving.js";
 import { toggleExcluded } from "../picture/clicking.js";
 import { LARGE_PX, residualColour } from "../shell/colours.js";
-import { make } from "../shell/notices.js";
+import { make, shape } from "../shell/notices.js";
 import { clicks, named, nameOf, onPainted, select, stampKey, state } from "../shell/state.js";
 import { candidatesOf, choose } from "./candidates.js";
 
@@ -87,15 +87,8 @@ function draw() {
 
 /** What to click, before there is a pair: a trihedral reflector with its inner corner marked. */
 function reflector() {
-  const drawing = document.createElementNS("http://www.w3.org/2000/svg", "svg");
-  drawing.setAttribute("viewBox", "0 0 120 104");
-  drawing.setAttribute("aria-hidden", "true");
-  for (const [name, d] of [["left", "M60 4 60 62 6 98z"], ["right", "M60 4 60 62 114 98z"], ["floor", "M60 62 6 98 114 98z"], ["corner", "M60 53a9 9 0 1 0 .01 0z"]]) {
-    const part = document.createElementNS("http://www.w3.org/2000/svg", "path");
-    part.setAttribute("d", d);
-    part.setAttribute("class", name);
-    drawing.append(part);
-  }
+  const parts = [["left", "M60 4 60 62 6 98z"], ["right", "M60 4 60 62 114 98z"], ["floor", "M60 62 6 98 114 98z"], ["corner", "M60 53a9 9 0 1 0 .01 0z"]];
+  const drawing = shape("svg", { viewBox: "0 0 120 104", "aria-hidden": "true" }, parts.map(([name, d]) => shape("path", { d, class: name })));
   const words = [make("strong", "", "Click the reflector's inner corner"), " where its three sheets meet, at each place where it stood. Eight places or more tell where the camera is, seen from the radar."];
   return make("figure", "reflector", [drawing, make("figcaption", "", words)]);
 }
@@ -247,20 +240,11 @@ const toSide = (angle, positive, negative) => (angle === null ? "" : Math.abs(an
 
 /** The shape shows the state, in addition to the colour. @param {string} clickState @param {string} colour */
 function glyph(clickState, colour) {
-  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
-  svg.setAttribute("viewBox", "0 0 12 12");
-  svg.setAttribute("role", "img");
-  svg.setAttribute("aria-label", clickState);
-  const shape = document.createElementNS("http://www.w3.org/2000/svg", "path");
-  const disc = "M6 2.2a3.8 3.8 0 1 0 .01 0z";
-  shape.setAttribute("d", clickState === "outlier" ? "M6 .8 11.2 6 6 11.2.8 6z" : disc);
   const hollow = ["excluded", "unpaired", "pending", "untouched"].includes(clickState);
-  shape.setAttribute("fill", hollow ? "none" : colour);
-  shape.setAttribute("stroke", colour);
-  shape.setAttribute("stroke-width", "1.5");
-  if (clickState === "pending" || clickState === "untouched") shape.setAttribute("stroke-dasharray", "2 2");
-  svg.append(shape);
-  return svg;
+  const d = clickState === "outlier" ? "M6 .8 11.2 6 6 11.2.8 6z" : "M6 2.2a3.8 3.8 0 1 0 .01 0z";
+  const dashes = clickState === "pending" || clickState === "untouched" ? "2 2" : "none";
+  const path = shape("path", { d, fill: hollow ? "none" : colour, stroke: colour, "stroke-width": 1.5, "stroke-dasharray": dashes });
+  return shape("svg", { viewBox: "0 0 12 12", role: "img", "aria-label": clickState }, [path]);
 }
 
 /** The id of the click whose row contains an element. @param {Element} element */

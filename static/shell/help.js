@@ -2,7 +2,7 @@
 
 import { ACTIONS, keyNames } from "./actions.js";
 import { ink } from "./colours.js";
-import { make } from "./notices.js";
+import { make, shape } from "./notices.js";
 
 const dialog = /** @type {HTMLDialogElement} */ (document.getElementById("help-dialog"));
 const ARROWS = ["←", "→", "↑", "↓"];
@@ -104,15 +104,6 @@ const key = (name) => make("span", "key", name);
 function drawing(spec) {
   const [path, style, colour] = spec.split("|");
   const stroke = ink[/** @type {keyof typeof ink} */ (colour)] ?? "currentColor";
-  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
-  svg.setAttribute("viewBox", "0 0 16 16");
-  svg.setAttribute("aria-hidden", "true");
-  const shape = document.createElementNS("http://www.w3.org/2000/svg", "path");
-  shape.setAttribute("d", path);
-  shape.setAttribute("fill", style === "fill" ? stroke : "none");
-  shape.setAttribute("stroke", stroke);
-  shape.setAttribute("stroke-width", "1.5");
-  if (style && style !== "fill") shape.setAttribute("stroke-dasharray", style);
-  svg.append(shape);
-  return svg;
+  const attributes = { d: path, fill: style === "fill" ? stroke : "none", stroke, "stroke-width": 1.5, "stroke-dasharray": style && style !== "fill" ? style : "none" };
+  return shape("svg", { viewBox: "0 0 16 16", "aria-hidden": "true" }, [shape("path", attributes)]);
 }

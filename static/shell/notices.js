@@ -151,12 +151,13 @@ export function make(name, className, content) {
   return element;
 }
 
-/** An icon from the sprite in index.html. @param {string} name */
-export function icon(name) {
-  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
-  const use = document.createElementNS("http://www.w3.org/2000/svg", "use");
-  use.setAttribute("href", `#i-${name}`);
-  svg.setAttribute("aria-hidden", "true");
-  svg.append(use);
-  return svg;
+/** An element of a drawing. @param {string} name @param {Record<string, string|number>} attributes @param {Element[]} [parts] */
+export function shape(name, attributes, parts = []) {
+  const element = document.createElementNS("http://www.w3.org/2000/svg", name);
+  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, String(value));
+  element.append(...parts);
+  return element;
 }
+
+/** An icon from the sprite in index.html. @param {string} name */
+export const icon = (name) => shape("svg", { "aria-hidden": "true" }, [shape("use", { href: `#i-${name}` })]);
