@@ -121,7 +121,8 @@ def test_boxes_need_no_mouse_and_fit_every_window(
     page.page.get_by_label("right edge [px]").fill("900")
     page.until("__cocalib.boxing.frame.boxes[0][2][2] === 900")
     page.page.keyboard.press("Tab")
-    judged_or_not = "!__cocalib.state.view.acc.judging && !__cocalib.state.view.boxes[0].following && !document.querySelector('.stale')"
+    at_rest = "!__cocalib.state.view.boxes[0].following && !document.querySelector('.stale')"
+    judged_or_not = f"!__cocalib.state.view.acc.judging && {at_rest}"
     page.until(judged_or_not)
     for theme in ("dark", "light"):
         assert page.value("document.documentElement.dataset.theme") == theme
