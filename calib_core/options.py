@@ -296,18 +296,20 @@ class CalibrationOptions:
         return self.method == "default"
 
 
+LensChoice: TypeAlias = Literal["auto", "pinhole", "plumb_bob", "rational_polynomial", "equidistant"]
+
+
 @dataclass(frozen=True, slots=True)
 class IntrinsicsOptions:
     """How a lens is calibrated."""
 
-    model: Literal["auto", "pinhole", "plumb_bob", "rational_polynomial", "equidistant"] = option(
+    model: LensChoice = option(
         "auto", "Lens model; auto takes the simplest that predicts views it has not seen as well as any."
     )
     board_shape: Literal["auto", "flat"] = option(
         "auto", "Shape of the board; auto estimates bending and unequal sides of the squares where the views show them."
     )
     robust: bool = option(True, "Leave out views and corners that contradict the others.")
-    square_pixels: bool = option(False, "Estimate one focal length for rows and columns.")
 
 
 def without_systematic_errors(options: CalibrationOptions) -> CalibrationOptions:

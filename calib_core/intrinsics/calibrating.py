@@ -67,9 +67,7 @@ class _Used:
         return choose_model(
             models,
             self.stack,
-            lambda model: fit_model(
-                model, self.stack, warp=warp, square_pixels=self.options.square_pixels, near=self.starts.get(model)
-            ),
+            lambda model: fit_model(model, self.stack, warp=warp, near=self.starts.get(model)),
         )
 
 

@@ -205,14 +205,10 @@ class Freedom:
         object.__setattr__(self, "pull", frozen_array(pull, (len(self.lens),)))
 
     @classmethod
-    def of(cls, camera: Camera, *, square_pixels: bool = False, warp: BoardWarp = FLAT) -> "Freedom":
-        """Free all parameters of a camera; with square pixels its two focal lengths change together."""
-        free = np.eye(len(camera.parameters))
-        if square_pixels:
-            free = np.delete(free, 1, axis=1)
-            free[1, 0] = 1.0
+    def of(cls, camera: Camera, *, warp: BoardWarp = FLAT) -> "Freedom":
+        """Free all parameters of a camera."""
         pulled = [_PULL_PX2 if name in _PULLED.get(camera.model, ()) else 0.0 for name in camera.parameter_names]
-        return cls(free, warp, np.array(pulled))
+        return cls(np.eye(len(camera.parameters)), warp, np.array(pulled))
 
     @classmethod
     def none(cls, camera: Camera) -> "Freedom":

@@ -56,26 +56,19 @@ class ChosenModel:
     choice: str
 
 
-def fit_model(
-    model: str, stack: ViewStack, *, warp: BoardWarp = FLAT, square_pixels: bool = False, near: LensState | None = None
-) -> LensFit | str:
+def fit_model(model: str, stack: ViewStack, *, warp: BoardWarp = FLAT, near: LensState | None = None) -> LensFit | str:
     """Fit a lens model by least squares; a sentence if that is not possible.
 
     Args:
         model: its name.
         stack: the views.
         warp: how the board may be warped.
-        square_pixels: whether both focal lengths are equal.
         near: a fit of the same model to start from.
     """
     first = near if near is not None else start(model, stack)
     if first is None:
         return "no focal length explains the views"
-    freedom = Freedom.of(first.camera, square_pixels=square_pixels, warp=warp)
-    if square_pixels:
-        mean_px = float(first.camera.parameters[:2].mean())
-        camera = first.camera.with_parameters(np.concatenate([[mean_px, mean_px], first.camera.parameters[2:]]))
-        first = LensState(camera, first.rotations, first.translations_m, first.amounts)
+    freedom = Freedom.of(first.camera, warp=warp)
     if not np.isfinite(weighted_cost(residuals_of(first, stack, warp if len(first.amounts) else FLAT), stack)):
         return "it cannot have seen all corners"
     state = adjust(first, stack, freedom)

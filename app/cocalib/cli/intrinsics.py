@@ -11,7 +11,7 @@ import tyro
 
 from calib_core.errors import InputError
 from calib_core.input_files import name_text
-from calib_core.options import IntrinsicsOptions
+from calib_core.options import IntrinsicsOptions, LensChoice
 from calib_core.recordings import RecordingOptions
 from cocalib.cli.flags import MORE, File, Folder, Switch, called, same
 from cocalib.cli.output import explain_unsolvable, write_whole
@@ -97,9 +97,8 @@ class Intrinsics:
     """Print everything as JSON (cocalib/intrinsics-1)."""
     verbose: Switch = False
     """List every view and every picture that was left out."""
-    options: Annotated[IntrinsicsOptions, tyro.conf.arg(name=""), tyro.conf.FlagConversionOff, MORE] = field(
-        default_factory=IntrinsicsOptions
-    )
+    model: Annotated[LensChoice, MORE] = "auto"
+    """Lens model; auto takes the simplest that predicts views it has not seen as well as any."""
 
     def run(self) -> int:
         """Calibrate or convert; return the exit code."""
@@ -163,7 +162,7 @@ class Intrinsics:
             search = search_for(pictures, board, _source_name(self.source), self.views)
             with kept_on_interruption(search, self.views):
                 found = searched(search, self.views)
-                lens = found if isinstance(found, Unsolvable) else calibrate_lens(found, self.options)
+                lens = found if isinstance(found, Unsolvable) else calibrate_lens(found, IntrinsicsOptions(self.model))
                 if isinstance(lens, Unsolvable) or isinstance(found, Unsolvable):
                     assert isinstance(lens, Unsolvable)
                     code = explain_unsolvable(lens)

@@ -84,19 +84,6 @@ def test_rational_coefficients_that_the_views_leave_free_stay_small() -> None:
     assert squares[0] <= squares[1] < 1.001 * squares[0]
 
 
-def test_square_pixels_have_one_focal_length() -> None:
-    camera = CAMERAS["pinhole"]
-    equal = camera.with_parameters(np.array([900.0, 900.0, 650.0, 350.0]))
-    stack = stack_views(drawn_views(equal, 8, 1), BOARD.corners_m, SIZE_PX)
-    posed, _ = pose_views(camera, stack)
-    state = adjust(
-        LensState(equal, posed.rotations, posed.translations_m), stack, Freedom.of(camera, square_pixels=True)
-    )
-    assert state.camera.matrix_px[0, 0] == state.camera.matrix_px[1, 1]
-    assert state.camera.matrix_px[0, 0] == pytest.approx(900.0, abs=3.0)
-    assert np.abs(state.camera.matrix_px[:2, 2] - [650.0, 350.0]).max() < 5.0
-
-
 def test_a_corner_without_weight_changes_nothing() -> None:
     stack = stacked("pinhole")
     state, _ = pose_views(CAMERAS["pinhole"], stack)
