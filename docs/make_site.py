@@ -24,7 +24,7 @@ _PAGES = {
     "How to": "radar-formats intrinsics drift fleet proposals boxes evaluation report rerun simulation",
     "Concepts": "method accuracy conventions GLOSSARY apex paper security",
     "Reference": "commands python formats warnings",
-    "Studies": "paper-experiments proposals-accuracy intrinsics-accuracy reliability speed",
+    "Studies": "paper-experiments reliability speed",
     "Project": "CHANGELOG CONTRIBUTING ARCHITECTURE SECURITY",
 }
 _FONT = "system-ui, sans-serif"

@@ -1,4 +1,4 @@
-"""`python -m benchmarks.intrinsics`: calibrate lenses on fresh draws, and write docs/intrinsics-accuracy.md."""
+"""`python -m benchmarks.intrinsics`: calibrate lenses on fresh draws, and write accuracy.md beside this file."""
 
 import argparse
 import json
@@ -47,9 +47,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--corners", choices=CASES, help="draw the corners of --only sigmas in this way only")
     parser.add_argument("--first", type=int, help="number of the first draw; by default from the present commit's hash")
     parser.add_argument("--scratch", type=Path, default=_ROOT / "build" / "intrinsics", help="where tables are kept")
-    parser.add_argument(
-        "--page", type=Path, default=_ROOT / "docs" / "intrinsics-accuracy.md", help="the page to write"
-    )
+    parser.add_argument("--page", type=Path, default=Path(__file__).with_name("accuracy.md"), help="the page to write")
     return parser.parse_args()
 
 

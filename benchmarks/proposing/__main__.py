@@ -1,4 +1,4 @@
-"""`python -m benchmarks.proposing`: propose on recordings that nobody looked at, and write docs/proposals-accuracy.md."""
+"""`python -m benchmarks.proposing`: propose on recordings that nobody looked at, and write accuracy.md beside this file."""
 
 import argparse
 import shlex
@@ -77,7 +77,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--recordings", type=int, default=40, help="recordings of which pictures and radar are mixed")
     parser.add_argument("--scratch", type=Path, default=_ROOT / "build" / "proposing", help="where figures are kept")
     parser.add_argument("--frames", type=Path, help="where rendered frames are kept; by default below --scratch")
-    parser.add_argument("--page", type=Path, default=_ROOT / "docs" / "proposals-accuracy.md", help="the page to write")
+    parser.add_argument("--page", type=Path, default=Path(__file__).with_name("accuracy.md"), help="the page to write")
     return parser.parse_args()
 
 

@@ -21,7 +21,7 @@ LEAST_SCORE = 25.0
 
 Set on simulated recordings of development: of 650 pairs of one recording's radar and another's pictures the best reached 22.
 Pairs drawn later with the threshold as it is are not independent of these, as they repeat the same 40 recordings;
-docs/proposals-accuracy.md has those of recordings that nobody had looked at.
+benchmarks/proposing/accuracy.md has those of recordings that nobody had looked at.
 """
 _MARGIN, _MARGIN_STEP = 2.0, 1.0
 """Score beyond what chance can reach and beyond the rival at which a pose is as probably right as not, and how fast that

@@ -2,6 +2,7 @@
 
 import ast
 import re
+import runpy
 import shlex
 from collections.abc import Iterator
 from pathlib import Path
@@ -111,6 +112,23 @@ def test_what_a_user_must_know_stays_little(project_root: Path) -> None:
     assert len(COMMANDS) == 13
     assert len({flag for flags in FLAGS.values() for flag in flags} - {"--help"}) <= 110
     assert len((project_root / "README.md").read_text(encoding="utf-8").splitlines()) <= 90
+
+
+def test_the_pages_stay_short(project_root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """At most 40,000 words without what a program writes: whole pages, rows of a registry, and shown output."""
+    monkeypatch.setattr("calib_core.interchange.FORMATS", ())
+    monkeypatch.setattr("calib_core.recordings.radar.registry.DECODERS", ())
+    monkeypatch.setattr("calib_core.recordings.plain_files.tables.text_tables.csv_columns", list)
+    makers = {"formats": ("make_formats_table", "with_table"), "radar-formats": ("make_radar_formats", "with_tables")}
+    words = 0
+    for path in sorted((project_root / "docs").glob("*.md")):
+        text = path.read_text(encoding="utf-8")
+        if path.stem in makers:
+            script, name = makers[path.stem]
+            text = runpy.run_path(str(path.with_name(f"{script}.py")))[name](text)
+        if not re.search("written by `(python|make)", text[:900], re.IGNORECASE):
+            words += len(re.sub(r"^```[^\n]*\n\$ (.*?)^```", "", text, flags=re.MULTILINE | re.DOTALL).split())
+    assert 20_000 < words <= 40_000
 
 
 _REMARK = re.compile(r"( \.\.\.)?(\s{3,}\S.*|\s+#.*|)$")
