@@ -24,7 +24,6 @@ from calib_core.estimation.beyond_the_fit import look_beyond
 from calib_core.estimation.covariance import PoseCovariance, pose_covariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.leave_one_out import LeaveOneOut, leave_one_out
-from calib_core.estimation.measured_position import contradicted_position
 from calib_core.estimation.measurement_model import PairMeasurements, pair_measurements
 from calib_core.estimation.pair_results import click_results, excluded_pair_results, fit_metrics, used_pair_results
 from calib_core.estimation.plausibility import implausible_input
@@ -331,9 +330,8 @@ def _answer(task: _Task, groups: Sequence[PlacementGroup], measurements: PairMea
     used = [group.pair for group in groups]
     if isinstance(fit, Unsolvable):
         return _explained(fit, used, measurements, options)
-    contradicted = contradicted_position(measurements, fit.refined, estimate_scale=options.noise.estimate_scale)
-    measurements = measurements if contradicted is None else contradicted.measurements
-    solution = _Solution.local(fit.refined if contradicted is None else contradicted.refined, options)
+    measurements = fit.weighed
+    solution = _Solution.local(fit.refined, options, doubt=None if fit.position is None else fit.position.doubt)
     rotation_sigma_rad = float(np.sqrt(solution.uncertainty.covariance[3:, 3:].diagonal().max()))
     if not rotation_sigma_rad < _UNDETERMINED_ROTATION_RAD:
         return _explained(unsolved.degenerate(len(used)), used, measurements, options)
@@ -352,7 +350,6 @@ def _answer(task: _Task, groups: Sequence[PlacementGroup], measurements: PairMea
         chi2_per_degree=metrics.chi2 / max(metrics.degrees_of_freedom, 1),
         options=options,
         beyond=beyond,
-        contradicted=contradicted,
     )
     angle_map = learn_angle_map(calibration)
     return replace(
@@ -372,8 +369,15 @@ class _Solution:
     left_out: LeaveOneOut
 
     @classmethod
-    def local(cls, refined: ErrorsInVariablesFit, options: CalibrationOptions, *, smooth: bool = True) -> "_Solution":
-        uncertainty = pose_covariance(refined, options.radar, smooth=smooth)
+    def local(
+        cls,
+        refined: ErrorsInVariablesFit,
+        options: CalibrationOptions,
+        *,
+        smooth: bool = True,
+        doubt: Values | None = None,
+    ) -> "_Solution":
+        uncertainty = pose_covariance(refined, options.radar, smooth=smooth, doubt=doubt)
         left_out = leave_one_out(
             refined.measurements,
             refined.camera_from_radar,

@@ -17,7 +17,7 @@ Written by `COMMAND`; do not edit.
   camera position.
 - **Measure the camera position.** With a TI radar and 20 pairs it brings the position from about 15 cm to a few, and shows what
   pairs alone cannot. One that is 3 to 11 cm off is covered by the stated error; one that is 30 cm off is named nine times in
-  ten, and left out of the pose. Of right ones, up to one in 33 is named too; the pose is then that of the pairs alone.
+  ten, and loses its weight in the pose. Of right ones, up to one in 33 is named too.
 - **The radar decides the angles:** about half a degree with an imaging radar, about one degree with a TI radar, several with a
   TI radar in a narrow aisle, where the verdict says coarse.
 - **Some errors no pair can show:** clicks that are all beside the point that the radar sees, elevations that are all wrong

@@ -181,9 +181,9 @@ def _away(error: Values) -> str:
 
 
 def camera_position(fit: SolvedFit) -> list[DataWarning]:
-    """Say that the pairs contradict the measured camera position, and that the pose leaves it out."""
-    found = fit.contradicted
-    if found is None:
+    """Say that the pairs contradict the measured camera position, and that the pose hardly uses it."""
+    found = fit.best.position
+    if found is None or not found.contradicted:
         return []
     other_unit = f"; {found.other_unit}" if found.other_unit else ""
     return [
@@ -191,7 +191,7 @@ def camera_position(fit: SolvedFit) -> list[DataWarning]:
             "camera-position-contradicted",
             f"the pairs alone place the camera {100 * found.away_m:.0f} cm from the measured position, "
             f"{found.sigmas:.1f} standard deviations{other_unit}; clicks that all lie as far beside the radar's phase centre "
-            "would look the same; the pose is that of the pairs alone",
+            "would look the same; the pose follows the pairs",
             "measure again from the radar's antennas to the lens: forward, left, up; and click the reflector's apex, where its "
             "three sheets meet, not its mouth or its stand",
         )

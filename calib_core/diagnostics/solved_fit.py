@@ -8,7 +8,6 @@ from calib_core.estimation.beyond_the_fit import BeyondTheFit
 from calib_core.estimation.covariance import PoseCovariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.leave_one_out import LeaveOneOut
-from calib_core.estimation.measured_position import ContradictedPosition
 from calib_core.estimation.measurement_model import PairMeasurements
 from calib_core.options import CalibrationOptions
 
@@ -28,7 +27,6 @@ class SolvedFit:
         chi2_per_degree: chi2 per degree of freedom under the assumed noise.
         options: of the calibration.
         beyond: what the fit and its covariance do not show.
-        contradicted: the measured camera position, if the pairs contradict it; it is then a weak prior of the fit.
     """
 
     ids: tuple[str, ...]
@@ -41,4 +39,3 @@ class SolvedFit:
     chi2_per_degree: float
     options: CalibrationOptions
     beyond: BeyondTheFit
-    contradicted: ContradictedPosition | None

@@ -3,13 +3,14 @@
 Mirror test: is one radar axis mirrored? Residuals alone do not show it; together with the camera prior they do.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit, fit_errors_in_variables
 from calib_core.estimation.gnc import GncSolution, associate, mixture_cost, solve_gnc
 from calib_core.estimation.initialization import initial_poses
+from calib_core.estimation.measured_position import WeighedPosition, weighed_position
 from calib_core.estimation.measurement_model import PairMeasurements
 from calib_core.estimation.unsolved import degenerate, mirrored, no_pose
 from calib_core.measurements import MIN_PAIRS, Unsolvable
@@ -90,18 +91,25 @@ class BestFit:
         refined: the fit.
         found: the GNC solutions of all starts, the most likely first.
         measurements: all pairs with the assumed noise.
+        position: what the pairs alone leave of a measured camera position; None without one.
     """
 
     refined: ErrorsInVariablesFit
     found: tuple[GncSolution, ...]
     measurements: PairMeasurements
+    position: WeighedPosition | None = None
+
+    @property
+    def weighed(self) -> PairMeasurements:
+        """All pairs with the assumed noise and the camera prior of the fit."""
+        return self.measurements if self.position is None else replace(self.measurements, prior=self.position.prior)
 
     def mirror_gain(self, options: CalibrationOptions) -> float:
         """Return the gain in twice the log-likelihood with mirrored radar axes; negative if they fit worse."""
         if _clearly_not_mirrored(self.measurements, self.refined):
             return -np.inf
         few = _some_pairs(self.measurements)
-        plain = self.refined if few is self.measurements else None
+        plain = self.refined if few is self.measurements and self.position is None else None
         estimate_scale, seed = options.noise.estimate_scale, options.solving.seed
         return mirror_gain(few, self.found[0], plain=plain, estimate_scale=estimate_scale, seed=seed)
 
@@ -115,8 +123,12 @@ def best_fit(measurements: PairMeasurements, options: CalibrationOptions) -> Bes
     found = solve_gnc(few, starts, estimate_scale=estimate_scale)
     if not found:
         return degenerate(len(measurements))
-    refined = fit_errors_in_variables(measurements, found[0], estimate_scale=estimate_scale)
-    best = BestFit(refined, found, measurements)
+    if measurements.prior.measured:
+        position, refined = weighed_position(measurements, found[0], estimate_scale=estimate_scale)
+        best = BestFit(refined, found, measurements, position)
+    else:
+        refined = fit_errors_in_variables(measurements, found[0], estimate_scale=estimate_scale)
+        best = BestFit(refined, found, measurements)
     inliers = int(refined.inliers.sum())
     if inliers < MIN_PAIRS:
         reason = f"only {inliers} of {len(measurements)} pairs agree on any pose"

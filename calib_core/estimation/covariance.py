@@ -63,7 +63,11 @@ class PoseCovariance:
 
 
 def pose_covariance(
-    refined: ErrorsInVariablesFit, radar: RadarOptions | None = None, *, smooth: bool = True
+    refined: ErrorsInVariablesFit,
+    radar: RadarOptions | None = None,
+    *,
+    smooth: bool = True,
+    doubt: Values | None = None,
 ) -> PoseCovariance:
     """Invert the observed information of the mixture at the optimum, and widen it by errors that the pairs share.
 
@@ -77,6 +81,7 @@ def pose_covariance(
         refined: the fit.
         radar: priors of the mounting of a radar that measures no elevation; None takes the defaults.
         smooth: look for smooth angle errors of the radar.
+        doubt: (6,) that not knowing whether a measured camera position is right adds to the pose's error.
     """
     plain, _ = normal_equations(refined.measurements, refined.camera_from_radar, refined.model, refined.weights)
     gradients = (np.swapaxes(refined.model.jacobian, 1, 2) @ refined.model.residual[:, :, None])[:, :, 0]
@@ -84,7 +89,7 @@ def pose_covariance(
     lost = (gradients * weight_variance[:, None]).T @ gradients
     residuals, priors = prior_rows(refined.measurements, refined.camera_from_radar)
     pull, prior = priors[:3].T @ residuals[:3], refined.measurements.prior
-    information = _floored(plain, lost + 2.0 * prior.loosening * np.outer(pull, pull) * prior.measured)
+    information = _floored(plain, lost + 2.0 * prior.tail * np.outer(pull, pull))
     prior_information = priors.T @ priors
     independent = symmetric_inverse(information)
     spread = pose_spread(refined, plain) if smooth else None
@@ -92,6 +97,8 @@ def pose_covariance(
     growth = float(np.sqrt(np.trace(covariance[3:6, 3:6]) / np.trace(independent[3:6, 3:6])))
     shared = _shared_errors(refined, plain, covariance)
     pose, assumed = covariance[:6, :6] + shared.pose, shared.pose
+    if doubt is not None:
+        pose = pose + np.outer(doubt, doubt)
     if refined.measurements.flat:
         moves = mounting_moves(refined.camera_from_radar, refined.placements_z_m, radar or RadarOptions())
         pose = pose + moves @ moves.T

@@ -1,23 +1,33 @@
-"""Measured camera position: do the pairs contradict it?
+"""Measured camera position: how far do the pairs believe it?
 
-The position that the pairs alone give is compared with the measured one. If it is farther away than that of one right set in
-thirty-three, the measured position is left out: a camera measured to the housing, or with a wrong sign, would otherwise pull the
-pose along and leave its residuals small.
+The pairs are fitted without the position first. Its distance a from the camera of that fit, with covariance C, tells how far
+it may be off: with V0 the variance that it has where the pairs say nothing, its expected error is e = V0 (V0 + C)^-1 a, so
+that its variance is V1 = (nu sigma^2 + |e|^2) / (nu - 2). With x the distance over the one that a right position exceeds in
+one set of thirty-three, it is believed with the probability
+
+    q = 1 / (1 + exp(_STEEPNESS (x^2 - _HALF_BELIEVED^2))).                                                (8)
+
+The answer is the mean of the pose with it, with q, and the pose without it. That is the pose of a position with the variance
+V1 / q + C (1 - q) / q, and the covariance grows by q (1 - q) times the square of the difference of the two poses, which is
+C (C + V1)^-1 a. So a camera measured to the housing, or with a wrong sign, does not pull the pose along, and a click that is
+moved a little moves the pose a little. A weight that depended on the pose it shapes would have two answers. Beyond x = 1 the
+position is named.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib_core.arrays import Matrix33, Matrix66, Vector3
+from calib_core.arrays import Matrix33, Matrix66, Values, Vector3
 from calib_core.estimation.covariance import pose_covariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit, fit_errors_in_variables
-from calib_core.estimation.gnc import GncSolution, normal_equations
+from calib_core.estimation.gnc import GncSolution
 from calib_core.estimation.measurement_model import CameraPrior, PairMeasurements
 from calib_core.geometry import RigidTransform
 
 _LEVEL = 0.03  # probability that a right position is farther from that of the pairs
-_SCREENING_SIGMAS = 1.8
+_HALF_BELIEVED, _STEEPNESS = 1.05, 6.0
+_SURELY, _LEAST_BELIEVED = 0.5, 0.01  # x below which smooth angle errors change nothing; q of a position without weight
 _OTHER_UNIT_SIGMAS = 4.0
 _AGREEING_SIGMAS = 3.0
 
@@ -31,57 +41,66 @@ _UNIT_SLIPS = (
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ContradictedPosition:
-    """A measured camera position that the pairs contradict, and the fit without it.
+class WeighedPosition:
+    """A measured camera position as the pairs leave it.
 
     Attributes:
-        measurements: all pairs with the assumed noise; the position is but a weak prior.
-        refined: their fit.
+        prior: with the standard deviation that it has in the fit; not a measured one where it has no weight.
+        doubt: (6,) of the pose, (dt, dtheta): its outer product is the covariance of not knowing whether the position is right.
+        contradicted: whether a right position would be as far away in less than one set of thirty-three.
         away_m: of the camera from the measured position, by the pairs alone.
         sigmas: the same in standard deviations.
         other_unit: which unit would remove the contradiction, in words; empty if none would.
     """
 
-    measurements: PairMeasurements
-    refined: ErrorsInVariablesFit
+    prior: CameraPrior
+    doubt: Values
+    contradicted: bool
     away_m: float
     sigmas: float
     other_unit: str
 
 
-def contradicted_position(
-    measurements: PairMeasurements, refined: ErrorsInVariablesFit, *, estimate_scale: bool
-) -> ContradictedPosition | None:
-    """Fit the pairs without the measured camera position; None if there is none, or they agree with it.
-
-    One step from the fit tells whether the other fit is needed.
+def weighed_position(
+    measurements: PairMeasurements, start: GncSolution, *, estimate_scale: bool
+) -> tuple[WeighedPosition, ErrorsInVariablesFit]:
+    """Fit the pairs without the measured camera position, weigh it by that, and fit them with it.
 
     Args:
-        measurements: all pairs with the assumed noise.
-        refined: their fit.
+        measurements: all pairs with the assumed noise, and the position as it was measured.
+        start: of the fit.
         estimate_scale: estimate the noise level.
     """
     prior = measurements.prior
-    if not prior.measured or _distance_after_one_step(refined, prior) < _SCREENING_SIGMAS:
-        return None
     weakened = replace(measurements, prior=prior.weakened())
-    start = GncSolution(refined.camera_from_radar, 0.0, float(refined.noise_scale.max()))
-    alone = fit_errors_in_variables(weakened, start, estimate_scale=estimate_scale)
-    centre = _Centre.of(alone.camera_from_radar, pose_covariance(alone).covariance, prior)
-    sigmas = centre.sigmas_from(prior.position_m)
-    if sigmas < _contradiction_sigmas(alone.degrees_of_freedom):
-        return None
-    away_m = float(np.linalg.norm(centre.position_m - prior.position_m))
-    return ContradictedPosition(weakened, alone, away_m, sigmas, _other_unit(centre, prior.position_m))
-
-
-def _distance_after_one_step(refined: ErrorsInVariablesFit, prior: CameraPrior) -> float:
-    """Return the distance of the camera from the measured position, in standard deviations, by one step without it."""
-    weak = replace(refined.measurements, prior=prior.weakened())
-    hessian, gradient = normal_equations(weak, refined.camera_from_radar, refined.model, refined.weights)
-    covariance = np.linalg.inv(hessian)
-    moved = refined.camera_from_radar.perturbed((covariance @ gradient)[:6])
-    return _Centre.of(moved, covariance[:6, :6], prior).sigmas_from(prior.position_m)
+    alone = fit_errors_in_variables(weakened, start, estimate_scale=estimate_scale, coarse=True)
+    centre = _Centre.of(alone.camera_from_radar, pose_covariance(alone, smooth=False).covariance)
+    limit = _contradiction_sigmas(alone.degrees_of_freedom)
+    sigmas = centre.sigmas_from(prior.position_m, prior.sigma_m)
+    if sigmas > _SURELY * limit:
+        centre = _Centre.of(alone.camera_from_radar, pose_covariance(alone).covariance)
+        sigmas = centre.sigmas_from(prior.position_m, prior.sigma_m)
+    believed = float(1.0 / (1.0 + np.exp(min(_STEEPNESS * ((sigmas / limit) ** 2 - _HALF_BELIEVED**2), 500.0))))
+    away_m = prior.position_m - centre.position_m
+    variance_m2 = prior.expected_variance_m2(np.zeros(3))
+    variance_m2 = prior.expected_variance_m2(variance_m2 * centre.solved(away_m, variance_m2))
+    difference = centre.mixed @ centre.solved(away_m, variance_m2)
+    weighed = weakened.prior
+    if believed > _LEAST_BELIEVED:
+        unbelieved_m2 = (1.0 - believed) * float(np.trace(centre.covariance_m2)) / 3.0
+        weighed = prior.weighed_with(float(np.sqrt((variance_m2 + unbelieved_m2) / believed)))
+    position = WeighedPosition(
+        weighed,
+        np.sqrt(believed * (1.0 - believed)) * difference,
+        sigmas > limit,
+        float(np.linalg.norm(away_m)),
+        sigmas,
+        _other_unit(centre, prior) if sigmas > limit else "",
+    )
+    near = GncSolution(alone.camera_from_radar, 0.0, 1.0)
+    scale = alone.noise_scale.tolist()
+    again = replace(measurements, prior=weighed, errors=alone.measurements.errors)
+    return position, fit_errors_in_variables(again, near, estimate_scale=estimate_scale, noise_scale=scale)
 
 
 def _contradiction_sigmas(degrees_of_freedom: float) -> float:
@@ -95,29 +114,35 @@ def _contradiction_sigmas(degrees_of_freedom: float) -> float:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Centre:
-    """The camera centre from the pairs alone, (3,) [m], with the covariance (3, 3) of its distance from the measured one."""
+    """The camera centre from the pairs alone, (3,) [m], its covariance (3, 3), and (6, 3) that of the pose with it."""
 
     position_m: Vector3
     covariance_m2: Matrix33
+    mixed: np.ndarray
 
     @classmethod
-    def of(cls, camera_from_radar: RigidTransform, covariance: Matrix66, measured: CameraPrior) -> "_Centre":
+    def of(cls, camera_from_radar: RigidTransform, covariance: Matrix66) -> "_Centre":
         """Take it from a pose."""
-        jacobian = measured.centre_jacobian(camera_from_radar)
-        covariance_m2 = jacobian @ covariance @ jacobian.T + measured.sigma_m**2 * np.eye(3)
-        return cls(camera_from_radar.inverse().translation_m, covariance_m2)
+        jacobian = CameraPrior.centre_jacobian(camera_from_radar)
+        mixed = covariance @ jacobian.T
+        return cls(camera_from_radar.inverse().translation_m, jacobian @ mixed, mixed)
 
-    def sigmas_from(self, position_m: Vector3) -> float:
-        """Return the distance from a position in standard deviations."""
+    def solved(self, away_m: Vector3, variance_m2: float) -> Vector3:
+        """Return (C + V)^-1 away (3,), with V the variance per axis of the position that it is away from."""
+        return np.asarray(np.linalg.solve(self.covariance_m2 + variance_m2 * np.eye(3), away_m))
+
+    def sigmas_from(self, position_m: Vector3, sigma_m: float) -> float:
+        """Return the distance from a position that was measured with a standard deviation, in standard deviations."""
         away_m = self.position_m - position_m
-        return float(np.sqrt(away_m @ np.linalg.solve(self.covariance_m2, away_m)))
+        return float(np.sqrt(away_m @ self.solved(away_m, sigma_m**2)))
 
 
-def _other_unit(centre: _Centre, measured_m: Vector3) -> str:
+def _other_unit(centre: _Centre, prior: CameraPrior) -> str:
     """Return in words which other unit would remove the contradiction; empty if none would."""
+    measured_m, sigma_m = prior.position_m, prior.sigma_m
     size_m = float(np.linalg.norm(measured_m))
     for text, factor, least_m in _UNIT_SLIPS:
-        clear = centre.sigmas_from(np.zeros(3)) > _OTHER_UNIT_SIGMAS or least_m > 0.0
-        if clear and size_m > least_m and centre.sigmas_from(factor * measured_m) < _AGREEING_SIGMAS:
+        clear = centre.sigmas_from(np.zeros(3), sigma_m) > _OTHER_UNIT_SIGMAS or least_m > 0.0
+        if clear and size_m > least_m and centre.sigmas_from(factor * measured_m, sigma_m) < _AGREEING_SIGMAS:
             return text
     return ""

@@ -198,12 +198,14 @@ class CameraPrior:
         sigma_m: per axis.
         measured: whether it was measured with a tape; otherwise it only selects between poses.
         height_sigma_m: what is added to the variance of its up coordinate, for a radar that does not measure elevation.
+        weighed: whether the pairs alone have told how far it may be off; it is then normal, so that the estimate has one peak.
     """
 
     position_m: Vector3
     sigma_m: float
     measured: bool
     height_sigma_m: float = 0.0
+    weighed: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "position_m", frozen_array(self.position_m, (3,)))
@@ -223,16 +225,29 @@ class CameraPrior:
     @property
     def _near_m2(self) -> float:
         """The variance per axis of a camera at the prior's position."""
-        return self.sigma_m**2 * (_FREEDOM / (_FREEDOM - 2.0) if self.measured else 1.0)
+        return self.sigma_m**2 * (_FREEDOM / (_FREEDOM - 2.0) if self.measured and not self.weighed else 1.0)
 
     @property
-    def loosening(self) -> float:
-        """The share of its squared distance that is added."""
-        return 1.0 / (_FREEDOM - 2.0) if self.measured else 1.0
+    def tail(self) -> float:
+        """The share of the squared error of a measured position that is expected in its variance."""
+        return 1.0 / (_FREEDOM - 2.0) if self.measured else 0.0
+
+    @property
+    def _loosening(self) -> float:
+        """The share of a camera's squared distance that is added to the variance."""
+        return 0.0 if self.weighed else self.tail or 1.0
+
+    def expected_variance_m2(self, error_m: Vector3) -> float:
+        """Return the variance per axis of a measured position that the pairs expect to be off by an error (3,)."""
+        return float(self._near_m2 + self.tail * (error_m @ error_m))
+
+    def weighed_with(self, sigma_m: float) -> "CameraPrior":
+        """Return the same measured position with the standard deviation that the pairs leave it."""
+        return replace(self, sigma_m=sigma_m, weighed=True)
 
     def _variance_m2(self, away_m: np.ndarray) -> np.ndarray:
         """Return the variance per radar axis (..., 3), for a camera (..., 3) away from the prior's position."""
-        variance = self._near_m2 + self.loosening * (away_m**2).sum(axis=-1, keepdims=True) * np.ones(3)
+        variance = self._near_m2 + self._loosening * (away_m**2).sum(axis=-1, keepdims=True) * np.ones(3)
         variance[..., 2] += self.height_sigma_m**2
         return variance
 
@@ -253,7 +268,7 @@ class CameraPrior:
     def _precision(self, rotations: np.ndarray, missed_m: np.ndarray) -> np.ndarray:
         """Return the precision (..., 3, 3) in camera axes, for a camera missed by (..., 3)."""
         if not self.height_sigma_m:  # the same along all axes, so the rotation cancels
-            farther = self.loosening * (missed_m**2).sum(axis=-1)[..., None, None]
+            farther = self._loosening * (missed_m**2).sum(axis=-1)[..., None, None]
             return np.asarray(np.eye(3) / (self._near_m2 + farther))
         to_radar = np.swapaxes(rotations, -1, -2)
         variance = self._variance_m2((to_radar @ missed_m[..., None])[..., 0])
@@ -261,7 +276,7 @@ class CameraPrior:
 
     def weakened(self) -> "CameraPrior":
         """Return the same position as a weak prior, with a sigma of at least 1 m."""
-        return replace(self, sigma_m=max(self.sigma_m, 1.0), measured=False)
+        return replace(self, sigma_m=max(self.sigma_m, 1.0), measured=False, weighed=False)
 
     def squared(self, rotations: np.ndarray, translations_m: np.ndarray) -> Values:
         """Return the squared distance of the camera of each pose (s,) from the position, in standard deviations."""
@@ -272,7 +287,7 @@ class CameraPrior:
     def costs(self, rotations: np.ndarray, translations_m: np.ndarray) -> Values:
         """Return twice the negative log-probability of each pose (s,), up to a constant."""
         squared = self.squared(rotations, translations_m)
-        return np.asarray(np.log1p(self.loosening * squared) / self.loosening) if self.measured else squared
+        return np.asarray(np.log1p(self.tail * squared) / self.tail) if self.measured and not self.weighed else squared
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,6 +11,7 @@ from benchmarks.accuracy.defects.adversaries_of_scans import ADVERSARIES_OF_SCAN
 from benchmarks.accuracy.figures import MET, MISSED, UNDECIDED, column, share
 from benchmarks.accuracy.outcomes import codes_in, named, outcome_figures, silently_wrong
 from benchmarks.accuracy.rows import Claim, Figures, Kept, Part, Row, Section
+from calib_core.results.verdict import verdict_on
 
 __all__ = ["ALL", "ROWS", "highest_share", "measure_adversary", "section", "silent"]
 
@@ -22,7 +23,9 @@ ALL: Mapping[str, Adversary] = {one.key: one for one in (*ADVERSARIES_OF_PAIRS, 
 def measure_adversary(key: str, trial: int) -> Figures:
     """Draw one trial of a row and solve it with the default options."""
     solved = ALL[key].solve(trial)
-    return outcome_figures(solved.outcome, solved.truth)
+    level = verdict_on(solved.outcome).level
+    relied = {"relied on": float(level in ("good", "usable")), "contradictory": float(level == "contradictory")}
+    return outcome_figures(solved.outcome, solved.truth) | relied
 
 
 def _key(adversary: Adversary) -> str:
@@ -35,7 +38,8 @@ ROWS = tuple(Row(_key(one), _TRIALS, partial(measure_adversary, one.key)) for on
 def silent(adversary: Adversary, trials: Sequence[Figures]) -> np.ndarray:
     """Flag the trials that are silently wrong."""
     if adversary.trusted is None:
-        return silently_wrong(trials, adversary.codes, always_wrong=adversary.always_wrong)
+        relied = adversary.always_wrong or column(trials, "relied on") > 0.0
+        return silently_wrong(trials, adversary.codes, always_wrong=adversary.always_wrong) & relied
     largest_deg, largest_m = adversary.trusted
     wrong = (column(trials, "rotation_rad") > np.deg2rad(largest_deg)) | (column(trials, "position_m") > largest_m)
     return wrong & ~np.array([named(figures, adversary.codes) for figures in trials], dtype=np.bool_)
@@ -51,23 +55,51 @@ def highest_share(count: int, draws: int) -> float:
 def section(kept: Kept) -> Section:
     """Write the table."""
     cells, counts, lengths = [], [], []
+    gauges = []
     for adversary in ALL.values():
         trials = kept.get(_key(adversary), ())
         if not trials:
+            continue
+        if adversary.gauge:
+            gauges.append((adversary, trials))
             continue
         flags = silent(adversary, trials)
         counts.append(int(flags.sum()))
         lengths.append(len(trials))
         cells.append(_cells(adversary, trials, counts[-1]))
     head = ("finding", "trials", "silently wrong", "", "c", "warned", "no pose", "warnings in a quarter or more")
-    claims = (_row_claim(counts, lengths), _overall_claim(counts, lengths))
+    claims = (_row_claim(counts, lengths), _overall_claim(counts, lengths), _gauge_claim(gauges))
     title = "Defects that were seen: how often is an answer silently wrong?"
-    return Section(title, _TEXT, (Part("", head, tuple(cells)),), claims)
+    seen = Part("What no pair can show", _GAUGE_HEAD, tuple(_gauge_cells(*one) for one in gauges))
+    return Section(title, _TEXT, (Part("", head, tuple(cells)), seen), claims)
+
+
+_GAUGE_HEAD = ("finding", "trials", "good or usable", "contradictory", "c", "good or usable and far off")
+
+
+def _gauge_cells(adversary: Adversary, trials: Sequence[Figures]) -> tuple[str, ...]:
+    relied, contradictory = (column(trials, name) > 0.0 for name in ("relied on", "contradictory"))
+    far = silently_wrong(trials, ()) & relied
+    counts = (len(trials), int(relied.sum()), int(contradictory.sum()))
+    return (adversary.finding, *map(str, counts), share(_covered(trials)).percent, str(int(far.sum())))
+
+
+def _covered(trials: Sequence[Figures]) -> np.ndarray:
+    squared = column(trials, "squared")
+    return np.where(np.isfinite(squared), squared <= column(trials, "quantile"), np.nan)
+
+
+def _gauge_claim(gauges: Sequence[tuple[Adversary, Sequence[Figures]]]) -> Claim:
+    aim = "what no pair can show, with a camera position that is right to 2 cm: contradictory, or inside"
+    trials = [one for adversary, several in gauges if adversary.finding.endswith("tape") for one in several]
+    if not trials:
+        return Claim(aim, "not run", "not run")
+    met = (column(trials, "contradictory") > 0.0) | (_covered(trials) > 0.0)
+    return Claim(aim, f"{int(met.sum())} of {len(met)}", MET if met.all() else MISSED)
 
 
 def _cells(adversary: Adversary, trials: Sequence[Figures], count: int) -> tuple[str, ...]:
-    squared, quantile = column(trials, "squared"), column(trials, "quantile")
-    covered = share(np.where(np.isfinite(squared), squared <= quantile, np.nan))
+    squared, covered = column(trials, "squared"), share(_covered(trials))
     warned = np.mean([bool(codes_in(one) & set(adversary.codes)) for one in trials])
     no_pose = int(np.isnan(column(trials, "rotation_rad")).sum())
     judged = _verdict(count, len(trials))
@@ -114,11 +146,14 @@ def _overall_claim(counts: Sequence[int], lengths: Sequence[int]) -> Claim:
 
 
 _TEXT = """Each row draws pairs, or scans and clicks, with one defect, and solves them with the default options, the camera
-position being unknown ("free") or given to 1 cm ("tape"). An answer is silently wrong if the squared Mahalanobis
-distance of the true pose is above twice the stated 99.9 % quantile and none of the row's warnings is given; "warned"
-is the share with such a warning, "-" if no warning excuses the row. The stated quantile is that of 6 F(6, nu), with
+position being unknown ("free") or given to 1 cm ("tape"). An answer is silently wrong if its verdict is good or usable, the
+squared Mahalanobis distance of the true pose is above twice the stated 99.9 % quantile and none of the row's warnings is given;
+"warned" is the share with such a warning, "-" if no warning excuses the row. The stated quantile is that of 6 F(6, nu), with
 nu from the stated 95 % quantile. Where the input makes no sense (mirrored axes, positions in millimetres or
 centimetres), every answer without the warning is silently wrong. With positions in feet and a measured camera
 position the pose can be right all the same. Algorithm 1 states no uncertainty: its answers count above 1 deg or 25
 cm. No answer is better than a wrong one, and never counts. `c` is the share whose truth lies inside the stated 95 %
-ellipsoid."""
+ellipsoid. In the second table another pose explains the pairs as well, so that at most a measured camera position, here
+right to 2 cm, can show the defect: these rows count for nothing above, and the assumption that the verdict states does not
+count as naming. A sheared array, whose elevations take up a share of the azimuths, is a roll to placements on the ground; 2 deg
+of it, and a picture cropped after its intrinsics were measured, are a turn, which a camera position does not show either."""

@@ -46,6 +46,7 @@ class Adversary:
         solve: draw a trial and solve it.
         always_wrong: no pose is true of such pairs: without one of the codes, every pose is silently wrong.
         trusted: (deg, m) errors above which an outcome without covariance and without a code is silently wrong.
+        gauge: another pose explains such pairs exactly as well, so that no estimator can see the defect in them.
     """
 
     key: str
@@ -54,6 +55,7 @@ class Adversary:
     solve: Callable[[int], Solved]
     always_wrong: bool = False
     trusted: tuple[float, float] | None = None
+    gauge: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,9 +11,12 @@ from benchmarks.accuracy.defects.pair_defects import (
     clicked_again,
     from_moved_camera,
     in_other_units,
+    lowered,
     mirrored,
     with_companion,
+    with_ground_bounce,
     with_rounded_elevations,
+    with_sheared_array,
     with_zero_pair,
 )
 from calib_core.calibration import calibrate_pairs
@@ -24,7 +27,9 @@ from calib_core.synthetic.simulated_pairs import NoiseName
 __all__ = ["ADVERSARIES_OF_PAIRS"]
 
 _TAPE_M = 0.01
+_RIGHT_M = 0.02
 _FREE_AISLE = PairsLayout(max_range_m=20.0, max_lateral_m=1.0)
+_TRIPODS = PairsLayout(height_m=0.5, max_height_m=1.5)
 
 
 def _flat(key: str, noise: NoiseName, pairs: int, tape_m: float | None, trial: int) -> Solved:
@@ -64,6 +69,18 @@ def _units(per_metre: float) -> Change:
     return lambda simulated, rng: in_other_units(simulated, per_metre)
 
 
+def _sheared(shear_deg: float) -> Change:
+    return lambda simulated, rng: with_sheared_array(simulated, shear_deg)
+
+
+def _lower(simulated: SimulatedPairs, rng: np.random.Generator) -> SimulatedPairs:
+    return lowered(simulated, 0.4)
+
+
+def _bounce(simulated: SimulatedPairs, rng: np.random.Generator) -> SimulatedPairs:
+    return with_ground_bounce(simulated, rng=rng)
+
+
 def _rounded(simulated: SimulatedPairs, rng: np.random.Generator) -> SimulatedPairs:
     return with_rounded_elevations(simulated, rng=rng)
 
@@ -74,9 +91,12 @@ def _rows(
     *draws: Draw,
     always_wrong: bool = False,
     trusted: tuple[float, float] | None = None,
+    gauge: bool = False,
 ) -> tuple[Adversary, ...]:
     """Make one row of each draw, with the same finding and codes."""
-    return tuple(Adversary(draw.key, f"{finding}, {_told(draw)}", codes, draw, always_wrong, trusted) for draw in draws)
+    return tuple(
+        Adversary(draw.key, f"{finding}, {_told(draw)}", codes, draw, always_wrong, trusted, gauge) for draw in draws
+    )
 
 
 def _told(draw: Draw) -> str:
@@ -122,6 +142,24 @@ _SHARED = (
         (),
         Draw("low-m-imaging-free", errors=SystematicErrors(reflector_offset_m=(0.0, 0.1, 0.0))),
         Draw("low-m-imaging-tape", tape_m=_TAPE_M, errors=SystematicErrors(reflector_offset_m=(0.0, 0.1, 0.0))),
+    ),
+    *_rows(
+        "principal point 15 px off",
+        _LENS,
+        Draw("principal-15-imaging-free", errors=SystematicErrors(principal_point_px=(15.0, 0.0))),
+        Draw("principal-15-ti-tape", "ti", tape_m=_TAPE_M, errors=SystematicErrors(principal_point_px=(9.0, -12.0))),
+    ),
+    *_rows(
+        "array sheared by 0.5 deg",
+        (),
+        Draw("shear-imaging-free", change=_sheared(0.5)),
+        Draw("shear-ti-tape", "ti", tape_m=_TAPE_M, change=_sheared(0.5)),
+    ),
+    *_rows(
+        "ground bounce at tripods of 0.5 to 1.5 m",
+        (),
+        Draw("bounce-ti-free", "ti", layout=_TRIPODS, change=_bounce),
+        Draw("bounce-ti-tape", "ti", tape_m=_TAPE_M, layout=_TRIPODS, change=_bounce),
     ),
     *_rows(
         "principal point 30 px off",
@@ -257,4 +295,24 @@ _INPUT = (
         trusted=(1.0, 0.25),
     ),
 )
-ADVERSARIES_OF_PAIRS: tuple[Adversary, ...] = (*_SHARED, *_TWO_DIMENSIONAL, *_CLICKING, *_INPUT)
+
+
+def _gauge(finding: str, key: str, errors: SystematicErrors, change: Change | None = None) -> tuple[Adversary, ...]:
+    """Make a row of each radar, without and with a camera position that is right."""
+    draws = (
+        Draw(f"gauge-{key}-{noise}-{known}", noise, tape_m=tape_m, errors=errors, change=change)
+        for noise in _RADARS
+        for known, tape_m in (("free", None), ("tape", _RIGHT_M))
+    )
+    return _rows(finding, ("camera-position-contradicted",), *draws, gauge=True)
+
+
+_RADARS: tuple[NoiseName, ...] = ("ti", "imaging")
+_GAUGES = (
+    *_gauge("the stand's head clicked, 30 cm up", "head", SystematicErrors(reflector_offset_m=(0.0, -0.3, 0.0))),
+    *_gauge("the person clicked, 40 cm aside", "person", SystematicErrors(reflector_offset_m=(0.4, 0.0, 0.0))),
+    *_gauge("elevations pulled to the ground, 40 cm", "ground", SystematicErrors(), _lower),
+    *_gauge("picture cropped by 200 rows", "cropped", SystematicErrors(principal_point_px=(0.0, 200.0))),
+    *_gauge("array sheared by 2 deg", "shear", SystematicErrors(), _sheared(2.0)),
+)
+ADVERSARIES_OF_PAIRS: tuple[Adversary, ...] = (*_SHARED, *_TWO_DIMENSIONAL, *_CLICKING, *_INPUT, *_GAUGES)

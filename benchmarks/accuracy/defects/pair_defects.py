@@ -14,7 +14,7 @@ from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.measurements import Candidate, Pair
 from calib_core.options import RadarOptions
-from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, polar_from_cartesian
+from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, direction_cosines, polar_from_cartesian
 from calib_core.synthetic.rig import Rig, RigOptions, radar_stand
 from calib_core.synthetic.simulated_pairs import SimulatedPairs
 
@@ -112,6 +112,42 @@ def mirrored(simulated: SimulatedPairs, axis: Literal["left", "up"] = "left") ->
 def in_other_units(simulated: SimulatedPairs, units_per_metre: float) -> SimulatedPairs:
     """Give the radar positions in another unit as if they were metres: 1000 for millimetres, 3.28 for feet."""
     return _with_positions(simulated, lambda points: points * units_per_metre)
+
+
+def with_sheared_array(simulated: SimulatedPairs, shear_deg: float) -> SimulatedPairs:
+    """Let the array's rows not be at right angles to its columns: the sine of elevation takes up a share of that of azimuth."""
+
+    def sheared(points: Points3) -> Points3:
+        range_m, u, w = direction_cosines(points).T
+        w = w + np.tan(np.deg2rad(shear_deg)) * u
+        return range_m[:, None] * np.stack([np.sqrt(1.0 - u**2 - w**2), u, w], axis=1)
+
+    return _with_positions(simulated, sheared)
+
+
+def lowered(simulated: SimulatedPairs, by_m: float) -> SimulatedPairs:
+    """Let the radar see every reflector lower than it is, as one that takes the foot of its stand for it."""
+    return _with_positions(simulated, lambda points: points - np.array([0.0, 0.0, by_m]))
+
+
+def with_ground_bounce(
+    simulated: SimulatedPairs, *, rng: np.random.Generator, reflection: float = 0.3
+) -> SimulatedPairs:
+    """Pull each elevation towards or away from the reflector's image in the ground, with the phase of the bounce at random.
+
+    A radar whose beam holds both measures the direct direction plus reflection * cos(phase) times the angle to the image.
+    """
+    world_from_radar = simulated.rig.radar_from_world.inverse()
+
+    def pulled(points: Points3) -> Points3:
+        polar, heights_m = polar_from_cartesian(points), (world_from_radar @ points)[:, 2]
+        phases = rng.uniform(0.0, 2.0 * np.pi, len(points))
+        towards_image = 2.0 * np.maximum(heights_m, 0.0) / polar[:, 0]
+        return cartesian_from_polar(
+            polar - (reflection * np.cos(phases) * towards_image)[:, None] * np.array([0.0, 0.0, 1.0])
+        )
+
+    return _with_positions(simulated, pulled)
 
 
 def with_rounded_elevations(

@@ -1,4 +1,7 @@
-"""A measured camera position: believed as far as it was measured, and left out where the pairs contradict it."""
+"""A measured camera position: believed as far as the pairs believe it, and without a jump where they cease to."""
+
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -8,7 +11,7 @@ from calib_core.options import HOW_MEASURED, CalibrationOptions, CameraPositionP
 from calib_core.results import Calibration
 from calib_core.results.verdict import stated_error
 from calib_core.synthetic import SimulatedPairs, simulate_pairs
-from calib_core.synthetic.simulated_pairs import draw_systematic_errors
+from calib_core.synthetic.simulated_pairs import NoiseName, draw_systematic_errors
 
 CONTRADICTED = "camera-position-contradicted"
 
@@ -46,7 +49,7 @@ def test_a_position_a_few_centimetres_off_is_within_the_stated_error_or_contradi
 
 
 @pytest.mark.parametrize("slip_m", [(0.3, 0.0, 0.0), (0.0, -0.3, 0.0), (0.0, 0.0, -0.3)])
-def test_a_contradicted_position_is_left_out_and_named(slip_m: tuple[float, float, float]) -> None:
+def test_a_contradicted_position_is_named_and_has_no_weight(slip_m: tuple[float, float, float]) -> None:
     for seed in range(4):
         simulated = drawn(seed)
         for sigma_m in (0.005, 0.03):
@@ -55,6 +58,40 @@ def test_a_contradicted_position_is_left_out_and_named(slip_m: tuple[float, floa
             assert off_m(answer, simulated) < 0.12
             assert answer.covariance_parts is not None
             assert not answer.covariance_parts.camera_position.any()
+
+
+def step(before: Calibration, after: Calibration) -> float:
+    error = after.camera_from_radar.error_from(before.camera_from_radar)
+    return float(np.sqrt(error @ np.linalg.solve(before.covariance, error)))
+
+
+@pytest.mark.parametrize(("direction", "sigma_m"), [((1.0, 0.0, 0.0), 0.03), ((0.0, -0.6, 0.8), 0.01)])
+def test_pose_and_covariance_follow_a_position_that_is_farther_and_farther_off(
+    direction: tuple[float, float, float], sigma_m: float
+) -> None:
+    simulated = drawn(1)
+    answers = [solved(simulated, tuple(0.01 * k * np.array(direction)), sigma_m=sigma_m) for k in range(41)]  # type: ignore[arg-type]
+    assert CONTRADICTED not in codes(answers[0])
+    assert CONTRADICTED in codes(answers[-1])
+    assert max(step(a, b) for a, b in pairwise(answers)) < 0.5
+    sizes = [np.sqrt(np.trace(answer.covariance[:3, :3])) for answer in answers]
+    assert max(abs(np.log(b / a)) for a, b in pairwise(sizes)) < 0.5
+
+
+@pytest.mark.parametrize("noise", ["ti", "imaging"])
+def test_a_dragged_click_moves_the_pose_by_less_than_a_sigma_a_step_or_changes_sides(noise: NoiseName) -> None:
+    for seed in range(2):
+        simulated = simulate_pairs(12, rng=np.random.default_rng([2035, seed]), noise=noise)
+        nearest = int(np.linalg.norm(simulated.points_radar_m, axis=1).argmin())
+        answers = []
+        for k in range(14):
+            pairs = list(simulated.pairs)
+            pixel_px = pairs[nearest].pixel_px + np.array([3.0 * k, 0.0])
+            pairs[nearest] = replace(pairs[nearest], pixel_px=pixel_px)
+            answers.append(solved(replace(simulated, pairs=tuple(pairs)), (0.0, 0.0, 0.0), sigma_m=0.01))
+        for before, after in pairwise(answers):
+            sides = [[pair.inlier for pair in answer.pairs] for answer in (before, after)]
+            assert step(before, after) < 1.0 or sides[0] != sides[1]
 
 
 def test_a_scale_of_the_angles_is_not_blamed_without_the_measured_position() -> None:

@@ -150,14 +150,22 @@ def with_lens(camera: Camera, *, focal: float = 1.0, k1: float | None = None) ->
     return camera.with_parameters(values)
 
 
-@pytest.mark.parametrize("wrong", [{"focal": 1.15}, {"k1": 0.4}])
-def test_a_lens_refined_far_beyond_its_prior_is_not_passed_off_as_known(wrong: dict[str, float]) -> None:
+@pytest.mark.parametrize("focal", [1.12, 1.15])
+def test_a_lens_refined_far_beyond_its_prior_is_not_passed_off_as_known(focal: float) -> None:
     simulated, given = draw_wrong_lens(TOLD, 0)
-    found = solved(simulated.pairs, with_lens(given, **wrong), TOLD.options)
+    found = solved(simulated.pairs, with_lens(given, focal=focal), TOLD.options)
     (warning,) = [one for one in found.warnings if one.code == "intrinsics-suspected"]
     assert "more than three times what was stated" in warning.message
     assert "focal length -" in warning.message
     assert "signs of the distortion" in warning.hint
+
+
+@pytest.mark.parametrize("k1", [0.35, 0.4, 0.5, 0.6])
+def test_a_distortion_that_refining_does_not_reach_leaves_residuals_that_name_the_intrinsics(k1: float) -> None:
+    simulated, given = draw_wrong_lens(TOLD, 0)
+    found = solved(simulated.pairs, with_lens(given, k1=k1), TOLD.options)
+    (warning,) = [one for one in found.warnings if one.code == "residuals-too-large"]
+    assert "check that the intrinsics belong to this camera" in warning.hint
 
 
 def test_a_change_that_the_pairs_leave_uncertain_is_stated_all_the_same() -> None:
