@@ -15,7 +15,7 @@ import numpy as np
 from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import DataWarning
 from calib_core.recordings.camera.images import ImageLayout, is_picture
-from calib_core.recordings.camera.jpeg import JPEG_MAGIC, has_end
+from calib_core.recordings.camera.jpeg import JPEG_MAGIC, PNG_MAGIC, has_end, png_fault
 from calib_core.recordings.containers.chunks import ChunkedSource
 from calib_core.recordings.containers.sources import Channel, Progress, Source
 from calib_core.recordings.messages.decoding import decode
@@ -238,6 +238,9 @@ class PictureCheck:
         start = payload.find(JPEG_MAGIC) if self.layout.compressed else -1
         if start >= 0 and not has_end(payload[start:]):
             self.open_ended += 1
+        start = payload.find(PNG_MAGIC) if self.layout.compressed else -1
+        if start >= 0 and (fault := png_fault(payload[start:])):
+            raise MessageError(f"topic {self.layout.topic}: a picture {fault}")
         if self.decode:
             with self._decoder.heard() as said:
                 self.layout.picture(payload)

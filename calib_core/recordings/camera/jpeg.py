@@ -1,6 +1,7 @@
 """Look at JPEG and PNG files without decoding them: whether they are whole, their size, and repairs that change no pixel."""
 
 import struct
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -77,6 +78,21 @@ def png_size(data: bytes) -> tuple[int, int, int, int]:
         raise MessageError("the PNG has no header")
     width, height, bits, colour = struct.unpack_from(">IIBB", data, 16)
     return width, height, bits, colour
+
+
+def png_fault(data: bytes) -> str:
+    """Say what the checksums of the parts that a PNG needs show; "" if it is whole."""
+    place = len(PNG_MAGIC)
+    while place + 12 <= len(data):
+        end = place + 8 + int(struct.unpack_from(">I", data, place)[0])
+        is_needed = not data[place + 4] & 0x20
+        wrong = data[end : end + 4] != struct.pack(">I", zlib.crc32(data[place + 4 : end]))
+        if end + 4 > len(data) or (is_needed and wrong):
+            return f"is a PNG damaged after byte {place}"
+        if data[place + 4 : place + 8] == _PNG_END:
+            return ""
+        place = end + 4
+    return "is a PNG that is cut off"
 
 
 def picture_fault(path: Path) -> str:

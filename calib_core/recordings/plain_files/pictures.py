@@ -7,7 +7,7 @@ import numpy as np
 
 from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import DataWarning, TimeNs
-from calib_core.recordings.camera.jpeg import JPEG_MAGIC, PNG_MAGIC, picture_fault, picture_size_px
+from calib_core.recordings.camera.jpeg import JPEG_MAGIC, PNG_MAGIC, picture_fault, picture_size_px, png_fault
 from calib_core.recordings.plain_files.file_stamps import stamp_files
 from calib_core.recordings.plain_files.folder_cameras import FolderCamera, camera_beside
 from calib_core.recordings.plain_files.source import (
@@ -21,6 +21,7 @@ from calib_core.recordings.plain_files.source import (
 PICTURE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".ppm", ".pgm", ".tif", ".tiff", ".webp")
 _FRAME = "camera"
 _MAX_BYTES = 1 << 30
+_SAMPLED = 8  # pictures whose checksums are read; if one is wrong, those of all
 
 
 def open_picture_folder(
@@ -38,6 +39,8 @@ def open_picture_folder(
         RecordingError: the files have no times, or none can be read.
     """
     faults = {file: fault for file in files if (fault := picture_fault(file))}
+    if any(_checksum_fault(file) for file in files[:: max(len(files) // _SAMPLED, 1)] if file not in faults):
+        faults |= {file: fault for file in files if file not in faults and (fault := _checksum_fault(file))}
     sound = [file for file in files if file not in faults]
     if not sound:
         file, fault = next(iter(faults.items()))
@@ -65,6 +68,14 @@ def open_picture_folder(
         camera=camera,
         unreadable=faults,
     )
+
+
+def _checksum_fault(file: Path) -> str:
+    try:
+        data = file.read_bytes()
+    except OSError as error:
+        return f"cannot be read: {error.strerror}"
+    return png_fault(data) if data.startswith(PNG_MAGIC) else ""
 
 
 def _about_faults(folder: Path, faults: Mapping[Path, str], count: int) -> tuple[DataWarning, ...]:

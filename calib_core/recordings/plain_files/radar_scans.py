@@ -138,10 +138,12 @@ def _open(folder: Path, stamped: StampedFiles, what: str, points: Callable[[Path
     def message(row: int) -> bytes:
         return cloud_message(TimeNs(int(stamped.times_ns[row])), _FRAME, points(stamped.files[row]))
 
+    sizes = [file.stat().st_size for file in stamped.files]
+    empty = sizes.count(0)
     return PlainSource(
         folder,
-        sum(file.stat().st_size for file in stamped.files),
-        f"{what}, {len(stamped.files)} files",
+        sum(sizes),
+        f"{what}, {len(stamped.files)} files" + (f", {empty} of them empty" if empty else ""),
         cloud_channel(topic),
         stamped.times_ns,
         message,

@@ -107,6 +107,14 @@ def test_pictures_that_are_cut_or_none_are_undecodable(ros, write):
     assert not found.sound
 
 
+def test_a_png_with_a_wrong_checksum_is_found_without_decoding_it(ros, write):
+    png = bytes(cv2.imencode(".png", np.full((24, 32, 3), 90, np.uint8))[1])
+    path = write(ros, pictures(ros, png, [png[:50] + b"?" + png[51:], png[:60] + png[63:]]))
+    found = verified(path)
+    assert counts(found, "/camera/image") == (8, 0, 0, 2)
+    assert "damaged after byte 33" in found.topics[0].fault
+
+
 def test_a_picture_that_is_zeroed_in_the_middle_is_found_by_decoding_it(ros, write):
     jpeg = big_jpeg()
     third = len(jpeg) // 3

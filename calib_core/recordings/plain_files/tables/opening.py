@@ -319,7 +319,12 @@ def _values(table: Table, columns: _Columns, options: PlainOptions) -> np.ndarra
     )
     if not same:
         raise MessageError(f"{table.path.name} has other columns than the other files: {', '.join(table.names[:12])}")
-    return _read(table, replace(own, wanted=tuple(places[name] for name in wanted)), None).values
+    rows = _read(table, replace(own, wanted=tuple(places[name] for name in wanted)), None)
+    if rows.is_cut_off:
+        raise RecordingError(
+            f"{table.path}: its last row is cut off; copy the file from its source again, or remove the row"
+        )
+    return rows.values
 
 
 def _rows(table: Table) -> Sequence[Sequence[str]]:

@@ -111,6 +111,10 @@ def open_text_table(path: Path) -> TextTable:
         raise RecordingError(f"{path}: cannot be read: {error.strerror}") from error
     encoding = _encoding(head)
     text = head.decode(encoding, errors="replace")
+    if "\0" in text:
+        raise RecordingError(
+            f"{path}: has zero bytes between its characters, as damaged files have; copy it from its source again"
+        )
     lines = text.splitlines()[: _HEADER_LINES + 3]
     if len(head) == _HEAD_BYTES and len(lines) == 1:
         raise RecordingError(f"{path}: the first line has more than {_HEAD_BYTES} bytes; it is not a table of text")

@@ -670,6 +670,32 @@ def test_what_a_folder_holds_and_nobody_reads_is_named(tmp_path) -> None:
         assert words in warning.message
 
 
+def test_pictures_with_wrong_checksums_are_named(tmp_path) -> None:
+    for number in range(3):
+        picture(tmp_path / "camera" / f"{START_NS + number}.png", (8, 8))
+    damaged = tmp_path / "camera" / f"{START_NS + 2}.png"
+    data = damaged.read_bytes()
+    damaged.write_bytes(data[:45] + bytes([data[45] ^ 1]) + data[46:])
+    (tmp_path / "radar.csv").write_text(f"time_ns,x_m,y_m\n{START_NS},3,1\n")
+    with open_recording(tmp_path) as recording:
+        assert len(recording.image_times) == 2
+        (warning,) = (one for one in recording.warnings if one.code == "unreadable-pictures")
+    assert f"{START_NS + 2}.png is a PNG damaged after byte 33" in warning.message
+
+
+@pytest.mark.parametrize(
+    ("end", "words"),
+    [(b"3,1\0\0\0\n", "has zero bytes between its characters"), (b"3,1\n14.5", "its last row is cut off")],
+)
+def test_a_damaged_scan_of_a_folder_of_tables_is_refused_and_not_shortened_in_silence(tmp_path, end, words) -> None:
+    for number in range(3):
+        picture(tmp_path / "camera" / f"{START_NS + number}.png", (8, 8))
+        (tmp_path / "radar").mkdir(exist_ok=True)
+        (tmp_path / "radar" / f"{START_NS + number}.csv").write_bytes(b"x_m,y_m\n" + (end if number == 1 else b"3,1\n"))
+    with pytest.raises(RecordingError, match=words), open_recording(tmp_path) as recording:
+        recording.radar_scans()
+
+
 def test_a_picture_that_is_no_file_is_named(tmp_path) -> None:
     for number in range(3):
         picture(tmp_path / "camera" / f"{START_NS + number}.png", (8, 8))
