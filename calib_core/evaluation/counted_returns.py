@@ -55,20 +55,6 @@ class Sightings:
             object.__setattr__(self, name, frozen_array(getattr(self, name), (len(self.frames),)))
         object.__setattr__(self, "points_radar_m", frozen_array(self.points_radar_m, (len(self.of_return), 3)))
 
-    def some(self, kept: Flags) -> "Sightings":
-        """Keep the sightings of these flags (s,) with their returns."""
-        number = np.cumsum(kept) - 1
-        rows = kept[self.of_return]
-        return Sightings(
-            self.names,
-            self.frames[kept],
-            self.targets[kept],
-            self.azimuth_rad[kept],
-            self.range_m[kept],
-            number[self.of_return[rows]],
-            self.points_radar_m[rows],
-        )
-
 
 @dataclass(frozen=True, slots=True)
 class Bearings:
