@@ -18,13 +18,13 @@ _BEGINNINGS = {
     b"#ROSBAG": "a recording; give it as RECORDING, or with --recording",
     b"\x89MCAP": "a recording; give it as RECORDING, or with --recording",
     b"SQLite format 3": "a recording; give it as RECORDING, or with --recording",
-    b"PK": "an archive; unpack it",
+    b"PK": "an archive or a spreadsheet; unpack it, or save it as CSV",
     b"\x89PNG": "a picture",
     b"\xff\xd8\xff": "a picture",
 }
 _USES = {
-    "calibration-1": "give it as CALIBRATION, before the recording; to solve it again: cocalib solve --pairs FILE",
-    "clicks-1": "solve them with their recording: cocalib solve RECORDING --clicks FILE",
+    "calibration-1": "give it as CALIBRATION, before the recording (open: --calibration FILE); solve it again with --pairs FILE",
+    "clicks-1": "give them with their recording: cocalib solve (or open) RECORDING --clicks FILE",
     "pairs-1": "solve them without a recording: cocalib solve --pairs FILE",
     "proposals-1": "confirm them on the page, or copy the clicks that you have looked at into a clicks-1 file",
     "boxes-1": "give it with --boxes FILE",

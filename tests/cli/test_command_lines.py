@@ -50,11 +50,25 @@ _TABLE = [
         "solve made.mcap --clicks stray.json --out o.json",
         "click stray at 1600000000.000000005 s has the stamp of no frame",
     ),
-    (2, "solve made.mcap --clicks outside.json --out o.json", "320 x 240"),
+    (
+        2,
+        "solve made.mcap --clicks outside.json --out o.json",
+        "320 x 240 px; give the clicks of this recording, column first",
+    ),
     (2, "solve made.mcap --clicks no-list.json --out o.json", "no-list.json: clicks"),
     (2, "solve made.mcap --clicks click.json", "click.json: no such file or folder; did you mean clicks.json?"),
     (2, "solve made.mcap --clicks good.json", "a cocalib/calibration-1 file, not cocalib/clicks-1; give it as CALIB"),
     (2, "solve made.mcap --clicks made.mcap/made.mcap.mcap", "not a text file but a recording; give it as RECORDING"),
+    (2, "solve --pairs good.json --out good.json", "is also an input, which is never changed"),
+    (2, "intrinsics camera.yaml --to ros --out camera.yaml", "is also an input, which is never changed"),
+    (2, "show broken.mp4 --out broken.mp4", "is also an input, which is never changed"),
+    (2, "solve --pairs pairs.xlsx --camera camera.yaml", "a spreadsheet; unpack it, or save it as CSV"),
+    (2, "solve a.bag --propose --options camera.yaml", "not TOML, such as sigma_px = 3 below [noise]"),
+    (
+        2,
+        "check good.json --against good.json --max-deg 0,5",
+        "takes DEG, as numbers like 0.5, without units, not '0,5'",
+    ),
     (2, "solve made.mcap --clicks nothing", "nothing: is a folder, not a file of clicks or pairs; name a file in it"),
     (2, "solve made.mcap --clicks empty", "empty: the file is empty"),
     (2, "solve made.mcap --clicks clicks.json --camera word.yaml", "found no keys"),
@@ -69,7 +83,7 @@ _TABLE = [
     (2, "solve a.bag --clicsk=b.json", "unknown option --clicsk; did you mean --clicks"),
     (2, "solve a.bag --propose --auto", "--propose solves nothing: give a recording"),
     (2, "solve a.bag --json", "--json applies with --propose only"),
-    (2, "solve a.bag --camera-position-m 0 1 4cm", "takes X Y Z, plain numbers without units, not '0 1 4cm'"),
+    (2, "solve a.bag --camera-position-m 0 1 4cm", "takes X Y Z, as numbers like 0.5, without units, not '0 1 4cm'"),
     (2, "solve a.bag --propose --camera-position-m 3 2 110", "Give metres: 0.11 or 1.1, if it is in mill"),
     (2, "solve a.bag --camera-position-by eye", "--camera-position-by"),
     (2, "solve a.bag --vehicle a/b", "--vehicle: 'a/b' cannot be a name; give one without slashes"),
@@ -183,7 +197,7 @@ _TABLE = [
     (2, "export absent.json --to tf2", "absent.json"),
     (2, "export a.json --to URDF", "did you mean urdf?"),
     (2, "export a.json --format tf2", "unknown option --format; did you mean --to?"),
-    (2, "export clicks.json --to tf2", "a cocalib/clicks-1 file, not a calibration; solve them with their recording"),
+    (2, "export clicks.json --to tf2", "a cocalib/clicks-1 file, not a calibration; give them with their recording"),
     (2, "export good.json --to urdf --out good.json", "holds something else, which is not overwritten"),
     (2, "export good.json --to urdf --out word.yaml", "holds something else, which is not overwritten"),
     *((0, f"export good.json --to {to} --out {to}", "") for to in 2 * ("urdf", "matlab", "matrix", "colmap")),
@@ -389,6 +403,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory, project_root: Path) -> Path
         f"distortion_coefficients: {{rows: 1, cols: 4, data: {_MADE.camera.distortion.tolist()}}}\n"
     )
     (path / "bare.yaml").write_text(f"{size}\ncamera_matrix: {{rows: 3, cols: 3, data: {matrix.ravel().tolist()}}}\n")
+    (path / "pairs.xlsx").write_bytes(b"PK\3\4\xff")
     (path / "word.yaml").write_text("hello")
     (path / "commas.csv").write_text("x;y;z;u;v\n5,0;1,0;0,1;100,5;90,0\n")
     body = (pose.inverse() @ RigidTransform(OPTICAL_FROM_LINK, np.zeros(3))).as_matrix()

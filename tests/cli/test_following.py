@@ -1,5 +1,7 @@
 """`cocalib open --follow`: the file may come later, and what is waited for is said."""
 
+from pathlib import Path
+
 import pytest
 
 from calib_core.recordings import FollowedRecording, Recording
@@ -7,8 +9,9 @@ from tests.growing_recording import SampleWriter
 
 
 @pytest.fixture
-def served(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Recording, int]]:
+def served(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[tuple[Recording, int]]:
     """Return the recordings that would be served, each with its number of frames."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     found: list[tuple[Recording, int]] = []
     monkeypatch.setattr(
         "cocalib.web.port.serving.Service.serve",

@@ -87,11 +87,7 @@ class Check:
         """
         if not self.calibration:
             raise InputError("CALIBRATION is missing; see cocalib check --help")
-        if any(
-            other and one.exists() and other.exists() and one.samefile(other)
-            for one in self.calibration
-            for other in (self.against, self.of)
-        ):
+        if {one.resolve() for one in (self.against, self.of) if one} & {one.resolve() for one in self.calibration}:
             print("note: a file is checked against itself, which proves nothing", file=sys.stderr)
         limited = any(limit is not None for limit in (self.max_deg, self.max_cm, self.max_px, self.max_sigma))
         if limited and self.against is None:

@@ -11,7 +11,7 @@ import tyro
 from calib_core.errors import InputError
 from cocalib.cli.exit_codes import NO_ANSWER, exit_code
 from cocalib.cli.flags import File, Require, Switch, called
-from cocalib.cli.output import write_whole
+from cocalib.cli.output import refuse_input, write_whole
 from cocalib.cli.recording_flags import TopicFlags, Topics
 from cocalib.cli.tree_flags import FrameFlags, Frames, input_file
 
@@ -241,13 +241,7 @@ class Import:
             raise InputError(
                 "import takes a calibration, or the files of one: cocalib import FILE... --out calibration.json"
             )
-        inputs = (*self.calibration, *(one for one in (self.camera, self.pairs, self.against) if one is not None))
-        if (
-            self.out is not None
-            and self.out.exists()
-            and any(one.exists() and self.out.samefile(one) for one in inputs)
-        ):
-            raise InputError(f"{self.out}: is also an input, which is never changed; choose another name for --out")
+        refuse_input(self.out, *self.calibration, self.camera, self.pairs, self.against)
         path, source = self.calibration[0], ", ".join(map(str, self.calibration))
         given = read_camera_file(self.camera) if self.camera else None
         against = read_any_file(self.against) if self.against else None

@@ -14,7 +14,7 @@ from calib_core.input_files import name_text
 from calib_core.options import IntrinsicsOptions, LensChoice
 from calib_core.recordings import RecordingOptions
 from cocalib.cli.flags import MORE, File, Folder, Switch, called, same
-from cocalib.cli.output import explain_unsolvable, write_whole
+from cocalib.cli.output import explain_unsolvable, refuse_input, write_whole
 from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
@@ -128,6 +128,7 @@ class Intrinsics:
                 "apply to pictures of a board"
             )
         require_format(self.to)
+        refuse_input(self.out, Path(self.source[0]))
         size_px = size_of(self.rescale) if self.rescale is not None else None
         return convert_camera(self.source[0], to=self.to, out=self.out, size_px=size_px)
 

@@ -44,7 +44,9 @@ def with_named(options: Named, settings: Sequence[str], file: Path | None = None
         try:
             tree = tomllib.loads(read_text(file, is_what="a TOML file of options"))
         except tomllib.TOMLDecodeError as error:
-            raise InputError(f"{file}: not TOML: {str(error)[:1].lower()}{str(error)[1:]}") from None
+            raise InputError(
+                f"{file}: not TOML, such as sigma_px = 3 below [noise]: {str(error)[:1].lower()}{str(error)[1:]}"
+            ) from None
     for text in settings:
         name, sign, value = text.partition("=")
         if not sign:

@@ -55,6 +55,16 @@ def write_whole(path: Path, content: str | bytes, *, again: bool = False) -> Non
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
+def refuse_input(out: Path | None, *inputs: Path | None) -> None:
+    """Refuse an output that is one of the files that are read.
+
+    Raises:
+        InputError: it is.
+    """
+    if out and out.exists() and any(one and one.exists() and out.samefile(one) for one in inputs):
+        raise InputError(f"{out}: is also an input, which is never changed; choose another name for --out")
+
+
 def _kind(data: bytes) -> bytes:
     """Return what tells kinds of output apart: our JSON by its schema, our other texts by our name, the rest by how it begins."""
     schema = re.search(rb'"schema": ?"(cocalib/[\w-]+)"', data[:200])

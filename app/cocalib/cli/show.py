@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from calib_core.errors import InputError
 from calib_core.input_files import read_text
 from cocalib.cli.flags import File, Switch, called
-from cocalib.cli.output import progress_bar, told_clicks_at_frames
+from cocalib.cli.output import progress_bar, refuse_input, told_clicks_at_frames
 from cocalib.cli.recording_flags import CameraFlags, GivenCamera, Recorded, RecordedFlags
 
 if TYPE_CHECKING:
@@ -54,6 +54,7 @@ class Show:
             return self._show()
         if self.web or self.port:
             raise InputError("--web and --port show a window; remove --out to open it")
+        refuse_input(self.out, *self.recorded.recording)
         if self.out.suffix.lower() == ".rrd":
             return self._write_rrd(self.out)
         return self._write_frames(self.out) if self.calibration is None else self._write_overlay(self.out)

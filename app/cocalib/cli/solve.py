@@ -15,7 +15,14 @@ from calib_core.results import Calibration
 from calib_core.results.verdict import verdict_on
 from cocalib.cli.exit_codes import exit_code
 from cocalib.cli.flags import MORE, File, MoreSwitch, Require, Switch
-from cocalib.cli.output import explain_unsolvable, recorded_clicks, shown_progress, tell_choices, write_whole
+from cocalib.cli.output import (
+    explain_unsolvable,
+    recorded_clicks,
+    refuse_input,
+    shown_progress,
+    tell_choices,
+    write_whole,
+)
 from cocalib.cli.recording_flags import (
     CameraFlags,
     GivenCamera,
@@ -81,6 +88,7 @@ class Solve:
             return self._propose()
         vehicle = self.vehicle.note()
         self._require_fitting()
+        refuse_input(self.out, self.pairs)
         return self._solve_recording(vehicle) if self.pairs is None else self._solve_pairs(self.pairs, vehicle)
 
     def _require_fitting(self) -> None:

@@ -74,7 +74,7 @@ def _reason(fault: Fault, kind: type[Runnable]) -> str:
             return f"{argument.name} takes {_alternatives(choices)}, not '{value}'"
         case BadValue(argument, typed):
             what = _NUMBERS.get(argument.value, argument.value)
-            only = "" if argument.value in _NUMBERS else ", plain numbers without units"
+            only = "" if argument.value in _NUMBERS else ", as numbers like 0.5, without units"
             return f"{argument.name} takes {what}{only}" + (
                 f", not '{typed}'" if typed else "; the given value is invalid"
             )

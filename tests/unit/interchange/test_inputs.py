@@ -101,7 +101,7 @@ def test_a_fault_in_a_pair_is_named_with_its_place_and_what_to_do(change, words)
         ("[" * 100_000, "nested too deeply"),
         (
             '{"schema": "cocalib/clicks-1"}',
-            "this is a cocalib/clicks-1 file, not cocalib/pairs-1; solve them with their recording: cocalib solve",
+            "this is a cocalib/clicks-1 file, not cocalib/pairs-1; give them with their recording: cocalib solve",
         ),
         ('{"pairs": []}', "schema: expected 'cocalib/pairs-1', found none"),
         (pairs_text(camera=None), "camera: missing; add it"),
