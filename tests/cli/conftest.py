@@ -2,7 +2,7 @@
 
 import json
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -180,31 +180,20 @@ def clicks_file(tmp_path: Path) -> Path:
     return path
 
 
+def pairs_text(camera: Camera, pairs: Iterable[tuple[str, np.ndarray, np.ndarray]]) -> str:
+    """Return a file of pairs: the name, the radar position and the pixel of each."""
+    described = {"model": camera.model, "width_px": camera.width_px, "height_px": camera.height_px}
+    arrays = {"matrix_px": camera.matrix_px.tolist(), "distortion": camera.distortion.tolist()}
+    rows = [{"id": name, "radar_m": list(point), "pixel_px": list(pixel)} for name, point, pixel in pairs]
+    return json.dumps({"schema": "cocalib/pairs-1", "camera": described | arrays, "pairs": rows})
+
+
 @pytest.fixture
-def pairs_file(tmp_path: Path) -> Callable[..., Path]:
-    """Return a function that writes a file of exact pairs, optionally after changing its document."""
-
-    def write(count: int = 8, change: Callable[[dict[str, object]], None] = lambda document: None) -> Path:
-        recording = Made()
-        positions: Sequence[Sequence[float]] = recording.positions_radar_m[:count].tolist()
-        pixels = recording.camera.project(recording.camera_from_radar @ recording.positions_radar_m)[:count].tolist()
-        document: dict[str, object] = {
-            "schema": "cocalib/pairs-1",
-            "camera": {
-                "model": "plumb_bob",
-                "width_px": 320,
-                "height_px": 240,
-                "matrix_px": recording.camera.matrix_px.tolist(),
-                "distortion": recording.camera.distortion.tolist(),
-            },
-            "pairs": [
-                {"id": f"p{i}", "radar_m": position, "pixel_px": pixel}
-                for i, (position, pixel) in enumerate(zip(positions, pixels, strict=True))
-            ],
-        }
-        change(document)
-        path = tmp_path / "pairs.json"
-        path.write_text(json.dumps(document))
-        return path
-
-    return write
+def pairs_file(tmp_path: Path) -> Path:
+    """Return a file of eight exact pairs."""
+    positions = Made().positions_radar_m
+    pixels = Made().camera.project(Made().camera_from_radar @ positions)
+    names = [f"p{index}" for index in range(len(positions))]
+    path = tmp_path / "pairs.json"
+    path.write_text(pairs_text(Made().camera, zip(names, positions, pixels, strict=True)))
+    return path

@@ -8,16 +8,17 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from calib_core.geometry import RigidTransform, rotation_exp
+from calib_core.interchange import read_calibration
+
 
 @pytest.fixture
 def moved(solved: Path, tmp_path: Path) -> Path:
     """Return the pose turned by 5 degrees, as a bare matrix."""
-    content = json.loads(solved.read_text())["camera_from_radar"]
-    matrix = np.eye(4)
-    turn, angle = np.eye(3), np.radians(5.0)
-    turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
-    matrix[:3, :3] = turn @ np.array(content["rotation"])
-    matrix[:3, 3] = content["translation_m"]
+    pose = read_calibration(solved.read_text()).calibration.camera_from_radar
+    turn = RigidTransform(rotation_exp(np.array([0.0, 0.0, np.radians(5.0)])), np.zeros(3))
+    matrix = (turn @ pose).as_matrix()
+    matrix[:3, 3] = pose.translation_m
     np.savetxt(tmp_path / "moved.txt", matrix)
     return tmp_path / "moved.txt"
 
@@ -76,12 +77,7 @@ def test_json_is_one_object_with_every_file(cocalib, solved, moved, tmp_path):
     assert [one["code"] for one in wrong["results"] if one["level"] == "error"] == ["disagrees"]
     assert [at["distance_m"] for at in wrong["comparison"]["pixels"]] == [5.0, 20.0, 60.0]
     assert "no pose of a camera and a radar" in unreadable["error"]
-
-
-def test_several_files_get_a_line_each(cocalib, solved, moved):
-    answer = cocalib("check", solved, moved, "--against", solved)
-
-    first, second = answer.out.splitlines()
+    first, second = cocalib("check", solved, moved, "--against", solved).out.splitlines()
     assert first.startswith(f"{solved}: right: ")
     assert second.startswith(f"{moved}: wrong: 5 deg")
 

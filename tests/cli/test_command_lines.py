@@ -15,7 +15,7 @@ from cocalib.cli import run
 from cocalib.cli.commands import COMMANDS
 from cocalib.cli.exit_codes import batch_exit_code, exit_codes
 from cocalib.cli.old_names import OLD_NAMES
-from tests.cli.conftest import Made
+from tests.cli.conftest import Made, pairs_text
 
 _MADE = Made(placements=20)
 _POSITION_M = tuple(f"{value:.6f}" for value in _MADE.camera_from_radar.inverse().translation_m)
@@ -287,6 +287,7 @@ _TABLE = [
     (2, "intrinsics grey.png --board 9x6 --square-mm 25 --marker-mm 3", "checkerboard has none"),
     (2, "intrinsics grey.png --board 9x6 --square-mm 25 --report o.pdf", "NAME.html"),
     (2, "intrinsics grey.png --board 9x6 --square-mm 25 --out no/camera.yaml", "does not exist"),
+    (0, "intrinsics camera.yaml --to kalibr", "radtan"),
     (2, "intrinsics camera.yaml --rescale 320x320", "another aspect ratio"),
     (2, "intrinsics camera.yaml --to kalib", "did you mean kalibr?"),
     (2, "intrinsics camera.yaml --board 9x6 --square-mm 25", "is a file with intrinsics"),
@@ -326,22 +327,12 @@ _TABLE = [
 ]
 
 
-def _pairs_text(points_radar_m: np.ndarray) -> str:
+def _noisy_pairs(points_radar_m: np.ndarray) -> str:
     """Write pairs with noise of a pixel."""
     pixels = _MADE.camera.project(_MADE.camera_from_radar @ _MADE.positions_radar_m)
     pixels += np.random.default_rng(3).normal(0.0, 1.0, pixels.shape)
-    camera = {
-        "model": "plumb_bob",
-        "width_px": _MADE.camera.width_px,
-        "height_px": _MADE.camera.height_px,
-        "matrix_px": _MADE.camera.matrix_px.tolist(),
-        "distortion": _MADE.camera.distortion.tolist(),
-    }
-    pairs = [
-        {"id": f"p{index}", "radar_m": point, "pixel_px": pixel}
-        for index, (point, pixel) in enumerate(zip(points_radar_m.tolist(), pixels.tolist(), strict=False))
-    ]
-    return json.dumps({"schema": "cocalib/pairs-1", "camera": camera, "pairs": pairs})
+    names = (f"p{index}" for index in range(len(points_radar_m)))
+    return pairs_text(_MADE.camera, zip(names, points_radar_m, pixels, strict=False))
 
 
 @pytest.fixture(scope="module")
@@ -384,10 +375,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory, project_root: Path) -> Path
     shutil.copy(project_root / "tests" / "golden" / "calibration-1.json", path / "golden.json")
     (path / "empty").write_bytes(b"")
     points_radar_m = _MADE.positions_radar_m
-    (path / "good-pairs.json").write_text(_pairs_text(points_radar_m))
-    (path / "misspelt.json").write_text(_pairs_text(points_radar_m).replace("pixel_px", "pixl_px"))
-    (path / "few.json").write_text(_pairs_text(points_radar_m[:2]))
-    (path / "mirrored.json").write_text(_pairs_text(points_radar_m * [1.0, -1.0, 1.0]))
+    (path / "good-pairs.json").write_text(_noisy_pairs(points_radar_m))
+    (path / "misspelt.json").write_text(_noisy_pairs(points_radar_m).replace("pixel_px", "pixl_px"))
+    (path / "few.json").write_text(_noisy_pairs(points_radar_m[:2]))
+    (path / "mirrored.json").write_text(_noisy_pairs(points_radar_m * [1.0, -1.0, 1.0]))
     for pairs, out in (("good-pairs", "good"), ("mirrored", "contradictory")):
         flags = ["--pairs", str(path / f"{pairs}.json"), "--camera-position-m", *_POSITION_M]
         run(["solve", *flags, "--out", str(path / f"{out}.json")])

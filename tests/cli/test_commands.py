@@ -68,7 +68,7 @@ def test_solve_prints_the_same_bytes_for_shuffled_clicks(cocalib, clicks_file, s
 
 def test_solve_refines_the_intrinsics_and_solves_its_file_again(cocalib, pairs_file, tmp_path):
     out, again, plain = (tmp_path / name for name in ("refined.json", "again.json", "plain.json"))
-    answer = cocalib("solve", "--pairs", pairs_file(), "--out", out, "--refine-intrinsics")
+    answer = cocalib("solve", "--pairs", pairs_file, "--out", out, "--refine-intrinsics")
     assert answer.code == 0, answer.err
     assert "intrinsics: The intrinsics were refined with the pose: " in answer.out
     document = json.loads(out.read_text())
@@ -84,7 +84,7 @@ def test_solve_refines_the_intrinsics_and_solves_its_file_again(cocalib, pairs_f
 
 def test_a_calibration_by_a_method_of_older_versions_is_read_and_solved_again_by_another(cocalib, pairs_file, tmp_path):
     old, again = tmp_path / "old.json", tmp_path / "again.json"
-    assert cocalib("solve", "--pairs", pairs_file(), "--out", old).code == 0
+    assert cocalib("solve", "--pairs", pairs_file, "--out", old).code == 0
     document = json.loads(old.read_text())
     document["options"] |= {"method": "ccm", "board": {"columns": 9, "registration": "linear"}}
     old.write_text(json.dumps(document))
@@ -227,7 +227,7 @@ def test_the_demo_of_another_version_has_a_session_of_its_own(tmp_path, monkeypa
 def test_a_calibration_is_solved_again_and_only_typed_options_change(cocalib, pairs_file, tmp_path):
     first, again, turned = (tmp_path / f"{name}.json" for name in ("first", "again", "turned"))
     position = ("--camera-position-m", "0.1", "0", "0.05", "--camera-position-sigma-m", "0.02")
-    assert cocalib("solve", "--pairs", pairs_file(), "--method", "paper", *position, "--out", first).code == 0
+    assert cocalib("solve", "--pairs", pairs_file, "--method", "paper", *position, "--out", first).code == 0
     assert cocalib("solve", "--pairs", first, "--out", again).code == 0
     assert (
         cocalib(
@@ -246,7 +246,7 @@ def test_a_calibration_is_solved_again_and_only_typed_options_change(cocalib, pa
 @pytest.mark.skipif(os.name == "nt", reason="no named pipes in the file system")
 @pytest.mark.parametrize("solved", [False, True], ids=["pairs-1", "calibration-1"])
 def test_pairs_are_read_once_so_a_pipe_works(cocalib, pairs_file, tmp_path, solved):
-    source, pipe = pairs_file(), tmp_path / "pipe"
+    source, pipe = pairs_file, tmp_path / "pipe"
     if solved:
         assert cocalib("solve", "--pairs", source, "--out", tmp_path / "a.json").code == 0
         source = tmp_path / "a.json"
@@ -258,7 +258,7 @@ def test_pairs_are_read_once_so_a_pipe_works(cocalib, pairs_file, tmp_path, solv
 
 
 def test_a_table_of_pairs_is_solved_with_a_camera(cocalib, pairs_file, tmp_path):
-    pairs, table = pairs_file(), tmp_path / "pairs.csv"
+    pairs, table = pairs_file, tmp_path / "pairs.csv"
     rows = [(*pair["radar_m"], *pair["pixel_px"]) for pair in json.loads(pairs.read_text())["pairs"]]
     table.write_text("x_m,y_m,z_m,u_px,v_px\n" + "".join(f"{','.join(map(str, row))}\n" for row in rows))
     assert cocalib("solve", "--pairs", table, "--camera", pairs, "--out", tmp_path / "a.json").code == 0

@@ -41,21 +41,19 @@ def one_line(answer: Any) -> str:
 @pytest.mark.parametrize("kind", ["pipe", "device", "socket"])
 def test_what_could_never_end_is_refused_at_once(cocalib, tmp_path, monkeypatch, arguments, kind):
     monkeypatch.setattr(input_files, "_WRITER_TIMEOUT_S", 0.02)
-    path = tmp_path / "input"
+    path = Path("/dev/zero") if kind == "device" else tmp_path / "input"
     if kind == "pipe":
         os.mkfifo(path)
     elif kind == "socket":
         with socket.socket(socket.AF_UNIX) as bound:
             bound.bind(str(path))
-    else:
-        path = Path("/dev/zero")
     line = one_line(cocalib(*(argument.format(path) for argument in arguments)))
     assert kind in line
     assert str(path) in line
 
 
 @pytest.mark.parametrize(
-    "text", ["a: " + "[" * 5000, "- " * 5000 + "x", "a: 2001-99-99", "!!int x", "? [a]\n: b"], ids=str.__len__
+    "text", ["a: " + "[" * 1000, "- " * 1000 + "x", "a: 2001-99-99", "!!int x", "? [a]\n: b"], ids=str.__len__
 )
 def test_a_metadata_file_of_another_kind_does_no_harm(cocalib, made, tmp_path, text):
     folder = tmp_path / "bag"
@@ -87,17 +85,14 @@ def test_half_a_character_in_our_files_is_refused(cocalib, clicks_file, made, ha
     assert "half of a character" in one_line(cocalib("solve", made(), "--clicks", clicks_file))
 
 
-@pytest.mark.parametrize("depth", [101, 100_000])
+@pytest.mark.parametrize("depth", [101, 20_000])
 @pytest.mark.parametrize("kind", ["json", "yaml", "xml"])
 def test_deep_nesting_is_refused(cocalib, tmp_path, depth, kind):
     opening, closing = ("<a>", "</a>") if kind == "xml" else ("[", "]")
-    outside = {
-        "json": '{{"a": {}}}',
-        "yaml": "a: {}",
-        "xml": '<?xml version="1.0"?><opencv_storage>{}</opencv_storage>',
-    }
+    xml = '<?xml version="1.0"?><opencv_storage>{}</opencv_storage>'
+    outside = {"json": '{{"a": {}}}', "yaml": "a: {}", "xml": xml}[kind]
     path = tmp_path / f"deep.{kind}"
-    path.write_text(outside[kind].format(opening * depth + closing * depth))
+    path.write_text(outside.format(opening * depth + closing * depth))
     for command in (("check", path), ("import", path, "--out", tmp_path / "c.json")):
         assert "deep" in one_line(cocalib(*command))
 
@@ -106,10 +101,10 @@ def test_deep_nesting_is_refused(cocalib, tmp_path, depth, kind):
 def test_a_pipe_that_nobody_reads_is_no_output(cocalib, pairs_file, tmp_path):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
-    assert "nobody reads from this pipe" in one_line(cocalib("solve", "--pairs", pairs_file(), "--out", pipe))
+    assert "nobody reads from this pipe" in one_line(cocalib("solve", "--pairs", pairs_file, "--out", pipe))
     reading = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
     try:
-        assert cocalib("solve", "--pairs", pairs_file(), "--out", pipe).code == 0
+        assert cocalib("solve", "--pairs", pairs_file, "--out", pipe).code == 0
         assert os.read(reading, 20).startswith(b"{")
     finally:
         os.close(reading)
@@ -125,10 +120,18 @@ def test_a_table_with_a_long_cell_is_read_in_time(cocalib, tmp_path, cell):
     one_line(cocalib("info", path))
 
 
+@pytest.mark.parametrize("value", ["1e308", "-1e308", "1e200", "1e400"])
+def test_a_quaternion_of_huge_numbers_is_refused(cocalib, tmp_path, value):
+    path, turn = tmp_path / "static.txt", f"--qx {value} --qy {value} --qz {value} --qw 1"
+    frames = "--frame-id camera --child-frame-id radar"
+    path.write_text(f"ros2 run tf2_ros static_transform_publisher --x 0 --y 0 --z 0 {turn} {frames}\n")
+    one_line(cocalib("check", path))
+
+
 @pytest.mark.parametrize("sigma", [1e308, 1e200, 5e-324, 1e-200])
 def test_a_standard_deviation_beyond_any_measurement_is_refused(cocalib, pairs_file, tmp_path, sigma):
     path = tmp_path / "calibration.json"
-    assert cocalib("solve", "--pairs", pairs_file(), "--out", path).code == 0
+    assert cocalib("solve", "--pairs", pairs_file, "--out", path).code == 0
     document = json.loads(path.read_text())
     document["pairs"][1]["candidates"][0]["sigma_polar"][1] = sigma
     path.write_text(json.dumps(document))
@@ -140,17 +143,7 @@ def test_an_error_of_next_to_no_standard_deviation_counts_as_exact(cocalib, pair
     priors = ("radar.range-scale-sigma", "radar.range-bias-sigma-m", "radar.height-sigma-m", "lens.distortion-sigma",
               "lens.focal-length-sigma", "radar.azimuth-scale-sigma", "reflector.offset-sigma-m")  # fmt: skip
     typed = [word for prior in priors for word in (f"--{prior}", sigma)]
-    assert cocalib("solve", "--pairs", pairs_file(), *typed).code == 0
-
-
-@pytest.mark.parametrize("value", ["1e308", "-1e308", "1e200", "1e400"])
-def test_a_quaternion_of_huge_numbers_is_refused(cocalib, tmp_path, value):
-    path = tmp_path / "static.txt"
-    path.write_text(
-        "ros2 run tf2_ros static_transform_publisher --x 0 --y 0 --z 0 "
-        f"--qx {value} --qy {value} --qz {value} --qw 1 --frame-id camera --child-frame-id radar\n"
-    )
-    one_line(cocalib("check", path))
+    assert cocalib("solve", "--pairs", pairs_file, *typed).code == 0
 
 
 @POSIX

@@ -9,21 +9,22 @@ def interrupted(*_: object, **__: object) -> NoReturn:
     raise KeyboardInterrupt
 
 
-@pytest.mark.parametrize("command", ["evaluate", "compared", "report", "rrd", "video"])
-def test_an_interrupt_leaves_no_file_and_no_traceback(cocalib, made, clicks_file, tmp_path, monkeypatch, command):
-    recording, pose = made(), tmp_path / "calibration.json"
-    assert cocalib("solve", recording, "--clicks", clicks_file, "--out", pose).code == 0
+@pytest.mark.parametrize("command", ["evaluate", "compared", "report", "rrd", "video", "propose", "auto"])
+def test_an_interrupt_leaves_no_file_and_no_traceback(cocalib, solved, clicks_file, tmp_path, monkeypatch, command):
+    recording, clicks = solved.with_name("made.mcap"), ("--clicks", clicks_file)
     before = sorted(tmp_path.rglob("*"))
-    monkeypatch.setattr("cocalib.evaluation.evaluating.pair_clicks", interrupted)
-    clicks = ("--clicks", clicks_file)
+    for place in ("cocalib.evaluation.evaluating.pair_clicks", "cocalib.proposing.dwell_views"):
+        monkeypatch.setattr(place, interrupted)
     arguments: dict[str, tuple[object, ...]] = {
-        "evaluate": ("evaluate", pose, recording),
-        "compared": ("check", pose, "--against", pose, "--recording", recording),
-        "report": ("evaluate", pose, recording, "--report", tmp_path / "made.html"),
-        "rrd": ("show", recording, "--calibration", pose, "--out", tmp_path / "made.rrd"),
-        "video": ("show", recording, "--calibration", pose, "--out", tmp_path / "made.mp4"),
+        "evaluate": ("evaluate", solved, recording, *clicks),
+        "compared": ("check", solved, "--against", solved, "--recording", recording, *clicks),
+        "report": ("evaluate", solved, recording, "--report", tmp_path / "made.html", *clicks),
+        "rrd": ("show", recording, "--calibration", solved, "--out", tmp_path / "made.rrd", *clicks),
+        "video": ("show", recording, "--calibration", solved, "--out", tmp_path / "made.mp4", *clicks),
+        "propose": ("solve", "--propose", recording, "--out", tmp_path / "made.json"),
+        "auto": ("solve", "--auto", recording, "--out", tmp_path / "made.json"),
     }
-    answer = cocalib(*arguments[command], *clicks)
+    answer = cocalib(*arguments[command])
 
     assert answer.code == 130
     assert "Traceback" not in answer.out + answer.err

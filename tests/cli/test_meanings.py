@@ -48,7 +48,7 @@ def test_import_writes_what_was_picked_and_says_so(cocalib, ambiguous, camera_fi
 
 
 def test_pairs_decide_what_the_numbers_mean(cocalib, ambiguous, camera_file, pairs_file, tmp_path):
-    out, pairs = tmp_path / "out.json", pairs_file()
+    out, pairs = tmp_path / "out.json", pairs_file
     assert cocalib("import", ambiguous, "--pairs", pairs, "--out", out, "--camera", camera_file).code == 0
     assert _is_pose(out)
     assert read_calibration(out.read_text()).evidence == "imported_proven"
@@ -59,7 +59,7 @@ def test_pairs_decide_what_the_numbers_mean(cocalib, ambiguous, camera_file, pai
 
 def test_what_the_pairs_contradict_cannot_be_picked(cocalib, ambiguous, camera_file, pairs_file, tmp_path):
     out = tmp_path / "out.json"
-    picking = ("--as", "camera_from_radar,body,m", "--pairs", pairs_file())
+    picking = ("--as", "camera_from_radar,body,m", "--pairs", pairs_file)
     refused = cocalib("import", ambiguous, *picking, "--out", out, "--camera", camera_file)
     assert refused.code == 2
     assert "--as camera_from_radar,body,m is contradicted" in refused.err
@@ -73,7 +73,7 @@ def test_check_reads_a_bare_matrix_as_import_reads_it(cocalib, camera_file, pair
     np.savetxt(bare, (POSE.inverse() if inverse else POSE).as_matrix())
     meaning = "radar_from_camera,optical,m" if inverse else "camera_from_radar,optical,m"
 
-    for evidence in ((), ("--pairs", pairs_file())):
+    for evidence in ((), ("--pairs", pairs_file)):
         assert f"taken as {meaning}" in cocalib("import", bare, "--out", out, "--camera", camera_file, *evidence).err
         checked = cocalib("check", bare, *evidence)
         assert checked.code == (0 if evidence else 3), checked.out

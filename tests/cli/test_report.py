@@ -39,22 +39,6 @@ def test_on_its_recording_the_report_has_held_out_errors_and_a_picture_and_names
     assert len(html.encode()) < 3_000_000
 
 
-def test_limits_that_are_not_met_end_with_exit_code_3(solved, tmp_path):
-    out = tmp_path / "report.html"
-    assert run(["evaluate", str(solved), "--report", str(out), "--require", "max-deg=9", "max-cm=90"]) == 0
-    assert run(["evaluate", str(solved), "--report", str(out), "--require", "max-deg=0.01"]) == 3
-    assert "FAIL" in out.read_text(encoding="utf-8")
-
-
-def test_a_calibration_by_the_paper_is_reported_with_its_doubts(solved, tmp_path):
-    paper, out = tmp_path / "paper.json", tmp_path / "paper.html"
-    assert run(["solve", "--pairs", str(solved), "--method", "paper", "--out", str(paper)]) == 0
-    assert run(["evaluate", str(paper), "--report", str(out)]) == 0
-    html = out.read_text(encoding="utf-8")
-    assert "contradictory" in html
-    assert "No error bars: this calibration states no covariance." in html
-
-
 def test_a_foreign_calibration_without_a_camera_takes_the_one_of_the_recording(golden, solved, sample, tmp_path):
     foreign, out = tmp_path / "tf.txt", tmp_path / "tf.html"
     assert run(["export", str(solved), "--to", "tf2", "--out", str(foreign)]) == 0

@@ -7,11 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from calib_core.interchange import read_clicks
-from calib_core.measurements import TimeNs
-from cocalib.session import ClickPlaced, RecordingFacts, advance
+from cocalib.session import RecordingFacts
 from cocalib.session.file import open_session_file
+from tests.unit.app.session.drive import files, kept, place, restored
 
 FACTS = RecordingFacts("drive.bag", 1_700_000_000_123_456_789 + 100_000_000 * np.arange(50), 640, 480)
 
@@ -31,13 +32,7 @@ def home(tmp_path: Path) -> Path:
 
 
 def clicked(folder: Path, clicks: int = 12, facts: RecordingFacts = FACTS) -> Path:
-    session_file = open_session_file(folder, facts)
-    history = session_file.restored.history
-    for frame in range(clicks):
-        step = ClickPlaced(TimeNs(int(facts.image_times[frame])), (float(frame), 2.0), "clicked")
-        history = advance(history, step, facts)
-        session_file.append(step, history)
-    session_file.close()
+    kept(folder, *(replace(place(frame, facts), pixel_px=(float(frame), 2.0)) for frame in range(clicks)), facts=facts)
     return folder
 
 
@@ -50,10 +45,6 @@ def damaged(folder: Path, line: int, *, with_copy: bool = False) -> Path:
     if not with_copy:
         (folder / "journal-copy.jsonl").unlink()
     return folder
-
-
-def files(folder: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in folder.iterdir() if path.name != "lock"}
 
 
 def test_the_list_names_every_session_here_and_in_the_users_folder(cocalib, home, state_folder):
@@ -105,39 +96,37 @@ def test_the_list_follows_no_link_and_prints_no_control_characters(cocalib, home
     assert target.read_bytes() == b"precious"
 
 
-def test_a_sound_session_needs_no_repair(cocalib, home):
+def test_a_sound_session_needs_no_repair_and_its_clicks_are_exported(cocalib, home, tmp_path):
     folder = clicked(home / "drive.bag.cocalib-session")
     before = files(folder)
     for arguments in ([folder], [home / "drive.bag"], [folder, "--yes"]):
         answer = cocalib("session", "repair", *arguments)
         assert (answer.code, answer.err) == (0, "")
         assert "Sound; nothing to repair." in answer.out
+    answer = cocalib("session", "export", home / "drive.bag", "--out", tmp_path / "clicks.json")
+    assert (answer.code, answer.err) == (0, "")
+    assert len(read_clicks((tmp_path / "clicks.json").read_text())) == 12
     assert files(folder) == before
 
 
-def test_a_repair_shows_what_it_would_keep_and_changes_nothing(cocalib, home):
+def test_a_repair_and_an_export_keep_what_is_proven_and_only_with_yes_a_repair_changes_files(cocalib, home, tmp_path):
     folder = damaged(clicked(home / "drive.bag.cocalib-session"), 9)
     before = files(folder)
-    answer = cocalib("session", "repair", folder)
-    assert answer.code == 1
-    assert "line 9 is damaged" in answer.out
-    assert "proven: 7 clicks, from 7 steps of the journal" in answer.out
-    assert "not proven, and left out: 5 lines of the journal" in answer.out
-    assert f"cocalib session repair {folder} --yes" in answer.out
+    shown = cocalib("session", "repair", folder)
+    exported = cocalib("session", "export", folder, "--out", tmp_path / "clicks.json")
+    assert (shown.code, exported.code) == (1, 3)
+    for said in ("line 9 is damaged", "not proven, and left out: 5 lines"):
+        assert said in shown.out
+        assert said in exported.err
+    assert "proven: 7 clicks, from 7 steps of the journal" in shown.out
+    assert f"cocalib session repair {folder} --yes" in shown.out
+    assert len(read_clicks((tmp_path / "clicks.json").read_text())) == 7
     assert files(folder) == before
-
-
-def test_a_repair_with_yes_keeps_what_is_proven_and_the_old_files(cocalib, home):
-    folder = damaged(clicked(home / "drive.bag.cocalib-session"), 9)
-    before = files(folder)
-    answer = cocalib("session", "repair", folder, "--yes")
-    assert answer.code == 0
-    assert "The old files are kept as journal.jsonl.backup-1." in answer.out
+    repaired = cocalib("session", "repair", folder, "--yes")
+    assert repaired.code == 0
+    assert "The old files are kept as journal.jsonl.backup-1." in repaired.out
     assert (folder / "journal.jsonl.backup-1").read_bytes() == before["journal.jsonl"]
-    session_file = open_session_file(folder, FACTS)
-    assert len(session_file.restored.history.present.clicks) == 7
-    assert session_file.restored.warnings == ()
-    session_file.close()
+    assert (len(restored(folder, FACTS).history.present.clicks), restored(folder, FACTS).warnings) == (7, ())
     assert cocalib("session", "repair", folder).code == 0
 
 
@@ -154,45 +143,21 @@ def test_two_files_that_do_not_belong_together_are_told_apart_by_hand(cocalib, h
     assert {name: files(folder)[f"{name}.backup-1"] for name in before} == before
 
 
-def test_an_export_writes_the_clicks_of_a_sound_session(cocalib, home, tmp_path):
-    clicked(home / "drive.bag.cocalib-session")
-    answer = cocalib("session", "export", home / "drive.bag", "--out", tmp_path / "clicks.json")
-    assert (answer.code, answer.err) == (0, "")
-    assert len(read_clicks((tmp_path / "clicks.json").read_text())) == 12
-
-
-def test_an_export_tells_of_a_last_step_that_is_not_whole(cocalib, home, tmp_path):
-    folder = clicked(home / "drive.bag.cocalib-session")
-    for path in folder.glob("journal*.jsonl"):
-        path.write_bytes(path.read_bytes()[:-1])
-    answer = cocalib("session", "export", folder, "--out", tmp_path / "clicks.json")
-    assert answer.code == 0
-    assert "a last step of" in answer.err
-    assert len(read_clicks((tmp_path / "clicks.json").read_text())) == 11
-
-
-def test_a_last_step_that_is_not_whole_is_listed_and_needs_no_repair(cocalib, home):
+def test_a_last_step_that_is_not_whole_is_listed_and_told_and_needs_no_repair(cocalib, home, tmp_path):
     folder = clicked(home / "drive.bag.cocalib-session", 1)
     for path in folder.glob("journal*.jsonl"):
         path.write_bytes(path.read_bytes() + b'{"type":"click_pl')
     (found,) = json.loads(cocalib("session", "list", folder, "--json").out)
     assert (found["state"], found["clicks"]) == ("torn", 1)
     assert "a last step of 17 bytes was never confirmed" in found["about"]
-    answer = cocalib("session", "repair", folder)
-    assert answer.code == 0
-    assert "proven: 1 click, from 1 step of the journal" in answer.out
-    assert "Sound" not in answer.out
-
-
-def test_an_export_of_a_damaged_session_writes_what_is_proven_and_says_what_is_not(cocalib, home, tmp_path):
-    folder = damaged(clicked(home / "drive.bag.cocalib-session"), 9)
-    before = files(folder)
-    answer = cocalib("session", "export", folder, "--out", tmp_path / "clicks.json")
-    assert answer.code == 3
-    assert len(read_clicks((tmp_path / "clicks.json").read_text())) == 7
-    assert "line 9 is damaged" in answer.err
-    assert "not proven, and left out: 5 lines" in answer.err
-    assert files(folder) == before
+    exported = cocalib("session", "export", folder, "--out", tmp_path / "clicks.json")
+    assert exported.code == 0
+    assert "a last step of" in exported.err
+    assert len(read_clicks((tmp_path / "clicks.json").read_text())) == 1
+    repaired = cocalib("session", "repair", folder)
+    assert repaired.code == 0
+    assert "proven: 1 click, from 1 step of the journal" in repaired.out
+    assert "Sound" not in repaired.out
 
 
 def test_what_proves_nothing_is_not_exported(cocalib, home, tmp_path):

@@ -7,7 +7,7 @@ def test_the_file_names_it_keeps_it_and_the_report_shows_it(cocalib, pairs_file,
     out, again, report = (tmp_path / name for name in ("calibration.json", "again.json", "report.html"))
     stated = ("--vehicle", "V<1>", "--vehicle-type", "van", "--session-name", "autumn")
     serials = ("--radar-serial", "R-1", "--camera-serial", "C-2")
-    assert cocalib("solve", "--pairs", pairs_file(), "--out", out, *stated, *serials).code == 0
+    assert cocalib("solve", "--pairs", pairs_file, "--out", out, *stated, *serials).code == 0
     expected = {"name": "V<1>", "type": "van", "session": "autumn", "radar_serial": "R-1", "camera_serial": "C-2"}
     assert json.loads(out.read_text())["vehicle"] == expected
     assert cocalib("solve", "--pairs", out, "--out", again, "--session-name", "winter").code == 0
@@ -20,7 +20,7 @@ def test_the_file_names_it_keeps_it_and_the_report_shows_it(cocalib, pairs_file,
 
 
 def test_nothing_stated_writes_nothing(cocalib, pairs_file, tmp_path):
-    assert cocalib("solve", "--pairs", pairs_file(), "--out", tmp_path / "calibration.json").code == 0
+    assert cocalib("solve", "--pairs", pairs_file, "--out", tmp_path / "calibration.json").code == 0
     assert "vehicle" not in json.loads((tmp_path / "calibration.json").read_text())
 
 

@@ -33,6 +33,7 @@ from cocalib.solving.solving import (
     solve_pairs,
 )
 from cocalib.workspace import open_workspace
+from tests.cli.conftest import pairs_text
 
 CAMERA = Camera("pinhole", 640, 480, np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]]))
 CLICK = ReflectorClick(TimeNs(10**18), "c1", 1.0, 2.0)
@@ -57,9 +58,7 @@ def sample(project_root: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def solved(recording: Recording, clicks: tuple[ReflectorClick, ...]) -> Calibration:
-    outcome = solve_clicks(recording, clicks, recording.camera(), CalibrationOptions())
-    assert isinstance(outcome, Calibration)
-    return outcome
+    return solve_clicks(recording, clicks, recording.camera(), CalibrationOptions()).unwrap()
 
 
 @pytest.mark.parametrize(
@@ -141,14 +140,8 @@ def test_right_clicks_alarm_nobody_in_any_order_and_a_wrong_one_is_named(recordi
     assert consistent == all(pair.inlier for pair in outcome.pairs), "neither does one that is left out look so"
 
 
-def test_without_intrinsics_the_answer_says_that_they_are_missing():
-    outcome = solve_clicks(Radar(), [CLICK], None, CalibrationOptions())
-    assert isinstance(outcome, Unsolvable)
-    assert outcome.code == "no-camera"
-    assert "--camera" in outcome.hint
-
-
-def test_options_out_of_range_are_refused_here_too():
+def test_options_out_of_range_are_refused_here_too_and_missing_intrinsics_an_answer():
+    assert solve_clicks(Radar(), [CLICK], None, CalibrationOptions()).code == "no-camera"
     wrong = CalibrationOptions(locating=LocatingOptions(window_s=-1.0))
     with pytest.raises(OptionError, match=r"locating\.window_s: -1 is out of range"):
         solve_clicks(Radar(), [CLICK], CAMERA, wrong)
@@ -156,23 +149,17 @@ def test_options_out_of_range_are_refused_here_too():
         solve_pairs(GivenPairs.read("{}", "pairs.json"), wrong)
 
 
-def test_scans_are_read_around_every_click_once_excluded_ones_too():
-    radar = Radar()
+def test_scans_are_read_around_every_click_once_excluded_ones_too_as_far_as_any_window_can_reach():
+    radar, options = Radar(), CalibrationOptions(locating=LocatingOptions(window_s=10.0, max_time_gap_s=2.0))
     later = replace(CLICK, id="c2", image_time=TimeNs(2 * 10**18), excluded=True)
-    outcome = solve_clicks(radar, [later, CLICK, replace(CLICK, id="c3")], CAMERA, CalibrationOptions())
-    assert radar.asked == [((10**18, 2 * 10**18), half_window_s(CalibrationOptions()))]
+    outcome = solve_clicks(radar, [later, CLICK, replace(CLICK, id="c3")], CAMERA, options)
+    assert radar.asked == [((10**18, 2 * 10**18), half_window_s(options))]
+    assert half_window_s(options) >= 10.0 / 2 + 2.0
     assert isinstance(outcome, Unsolvable)
 
 
-def test_the_scans_read_reach_as_far_as_any_window_can():
-    options = CalibrationOptions(locating=LocatingOptions(window_s=10.0, max_time_gap_s=2.0))
-    assert half_window_s(options) >= 10.0 / 2 + 2.0
-
-
 def test_reading_more_scans_than_needed_does_not_change_the_answer(recording, clicks, solved):
-    everything = Radar(recording.radar_scans)
-    outcome = solve_clicks(everything, clicks, recording.camera(), CalibrationOptions())
-    assert isinstance(outcome, Calibration)
+    outcome = solve_clicks(Radar(recording.radar_scans), clicks, recording.camera(), CalibrationOptions())
     assert calibration_text(outcome, recording) == calibration_text(solved, recording)
 
 
@@ -180,7 +167,6 @@ def test_reading_more_scans_than_needed_does_not_change_the_answer(recording, cl
 def test_page_and_command_line_give_the_same_bytes(tmp_path, recording, clicks, method):
     options = CalibrationOptions(method=method)
     by_command = solve_clicks(recording, clicks, recording.camera(), options)
-    assert isinstance(by_command, Calibration)
     answered = threading.Event()
     workspace = open_workspace(recording, camera=recording.camera(), session_folder=tmp_path / "s", name="sample")
     workspace.dispatch(OptionsChanged.of(options))
@@ -189,7 +175,6 @@ def test_page_and_command_line_give_the_same_bytes(tmp_path, recording, clicks, 
     assert answered.wait(60)
     by_page = workspace.session.outcome
     workspace.close()
-    assert isinstance(by_page, Calibration)
     assert calibration_text(by_page, recording) == calibration_text(by_command, recording)
 
 
@@ -215,61 +200,44 @@ def test_the_text_says_what_went_in(sample, recording, solved):
     assert {row.name: row.sha256 for row in file.provenance.inputs} == {
         name: sha256((sample / name).read_bytes()).hexdigest() for name in ("camera.bag", "radar.bag")
     }
-    assert file.provenance.radar_topic == recording.radar_topic
-    assert file.provenance.image_topic == recording.image_topic
-    assert file.provenance.version == version()
+    made = file.provenance
+    assert (made.radar_topic, made.image_topic, made.version) == (
+        recording.radar_topic,
+        recording.image_topic,
+        version(),
+    )
     assert (file.frames.radar, file.frames.camera) == (recording.radar_frame, recording.camera_frame)
-
-
-def test_the_text_says_what_the_user_specified_about_axes(sample, solved):
     options = RecordingOptions(radar_axes="forward,right,up")
-    with open_recording([sample / "camera.bag", sample / "radar.bag"], options) as recording:
-        provenance = json.loads(calibration_text(solved, recording))["provenance"]
-    assert provenance["radar_axes"] == "forward,right,up"
-    assert provenance["video_start"] is None, "the frames are from no video"
-
-
-class Renamed:
-    """A recording with odd frame names."""
-
-    def __init__(self, recording: Recording, radar_frame: str, camera_frame: str) -> None:
-        self._recording = recording
-        self.radar_frame, self.camera_frame = radar_frame, camera_frame
-
-    def __getattr__(self, name: str) -> object:
-        return getattr(self._recording, name)
+    with open_recording([sample / "camera.bag", sample / "radar.bag"], options) as turned:
+        made = json.loads(calibration_text(solved, turned))["provenance"]
+    assert (made["radar_axes"], made["video_start"]) == ("forward,right,up", None), "the frames are from no video"
 
 
 @pytest.mark.parametrize(
-    ("radar_frame", "camera_frame", "names"),
+    ("frames", "names"),
     [
-        ("", "", ("radar", "camera_optical")),
-        ("r", "", ("r", "camera_optical")),
-        ("same", "same", ("radar", "camera_optical")),
-        ("$(evil)", "c", ("radar", "camera_optical")),
+        (("", ""), ("radar", "camera_optical")),
+        (("r", ""), ("r", "camera_optical")),
+        (("same", "same"), ("radar", "camera_optical")),
+        (("$(evil)", "c"), ("radar", "camera_optical")),
     ],
 )
-def test_odd_frame_names_do_not_cost_the_calibration(recording, solved, radar_frame, camera_frame, names):
-    text = calibration_text(solved, Renamed(recording, radar_frame, camera_frame))
-    frames = json.loads(text)["frames"]
-    assert (frames["radar"], frames["camera"]) == names
+def test_odd_frame_names_do_not_cost_the_calibration(recording, solved, frames, names, monkeypatch):
+    for sensor, name in zip(("radar", "camera"), frames, strict=True):
+        monkeypatch.setattr(recording, f"{sensor}_frame", name)
+    written = json.loads(calibration_text(solved, recording))["frames"]
+    assert (written["radar"], written["camera"]) == names
 
 
-def test_the_recordings_own_camera_is_used_unless_a_file_is_given(tmp_path, recording):
+def test_the_recordings_own_camera_is_used_unless_a_file_that_fits_is_given(tmp_path, recording):
     assert camera_for(recording, None) is recording.camera()
-    given = recording.camera()
+    given, path = recording.camera(), tmp_path / "camera.yaml"
     other = Camera("pinhole", given.width_px, given.height_px, given.matrix_px * [[1.1], [1.1], [1.0]])
-    (tmp_path / "camera.yaml").write_text(camera_info_text(other), encoding="utf-8")
-    read = camera_for(recording, CameraFile.read(tmp_path / "camera.yaml"))
-    assert read.matrix_px == pytest.approx(other.matrix_px)
-
-
-def test_intrinsics_of_another_image_size_are_refused_with_both_sizes(tmp_path, recording):
-    (tmp_path / "camera.yaml").write_text(
-        camera_info_text(replace(CAMERA, width_px=123, height_px=45)), encoding="utf-8"
-    )
+    path.write_text(camera_info_text(other), encoding="utf-8")
+    assert camera_for(recording, CameraFile.read(path)).matrix_px == pytest.approx(other.matrix_px)
+    path.write_text(camera_info_text(replace(CAMERA, width_px=123, height_px=45)), encoding="utf-8")
     with pytest.raises(InputError, match=r"camera\.yaml: calibrated for 123 x 45 px, but the frames have"):
-        camera_for(recording, CameraFile.read(tmp_path / "camera.yaml"))
+        camera_for(recording, CameraFile.read(path))
 
 
 def test_a_camera_file_is_named_by_its_content_whether_it_came_by_its_path_or_was_dropped_on_the_page(
@@ -287,37 +255,15 @@ def test_a_camera_file_is_named_by_its_content_whether_it_came_by_its_path_or_wa
     assert inputs[:-1] == json.loads(calibration_text(solved, recording))["provenance"]["inputs"]
 
 
-def pairs_text(solved: Calibration, count: int) -> str:
-    camera = solved.camera
-    return json.dumps(
-        {
-            "schema": "cocalib/pairs-1",
-            "camera": {
-                "model": camera.model,
-                "width_px": camera.width_px,
-                "height_px": camera.height_px,
-                "matrix_px": camera.matrix_px.tolist(),
-                "distortion": camera.distortion.tolist(),
-            },
-            "pairs": [
-                {"id": pair.id, "radar_m": pair.point_radar_m.tolist(), "pixel_px": pair.pixel_px.tolist()}
-                for pair in solved.pairs[:count]
-            ],
-        }
-    )
-
-
 def test_a_file_of_pairs_is_solved_and_named_in_the_text(solved):
-    text = pairs_text(solved, 20)
-    outcome = solve_pairs(GivenPairs.read(text, "pairs.json"), CalibrationOptions())
-    assert isinstance(outcome, Calibration)
-    inputs = json.loads(calibration_text_of_pairs(outcome, GivenPairs.read(text, "pairs.json")))["provenance"]["inputs"]
+    pairs = [(pair.id, pair.point_radar_m, pair.pixel_px) for pair in solved.pairs]
+    text = pairs_text(solved.camera, pairs)
+    given = GivenPairs.read(text, "pairs.json")
+    outcome = solve_pairs(given, CalibrationOptions())
+    inputs = json.loads(calibration_text_of_pairs(outcome, given))["provenance"]["inputs"]
     assert [(row["name"], row["sha256"]) for row in inputs] == [("pairs.json", sha256(text.encode()).hexdigest())]
-
-
-def test_too_few_pairs_in_a_file_are_an_answer_and_no_file_of_pairs_is_an_error(solved):
-    outcome = solve_pairs(GivenPairs.read(pairs_text(solved, 3), "pairs.json"), CalibrationOptions())
-    assert isinstance(outcome, Unsolvable)
+    few = GivenPairs.read(pairs_text(solved.camera, pairs[:3]), "pairs.json")
+    assert isinstance(solve_pairs(few, CalibrationOptions()), Unsolvable)
     with pytest.raises(InputError, match=r"pairs\.json"):
         solve_pairs(GivenPairs.read("{}", "pairs.json"), CalibrationOptions())
 

@@ -71,6 +71,8 @@ def test_a_page_that_waits_sees_the_first_picture_and_is_greeted_once_the_record
         server = early(opening)
         assert capsys.readouterr().out.splitlines() == ["Opening long.bag", f"Open {server.url}"]
         cookie = come_in(server)
+        with channel(server, cookie, "/ws/gone") as gone:
+            wanted(gone, "opening")
         with channel(server, cookie, "/ws/tab1") as one, channel(server, cookie, "/ws/tab2") as two:
             for socket in (one, two):
                 socket.send('{"type":"hello"}')
@@ -116,18 +118,6 @@ def test_messages_sent_while_waiting_are_handled_afterwards_in_order(workspace):
     )
 
 
-def test_a_page_that_disconnects_while_waiting_does_not_affect_others(workspace):
-    with service() as opening:
-        server = early(opening)
-        cookie = come_in(server)
-        with channel(server, cookie, "/ws/gone") as gone:
-            wanted(gone, "opening")
-        with channel(server, cookie, "/ws/stays") as stays:
-            stays.send('{"type":"hello"}')
-            server.admit(workspace, RECORDING)
-            assert wanted(stays, "recording")["name"] == "three greys"
-
-
 def test_a_page_that_sends_too_many_messages_while_waiting_is_disconnected():
     with service() as opening:
         server = early(opening)
@@ -162,9 +152,6 @@ def _end_of(server: RunningServer, socket: ClientConnection, error: BaseExceptio
 def test_an_end_while_opening_reaches_the_page_and_the_caller(error):
     with ExitStack() as pages, pytest.raises(type(error)):
         fail_to_open(error, pages)
-
-
-def test_an_error_of_another_kind_is_left_to_the_terminal():
     assert serving._problem_text(OSError(5, "Input/output error")).endswith("see the terminal for the reason.")
 
 
@@ -233,12 +220,6 @@ def test_an_error_that_ends_the_program_does_not_hide_where_the_clicks_are(tmp_p
     assert "no port is free" in problem
 
 
-def test_an_immediate_error_starts_no_server(monkeypatch):
-    monkeypatch.setattr(serving, "RunningServer", None)
-    with pytest.raises(RecordingError, match="empty"), service(let_in_after_s=LONG_S):
-        raise RecordingError("empty")
-
-
 def test_a_port_that_cannot_be_bound_is_reported_before_anything_is_opened(monkeypatch):
     def taken(*_: object) -> None:
         raise OSError("no port is free")
@@ -246,6 +227,9 @@ def test_a_port_that_cannot_be_bound_is_reported_before_anything_is_opened(monke
     monkeypatch.setattr(serving, "RunningServer", taken)
     with pytest.raises(OSError, match="no port is free"), service():
         pytest.fail("opened anyway")
+    monkeypatch.setattr(serving, "RunningServer", None)
+    with pytest.raises(RecordingError, match="empty"), service(let_in_after_s=LONG_S):
+        raise RecordingError("empty")  # at once: no server is started
 
 
 def test_a_late_error_is_one_line_and_exit_code_2(tmp_path, monkeypatch, capsys):
@@ -284,7 +268,7 @@ RunningServer.admit = lambda *arguments: (admit(*arguments), print("serving"))
 """
 
 
-def started(arguments: Sequence[object], *, patch: str, sigint: str) -> subprocess.Popen[str]:
+def started(arguments: Sequence[object], *, patch: str, sigint: str = "SIG_IGN") -> subprocess.Popen[str]:
     """Start the program in its own process, after a patch.
 
     Args:
@@ -300,13 +284,9 @@ def started(arguments: Sequence[object], *, patch: str, sigint: str) -> subproce
     )  # fmt: skip
 
 
-def stopped(running: subprocess.Popen[str], *, once_printed: str, by: signal.Signals) -> tuple[int, str, str]:
-    """Send a signal once the program has printed a text; return its exit code and what it printed after that."""
-    assert running.stdout is not None
-    assert any(once_printed in line for line in running.stdout)
-    running.send_signal(by)
-    out, err = running.communicate(timeout=30)
-    return running.returncode, out, err
+def printed(running: subprocess.Popen[str], text: str) -> bool:
+    """Wait until the program has printed a text."""
+    return any(text in line for line in running.stdout)
 
 
 @POSIX_SIGNALS
@@ -319,8 +299,10 @@ def test_a_signal_while_opening_ends_the_program_quietly(tmp_path, sigint, sent,
     (tmp_path / "long.bag").write_bytes(b"")
     arguments = ["open", tmp_path / "long.bag", "--no-browser", "--port", 0]
     running = started(arguments, patch=SLOW_TO_OPEN, sigint=sigint)
-    returned, _, errors = stopped(running, once_printed="http://", by=sent)
-    assert (returned, errors.strip()) == (code, "")
+    assert printed(running, "http://")
+    running.send_signal(sent)
+    _, errors = running.communicate(timeout=30)
+    assert (running.returncode, errors.strip()) == (code, "")
 
 
 SLOW_TO_CLOSE = f"""{PRINTS_WHEN_IT_SERVES}
@@ -335,27 +317,7 @@ SessionFile.close = close_slowly
 """
 
 
-@POSIX_SIGNALS
-@pytest.mark.parametrize(
-    ("first", "second"),
-    [(signal.SIGINT, signal.SIGTERM), (signal.SIGTERM, signal.SIGHUP), (signal.SIGHUP, signal.SIGINT)],
-    ids=lambda sent: sent.name,
-)
-def test_a_signal_while_serving_closes_the_session_and_a_second_one_does_not_interrupt_that(tmp_path, first, second):
-    arguments = ["demo", "--no-browser", "--port", 0, "--session", tmp_path / "session"]
-    sigint = "default_int_handler" if signal.SIGINT in (first, second) else "SIG_IGN"
-    running = started(arguments, patch=SLOW_TO_CLOSE, sigint=sigint)
-    assert running.stdout is not None
-    assert any("serving" in line for line in running.stdout)
-    running.send_signal(first)
-    assert any("closing" in line for line in running.stdout)
-    running.send_signal(second)
-    out, errors = running.communicate("\n", timeout=30)
-    assert (running.returncode, errors) == (0, "")
-    assert "all clicks are saved" in out
-    assert (tmp_path / "session" / "journal-copy.jsonl").is_file()
-
-
+SWITCHED_OFF = f"signal.signal(signal.SIGHUP, signal.SIG_IGN)\n{PRINTS_WHEN_IT_SERVES}"
 SIGNAL_IN_ANOTHER_THREAD = f"""{PRINTS_WHEN_IT_SERVES}
 import sys, time
 def raise_when_it_waits():
@@ -369,31 +331,34 @@ threading.Thread(target=raise_when_it_waits, daemon=True).start()
 
 
 @POSIX_SIGNALS
-def test_a_signal_that_does_not_wake_the_waiting_thread_is_noticed_soon(tmp_path):
-    """Such as one that comes just before it waits."""
+@pytest.mark.parametrize(
+    ("patch", "sent", "later"),
+    [
+        (SLOW_TO_CLOSE, [signal.SIGINT], [signal.SIGTERM]),
+        (SLOW_TO_CLOSE, [signal.SIGTERM], [signal.SIGHUP]),
+        (SLOW_TO_CLOSE, [signal.SIGHUP], [signal.SIGINT]),
+        (SIGNAL_IN_ANOTHER_THREAD, [], []),
+        (SWITCHED_OFF, [signal.SIGHUP, signal.SIGINT, signal.SIGTERM], []),
+    ],
+    ids=["SIGINT first", "SIGTERM first", "SIGHUP first", "just before the main thread waits", "nohup"],
+)
+def test_a_signal_while_serving_closes_the_session_and_a_second_one_does_not_interrupt_that(
+    tmp_path, patch, sent, later
+):
+    """A signal that is switched off stays off: `nohup cocalib open` outlives its terminal."""
     arguments = ["demo", "--no-browser", "--port", 0, "--session", tmp_path / "session"]
-    running = started(arguments, patch=SIGNAL_IN_ANOTHER_THREAD, sigint="SIG_IGN")
-    assert running.stdout is not None
-    assert any("serving" in line for line in running.stdout)
+    takes_sigint = patch == SLOW_TO_CLOSE and signal.SIGINT in (*sent, *later)
+    running = started(arguments, patch=patch, sigint="default_int_handler" if takes_sigint else "SIG_IGN")
+    assert printed(running, "serving")
+    for one in sent:
+        running.send_signal(one)
+    if later:
+        assert printed(running, "closing")
+        running.send_signal(later[0])
     out, errors = running.communicate("\n", timeout=30)
     assert (running.returncode, errors) == (0, "")
     assert "all clicks are saved" in out
-
-
-@POSIX_SIGNALS
-def test_a_signal_that_is_switched_off_stays_off(tmp_path):
-    """`nohup cocalib open` outlives its terminal."""
-    arguments = ["demo", "--no-browser", "--port", 0, "--session", tmp_path / "session"]
-    patch = f"signal.signal(signal.SIGHUP, signal.SIG_IGN)\n{PRINTS_WHEN_IT_SERVES}"
-    running = started(arguments, patch=patch, sigint="SIG_IGN")
-    assert running.stdout is not None
-    assert any("serving" in line for line in running.stdout)
-    running.send_signal(signal.SIGHUP)
-    running.send_signal(signal.SIGINT)
-    running.send_signal(signal.SIGTERM)
-    out, errors = running.communicate(timeout=30)
-    assert (running.returncode, errors) == (0, "")
-    assert "all clicks are saved" in out
+    assert (tmp_path / "session" / "journal-copy.jsonl").is_file()
 
 
 def test_a_large_recording_has_its_link_before_it_is_opened(tmp_path, monkeypatch, capsys):
