@@ -3,7 +3,7 @@
 import json
 import shutil
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -26,32 +26,29 @@ START = TimeNs(1_700_000_000 * NS_PER_S)
 DWELL_S = 4
 FRAME_TIMES_S = 0.5
 SCAN_TIMES_S = 0.1
+CAMERA = Camera(
+    "plumb_bob",
+    320,
+    240,
+    np.array([[260.0, 0, 160], [0, 260, 120], [0, 0, 1]]),
+    np.array([-0.1, 0.02, 0.001, -0.001]),
+)
+CAMERA_FROM_RADAR = RigidTransform(
+    rotation_exp(np.array([0.02, -0.03, 0.01])) @ np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]]),
+    np.array([0.05, -0.06, 0.02]),
+)
 
 
 @dataclass(frozen=True)
 class Made:
     """A recording to make: eight placements by default, four seconds each."""
 
-    camera: Camera = field(
-        default_factory=lambda: Camera(
-            "plumb_bob",
-            320,
-            240,
-            np.array([[260.0, 0, 160], [0, 260, 120], [0, 0, 1]]),
-            np.array([-0.1, 0.02, 0.001, -0.001]),
-        )
-    )
-    camera_from_radar: RigidTransform = field(
-        default_factory=lambda: RigidTransform(
-            rotation_exp(np.array([0.02, -0.03, 0.01])) @ np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]]),
-            np.array([0.05, -0.06, 0.02]),
-        )
-    )
+    camera: Camera = CAMERA
+    camera_from_radar: RigidTransform = CAMERA_FROM_RADAR
     placements: int = 8
     with_camera_info: bool = True
     with_images: bool = True
     with_radar: bool = True
-    radar_late_s: float = 0.0
     nan_scans: int = 0
     with_speeds: bool = True
     reflector_m: float = 0.0
@@ -71,8 +68,7 @@ class Made:
         pixels = self.camera.project(self.camera_from_radar @ self.positions_radar_m)
         clicks = []
         for index, (u, v) in enumerate(pixels):
-            time = TimeNs(START + int((index * DWELL_S + DWELL_S / 2) * NS_PER_S))
-            sec, nanosec = time_parts(time)
+            sec, nanosec = time_parts(TimeNs(START + int((index * DWELL_S + DWELL_S / 2) * NS_PER_S)))
             clicks.append({"id": f"c{index}", "image_time": {"sec": sec, "nanosec": nanosec}, "pixel_px": [u, v]})
         return json.dumps({"schema": "cocalib/clicks-1", "clicks": clicks})
 
@@ -92,28 +88,25 @@ class Made:
     def messages(self) -> Iterator[RecordedMessage]:
         """Yield the messages in order of time."""
         jpegs = [cv2.imencode(".jpg", self.picture(index))[1].tobytes() for index in range(self.placements)]
-        late = int(self.radar_late_s * NS_PER_S)
         made: list[RecordedMessage] = []
         for k in range(int(self.placements * DWELL_S / FRAME_TIMES_S) + 1):
             time = TimeNs(START + int(k * FRAME_TIMES_S * NS_PER_S))
             if self.with_images:
                 jpeg = jpegs[min(int(k * FRAME_TIMES_S / DWELL_S), self.placements - 1)]
-                made.append(
-                    RecordedMessage("/camera/image/compressed", time, CompressedImageMessage(time, "cam", jpeg))
-                )
+                image = CompressedImageMessage(time, "cam", jpeg)
+                made.append(RecordedMessage("/camera/image/compressed", time, image))
             if self.with_camera_info:
                 made.append(RecordedMessage("/camera/camera_info", time, CameraInfoMessage(time, "cam", self.camera)))
         rng = np.random.default_rng(7)
         for k in range(int(self.placements * DWELL_S / SCAN_TIMES_S)) if self.with_radar else ():
-            time = TimeNs(START + late + int(k * SCAN_TIMES_S * NS_PER_S))
+            time = TimeNs(START + int(k * SCAN_TIMES_S * NS_PER_S))
             index = int(k * SCAN_TIMES_S / DWELL_S)
             points = self.positions_radar_m[[index]] + rng.normal(0, 0.003, (1, 3))
             values = np.concatenate([points, [[0.0, 20.0]]], axis=1)
             if k % 7 < self.nan_scans:
                 values[:, 0] = np.nan
             names = ("x", "y", "z", "velocity", "snr") if self.with_speeds else ("x", "y", "z", "snr")
-            if not self.with_speeds:
-                values = np.delete(values, 3, axis=1)
+            values = values if self.with_speeds else np.delete(values, 3, axis=1)
             made.append(RecordedMessage("/radar/points", time, CloudMessage(time, "radar", names, values)))
         return iter(sorted(made, key=lambda message: message.receive_time))
 
@@ -141,6 +134,29 @@ def cocalib(capsys: pytest.CaptureFixture[str]) -> Callable[..., Typed]:
         return Typed(code, captured.out, captured.err)
 
     return typed
+
+
+@pytest.fixture(scope="session")
+def sample(project_root: Path) -> Path:
+    return project_root / "sample_data" / "rooftop"
+
+
+@pytest.fixture(scope="session")
+def bags(sample: Path) -> tuple[Path, Path]:
+    return sample / "camera.bag", sample / "radar.bag"
+
+
+@pytest.fixture(scope="session")
+def golden(project_root: Path) -> Path:
+    return project_root / "tests" / "golden" / "calibration-1.json"
+
+
+@pytest.fixture(scope="session")
+def solved_sample(sample: Path, bags: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the calibration of the sample's own clicks."""
+    out = tmp_path_factory.mktemp("sample") / "calibration.json"
+    assert run(["solve", *map(str, bags), "--clicks", str(sample / "clicks.json"), "--out", str(out)]) == 0
+    return out
 
 
 @pytest.fixture(scope="session")

@@ -18,11 +18,6 @@ def paths(project_root: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple
     return vendor_sample(project_root / "sample_data" / "rooftop", tmp_path_factory.mktemp("vendor"))
 
 
-@pytest.fixture
-def clicks(project_root: Path) -> Path:
-    return project_root / "sample_data" / "rooftop" / "clicks.json"
-
-
 def test_info_shows_what_was_taken_for_what_and_what_is_assumed(cocalib, paths):
     answer = cocalib("info", *paths)
     assert answer.code == 0
@@ -39,17 +34,18 @@ def test_info_shows_what_was_taken_for_what_and_what_is_assumed(cocalib, paths):
     assert [row["confirmed"] for row in summary["assumptions"]] == [False, False]
 
 
-def test_solve_waits_until_everything_is_confirmed_or_stated(cocalib, paths, clicks, tmp_path):
-    answer = cocalib("solve", *paths, "--clicks", clicks, "--out", tmp_path / "a.json")
+def test_solve_waits_until_everything_is_confirmed_or_stated(cocalib, paths, sample, tmp_path):
+    clicks = ("--clicks", sample / "clicks.json")
+    answer = cocalib("solve", *paths, *clicks, "--out", tmp_path / "a.json")
     assert answer.code == 2
     assert "f_Azimuth is taken as growing to the left" in answer.err
     assert "--confirm-assumptions" in answer.err
-    confirmed = cocalib("solve", *paths, "--clicks", clicks, "--out", tmp_path / "b.json", "--confirm-assumptions")
+    confirmed = cocalib("solve", *paths, *clicks, "--out", tmp_path / "b.json", "--confirm-assumptions")
     assert confirmed.code == 0, confirmed.err
     provenance = json.loads((tmp_path / "b.json").read_text())["provenance"]
     assert [one["confirmed"] for one in provenance["assumptions"]] == [True, True]
     maps = [word for one in STATED for word in ("--map", one)]
-    stated = cocalib("solve", *paths, "--clicks", clicks, "--out", tmp_path / "c.json", *maps)
+    stated = cocalib("solve", *paths, *clicks, "--out", tmp_path / "c.json", *maps)
     assert stated.code == 0, stated.err
     provenance = json.loads((tmp_path / "c.json").read_text())["provenance"]
     assert "assumptions" not in provenance

@@ -23,23 +23,6 @@ def moved(solved: Path, tmp_path: Path) -> Path:
     return tmp_path / "moved.txt"
 
 
-def test_a_file_is_that_calibrations_file_or_stale(cocalib, solved, tmp_path):
-    out = tmp_path / "tf.sh"
-    cocalib("export", solved, "--to", "tf2", "--out", out)
-
-    fresh = cocalib("check", out, "--of", solved)
-    assert fresh.code == 0, fresh.out
-    assert "ok: the pose is that calibration's" in fresh.out
-
-    content = json.loads(solved.read_text())
-    content["warnings"] = []
-    del content["verdict"]
-    other = tmp_path / "other.json"
-    other.write_text(json.dumps(content))
-    stale = cocalib("check", out, "--of", other)
-    assert "stale: exported from another calibration than this one (sha256 " in stale.out
-
-
 def test_a_pose_that_rests_on_a_fleets_prior_is_warned_of(cocalib, project_root, tmp_path):
     drawn = project_root / "tests/golden/calibration-1-fleet-prior.json"
     checked = cocalib("check", drawn)

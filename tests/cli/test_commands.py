@@ -3,7 +3,6 @@
 import hashlib
 import json
 import os
-import threading
 import tomllib
 from functools import partial
 from pathlib import Path
@@ -104,18 +103,25 @@ def test_info_names_the_topics_as_text_and_as_json(cocalib, made):
     assert {topic["name"] for topic in json.loads(data.out)["topics"]} == names
 
 
-@pytest.mark.parametrize("command", [["export", "--to", "urdf"], ["import"]], ids=["export", "import"])
-def test_a_file_is_read_once_and_may_be_a_pipe(cocalib, solved, tmp_path, command):
-    out = tmp_path / "out"
+@pytest.mark.parametrize(
+    ("command", "source"),
+    [
+        ("export {} --to urdf", "calibration.json"),
+        ("import {}", "calibration.json"),
+        ("solve --pairs {}", "calibration.json"),
+        ("solve --pairs {}", "pairs.json"),
+    ],
+)
+def test_a_file_is_read_once_and_may_be_a_pipe(cocalib, solved, pairs_file, tmp_path, command, source):
     reading, writing = os.pipe()
-    os.write(writing, solved.read_bytes())
+    os.write(writing, (tmp_path / source).read_bytes())
     os.close(writing)
     try:
-        answer = cocalib(command[0], f"/dev/fd/{reading}", *command[1:], "--out", out)
+        answer = cocalib(*command.format(f"/dev/fd/{reading}").split(), "--out", tmp_path / "out")
     finally:
         os.close(reading)
     assert answer.code == 0, answer.err
-    assert cocalib("check", out, "--against", solved).code == 0
+    assert cocalib("check", tmp_path / "out", "--against", solved, "--max-deg", 1, "--max-px", 20).code == 0
 
 
 def test_export_without_out_prints_and_into_a_folder_names_itself(cocalib, solved, tmp_path):
@@ -241,20 +247,6 @@ def test_a_calibration_is_solved_again_and_only_typed_options_change(cocalib, pa
     }
     assert texts[2]["options"]["method"] == "default"
     assert texts[2]["options"]["solving"]["camera_position"] == {"position_m": [0.1, 0.0, 0.05], "sigma_m": 0.02}
-
-
-@pytest.mark.skipif(os.name == "nt", reason="no named pipes in the file system")
-@pytest.mark.parametrize("solved", [False, True], ids=["pairs-1", "calibration-1"])
-def test_pairs_are_read_once_so_a_pipe_works(cocalib, pairs_file, tmp_path, solved):
-    source, pipe = pairs_file, tmp_path / "pipe"
-    if solved:
-        assert cocalib("solve", "--pairs", source, "--out", tmp_path / "a.json").code == 0
-        source = tmp_path / "a.json"
-    os.mkfifo(pipe)
-    writer = threading.Thread(target=pipe.write_bytes, args=(source.read_bytes(),), daemon=True)
-    writer.start()
-    assert cocalib("solve", "--pairs", pipe, "--out", tmp_path / "b.json").code == 0
-    writer.join(60)
 
 
 def test_a_table_of_pairs_is_solved_with_a_camera(cocalib, pairs_file, tmp_path):

@@ -12,48 +12,23 @@ import pytest
 from mcap.reader import make_reader
 
 import cocalib.cli.export as command
+from cocalib.cli import run
 
 
 @pytest.fixture(scope="module")
-def calibration(project_root, tmp_path_factory):
-    """Return the calibration of the sample's own clicks."""
-    from cocalib.cli import run
-
-    path = tmp_path_factory.mktemp("calibration") / "calibration.json"
-    sample = project_root / "sample_data" / "rooftop"
-    assert run(["solve", *map(str, files(sample)), "--clicks", str(sample / "clicks.json"), "--out", str(path)]) == 0
-    return path
-
-
-@pytest.fixture
-def sample(project_root):
-    return project_root / "sample_data" / "rooftop"
-
-
-@pytest.fixture(scope="module")
-def exported(project_root, calibration, tmp_path_factory):
+def exported(solved_sample: Path, bags: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the new recording."""
-    from cocalib.cli import run
-
     out = tmp_path_factory.mktemp("exported") / "new.mcap"
-    sample = project_root / "sample_data" / "rooftop"
-    assert (
-        run(["export", str(calibration), "--to", "mcap", "--recording", *map(str, files(sample)), "--out", str(out)])
-        == 0
-    )
+    assert run(["export", str(solved_sample), "--to", "mcap", "--recording", *map(str, bags), "--out", str(out)]) == 0
     return out
 
 
-def files(sample):
-    return sample / "camera.bag", sample / "radar.bag"
-
-
 def test_the_new_recording_gives_the_same_calibration_from_the_same_clicks(
-    cocalib, sample, calibration, exported, tmp_path
+    cocalib, sample, solved_sample, exported, tmp_path
 ):
     again = tmp_path / "again.json"
     assert cocalib("solve", exported, "--clicks", sample / "clicks.json", "--out", again).code == 0
-    first, second = (json.loads(path.read_text()) for path in (calibration, again))
+    first, second = (json.loads(path.read_text()) for path in (solved_sample, again))
     for document in (first, second):
         document["provenance"].pop("inputs")
     assert first == second
@@ -67,7 +42,7 @@ def test_the_new_recording_gives_the_same_calibration_from_the_same_clicks(
 
 
 @pytest.mark.parametrize("link", ["itself", "symlink", "hardlink"])
-def test_the_recording_itself_is_never_written_over(link, cocalib, calibration, exported, tmp_path):
+def test_the_recording_itself_is_never_written_over(link, cocalib, solved_sample, exported, tmp_path):
     first = Path(shutil.copy(exported, tmp_path / "first.mcap"))
     before = first.read_bytes()
     out = first if link == "itself" else tmp_path / "other.mcap"
@@ -75,31 +50,22 @@ def test_the_recording_itself_is_never_written_over(link, cocalib, calibration, 
         out.symlink_to(first)
     elif link == "hardlink":
         out.hardlink_to(first)
-    done = cocalib("export", calibration, "--to", "mcap", "--recording", first, "--out", out, "--force")
+    done = cocalib("export", solved_sample, "--to", "mcap", "--recording", first, "--out", out, "--force")
     assert (done.code, first.read_bytes() == before) == (2, True)
     assert "is the recording itself, which is never changed" in done.err
 
 
-def test_a_file_that_exists_is_overwritten_only_with_force(cocalib, sample, calibration, tmp_path):
-    command_line = (
-        "export",
-        calibration,
-        "--to",
-        "mcap",
-        "--recording",
-        *files(sample),
-        "--out",
-        tmp_path / "new.mcap",
-    )
+def test_a_file_that_exists_is_overwritten_only_with_force(cocalib, bags, solved_sample, tmp_path):
+    typed = ("export", solved_sample, "--to", "mcap", "--recording", *bags, "--out", tmp_path / "new.mcap")
     for name in ("new.mcap", "new.foxglove-layout.json"):
         (tmp_path / name).write_text("mine")
-        done = cocalib(*command_line)
+        done = cocalib(*typed)
         assert done.code == 2
         assert f"{name}: already exists" in done.err
         assert [path.read_text() for path in tmp_path.iterdir()] == ["mine"]
         (tmp_path / name).unlink()
     (tmp_path / "new.mcap").write_text("mine")
-    done = cocalib(*command_line, "--force")
+    done = cocalib(*typed, "--force")
     assert done.code == 0
     assert "messages of the recording, unchanged; added: " in done.out
     assert (tmp_path / "new.mcap").read_bytes()[1:5] == b"MCAP"
@@ -121,7 +87,7 @@ class Full(io.RawIOBase):
 @pytest.mark.parametrize(
     "stop", [OSError(errno.ENOSPC, "No space left on device"), KeyboardInterrupt()], ids=["full", "ctrl-c"]
 )
-def test_nothing_half_written_stays(stop, cocalib, sample, calibration, tmp_path, monkeypatch):
+def test_nothing_half_written_stays(stop, cocalib, bags, solved_sample, tmp_path, monkeypatch):
     writing = command.writing_whole
 
     @contextmanager
@@ -130,7 +96,7 @@ def test_nothing_half_written_stays(stop, cocalib, sample, calibration, tmp_path
             yield Full(stream, 1_000_000, stop)
 
     monkeypatch.setattr(command, "writing_whole", small)
-    done = cocalib("export", calibration, "--to", "mcap", "--recording", *files(sample), "--out", tmp_path / "new.mcap")
+    done = cocalib("export", solved_sample, "--to", "mcap", "--recording", *bags, "--out", tmp_path / "new.mcap")
     assert done.code != 0
     assert list(tmp_path.iterdir()) == []
     if isinstance(stop, OSError):
@@ -138,13 +104,13 @@ def test_nothing_half_written_stays(stop, cocalib, sample, calibration, tmp_path
 
 
 @pytest.mark.parametrize("to", ["mcap", "tf2", "into"])
-def test_an_assumed_meaning_is_said_with_every_export(to, cocalib, sample, calibration, tmp_path):
-    content = json.loads(calibration.read_text()) | {"evidence": "imported_assumed", "warnings": []}
+def test_an_assumed_meaning_is_said_with_every_export(to, cocalib, bags, solved_sample, tmp_path):
+    content = json.loads(solved_sample.read_text()) | {"evidence": "imported_assumed", "warnings": []}
     assumed, vehicle = tmp_path / "assumed.json", tmp_path / "vehicle.urdf"
     assumed.write_text(json.dumps(content))
-    cocalib("export", calibration, "--to", "urdf", "--out", vehicle)
+    cocalib("export", solved_sample, "--to", "urdf", "--out", vehicle)
     options = {
-        "mcap": ("--to", "mcap", "--recording", *files(sample), "--out", tmp_path / "new.mcap"),
+        "mcap": ("--to", "mcap", "--recording", *bags, "--out", tmp_path / "new.mcap"),
         "tf2": ("--to", "tf2"),
         "into": ("--into", vehicle),
     }[to]

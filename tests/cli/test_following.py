@@ -39,9 +39,3 @@ def test_a_recording_that_has_not_been_begun_is_waited_for(cocalib, served, monk
     [(recording, frames)] = served
     assert isinstance(recording, FollowedRecording)
     assert frames > 5
-
-
-def test_what_cannot_be_followed_is_refused_at_once(cocalib, tmp_path):
-    answer = cocalib("open", "--follow", tmp_path / "radar.csv", "--no-browser", "--port", 0)
-    assert answer.code == 2
-    assert "radar.csv: cannot be followed" in answer.err

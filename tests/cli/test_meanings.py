@@ -58,13 +58,12 @@ def test_pairs_decide_what_the_numbers_mean(cocalib, ambiguous, camera_file, pai
 
 
 def test_what_the_pairs_contradict_cannot_be_picked(cocalib, ambiguous, camera_file, pairs_file, tmp_path):
-    out = tmp_path / "out.json"
-    picking = ("--as", "camera_from_radar,body,m", "--pairs", pairs_file)
-    refused = cocalib("import", ambiguous, *picking, "--out", out, "--camera", camera_file)
+    flags = ("--as", "camera_from_radar,body,m", "--pairs", pairs_file, "--out", tmp_path / "out.json")
+    refused = cocalib("import", ambiguous, *flags, "--camera", camera_file)
     assert refused.code == 2
     assert "--as camera_from_radar,body,m is contradicted" in refused.err
     assert "the test supports radar_from_camera,body,m" in refused.err
-    assert not out.exists()
+    assert not (tmp_path / "out.json").exists()
 
 
 @pytest.mark.parametrize("inverse", [False, True])

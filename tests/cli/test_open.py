@@ -48,20 +48,13 @@ def test_a_radar_alone_is_opened_without_intrinsics_and_stores_nothing(served, c
     assert [path.name for path in radar.parent.iterdir() if path.name != "state"] == ["radar.bag"]
 
 
-@pytest.mark.parametrize("flag", ["--camera", "--calibration", "--clicks"])
-def test_files_that_need_a_camera_are_refused_without_one(flag, served, copied, capsys):
-    clicks = copied("clicks.json")
-    assert run(["open", str(copied("radar.bag")), "--no-browser", flag, str(clicks)]) == 2
-    errors = capsys.readouterr().err
-    assert "clicks.json cannot be used; give the camera's recording as well" in errors
-    assert served == []
-
-
-def test_a_camera_alone_is_refused_with_what_to_do(served, copied, capsys):
-    assert run(["open", str(copied("camera.bag")), "--no-browser"]) == 2
-    errors = capsys.readouterr().err
-    assert "camera.bag" in errors
-    assert "radar" in errors
+@pytest.mark.parametrize("flag", ["--camera", "--calibration", "--clicks", None])
+def test_files_that_need_a_camera_are_refused_without_one_and_a_camera_without_a_radar(flag, served, copied, cocalib):
+    recording, clicks = copied("radar.bag" if flag else "camera.bag"), copied("clicks.json")
+    answer = cocalib("open", recording, "--no-browser", *((flag, clicks) if flag else ()))
+    assert answer.code == 2
+    words = "clicks.json cannot be used; give the camera's recording as well" if flag else "no readable radar"
+    assert words in answer.err
     assert served == []
 
 
@@ -74,24 +67,16 @@ def test_intrinsics_next_to_the_recording_are_named(tmp_path, capsys):
     assert f"such as --camera {tmp_path / 'recording_csv' / 'camera.yaml'}" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(("camera", "clicks"), [("camera", "clicks.json"), ("camera_2", "clicks_2.json")])
-def test_each_of_two_cameras_in_one_recording_is_opened_by_its_topic(camera, clicks, served, tmp_path):
-    options = SimulationOptions(
-        placements=4,
-        dwell_s=4.0,
-        width_px=128,
-        height_px=80,
-        camera_rate_hz=1.0,
-        other_camera=OtherCamera(present=True),
-    )
+def test_each_of_two_cameras_in_one_recording_is_opened_by_its_topic(served, tmp_path, cocalib):
+    size = {"placements": 4, "dwell_s": 4.0, "width_px": 128, "height_px": 80, "camera_rate_hz": 1.0}
     with grey_frames():
-        write_recording(simulate(options), tmp_path)
-    bags = [str(tmp_path / name) for name in ("radar.bag", "camera.bag")]
-    topic = f"/{camera}/image_raw/compressed"
-    given = ["--image-topic", topic, "--clicks", str(tmp_path / clicks), "--no-browser"]
-    assert run(["open", *bags, *given]) == 0
-    expected = json.loads((tmp_path / clicks).read_text())["clicks"]
-    assert len(served[0].session.clicks) == len(expected) == 4
+        write_recording(simulate(SimulationOptions(**size, other_camera=OtherCamera(present=True))), tmp_path)
+    for camera, name in (("camera", "clicks.json"), ("camera_2", "clicks_2.json")):
+        given = ("--image-topic", f"/{camera}/image_raw/compressed", "--clicks", tmp_path / name, "--no-browser")
+        session = ("--session", tmp_path / camera)
+        assert cocalib("open", tmp_path / "radar.bag", tmp_path / "camera.bag", *given, *session).code == 0
+        expected = json.loads((tmp_path / name).read_text())["clicks"]
+        assert len(served.pop().session.clicks) == len(expected) == 4
 
 
 def test_clicks_that_nobody_confirmed_are_opened_with_a_note(served, made, clicks_file, capsys):

@@ -1,7 +1,6 @@
 """`cocalib solve --propose` and `cocalib solve --auto`: on a small recording, on the sample, and on what they must refuse."""
 
 import json
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,6 @@ from calib_core.recordings.containers.writing import write_ros2
 from cocalib.cli import run
 from tests.cli.conftest import DWELL_S, START, Made
 
-Cocalib = Callable[..., Any]
 SIZE = ("--reflector-m", "0.4")
 SEEN = Made(reflector_m=0.4, placements=12)
 
@@ -37,10 +35,6 @@ def true_pixel_px(image_time: dict[str, int]) -> np.ndarray:
 
 def off_px(click: dict[str, Any]) -> float:
     return float(np.linalg.norm(np.array(click["pixel_px"]) - true_pixel_px(click["image_time"])))
-
-
-def names_in(folder: Path) -> list[Path]:
-    return sorted(folder.rglob("*"))
 
 
 def test_what_is_proposed_is_the_reflector_and_becomes_clicks_that_solve(cocalib, recording, tmp_path):

@@ -1,16 +1,12 @@
 """`video --overlay`, `record-rrd` and `rerun` on good and on bad input."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from calib_core.measurements import NS_PER_S, TimeNs, time_parts
 from tests.cli.conftest import START
-
-Cocalib = Callable[..., Any]
 
 
 @pytest.fixture

@@ -20,3 +20,10 @@ def recording(project_root: Path) -> Iterator[Recording]:
 @pytest.fixture(scope="module")
 def clicks(project_root: Path) -> tuple[ReflectorClick, ...]:
     return read_clicks((project_root / "sample_data" / "rooftop" / "clicks.json").read_text(encoding="utf-8"))
+
+
+@pytest.fixture(autouse=True)
+def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Give the program a folder of its own for its state; return it."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    return tmp_path / "state" / "cocalib"

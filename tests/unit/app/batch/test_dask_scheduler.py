@@ -5,9 +5,9 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-import msgspec
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from calib_core.errors import InputError
 from cocalib.batch import dask_scheduler
@@ -46,9 +46,7 @@ def test_workers_of_a_scheduler_that_are_killed_change_no_outcome(address, tmp_p
         found = drive(jobs, DaskScheduler(address), ResultsFolder(tmp_path / "dask"), kill)
     assert alive == []
     plain = drive(jobs, InProcess(), ResultsFolder(tmp_path / "none"))
-    assert [msgspec.structs.replace(one, run=None) for one in found] == [
-        msgspec.structs.replace(one, run=None) for one in plain
-    ]
+    assert [replace(one, run=None) for one in found] == [replace(one, run=None) for one in plain]
 
 
 @pytest.mark.usefixtures("impatient")

@@ -103,7 +103,6 @@ def test_a_bug_in_one_job_is_its_outcome(tmp_path, monkeypatch):
     def broken(job, _):
         raise RuntimeError(f"no such thing as {job.row.vehicle}")
 
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     monkeypatch.setattr(running_job, "run_job", broken)
     outcomes = drive(quick_jobs(tmp_path, 2), InProcess(), ResultsFolder(tmp_path))
     assert [outcome.status for outcome in outcomes] == ["failed", "failed"]

@@ -7,16 +7,15 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-import msgspec
 import numpy as np
 import psutil
 import pytest
+from msgspec.structs import replace
 
 from calib_core.errors import InputError
 from cocalib.batch import driving
 from cocalib.batch.driving import drive
 from cocalib.batch.engine import InProcess
-from cocalib.batch.outcome import Outcome
 from cocalib.batch.results_folder import ResultsFolder
 from cocalib.batch.worker_processes import WorkerProcesses
 from tests.batch_calls import (
@@ -32,10 +31,6 @@ from tests.batch_calls import (
 )
 
 pytestmark = pytest.mark.slow
-
-
-def _without_run(outcomes: Sequence[Outcome]) -> list[Outcome]:
-    return [msgspec.structs.replace(outcome, run=None) for outcome in outcomes]
 
 
 @pytest.fixture
@@ -60,7 +55,7 @@ def test_workers_killed_at_random_change_no_outcome_and_leave_nothing_behind(tmp
     found = drive(jobs, WorkerProcesses(2), ResultsFolder(tmp_path / "workers"), kill)
     assert len(killed) == 4
     plain = drive(jobs, InProcess(), ResultsFolder(tmp_path / "none"))
-    assert _without_run(found) == _without_run(plain)
+    assert [replace(one, run=None) for one in found] == [replace(one, run=None) for one in plain]
     assert multiprocessing.active_children() == []
     assert list(temporary.iterdir()) == []
     assert not list((tmp_path / "workers" / "results").glob(".*"))
@@ -68,11 +63,10 @@ def test_workers_killed_at_random_change_no_outcome_and_leave_nothing_behind(tmp
 
 def _sockets(processes: Sequence[psutil.Process]) -> set[tuple[object, ...]]:
     """Return all network sockets of processes, and their UNIX sockets that have a name."""
-    found: set[tuple[object, ...]] = set()
-    for process in processes:
-        found |= {(process.pid, one.fd, one.laddr) for one in process.net_connections(kind="inet")}
-        found |= {(process.pid, one.fd, one.laddr) for one in process.net_connections(kind="unix") if one.laddr}
-    return found
+    of_kind = (
+        (one.pid, kind, found) for one in processes for kind in ("inet", "unix") for found in one.net_connections(kind)
+    )
+    return {(pid, found.fd, found.laddr) for pid, kind, found in of_kind if kind == "inet" or found.laddr}
 
 
 def test_nothing_listens_on_a_port_or_a_socket(tmp_path):

@@ -157,8 +157,7 @@ def test_a_cancelled_search_goes_on_from_its_views_for_the_same_board_only(searc
     assert search.searched[1] == ((0, 1, 2, 3) if is_same else ())
 
 
-def test_what_is_wrong_is_said_in_words_and_the_former_result_stays(search, watched, monkeypatch, tmp_path):
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+def test_what_is_wrong_is_said_in_words_and_the_former_result_stays(search, watched, tmp_path):
 
     def ended(stage: LensStage) -> LensSnapshot:
         watched.job.start(Pictures(), BOARD, OPTIONS)

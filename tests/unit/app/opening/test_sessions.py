@@ -14,9 +14,8 @@ from tests.picture_recording import PictureRecording, grey_pictures
 
 
 @pytest.fixture
-def path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def path(tmp_path: Path) -> Path:
     """Return a recording with a session of three frames and two clicks."""
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     recording = PictureRecording(grey_pictures(3))
     folder = tmp_path / "a.bag.cocalib-session"
     workspace = open_workspace(recording, camera=None, session_folder=folder, name="a.bag")

@@ -67,7 +67,7 @@ def test_the_same_error_is_saved_once_and_old_reports_go(state, monkeypatch):
     assert len(reports(state)) == 20
 
 
-def test_a_report_that_cannot_be_saved_is_said(tmp_path, monkeypatch):
+def test_a_report_that_cannot_be_saved_is_said(tmp_path):
     (tmp_path / "cocalib").write_text("a file where the folder should be")
     assert "could not be saved" in report_of(LookupError("x"), "a test")
 

@@ -21,12 +21,10 @@ IMAGE_TIMES = DRIVE.image_times
 FACTS = replace(DRIVE, name="drive.bag", radar_times=RADAR_TIMES)
 
 
-@pytest.fixture(autouse=True)
-def state_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    folder = tmp_path / "state" / "cocalib" / "sessions"
-    folder.mkdir(parents=True)
-    return folder
+@pytest.fixture
+def state_folder(state: Path) -> Path:
+    (state / "sessions").mkdir(parents=True)
+    return state / "sessions"
 
 
 @pytest.fixture

@@ -96,6 +96,11 @@ def test_a_frame_may_have_several_marks_and_imported_clicks_replace_those_of_the
     session = session_of(place(3), ClickPlaced(TIMES[3], (99.5, 88.25), "clicked"), place(4))
     assert [(click.id, click.u_px) for click in session.clicks] == [("c1", 3.0), ("c2", 99.5), ("c3", 4.0)]
     assert ids(apply(session, imported(4, "p1"), FACTS)) == ["c1", "c2", "p1"]
+    for corner in ((-0.5, -0.5), (639.5, 479.5)):  # half a pixel beyond the outermost pixels' centres
+        assert session_of(ClickPlaced(TIMES[0], corner, "clicked")).clicks[0].u_px == corner[0]
+    assert FACTS.frame_at(TIMES[49]) == 49
+    assert FACTS.frame_at(TimeNs(START_NS + 1)) is None, "only by its exact stamp"
+    assert RecordingFacts("empty", np.zeros(0, dtype=np.int64), 1, 1).frame_at(TimeNs(0)) is None
 
 
 def test_a_snapped_mark_has_its_own_sigma_and_loses_it_when_it_is_moved():
@@ -202,22 +207,13 @@ def test_an_event_that_does_not_fit_is_refused_with_a_clear_error(event, words):
     assert isinstance(refused.value, CalibrationError)
 
 
-@pytest.mark.parametrize(("u_px", "v_px"), [(-0.5, -0.5), (639.5, 479.5)])
-def test_the_frame_reaches_half_a_pixel_beyond_its_outermost_pixel_centres(u_px, v_px):
-    assert session_of(ClickPlaced(TIMES[0], (u_px, v_px), "clicked")).clicks[0].u_px == u_px
-
-
-def test_options_out_of_range_are_refused():
-    wrong = CalibrationOptions(noise=NoiseOptions(sigma_px=float("nan")))
-    with pytest.raises(OptionError, match=r"noise\.sigma_px"):
-        session_of(place(3), OptionsChanged.of(wrong))
-
-
-def test_edited_options_change_only_what_they_name():
+def test_edited_options_change_only_what_they_name_and_none_out_of_range():
     event = OptionsChanged({"noise": {"sigma_px": 3.5}})
     session = session_of(place(3), event)
     assert session.options == CalibrationOptions(noise=NoiseOptions(sigma_px=3.5))
     assert settled(event, session_of(place(3))) == OptionsChanged.of(session.options)
+    with pytest.raises(OptionError, match=r"noise\.sigma_px"):
+        session_of(OptionsChanged.of(CalibrationOptions(noise=NoiseOptions(sigma_px=float("nan")))))
 
 
 def test_an_answer_stays_shown_while_a_newer_one_is_computed():
@@ -255,9 +251,3 @@ def test_chosen_intrinsics_are_solved_with_undone_and_redone_and_have_all_number
     assert (camera.model, camera.width_px, camera.height_px) == ("plumb_bob", 640, 480)
     np.testing.assert_array_equal(camera.parameters, CAMERA.parameters)
     assert ChosenIntrinsics.of(camera, CHOSEN.about) == CHOSEN
-
-
-def test_a_frame_is_found_by_its_exact_stamp_only():
-    assert FACTS.frame_at(TIMES[49]) == 49
-    assert FACTS.frame_at(TimeNs(START_NS + 1)) is None
-    assert RecordingFacts("empty", np.zeros(0, dtype=np.int64), 1, 1).frame_at(TimeNs(0)) is None

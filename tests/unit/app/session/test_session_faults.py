@@ -20,12 +20,6 @@ from tests.unit.app.session.drive import FACTS, clicks_in, files, keep, kept, li
 POSIX = pytest.mark.skipif(os.name == "nt", reason="Windows needs a right to make links, and has no pipes in folders")
 
 
-@pytest.fixture(autouse=True)
-def own_state_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    return tmp_path / "state" / "cocalib" / "sessions"
-
-
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     return tmp_path / "s"
@@ -174,9 +168,7 @@ def test_a_step_is_refused_when_another_program_changed_the_journal(folder, chan
 
 @POSIX
 @pytest.mark.parametrize("how", ["deleted", "moved", "replaced"])
-def test_a_folder_that_went_away_is_written_to_the_users_folder_and_found_again(
-    tmp_path, folder, own_state_folder, how
-):
+def test_a_folder_that_went_away_is_written_to_the_users_folder_and_found_again(tmp_path, folder, state, how):
     session_file = open_session_file(folder, FACTS)
     history = keep(session_file, *map(place, (1, 2, 3)))
     if how == "deleted":
@@ -189,7 +181,7 @@ def test_a_folder_that_went_away_is_written_to_the_users_folder_and_found_again(
         session_file.append(place(4), advance(history, place(4), FACTS))
     left = session_file.close()
     assert left is session_file.close()
-    assert left.kept_in == own_state_folder / "drive-rescued-1.cocalib-session"
+    assert left.kept_in == state / "sessions" / "drive-rescued-1.cocalib-session"
     assert "was deleted, moved or replaced while it was open" in left.note
     assert clicks_in(left.kept_in) == [1.0, 2.0, 3.0]
     assert how == "replaced" or not folder.exists()

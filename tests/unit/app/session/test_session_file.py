@@ -438,7 +438,6 @@ def test_a_session_set_aside_is_renamed_with_the_next_free_number(tmp_path):
 
 def test_a_session_is_next_to_its_recording_or_in_the_state_folder(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "platform", "linux")
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     recording = tmp_path / "drive.bag"
     assert recording_session_folder([recording, tmp_path / "b.bag"]) == tmp_path / "drive.bag.cocalib-session"
     folder = recording_session_folder([tmp_path / "missing" / "drive.bag"])  # which cannot be written

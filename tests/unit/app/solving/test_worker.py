@@ -78,8 +78,7 @@ def test_a_recording_that_cannot_be_read_is_reported_as_the_answer():
     assert (outcome.code, outcome.reason) == ("unreadable", "radar.bag: chunk 7 is damaged; copy the file again")
 
 
-def test_a_bug_in_the_program_is_logged_and_reported_and_the_worker_continues(caplog, tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+def test_a_bug_in_the_program_is_logged_and_reported_and_the_worker_continues(caplog, tmp_path):
     faults = iter([True])
 
     def faulty() -> RadarScans:

@@ -9,7 +9,6 @@ import pytest
 from calib_core.errors import InputError
 from calib_core.interchange import (
     FORMATS,
-    FrameNames,
     adopt,
     export,
     format_named,
@@ -143,12 +142,3 @@ def test_a_calibration_brings_its_camera_where_it_fits_the_frames(file, tmp_path
     camera = file.calibration.camera
     assert camera_in(path, camera.width_px, camera.height_px) is not None
     assert camera_in(path, camera.width_px + 1, camera.height_px) is None
-
-
-def test_bad_frames_and_mirrored_rotations_are_refused_with_a_clear_error():
-    with pytest.raises(InputError, match="no name"):
-        FrameNames("", "camera")
-    with pytest.raises(InputError, match="both frames"):
-        FrameNames("a", "a")
-    with pytest.raises(InputError, match="proper rotation"):
-        read_any("1 0 0 0\n0 1 0 0\n0 0 -1 0\n0 0 0 1\n", "mirrored.txt")

@@ -55,9 +55,8 @@ def workspace(tmp_path: Path) -> Iterator[Workspace]:
 def found(monkeypatch: pytest.MonkeyPatch) -> None:
     def calibrate(pictures: object, board: Board, options: object, *, progress: Any, **_: object) -> Any:
         progress(SearchProgress(4, 4))
-        return BoardSearch(board, (640, 480), (), (), 4), CalibratedLens(
-            FOUND, board, board.corners_m, (), (), 0.1, 0.12
-        )
+        lens = CalibratedLens(FOUND, board, board.corners_m, (), (), 0.1, 0.12)
+        return BoardSearch(board, (640, 480), (), (), 4), lens
 
     monkeypatch.setattr("cocalib.intrinsics.job.calibrate_from", calibrate)
 
@@ -130,13 +129,9 @@ def test_what_a_page_sends_becomes_a_request_and_what_it_is_told_is_json(workspa
     assert command == WANTED
     with pytest.raises(InputError, match="lens_calibrate"):
         parse('{"type":"lens_calibrate","kind":"circles","size":"9x6","square_mm":25}')
-
-    async def visit(desk: LensDesk, told: list[Outgoing]) -> None:
-        outbox = Outbox()
-        desk.greet(outbox)
-        assert len(outbox) == 1
-
-    at_desk(workspace, visit)
+    outbox = Outbox()
+    at_desk(workspace, lambda desk, _: asyncio.sleep(0, desk.greet(outbox)))
+    assert len(outbox) == 1
     state = json.loads(encode(LensState(None, False, 4, "idle", 0, 0, 0, 0, "", "", "", False, None, 0, False)))
     assert state["type"] == "lens"
 
@@ -171,15 +166,11 @@ LENS = CalibratedLens(
 
 def test_intrinsics_are_shown_with_what_is_known_of_them():
     table = camera_table(CAMERA, "camera.yaml")
-    assert [(row.label, row.value, row.unit) for row in table.parameters[:2]] == [
-        ("fx", "500.0 ± 0.5", "px"),
-        ("fy", "500.0 ± 0.5", "px"),
-    ]
-    assert table.known
-    assert table.field == "65.2° x 51.3°"
+    first = [(row.label, row.value, row.unit) for row in table.parameters[:2]]
+    assert first == [("fx", "500.0 ± 0.5", "px"), ("fy", "500.0 ± 0.5", "px")]
+    assert (table.known, table.field) == (True, "65.2° x 51.3°")
     unknown = camera_table(Camera("pinhole", 640, 480, MATRIX), "camera.yaml")
-    assert unknown.parameters[0].value == "500.000"
-    assert not unknown.known
+    assert (unknown.known, unknown.parameters[0].value) == (False, "500.000")
 
 
 def test_a_lens_is_shown_with_its_views_what_was_left_out_and_why():

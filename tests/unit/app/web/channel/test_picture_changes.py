@@ -32,21 +32,14 @@ def compared(recording: PictureRecording, busy: list[bool]) -> list[PictureChang
 
 
 def test_a_person_who_walks_changes_the_picture_and_one_who_stands_does_not():
-    recording = PictureRecording([walker(100), walker(100), walker(100), walker(130), walker(160)])
-    last = compared(recording, [])[-1]
+    recording, busy = PictureRecording([walker(100), walker(100), walker(100), walker(130), walker(160)]), [True]
+    last = compared(recording, busy)[-1]
+    assert busy == [], "they are compared only while nobody plays"
     assert last.complete
     assert last.seconds == (0.0, 0.1, 0.2, 0.3)
     still, walking = last.grey_levels[:2], last.grey_levels[2:]
     assert max(still) < 5
     assert min(walking) > 50
-
-
-def test_pictures_are_compared_only_while_nobody_plays():
-    recording = PictureRecording([walker(100), walker(130)])
-    busy = [True]
-    told = compared(recording, busy)
-    assert busy == []
-    assert told[-1].complete
 
 
 def test_the_first_comparisons_span_the_recording_and_none_crosses_a_gap():

@@ -50,15 +50,12 @@ def test_the_answer_is_the_apex_with_its_sigma():
 
 
 @pytest.mark.parametrize("pixel_px", [(30.0, 30.0), (1e30, -1e30)])
-def test_no_corner_is_an_answer_with_a_reason(pixel_px):
+def test_no_corner_is_an_answer_with_a_reason_and_no_frame_is_refused(pixel_px):
     answer = _ask(1_000_000_000, pixel_px)
     assert (answer.pixel_px, answer.sigma_px) == (None, None)
     assert answer.words.startswith("No corner found: ")
-
-
-def test_a_stamp_without_a_frame_is_refused():
     with pytest.raises(InputError, match="no frame has the stamp 1050000000"):
-        _ask(1_050_000_000, (100.0, 100.0))
+        _ask(1_050_000_000, pixel_px)
 
 
 def test_the_message_of_a_page_is_understood_and_answered_by_its_type():

@@ -58,8 +58,7 @@ def test_tries_take_turns_and_only_so_many_wait():
 
 
 @pytest.fixture
-def server(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[RunningServer]:
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+def server(tmp_path: Path) -> Iterator[RunningServer]:
     recording = PictureRecording(grey_pictures(1))
     with serving(recording, tmp_path / "s", name="one grey", token=TOKEN) as (running, _):
         yield running

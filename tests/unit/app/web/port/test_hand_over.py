@@ -14,7 +14,6 @@ from tests.port_client import come_in
 
 @pytest.fixture(autouse=True)
 def runtime(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     monkeypatch.setattr(module, "_SNAPS", ())
     return tmp_path
@@ -66,7 +65,7 @@ def test_a_browser_from_a_snap_gets_a_file_that_it_can_read(runtime, monkeypatch
     assert not given.path.parent.exists()
 
 
-def test_where_no_file_can_be_written_nothing_is_opened(runtime, monkeypatch):
+def test_where_no_file_can_be_written_nothing_is_opened(runtime):
     (runtime / "cocalib").write_text("a file where the folder should be")
     opened = Opened()
     given = HandOver("http://127.0.0.1/?token=SECRET", opened)

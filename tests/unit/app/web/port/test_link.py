@@ -2,7 +2,6 @@
 
 import socket
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
@@ -11,11 +10,6 @@ from cocalib.web.port.link import Link, ServerOptions
 from cocalib.web.port.server import RunningServer
 from cocalib.web.port.waiting import WaitingRoom
 from tests.port_client import come_in, get
-
-
-@pytest.fixture(autouse=True)
-def own_state_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
 
 
 @pytest.fixture

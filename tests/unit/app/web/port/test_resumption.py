@@ -5,7 +5,6 @@ import hmac
 import json
 import os
 import sys
-from pathlib import Path
 from urllib.parse import urlencode
 
 import pytest
@@ -16,12 +15,6 @@ from tests.port_client import come_in, get
 from tests.serving import serving
 
 ORIGIN = "http://127.0.0.1:8080"
-
-
-@pytest.fixture(autouse=True)
-def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    return tmp_path / "cocalib"
 
 
 def signed(ticket: Ticket, challenge: str, origin: str = ORIGIN) -> str:
@@ -73,7 +66,7 @@ def test_nonsense_is_refused(name):
 @pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX permissions")
 @pytest.mark.parametrize("kind", ["readable", "short", "link", "pipe"])
 def test_a_key_file_that_others_may_know_is_not_used(state, kind):
-    state.mkdir()
+    state.mkdir(parents=True)
     key = state / "page.key"
     if kind == "pipe":
         os.mkfifo(key, 0o600)

@@ -281,8 +281,7 @@ def test_half_a_character_is_refused_and_the_channel_stays_open(server, cookie, 
         assert wanted(socket, "done")["request"] == 2
 
 
-def test_after_closing_no_connection_is_accepted(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+def test_after_closing_no_connection_is_accepted(tmp_path, state):
     recording = PictureRecording(grey_pictures(1))
     workspace = open_workspace(recording, camera=None, session_folder=tmp_path / "s", name="one grey")
     running = start(workspace, recording, ServerOptions(port=0, token="mine"))
@@ -295,7 +294,7 @@ def test_after_closing_no_connection_is_accepted(tmp_path, monkeypatch):
             wanted(socket, "never")
     with pytest.raises(ConnectionRefusedError):
         get(running, "/")
-    assert (tmp_path / "cocalib" / "page.key").stat().st_mode & 0o077 == 0
+    assert (state / "page.key").stat().st_mode & 0o077 == 0
 
 
 def test_failures_are_logged_but_disconnecting_clients_are_not(server, caplog):

@@ -151,8 +151,7 @@ def test_a_server_without_free_descriptors_says_so_once_and_recovers():
     assert others == "", "said once"
 
 
-def test_what_the_event_loop_reports_is_one_line_with_a_report(caplog, tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+def test_what_the_event_loop_reports_is_one_line_with_a_report(caplog, tmp_path):
     complaints = websockets_hook._Complaints()
     loop = asyncio.new_event_loop()
     for _ in range(6200):
