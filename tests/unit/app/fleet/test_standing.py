@@ -76,8 +76,10 @@ def test_two_sessions_of_a_vehicle_are_compared(fleet):
     compared = compare_sessions(fleet, "V002/s0", "V002/s1")
     assert compared.outcome == "differs"
     assert compared.words.startswith("this radar was remounted")
-    with pytest.raises(InputError, match="V001 and V001/s1 are the same session; name two"):
-        compare_sessions(fleet, "V001", "V001/s1")
+    for a, b in (("V001", "V001/s1"), ("truck/1", "truck/1/s/0")):
+        with pytest.raises(InputError, match=f"{a} and {b} are the same session; name two"):
+            compare_sessions(fleet, a, b)
+    assert compare_sessions(fleet, "V000", "V004").b.session == "s1", "the last that can be compared"
 
 
 def test_two_vehicles_differ_without_a_remount(fleet):
@@ -87,15 +89,6 @@ def test_two_vehicles_differ_without_a_remount(fleet):
     assert "between V000/s1 and odd/s1" in compared.words
     assert "remounted" not in compared.words
     assert "instead of" not in compared.words
-
-
-def test_a_vehicle_is_compared_by_its_last_session_that_can_be(fleet):
-    assert compare_sessions(fleet, "V000", "V004").b.session == "s1"
-
-
-def test_names_with_slashes_are_found(fleet):
-    with pytest.raises(InputError, match="are the same session"):
-        compare_sessions(fleet, "truck/1", "truck/1/s/0")
 
 
 @pytest.mark.parametrize(

@@ -183,15 +183,18 @@ def test_with_a_calibration_the_camera_moves_to_its_place_and_the_pairs_appear_u
 
 
 def test_the_best_next_placement_is_ringed_until_no_more_are_needed(drawn):
-    seen = sight(calibration())
-    advice = Advice(NextPlacement(np.array([4.0, 3.0, 0.0]), np.array([10.0, 20.0]), 1.4, False), 5.0, "There.")
-    drawn.scene.show(replace(seen, view=replace(seen.view, advice=advice)))
-    assert "/next" in drawn.names()
+    segments = next_place(np.array([[6.0, -2.0, 0.4]]), radius_m=0.5)
+    ring, plumb = segments[:-1], segments[-1]
+    assert np.linalg.norm(ring - [6.0, -2.0, 0.4], axis=2) == pytest.approx(0.5)
+    assert ring[..., 2] == pytest.approx(0.4), "it is level"
+    assert np.linalg.norm(ring[:, 1] - ring[:, 0], axis=1).sum() == pytest.approx(np.pi * 0.5, rel=0.01), "half gaps"
+    assert plumb == pytest.approx(np.array([[6.0, -2.0, 0.15], [6.0, -2.0, 0.65]]))
+    best = NextPlacement(np.array([4.0, 3.0, 0.0]), np.array([10.0, 20.0]), 1.4, False)
+    for may_stop in (False, True):
+        seen, advice = sight(calibration()), Advice(replace(best, may_stop=may_stop), 5.0, "There.")
+        drawn.scene.show(replace(seen, view=replace(seen.view, advice=advice)))
+        assert ("/next" in drawn.names()) == (not may_stop)
     assert drawn.node("/next").points.reshape(-1, 3).mean(axis=0) == pytest.approx([4.0, 3.0, 0.0], abs=0.05)
-    drawn.scene.show(
-        replace(seen, view=replace(seen.view, advice=replace(advice, best=replace(advice.best, may_stop=True))))
-    )
-    assert "/next" not in drawn.names()
 
 
 def test_in_the_light_theme_nothing_is_white_on_white(drawn):
@@ -205,15 +208,6 @@ def test_in_the_light_theme_nothing_is_white_on_white(drawn):
     drawn.scene.show(sight(solved, selected="c2"))
     assert drawn.node("/camera").color == dark
     assert np.asarray(drawn.node("/ray").colors).min() == 255
-
-
-def test_the_ring_of_the_next_place_is_level_and_half_gaps():
-    segments = next_place(np.array([[6.0, -2.0, 0.4]]), radius_m=0.5)
-    ring, plumb = segments[:-1], segments[-1]
-    assert np.linalg.norm(ring - [6.0, -2.0, 0.4], axis=2) == pytest.approx(0.5)
-    assert ring[..., 2] == pytest.approx(0.4)
-    assert np.linalg.norm(ring[:, 1] - ring[:, 0], axis=1).sum() == pytest.approx(np.pi * 0.5, rel=0.01)
-    assert plumb == pytest.approx(np.array([[6.0, -2.0, 0.15], [6.0, -2.0, 0.65]]))
 
 
 def test_the_page_can_tell_which_frame_the_3d_view_has_drawn(drawn):
