@@ -127,15 +127,12 @@ def test_right_clicks_alarm_nobody_in_any_order_and_a_wrong_one_is_named(recordi
     order = [clicks[place] for place in np.random.default_rng(seed).permutation(len(clicks))]
     for count in (5, 9, 12):
         outcome = solve_clicks(recording, order[:count], recording.camera(), CalibrationOptions())
-        assert isinstance(outcome, Calibration)
         assert all(pair.inlier for pair in outcome.pairs)
         assert verdict_on(outcome).level != "contradictory"
     wrong = replace(order[11], u_px=abs(order[11].u_px - 45.0))
     outcome = solve_clicks(recording, [*order[:11], wrong], recording.camera(), CalibrationOptions())
-    assert isinstance(outcome, Calibration)
     assert verdict_on(outcome).level == "coarse" or wrong.id in [pair.id for pair in outcome.pairs if not pair.inlier]
     outcome = solve_clicks(recording, [*order[:6], wrong], recording.camera(), CalibrationOptions())
-    assert isinstance(outcome, Calibration)
     consistent = any("looks consistent" in warning.message for warning in outcome.warnings)
     assert consistent == all(pair.inlier for pair in outcome.pairs), "neither does one that is left out look so"
 
@@ -184,7 +181,6 @@ def test_a_preview_comes_first_and_the_answer_does_not_depend_on_it(recording, c
     for previous in (None, warned):
         preview, answer = solve_in_steps(recording, clicks, camera, options, previous=previous)
         assert isinstance(preview, Calibration)
-        assert isinstance(answer, Calibration)
         assert (preview.checking, answer.checking) == (True, False)
         error = preview.camera_from_radar.error_from(answer.camera_from_radar)
         assert error @ np.linalg.solve(answer.covariance, error) < 0.1
@@ -273,5 +269,4 @@ def test_clicks_outside_the_radar_recording_are_named_in_the_answer(recording, c
     away = [replace(click, image_time=TimeNs(click.image_time + 10**12)) for click in clicks[:5]]
     options = CalibrationOptions(method=method)
     outcome = solve_clicks(recording, away, recording.camera(), options)
-    assert isinstance(outcome, Unsolvable)
     assert [row.id for row in outcome.unpaired] == [click.id for click in away]
