@@ -249,7 +249,7 @@ def test_a_named_file_that_is_missing_is_refused_before_anything_is_read(flag, t
     (tmp_path / "a.bag").write_bytes(b"")
     assert run(["open", str(tmp_path / "a.bag"), "--no-browser", flag, str(tmp_path / "absent")]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert line.endswith("absent: no such file; check the path")
+    assert "absent: no such file" in line
 
 
 SLOW_TO_OPEN = """
