@@ -9,6 +9,7 @@ from cocalib.report.markup import Markup, tag
 from cocalib.report.subject import ReportSubject
 
 _UNITS = {"max-deg": "deg", "max-cm": "cm", "max-px": "px"}
+_WORDS = {"max-deg": "rotation", "max-cm": "camera position", "max-px": "reprojection"}
 _SIGNED = ("Name", "Date", "Signature", "Remarks")
 
 
@@ -77,13 +78,13 @@ def _table(limits: tuple[Limit, ...]) -> Markup:
     body = (
         tag(
             "tr",
-            tag("th", f"{one.name.removeprefix('max-')}", scope="row"),
+            tag("th", _WORDS[one.name], scope="row"),
             tag("td", f"{one.limit:g} {_UNITS[one.name]}"),
             tag("td", f"{one.stated:g} {_UNITS[one.name]}" if one.stated == one.stated else "not stated"),
             tag("td", tag("b", "pass" if one.met else "FAIL")),
         )
         for one in limits
     )
-    heads = ("error, 95 %", "limit", "stated", "")
+    heads = ("stated error, 95 %", "limit", "stated", "")
     head = tag("thead", tag("tr", *(tag("th", name, scope="col") if name else tag("td") for name in heads)))
     return tag("table", head, tag("tbody", *body), class_="figures")
