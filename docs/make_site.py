@@ -20,7 +20,7 @@ from cocalib.cli.help import named_options_help, written_help
 _ROOT = Path(__file__).parent.parent
 _MOST_MB = 10.0
 _PAGES = {
-    "Tour": "tour first-steps",
+    "Tour": "tour gallery first-steps",
     "How to": "radar-formats intrinsics drift fleet proposals boxes evaluation report rerun simulation",
     "Concepts": "method accuracy conventions GLOSSARY apex paper security",
     "Reference": "commands python formats warnings",

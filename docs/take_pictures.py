@@ -1,9 +1,11 @@
 """Take the pictures of the documentation: `make picture` writes docs/pictures/*.png from the sample recording.
 
-`python docs/take_pictures.py --sizes` writes docs/pictures/sizes.jpg: the page in windows of five sizes, dark and light.
+`python docs/take_pictures.py --sizes` writes docs/pictures/sizes.jpg: the page in windows of five sizes, dark and light;
+`--commands` takes again only what the command line makes, the report and a frame of a video.
 """
 
 import json
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -100,6 +102,29 @@ def take_radar_only(browser: Browser, folder: Path, session: Path) -> None:
         workspace.close()
 
 
+def take_commands(browser: Browser, sample: Path, made: Path) -> None:
+    """Make a report and a video of the sample with the commands that the gallery shows."""
+    recording = [sample / "radar.bag", sample / "camera.bag"]
+    answer, report, video = made / "calibration.json", made / "report.html", made / "overlay.mp4"
+    assert run(["solve", *recording, "--clicks", sample / "clicks.json", "--out", answer]) == 0
+    assert run(["evaluate", answer, *recording, "--report", report, "--require", "max-deg=2", "max-cm=30"]) == 0
+    assert run(["show", *recording, "--calibration", answer, "--out", video]) == 0
+    page = browser.new_page(viewport={"width": 1100, "height": 1270}, color_scheme="light")
+    page.goto(report.as_uri())
+    page.screenshot(path=PICTURES / "report.png")
+    page.close()
+    frames = cv2.VideoCapture(str(video))
+    frames.set(cv2.CAP_PROP_POS_MSEC, 28_000)
+    there, frame = frames.read()
+    assert there
+    cv2.imwrite(str(PICTURES / "overlay.jpg"), frame, [cv2.IMWRITE_JPEG_QUALITY, 85])
+
+
+def run(words: list[str | Path]) -> int:
+    """Run a command of cocalib."""
+    return subprocess.run([sys.executable, "-m", "cocalib", *words]).returncode
+
+
 def take_sizes(browser: Browser, server: RunningServer, clicks: list[dict[str, Any]]) -> None:
     """Put the page in windows of all sizes on one sheet, one row for each theme."""
     first = opened(browser, server, "dark")
@@ -139,9 +164,9 @@ def beside(pictures: list[np.ndarray], axis: int) -> np.ndarray:
 
 def main() -> None:
     """Serve the sample with a session of its own and take the pictures."""
-    only_sizes = sys.argv[1:] == ["--sizes"]
-    if sys.argv[1:] and not only_sizes:
-        sys.exit("usage: python docs/take_pictures.py [--sizes]")
+    only = sys.argv[1:]
+    if only not in ([], ["--sizes"], ["--commands"]):
+        sys.exit("usage: python docs/take_pictures.py [--sizes | --commands]")
     PICTURES.mkdir(parents=True, exist_ok=True)
     folder = ROOT / "sample_data" / "rooftop"
     clicks = json.loads((folder / "clicks.json").read_text(encoding="utf-8"))["clicks"]
@@ -155,11 +180,13 @@ def main() -> None:
         server = start(workspace, recording, ServerOptions(port=0, token="pictures"))
         with sync_playwright() as playwright:
             browser = playwright.chromium.launch(executable_path=str(find_browser()), args=FLAGS)
-            if only_sizes:
+            if only == ["--sizes"]:
                 take_sizes(browser, server, clicks)
-            else:
+            if not only:
                 take_all(browser, server, clicks)
                 take_radar_only(browser, folder, Path(session) / "radar")
+            if only != ["--sizes"]:
+                take_commands(browser, folder, Path(session))
             browser.close()
         server.close()
         workspace.close()
