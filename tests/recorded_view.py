@@ -31,7 +31,7 @@ def opened_view(folder: Path, **more: object) -> Iterator[RecordedView]:
         clicks = read_clicks(made.clicks(), "clicks.json")
         solved = solve_clicks(recording, clicks, made.camera, CalibrationOptions())
         assert isinstance(solved, Calibration)
-        yield recorded_view(recording, solved, "range", **more)  # type: ignore[arg-type]
+        yield recorded_view(recording, solved, "range", **more)
 
 
 def boxes_around(recording: Recording, frames: tuple[int, ...]) -> Boxes:

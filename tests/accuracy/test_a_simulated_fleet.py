@@ -46,7 +46,7 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_what_was_planned_is_named_and_nothing_else(fleet: Path) -> None:
+def test_what_was_planned_is_named_and_nothing_else(fleet):
     *judged, verdicts = judge(read_truth(fleet), read_fleet(fleet / "out"))
     assert {one.question: one.wrong for one in judged if one.wrong} == {}
     assert [one.of for one in judged] == [7, 1, 1, 2, 1, 3]
@@ -55,14 +55,14 @@ def test_what_was_planned_is_named_and_nothing_else(fleet: Path) -> None:
     )  # 10 placements in such pictures may be too few
 
 
-def test_the_reasons_of_what_was_not_calibrated_are_told(fleet: Path) -> None:
+def test_the_reasons_of_what_was_not_calibrated_are_told(fleet):
     outcomes = [one.outcome for vehicle in read_fleet(fleet / "out").vehicles for one in vehicle.sessions]
     reasons = {one.status: one.reason for one in outcomes if one.status in ("failed", "refused")}
     assert "not a recording" in reasons["failed"]
     assert "nothing was clicked" in reasons["refused"]
 
 
-def test_errors_of_calibrations_are_within_what_they_state(fleet: Path) -> None:
+def test_errors_of_calibrations_are_within_what_they_state(fleet):
     truth = json.loads((fleet / "truth.json").read_text())["sessions"]
     poses = {(one["vehicle"], one["session"]): one["camera_from_radar"] for one in truth if one["fault"] is None}
     squared = []
@@ -78,7 +78,7 @@ def test_errors_of_calibrations_are_within_what_they_state(fleet: Path) -> None:
     assert max(squared) < 22.5  # 1 in 1,000 of chi2 with 6 degrees of freedom
 
 
-def test_a_plan_has_every_fault_on_a_vehicle_of_its_own() -> None:
+def test_a_plan_has_every_fault_on_a_vehicle_of_its_own():
     plan = plan_fleet(50, 3, 2)
     assert len(plan.sessions) == 150
     assert Counter(one.fault for one in plan.sessions) == {
@@ -93,7 +93,7 @@ def test_a_plan_has_every_fault_on_a_vehicle_of_its_own() -> None:
     assert not set(odd) & {one.vehicle for one in plan.sessions if one.fault}
 
 
-def test_a_remount_changes_a_mounting_by_its_size() -> None:
+def test_a_remount_changes_a_mounting_by_its_size():
     plan = plan_fleet(7, 3, 2)
     sizes = []
     for before, after in zip(plan.sessions, plan.sessions[1:], strict=False):

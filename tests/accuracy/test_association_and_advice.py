@@ -5,7 +5,6 @@ import pytest
 
 from benchmarks.accuracy.advice import Advised, measure_advice
 from benchmarks.accuracy.clutter import SCENES, measure_clutter
-from benchmarks.accuracy.scenes import Scene
 
 _OF_SCENE = {scene.name: scene for scene in SCENES}
 
@@ -19,13 +18,13 @@ _OF_SCENE = {scene.name: scene for scene in SCENES}
     ],
     ids=lambda scene: scene.name,
 )
-def test_no_placement_gets_the_position_of_something_else(scene: Scene) -> None:
+def test_no_placement_gets_the_position_of_something_else(scene):
     trials = [measure_clutter(scene, trial) for trial in range(2)]
     assert sum(trial["wrong"] or 0.0 for trial in trials) == 0.0
     assert sum(trial["paper_wrong"] or 0.0 for trial in trials) >= 0.8 * 40
 
 
-def test_advice_shrinks_the_rotation_sigma_at_equal_numbers() -> None:
+def test_advice_shrinks_the_rotation_sigma_at_equal_numbers():
     trials = [measure_advice(Advised("ti", 10, None), trial) for trial in range(4)]
     before, after = (np.array([trial[name] for trial in trials]) for name in ("sigma_rad", "advised_sigma_rad"))
     assert np.sqrt((before**2).mean() / (after**2).mean()) > 1.2

@@ -48,7 +48,7 @@ def allowed_to_fail(case: Case) -> int:
 
 
 @pytest.mark.parametrize("case", KNOWN, ids=lambda case: case.key)
-def test_the_error_is_near_the_bound_and_nothing_fails(case: Case) -> None:
+def test_the_error_is_near_the_bound_and_nothing_fails(case):
     trials = tuple(one for one, far in zip(measured(case), failed(measured(case)), strict=True) if not far)
     assert len(trials) >= TRIALS - allowed_to_fail(case)
     aim = (
@@ -58,7 +58,7 @@ def test_the_error_is_near_the_bound_and_nothing_fails(case: Case) -> None:
     assert ratio(column(trials, "position_m"), column(trials, "bound_m")).value < aim + 0.2
 
 
-def test_the_ellipsoid_contains_the_truth_as_often_as_stated() -> None:
+def test_the_ellipsoid_contains_the_truth_as_often_as_stated():
     together = np.concatenate([inside(case) for case in KNOWN])
     low, high = binomial_limits(len(together))
     assert low <= together.sum() <= high
@@ -66,7 +66,7 @@ def test_the_ellipsoid_contains_the_truth_as_often_as_stated() -> None:
 
 
 @pytest.mark.parametrize("case", NOT_TOLD, ids=["not told", "told too small"])
-def test_the_ellipsoid_contains_the_truth_whatever_noise_is_assumed(case: Case) -> None:
+def test_the_ellipsoid_contains_the_truth_whatever_noise_is_assumed(case):
     assert inside(case).sum() >= binomial_limits(TRIALS)[0]
     assert failed(measured(case)).sum() <= allowed_to_fail(case)
 
@@ -76,11 +76,11 @@ def under_smooth_error() -> list[Figures]:
     return [measure_smooth(20, trial) for trial in range(16)]
 
 
-def test_the_ellipsoid_contains_the_truth_under_a_smooth_angle_error(under_smooth_error: list[Figures]) -> None:
+def test_the_ellipsoid_contains_the_truth_under_a_smooth_angle_error(under_smooth_error):
     assert column(under_smooth_error, "inside").sum() >= binomial_limits(16)[0]
 
 
-def test_new_placements_come_out_nearer_with_the_learnt_map(under_smooth_error: list[Figures]) -> None:
+def test_new_placements_come_out_nearer_with_the_learnt_map(under_smooth_error):
     mapped, plain, paper, best = (
         column(under_smooth_error, f"{name}_px").mean() for name in ("mapped", "held_out", "paper", "best")
     )
@@ -88,7 +88,7 @@ def test_new_placements_come_out_nearer_with_the_learnt_map(under_smooth_error: 
     assert mapped > best
 
 
-def test_a_thousand_pairs_leave_no_bias_where_plain_pnp_keeps_one() -> None:
+def test_a_thousand_pairs_leave_no_bias_where_plain_pnp_keeps_one():
     trials = [measure_many(Case("ti_aisle", 1000, tape_m=None), trial) for trial in range(3)]
     ours, plain = (column(trials, name) for name in ("position_m", "plain position_m"))
     assert ratio(ours, column(trials, "bound_m")).value < 1.6

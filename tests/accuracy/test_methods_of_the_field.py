@@ -25,7 +25,7 @@ def pixels(simulated: SimulatedPairs) -> np.ndarray:
 
 
 @pytest.mark.parametrize("simulated", EXACT, ids=range(3))
-def test_without_noise_both_find_the_true_pose(simulated: SimulatedPairs) -> None:
+def test_without_noise_both_find_the_true_pose(simulated):
     points, clicked, camera = positions(simulated), pixels(simulated), simulated.camera
     for pose in (
         gmlpnp(points, clicked, camera),
@@ -35,13 +35,13 @@ def test_without_noise_both_find_the_true_pose(simulated: SimulatedPairs) -> Non
         assert np.abs(simulated.camera_from_radar.error_from(pose)).max() < 1e-7
 
 
-def test_too_few_pairs_are_no_pose() -> None:
+def test_too_few_pairs_are_no_pose():
     points, clicked, camera = positions(EXACT[0])[:3], pixels(EXACT[0])[:3], EXACT[0].camera
     assert gmlpnp(points, clicked, camera) is None
     assert bias_compensated_pnp(points, clicked, np.zeros((3, 3)), 1.0, camera) is None
 
 
-def test_the_mean_of_noisy_positions_is_right_once_its_bias_is_taken_off() -> None:
+def test_the_mean_of_noisy_positions_is_right_once_its_bias_is_taken_off():
     rng = np.random.default_rng(1)
     true = np.array([[8.0, 3.0, -2.0]])
     sigma = np.array([[0.02, np.deg2rad(8.0), np.deg2rad(12.0)]])
@@ -50,7 +50,7 @@ def test_the_mean_of_noisy_positions_is_right_once_its_bias_is_taken_off() -> No
     assert np.abs(unbiased_positions(noisy, sigma).mean(axis=0) - true).max() < 0.01
 
 
-def test_a_thousand_pairs_leave_little_of_the_bias_that_plain_pnp_has() -> None:
+def test_a_thousand_pairs_leave_little_of_the_bias_that_plain_pnp_has():
     case = Case("ti_aisle", 1000, tape_m=None)
     backwards_m = []
     for trial in range(3):
@@ -67,7 +67,7 @@ def forwards(simulated: SimulatedPairs, pose: RigidTransform | None) -> float:
     return float(pose.inverse().translation_m[0] - simulated.rig.camera_position_radar_m[0])
 
 
-def test_gmlpnp_learns_that_one_axis_is_noisier_than_the_others() -> None:
+def test_gmlpnp_learns_that_one_axis_is_noisier_than_the_others():
     sigma_m, errors = np.array([0.3, 0.01, 0.01]), []
     for trial in range(20):
         rng = np.random.default_rng([5, trial])
@@ -95,12 +95,12 @@ def simulated_at(simulated: SimulatedPairs, points: np.ndarray) -> SimulatedPair
     return replace(simulated, pairs=tuple(pairs))
 
 
-def test_methods_without_a_row_say_why() -> None:
+def test_methods_without_a_row_say_why():
     assert all("not reproduced" in why for why in NOT_RUN.values())
     assert not set(NOT_RUN) & set(PEERS)
 
 
-def test_seconds_are_the_sum_of_keys_clicks_and_thoughts() -> None:
+def test_seconds_are_the_sum_of_keys_clicks_and_thoughts():
     mouse, keys, guesses = WAYS
     assert (mouse.keys(20), mouse.clicks(20), keys.clicks(20), guesses.clicks(20)) == (20, 20, 0, 4)
     assert mouse.seconds(20) == pytest.approx(0.4 + 20 * (0.28 + 1.35 + 1.1 + 0.2))
@@ -109,7 +109,7 @@ def test_seconds_are_the_sum_of_keys_clicks_and_thoughts() -> None:
     assert guesses.seconds(4) == mouse.seconds(4)
 
 
-def test_the_table_stands_only_where_the_errors_were_measured() -> None:
+def test_the_table_stands_only_where_the_errors_were_measured():
     assert section({}).parts[0].cells == ()
     key = f"ours-{Case('ti', 10, 0.1, tape_m=None).key}"
     cells = section({key: [{"rotation_rad": np.deg2rad(1.0), "position_m": 0.1}] * 3}).parts[0].cells

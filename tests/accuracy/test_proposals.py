@@ -33,11 +33,11 @@ def figures() -> list[Figures]:
     return found
 
 
-def test_the_radar_shows_the_placements(figures: list[Figures]) -> None:
+def test_the_radar_shows_the_placements(figures):
     assert summed(figures, "found") >= 0.9 * summed(figures, "placements")
 
 
-def test_most_proposals_lie_on_the_reflector_and_more_after_one_click(figures: list[Figures]) -> None:
+def test_most_proposals_lie_on_the_reflector_and_more_after_one_click(figures):
     placements = summed(figures, "placements")
     assert summed(figures, "without nowhere") <= 0.1 * summed(figures, "without proposed")
     assert summed(figures, "after nowhere") <= 0.1 * summed(figures, "after proposed")
@@ -45,24 +45,24 @@ def test_most_proposals_lie_on_the_reflector_and_more_after_one_click(figures: l
     assert summed(figures, "after right") >= 0.6 * placements
 
 
-def test_nothing_is_confidently_wrong(figures: list[Figures]) -> None:
+def test_nothing_is_confidently_wrong(figures):
     assert summed(figures, "auto far") == 0
     assert summed(figures, "auto wrong clicks") <= 0.1 * summed(figures, "auto clicks")
 
 
-def test_any_24_seeds_have_every_scene_with_both_radars_and_all_clutter() -> None:
+def test_any_24_seeds_have_every_scene_with_both_radars_and_all_clutter():
     options = [case_of(seed).options for seed in range(601, 625)]
     assert len({(one.scene, one.radar, one.clutter) for one in options}) == 24
     traits = {trait for seed in range(601, 641) for trait in case_of(seed).traits}
     assert {"light changes", "passers-by", "two reflectors", "tripod"} <= traits
 
 
-def test_no_failure_in_a_hundred_leaves_three_percent() -> None:
+def test_no_failure_in_a_hundred_leaves_three_percent():
     assert limit_95(0, 100) == "0 of 100, at most 3 % of all at 95 % confidence"
     assert limit_95(2, 2) == "2 of 2, at most 1e+02 % of all at 95 % confidence"
 
 
-def test_the_same_seed_gives_the_same_case_and_pictures() -> None:
+def test_the_same_seed_gives_the_same_case_and_pictures():
     one, other = draw_small(541), draw_small(541)
     assert one.case == other.case
     np.testing.assert_array_equal(one.frames.image(5), other.frames.image(5))

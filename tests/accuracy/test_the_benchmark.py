@@ -28,7 +28,7 @@ def never(trial: int) -> Figures:
     raise AssertionError(f"trial {trial} has been measured already")
 
 
-def test_an_interrupted_run_resumes_where_it_stopped(tmp_path: Path) -> None:
+def test_an_interrupted_run_resumes_where_it_stopped(tmp_path):
     keeper = Keeper(tmp_path)
     run([row()], keeper, jobs=1, most=3)
     path = tmp_path / f"{row().key}.jsonl"
@@ -40,12 +40,12 @@ def test_an_interrupted_run_resumes_where_it_stopped(tmp_path: Path) -> None:
     run([Row(row().key, 5, never)], keeper, jobs=1)
 
 
-def test_processes_do_not_change_a_figure(tmp_path: Path) -> None:
+def test_processes_do_not_change_a_figure(tmp_path):
     run([row()], Keeper(tmp_path), jobs=2)
     assert kept_figures([row()], Keeper(tmp_path))[row().key] == tuple(measure_ours(CASE, trial) for trial in range(11))
 
 
-def test_fresh_seeds_are_other_trials_of_the_same_row_and_are_kept_next_to_the_fixed_ones(tmp_path: Path) -> None:
+def test_fresh_seeds_are_other_trials_of_the_same_row_and_are_kept_next_to_the_fixed_ones(tmp_path):
     assert last_fresh_seeds(tmp_path) is None
     fresh = fresh_seeds(tmp_path)
     assert last_fresh_seeds(tmp_path) == fresh
@@ -60,20 +60,20 @@ def test_fresh_seeds_are_other_trials_of_the_same_row_and_are_kept_next_to_the_f
     assert others[0] == measure_ours(CASE, fresh.first_trial) != fixed[0]
 
 
-def test_figures_are_not_kept_across_a_change_of_the_estimator() -> None:
+def test_figures_are_not_kept_across_a_change_of_the_estimator():
     assert digest_of_sources() == digest_of_sources()
     sources = [path for path in Path(keeping.__file__).parents[2].glob("calib_core/estimation/*.py")]
     assert sources
     assert set(sources) <= set(keeping.sources())
 
 
-def test_every_row_has_a_key_of_its_own_that_is_a_file_name() -> None:
+def test_every_row_has_a_key_of_its_own_that_is_a_file_name():
     keys = [row.key for rows in TABLES.values() for row in rows]
     assert len(set(keys)) == len(keys)
     assert all(key.replace("-", "").replace("_", "").replace(".", "").isalnum() for key in keys)
 
 
-def test_the_page_names_met_and_missed_aims() -> None:
+def test_the_page_names_met_and_missed_aims():
     good = {"rotation_rad": 0.01, "position_m": 0.01, "bound_rad": 0.01, "bound_m": 0.01, "inside": 1.0}
     bad = good | {"rotation_rad": 0.02}
     for figures, verdict in ((good, MET), (bad, MISSED)):
@@ -83,7 +83,7 @@ def test_the_page_names_met_and_missed_aims() -> None:
         assert "RMSE of the rotation at most 1.05 times the bound" in text
 
 
-def test_the_page_names_the_commit_of_fresh_seeds_and_nothing_that_was_not_run() -> None:
+def test_the_page_names_the_commit_of_fresh_seeds_and_nothing_that_was_not_run():
     figures = {
         "rotation_rad": 0.01,
         "position_m": 0.01,
@@ -98,13 +98,13 @@ def test_the_page_names_the_commit_of_fresh_seeds_and_nothing_that_was_not_run()
     assert "| not run |" not in text
 
 
-def test_a_figure_above_its_limit_is_missed_only_when_that_is_significant() -> None:
+def test_a_figure_above_its_limit_is_missed_only_when_that_is_significant():
     verdicts = [at_most(Measured(value, 0.04), 1.05) for value in (1.04, 1.07, 1.12)]
     assert verdicts == [MET, UNDECIDED, MISSED]
     assert within(Measured(99.0, 1.0), 93.0, 97.0) == MISSED
 
 
-def test_two_standard_errors_are_what_repetition_shows() -> None:
+def test_two_standard_errors_are_what_repetition_shows():
     rng = np.random.default_rng(1)
     measured = [
         ratio(np.linalg.norm(rng.standard_normal((200, 3)), axis=1), np.full(200, np.sqrt(3.0))) for _ in range(300)
@@ -115,13 +115,13 @@ def test_two_standard_errors_are_what_repetition_shows() -> None:
     assert share(np.ones(100)).error > 1.0  # all of 100 is not certainty
 
 
-def test_a_trial_without_a_pose_is_a_failure() -> None:
+def test_a_trial_without_a_pose_is_a_failure():
     good: Figures = {"rotation_rad": 0.01, "position_m": 0.01, "bound_rad": 0.01, "bound_m": 0.01}
     trials = [good, good | {"rotation_rad": None, "position_m": None}, good | {"position_m": 0.07}]
     assert failed(trials).tolist() == [False, True, True]
 
 
-def test_the_bound_shrinks_with_the_root_of_the_number_and_by_a_measured_position() -> None:
+def test_the_bound_shrinks_with_the_root_of_the_number_and_by_a_measured_position():
     free, tape = Case("imaging", 40, tape_m=None), Case("imaging", 40)
     simulated = draw(free, 0)
     once = bound_of(simulated, "imaging", None)

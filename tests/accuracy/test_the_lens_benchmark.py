@@ -13,7 +13,7 @@ from calib_core.intrinsics import CalibratedLens, IntrinsicsOptions, calibrate_l
 _DRAWS = 6
 
 
-def test_drawn_corners_give_the_focal_length_and_a_sigma_that_holds() -> None:
+def test_drawn_corners_give_the_focal_length_and_a_sigma_that_holds():
     scaled, focal = [], []
     for draw in range(_DRAWS):
         series, search = drawn_search([draw, 1], "plumb_bob", CASES["independent 0.1 px"])
@@ -25,7 +25,7 @@ def test_drawn_corners_give_the_focal_length_and_a_sigma_that_holds() -> None:
     assert 0.7 < np.sqrt(np.mean(np.square(scaled))) < 1.3  # 1.00 with a standard error of 0.10
 
 
-def test_rendered_pictures_give_the_focal_length() -> None:
+def test_rendered_pictures_give_the_focal_length():
     series = drawn_series([3, 1], "plumb_bob", FILMS["blur and noise"], views=7)
     result = measured(series)
     assert result.views >= 6
@@ -35,20 +35,20 @@ def test_rendered_pictures_give_the_focal_length() -> None:
 
 
 @pytest.mark.parametrize("lens", LENSES)
-def test_cameras_differ_from_draw_to_draw(lens: str) -> None:
+def test_cameras_differ_from_draw_to_draw(lens):
     first, second = (drawn_camera(np.random.default_rng(seed), lens) for seed in (1, 2))
     assert first.model == lens
     assert abs(first.matrix_px[0, 0] - second.matrix_px[0, 0]) > 1.0
 
 
-def test_light_changes_and_boards_drift_only_where_they_should() -> None:
+def test_light_changes_and_boards_drift_only_where_they_should():
     rng = np.random.default_rng(1)
     for name, film in FILMS.items():
         assert (moved(rng, film) == film) == (name != "rolling shutter")
         assert (changed_light(rng, film) == film) == (name != "changing light")
 
 
-def test_bad_views_come_after_the_good_ones() -> None:
+def test_bad_views_come_after_the_good_ones():
     pictures, bad = planted([5, 1], views=3)
     assert sorted(bad) == list(range(3, len(pictures)))
     assert list(bad.values()).count("blurred") == 3
@@ -57,7 +57,7 @@ def test_bad_views_come_after_the_good_ones() -> None:
     assert blurred < 0.5 * sharp
 
 
-def test_a_table_is_written_in_markdown() -> None:
+def test_a_table_is_written_in_markdown():
     text = Table("Speed", ("frames", "time"), (("300", "9 s"),), "On one machine.").text
     assert text == "## Speed\n\nOn one machine.\n\n| frames | time |\n|---|---|\n| 300 | 9 s |\n"
     assert CHECKERBOARD.columns == 9

@@ -29,14 +29,14 @@ def page(project_root: Path) -> str:
     return (project_root / "ARCHITECTURE.md").read_text(encoding="utf-8")
 
 
-def test_rooms_have_no_circular_imports(structure: ModuleType, graph: dict[str, set[str]]) -> None:
+def test_rooms_have_no_circular_imports(structure, graph):
     for folder in {name.rpartition(".")[0] for name in graph} - {""}:
         structure.floors(structure.between_rooms(graph, folder))
     with pytest.raises(ValueError, match="circular imports among a, b"):
         structure.floors({"a": {"b"}, "b": {"a"}, "c": set()})
 
 
-def test_a_house_that_has_grown_by_a_tenth_is_named(structure: ModuleType, tmp_path: Path) -> None:
+def test_a_house_that_has_grown_by_a_tenth_is_named(structure, tmp_path):
     for folder in ("app/cocalib", "calib_core", "static", ".ci"):
         (tmp_path / folder).mkdir(parents=True)
     for number in range(10):
@@ -50,7 +50,7 @@ def test_a_house_that_has_grown_by_a_tenth_is_named(structure: ModuleType, tmp_p
     ]
 
 
-def test_the_paths_it_names_exist(page: str, project_root: Path) -> None:
+def test_the_paths_it_names_exist(page, project_root):
     named = set(re.findall(r"`((?:app|calib_core|static|docs|tests|\.ci)/[\w./]+)`", page))
     assert len(named) > 15
     assert {

@@ -29,14 +29,12 @@ def committed_texts(project_root: Path) -> dict[str, str]:
     return texts
 
 
-def test_no_committed_file_names_a_package_index(committed_texts: dict[str, str]) -> None:
+def test_no_committed_file_names_a_package_index(committed_texts):
     found = [name for name, text in committed_texts.items() if any(host in text for host in _INDEX_HOSTS)]
     assert found == []
 
 
-def test_no_committed_file_names_a_folder_of_the_developers_machine(
-    committed_texts: dict[str, str], project_root: Path
-) -> None:
+def test_no_committed_file_names_a_folder_of_the_developers_machine(committed_texts, project_root):
     here = re.escape(str(project_root.parent))
     pattern = re.compile(rf"(?<![\w.]){here}/\w|/home/\w+/|/Users/\w+/")
     found = [
@@ -48,7 +46,7 @@ def test_no_committed_file_names_a_folder_of_the_developers_machine(
 
 
 @pytest.mark.parametrize("name", ["runtime.txt", "dev.txt"])
-def test_pins_are_exact_hashed_and_without_addresses(name: str, project_root: Path) -> None:
+def test_pins_are_exact_hashed_and_without_addresses(name, project_root):
     lines = (project_root / "requirements" / name).read_text().splitlines()
     pins = [line for line in lines if line and not line.startswith((" ", "#"))]
     assert len(pins) > 20
@@ -61,7 +59,7 @@ def test_pins_are_exact_hashed_and_without_addresses(name: str, project_root: Pa
     assert not any("://" in line for line in lines)
 
 
-def test_the_tests_run_on_the_runtime_pins(project_root: Path) -> None:
+def test_the_tests_run_on_the_runtime_pins(project_root):
     def pins(name: str) -> dict[str, str]:
         lines = (project_root / "requirements" / name).read_text().splitlines()
         return {
@@ -89,11 +87,11 @@ def test_the_tests_run_on_the_runtime_pins(project_root: Path) -> None:
         ".ci/run",
     ],
 )
-def test_the_projects_standard_files_exist(name: str, project_root: Path) -> None:
+def test_the_projects_standard_files_exist(name, project_root):
     assert (project_root / name).stat().st_size > 100
 
 
-def test_nothing_in_the_code_unpickles_or_evaluates(committed_texts: dict[str, str]) -> None:
+def test_nothing_in_the_code_unpickles_or_evaluates(committed_texts):
     pattern = re.compile(
         r"\bimport pickle\b|\bpickle\.loads?\b|allow_pickle=True|(?<![\w.])eval\(|(?<![\w.])exec\(|yaml\.load\(|typ=.unsafe"
     )

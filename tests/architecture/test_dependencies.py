@@ -70,9 +70,7 @@ def declared(project_root: Path) -> set[str]:
     return {re.split(r"[^\w-]", line)[0].lower() for line in lines}
 
 
-def test_every_module_that_is_imported_comes_with_a_declared_dependency(
-    modules: dict[str, set[str]], distributions: defaultdict[str, set[str]], declared: set[str]
-) -> None:
+def test_every_module_that_is_imported_comes_with_a_declared_dependency(modules, distributions, declared):
     assert {"numpy", "cv2", "lz4", "backports"} <= set(modules)
     undeclared = {
         module: sorted(files) for module, files in modules.items() if distributions[module].isdisjoint(declared)
@@ -80,14 +78,12 @@ def test_every_module_that_is_imported_comes_with_a_declared_dependency(
     assert undeclared == {}, "declare the dependencies of these modules in pyproject.toml, or do not import them"
 
 
-def test_every_declared_dependency_is_imported(
-    modules: dict[str, set[str]], distributions: defaultdict[str, set[str]], declared: set[str]
-) -> None:
+def test_every_declared_dependency_is_imported(modules, distributions, declared):
     imported = {name for module in modules for name in distributions[module]}
     assert declared - imported == set(AWAITED), "remove unused dependencies from pyproject.toml"
 
 
-def test_every_dependency_has_a_lowest_and_an_upper_bound(project_root: Path) -> None:
+def test_every_dependency_has_a_lowest_and_an_upper_bound(project_root):
     project = tomllib.loads((project_root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     pattern = re.compile(r"[a-z][a-z0-9-]*>=\d[\d.]*,<\d[\d.]*(; .+)?")
     assert [line for line in project["dependencies"] if not pattern.fullmatch(line)] == []

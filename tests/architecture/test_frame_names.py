@@ -27,7 +27,7 @@ def findings_in(text: str) -> list[str]:
     return [finding.message for finding in frame_names.check_sources([frame_names.Source("snippet.py", text)])]
 
 
-def test_frames_meet_in_the_whole_program(project_root: Path) -> None:
+def test_frames_meet_in_the_whole_program(project_root):
     sources = [
         frame_names.Source(str(path.relative_to(project_root)), path.read_text(encoding="utf-8"))
         for folder in ("app", "calib_core", "benchmarks")
@@ -62,7 +62,7 @@ def test_frames_meet_in_the_whole_program(project_root: Path) -> None:
         "f(parent_from_child=camera_from_radar, points_source=points_radar)",
     ],
 )
-def test_frames_that_meet_pass(text: str) -> None:
+def test_frames_that_meet_pass(text):
     assert findings_in(text) == []
 
 
@@ -109,17 +109,17 @@ def test_frames_that_meet_pass(text: str) -> None:
         "Rt = 1",
     ],
 )
-def test_a_frame_in_the_wrong_place_is_found(text: str) -> None:
+def test_a_frame_in_the_wrong_place_is_found(text):
     assert findings_in(text) != []
 
 
-def test_a_finding_says_where_and_which_frames() -> None:
+def test_a_finding_says_where_and_which_frames():
     text = "a = 1\n\nb = camera_from_radar @ points_camera\n"
     (finding,) = frame_names.check_sources([frame_names.Source("calib_core/x.py", text)])
     assert str(finding) == "calib_core/x.py:3: camera_from_radar @ points in camera: 'radar' meets 'camera'"
 
 
-def test_a_positional_argument_is_compared_with_a_function_of_another_file() -> None:
+def test_a_positional_argument_is_compared_with_a_function_of_another_file():
     callee = frame_names.Source("a.py", "def project(points_radar, camera_from_radar): ...")
     caller = frame_names.Source("b.py", "project(points_radar, radar_from_camera)")
     assert [finding.source for finding in frame_names.check_sources([callee, caller])] == ["b.py"]

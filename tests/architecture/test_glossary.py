@@ -1,12 +1,11 @@
 """The glossary is complete and sorted, and the convention pages have valid links."""
 
 import re
-from pathlib import Path
 
 _ENTRY = re.compile(r"^\*\*(.+?)\*\*", re.MULTILINE)
 
 
-def test_every_term_says_what_to_avoid_and_is_in_alphabetical_order(project_root: Path) -> None:
+def test_every_term_says_what_to_avoid_and_is_in_alphabetical_order(project_root):
     entries = [
         block
         for block in (project_root / "GLOSSARY.md").read_text(encoding="utf-8").split("\n\n")
@@ -18,7 +17,7 @@ def test_every_term_says_what_to_avoid_and_is_in_alphabetical_order(project_root
     assert terms == sorted(terms, key=str.casefold)
 
 
-def test_every_link_of_the_convention_pages_leads_to_a_file(project_root: Path) -> None:
+def test_every_link_of_the_convention_pages_leads_to_a_file(project_root):
     for page in ("GLOSSARY.md", "docs/conventions.md", "docs/paper.md"):
         text = (project_root / page).read_text(encoding="utf-8")
         targets = [target for target in re.findall(r"\]\(([^)#:]+)\)", text) if target != "accuracy.md"]

@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -17,11 +16,11 @@ def heavy_modules_after(statement: str) -> str:
     return done.stdout.strip()
 
 
-def test_the_core_imports_nothing_heavy() -> None:
+def test_the_core_imports_nothing_heavy():
     assert heavy_modules_after("import calib_core") == ""
 
 
-def test_the_mathematics_imports_nothing_heavy(project_root: Path) -> None:
+def test_the_mathematics_imports_nothing_heavy(project_root):
     core = project_root / "calib_core"
     rooms = ("lens_models", "association", "estimation", "diagnostics", "paper", "advice")
     files = [*core.glob("[!_]*.py"), *(file for room in rooms for file in (core / room).rglob("[!_]*.py"))]
@@ -30,14 +29,14 @@ def test_the_mathematics_imports_nothing_heavy(project_root: Path) -> None:
     assert heavy_modules_after("".join(f"import {module}\n" for module in modules)) == ""
 
 
-def test_numpy_random_is_not_imported_before_it_is_needed() -> None:
+def test_numpy_random_is_not_imported_before_it_is_needed():
     """NumPy imports `numpy.random`, and OpenSSL with it, on first access; a quoted annotation does not access it."""
     code = "import calib_core.calibration, sys\nprint('numpy.random' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
 
 
-def test_a_verdict_needs_no_optimizer_of_scipy() -> None:
+def test_a_verdict_needs_no_optimizer_of_scipy():
     """`scipy.optimize` is a third of a second of every `cocalib solve`, and of the first answer on the page."""
     code = (
         "import sys\nfrom dataclasses import replace\nimport numpy as np\n"
@@ -51,14 +50,14 @@ def test_a_verdict_needs_no_optimizer_of_scipy() -> None:
     assert done.stdout.strip() == "False"
 
 
-def test_session_and_view_import_nothing_heavy() -> None:
+def test_session_and_view_import_nothing_heavy():
     assert heavy_modules_after("import cocalib.session\nimport cocalib.view") == ""
 
 
 @pytest.mark.parametrize("package", ["calib_core.interchange", "calib_core.synthetic", "calib_core.recordings"])
-def test_the_borders_of_the_core_import_nothing_heavy(package: str) -> None:
+def test_the_borders_of_the_core_import_nothing_heavy(package):
     assert heavy_modules_after(f"import {package}") == ""
 
 
-def test_a_heavy_import_would_be_seen() -> None:
+def test_a_heavy_import_would_be_seen():
     assert heavy_modules_after("import cv2") == "cv2"

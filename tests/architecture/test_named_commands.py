@@ -73,7 +73,7 @@ def texts(project_root: Path) -> dict[str, list[str]]:
     return {str(path.relative_to(project_root)): [*literals(path)] for path in modules}
 
 
-def test_every_command_that_the_program_names_exists(texts: dict[str, list[str]]) -> None:
+def test_every_command_that_the_program_names_exists(texts):
     unknown = {
         path: names
         for path, strings in texts.items()
@@ -82,7 +82,7 @@ def test_every_command_that_the_program_names_exists(texts: dict[str, list[str]]
     assert unknown == {}
 
 
-def test_every_option_that_the_program_names_exists(texts: dict[str, list[str]]) -> None:
+def test_every_option_that_the_program_names_exists(texts):
     unknown = {
         path: names
         for path, strings in texts.items()
@@ -92,13 +92,13 @@ def test_every_option_that_the_program_names_exists(texts: dict[str, list[str]])
     assert unknown == {}
 
 
-def test_the_page_names_commands_that_exist(project_root: Path) -> None:
+def test_the_page_names_commands_that_exist(project_root):
     for path in sorted((project_root / "static").rglob("*.js")):
         assert unknown_names(path.read_text(encoding="utf-8"), prose=PROSE) == [], path.name
 
 
 @pytest.mark.parametrize("page", ["README.md", "CONTRIBUTING.md", "ARCHITECTURE.md", "CHANGELOG.md", "docs"])
-def test_the_pages_name_commands_that_exist(page: str, project_root: Path) -> None:
+def test_the_pages_name_commands_that_exist(page, project_root):
     path = project_root / page
     for file in sorted(path.glob("*.md")) if path.is_dir() else [path]:
         text = file.read_text(encoding="utf-8").replace(".venv/bin/cocalib", "cocalib")
@@ -142,7 +142,7 @@ def command_lines(page: Path) -> Iterator[str]:
                 yield _REMARK.sub("", line.removeprefix("$ "))
 
 
-def test_the_command_lines_of_the_pages_are_right(project_root: Path) -> None:
+def test_the_command_lines_of_the_pages_are_right(project_root):
     pages = [project_root / "README.md", *sorted((project_root / "docs").glob("*.md"))]
     lines = [(page.name, line) for page in pages for line in command_lines(page) if "[" not in line]
     assert len(lines) > 50
@@ -162,5 +162,5 @@ def test_the_command_lines_of_the_pages_are_right(project_root: Path) -> None:
         ("cocalib export {} --to FORMAT [--out FILE]", []),
     ],
 )
-def test_a_command_that_does_not_exist_is_found(text: str, expected: list[str]) -> None:
+def test_a_command_that_does_not_exist_is_found(text, expected):
     assert unknown_names(text, prose=PROSE) == expected

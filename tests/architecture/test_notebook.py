@@ -21,7 +21,7 @@ def maker(project_root: Path) -> ModuleType:
     return module
 
 
-def test_the_notebook_holds_the_scripts_cells_and_prints_the_same_today(maker: ModuleType) -> None:
+def test_the_notebook_holds_the_scripts_cells_and_prints_the_same_today(maker):
     kept, today = json.loads(maker.NOTEBOOK.read_text(encoding="utf-8")), json.loads(maker.notebook())
     assert [cell["source"] for cell in kept["cells"]] == [cell["source"] for cell in today["cells"]]
     for before, now in zip(kept["cells"], today["cells"], strict=True):

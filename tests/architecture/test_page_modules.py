@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from pathlib import PurePosixPath
 
 import pytest
 
@@ -166,7 +166,7 @@ def circles(graph: Mapping[str, Sequence[str]]) -> list[list[str]]:
     return found
 
 
-def test_the_modules_of_the_page_fit_together(project_root: Path) -> None:
+def test_the_modules_of_the_page_fit_together(project_root):
     folder = project_root / "static"
     texts = {
         path.relative_to(folder).as_posix(): path.read_text(encoding="utf-8")
@@ -198,12 +198,12 @@ export async function start(word) {
 }
 
 
-def test_modules_that_fit_together_have_no_faults() -> None:
+def test_modules_that_fit_together_have_no_faults():
     used = 'await page.evaluate("const { again } = await import("/a/two.js")")'
     assert faults(SOUND, entries=("main.js",), used_by_tests=used) == []
 
 
-def test_what_a_browser_test_imports_must_be_exported() -> None:
+def test_what_a_browser_test_imports_must_be_exported():
     for names, path in (("again, gone", "a/two.js"), ("gone", "b/two.js"), ("gone", "./a/two.js")):
         used = f"const {{ {names} }} = await import('{'' if path.startswith('.') else '/'}{path}')"
         fault = f"tests import gone of {path.removeprefix('./')}, which does not export it"
@@ -230,7 +230,7 @@ def test_what_a_browser_test_imports_must_be_exported() -> None:
         ("a/one.js", '"./three.js"', '"./one.js"', "circle: a/one.js -> a/one.js"),
     ],
 )  # fmt: skip
-def test_a_planted_fault_is_found(path: str, old: str, new: str, fault: str) -> None:
+def test_a_planted_fault_is_found(path, old, new, fault):
     text = SOUND.get(path, "")
     assert old in text
     used = 'const { again } = await import("/a/two.js")'

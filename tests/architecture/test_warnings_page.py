@@ -18,13 +18,13 @@ def _warnings(project_root: Path) -> dict[str, list[ast.Call]]:
     return found
 
 
-def test_the_page_explains_every_code_and_no_other(project_root: Path) -> None:
+def test_the_page_explains_every_code_and_no_other(project_root):
     page = (project_root / "docs" / "warnings.md").read_text(encoding="utf-8")
     explained = set(re.findall(r"^\| `([a-z-]+)` \|", page, re.MULTILINE))
     assert explained == set(_warnings(project_root))
 
 
-def test_every_warning_has_a_code_a_message_and_a_hint(project_root: Path) -> None:
+def test_every_warning_has_a_code_a_message_and_a_hint(project_root):
     warnings = _warnings(project_root)
     assert len(warnings) > 10
     assert [code for code, calls in warnings.items() if any(len(call.args) != 3 for call in calls)] == []

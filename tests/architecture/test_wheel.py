@@ -58,7 +58,7 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_the_wheel_contains_the_page_the_sample_and_the_code_of_the_pack(wheel: Path) -> None:
+def test_the_wheel_contains_the_page_the_sample_and_the_code_of_the_pack(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
     assert {
         "cocalib/static/index.html",
@@ -77,7 +77,7 @@ def test_the_wheel_contains_the_page_the_sample_and_the_code_of_the_pack(wheel: 
     assert not any("__pycache__" in name or "/tests/" in name for name in names)
 
 
-def test_the_installed_command_finds_its_own_page_and_sample(installed: Path, tmp_path: Path) -> None:
+def test_the_installed_command_finds_its_own_page_and_sample(installed, tmp_path):
     code = "from cocalib.platform import resources; print(resources.static_folder()); print(resources.sample_folder())"
     printed = subprocess.run(
         [installed / "bin" / "python", "-c", code],
@@ -92,7 +92,7 @@ def test_the_installed_command_finds_its_own_page_and_sample(installed: Path, tm
         assert Path(line).is_relative_to(installed), "found in the checkout, not in the wheel"
 
 
-def test_a_foreign_package_called_app_is_left_alone(wheel: Path, tmp_path: Path) -> None:
+def test_a_foreign_package_called_app_is_left_alone(wheel, tmp_path):
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", tmp_path], check=True)
     python = tmp_path / "bin" / "python"
     ask = "import sysconfig; print(sysconfig.get_path('purelib'))"
@@ -112,7 +112,7 @@ def test_a_foreign_package_called_app_is_left_alone(wheel: Path, tmp_path: Path)
     assert not (site / "cocalib").exists()
 
 
-def test_the_installed_command_serves_its_page(installed: Path, tmp_path: Path) -> None:
+def test_the_installed_command_serves_its_page(installed, tmp_path):
     server = subprocess.Popen(
         [installed / "bin" / "cocalib", "demo", "--no-browser", "--port", "0", "--session", tmp_path / "session"],
         cwd=tmp_path,
@@ -135,7 +135,7 @@ def test_the_installed_command_serves_its_page(installed: Path, tmp_path: Path) 
         server.communicate()
 
 
-def test_the_installed_command_solves_its_sample_and_packs_it(installed: Path, tmp_path: Path) -> None:
+def test_the_installed_command_solves_its_sample_and_packs_it(installed, tmp_path):
     code = "from cocalib.platform import resources; print(resources.sample_folder() / 'rooftop')"
     sample = Path(
         subprocess.run(
@@ -165,9 +165,7 @@ def test_the_installed_command_solves_its_sample_and_packs_it(installed: Path, t
     assert subprocess.run([sys.executable, "-I", "-S", tmp_path / "pack" / "selftest.py"]).returncode == 0
 
 
-def test_the_command_lines_of_readme_tour_and_report_run_from_the_wheel(
-    installed: Path, project_root: Path, tmp_path: Path
-) -> None:
+def test_the_command_lines_of_readme_tour_and_report_run_from_the_wheel(installed, project_root, tmp_path):
     """In an empty folder with the sample's files, called as the pages call them; windows are left out."""
     for name in ("radar.bag", "camera.bag", "clicks.json"):
         shutil.copy(project_root / "sample_data" / "rooftop" / name, tmp_path)

@@ -1,7 +1,6 @@
 """Calibrations in the shape that other programs write: read right, or refused in words, and never read wrong."""
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -32,7 +31,7 @@ def readings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Reading]:
 
 
 @pytest.mark.parametrize("name", CALIBRATIONS)
-def test_a_file_is_read_right_or_refused_with_what_to_do(readings: dict[str, Reading], name: str) -> None:
+def test_a_file_is_read_right_or_refused_with_what_to_do(readings, name):
     calibration, reading = CALIBRATIONS[name], readings[name]
     print(f"{name:32} {reading.outcome:8} {reading.why}")
 
@@ -43,14 +42,14 @@ def test_a_file_is_read_right_or_refused_with_what_to_do(readings: dict[str, Rea
         assert reading.outcome == "right", reading.why
 
 
-def test_a_sensor_that_the_file_does_not_call_a_radar_is_an_assumption(readings: dict[str, Reading]) -> None:
+def test_a_sensor_that_the_file_does_not_call_a_radar_is_an_assumption(readings):
     for name in ("koide3", "KITTI raw", "KITTI odometry", "Scale frame", "Segments.ai", "Autoware.AI", "OpenLABEL"):
         assert readings[name].assumed, name
     for name in ("tf2_echo without names", "TUM pose", "PJLab", "DriveWorks rig, corrected"):
         assert readings[name].assumed, name
 
 
-def test_the_folder_of_a_file_is_looked_at_for_what_completes_it(tmp_path: Path) -> None:
+def test_the_folder_of_a_file_is_looked_at_for_what_completes_it(tmp_path):
     calibration = CALIBRATIONS["KITTI raw"]
     together = read(calibration, tmp_path)
     (tmp_path / "calib_cam_to_cam.txt").write_text("R_rect_00: 1 0 0\n", encoding="utf-8")
@@ -61,7 +60,7 @@ def test_the_folder_of_a_file_is_looked_at_for_what_completes_it(tmp_path: Path)
 
 
 @pytest.mark.parametrize("name", CALIBRATIONS)
-def test_a_damaged_file_is_read_or_refused(name: str) -> None:
+def test_a_damaged_file_is_read_or_refused(name):
     content = CALIBRATIONS[name].content
     data = content.encode() if isinstance(content, str) else content
     rng = np.random.default_rng(len(data))

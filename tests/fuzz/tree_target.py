@@ -54,6 +54,6 @@ def tree_reader(swallow: Callable[[Callable[[], object]], None]) -> Callable[[by
         frames: list[str] = []
         swallow(lambda: frames.extend(read_tree(files).frames))
         for frame in frames[1:4]:
-            swallow(lambda frame=frame: patched(files, (), calibration, WantedFrames(frames[0], frame)))  # type: ignore[misc]
+            swallow(lambda frame=frame: patched(files, (), calibration, WantedFrames(frames[0], frame)))
 
     return read

@@ -87,8 +87,8 @@ def test_the_python_launch_file_is_a_node_with_these_arguments(file, monkeypatch
         types.ModuleType("launch_ros"),
         types.ModuleType("actions"),
     )
-    launch.LaunchDescription = list  # type: ignore[attr-defined]
-    actions.Node = lambda **given: built.update(given)  # type: ignore[attr-defined]
+    launch.LaunchDescription = list
+    actions.Node = lambda **given: built.update(given)
     for name, module in (("launch", launch), ("launch_ros", launch_ros), ("launch_ros.actions", actions)):
         monkeypatch.setitem(sys.modules, name, module)
     scope: dict = {}

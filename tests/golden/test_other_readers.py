@@ -177,7 +177,7 @@ def test_camera_info_is_loaded_as_ros_does_and_by_camera_option(file):
 
 
 @pytest.mark.parametrize("name", KEPT)
-def test_it_is_read_as_its_calibration(file: CalibrationFile, name: str) -> None:
+def test_it_is_read_as_its_calibration(file, name):
     found = read_any(kept_file(name))
 
     assert (found.format, found.frames, found.evidence, found.assumptions) == (name, file.frames, "clicked", ())
@@ -190,7 +190,7 @@ def test_it_is_read_as_its_calibration(file: CalibrationFile, name: str) -> None
 
 
 @pytest.mark.parametrize("name", ["koide3", "openlabel", "foxglove", "numpy"])
-def test_its_lens_is_read(file: CalibrationFile, name: str) -> None:
+def test_its_lens_is_read(file, name):
     camera, wanted = read_any(kept_file(name)).camera, file.calibration.camera
 
     assert (camera.width_px, camera.height_px) == (wanted.width_px, wanted.height_px)
@@ -199,6 +199,6 @@ def test_its_lens_is_read(file: CalibrationFile, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", KEPT)
-def test_it_is_no_longer_written(file: CalibrationFile, name: str) -> None:
+def test_it_is_no_longer_written(file, name):
     with pytest.raises(InputError, match=f"format '{name}' went in 0.1: use "):
         export(file, name)

@@ -1,7 +1,6 @@
 """docs/paper.md names functions and tests; they exist."""
 
 import re
-from pathlib import Path
 
 import calib_core.geometry
 import calib_core.paper.algorithm_1
@@ -14,7 +13,7 @@ from calib_core.results import Calibration
 _ROW = re.compile(r"\| `(\w+)` \| `(test_\w+)` \|$", re.MULTILINE)
 
 
-def test_every_function_and_test_in_the_table_exists(project_root: Path) -> None:
+def test_every_function_and_test_in_the_table_exists(project_root):
     rows = _ROW.findall((project_root / "docs" / "paper.md").read_text(encoding="utf-8"))
     tests = "".join(path.read_text(encoding="utf-8") for path in (project_root / "tests" / "paper").glob("test_*.py"))
     homes = (
@@ -29,7 +28,7 @@ def test_every_function_and_test_in_the_table_exists(project_root: Path) -> None
     assert [test for _, test in rows if f"def {test}(" not in tests] == []
 
 
-def test_the_judgements_of_the_experiments_are_those_of_the_table(project_root: Path) -> None:
+def test_the_judgements_of_the_experiments_are_those_of_the_table(project_root):
     text = (project_root / "docs" / "paper.md").read_text(encoding="utf-8")
     sets = read_measured().sets
     for name in PAPER:
@@ -37,7 +36,7 @@ def test_the_judgements_of_the_experiments_are_those_of_the_table(project_root: 
         assert said == verdict(name, sets)
 
 
-def test_every_line_of_algorithm_1_cites_itself() -> None:
+def test_every_line_of_algorithm_1_cites_itself():
     lines = {
         1: calib_core.paper.algorithm_1.clicks_by_time,
         2: calib_core.paper.algorithm_1.static_returns_as_printed,

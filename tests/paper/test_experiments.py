@@ -44,13 +44,11 @@ def agrees(folder: Path, simulated: SimulatedScans, camera: str = "camera") -> N
 
 
 @pytest.mark.parametrize("dataset", ["d1", "d2"])
-def test_bags_clicks_and_the_command_give_what_the_scans_alone_give(dataset: Dataset, tmp_path: Path) -> None:
+def test_bags_clicks_and_the_command_give_what_the_scans_alone_give(dataset, tmp_path):
     agrees(tmp_path, recorded(dataset, tmp_path))
 
 
-def test_both_cameras_of_the_aisle_are_solved_from_one_recording(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_both_cameras_of_the_aisle_are_solved_from_one_recording(tmp_path, capsys):
     simulated = recorded("d3", tmp_path)
     agrees(tmp_path, simulated)
     agrees(tmp_path, other_rig(simulated), "camera_2")
@@ -67,7 +65,7 @@ def test_both_cameras_of_the_aisle_are_solved_from_one_recording(
     assert f"--image-topic {choice[1]}" in capsys.readouterr().err.splitlines()[-1]
 
 
-def test_the_tables_settings_are_the_best_of_the_committed_fit() -> None:
+def test_the_tables_settings_are_the_best_of_the_committed_fit():
     found = read_fit()
     grid = {(a, e, float(c)) for a in AZIMUTHS_DEG for e in ELEVATIONS_DEG for c in CORNERS}
     assert {one.settings for one in found.places} == grid
@@ -83,7 +81,7 @@ def test_the_tables_settings_are_the_best_of_the_committed_fit() -> None:
     assert len({*FIT_SEEDS, *SEED_SETS[0], *SEED_SETS[1]}) == len(FIT_SEEDS) + 40
 
 
-def test_the_fit_compares_with_the_papers_figures_of_d1_and_d2_alone() -> None:
+def test_the_fit_compares_with_the_papers_figures_of_d1_and_d2_alone():
     assert FITTED_ROWS == ("PPM+D1", "PPM+D2", "CCM+D2")
     assert mismatch_of({name: PAPER[name] for name in FITTED_ROWS}) == pytest.approx(0.0, abs=1e-12)
     assert mismatch_of({"PPM+D1": (15.31 * np.e, 9.40 / np.e**2)}) == pytest.approx(1.0 + 4.0)
@@ -99,7 +97,7 @@ def test_the_fit_compares_with_the_papers_figures_of_d1_and_d2_alone() -> None:
         (Judged(10.0, 40.0, 9.0, 200.0), "order of magnitude"),
     ],
 )
-def test_a_figure_is_judged_by_our_range_and_our_median(figure: Judged, judgement: str) -> None:
+def test_a_figure_is_judged_by_our_range_and_our_median(figure, judgement):
     assert figure.judgement == judgement
 
 
@@ -108,7 +106,7 @@ def seeds_around(name: str, *scales: tuple[float, float]) -> list[Seed]:
     return [Seed({name: Figures(aed * a, cdsd * c, 0.0)}) for a, c in scales]
 
 
-def test_aed_and_cdsd_of_a_row_are_judged_each() -> None:
+def test_aed_and_cdsd_of_a_row_are_judged_each():
     low, high = (0.9, 0.5), (1.1, 0.6)
     aed, cdsd = judged("PPM+D3", seeds_around("PPM+D3", low, high))
     assert (aed.judgement, cdsd.judgement) == ("reproduced", "not reproduced")
@@ -119,7 +117,7 @@ def test_aed_and_cdsd_of_a_row_are_judged_each() -> None:
     assert row_judgement("CCM+D1", seeds_around("CCM+D1", (0.01, 0.01), (2.0, 2.0))) == "reproduced in order only"
 
 
-def test_figures_that_two_sets_judge_differently_are_named_with_the_reason() -> None:
+def test_figures_that_two_sets_judge_differently_are_named_with_the_reason():
     good = [Seed({name: Figures(aed * a, cdsd * a, 0.0) for name, (aed, cdsd) in PAPER.items()}) for a in (0.9, 1.1)]
     bad = [Seed({**seed.rows, "PPM+D1": Figures(7.655, 9.4 * (0.8 + 0.45 * k), 0.0)}) for k, seed in enumerate(good)]
     assert differing(good, good) == []
@@ -130,7 +128,7 @@ def test_figures_that_two_sets_judge_differently_are_named_with_the_reason() -> 
     assert "range 1.59 and 2.82 times apart" in cdsd
 
 
-def test_gross_errors_are_of_the_stated_number_and_size_and_never_behind_the_radar() -> None:
+def test_gross_errors_are_of_the_stated_number_and_size_and_never_behind_the_radar():
     settings = dataclasses.replace(FITTED, placements=8)
     without = with_gross_errors(other_rig(session("d3", 1, settings)), 0, 4.0).unwrap()
     pairs = measured_pairs(without)
@@ -143,19 +141,19 @@ def test_gross_errors_are_of_the_stated_number_and_size_and_never_behind_the_rad
     assert not off_m[:, 2].any()
 
 
-def test_the_figures_of_a_run_come_back_from_their_file(tmp_path: Path) -> None:
+def test_the_figures_of_a_run_come_back_from_their_file(tmp_path):
     write_lines(tmp_path / "measured.json", read_measured(), "rows")
     assert (tmp_path / "measured.json").read_bytes() == MEASURED_FILE.read_bytes()
 
 
-def test_the_documented_page_is_what_the_last_run_measured(project_root: Path) -> None:
+def test_the_documented_page_is_what_the_last_run_measured(project_root):
     documented = (project_root / "docs" / "paper-experiments.md").read_text(encoding="utf-8")
     assert documented == page(read_measured(), FITTED, read_fit())
     assert "{" not in documented
     assert all(f"\n| {name} | " in documented for name in PAPER)
 
 
-def test_every_picture_says_that_it_is_simulated(project_root: Path) -> None:
+def test_every_picture_says_that_it_is_simulated(project_root):
     pictures = sorted((project_root / "docs" / "pictures" / "paper").glob("*"))
     assert [one.name for one in pictures] == [f"fig-{number}.svg" for number in range(2, 7)]
     assert all(", simulated: " in one.read_text(encoding="utf-8") for one in pictures)

@@ -97,20 +97,17 @@ def both(figures: Figures) -> tuple[float, float]:
     return figures.aed_px, figures.cdsd_px
 
 
-def test_aed_and_cdsd_of_ppm_are_those_of_the_formulas(d1: Calibration, d2: tuple[SimulatedScans, Calibration]) -> None:
+def test_aed_and_cdsd_of_ppm_are_those_of_the_formulas(d1, d2):
     for calibration in (d1, d2[1]):
         pose = calibration.camera_from_radar
         matrix = np.column_stack([pose.rotation, pose.translation_m]).tolist()
         assert both(figures_of(calibration)) == pytest.approx(again(matrix, calibration), rel=1e-6)
 
 
-def test_ccm_is_least_squares_for_twelve_numbers_on_its_own_board_and_on_d1(
-    d1: Calibration, d2: tuple[SimulatedScans, Calibration]
-) -> None:
+def test_ccm_is_least_squares_for_twelve_numbers_on_its_own_board_and_on_d1(d1, d2):
     simulated, on_board = d2
     points, clicked = points_and_pixels(on_board)
     board = simulated.stage.scene.board
-    assert board is not None
     corners = (simulated.stage.rig.camera_from_world @ board.corners_m).tolist()
     lens, distortion = lens_of(on_board)
     identity = np.eye(3, 4).tolist()
@@ -123,7 +120,7 @@ def test_ccm_is_least_squares_for_twelve_numbers_on_its_own_board_and_on_d1(
     assert condition > 1e9
 
 
-def test_pmm_looks_along_the_radar_and_the_swaps_take_its_parts(d1: Calibration) -> None:
+def test_pmm_looks_along_the_radar_and_the_swaps_take_its_parts(d1):
     """The camera is 4.5 cm above the radar and looks where it looks: x right, y down, z forward of x forward, y left, z up."""
     axes, offset = [(0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)], (0.0, 0.045, 0.0)
     pose, rows = d1.camera_from_radar, measure(SEED_SETS[0][0], FITTED, ["d1"]).rows

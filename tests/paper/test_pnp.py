@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from calib_core.camera import CAMERA_MODELS, Camera, CameraModel
+from calib_core.camera import CAMERA_MODELS, Camera
 from calib_core.geometry import RigidTransform, rotation_angle_rad
 from calib_core.paper.pnp import PnPSolver, refine_lm, solve_pnp, solve_pnp_ransac, spans_a_plane
 from calib_core.synthetic import SimulatedPairs, simulate_pairs, typical_camera
@@ -26,7 +26,7 @@ def squared_error_px2(points: np.ndarray, pixels: np.ndarray, camera: Camera, po
 
 @pytest.mark.parametrize("model", CAMERA_MODELS)
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_pnp_gives_the_true_pose_through_every_lens(model: CameraModel, solver: PnPSolver) -> None:
+def test_pnp_gives_the_true_pose_through_every_lens(model, solver):
     simulated = pairs_without_noise(typical_camera(model))
     pose = solve_pnp(simulated.points_radar_m, simulated.pixels_px, simulated.camera, solver)
     assert angle_deg(pose, simulated.camera_from_radar) < 0.01
@@ -35,7 +35,7 @@ def test_pnp_gives_the_true_pose_through_every_lens(model: CameraModel, solver: 
 
 @pytest.mark.parametrize("model", CAMERA_MODELS)
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_ransac_names_the_wrong_pairs_through_every_lens(model: CameraModel, solver: PnPSolver) -> None:
+def test_ransac_names_the_wrong_pairs_through_every_lens(model, solver):
     simulated = pairs_without_noise(typical_camera(model))
     pixels = simulated.pixels_px.copy()
     wrong = [2, 7, 11]
@@ -46,7 +46,7 @@ def test_ransac_names_the_wrong_pairs_through_every_lens(model: CameraModel, sol
 
 
 @pytest.mark.parametrize("model", CAMERA_MODELS)
-def test_refinement_reaches_the_least_squares_of_the_pixels(model: CameraModel) -> None:
+def test_refinement_reaches_the_least_squares_of_the_pixels(model):
     rng = np.random.default_rng(5)
     simulated = pairs_without_noise(typical_camera(model))
     points, camera = simulated.points_radar_m, simulated.camera
@@ -60,7 +60,7 @@ def test_refinement_reaches_the_least_squares_of_the_pixels(model: CameraModel) 
         assert squared_error_px2(points, pixels, camera, refined.perturbed(error)) > least
 
 
-def test_our_own_refinement_agrees_with_opencvs() -> None:
+def test_our_own_refinement_agrees_with_opencvs():
     # a tiny skew selects our own refinement for the same problem
     rng = np.random.default_rng(6)
     simulated = pairs_without_noise(study_camera())
@@ -78,7 +78,7 @@ def skewed(camera: Camera, skew_px: float) -> Camera:
     return Camera(camera.model, camera.width_px, camera.height_px, matrix, camera.distortion)
 
 
-def test_skew_is_not_dropped_silently() -> None:
+def test_skew_is_not_dropped_silently():
     simulated = pairs_without_noise(skewed(typical_camera("plumb_bob"), 40.0))
     pose = solve_pnp(simulated.points_radar_m, simulated.pixels_px, simulated.camera, "sqpnp")
     assert pose is not None
@@ -87,7 +87,7 @@ def test_skew_is_not_dropped_silently() -> None:
 
 @pytest.mark.parametrize("count", [4, 5, 6])
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_few_pairs_are_enough_from_four_on(count: int, solver: PnPSolver) -> None:
+def test_few_pairs_are_enough_from_four_on(count, solver):
     simulated = pairs_without_noise(study_camera(), count=count, seed=8)
     points, pixels, camera = simulated.points_radar_m, simulated.pixels_px, simulated.camera
     for pose in (solve_pnp(points, pixels, camera, solver), solve_pnp_ransac(points, pixels, camera, solver)):
@@ -95,7 +95,7 @@ def test_few_pairs_are_enough_from_four_on(count: int, solver: PnPSolver) -> Non
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_three_pairs_are_too_few(solver: PnPSolver) -> None:
+def test_three_pairs_are_too_few(solver):
     simulated = pairs_without_noise(study_camera(), count=3)
     points, pixels, camera = simulated.points_radar_m, simulated.pixels_px, simulated.camera
     assert solve_pnp(points, pixels, camera, solver) is None
@@ -105,7 +105,7 @@ def test_three_pairs_are_too_few(solver: PnPSolver) -> None:
 
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("step", [0.0, 0.5], ids=["one point", "one line"])
-def test_no_pose_from_one_point_or_one_line(solver: PnPSolver, step: float) -> None:
+def test_no_pose_from_one_point_or_one_line(solver, step):
     points = np.array([[5.0, 0.3, -0.4]]) + step * np.arange(8)[:, None] * np.array([[1.0, 0.2, 0.1]])
     pixels = np.random.default_rng(1).uniform(100.0, 900.0, (8, 2))
     assert not spans_a_plane(points)
@@ -113,14 +113,14 @@ def test_no_pose_from_one_point_or_one_line(solver: PnPSolver, step: float) -> N
     assert solve_pnp_ransac(points, pixels, study_camera(), solver) is None
 
 
-def test_no_pose_where_no_pairs_agree() -> None:
+def test_no_pose_where_no_pairs_agree():
     rng = np.random.default_rng(2)
     points = rng.uniform([2.0, -3.0, -1.0], [15.0, 3.0, 1.0], (20, 3))
     pixels = rng.uniform([0.0, 0.0], [1900.0, 1000.0], (20, 2))
     assert solve_pnp_ransac(points, pixels, study_camera(), "sqpnp", threshold_px=0.01, iterations=200) is None
 
 
-def test_a_fisheye_click_at_ninety_degrees_is_no_inlier_but_does_no_harm() -> None:
+def test_a_fisheye_click_at_ninety_degrees_is_no_inlier_but_does_no_harm():
     simulated = pairs_without_noise(typical_camera("equidistant"))
     camera = simulated.camera
     sideways_px = camera.project(np.array([[1.0, 0.0, -0.05]]))  # seen a little behind the image plane
@@ -130,7 +130,7 @@ def test_a_fisheye_click_at_ninety_degrees_is_no_inlier_but_does_no_harm() -> No
     assert solution.inliers.tolist() == [True] * 20 + [False]
 
 
-def test_the_same_pairs_give_the_same_bits() -> None:
+def test_the_same_pairs_give_the_same_bits():
     simulated = simulate_pairs(20, rng=np.random.default_rng(9), noise="imaging", outlier_share=0.2)
     points = np.stack([pair.candidates[0].position_radar_m for pair in simulated.pairs])
     pixels = np.stack([pair.pixel_px for pair in simulated.pairs])

@@ -25,10 +25,10 @@ def solved(pairs: list[Pair] | tuple[Pair, ...], seed: int, options: Calibration
 
 @FEW
 @given(seed=SEEDS, order=st.randoms(use_true_random=False))
-def test_shuffling_pairs_changes_no_bit(seed: int, order: object) -> None:
+def test_shuffling_pairs_changes_no_bit(seed, order):
     pairs = list(simulate_pairs(10, rng=np.random.default_rng(seed), outlier_share=0.2).pairs)
     plain = solved(pairs, seed)
-    order.shuffle(pairs)  # type: ignore[attr-defined]
+    order.shuffle(pairs)
     shuffled = solved(pairs, seed)
     assert plain.camera_from_radar.as_matrix().tobytes() == shuffled.camera_from_radar.as_matrix().tobytes()
     assert plain.covariance.tobytes() == shuffled.covariance.tobytes()
@@ -37,7 +37,7 @@ def test_shuffling_pairs_changes_no_bit(seed: int, order: object) -> None:
 
 @FEW
 @given(seed=SEEDS, turn=st.floats(-0.3, 0.3))
-def test_turning_the_radar_about_its_vertical_axis_turns_the_answer(seed: int, turn: float) -> None:
+def test_turning_the_radar_about_its_vertical_axis_turns_the_answer(seed, turn):
     """A yaw of a radar without scale errors only shifts azimuths, with the same noise: the fit must rotate with it."""
     simulated = simulate_pairs(12, rng=np.random.default_rng(seed))
     turned_from_radar = RigidTransform(rotation_exp(np.array([0.0, 0.0, turn])), np.zeros(3))
@@ -60,7 +60,7 @@ def test_turning_the_radar_about_its_vertical_axis_turns_the_answer(seed: int, t
 
 @FEW
 @given(seed=SEEDS)
-def test_covariances_are_symmetric_and_positive(seed: int) -> None:
+def test_covariances_are_symmetric_and_positive(seed):
     calibration = solved(simulate_pairs(8, rng=np.random.default_rng(seed), outlier_share=0.25).pairs, seed)
     assert (calibration.covariance == calibration.covariance.T).all()
     assert np.linalg.eigvalsh(calibration.covariance).min() > 0
@@ -69,7 +69,7 @@ def test_covariances_are_symmetric_and_positive(seed: int) -> None:
 
 @FEW
 @given(seed=SEEDS)
-def test_excluding_the_outliers_leaves_the_pose_where_it_was(seed: int) -> None:
+def test_excluding_the_outliers_leaves_the_pose_where_it_was(seed):
     simulated = simulate_pairs(20, rng=np.random.default_rng(seed), noise="imaging", outlier_share=0.2)
     whole = solved(simulated.pairs, seed)
     named = frozenset(pair.id for pair in whole.pairs if pair.outlier_probability > 0.99)
@@ -80,7 +80,7 @@ def test_excluding_the_outliers_leaves_the_pose_where_it_was(seed: int) -> None:
 
 @FEW
 @given(seed=SEEDS, count=st.integers(0, 6))
-def test_any_number_of_pairs_gives_an_answer_or_a_reason(seed: int, count: int) -> None:
+def test_any_number_of_pairs_gives_an_answer_or_a_reason(seed, count):
     pairs = simulate_pairs(6, rng=np.random.default_rng(seed), outlier_share=0.5).pairs[:count]
     outcome = calibrate_pairs(pairs, simulate_pairs(1, rng=np.random.default_rng(0)).camera, CalibrationOptions())
     if isinstance(outcome, Unsolvable):
@@ -92,7 +92,7 @@ def test_any_number_of_pairs_gives_an_answer_or_a_reason(seed: int, count: int) 
         assert np.isfinite(outcome.metrics.aed_px)
 
 
-def test_more_pairs_make_the_pose_more_certain() -> None:
+def test_more_pairs_make_the_pose_more_certain():
     simulated = simulate_pairs(40, rng=np.random.default_rng(1))
     sigmas = [np.sqrt(np.trace(solved(simulated.pairs[:count], 1).covariance[3:, 3:])) for count in (8, 16, 40)]
     assert sigmas == sorted(sigmas, reverse=True)

@@ -57,12 +57,12 @@ def projected_by_opencv(camera: Camera, points: np.ndarray) -> np.ndarray:
 
 
 @given(cameras(_OPENCV_MODELS), points_ahead())
-def test_projection_agrees_with_opencv(camera: Camera, points: np.ndarray) -> None:
+def test_projection_agrees_with_opencv(camera, points):
     np.testing.assert_allclose(camera.project(points), projected_by_opencv(camera, points), atol=1e-6)
 
 
 @given(cameras(), points_ahead())
-def test_the_jacobian_is_the_slope_of_the_projection(camera: Camera, points: np.ndarray) -> None:
+def test_the_jacobian_is_the_slope_of_the_projection(camera, points):
     _, jacobian = camera.project_with_jacobian(points)
     distance = float(np.abs(points).max())
     step = 1e-6 * distance
@@ -75,14 +75,14 @@ def test_the_jacobian_is_the_slope_of_the_projection(camera: Camera, points: np.
 
 
 @given(cameras(), points_ahead())
-def test_a_point_lies_on_the_ray_of_its_pixel(camera: Camera, points: np.ndarray) -> None:
+def test_a_point_lies_on_the_ray_of_its_pixel(camera, points):
     rays = camera.rays(camera.project(points))
     directions = points / np.linalg.norm(points, axis=1, keepdims=True)
     np.testing.assert_allclose(rays, directions, atol=1e-7)
 
 
 @given(cameras(), st.lists(st.tuples(st.floats(0.0, 1279.0), st.floats(0.0, 719.0)), min_size=1, max_size=6))
-def test_a_ray_projects_back_to_its_pixel(camera: Camera, pixels: list[tuple[float, float]]) -> None:
+def test_a_ray_projects_back_to_its_pixel(camera, pixels):
     rays = camera.rays(np.array(pixels))
     known = np.isfinite(rays).all(axis=1)
     np.testing.assert_allclose(np.linalg.norm(rays[known], axis=1), 1.0, rtol=1e-12)
@@ -90,22 +90,18 @@ def test_a_ray_projects_back_to_its_pixel(camera: Camera, pixels: list[tuple[flo
 
 
 @given(cameras(), points_ahead(), st.floats(0.1, 10.0))
-def test_a_pixel_does_not_depend_on_the_distance_along_its_ray(
-    camera: Camera, points: np.ndarray, factor: float
-) -> None:
+def test_a_pixel_does_not_depend_on_the_distance_along_its_ray(camera, points, factor):
     np.testing.assert_allclose(camera.project(factor * points), camera.project(points), atol=1e-6)
 
 
 @given(cameras(), points_ahead(), st.sampled_from([0.25, 0.5, 2.0, 3.0]))
-def test_scaling_the_camera_scales_the_pixels_about_the_corner_of_the_image(
-    camera: Camera, points: np.ndarray, factor: float
-) -> None:
+def test_scaling_the_camera_scales_the_pixels_about_the_corner_of_the_image(camera, points, factor):
     scaled_px = camera.scaled(factor).project(points)
     np.testing.assert_allclose(scaled_px + 0.5, factor * (camera.project(points) + 0.5), atol=1e-6)
 
 
 @given(cameras(), points_ahead())
-def test_what_the_camera_sees_is_what_falls_on_the_image(camera: Camera, points: np.ndarray) -> None:
+def test_what_the_camera_sees_is_what_falls_on_the_image(camera, points):
     assert camera.sees(points).tolist() == camera.in_image(camera.project(points)).tolist()
     if camera.lens.is_perspective:  # a fisheye lens may well see what is behind it
         assert not camera.sees(-points).any()

@@ -61,13 +61,13 @@ def _scatter(sessions: list[SessionPose]) -> MountingScatter:
 
 
 @given(_vectors, _vectors)
-def test_coordinates_and_back(values: np.ndarray, common: np.ndarray) -> None:
+def test_coordinates_and_back(values, common):
     centre = _poses(common)
     np.testing.assert_allclose(coordinates(pose_from_coordinates(values, centre), centre), values, atol=1e-9)
 
 
 @given(_vectors, _vectors)
-def test_the_jacobian_of_the_coordinates_is_the_slope_of_the_numbers(one: np.ndarray, other: np.ndarray) -> None:
+def test_the_jacobian_of_the_coordinates_is_the_slope_of_the_numbers(one, other):
     common, step = _poses(other), 1e-6
     pose = pose_from_coordinates(one, common)
     columns = [
@@ -80,10 +80,10 @@ def test_the_jacobian_of_the_coordinates_is_the_slope_of_the_numbers(one: np.nda
 
 @_few
 @given(_seeds, st.randoms(use_true_random=False))
-def test_the_order_of_the_sessions_changes_nothing(seed: int, random: object) -> None:
+def test_the_order_of_the_sessions_changes_nothing(seed, random):
     sessions = _sessions(seed)
     shuffled = list(sessions)
-    random.shuffle(shuffled)  # type: ignore[attr-defined]
+    random.shuffle(shuffled)
     one, other = _scatter(sessions), _scatter(shuffled)
     np.testing.assert_array_equal(one.scatter, other.scatter)
     assert [mounting.sessions for mounting in one.mountings] == [mounting.sessions for mounting in other.mountings]
@@ -91,7 +91,7 @@ def test_the_order_of_the_sessions_changes_nothing(seed: int, random: object) ->
 
 @_few
 @given(_seeds, st.integers(2, 5))
-def test_another_session_never_widens_a_mounting(seed: int, count: int) -> None:
+def test_another_session_never_widens_a_mounting(seed, count):
     rng = np.random.default_rng(seed)
     rows = [simulated_session(NOMINAL, Accuracy(0.01, 0.2, systematic=0.0), rng, vehicle="van") for _ in range(count)]
     fewer, more = mounting_of(rows[:-1]).covariance, mounting_of(rows).covariance
@@ -101,7 +101,7 @@ def test_another_session_never_widens_a_mounting(seed: int, count: int) -> None:
 
 @_few
 @given(_seeds)
-def test_a_transition_there_and_back_is_as_large(seed: int) -> None:
+def test_a_transition_there_and_back_is_as_large(seed):
     one, other = _sessions(seed, vehicles=1)
     there, back = transition(one, other), transition(other, one)
     assert np.isclose(there.squared, back.squared, rtol=1e-6)
@@ -112,7 +112,7 @@ def test_a_transition_there_and_back_is_as_large(seed: int) -> None:
 
 @_few
 @given(_seeds, st.floats(1.0, 100.0))
-def test_wider_error_bars_never_make_a_remount(seed: int, wider: float) -> None:
+def test_wider_error_bars_never_make_a_remount(seed, wider):
     one, other = _sessions(seed, vehicles=1)
     wide = SessionPose("v0", "wide", other.camera_from_radar, wider * other.covariance)
     assert transition(one, wide).squared <= transition(one, other).squared * (1.0 + 1e-9)

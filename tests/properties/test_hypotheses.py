@@ -100,9 +100,7 @@ conventions = st.tuples(
 @pytest.mark.parametrize("writer", WRITERS)
 @settings(max_examples=8, deadline=None)
 @given(pose=mountings(), convention=conventions)
-def test_a_pose_is_among_the_hypotheses_however_it_is_written(
-    writer: str, pose: RigidTransform, convention: tuple[str, str, str, str]
-) -> None:
+def test_a_pose_is_among_the_hypotheses_however_it_is_written(writer, pose, convention):
     file = read_unstated(json.dumps(WRITERS[writer](written(pose, *convention))), "file.json")
     hypotheses = hypotheses_of(file.pose_at(None))
     fitting = [one for one in hypotheses if _same(one.camera_from_radar, pose)]
@@ -116,9 +114,7 @@ def test_a_pose_is_among_the_hypotheses_however_it_is_written(
 @pytest.mark.parametrize("writer", WRITERS)
 @settings(max_examples=4, deadline=None)
 @given(pose=mountings(), convention=conventions, seed=st.integers(0, 2**32 - 1))
-def test_pairs_find_the_pose_among_the_hypotheses(
-    writer: str, pose: RigidTransform, convention: tuple[str, str, str, str], seed: int
-) -> None:
+def test_pairs_find_the_pose_among_the_hypotheses(writer, pose, convention, seed):
     rng = np.random.default_rng(seed)
     pixels_px = rng.uniform((0, 0), (640, 480), (20, 2))
     points_radar_m = pose.inverse() @ (CAMERA.rays(pixels_px) * rng.uniform(3, 15, (20, 1)))
@@ -134,9 +130,7 @@ def test_pairs_find_the_pose_among_the_hypotheses(
 
 @settings(max_examples=20, deadline=None)
 @given(pose=mountings(), convention=conventions)
-def test_another_calibration_finds_the_pose_among_the_hypotheses(
-    pose: RigidTransform, convention: tuple[str, str, str, str]
-) -> None:
+def test_another_calibration_finds_the_pose_among_the_hypotheses(pose, convention):
     file = read_unstated(json.dumps({"T": written(pose, *convention).as_matrix().tolist()}), "file.json")
     first = hypotheses_of(file.pose_at(None), against=pose)[0]
     assert first.fits
@@ -146,9 +140,7 @@ def test_another_calibration_finds_the_pose_among_the_hypotheses(
 
 @settings(max_examples=20, deadline=None)
 @given(pose=mountings(), convention=conventions)
-def test_the_shares_add_up_and_no_two_hypotheses_are_one_pose(
-    pose: RigidTransform, convention: tuple[str, str, str, str]
-) -> None:
+def test_the_shares_add_up_and_no_two_hypotheses_are_one_pose(pose, convention):
     file = read_unstated(json.dumps({"T": written(pose, *convention).as_matrix().tolist()}), "file.json")
     hypotheses = hypotheses_of(file.pose_at(None))
     assert sum(one.share for one in hypotheses) == pytest.approx(1.0)

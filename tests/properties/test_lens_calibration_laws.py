@@ -32,7 +32,7 @@ def same_lens(one: CalibratedLens, other: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize("factor", [0.01, 3.0])
-def test_the_size_of_the_squares_changes_distances_and_nothing_else(factor: float) -> None:
+def test_the_size_of_the_squares_changes_distances_and_nothing_else(factor):
     other = calibrated(VIEWS, square_m=factor * BOARD.square_m)
     same_lens(other, LENS.camera.parameters)
     for one, two in zip(LENS.views, other.views, strict=True):
@@ -41,22 +41,22 @@ def test_the_size_of_the_squares_changes_distances_and_nothing_else(factor: floa
         )
 
 
-def test_the_order_of_the_views_does_not_matter() -> None:
+def test_the_order_of_the_views_does_not_matter():
     same_lens(calibrated(VIEWS[::-1]), LENS.camera.parameters)
 
 
-def test_the_order_of_the_corners_does_not_matter() -> None:
+def test_the_order_of_the_corners_does_not_matter():
     order = np.random.default_rng(0).permutation(54)
     mixed = tuple(replace(view, corner_ids=view.corner_ids[order], pixels_px=view.pixels_px[order]) for view in VIEWS)
     same_lens(calibrated(mixed), LENS.camera.parameters)
 
 
-def test_pictures_of_twice_the_size_have_twice_the_focal_length() -> None:
+def test_pictures_of_twice_the_size_have_twice_the_focal_length():
     larger = tuple(replace(view, size_px=(2560, 1440), pixels_px=2.0 * view.pixels_px + 0.5) for view in VIEWS)
     same_lens(calibrated(larger, size_px=(2560, 1440)), LENS.camera.scaled(2.0).parameters)
 
 
-def test_mirroring_all_pictures_mirrors_the_principal_point() -> None:
+def test_mirroring_all_pictures_mirrors_the_principal_point():
     mirrored = tuple(replace(view, pixels_px=view.pixels_px * [-1.0, 1.0] + [SIZE_PX[0] - 1.0, 0.0]) for view in VIEWS)
     expected = LENS.camera.parameters.copy()
     expected[2] = SIZE_PX[0] - 1.0 - expected[2]

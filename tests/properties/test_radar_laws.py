@@ -22,18 +22,18 @@ _points = st.tuples(_coordinates, _coordinates, _coordinates).map(lambda row: np
 
 
 @given(_polar)
-def test_polar_to_cartesian_and_back(polar: np.ndarray) -> None:
+def test_polar_to_cartesian_and_back(polar):
     np.testing.assert_allclose(polar_from_cartesian(cartesian_from_polar(polar)), polar, rtol=1e-9, atol=1e-9)
 
 
 @given(_points)
-def test_cartesian_to_polar_and_back(points_radar_m: np.ndarray) -> None:
+def test_cartesian_to_polar_and_back(points_radar_m):
     back = cartesian_from_polar(polar_from_cartesian(points_radar_m))
     np.testing.assert_allclose(back, points_radar_m, rtol=1e-12, atol=1e-11)
 
 
 @given(_polar)
-def test_the_jacobian_is_the_slope_of_the_numbers(polar: np.ndarray) -> None:
+def test_the_jacobian_is_the_slope_of_the_numbers(polar):
     step = 1e-6
     columns = []
     for axis in np.eye(3):
@@ -43,7 +43,7 @@ def test_the_jacobian_is_the_slope_of_the_numbers(polar: np.ndarray) -> None:
 
 
 @given(_polar)
-def test_direction_cosines_are_the_sines_of_the_angles(polar: np.ndarray) -> None:
+def test_direction_cosines_are_the_sines_of_the_angles(polar):
     range_m, azimuth, elevation = polar[0]
     u, w = math.cos(elevation) * math.sin(azimuth), math.sin(elevation)
     np.testing.assert_allclose(
@@ -52,7 +52,7 @@ def test_direction_cosines_are_the_sines_of_the_angles(polar: np.ndarray) -> Non
 
 
 @given(_polar, st.tuples(st.floats(0.001, 1.0), st.floats(1e-4, 0.1), st.floats(1e-4, 0.1)))
-def test_a_covariance_is_symmetric_positive_and_keeps_its_volume(polar: np.ndarray, sigmas: tuple[float, ...]) -> None:
+def test_a_covariance_is_symmetric_positive_and_keeps_its_volume(polar, sigmas):
     covariance = covariance_from_sigma_polar(cartesian_from_polar(polar), np.array([sigmas]))[0]
     np.testing.assert_allclose(covariance, covariance.T, rtol=1e-12, atol=1e-15)
     range_m, _, elevation = polar[0]

@@ -247,7 +247,7 @@ def lived(taken: Sequence[Step]) -> list[tuple[Step, History]]:
 
 @settings(max_examples=30, deadline=None)
 @given(taken=st.lists(steps, max_size=12), share=st.floats(0.0, 1.0))
-def test_a_journal_cut_at_any_byte_gives_the_last_confirmed_session_back(taken: list[Step], share: float) -> None:
+def test_a_journal_cut_at_any_byte_gives_the_last_confirmed_session_back(taken, share):
     kept = lived(taken)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

@@ -9,7 +9,6 @@ from hypothesis.extra.numpy import arrays
 from calib_core.measurements import TimeNs
 from calib_core.radar import direction_cosines
 from calib_core.synthetic import RADAR_PROFILES, simulate_pairs
-from calib_core.synthetic.options import RadarName
 from calib_core.synthetic.radar_returns import Targets, measure
 from calib_core.synthetic.rendering.surfaces import line_coverage
 from calib_core.synthetic.scene.person import PersonState, capsules
@@ -24,9 +23,7 @@ seeds = st.integers(0, 2**32 - 1)
     velocity=arrays(np.float64, 6, elements=st.floats(-9.0, 9.0)),
     name=st.sampled_from(["awr1843", "imaging"]),
 )
-def test_whatever_is_in_front_a_scan_is_finite_forward_and_on_its_bins(
-    seed: int, points: np.ndarray, velocity: np.ndarray, name: RadarName
-) -> None:
+def test_whatever_is_in_front_a_scan_is_finite_forward_and_on_its_bins(seed, points, velocity, name):
     profile = RADAR_PROFILES[name]
     targets = Targets(
         points, velocity, np.full(6, 20.0), np.full(6, 3.0), np.zeros((6, 3)), np.zeros(6, dtype=np.bool_)
@@ -43,7 +40,7 @@ def test_whatever_is_in_front_a_scan_is_finite_forward_and_on_its_bins(
 
 
 @given(seed=seeds, hidden=arrays(np.bool_, 5))
-def test_what_is_hidden_or_still_is_not_seen_or_not_moving(seed: int, hidden: np.ndarray) -> None:
+def test_what_is_hidden_or_still_is_not_seen_or_not_moving(seed, hidden):
     points = np.stack([np.arange(4.0, 14.0, 2.0), np.zeros(5), np.zeros(5)], axis=1)
     targets = Targets(points, np.zeros(5), np.full(5, 15.0), np.zeros(5), np.zeros((5, 3)), hidden)
     scan = measure(np.random.default_rng(seed), targets, profile=RADAR_PROFILES["awr1843"], time=TimeNs(1)).scan
@@ -54,7 +51,7 @@ def test_what_is_hidden_or_still_is_not_seen_or_not_moving(seed: int, hidden: np
 
 
 @given(seed=seeds, rate_hz=st.floats(1.0, 30.0), jitter_s=st.floats(0.0, 0.01), dropped=st.floats(0.0, 0.5))
-def test_both_clocks_of_a_sensor_always_rise(seed: int, rate_hz: float, jitter_s: float, dropped: float) -> None:
+def test_both_clocks_of_a_sensor_always_rise(seed, rate_hz, jitter_s, dropped):
     times = draw_times(
         np.random.default_rng(seed),
         duration_s=10.0,
@@ -72,7 +69,7 @@ def test_both_clocks_of_a_sensor_always_rise(seed: int, rate_hz: float, jitter_s
 
 @settings(max_examples=25)
 @given(seed=seeds, outliers=st.sampled_from([0.0, 0.2, 0.5]), decoys=st.integers(0, 3))
-def test_the_seed_alone_decides_the_pairs_and_their_truth_projects(seed: int, outliers: float, decoys: int) -> None:
+def test_the_seed_alone_decides_the_pairs_and_their_truth_projects(seed, outliers, decoys):
     first, again = (
         simulate_pairs(8, rng=np.random.default_rng(seed), outlier_share=outliers, decoys=decoys) for _ in range(2)
     )
@@ -91,9 +88,7 @@ def test_the_seed_alone_decides_the_pairs_and_their_truth_projects(seed: int, ou
     crouch=st.floats(0.0, 1.0),
     carrying=st.booleans(),
 )
-def test_a_person_keeps_their_bones_and_stays_above_the_ground(
-    heading: float, walked: float, pace: float, crouch: float, carrying: bool
-) -> None:
+def test_a_person_keeps_their_bones_and_stays_above_the_ground(heading, walked, pace, crouch, carrying):
     limbs = capsules(PersonState(3.0, 1.0, heading, walked, pace, crouch, carrying))
     lengths = [float(np.linalg.norm(limb.end_m - limb.start_m)) for limb in limbs if limb.surface == "trousers"]
     lowest = min(float(min(limb.start_m[2], limb.end_m[2])) for limb in limbs)
@@ -104,15 +99,13 @@ def test_a_person_keeps_their_bones_and_stays_above_the_ground(
 
 
 @given(at=st.floats(-50.0, 50.0), period=st.floats(0.05, 3.0), share=st.floats(0.01, 0.9), size=st.floats(1e-3, 10.0))
-def test_a_pixel_is_never_covered_by_less_than_nothing_or_more_than_all(
-    at: float, period: float, share: float, size: float
-) -> None:
+def test_a_pixel_is_never_covered_by_less_than_nothing_or_more_than_all(at, period, share, size):
     covered = line_coverage(np.array([at]), period_m=period, width_m=share * period, footprint_m=np.array([size]))
     assert -1e-6 <= covered[0] <= 1.0 + 1e-6
 
 
 @given(seed=seeds, steps_s=st.lists(st.floats(4.0, 40.0), min_size=1, max_size=8))
-def test_islands_keep_the_order_of_time_and_leave_minutes_between(seed: int, steps_s: list[float]) -> None:
+def test_islands_keep_the_order_of_time_and_leave_minutes_between(seed, steps_s):
     middles_s = np.cumsum(steps_s)
     islands = draw_islands(np.random.default_rng(seed), middles_s)
     times_s = np.arange(0.0, middles_s[-1] + 20.0, 0.05)

@@ -33,7 +33,7 @@ def solve(rows: list[dict], camera: Camera, noise: NoiseOptions, *, exact: bool 
     return calibrate_pairs(pairs, camera, without_systematic_errors(options) if exact else options).unwrap()
 
 
-def test_forty_board_centres_give_the_published_pose_and_name_the_outlier(shared_data: Path) -> None:
+def test_forty_board_centres_give_the_published_pose_and_name_the_outlier(shared_data):
     rows, camera, published = load(shared_data, "acfr_lidar_chessboard_40", (1920, 1208))
     calibration = solve(rows, camera, NoiseOptions(1.0, 0.015, 0.3, 0.3))
     pose = calibration.camera_from_radar
@@ -46,7 +46,7 @@ def test_forty_board_centres_give_the_published_pose_and_name_the_outlier(shared
     assert calibration.metrics.aed_px < 2.5
 
 
-def test_forty_board_centres_solve_with_radar_noise_assumed_as_well(shared_data: Path) -> None:
+def test_forty_board_centres_solve_with_radar_noise_assumed_as_well(shared_data):
     """Told three to ten times the real noise, the estimator finds the real level and the same pose."""
     rows, camera, published = load(shared_data, "acfr_lidar_chessboard_40", (1920, 1208))
     calibration = solve(rows, camera, NoiseOptions())
@@ -58,7 +58,7 @@ def test_forty_board_centres_solve_with_radar_noise_assumed_as_well(shared_data:
     ]
 
 
-def test_forty_board_centres_hold_the_published_pose_far_inside_what_is_thought_possible(shared_data: Path) -> None:
+def test_forty_board_centres_hold_the_published_pose_far_inside_what_is_thought_possible(shared_data):
     """Without an azimuth scale in the model the published pose was 10 times farther out than the edge of the ellipsoid."""
     rows, camera, published = load(shared_data, "acfr_lidar_chessboard_40", (1920, 1208))
     calibration = solve(rows, camera, NoiseOptions())
@@ -67,7 +67,7 @@ def test_forty_board_centres_hold_the_published_pose_far_inside_what_is_thought_
     assert calibration.radar_errors.azimuth_scale == pytest.approx(-0.011, abs=0.01)
 
 
-def test_sixteen_hasty_clicks_are_no_more_certain_than_they_are(shared_data: Path) -> None:
+def test_sixteen_hasty_clicks_are_no_more_certain_than_they_are(shared_data):
     """The published pose lies 5 deg from every fit to all clicks; with the noise of hasty clicks it is not excluded."""
     rows, camera, published = load(shared_data, "heethesh_lidar_clicks_16", (964, 724))
     hasty = NoiseOptions(6.0, 0.03, 1.15, 1.15, estimate_scale=False)
@@ -77,7 +77,7 @@ def test_sixteen_hasty_clicks_are_no_more_certain_than_they_are(shared_data: Pat
     assert np.linalg.norm(error[3:]) > np.deg2rad(3.0)
 
 
-def test_the_published_pose_of_the_hasty_clicks_is_a_fit_to_nine_of_them(shared_data: Path) -> None:
+def test_the_published_pose_of_the_hasty_clicks_is_a_fit_to_nine_of_them(shared_data):
     """It is no truth: RANSAC with OpenCV's default of 8 px keeps nine of these very clicks, and least squares fits those."""
     points, pixels, camera, published = arrays(shared_data)
     found = solve_pnp_ransac(points, pixels, camera)
@@ -90,7 +90,7 @@ def test_the_published_pose_of_the_hasty_clicks_is_a_fit_to_nine_of_them(shared_
     assert np.linalg.norm(error[:3]) < 1e-4
 
 
-def test_the_published_fit_differs_from_ours_by_no_more_than_two_fits_to_the_same_noise_may(shared_data: Path) -> None:
+def test_the_published_fit_differs_from_ours_by_no_more_than_two_fits_to_the_same_noise_may(shared_data):
     """With B_i the linear maps from residuals to poses, the difference has the covariance (B_1 - B_2) S (B_1 - B_2)^T."""
     rows, camera, published = load(shared_data, "heethesh_lidar_clicks_16", (964, 724))
     points, pixels, _, _ = arrays(shared_data)
@@ -120,7 +120,7 @@ def map_to_pose(jacobian: np.ndarray, weight: np.ndarray) -> np.ndarray:
     return np.asarray(np.linalg.solve((weighted @ jacobian).sum(axis=0), weighted))
 
 
-def test_another_robust_fit_to_the_hasty_clicks_lies_inside_the_uncertainty(shared_data: Path) -> None:
+def test_another_robust_fit_to_the_hasty_clicks_lies_inside_the_uncertainty(shared_data):
     rows, camera, _ = load(shared_data, "heethesh_lidar_clicks_16", (964, 724))
     document = json.loads((shared_data / "real_pairs" / "heethesh_lidar_clicks_16.json").read_text(encoding="utf-8"))
     u, _, vt = np.linalg.svd(np.array(document["my_robust_fit"]["R"]))
@@ -140,7 +140,7 @@ def as_printed(folder: Path, name: str, size_px: tuple[int, int]) -> tuple[Calib
     return solve_pairs_as_printed(pairs, camera, CalibrationOptions(method="paper")).unwrap(), published
 
 
-def test_by_the_paper_forty_board_centres_give_about_the_published_pose(shared_data: Path) -> None:
+def test_by_the_paper_forty_board_centres_give_about_the_published_pose(shared_data):
     result, published = as_printed(shared_data, "acfr_lidar_chessboard_40", (1920, 1208))
     apart_deg = np.rad2deg(rotation_angle_rad(result.camera_from_radar.rotation @ published.rotation.T))
     assert apart_deg < 1.0
@@ -149,14 +149,14 @@ def test_by_the_paper_forty_board_centres_give_about_the_published_pose(shared_d
     assert result.metrics.aed_px < 6.0
 
 
-def test_ransac_marks_the_one_wrong_board_that_the_last_line_uses_all_the_same(shared_data: Path) -> None:
+def test_ransac_marks_the_one_wrong_board_that_the_last_line_uses_all_the_same(shared_data):
     result, _ = as_printed(shared_data, "acfr_lidar_chessboard_40", (1920, 1208))
     worst = max(result.pairs, key=lambda pair: pair.distance_px)
     assert worst.distance_px > 40.0
     assert not worst.inlier
 
 
-def test_sixteen_human_clicks_with_wrong_ones_among_them_are_not_solved_to_a_click(shared_data: Path) -> None:
+def test_sixteen_human_clicks_with_wrong_ones_among_them_are_not_solved_to_a_click(shared_data):
     result, _ = as_printed(shared_data, "heethesh_lidar_clicks_16", (964, 724))
     assert 0 < sum(pair.inlier for pair in result.pairs) < 16
     assert result.metrics.aed_px > 5.0

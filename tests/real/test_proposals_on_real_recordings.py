@@ -1,7 +1,5 @@
 """Real recordings without a reflector: no placement is invented, and what lacks a radar or a camera says so."""
 
-from pathlib import Path
-
 import pytest
 
 from benchmarks.proposing.without_reflector import measure_real
@@ -10,7 +8,7 @@ pytestmark = pytest.mark.real
 
 
 @pytest.mark.parametrize("name", ["pjlab_radar_camera.bag", "pjlab_radar_camera_mcap", "pjlab_radar_camera_db3"])
-def test_nothing_is_proposed_on_the_road(shared_data: Path, name: str) -> None:
+def test_nothing_is_proposed_on_the_road(shared_data, name):
     figures = measure_real(shared_data / "real_radar_camera_road" / name)
     assert isinstance(figures, dict)
     assert (figures["placements"], figures["proposed"], figures["accepted"]) == (0.0, 0.0, 0.0)
@@ -23,7 +21,7 @@ def test_nothing_is_proposed_on_the_road(shared_data: Path, name: str) -> None:
         ("real_camera_formats/raw.bag", "no readable radar"),
     ],
 )
-def test_a_recording_without_radar_or_camera_says_so(shared_data: Path, name: str, lacks: str) -> None:
+def test_a_recording_without_radar_or_camera_says_so(shared_data, name, lacks):
     answer = measure_real(shared_data / name)
     assert isinstance(answer, str)
     assert lacks in answer

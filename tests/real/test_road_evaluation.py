@@ -32,18 +32,14 @@ def published(shared_data: Path, tmp_path: Path) -> tuple[Path, Path, Path]:
     return recording, tmp_path / "published.txt", tmp_path / "boxes.json"
 
 
-def test_without_clicks_and_boxes_there_is_nothing_to_judge_by(
-    published: tuple[Path, Path, Path], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_without_clicks_and_boxes_there_is_nothing_to_judge_by(published, capsys):
     recording, pose, _ = published
 
     assert run(["evaluate", str(pose), str(recording)]) == 1
     assert "nothing to judge published.txt by: no clicks" in capsys.readouterr().err
 
 
-def test_with_boxes_it_says_that_nothing_moves_within_reach(
-    published: tuple[Path, Path, Path], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_with_boxes_it_says_that_nothing_moves_within_reach(published, capsys):
     recording, pose, boxes = published
 
     assert run(["evaluate", str(pose), str(recording), "--boxes", str(boxes)]) == 1

@@ -40,7 +40,7 @@ def published_calibration(folder: Path) -> tuple[Calibration, np.ndarray]:
 
 
 @pytest.mark.parametrize("name", ["pjlab_radar_camera.bag", "pjlab_radar_camera_mcap", "pjlab_radar_camera_db3"])
-def test_tracks_are_drawn_where_opencv_projects_them(shared_data: Path, name: str) -> None:
+def test_tracks_are_drawn_where_opencv_projects_them(shared_data, name):
     folder = shared_data / "real_radar_camera_road"
     calibration, matrix = published_calibration(folder)
     camera = calibration.camera

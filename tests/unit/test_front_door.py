@@ -4,7 +4,6 @@ import ast
 import json
 import subprocess
 import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,14 +24,14 @@ def solved(simulated: SimulatedPairs) -> cc.Calibration:
     return cc.calibrate_pairs(simulated.pairs, simulated.camera).unwrap()
 
 
-def test_the_public_names_are_sorted_complete_and_documented() -> None:
+def test_the_public_names_are_sorted_complete_and_documented():
     assert list(cc.__all__) == sorted(cc.__all__)
     assert dir(cc) == list(cc.__all__)
     for name in cc.__all__:
         assert (getattr(cc, name).__doc__ or "").strip(), name
 
 
-def test_the_names_for_type_checkers_are_those_that_can_be_imported(project_root: Path) -> None:
+def test_the_names_for_type_checkers_are_those_that_can_be_imported(project_root):
     module = ast.parse((project_root / "calib_core" / "__init__.py").read_text(encoding="utf-8"))
     guarded = next(node for node in module.body if isinstance(node, ast.If))
     imported = {
@@ -46,18 +45,18 @@ def test_the_names_for_type_checkers_are_those_that_can_be_imported(project_root
     assert {name.rpartition(".")[2] for name in lazy} == set(cc.__all__)
 
 
-def test_importing_the_package_imports_nothing_else() -> None:
+def test_importing_the_package_imports_nothing_else():
     code = "import sys; import calib_core; print(*(m for m in sys.modules if m.startswith(('calib_core.', 'numpy'))))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == ""
 
 
-def test_a_misspelt_name_is_refused_with_a_clear_error() -> None:
+def test_a_misspelt_name_is_refused_with_a_clear_error():
     with pytest.raises(AttributeError, match=r"no attribute 'calibrat'; its public names are in calib_core\.__all__"):
-        _ = cc.calibrat  # type: ignore[attr-defined]
+        _ = cc.calibrat
 
 
-def test_a_calibration_reads_back_from_its_file(solved: cc.Calibration, tmp_path: Path) -> None:
+def test_a_calibration_reads_back_from_its_file(solved, tmp_path):
     path = tmp_path / "calibration.json"
     cc.write_calibration(path, solved, frames=cc.FrameNames("radar_front", "cam_optical"))
     file = cc.read_calibration(path)
@@ -67,7 +66,7 @@ def test_a_calibration_reads_back_from_its_file(solved: cc.Calibration, tmp_path
     assert (tmp_path / "again.json").read_bytes() == path.read_bytes()
 
 
-def test_pairs_and_clicks_read_back_from_their_files(simulated: SimulatedPairs, tmp_path: Path) -> None:
+def test_pairs_and_clicks_read_back_from_their_files(simulated, tmp_path):
     cc.write_pairs(tmp_path / "pairs.json", cc.PairsFile(simulated.camera, simulated.pairs))
     assert [pair.id for pair in cc.read_pairs(tmp_path / "pairs.json").pairs] == [pair.id for pair in simulated.pairs]
     clicks = (cc.ReflectorClick(TimeNs(7), "c1", 3.0, 4.0),)
@@ -75,7 +74,7 @@ def test_pairs_and_clicks_read_back_from_their_files(simulated: SimulatedPairs, 
     assert cc.read_clicks(tmp_path / "clicks.json") == clicks
 
 
-def test_a_calibration_is_exported_and_the_file_checked(solved: cc.Calibration, tmp_path: Path) -> None:
+def test_a_calibration_is_exported_and_the_file_checked(solved, tmp_path):
     exported = cc.export(solved, "opencv")
     (tmp_path / "camera.yml").write_bytes(exported.data)
     assert cc.check(tmp_path / "camera.yml").verdict == "right"
@@ -84,7 +83,7 @@ def test_a_calibration_is_exported_and_the_file_checked(solved: cc.Calibration, 
 
 
 @pytest.mark.parametrize("read", [cc.read_pairs, cc.read_clicks, cc.read_calibration])
-def test_files_that_cannot_be_read_are_refused_in_one_line(read: Any, tmp_path: Path) -> None:
+def test_files_that_cannot_be_read_are_refused_in_one_line(read, tmp_path):
     (tmp_path / "binary.json").write_bytes(b"\xff\xfe\x00\x9c")
     for name, words in (("missing.json", "no such file or folder"), ("binary.json", "not a text file")):
         with pytest.raises(cc.InputError, match=words) as refusal:
@@ -93,9 +92,7 @@ def test_files_that_cannot_be_read_are_refused_in_one_line(read: Any, tmp_path: 
         assert "\n" not in str(refusal.value)
 
 
-def test_the_readmes_example_runs_as_it_stands(
-    simulated: SimulatedPairs, project_root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_readmes_example_runs_as_it_stands(simulated, project_root, tmp_path, monkeypatch):
     readme = (project_root / "README.md").read_text(encoding="utf-8")
     (example,) = [part.partition("```")[0] for part in readme.split("```python\n")[1:]]
     assert len([line for line in example.splitlines() if line.strip() and not line.startswith("#")]) <= 10

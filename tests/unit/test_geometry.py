@@ -19,7 +19,7 @@ from calib_core.geometry import (
 QUARTER_ABOUT_Z = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 
-def test_a_transform_moves_points_from_source_to_target() -> None:
+def test_a_transform_moves_points_from_source_to_target():
     camera_from_radar = RigidTransform(QUARTER_ABOUT_Z, np.array([10.0, 0.0, 0.0]))
     points_camera = camera_from_radar @ np.array([[1.0, 0.0, 0.0], [0.0, 2.0, 3.0]])
     np.testing.assert_allclose(points_camera, [[10.0, 1.0, 0.0], [8.0, 0.0, 3.0]])
@@ -33,13 +33,11 @@ def test_a_transform_moves_points_from_source_to_target() -> None:
         ((90.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, -1.0, 0.0)),  # its head to the right: right is up, and up is -y
     ],
 )
-def test_mounting_angles_turn_the_camera_as_they_say(
-    roll_pitch_yaw_deg: tuple[float, float, float], seen_m: tuple[float, ...], optical: tuple[float, ...]
-) -> None:
+def test_mounting_angles_turn_the_camera_as_they_say(roll_pitch_yaw_deg, seen_m, optical):
     assert mounting_rotation(*roll_pitch_yaw_deg) @ np.array(seen_m) == pytest.approx(optical, abs=1e-12)
 
 
-def test_a_mirrored_rotation_is_refused_and_the_message_says_so() -> None:
+def test_a_mirrored_rotation_is_refused_and_the_message_says_so():
     with pytest.raises(ValueError, match="left-handed"):
         RigidTransform(np.diag([1.0, -1.0, 1.0]), np.zeros(3))
 
@@ -54,12 +52,12 @@ def test_a_mirrored_rotation_is_refused_and_the_message_says_so() -> None:
         (np.eye(3), np.zeros(2), "expected an array of 3"),
     ],
 )
-def test_an_invalid_transform_is_refused(rotation: np.ndarray, translation: np.ndarray, reason: str) -> None:
+def test_an_invalid_transform_is_refused(rotation, translation, reason):
     with pytest.raises(ValueError, match=reason):
         RigidTransform(rotation, translation)
 
 
-def test_a_rotation_rounded_to_six_decimals_can_be_inverted_and_composed() -> None:
+def test_a_rotation_rounded_to_six_decimals_can_be_inverted_and_composed():
     for seed in range(60):  # of seven of these, the rows are orthonormal within the tolerance and the columns are not
         rotation = rotation_exp(np.random.default_rng(seed).normal(0.0, 1.5, 3)).round(6)
         if np.abs(rotation @ rotation.T - np.eye(3)).max() <= 1e-6:
@@ -69,7 +67,7 @@ def test_a_rotation_rounded_to_six_decimals_can_be_inverted_and_composed() -> No
             assert together == pytest.approx(np.eye(4), abs=1e-11)
 
 
-def test_a_transform_cannot_be_changed_and_does_not_share_its_arrays() -> None:
+def test_a_transform_cannot_be_changed_and_does_not_share_its_arrays():
     rotation = np.eye(3)
     camera_from_radar = RigidTransform(rotation, np.zeros(3))
     rotation[0, 0] = 7.0
@@ -78,7 +76,7 @@ def test_a_transform_cannot_be_changed_and_does_not_share_its_arrays() -> None:
         camera_from_radar.rotation[0, 0] = 2.0
 
 
-def test_quaternions_are_w_first_with_w_positive() -> None:
+def test_quaternions_are_w_first_with_w_positive():
     half = math.sqrt(0.5)
     np.testing.assert_allclose(quaternion_wxyz_from_matrix(QUARTER_ABOUT_Z), [half, 0.0, 0.0, half])
     np.testing.assert_allclose(
@@ -88,32 +86,32 @@ def test_quaternions_are_w_first_with_w_positive() -> None:
 
 
 @pytest.mark.parametrize("quaternion", [np.zeros(4), np.array([np.nan, 0.0, 0.0, 1.0])])
-def test_a_quaternion_without_direction_is_refused(quaternion: np.ndarray) -> None:
+def test_a_quaternion_without_direction_is_refused(quaternion):
     with pytest.raises(ValueError, match="not a rotation"):
         matrix_from_quaternion_wxyz(quaternion)
 
 
-def test_skew_is_the_cross_product() -> None:
+def test_skew_is_the_cross_product():
     a, b = np.array([1.0, -2.0, 3.0]), np.array([0.5, 4.0, -1.0])
     np.testing.assert_allclose(skew(a) @ b, np.cross(a, b))
 
 
 @pytest.mark.parametrize("axis", [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.6, -0.8, 0.0]])
 @pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-7, 1e-3, 1.0, math.pi - 1e-9, math.pi])
-def test_exp_and_log_keep_full_precision_near_zero_and_near_pi(axis: list[float], angle: float) -> None:
+def test_exp_and_log_keep_full_precision_near_zero_and_near_pi(axis, angle):
     rotation = rotation_exp(angle * np.array(axis))
     assert rotation_angle_rad(rotation) == pytest.approx(angle, rel=1e-9, abs=1e-15)
     np.testing.assert_allclose(rotation_exp(rotation_log(rotation)), rotation, atol=1e-14)
 
 
-def test_a_perturbation_shifts_the_translation_and_turns_from_the_left() -> None:
+def test_a_perturbation_shifts_the_translation_and_turns_from_the_left():
     camera_from_radar = RigidTransform(QUARTER_ABOUT_Z, np.array([1.0, 2.0, 3.0]))
     moved = camera_from_radar.perturbed(np.array([0.1, 0.2, 0.3, 0.01, 0.0, 0.0]))
     np.testing.assert_allclose(moved.translation_m, [1.1, 2.2, 3.3])
     np.testing.assert_allclose(moved.rotation, rotation_exp(np.array([0.01, 0.0, 0.0])) @ QUARTER_ABOUT_Z, atol=1e-15)
 
 
-def test_the_adjoint_maps_a_small_motion_to_the_target_frame() -> None:
+def test_the_adjoint_maps_a_small_motion_to_the_target_frame():
     camera_from_radar = RigidTransform(QUARTER_ABOUT_Z, np.array([1.0, 2.0, 3.0]))
     error = 1e-6 * np.array([1.0, -2.0, 0.5, 0.3, 0.7, -0.4])
     motion = RigidTransform(rotation_exp(error[3:]), error[:3])

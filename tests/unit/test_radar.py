@@ -12,7 +12,7 @@ from calib_core.radar import (
 )
 
 
-def test_azimuth_is_positive_to_the_left_and_elevation_upwards() -> None:
+def test_azimuth_is_positive_to_the_left_and_elevation_upwards():
     polar = polar_from_cartesian(np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 0.0, 1.0], [3.0, 0.0, 0.0]]))
     quarter = math.pi / 4
     root = math.sqrt(2.0)
@@ -20,23 +20,23 @@ def test_azimuth_is_positive_to_the_left_and_elevation_upwards() -> None:
     np.testing.assert_allclose(polar, expected, atol=1e-15)
 
 
-def test_the_origin_has_no_direction_and_makes_no_nan() -> None:
+def test_the_origin_has_no_direction_and_makes_no_nan():
     origin = np.zeros((1, 3))
     np.testing.assert_array_equal(polar_from_cartesian(origin), origin)
     np.testing.assert_array_equal(direction_cosines(origin), origin)
 
 
-def test_direction_cosines_are_y_and_z_over_range() -> None:
+def test_direction_cosines_are_y_and_z_over_range():
     np.testing.assert_allclose(direction_cosines(np.array([[2.0, 3.0, 6.0]])), [[7.0, 3.0 / 7.0, 6.0 / 7.0]])
 
 
-def test_a_covariance_ahead_has_range_along_x_azimuth_along_y_elevation_along_z() -> None:
+def test_a_covariance_ahead_has_range_along_x_azimuth_along_y_elevation_along_z():
     sigma = np.array([[0.03, 0.01, 0.02]])
     covariance = covariance_from_sigma_polar(np.array([[10.0, 0.0, 0.0]]), sigma)
     np.testing.assert_allclose(covariance, [np.diag([0.03**2, 0.1**2, 0.2**2])], atol=1e-15)
 
 
-def test_a_covariance_predicts_the_scatter_of_noisy_returns() -> None:
+def test_a_covariance_predicts_the_scatter_of_noisy_returns():
     rng = np.random.default_rng(1)
     point = np.array([[8.0, 3.0, -1.0]])
     sigma = np.array([[0.03, 0.01, 0.02]])

@@ -3,7 +3,6 @@
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ import pytest
 from calib_core.calibration import calibrate, calibrate_pairs, solve_again
 from calib_core.errors import InputError, OptionError
 from calib_core.interchange import calibration_text, read_calibration
-from calib_core.measurements import RadarScans, Unsolvable
+from calib_core.measurements import RadarScans
 from calib_core.options import CalibrationOptions, CameraPositionPrior, NoiseOptions, SolvingOptions
 from calib_core.results import Calibration
 from calib_core.synthetic import simulate_pairs
@@ -41,7 +40,7 @@ def solved(request: pytest.FixtureRequest, project_root: Path) -> Calibration:
     return outcome
 
 
-def test_the_file_solved_again_differs_only_in_its_provenance(solved: Calibration) -> None:
+def test_the_file_solved_again_differs_only_in_its_provenance(solved):
     text = calibration_text(solved)
     given = GivenPairs.read(text, "calibration.json")
     again = solve_pairs(given)
@@ -49,19 +48,19 @@ def test_the_file_solved_again_differs_only_in_its_provenance(solved: Calibratio
     assert without_provenance(calibration_text_of_pairs(again, given)) == without_provenance(text)
 
 
-def test_a_calibration_solved_again_from_memory_has_the_same_bits(solved: Calibration) -> None:
+def test_a_calibration_solved_again_from_memory_has_the_same_bits(solved):
     again = solve_again(solved).unwrap()
     assert calibration_text(again) == calibration_text(solved)
     assert again.camera_from_radar.rotation.tobytes() == solved.camera_from_radar.rotation.tobytes()
     assert again.covariance.tobytes() == solved.covariance.tobytes()
 
 
-def test_a_file_written_from_a_file_can_be_solved_again(solved: Calibration) -> None:
+def test_a_file_written_from_a_file_can_be_solved_again(solved):
     text = calibration_text(read_calibration(calibration_text(solved)).calibration)
     assert text == calibration_text(solved)
 
 
-def test_clock_warnings_of_the_recording_are_copied(project_root: Path) -> None:
+def test_clock_warnings_of_the_recording_are_copied(project_root):
     clicks, scans, camera = read_rooftop(project_root, 8.0)
     late = RadarScans(
         scans.times_ns + 3_500_000_000,
@@ -77,7 +76,7 @@ def test_clock_warnings_of_the_recording_are_copied(project_root: Path) -> None:
     assert again.warnings == outcome.warnings
 
 
-def test_given_options_replace_those_of_the_file(solved: Calibration) -> None:
+def test_given_options_replace_those_of_the_file(solved):
     text = calibration_text(solved)
     louder = replace(solved.options, noise=replace(solved.options.noise, sigma_px=7.0))
     again = solve_pairs(GivenPairs.read(text, "calibration.json"), louder)
@@ -93,7 +92,7 @@ def test_given_options_replace_those_of_the_file(solved: Calibration) -> None:
         )
 
 
-def test_options_that_choose_returns_are_refused_for_pairs_that_exist(solved: Calibration) -> None:
+def test_options_that_choose_returns_are_refused_for_pairs_that_exist(solved):
     nearer = replace(solved.options, gating=replace(solved.options.gating, max_range_m=8.0))
     with pytest.raises(OptionError, match=r"^a\.json: gating\.max_range_m chooses radar returns, .* made with 60"):
         solve_pairs(GivenPairs.read(calibration_text(solved), "a.json"), nearer)
@@ -110,7 +109,7 @@ def test_options_that_choose_returns_are_refused_for_pairs_that_exist(solved: Ca
         (lambda pair: pair.update(id="a"), "a"),
     ],
 )
-def test_an_edited_pair_that_contradicts_itself_is_refused_with_its_place(change: Any, words: str) -> None:
+def test_an_edited_pair_that_contradicts_itself_is_refused_with_its_place(change, words):
     simulated = simulate_pairs(8, rng=np.random.default_rng(2), noise="ti")
     outcome = calibrate_pairs(simulated.pairs, simulated.camera).unwrap()
     content = json.loads(calibration_text(outcome))
@@ -122,27 +121,26 @@ def test_an_edited_pair_that_contradicts_itself_is_refused_with_its_place(change
     assert "\n" not in str(refusal.value)
 
 
-def test_a_pose_without_pairs_says_so(solved: Calibration) -> None:
+def test_a_pose_without_pairs_says_so(solved):
     with pytest.raises(InputError, match="contains a pose but no pairs"):
         solve_again(replace(solved, pairs=()))
 
 
-def test_pairs_without_candidates_cannot_be_solved_again_and_the_error_says_so(project_root: Path) -> None:
+def test_pairs_without_candidates_cannot_be_solved_again_and_the_error_says_so(project_root):
     earlier = (project_root / "tests" / "golden" / "calibration-1-earlier.json").read_text(encoding="utf-8")
     with pytest.raises(InputError, match=r"^earlier\.json: .* pairs have no candidates") as refusal:
         solve_pairs(GivenPairs.read(earlier, "earlier.json"))
     assert "\n" not in str(refusal.value)
 
 
-def test_too_few_pairs_left_give_an_unsolvable_that_keeps_the_unpaired(solved: Calibration) -> None:
+def test_too_few_pairs_left_give_an_unsolvable_that_keeps_the_unpaired(solved):
     few = replace(solved, pairs=solved.pairs[:3])
     outcome = solve_again(few)
-    assert isinstance(outcome, Unsolvable)
     assert outcome.code == "too-few-pairs"
     assert outcome.unpaired == solved.unpaired
 
 
-def test_alternatives_are_kept_with_their_scores() -> None:
+def test_alternatives_are_kept_with_their_scores():
     simulated = simulate_pairs(20, rng=np.random.default_rng(11), noise="ti", decoys=2)
     outcome = calibrate_pairs(simulated.pairs, simulated.camera).unwrap()
     assert max(len(pair["candidates"]) for pair in json.loads(calibration_text(outcome))["pairs"]) > 1

@@ -2,7 +2,6 @@
 
 import json
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -67,7 +66,7 @@ def rests_at(placement: Placement, start: TimeNs, end: TimeNs, position_radar_m:
     ],
     ids=["rooftop", "field-imaging-heavy", "aisle-heavy", "checkerboard-short"],
 )
-def test_nearly_all_simulated_placements_are_found_and_nearly_nothing_else(options: SimulationOptions) -> None:
+def test_nearly_all_simulated_placements_are_found_and_nearly_nothing_else(options):
     simulated = simulate_scans(options)
     found = find_placements(simulated.scans, GatingOptions())
     hits = sum(any(is_of(placement, truth) for placement in found) for truth in simulated.placements)
@@ -77,7 +76,7 @@ def test_nearly_all_simulated_placements_are_found_and_nearly_nothing_else(optio
     assert all(0.0 < placement.score <= 1.0 for placement in found)
 
 
-def test_all_placements_of_the_sample_recording_are_found_and_nothing_else(project_root: Path) -> None:
+def test_all_placements_of_the_sample_recording_are_found_and_nothing_else(project_root):
     folder = project_root / "sample_data" / "rooftop"
     with open_recording([folder / "camera.bag", folder / "radar.bag"]) as recording:
         found = find_placements(recording.radar_scans(), GatingOptions())
@@ -88,7 +87,7 @@ def test_all_placements_of_the_sample_recording_are_found_and_nothing_else(proje
         assert rests_at(placement, start, end, np.array(true["position_radar_m"]))
 
 
-def test_a_dwell_is_found_with_its_times_and_its_place() -> None:
+def test_a_dwell_is_found_with_its_times_and_its_place():
     (placement,) = found_in((20.0, 27.0, REFLECTOR, 25.0))
     assert placement.start / NS_PER_S == pytest.approx(20.0, abs=0.5)
     assert placement.end / NS_PER_S == pytest.approx(27.0, abs=0.5)
@@ -96,20 +95,20 @@ def test_a_dwell_is_found_with_its_times_and_its_place() -> None:
     assert placement.snr_db == pytest.approx(25.0, abs=0.5)
 
 
-def test_what_is_always_there_is_clutter() -> None:
+def test_what_is_always_there_is_clutter():
     assert found_in((0.0, 60.0, REFLECTOR, 40.0)) == ()
 
 
-def test_a_blinking_return_is_not_a_placement() -> None:
+def test_a_blinking_return_is_not_a_placement():
     blinks = [(float(start), start + 2.5, REFLECTOR, 25.0) for start in range(0, 60, 5)]
     assert found_in(*blinks) == ()
 
 
-def test_a_short_stop_is_not_a_placement() -> None:
+def test_a_short_stop_is_not_a_placement():
     assert found_in((20.0, 21.5, REFLECTOR, 25.0)) == ()
 
 
-def test_of_two_simultaneous_objects_the_stronger_is_the_reflector() -> None:
+def test_of_two_simultaneous_objects_the_stronger_is_the_reflector():
     person = (21.0, 26.0, (6.5, -0.5, 0.2), 12.0)
     (placement,) = found_in((20.0, 27.0, REFLECTOR, 25.0), person)
     np.testing.assert_allclose(placement.position_radar_m, REFLECTOR, atol=0.02)
@@ -120,7 +119,7 @@ def in_turn(count: int, *, snr_db: float = 25.0) -> list[tuple[float, float, tup
     return [(6.0 * i + 2.0, 6.0 * i + 13.5, (6.0 + 0.4 * i, 1.5 - 0.5 * i, -0.8), snr_db) for i in range(count)]
 
 
-def test_two_reflectors_moved_in_turn_are_all_found_and_nothing_else() -> None:
+def test_two_reflectors_moved_in_turn_are_all_found_and_nothing_else():
     truth = in_turn(8)
     ghosts = [(start, end, (x + 1.5, y, z), 12.0) for start, end, (x, y, z), _ in truth]
     person = [(start + 3.0, start + 6.0, (x - 0.5, y + 1.0, z), 11.0) for start, _, (x, y, z), _ in truth]
@@ -131,13 +130,13 @@ def test_two_reflectors_moved_in_turn_are_all_found_and_nothing_else() -> None:
         np.testing.assert_allclose(placement.position_radar_m, position, atol=0.02)
 
 
-def test_what_comes_and_goes_with_something_stronger_belongs_to_it() -> None:
+def test_what_comes_and_goes_with_something_stronger_belongs_to_it():
     placements = found_in((20.0, 27.0, REFLECTOR, 25.0), (20.0, 27.0, (7.2, 1.2, -0.8), 22.0))
     assert [placement.position_radar_m[0] < 6.5 for placement in placements] == [True]
 
 
 @pytest.mark.parametrize(("other", "count"), [((8.0, -2.0, -0.8), 2), ((12.0, -2.0, -1.6), 2), ((12.0, 2.0, -1.6), 1)])
-def test_two_reflectors_that_fill_a_piece_are_two_placements_and_a_second_echo_is_none(other, count) -> None:
+def test_two_reflectors_that_fill_a_piece_are_two_placements_and_a_second_echo_is_none(other, count):
     both = scans_with([(0.0, 100.0, REFLECTOR, 25.0), (0.0, 100.0, other, 20.0)], length_s=5.0)
     nothing = scans_with([], length_s=60.0)
     later = RadarScans(
@@ -149,12 +148,12 @@ def test_two_reflectors_that_fill_a_piece_are_two_placements_and_a_second_echo_i
     assert min(abs(one.position_radar_m[0] - REFLECTOR[0]) for one in placements) < 0.1
 
 
-def test_a_dwell_that_somebody_hides_for_a_moment_is_one_placement() -> None:
+def test_a_dwell_that_somebody_hides_for_a_moment_is_one_placement():
     (placement,) = found_in((10.0, 15.0, REFLECTOR, 25.0), (17.0, 23.0, REFLECTOR, 25.0))
     assert (placement.start / NS_PER_S, placement.end / NS_PER_S) == pytest.approx((10.0, 23.0), abs=0.5)
 
 
-def test_without_snr_only_one_placement_stands_at_a_time() -> None:
+def test_without_snr_only_one_placement_stands_at_a_time():
     scans = scans_with(in_turn(6))
     silent = RadarScans(
         scans.times_ns,
@@ -168,7 +167,7 @@ def test_without_snr_only_one_placement_stands_at_a_time() -> None:
     assert all(one.end <= other.start + NS_PER_S for one, other in pairwise(found))
 
 
-def test_a_radar_that_scatters_widely_shows_its_placements_too() -> None:
+def test_a_radar_that_scatters_widely_shows_its_placements_too():
     fine = scans_with([(5.0 + 12.0 * i, 13.0 + 12.0 * i, (6.0 + i, 1.0 - i, -0.8), 25.0) for i in range(4)])
     rng = np.random.default_rng(3)
     polar = polar_from_cartesian(fine.points_radar_m)
@@ -179,26 +178,26 @@ def test_a_radar_that_scatters_widely_shows_its_placements_too() -> None:
     assert len(find_placements(rough, GatingOptions())) == 4
 
 
-def test_strength_is_corrected_for_range_so_that_a_far_reflector_counts() -> None:
+def test_strength_is_corrected_for_range_so_that_a_far_reflector_counts():
     near = (5.0, 10.0, (3.0, 0.0, -0.8), 40.0)
     far = (20.0, 25.0, (12.0, 1.0, -0.8), 40.0 - 40.0 * float(np.log10(12.0 / 3.0)))
     assert len(found_in(near, far)) == 2
 
 
-def test_something_much_weaker_than_the_placements_is_left_out() -> None:
+def test_something_much_weaker_than_the_placements_is_left_out():
     dwells = [(5.0 + 10.0 * i, 10.0 + 10.0 * i, (4.0 + i, 0.0, -0.8), 30.0) for i in range(4)]
     weak = (47.0, 52.0, (6.0, 2.0, 0.0), 8.0)
     assert len(found_in(*dwells)) == 4
     assert len(found_in(*dwells, weak)) == 4
 
 
-def test_a_return_between_two_cells_is_one_placement() -> None:
+def test_a_return_between_two_cells_is_one_placement():
     # range 6.00 m lies on a border of the 8 cm cells, azimuth 0 on one of the angle cells
     (placement,) = found_in((20.0, 27.0, (6.0, 0.0, 0.0), 25.0))
     assert (placement.end - placement.start) / NS_PER_S > 6.0
 
 
-def test_moving_returns_and_returns_without_position_are_ignored() -> None:
+def test_moving_returns_and_returns_without_position_are_ignored():
     scans = scans_with([(20.0, 27.0, REFLECTOR, 25.0)])
     columns = {
         "times_ns": scans.times_ns,
@@ -212,7 +211,7 @@ def test_moving_returns_and_returns_without_position_are_ignored() -> None:
     assert find_placements(nowhere, GatingOptions()) == ()
 
 
-def test_a_radar_without_snr_and_doppler_still_shows_placements() -> None:
+def test_a_radar_without_snr_and_doppler_still_shows_placements():
     scans = scans_with([(20.0, 27.0, REFLECTOR, float("nan"))])
     silent = RadarScans(
         times_ns=scans.times_ns,
@@ -227,32 +226,32 @@ def test_a_radar_without_snr_and_doppler_still_shows_placements() -> None:
     assert placement.score > 0.5
 
 
-def test_no_scans_contain_no_placements() -> None:
+def test_no_scans_contain_no_placements():
     assert find_placements(RadarScans(), GatingOptions()) == ()
 
 
 TIMES_S = np.arange(0.0, 6.0, 0.1)
 
 
-def test_weak_echoes_at_both_ends_are_left_out() -> None:
+def test_weak_echoes_at_both_ends_are_left_out():
     snr_db = np.full(60, 30.0)
     snr_db[:3], snr_db[-4:] = 15.0, 17.0
     assert firm_span(TIMES_S, snr_db) == FirmSpan(3, 55)
 
 
-def test_a_single_strong_scan_after_a_gap_is_no_end() -> None:
+def test_a_single_strong_scan_after_a_gap_is_no_end():
     snr_db = np.full(60, 30.0)
     snr_db[-8:-1] = np.nan
     assert firm_span(TIMES_S, snr_db) == FirmSpan(0, 51)
 
 
-def test_an_echo_that_varies_keeps_its_ends() -> None:
+def test_an_echo_that_varies_keeps_its_ends():
     snr_db = 30.0 + 5.0 * np.random.default_rng(1).standard_normal(60)
     snr_db[[0, -1]] = 22.0
     assert firm_span(TIMES_S, snr_db) == FirmSpan(0, 59)
 
 
-def test_nothing_is_left_out_without_strengths_or_where_an_echo_changes_for_long() -> None:
+def test_nothing_is_left_out_without_strengths_or_where_an_echo_changes_for_long():
     assert firm_span(TIMES_S, np.full(60, np.nan)) == FirmSpan(0, 59)
     half = np.where(np.arange(60) < 25, 30.0, 12.0)
     assert firm_span(TIMES_S, half[::-1]).first == 0

@@ -46,7 +46,7 @@ def followed(pictures: Iterator[np.ndarray], start: tuple[float, float, float, f
     return list(follow_box(pictures, start))
 
 
-def test_a_box_follows_its_object_to_a_pixel() -> None:
+def test_a_box_follows_its_object_to_a_pixel():
     way = [(60 + 4.3 * step, 100 + 20 * np.sin(step / 6)) for step in range(40)]
     found = followed((picture(at, seed=step) for step, at in enumerate(way)), edges(way[0]))
     assert len(found) == 39
@@ -56,7 +56,7 @@ def test_a_box_follows_its_object_to_a_pixel() -> None:
         assert 0.6 < box.confidence <= 1.0
 
 
-def test_a_box_grows_with_its_object() -> None:
+def test_a_box_grows_with_its_object():
     scales = [1.015**step for step in range(45)]
     way = [(150 + step, 120.0) for step in range(45)]
     found = followed((picture(at, scale) for at, scale in zip(way, scales, strict=True)), edges(way[0]))
@@ -68,7 +68,7 @@ def test_a_box_grows_with_its_object() -> None:
     assert ((left + right) / 2, (top + bottom) / 2) == pytest.approx(way[-1], abs=4)
 
 
-def test_a_box_is_lost_behind_a_pillar_and_says_so() -> None:
+def test_a_box_is_lost_behind_a_pillar_and_says_so():
     way = [(60 + 3.0 * step, 120.0) for step in range(60)]
     found = followed((picture(at, pillar_at=150, seed=step) for step, at in enumerate(way)), edges(way[0]))
     assert isinstance(found[-1], LostBox)
@@ -78,7 +78,7 @@ def test_a_box_is_lost_behind_a_pillar_and_says_so() -> None:
     assert not any(isinstance(box, LostBox) for box in found[:-1])
 
 
-def test_a_box_survives_a_post_that_hides_its_object_for_a_moment() -> None:
+def test_a_box_survives_a_post_that_hides_its_object_for_a_moment():
     def pictures() -> Iterator[np.ndarray]:
         for step in range(40):
             shown = picture((60 + 5.0 * step, 120.0), seed=step)
@@ -92,7 +92,7 @@ def test_a_box_survives_a_post_that_hides_its_object_for_a_moment() -> None:
     assert found[-1].edges_px == pytest.approx(edges((255, 120)), abs=2.5)
 
 
-def test_a_box_ends_where_its_object_leaves_the_picture() -> None:
+def test_a_box_ends_where_its_object_leaves_the_picture():
     way = [(200 + 6.0 * step, 120.0) for step in range(40)]
     found = followed((picture(at, seed=step) for step, at in enumerate(way)), edges(way[0]))
     assert isinstance(found[-1], LostBox)
@@ -104,7 +104,7 @@ def test_a_box_ends_where_its_object_leaves_the_picture() -> None:
         assert box.edges_px[2] <= 319.5
 
 
-def test_another_picture_altogether_loses_the_box() -> None:
+def test_another_picture_altogether_loses_the_box():
     def pictures() -> Iterator[np.ndarray]:
         yield picture((100, 100))
         for seed in range(8):
@@ -115,7 +115,7 @@ def test_another_picture_altogether_loses_the_box() -> None:
     assert isinstance(found[0], LostBox)
 
 
-def test_an_object_before_a_wall_of_one_colour_is_followed() -> None:
+def test_an_object_before_a_wall_of_one_colour_is_followed():
     def pictures() -> Iterator[np.ndarray]:
         for step in range(20):
             drawn = np.full(SIZE[::-1], 150, dtype=np.uint8)
@@ -128,14 +128,14 @@ def test_an_object_before_a_wall_of_one_colour_is_followed() -> None:
     assert found[-1].edges_px == pytest.approx((134.5, 67.5, 174.5, 131.5), abs=2.0)
 
 
-def test_a_box_of_one_colour_cannot_be_followed() -> None:
+def test_a_box_of_one_colour_cannot_be_followed():
     grey = np.full((240, 320), 90, dtype=np.uint8)
     [lost] = followed(iter([grey, grey]), edges((100, 100)))
     assert isinstance(lost, LostBox)
     assert "one colour" in lost.reason
 
 
-def test_pictures_are_read_only_as_they_are_asked_for() -> None:
+def test_pictures_are_read_only_as_they_are_asked_for():
     read: list[int] = []
 
     def pictures() -> Iterator[np.ndarray]:

@@ -53,7 +53,7 @@ def unseen_aed_px(simulated: SimulatedPairs, count: int, calibration: Calibratio
     return float(np.linalg.norm(projected - clicks, axis=1).mean())
 
 
-def test_a_smooth_error_is_learnt_and_new_placements_come_out_closer() -> None:
+def test_a_smooth_error_is_learnt_and_new_placements_come_out_closer():
     simulated = drawn(40, bend=True)
     calibration = solved(simulated, 40)
     angle_map = learn_angle_map(calibration)
@@ -63,7 +63,7 @@ def test_a_smooth_error_is_learnt_and_new_placements_come_out_closer() -> None:
     assert angle_map.corrected_aed_px == pytest.approx(after, rel=0.35), "the map's own figure is not too optimistic"
 
 
-def test_the_map_is_almost_flat_if_errors_are_independent() -> None:
+def test_the_map_is_almost_flat_if_errors_are_independent():
     simulated = drawn(40, bend=False)
     calibration = solved(simulated, 40)
     angle_map = learn_angle_map(calibration)
@@ -72,7 +72,7 @@ def test_the_map_is_almost_flat_if_errors_are_independent() -> None:
     assert after < 1.05 * before
 
 
-def test_sigma_grows_where_no_placement_was() -> None:
+def test_sigma_grows_where_no_placement_was():
     simulated = drawn(30, bend=True)
     calibration = solved(simulated, 30)
     angle_map = learn_angle_map(calibration)
@@ -85,7 +85,7 @@ def test_sigma_grows_where_no_placement_was() -> None:
         assert sigma[away > np.deg2rad(9.0)].mean() > sigma[away < np.deg2rad(2.0)].mean()
 
 
-def test_a_correction_keeps_the_range_is_linear_between_lines_and_ends_at_the_edge() -> None:
+def test_a_correction_keeps_the_range_is_linear_between_lines_and_ends_at_the_edge():
     correction = np.zeros((2, 2, 2))
     correction[:, 1, 0], correction[1, :, 1] = 0.02, 0.01
     flat = np.zeros((2, 2, 2))
@@ -97,13 +97,13 @@ def test_a_correction_keeps_the_range_is_linear_between_lines_and_ends_at_the_ed
     assert angle_map.corrected(np.zeros((0, 3))).shape == (0, 3)
 
 
-def test_a_return_without_a_position_stays_without_one() -> None:
+def test_a_return_without_a_position_stays_without_one():
     angle_map = AngleMap(np.array([0.0, 0.1]), np.array([0.0, 0.1]), np.zeros((2, 2, 2)), np.zeros((2, 2, 2)), 1.0, 1.0)
     assert np.isnan(angle_map.corrected(np.full((1, 3), np.nan))).all()
 
 
 @pytest.mark.parametrize("reason", ["few", "paper"])
-def test_there_is_no_map_without_pairs_or_a_noise_model(reason: str) -> None:
+def test_there_is_no_map_without_pairs_or_a_noise_model(reason):
     simulated = drawn(20, bend=True)
     if reason == "few":
         calibration = solved(simulated, 7)
@@ -112,7 +112,7 @@ def test_there_is_no_map_without_pairs_or_a_noise_model(reason: str) -> None:
     assert learn_angle_map(calibration) is None
 
 
-def test_a_radar_without_elevation_gets_no_elevation_correction() -> None:
+def test_a_radar_without_elevation_gets_no_elevation_correction():
     simulated = drawn(20, bend=False)
     calibration = solved(simulated, 20)
     flat = tuple(replace(pair, point_radar_m=np.array([*pair.point_radar_m[:2], 0.0])) for pair in calibration.pairs)
@@ -120,7 +120,7 @@ def test_a_radar_without_elevation_gets_no_elevation_correction() -> None:
     assert angle_map is None or not angle_map.correction_rad[:, :, 1].any()
 
 
-def test_many_pairs_are_thinned_out_and_the_map_is_reproducible() -> None:
+def test_many_pairs_are_thinned_out_and_the_map_is_reproducible():
     simulated = drawn(200, bend=True)
     calibration = solved(simulated, 200)
     first, second = learn_angle_map(calibration), learn_angle_map(calibration)
@@ -129,6 +129,6 @@ def test_many_pairs_are_thinned_out_and_the_map_is_reproducible() -> None:
     assert after < 0.75 * before
 
 
-def test_a_map_whose_lines_do_not_ascend_is_refused() -> None:
+def test_a_map_whose_lines_do_not_ascend_is_refused():
     with pytest.raises(ValueError, match="ascend"):
         AngleMap(np.array([0.1, 0.0]), np.array([0.0, 0.1]), np.zeros((2, 2, 2)), np.zeros((2, 2, 2)), 1.0, 1.0)

@@ -60,24 +60,22 @@ def warnings(pairs: Sequence[Pair], camera: Camera, options: CalibrationOptions)
 
 
 @pytest.mark.parametrize("noise", ["ti", "imaging"])
-def test_good_data_with_a_tape_measure_give_no_warning(noise: str) -> None:
+def test_good_data_with_a_tape_measure_give_no_warning(noise):
     for seed in range(4):
-        simulated = simulate_pairs(20, rng=np.random.default_rng(seed), noise=noise)  # type: ignore[arg-type]
+        simulated = simulate_pairs(20, rng=np.random.default_rng(seed), noise=noise)
         assert codes(simulated.pairs, simulated.camera, measured()) == set()
 
 
 @pytest.mark.parametrize("axes", [(1, -1, 1), (1, 1, -1)])
 @pytest.mark.parametrize("sigma_m", [0.01, 0.3])
-def test_mirrored_axes_are_caught_whenever_the_camera_position_is_known(
-    axes: tuple[int, int, int], sigma_m: float
-) -> None:
+def test_mirrored_axes_are_caught_whenever_the_camera_position_is_known(axes, sigma_m):
     for seed in range(4):
         simulated = simulate_pairs(20, rng=np.random.default_rng(seed))
         found = codes(moved(simulated.pairs, axes), simulated.camera, measured(sigma_m, (0.0, 0.0, 0.0)))
         assert "mirrored-axes" in found
 
 
-def test_mirrored_axes_are_caught_by_placements_at_varied_heights_alone() -> None:
+def test_mirrored_axes_are_caught_by_placements_at_varied_heights_alone():
     tripod = replace(FIELD, max_height_m=1.5)
     simulated = simulate_pairs(20, rng=np.random.default_rng(1), layout=tripod)
     assert "mirrored-axes" in codes(moved(simulated.pairs, (1, -1, 1)), simulated.camera, FREE)
@@ -85,17 +83,17 @@ def test_mirrored_axes_are_caught_by_placements_at_varied_heights_alone() -> Non
     assert "handedness-open" not in codes(simulated.pairs, simulated.camera, FREE)
 
 
-def test_two_mirrored_axes_are_a_rotation_and_give_no_warning() -> None:
+def test_two_mirrored_axes_are_a_rotation_and_give_no_warning():
     simulated = simulate_pairs(20, rng=np.random.default_rng(2))
     assert codes(moved(simulated.pairs, (1, -1, -1)), simulated.camera, measured(0.05)) == set()
 
 
-def test_a_flat_radar_is_reported() -> None:
+def test_a_flat_radar_is_reported():
     simulated = simulate_pairs(20, rng=np.random.default_rng(3))
     assert "flat-radar" in codes(moved(simulated.pairs, (1, 1, 0)), simulated.camera, measured())
 
 
-def test_wrong_intrinsics_show_in_the_residuals() -> None:
+def test_wrong_intrinsics_show_in_the_residuals():
     simulated = simulate_pairs(30, rng=np.random.default_rng(4), noise="imaging")
     matrix = simulated.camera.matrix_px * np.array([[1.25, 1, 1], [1, 1.25, 1], [1, 1, 1]])
     wrong = replace(simulated.camera, matrix_px=matrix)
@@ -108,12 +106,12 @@ def test_wrong_intrinsics_show_in_the_residuals() -> None:
     }
 
 
-def test_a_wrong_tape_measure_is_contradicted() -> None:
+def test_a_wrong_tape_measure_is_contradicted():
     simulated = simulate_pairs(40, rng=np.random.default_rng(5), noise="imaging")
     assert "camera-position-contradicted" in codes(simulated.pairs, simulated.camera, measured(0.02, (0.0, 0.4, 0.0)))
 
 
-def test_a_tape_that_fits_the_residuals_is_contradicted_by_the_pairs_all_the_same() -> None:
+def test_a_tape_that_fits_the_residuals_is_contradicted_by_the_pairs_all_the_same():
     """An azimuth scale that is uncertain by 2 % leaves the pairs alone uncertain by 10 cm: then only half of these are found."""
     contradicted = 0
     for seed in range(6):
@@ -126,25 +124,25 @@ def test_a_tape_that_fits_the_residuals_is_contradicted_by_the_pairs_all_the_sam
     assert contradicted >= 5
 
 
-def test_placements_in_one_corner_give_a_weak_geometry() -> None:
+def test_placements_in_one_corner_give_a_weak_geometry():
     corner = replace(FIELD, min_range_m=9.0, max_range_m=10.0, max_azimuth_deg=10.0, separation_m=0.05)
     simulated = simulate_pairs(16, rng=np.random.default_rng(7), layout=corner)
     (weak,) = (one for one in warnings(simulated.pairs, simulated.camera, FREE) if one.code == "weak-geometry")
     assert "tape" in weak.hint
 
 
-def test_many_outliers_are_counted_and_named() -> None:
+def test_many_outliers_are_counted_and_named():
     simulated = simulate_pairs(20, rng=np.random.default_rng(8), outlier_share=0.45)
     (many,) = (one for one in warnings(simulated.pairs, simulated.camera, measured()) if one.code == "many-outliers")
     assert "of 20 pairs" in many.message
 
 
-def test_few_pairs_are_reported() -> None:
+def test_few_pairs_are_reported():
     simulated = simulate_pairs(6, rng=np.random.default_rng(9))
     assert "few-pairs" in codes(simulated.pairs, simulated.camera, measured())
 
 
-def test_many_clicks_of_few_places_are_reported() -> None:
+def test_many_clicks_of_few_places_are_reported():
     simulated = simulate_pairs(5, rng=np.random.default_rng(10), noise="imaging")
     rng = np.random.default_rng(1)
     returned = [  # the reflector was carried away and put back, each time to a few centimetres
@@ -157,7 +155,7 @@ def test_many_clicks_of_few_places_are_reported() -> None:
     assert "repeated-placements" in codes(returned, simulated.camera, measured())
 
 
-def test_two_radar_positions_that_fit_one_click_are_reported() -> None:
+def test_two_radar_positions_that_fit_one_click_are_reported():
     simulated = simulate_pairs(12, rng=np.random.default_rng(11))
     first = simulated.pairs[0]
     chosen = first.candidates[0]
@@ -182,7 +180,7 @@ def ambiguous(count: int) -> tuple[SimulatedPairs, list[Pair]]:
     return simulated, pairs
 
 
-def test_a_click_that_two_returns_fit_does_not_agree_until_one_is_chosen() -> None:
+def test_a_click_that_two_returns_fit_does_not_agree_until_one_is_chosen():
     simulated, pairs = ambiguous(1)
     asked, *others = calibrate_pairs(pairs, simulated.camera, measured()).unwrap().pairs
     assert (asked.inlier, asked.outlier_probability) == (False, 0.5)
@@ -193,14 +191,14 @@ def test_a_click_that_two_returns_fit_does_not_agree_until_one_is_chosen() -> No
     assert (answered.inlier, answered.rival) == (True, -1)
 
 
-def test_what_two_returns_do_at_most_placements_keeps_no_click_from_agreeing() -> None:
+def test_what_two_returns_do_at_most_placements_keeps_no_click_from_agreeing():
     simulated, pairs = ambiguous(8)
     outcome = calibrate_pairs(pairs, simulated.camera, measured()).unwrap()
     assert sum(pair.rival >= 0 for pair in outcome.pairs) > 3
     assert all(pair.inlier for pair in outcome.pairs)
 
 
-def test_a_return_that_another_click_of_the_scene_needs_is_no_rival() -> None:
+def test_a_return_that_another_click_of_the_scene_needs_is_no_rival():
     simulated, pairs = ambiguous(1)
     first, second = pairs[0], pairs[1]
     needed = replace(second, candidates=(first.candidates[1],), image_time=TimeNs(1), pixel_px=second.pixel_px)
@@ -228,28 +226,28 @@ def decisive(simulated: SimulatedPairs, *more: SimulatedPairs) -> list[str]:
 
 @pytest.mark.parametrize("noise", ["ti", "imaging"])
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_one_near_placement_among_far_ones_decides(noise: str, seed: int) -> None:
+def test_one_near_placement_among_far_ones_decides(noise, seed):
     rng = np.random.default_rng([31, seed])
-    far = simulate_pairs(19, rng=rng, noise=noise, layout=FAR)  # type: ignore[arg-type]
-    near = simulate_pairs(1, rng=rng, noise=noise, layout=NEAR, rig=far.rig)  # type: ignore[arg-type]
+    far = simulate_pairs(19, rng=rng, noise=noise, layout=FAR)
+    near = simulate_pairs(1, rng=rng, noise=noise, layout=NEAR, rig=far.rig)
     (text,) = decisive(far, near)
     assert "depends on near alone" in text
 
 
 @pytest.mark.parametrize("noise", ["ti", "imaging"])
-def test_a_second_near_placement_takes_the_decision_from_the_first(noise: str) -> None:
+def test_a_second_near_placement_takes_the_decision_from_the_first(noise):
     rng = np.random.default_rng([31, 1])
-    far = simulate_pairs(18, rng=rng, noise=noise, layout=FAR)  # type: ignore[arg-type]
-    near = simulate_pairs(4, rng=rng, noise=noise, layout=NEAR, rig=far.rig)  # type: ignore[arg-type]
+    far = simulate_pairs(18, rng=rng, noise=noise, layout=FAR)
+    near = simulate_pairs(4, rng=rng, noise=noise, layout=NEAR, rig=far.rig)
     pairs = [replace(pair, id=f"near-{i}") for i, pair in enumerate(near.pairs)]
     outcome = calibrate_pairs([*far.pairs, *pairs], far.camera, CalibrationOptions()).unwrap()
     assert "one-pair-decides" not in {one.code for one in outcome.warnings}
 
 
 @pytest.mark.parametrize("noise", ["ti", "imaging"])
-def test_no_pair_of_a_good_set_decides(noise: str) -> None:
+def test_no_pair_of_a_good_set_decides(noise):
     for seed in range(8):
-        assert decisive(simulate_pairs(20, rng=np.random.default_rng([32, seed]), noise=noise)) == []  # type: ignore[arg-type]
+        assert decisive(simulate_pairs(20, rng=np.random.default_rng([32, seed]), noise=noise)) == []
 
 
 # A second pose is said when the pairs leave it open, and the expected distance only when it decides.
@@ -281,7 +279,7 @@ def with_another(fit: SolvedFit, step_m: float, *, worse_by_pairs: float) -> Sol
     return replace(fit, best=replace(fit.best, found=(best, GncSolution(pose, cost, 1.0))))
 
 
-def test_a_pose_that_differs_in_position_only_is_said(fit: SolvedFit) -> None:
+def test_a_pose_that_differs_in_position_only_is_said(fit):
     (warning,) = two_poses(with_another(fit, 0.5, worse_by_pairs=1.0))
     assert warning.code == "two-poses"
     assert "0.1 deg and 0.50 m away" in warning.message
@@ -289,7 +287,7 @@ def test_a_pose_that_differs_in_position_only_is_said(fit: SolvedFit) -> None:
     assert two_poses(with_another(fit, 0.001, worse_by_pairs=0.0)) == []
 
 
-def test_the_expected_distance_is_asked_for_when_it_decides_between_two_poses(fit: SolvedFit) -> None:
+def test_the_expected_distance_is_asked_for_when_it_decides_between_two_poses(fit):
     assert two_poses(with_another(fit, 4.0, worse_by_pairs=1.0)) == []  # no rig has its camera there
     assert two_poses(with_another(fit, 4.0, worse_by_pairs=-20.0)) == []
     solving = replace(fit.options.solving, rig_size_m=30.0)
@@ -301,14 +299,14 @@ def test_the_expected_distance_is_asked_for_when_it_decides_between_two_poses(fi
 
 
 @pytest.mark.parametrize("offset_m", [(0.0, 3.0, 0.5), (-3.0, 7.4, 1.0)])
-def test_sensors_far_apart_are_no_reason_for_a_warning(offset_m: tuple[float, float, float]) -> None:
+def test_sensors_far_apart_are_no_reason_for_a_warning(offset_m):
     for seed, noise in enumerate[NoiseName](("ti", "imaging")):
         rig = RigOptions(camera_offset_m=offset_m)
         simulated = simulate_pairs(40, rng=np.random.default_rng([72, seed]), noise=noise, rig_options=rig)
         assert "camera-far-away" not in {one.code for one in solved(simulated).warnings}
 
 
-def test_an_object_that_always_stands_behind_the_reflector_is_said() -> None:
+def test_an_object_that_always_stands_behind_the_reflector_is_said():
     said = 0
     for seed in range(4):
         rng = np.random.default_rng([73, seed])
@@ -349,16 +347,12 @@ def clock_warnings(rooftop: ClickedSample, ahead_s: float) -> list[str]:
 
 
 @pytest.mark.parametrize("ahead_s", [0.0, 1.0, -1.0])
-def test_an_offset_that_leaves_the_clicks_in_their_dwells_gives_no_warning(
-    rooftop: ClickedSample, ahead_s: float
-) -> None:
+def test_an_offset_that_leaves_the_clicks_in_their_dwells_gives_no_warning(rooftop, ahead_s):
     assert clock_warnings(rooftop, ahead_s) == []
 
 
 @pytest.mark.parametrize(("ahead_s", "words"), [(AHEAD_S, "ahead of"), (-AHEAD_S, "behind")])
-def test_stamps_that_take_the_clicks_out_of_their_dwells_are_suspected(
-    rooftop: ClickedSample, ahead_s: float, words: str
-) -> None:
+def test_stamps_that_take_the_clicks_out_of_their_dwells_are_suspected(rooftop, ahead_s, words):
     (text,) = clock_warnings(rooftop, ahead_s)
     assert words in text
 
@@ -380,7 +374,7 @@ def placed(offsets_s: list[float]) -> tuple[list[PairResult], RadarScans]:
     return pairs, RadarScans.from_scans(scans)
 
 
-def test_the_offset_lies_between_what_all_clicks_allow() -> None:
+def test_the_offset_lies_between_what_all_clicks_allow():
     clicked_s = [-2.9, -1.7, -2.6, -2.5, -3.0]
     offset = clock_offset(*placed(clicked_s), GatingOptions())
     assert offset.least_s == pytest.approx(3.0 - DWELL_S / 2, abs=0.11)
@@ -390,19 +384,19 @@ def test_the_offset_lies_between_what_all_clicks_allow() -> None:
     assert offset.clicks == len(clicked_s)
 
 
-def test_clicks_anywhere_inside_their_dwells_give_no_warning() -> None:
+def test_clicks_anywhere_inside_their_dwells_give_no_warning():
     assert clock_offset(*placed([-1.9, 1.8, 0.0, -1.0, 1.5]), GatingOptions()) is None
 
 
-def test_clicks_that_miss_to_both_sides_are_not_a_clock_offset() -> None:
+def test_clicks_that_miss_to_both_sides_are_not_a_clock_offset():
     assert clock_offset(*placed([-2.9, 2.8, -3.1, 3.0, -2.7, 2.9]), GatingOptions()) is None
 
 
-def test_two_hasty_clicks_are_not_a_clock_offset() -> None:
+def test_two_hasty_clicks_are_not_a_clock_offset():
     assert clock_offset(*placed([-2.9, -2.8, 0.0, 0.1, -0.2, 0.3]), GatingOptions()) is None
 
 
-def test_without_scans_or_stamps_there_is_no_warning() -> None:
+def test_without_scans_or_stamps_there_is_no_warning():
     pairs, scans = placed([-2.9, -3.0, -2.8])
     assert clock_offset(pairs, RadarScans(), GatingOptions()) is None
     assert clock_offset([replace(pair, image_time=None) for pair in pairs], scans, GatingOptions()) is None

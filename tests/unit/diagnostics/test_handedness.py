@@ -14,7 +14,6 @@ from calib_core.options import CalibrationOptions, CameraPositionPrior, RadarOpt
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.results import DataWarning
 from calib_core.synthetic import FIELD, RigOptions, SimulatedPairs, simulate_pairs
-from calib_core.synthetic.simulated_pairs import NoiseName
 
 HANDEDNESS = {"mirrored-axes", "handedness-open", "handedness-assumed"}
 ANYWHERE = CalibrationOptions(solving=SolvingOptions(sensors_above_placements=False))
@@ -43,9 +42,7 @@ def handedness(pairs: Sequence[Pair], simulated: SimulatedPairs, options: Calibr
 
 @pytest.mark.parametrize("noise", ["ti", "imaging"])
 @pytest.mark.parametrize(("offset_m", "distance_m"), [((0.0, 0.0, 0.045), 1.0), ((-3.0, 7.4, 1.0), 8.0)])
-def test_the_side_of_the_ground_tells_mirrored_axes_from_right_ones(
-    noise: NoiseName, offset_m: tuple[float, float, float], distance_m: float
-) -> None:
+def test_the_side_of_the_ground_tells_mirrored_axes_from_right_ones(noise, offset_m, distance_m):
     for seed in range(3):
         rig = RigOptions(camera_offset_m=offset_m)
         simulated = simulate_pairs(20, rng=np.random.default_rng([81, seed]), noise=noise, rig_options=rig)
@@ -55,7 +52,7 @@ def test_the_side_of_the_ground_tells_mirrored_axes_from_right_ones(
             assert handedness(mirrored, simulated, apart(distance_m)) == {"mirrored-axes"}
 
 
-def test_a_wrong_pair_off_the_plane_does_not_acquit_mirrored_axes() -> None:
+def test_a_wrong_pair_off_the_plane_does_not_acquit_mirrored_axes():
     rng = np.random.default_rng([9301, 40, 0, ord("e"), 3])
     simulated = simulate_pairs(40, rng=rng, noise="imaging", outlier_share=0.1)
     assert handedness(simulated.pairs, simulated, apart(1.0)) == set()
@@ -63,7 +60,7 @@ def test_a_wrong_pair_off_the_plane_does_not_acquit_mirrored_axes() -> None:
     assert handedness(mirrored, simulated, apart(1.0)) & {"mirrored-axes", "handedness-open"}
 
 
-def test_without_the_assumption_flat_ground_is_never_called_good() -> None:
+def test_without_the_assumption_flat_ground_is_never_called_good():
     for seed in range(3):
         simulated = simulate_pairs(20, rng=np.random.default_rng([82, seed]))
         assert handedness(simulated.pairs, simulated, ANYWHERE)
@@ -71,7 +68,7 @@ def test_without_the_assumption_flat_ground_is_never_called_good() -> None:
         assert handedness(tripod.pairs, tripod, ANYWHERE) == set()
 
 
-def test_sensors_above_and_below_the_placements_are_accused_only_under_the_assumption() -> None:
+def test_sensors_above_and_below_the_placements_are_accused_only_under_the_assumption():
     below = RigOptions(camera_offset_m=(0.0, 0.0, -2.4))  # a camera in a pit sees the reflector from below
     simulated = simulate_pairs(20, rng=np.random.default_rng(84), noise="imaging", rig_options=below)
     assert handedness(simulated.pairs, simulated, apart(2.4)) == {"mirrored-axes"}
@@ -80,7 +77,7 @@ def test_sensors_above_and_below_the_placements_are_accused_only_under_the_assum
 
 
 @pytest.mark.parametrize("kind", ["elevation", "height", "zero", "rounded"])
-def test_a_radar_without_elevation_is_never_told_to_flip_an_axis(kind: str) -> None:
+def test_a_radar_without_elevation_is_never_told_to_flip_an_axis(kind):
     for seed in range(3):
         rng = np.random.default_rng([85, seed])
         simulated = simulate_pairs(15, rng=rng)
@@ -105,13 +102,13 @@ MEASURED = CalibrationOptions(radar=EXACT_RADAR, solving=POSITION)
 
 
 def suspected(seed: int, noise: str, options: CalibrationOptions, *, focal: float = 1.0, count: int = 20) -> str | None:
-    simulated = simulate_pairs(count, rng=np.random.default_rng([7, seed]), noise=noise)  # type: ignore[arg-type]
+    simulated = simulate_pairs(count, rng=np.random.default_rng([7, seed]), noise=noise)
     matrix_px = simulated.camera.matrix_px * np.array([[focal, 1, 1], [1, focal, 1], [1, 1, 1]])
     return warning_with(replace(simulated.camera, matrix_px=matrix_px), simulated.pairs, options)
 
 
 def warning_with(camera: Camera, pairs: object, options: CalibrationOptions) -> str | None:
-    outcome = calibrate_pairs(pairs, camera, options).unwrap()  # type: ignore[arg-type]
+    outcome = calibrate_pairs(pairs, camera, options).unwrap()
     return text_of(outcome.warnings)
 
 
@@ -121,7 +118,7 @@ def text_of(warnings: tuple[DataWarning, ...]) -> str | None:
 
 
 @pytest.mark.parametrize(("focal", "word"), [(1.03, "too long"), (0.97, "too short")])
-def test_a_focal_length_that_is_three_percent_off_is_reported_with_amount_and_sign(focal: float, word: str) -> None:
+def test_a_focal_length_that_is_three_percent_off_is_reported_with_amount_and_sign(focal, word):
     for seed in range(3):
         text = suspected(seed, "imaging", MEASURED, focal=focal)
         assert text is not None
@@ -131,7 +128,7 @@ def test_a_focal_length_that_is_three_percent_off_is_reported_with_amount_and_si
         assert sigma < 0.7
 
 
-def test_a_distortion_that_was_forgotten_is_suspected() -> None:
+def test_a_distortion_that_was_forgotten_is_suspected():
     for seed in range(3):
         simulated = simulate_pairs(30, rng=np.random.default_rng([8, seed]), noise="imaging")
         straight = replace(simulated.camera, distortion=np.zeros(4))
@@ -142,14 +139,14 @@ def test_a_distortion_that_was_forgotten_is_suspected() -> None:
 
 @pytest.mark.parametrize("options", [FREE, MEASURED, CalibrationOptions(), CalibrationOptions(solving=POSITION)])
 @pytest.mark.parametrize("noise", ["ti", "imaging"])
-def test_right_intrinsics_are_not_suspected(noise: str, options: CalibrationOptions) -> None:
+def test_right_intrinsics_are_not_suspected(noise, options):
     assert [suspected(seed, noise, options) for seed in range(6)] == [None] * 6
 
 
-def test_a_focal_length_that_the_radars_scale_explains_is_not_blamed_on_the_lens() -> None:
+def test_a_focal_length_that_the_radars_scale_explains_is_not_blamed_on_the_lens():
     for seed in range(3):
         assert suspected(seed, "imaging", CalibrationOptions(solving=POSITION), focal=1.03) is None
 
 
-def test_a_few_pairs_are_not_tested() -> None:
+def test_a_few_pairs_are_not_tested():
     assert suspected(0, "imaging", MEASURED, focal=1.03, count=8) is None

@@ -40,7 +40,7 @@ def measured_at(position: np.ndarray, name: str, simulated: SimulatedPairs, rng:
     return Pair(name, pixel, (type(example)(point, sigma, covariance),), sigma_px=2.0)
 
 
-def test_the_promised_gain_is_what_a_pair_there_brings() -> None:
+def test_the_promised_gain_is_what_a_pair_there_brings():
     options = replace(OPTIONS, noise=replace(OPTIONS.noise, estimate_scale=False))
     for seed in (3, 5):
         rng = np.random.default_rng(seed)
@@ -55,7 +55,7 @@ def test_the_promised_gain_is_what_a_pair_there_brings() -> None:
         assert spreads[0] / spreads[1] == pytest.approx(advice.gain, rel=0.15)
 
 
-def test_more_clicks_of_the_same_placements_leave_the_gain_unchanged() -> None:
+def test_more_clicks_of_the_same_placements_leave_the_gain_unchanged():
     simulated = simulate_pairs(10, rng=np.random.default_rng(3))
     before = solved(list(simulated.pairs), simulated)
     repeated = [replace(pair, id=f"{pair.id}-{copy}") for pair in before.pairs for copy in range(3)]
@@ -67,7 +67,7 @@ def test_more_clicks_of_the_same_placements_leave_the_gain_unchanged() -> None:
     assert thrice.gain == pytest.approx(once.gain, rel=0.05)
 
 
-def test_no_placement_is_said_to_level_a_radar_without_elevation() -> None:
+def test_no_placement_is_said_to_level_a_radar_without_elevation():
     simulated = simulate_pairs(20, rng=np.random.default_rng(4))
     flat = [np.array([np.hypot(*one[[0, 2]]), one[1], 0.0]) for one in positions(simulated)]
     pairs = [
@@ -78,7 +78,7 @@ def test_no_placement_is_said_to_level_a_radar_without_elevation() -> None:
     assert advice.gain < 1.5
 
 
-def test_the_advised_place_is_in_view_and_new() -> None:
+def test_the_advised_place_is_in_view_and_new():
     simulated = simulate_pairs(10, rng=np.random.default_rng(3))
     calibration = solved(list(simulated.pairs), simulated)
     advice = next_placement(calibration, limits=PlacementLimits(separation_m=1.0))
@@ -88,7 +88,7 @@ def test_the_advised_place_is_in_view_and_new() -> None:
     assert advice.gain > 1.0
 
 
-def test_the_advice_is_to_stop_after_many_placements_and_not_after_few() -> None:
+def test_the_advice_is_to_stop_after_many_placements_and_not_after_few():
     simulated = simulate_pairs(60, rng=np.random.default_rng(4))
     few, many = (next_placement(solved(list(simulated.pairs[:n]), simulated)) for n in (6, 60))
     assert not few.may_stop
@@ -96,7 +96,7 @@ def test_the_advice_is_to_stop_after_many_placements_and_not_after_few() -> None
     assert few.gain > many.gain
 
 
-def test_there_is_no_advice_without_a_covariance() -> None:
+def test_there_is_no_advice_without_a_covariance():
     simulated = simulate_pairs(12, rng=np.random.default_rng(5), noise="imaging")
     outcome = calibrate_pairs(simulated.pairs, simulated.camera, CalibrationOptions(method="paper")).unwrap()
     assert next_placement(outcome) is None

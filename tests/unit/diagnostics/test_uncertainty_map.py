@@ -21,7 +21,7 @@ def solved() -> Calibration:
 
 
 @pytest.mark.parametrize("distance_m", [5.0, 20.0, 60.0])
-def test_the_map_holds_95_percent_of_drawn_poses_along_its_longest_axis(solved: Calibration, distance_m: float) -> None:
+def test_the_map_holds_95_percent_of_drawn_poses_along_its_longest_axis(solved, distance_m):
     known_noise = replace(solved, covariance_quantile=_CHI2_95_6D)
     found = uncertainty_map(known_noise, distance_m, columns=5)
     rng = np.random.default_rng(3)
@@ -39,7 +39,7 @@ def test_the_map_holds_95_percent_of_drawn_poses_along_its_longest_axis(solved: 
         assert (np.linalg.norm(moved_px[:, i] - grid_px[i], axis=1) <= semi_major_px).mean() >= 0.93
 
 
-def test_few_pairs_widen_the_map_as_student_s_distribution_does() -> None:
+def test_few_pairs_widen_the_map_as_student_s_distribution_does():
     from scipy.special import fdtri
 
     assert pixel_quantile(_CHI2_95_6D) == _CHI2_95_2D
@@ -51,7 +51,7 @@ def test_few_pairs_widen_the_map_as_student_s_distribution_does() -> None:
         )
 
 
-def test_where_the_lens_has_no_ray_the_map_is_empty(solved: Calibration) -> None:
+def test_where_the_lens_has_no_ray_the_map_is_empty(solved):
     matrix = np.array([[300.0, 0, 320], [0, 300, 240], [0, 0, 1]])
     folding = Camera("plumb_bob", 640, 480, matrix, np.array([-0.45, 0.0, 0.0, 0.0]))
     found = uncertainty_map(replace(solved, camera=folding), 20.0)
@@ -61,13 +61,13 @@ def test_where_the_lens_has_no_ray_the_map_is_empty(solved: Calibration) -> None
     assert np.isfinite(found.semi_major_px[len(found.rows_px) // 2, len(found.columns_px) // 2])
 
 
-def test_a_method_without_noise_model_has_no_map(solved: Calibration) -> None:
+def test_a_method_without_noise_model_has_no_map(solved):
     unknown = replace(solved, covariance=np.full((6, 6), np.nan))
 
     assert np.isnan(uncertainty_map(unknown, 20.0).semi_major_px).all()
 
 
-def test_a_radar_without_elevation_is_mapped_by_what_its_pairs_determine() -> None:
+def test_a_radar_without_elevation_is_mapped_by_what_its_pairs_determine():
     from calib_core.synthetic import SystematicErrors
 
     drawn = simulate_pairs(20, rng=np.random.default_rng(5), systematic=SystematicErrors(measures_elevation=False))

@@ -32,7 +32,7 @@ def solved(simulated: SimulatedPairs, options: CalibrationOptions = MEASURED) ->
     return calibrate_pairs(simulated.pairs, simulated.camera, options).unwrap()
 
 
-def test_pixel_covariance_is_that_of_projections_under_drawn_poses() -> None:
+def test_pixel_covariance_is_that_of_projections_under_drawn_poses():
     simulated = simulate_pairs(20, rng=np.random.default_rng(3), noise="imaging")
     calibration = solved(simulated, EXACT)
     points = np.array([[8.0, 1.0, 0.2], [4.0, -1.0, -0.5]])
@@ -43,19 +43,19 @@ def test_pixel_covariance_is_that_of_projections_under_drawn_poses() -> None:
         assert np.cov(pixels[:, k].T) == pytest.approx(calibration.pixel_covariance(points)[k], rel=0.25, abs=0.3)
 
 
-def test_pixel_covariance_of_what_the_lens_does_not_see_is_not_a_number() -> None:
+def test_pixel_covariance_of_what_the_lens_does_not_see_is_not_a_number():
     calibration = solved(simulate_pairs(12, rng=np.random.default_rng(3)))
     assert np.isnan(calibration.pixel_covariance(np.array([[-5.0, 0.0, 0.0]]))).all()
 
 
-def test_a_measured_camera_position_shrinks_rotation_and_position_uncertainty() -> None:
+def test_a_measured_camera_position_shrinks_rotation_and_position_uncertainty():
     simulated = simulate_pairs(15, rng=np.random.default_rng(4))
     measured, free = (np.diag(solved(simulated, options).covariance) for options in (MEASURED, CalibrationOptions()))
     assert measured[:3].sum() < 0.2 * free[:3].sum()
     assert measured[3:].sum() < 0.8 * free[3:].sum()
 
 
-def test_leave_one_out_by_one_step_agrees_with_solving_without_the_pair() -> None:
+def test_leave_one_out_by_one_step_agrees_with_solving_without_the_pair():
     simulated = simulate_pairs(16, rng=np.random.default_rng(5), noise="imaging")
     prior = CameraPositionPrior((0.0, 0.0, 0.045), 0.1)  # so wide that its weight does not change
     fixed = replace(EXACT, noise=replace(MEASURED.noise, estimate_scale=False), solving=SolvingOptions(prior))
@@ -71,7 +71,7 @@ def test_leave_one_out_by_one_step_agrees_with_solving_without_the_pair() -> Non
         assert stated == pytest.approx(influence, rel=0.15, abs=0.02)
 
 
-def test_a_known_noise_level_takes_the_chi_square_quantile() -> None:
+def test_a_known_noise_level_takes_the_chi_square_quantile():
     simulated = simulate_pairs(12, rng=np.random.default_rng(6))
     fixed = replace(MEASURED, noise=replace(MEASURED.noise, estimate_scale=False))
     assert solved(simulated, fixed).covariance_quantile == pytest.approx(12.5916, abs=1e-3)
@@ -136,7 +136,7 @@ def drawn() -> tuple[Drawn, ...]:
     return tuple(Drawn.of(seed) for seed in range(8))
 
 
-def test_the_systematic_part_is_what_errors_of_the_radar_move_the_pose_by(drawn: tuple[Drawn, ...]) -> None:
+def test_the_systematic_part_is_what_errors_of_the_radar_move_the_pose_by(drawn):
     bias_m, *scales = (
         _STEP * sigma for sigma in (_RADAR.range_bias_sigma_m, _RADAR.azimuth_scale_sigma, _RADAR.elevation_scale_sigma)
     )
@@ -149,7 +149,7 @@ def test_the_systematic_part_is_what_errors_of_the_radar_move_the_pose_by(drawn:
     np.testing.assert_allclose(sum(diagonal(one, "systematic") for one in drawn), expected, rtol=0.2)
 
 
-def test_the_part_of_the_tape_is_what_another_reading_moves_the_pose_by(drawn: tuple[Drawn, ...]) -> None:
+def test_the_part_of_the_tape_is_what_another_reading_moves_the_pose_by(drawn):
     readings = (
         _STEP * np.sqrt(2.0) * _SIGMA_M * np.eye(3)
     )  # the standard deviation of Student's t with 4 degrees of freedom
@@ -162,7 +162,7 @@ def diagonal(drawn: Drawn, part: str) -> np.ndarray:
     return np.diag(getattr(drawn.answer.covariance_parts, part))
 
 
-def test_errors_that_only_widen_count_as_systematic_and_the_parts_never_exceed_the_whole() -> None:
+def test_errors_that_only_widen_count_as_systematic_and_the_parts_never_exceed_the_whole():
     for seed in range(4):
         simulated = simulate_pairs(12, rng=np.random.default_rng(seed), noise="ti")
         prior = CameraPositionPrior((0.05, -0.1, 0.12), 0.05)
@@ -178,23 +178,23 @@ def test_errors_that_only_widen_count_as_systematic_and_the_parts_never_exceed_t
             assert np.linalg.eigvalsh(part / np.outer(scale, scale))[0] > -1e-9
 
 
-def test_without_a_tape_its_part_is_nothing() -> None:
+def test_without_a_tape_its_part_is_nothing():
     simulated = simulate_pairs(12, rng=np.random.default_rng(1), noise="ti")
     parts = calibrate_pairs(simulated.pairs, simulated.camera).unwrap().covariance_parts
     assert not parts.camera_position.any()
     assert parts.systematic.any()
 
 
-def test_of_few_pairs_with_a_posterior_that_is_not_normal_they_are_made_to_fit() -> None:
+def test_of_few_pairs_with_a_posterior_that_is_not_normal_they_are_made_to_fit():
     rng = np.random.default_rng(1926)
     noise, count = str(rng.choice(["ti", "imaging", "ti_aisle"])), int(rng.integers(4, 16))
-    made = simulate_pairs(count, rng=rng, noise=noise, outlier_share=float(rng.choice([0, 0, 0.2, 0.4])))  # type: ignore[arg-type]
+    made = simulate_pairs(count, rng=rng, noise=noise, outlier_share=float(rng.choice([0, 0, 0.2, 0.4])))
     found = calibrate_pairs(made.pairs, made.camera).unwrap()
     pose = session_pose(found, vehicle="van", session="spring")  # refuses parts that exceed the covariance
     assert np.trace(pose.systematic) > 0.0
 
 
-def test_parts_that_fit_stay_and_others_shrink_by_one_factor() -> None:
+def test_parts_that_fit_stay_and_others_shrink_by_one_factor():
     whole = np.diag([1e-4] * 3 + [1e-6] * 3)
     parts = CovarianceParts(0.5 * whole, 0.25 * whole)
     assert parts.within(whole) is parts
@@ -235,7 +235,7 @@ def solved_with_tape(simulated: SimulatedPairs) -> Calibration:
 
 
 @pytest.mark.slow
-def test_the_ellipsoid_contains_the_truth_despite_smooth_errors() -> None:
+def test_the_ellipsoid_contains_the_truth_despite_smooth_errors():
     """If the errors were taken as independent, it would contain the truth in fewer than 3 of 24 sets."""
     inside = 0
     for seed in range(24):
@@ -246,14 +246,14 @@ def test_the_ellipsoid_contains_the_truth_despite_smooth_errors() -> None:
     assert inside >= 20
 
 
-def test_smooth_errors_raise_a_warning_and_independent_ones_do_not() -> None:
+def test_smooth_errors_raise_a_warning_and_independent_ones_do_not():
     smooth_one = solved_with_tape(with_smooth_errors(1, 60))
     plain = solved_with_tape(simulate_pairs(60, rng=np.random.default_rng(1), layout=CROWDED))
     assert "smooth-angle-errors" in {warning.code for warning in smooth_one.warnings}
     assert "smooth-angle-errors" not in {warning.code for warning in plain.warnings}
 
 
-def test_under_smooth_errors_the_stated_uncertainty_turns_with_the_camera() -> None:
+def test_under_smooth_errors_the_stated_uncertainty_turns_with_the_camera():
     upright = with_smooth_errors(1, 60)
     centre_px = upright.camera.matrix_px[:2, 2]
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # a quarter about the optical axis
@@ -271,6 +271,6 @@ def test_under_smooth_errors_the_stated_uncertainty_turns_with_the_camera() -> N
     np.testing.assert_allclose(turned / np.outer(scale, scale), after.covariance / np.outer(scale, scale), atol=1e-3)
 
 
-def test_more_pairs_do_not_average_smooth_errors_out() -> None:
+def test_more_pairs_do_not_average_smooth_errors_out():
     few, many = (np.trace(solved_with_tape(with_smooth_errors(2, count)).covariance[3:, 3:]) for count in (40, 160))
     assert many > 0.4 * few

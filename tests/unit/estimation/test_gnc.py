@@ -18,14 +18,14 @@ from calib_core.synthetic import RigOptions, SimulatedPairs, simulate_pairs
 MEASURED = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.045), 0.01)))
 
 
-def test_candidates_are_associated_with_their_clicks_at_the_true_pose() -> None:
+def test_candidates_are_associated_with_their_clicks_at_the_true_pose():
     simulated = simulate_pairs(15, rng=np.random.default_rng(1), noise="ti_fine", decoys=4)
     measurements = pair_measurements(simulated.pairs, simulated.camera, MEASURED)
     rows, _ = associate(measurements, simulated.camera_from_radar)
     assert tuple(rows - measurements.first[:-1]) == simulated.true_candidate
 
 
-def test_the_true_pose_is_found_with_half_of_the_pairs_wrong() -> None:
+def test_the_true_pose_is_found_with_half_of_the_pairs_wrong():
     simulated = simulate_pairs(24, rng=np.random.default_rng(2), outlier_share=0.5)
     measurements = pair_measurements(simulated.pairs, simulated.camera, MEASURED)
     starts = initial_poses(measurements, most=3, rng=np.random.default_rng(1))
@@ -33,7 +33,7 @@ def test_the_true_pose_is_found_with_half_of_the_pairs_wrong() -> None:
     assert np.linalg.norm(simulated.camera_from_radar.error_from(best.camera_from_radar)[3:]) < np.deg2rad(3.0)
 
 
-def test_starts_that_end_in_the_same_pose_count_once() -> None:
+def test_starts_that_end_in_the_same_pose_count_once():
     simulated = simulate_pairs(20, rng=np.random.default_rng(3))
     measurements = pair_measurements(simulated.pairs, simulated.camera, MEASURED)
     truth = simulated.camera_from_radar
@@ -41,14 +41,14 @@ def test_starts_that_end_in_the_same_pose_count_once() -> None:
     assert len(solve_gnc(measurements, starts, estimate_scale=False)) == 1
 
 
-def test_noise_three_times_larger_than_assumed_is_detected() -> None:
+def test_noise_three_times_larger_than_assumed_is_detected():
     simulated = simulate_pairs(20, rng=np.random.default_rng(4))
     measurements = pair_measurements(simulated.pairs, simulated.camera, MEASURED).scaled([1.0, 0.3, 0.3, 0.3])
     starts = initial_poses(measurements, most=3, rng=np.random.default_rng(1))
     assert solve_gnc(measurements, starts, estimate_scale=True)[0].noise_scale > 1.5
 
 
-def test_the_true_pose_is_more_likely_than_a_wrong_one() -> None:
+def test_the_true_pose_is_more_likely_than_a_wrong_one():
     simulated = simulate_pairs(12, rng=np.random.default_rng(5), outlier_share=0.25)
     measurements = pair_measurements(simulated.pairs, simulated.camera, MEASURED)
     wrong = simulated.camera_from_radar.perturbed(np.array([0, 0, 0, 0, 0.1, 0]))
@@ -59,7 +59,7 @@ def test_the_true_pose_is_more_likely_than_a_wrong_one() -> None:
 
 
 @pytest.mark.parametrize("options", [CalibrationOptions(), MEASURED])
-def test_one_start_is_near_the_truth_despite_wrong_pairs(options: CalibrationOptions) -> None:
+def test_one_start_is_near_the_truth_despite_wrong_pairs(options):
     simulated = simulate_pairs(20, rng=np.random.default_rng(3), outlier_share=0.4)
     measurements = pair_measurements(simulated.pairs, simulated.camera, options)
     starts = initial_poses(measurements, most=4, rng=np.random.default_rng(1))
@@ -67,7 +67,7 @@ def test_one_start_is_near_the_truth_despite_wrong_pairs(options: CalibrationOpt
     assert min(angles) < np.deg2rad(5.0)
 
 
-def test_a_camera_three_metres_away_is_found_by_three_points() -> None:
+def test_a_camera_three_metres_away_is_found_by_three_points():
     rig_options = RigOptions(camera_offset_m=(0.0, 3.0, 0.5))
     simulated = simulate_pairs(20, rng=np.random.default_rng(4), noise="ti_fine", rig_options=rig_options)
     measurements = pair_measurements(simulated.pairs, simulated.camera, CalibrationOptions())
@@ -76,14 +76,14 @@ def test_a_camera_three_metres_away_is_found_by_three_points() -> None:
     assert min(np.linalg.norm(centre - simulated.rig.camera_position_radar_m) for centre in centres) < 0.8
 
 
-def test_exact_pairs_give_an_exact_three_point_start() -> None:
+def test_exact_pairs_give_an_exact_three_point_start():
     simulated = simulate_pairs(8, rng=np.random.default_rng(5), noise="none")
     measurements = pair_measurements(simulated.pairs, simulated.camera, CalibrationOptions())
     best = initial_poses(measurements, most=1, rng=np.random.default_rng(1))[0]
     assert np.linalg.norm(simulated.camera_from_radar.error_from(best)) < 0.05
 
 
-def test_the_true_pose_costs_less_than_one_turned_by_ten_degrees() -> None:
+def test_the_true_pose_costs_less_than_one_turned_by_ten_degrees():
     simulated = simulate_pairs(12, rng=np.random.default_rng(6))
     measurements = pair_measurements(simulated.pairs, simulated.camera, CalibrationOptions())
     truth = simulated.camera_from_radar
@@ -95,7 +95,7 @@ def test_the_true_pose_costs_less_than_one_turned_by_ten_degrees() -> None:
     assert costs[0] < 0.3 * costs[1]
 
 
-def test_the_same_seed_draws_the_same_starts() -> None:
+def test_the_same_seed_draws_the_same_starts():
     simulated = simulate_pairs(30, rng=np.random.default_rng(7), decoys=2)
     measurements = pair_measurements(simulated.pairs, simulated.camera, CalibrationOptions())
     first, second = (initial_poses(measurements, most=3, rng=np.random.default_rng(9)) for _ in range(2))
@@ -135,7 +135,7 @@ def with_alternatives(simulated: SimulatedPairs, kind: str, rng: np.random.Gener
     ("kind", "options"),
     [("another azimuth", FREE), ("another azimuth", FROM_ABOVE), ("mirrored elevation", FROM_ABOVE)],
 )
-def test_the_right_one_of_two_positions_is_chosen_for_every_pair(kind: str, options: CalibrationOptions) -> None:
+def test_the_right_one_of_two_positions_is_chosen_for_every_pair(kind, options):
     for seed in range(3):
         rng = np.random.default_rng([61, seed])
         simulated = simulate_pairs(20, rng=rng, noise="imaging")
@@ -150,7 +150,7 @@ def test_the_right_one_of_two_positions_is_chosen_for_every_pair(kind: str, opti
         assert len(named) >= bool(wrong)
 
 
-def test_if_all_elevations_may_be_mirrored_the_ground_decides_and_without_it_a_warning_says_so() -> None:
+def test_if_all_elevations_may_be_mirrored_the_ground_decides_and_without_it_a_warning_says_so():
     for seed in range(3):
         rng = np.random.default_rng([62, seed])
         simulated = simulate_pairs(20, rng=rng, noise="imaging")
@@ -162,7 +162,7 @@ def test_if_all_elevations_may_be_mirrored_the_ground_decides_and_without_it_a_w
         assert {one.code for one in outcome.warnings} & {"handedness-open", "two-poses", "mirrored-axes"}
 
 
-def test_two_clicks_of_one_moment_do_not_take_the_same_return() -> None:
+def test_two_clicks_of_one_moment_do_not_take_the_same_return():
     """Both would explain both clicks well enough; the second reflector's own return is a little worse, and right."""
     simulated = simulate_pairs(12, rng=np.random.default_rng(31), noise="imaging")
     pairs = [replace(pair, image_time=TimeNs(k * 60 * 10**9)) for k, pair in enumerate(simulated.pairs)]

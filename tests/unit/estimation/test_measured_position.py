@@ -11,7 +11,7 @@ from calib_core.options import HOW_MEASURED, CalibrationOptions, CameraPositionP
 from calib_core.results import Calibration
 from calib_core.results.verdict import stated_error
 from calib_core.synthetic import SimulatedPairs, simulate_pairs
-from calib_core.synthetic.simulated_pairs import NoiseName, draw_systematic_errors
+from calib_core.synthetic.simulated_pairs import draw_systematic_errors
 
 CONTRADICTED = "camera-position-contradicted"
 
@@ -39,8 +39,8 @@ def codes(answer: Calibration) -> set[str]:
 
 @pytest.mark.parametrize("slip_m", [(0.0, 0.0, 0.05), (0.05, 0.0, 0.0), (0.1, 0.0, 0.0), (0.0, 0.0, 0.0)])
 def test_a_position_a_few_centimetres_off_is_within_the_stated_error_or_contradicted(
-    slip_m: tuple[float, float, float],
-) -> None:
+    slip_m,
+):
     for seed in range(4):
         simulated = drawn(seed)
         answer = solved(simulated, slip_m)
@@ -49,14 +49,13 @@ def test_a_position_a_few_centimetres_off_is_within_the_stated_error_or_contradi
 
 
 @pytest.mark.parametrize("slip_m", [(0.3, 0.0, 0.0), (0.0, -0.3, 0.0), (0.0, 0.0, -0.3)])
-def test_a_contradicted_position_is_named_and_has_no_weight(slip_m: tuple[float, float, float]) -> None:
+def test_a_contradicted_position_is_named_and_has_no_weight(slip_m):
     for seed in range(4):
         simulated = drawn(seed)
         for sigma_m in (0.005, 0.03):
             answer = solved(simulated, slip_m, sigma_m=sigma_m)
             assert CONTRADICTED in codes(answer)
             assert off_m(answer, simulated) < 0.12
-            assert answer.covariance_parts is not None
             assert not answer.covariance_parts.camera_position.any()
 
 
@@ -79,7 +78,7 @@ def test_pose_and_covariance_follow_a_position_that_is_farther_and_farther_off(
 
 
 @pytest.mark.parametrize("noise", ["ti", "imaging"])
-def test_a_dragged_click_moves_the_pose_by_less_than_a_sigma_a_step_or_changes_sides(noise: NoiseName) -> None:
+def test_a_dragged_click_moves_the_pose_by_less_than_a_sigma_a_step_or_changes_sides(noise):
     for seed in range(2):
         simulated = simulate_pairs(12, rng=np.random.default_rng([2035, seed]), noise=noise)
         nearest = int(np.linalg.norm(simulated.points_radar_m, axis=1).argmin())
@@ -94,7 +93,7 @@ def test_a_dragged_click_moves_the_pose_by_less_than_a_sigma_a_step_or_changes_s
             assert step(before, after) < 1.0 or sides[0] != sides[1]
 
 
-def test_a_scale_of_the_angles_is_not_blamed_without_the_measured_position() -> None:
+def test_a_scale_of_the_angles_is_not_blamed_without_the_measured_position():
     blamed = [
         next(
             (
@@ -110,7 +109,7 @@ def test_a_scale_of_the_angles_is_not_blamed_without_the_measured_position() -> 
     assert all("not where it was measured" in text for text in blamed if text)
 
 
-def test_the_ways_to_measure_have_their_standard_deviations() -> None:
+def test_the_ways_to_measure_have_their_standard_deviations():
     assert CameraPositionPrior((0.1, 0.2, 0.3)).sigma_m == 0.03
     sigmas_m = [CameraPositionPrior.measured((0.1, 0.2, 0.3), how).sigma_m for how in HOW_MEASURED]
     assert sigmas_m == [0.05, 0.02, 0.005]

@@ -23,7 +23,7 @@ def simulated(decoys: int = 0) -> tuple[SimulatedPairs, PairMeasurements]:
     return pairs, pair_measurements(pairs.pairs, pairs.camera, CalibrationOptions())
 
 
-def test_the_pose_jacobian_is_the_derivative_of_the_projection() -> None:
+def test_the_pose_jacobian_is_the_derivative_of_the_projection():
     pairs, measurements = simulated()
     pose = pairs.camera_from_radar
     model = linearize(
@@ -44,7 +44,7 @@ def test_the_pose_jacobian_is_the_derivative_of_the_projection() -> None:
         assert model.pose_jacobian[:, :, k] == pytest.approx(whitened, rel=1e-4, abs=1e-3)
 
 
-def test_whitening_undoes_the_covariance_of_click_and_radar_noise() -> None:
+def test_whitening_undoes_the_covariance_of_click_and_radar_noise():
     """S = C + J V J^T, sampled."""
     pairs, measurements = simulated()
     rng = np.random.default_rng(2)
@@ -67,7 +67,7 @@ def test_whitening_undoes_the_covariance_of_click_and_radar_noise() -> None:
     assert covariance == pytest.approx(np.tile(np.eye(2), (len(measurements), 1, 1)), abs=0.12)
 
 
-def test_a_position_behind_the_camera_has_no_influence() -> None:
+def test_a_position_behind_the_camera_has_no_influence():
     pairs, measurements = simulated()
     backwards = RigidTransform(rotation_exp(np.array([0.0, np.pi, 0.0])), np.zeros(3)) @ pairs.camera_from_radar
     model = linearize(
@@ -82,7 +82,7 @@ def test_a_position_behind_the_camera_has_no_influence() -> None:
     assert not model.pose_jacobian.any()
 
 
-def test_the_prior_rows_are_the_derivative_of_the_camera_centre() -> None:
+def test_the_prior_rows_are_the_derivative_of_the_camera_centre():
     pairs, _ = simulated()
     pose = pairs.camera_from_radar
     prior = CameraPrior(pose.inverse().translation_m, 0.01, measured=True)  # where its weight does not change
@@ -96,7 +96,7 @@ def test_the_prior_rows_are_the_derivative_of_the_camera_centre() -> None:
 
 @pytest.mark.parametrize("measured", [True, False])
 @pytest.mark.parametrize("height_sigma_m", [0.0, 0.5])
-def test_a_step_by_the_priors_rows_goes_down_its_cost(measured: bool, height_sigma_m: float) -> None:
+def test_a_step_by_the_priors_rows_goes_down_its_cost(measured, height_sigma_m):
     """Of a measured position, the gradient of the cost is twice that of the rows: the weight follows from the distance."""
     pose = simulated()[0].camera_from_radar
     away_m = np.array([0.04, -0.02, 0.03])
@@ -115,7 +115,7 @@ def test_a_step_by_the_priors_rows_goes_down_its_cost(measured: bool, height_sig
         assert gradient == pytest.approx(pull, rel=1e-4)
 
 
-def test_a_weak_camera_prior_has_less_weight_the_farther_it_is_off() -> None:
+def test_a_weak_camera_prior_has_less_weight_the_farther_it_is_off():
     prior = CameraPrior(np.zeros(3), 1.0, measured=False)
     pulls = []
     for distance_m in (1.0, 10.0):
@@ -124,7 +124,7 @@ def test_a_weak_camera_prior_has_less_weight_the_farther_it_is_off() -> None:
     assert pulls[1] < 0.25 * pulls[0]
 
 
-def test_a_radar_that_always_reports_elevation_zero_has_a_small_sigma_and_an_unknown_height() -> None:
+def test_a_radar_that_always_reports_elevation_zero_has_a_small_sigma_and_an_unknown_height():
     pairs, _ = simulated()
     flat = [
         type(pair)(
@@ -143,7 +143,7 @@ def test_a_radar_that_always_reports_elevation_zero_has_a_small_sigma_and_an_unk
     assert "squared_height_m2" in {one.name for one in measurements.errors.estimated}
 
 
-def test_some_pairs_keep_their_candidates() -> None:
+def test_some_pairs_keep_their_candidates():
     _, measurements = simulated(decoys=3)
     few = measurements.some(np.array([2, 5]))
     assert few.first.tolist() == [0, 4, 8]
@@ -174,9 +174,7 @@ def solved(seed: int, height_m: float, options: CalibrationOptions) -> tuple[Cal
 
 @pytest.mark.parametrize("options", [FREE, MEASURED])
 @pytest.mark.parametrize("height_m", [0.025, 1.2])
-def test_the_truth_lies_inside_whether_the_reflector_stood_on_the_ground_or_at_the_radars_height(
-    height_m: float, options: CalibrationOptions
-) -> None:
+def test_the_truth_lies_inside_whether_the_reflector_stood_on_the_ground_or_at_the_radars_height(height_m, options):
     inside = 0
     for seed in range(10):
         calibration, truth = solved(seed, height_m, options)
@@ -186,7 +184,7 @@ def test_the_truth_lies_inside_whether_the_reflector_stood_on_the_ground_or_at_t
 
 
 @pytest.mark.parametrize("reported_z_m", [0.5, 1e-5])
-def test_a_radar_that_reports_one_height_or_rounded_zeros_is_flat_too(reported_z_m: float) -> None:
+def test_a_radar_that_reports_one_height_or_rounded_zeros_is_flat_too(reported_z_m):
     """Drivers add the mounting height, or convert zeros back and forth: judged as elevations, both are wrong by metres."""
     rng, inside = np.random.default_rng(4), 0
     for seed in range(6):
@@ -204,7 +202,7 @@ def test_a_radar_that_reports_one_height_or_rounded_zeros_is_flat_too(reported_z
     assert inside == 6
 
 
-def test_the_warning_says_what_the_pairs_determine_and_what_is_assumed() -> None:
+def test_the_warning_says_what_the_pairs_determine_and_what_is_assumed():
     calibration, _ = solved(1, 1.2, FREE)
     (warning,) = (one for one in calibration.warnings if one.code == "flat-radar")
     determined, assumed = warning.message.split("; up ")
@@ -213,13 +211,13 @@ def test_the_warning_says_what_the_pairs_determine_and_what_is_assumed() -> None
     assert "tilt and height" in warning.hint
 
 
-def test_the_covariance_of_a_radar_with_elevation_is_not_widened() -> None:
+def test_the_covariance_of_a_radar_with_elevation_is_not_widened():
     simulated = simulate_pairs(20, rng=np.random.default_rng(2))
     outcome = calibrate_pairs(simulated.pairs, simulated.camera, MEASURED).unwrap()
     assert np.sqrt(outcome.covariance[3:, 3:].trace()) < np.deg2rad(1.5)
 
 
-def test_the_first_preview_of_a_radar_without_elevation_says_so() -> None:
+def test_the_first_preview_of_a_radar_without_elevation_says_so():
     simulated = simulate_pairs(20, rng=np.random.default_rng(3), rig_options=LEVEL)
     preview = preview_pairs([flattened(pair) for pair in simulated.pairs], simulated.camera)
     assert isinstance(preview, Calibration)
@@ -236,7 +234,7 @@ TAPED = without_systematic_errors(
 )
 
 
-def test_scipy_finds_the_same_optimum_over_pose_and_true_positions() -> None:
+def test_scipy_finds_the_same_optimum_over_pose_and_true_positions():
     simulated = simulate_pairs(10, rng=np.random.default_rng(1))
     measurements = pair_measurements(simulated.pairs, simulated.camera, TAPED)
     truth = simulated.camera_from_radar
@@ -259,7 +257,7 @@ def test_scipy_finds_the_same_optimum_over_pose_and_true_positions() -> None:
     assert np.linalg.norm(apart[:3]) < 2e-4
 
 
-def test_the_camera_is_not_pulled_backwards_by_many_noisy_pairs() -> None:
+def test_the_camera_is_not_pulled_backwards_by_many_noisy_pairs():
     """PnP on noisy points is biased by centimetres however many pairs there are; errors in variables is not."""
     crowded = replace(FIELD, separation_m=0.0)
     backwards_m = []
@@ -277,7 +275,7 @@ def test_the_camera_is_not_pulled_backwards_by_many_noisy_pairs() -> None:
 
 
 @pytest.mark.parametrize("factor", [0.4, 2.5])
-def test_the_noise_level_is_found_from_either_side(factor: float) -> None:
+def test_the_noise_level_is_found_from_either_side(factor):
     simulated = simulate_pairs(60, rng=np.random.default_rng(2))
     measurements = pair_measurements(simulated.pairs, simulated.camera, TAPED)
     assumed = measurements.scaled([1.0, factor, factor, factor])
@@ -286,7 +284,7 @@ def test_the_noise_level_is_found_from_either_side(factor: float) -> None:
     assert refined.noise_scale[3] == pytest.approx(1.0 / factor, rel=0.3)
 
 
-def test_with_the_scale_fixed_the_noise_stays_as_assumed() -> None:
+def test_with_the_scale_fixed_the_noise_stays_as_assumed():
     simulated = simulate_pairs(20, rng=np.random.default_rng(3))
     measurements = pair_measurements(simulated.pairs, simulated.camera, TAPED)
     refined = fit_errors_in_variables(
@@ -296,7 +294,7 @@ def test_with_the_scale_fixed_the_noise_stays_as_assumed() -> None:
     assert refined.degrees_of_freedom == 0.0
 
 
-def test_outliers_get_no_weight_and_inliers_nearly_all() -> None:
+def test_outliers_get_no_weight_and_inliers_nearly_all():
     simulated = simulate_pairs(30, rng=np.random.default_rng(4), noise="imaging", outlier_share=0.3)
     measurements = pair_measurements(simulated.pairs, simulated.camera, TAPED)
     refined = fit_errors_in_variables(

@@ -63,7 +63,7 @@ def named(calibration: Calibration) -> set[str]:
     return out | {pair.id for pair in calibration.pairs if any(f"without {pair.id} " in text for text in texts)}
 
 
-def test_the_sample_gives_no_warning(rooftop: ClickedSample, truth: RigidTransform) -> None:
+def test_the_sample_gives_no_warning(rooftop, truth):
     calibration = solved_with(rooftop, "c1")
     assert named(calibration) == set()
     assert calibration.warnings == ()
@@ -74,8 +74,8 @@ def test_the_sample_gives_no_warning(rooftop: ClickedSample, truth: RigidTransfo
     ("click", "du_px", "dv_px"), [("c1", -60.0, 0.0), ("c11", 0.0, -40.0), ("c6", 35.0, 0.0), ("c2", -40.0, 0.0)]
 )
 def test_a_misplaced_click_is_reported_and_the_truth_stays_inside_the_stated_uncertainty(
-    rooftop: ClickedSample, truth: RigidTransform, click: str, du_px: float, dv_px: float
-) -> None:
+    rooftop, truth, click, du_px, dv_px
+):
     exact = solved_with(rooftop, click, du_px=du_px, dv_px=dv_px, options=EXACT)
     assert named(exact) == {click}
     assert inside_what_is_stated(exact, truth)
@@ -83,13 +83,13 @@ def test_a_misplaced_click_is_reported_and_the_truth_stays_inside_the_stated_unc
     assert inside_what_is_stated(solved_with(rooftop, click, du_px=du_px, dv_px=dv_px), truth)
 
 
-def test_a_misplaced_click_far_away_does_not_change_the_noise_level(rooftop: ClickedSample) -> None:
+def test_a_misplaced_click_far_away_does_not_change_the_noise_level(rooftop):
     clicks, scans, camera = rooftop
     without = calibrate([replace(one, excluded=one.id == "c11") for one in clicks], scans, camera, FREE).unwrap()
     assert solved_with(rooftop, "c11", dv_px=-60.0).noise_scale == pytest.approx(without.noise_scale, rel=0.1)
 
 
-def test_a_click_that_is_dragged_away_is_set_aside_without_a_jump() -> None:
+def test_a_click_that_is_dragged_away_is_set_aside_without_a_jump():
     """Twelve pairs of an imaging radar: the nearest click, which the pose leans on, moves by 3 px at a time."""
     for seed, tape in ((0, False), (2, True)):
         simulated = simulate_pairs(12, rng=np.random.default_rng([292_000, seed]), noise="imaging")
@@ -114,7 +114,7 @@ def good_sets() -> list[SimulatedPairs]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("options", [FREE, MEASURED], ids=["free", "measured"])
-def test_thirty_good_sets_give_no_warning(options: CalibrationOptions, good_sets: list[SimulatedPairs]) -> None:
+def test_thirty_good_sets_give_no_warning(options, good_sets):
     """A share of warnings of 10 % would pass with a chance of 4 %, as with fewer than two in fifty."""
     for simulated in good_sets:
         outcome = calibrate_pairs(simulated.pairs, simulated.camera, options).unwrap()
@@ -122,14 +122,14 @@ def test_thirty_good_sets_give_no_warning(options: CalibrationOptions, good_sets
         assert all(pair.inlier for pair in outcome.pairs)
 
 
-def test_algorithm_1_says_that_most_pairs_disagree_and_residuals_are_too_large(rooftop: ClickedSample) -> None:
+def test_algorithm_1_says_that_most_pairs_disagree_and_residuals_are_too_large(rooftop):
     calibration = solved_with(rooftop, "c1", options=CalibrationOptions(method="paper"))
     codes = {warning.code for warning in calibration.warnings}
     assert {"many-outliers", "residuals-too-large"} <= codes
 
 
 @pytest.mark.parametrize("seed", [1, 43])
-def test_without_the_pivotal_pair_a_wrong_pose_moves_to_the_truth(seed: int) -> None:
+def test_without_the_pivotal_pair_a_wrong_pose_moves_to_the_truth(seed):
     simulated = simulate_pairs(12, rng=np.random.default_rng(seed), outlier_share=0.3)
     solved = solve_draw(simulated)
     found = find_pivotal_pair(solved.measurements, solved.refined)
@@ -143,7 +143,7 @@ def test_without_the_pivotal_pair_a_wrong_pose_moves_to_the_truth(seed: int) -> 
     assert simulated.outlier[found.pair]
 
 
-def test_right_pairs_have_none() -> None:
+def test_right_pairs_have_none():
     for seed in range(12):
         solved = solve_draw(simulate_pairs(12, rng=np.random.default_rng([3, seed])))
         assert find_pivotal_pair(solved.measurements, solved.refined) is None
@@ -153,7 +153,7 @@ def test_right_pairs_have_none() -> None:
 
 
 @pytest.mark.parametrize("estimate_scale", [False, True])
-def test_one_step_predicts_what_a_fit_without_the_pair_predicts(estimate_scale: bool) -> None:
+def test_one_step_predicts_what_a_fit_without_the_pair_predicts(estimate_scale):
     simulated = simulate_pairs(20, rng=np.random.default_rng(3), noise="imaging")
     measurements = pair_measurements(simulated.pairs, simulated.camera, CalibrationOptions())
     start = GncSolution(simulated.camera_from_radar, 0.0, 1.0)
@@ -172,7 +172,7 @@ def test_one_step_predicts_what_a_fit_without_the_pair_predicts(estimate_scale: 
         assert np.linalg.norm(predicted - missed) < 0.15 * np.linalg.norm(missed) + 0.5  # pixels
 
 
-def test_the_noise_components_of_each_pair_add_up_to_its_whitened_covariance() -> None:
+def test_the_noise_components_of_each_pair_add_up_to_its_whitened_covariance():
     simulated = simulate_pairs(12, rng=np.random.default_rng(4))
     measurements = pair_measurements(simulated.pairs, simulated.camera, CalibrationOptions())
     fit = fit_errors_in_variables(measurements, GncSolution(simulated.camera_from_radar, 0.0, 1.0), estimate_scale=True)
@@ -180,5 +180,5 @@ def test_the_noise_components_of_each_pair_add_up_to_its_whitened_covariance() -
     np.testing.assert_allclose(columns @ np.swapaxes(columns, 1, 2), np.tile(np.eye(2), (12, 1, 1)), atol=1e-9)
 
 
-def test_without_data_every_scale_is_the_assumed_one() -> None:
+def test_without_data_every_scale_is_the_assumed_one():
     assert shrunk_scales(np.zeros((3, 4)), np.zeros((3, 4))).tolist() == [[1.0] * 4] * 3

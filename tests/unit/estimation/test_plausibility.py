@@ -64,13 +64,13 @@ def said(
         (lambda points, pixels: (points * [-1.0, -1.0, 1.0], pixels), "radar-axes-suspected", "behind the radar"),
     ],
 )
-def test_what_the_input_looks_like_is_said(simulated, change, code: str, words: str, method: Method) -> None:
+def test_what_the_input_looks_like_is_said(simulated, change, code, words, method):
     found = said(simulated, *change(*arrays(simulated)), method=method)
     assert any(words in text for name, text in found.items() if name == code or name.startswith("no-")), found
     assert code == "units-suspected" or "mirrored-axes" not in found
 
 
-def test_good_input_is_not_suspected(simulated: SimulatedPairs) -> None:
+def test_good_input_is_not_suspected(simulated):
     found = said(simulated, *arrays(simulated))
     assert not set(found) & SUSPECTED
 
@@ -82,15 +82,13 @@ def test_good_input_is_not_suspected(simulated: SimulatedPairs) -> None:
         (1.0, 1.0 / 0.3048, "the measured position looks like feet"),
     ],
 )
-def test_feet_are_told_by_a_measured_position(
-    simulated: SimulatedPairs, in_ranges: float, in_tape: float, words: str
-) -> None:
+def test_feet_are_told_by_a_measured_position(simulated, in_ranges, in_tape, words):
     points, pixels = arrays(simulated)
     found = said(simulated, in_ranges * points, pixels, position_m=in_tape * simulated.rig.camera_position_radar_m)
     assert words in found["camera-position-contradicted"]
 
 
-def test_a_position_in_centimetres_is_blamed_rather_than_the_placements() -> None:
+def test_a_position_in_centimetres_is_blamed_rather_than_the_placements():
     for seed in range(3):
         simulated = simulate_pairs(20, rng=np.random.default_rng([92, seed]), noise="imaging")
         found = said(simulated, *arrays(simulated), position_m=100.0 * simulated.rig.camera_position_radar_m)
@@ -99,7 +97,7 @@ def test_a_position_in_centimetres_is_blamed_rather_than_the_placements() -> Non
 
 
 def changed(pair: Pair, **values: object) -> Pair:
-    candidate: Candidate = replace(pair.candidates[0], **values)  # type: ignore[arg-type]
+    candidate: Candidate = replace(pair.candidates[0], **values)
     return replace(pair, candidates=(candidate,))
 
 
@@ -119,13 +117,13 @@ def changed(pair: Pair, **values: object) -> Pair:
         (lambda pair: changed(pair, sigma_polar=np.array([0.1, -0.1, 0.1])), "pair p1: sigma_polar is .* above zero"),
     ],
 )
-def test_impossible_numbers_in_a_pair_are_refused_with_its_name(simulated, change, words: str) -> None:
+def test_impossible_numbers_in_a_pair_are_refused_with_its_name(simulated, change, words):
     first, *others = simulated.pairs
     with pytest.raises(InputError, match=words):
         calibrate_pairs([change(first), *others], simulated.camera)
 
 
-def test_a_position_behind_the_radar_is_an_outlier_and_not_the_end(simulated: SimulatedPairs) -> None:
+def test_a_position_behind_the_radar_is_an_outlier_and_not_the_end(simulated):
     first, *others = simulated.pairs
     behind = changed(first, position_radar_m=first.candidates[0].position_radar_m * np.array([-1.0, -1.0, 1.0]))
     outcome = calibrate_pairs([behind, *others], simulated.camera).unwrap()

@@ -58,7 +58,7 @@ def an_aisle(seed: int) -> SimulatedPairs:
 
 
 @pytest.mark.parametrize("estimate_scale", [False, True])
-def test_a_nearly_normal_posterior_has_the_local_mean_and_covariance(estimate_scale: bool) -> None:
+def test_a_nearly_normal_posterior_has_the_local_mean_and_covariance(estimate_scale):
     simulated = simulate_pairs(30, rng=np.random.default_rng(4), noise="imaging", outlier_share=0.1)
     solved = solve_draw(simulated, tape=True, estimate_scale=estimate_scale)
     drawn = sampled(solved)
@@ -73,7 +73,7 @@ def test_a_nearly_normal_posterior_has_the_local_mean_and_covariance(estimate_sc
     assert summary.inside == pytest.approx(0.95, abs=0.025)
 
 
-def test_in_an_aisle_the_samples_contain_a_truth_that_the_local_ellipsoid_misses() -> None:
+def test_in_an_aisle_the_samples_contain_a_truth_that_the_local_ellipsoid_misses():
     simulated = an_aisle(36)
     solved = solve_draw(simulated)
     summary = summarized(solved, sampled(solved))
@@ -83,7 +83,7 @@ def test_in_an_aisle_the_samples_contain_a_truth_that_the_local_ellipsoid_misses
     assert inside(simulated, summary.camera_from_radar, summary.covariance, summary.quantile)
 
 
-def test_a_wrong_pair_that_agrees_leaves_two_possible_poses_of_which_one_is_right() -> None:
+def test_a_wrong_pair_that_agrees_leaves_two_possible_poses_of_which_one_is_right():
     simulated = simulate_pairs(12, rng=np.random.default_rng(1), outlier_share=0.3)
     solved = solve_draw(simulated)
     found = possible_poses(sampled(solved))
@@ -94,7 +94,7 @@ def test_a_wrong_pair_that_agrees_leaves_two_possible_poses_of_which_one_is_righ
     assert max(apart) > 2.0 * min(apart)
 
 
-def test_errors_that_the_samples_do_not_contain_widen_them() -> None:
+def test_errors_that_the_samples_do_not_contain_widen_them():
     solved = solve_draw(simulate_pairs(20, rng=np.random.default_rng(5)))
     drawn = sampled(solved)
     shared = np.diag([0.3, 0.3, 0.3, 0.05, 0.05, 0.05]) ** 2
@@ -102,14 +102,14 @@ def test_errors_that_the_samples_do_not_contain_widen_them() -> None:
     assert np.diag(widened.covariance - plain.covariance) == pytest.approx(np.diag(shared), rel=0.35)
 
 
-def test_the_same_seed_gives_the_same_samples() -> None:
+def test_the_same_seed_gives_the_same_samples():
     solved = solve_draw(simulate_pairs(12, rng=np.random.default_rng(6), outlier_share=0.2))
     first, second = sampled(solved), sampled(solved)
     assert (first.samples.states == second.samples.states).all()
     assert (first.samples.weights == second.samples.weights).all()
 
 
-def test_a_state_and_its_pose_are_the_same_thing() -> None:
+def test_a_state_and_its_pose_are_the_same_thing():
     solved = solve_draw(simulate_pairs(10, rng=np.random.default_rng(7)))
     reference = solved.refined.camera_from_radar
     posterior = pose_posterior(solved.measurements, reference, np.array([8.0, 0.5, -1.0]))
@@ -121,7 +121,7 @@ def test_a_state_and_its_pose_are_the_same_thing() -> None:
     assert moved == pytest.approx(posterior.state_jacobian(pose) @ error, abs=1e-10)
 
 
-def test_the_posterior_of_many_states_is_that_of_each_alone() -> None:
+def test_the_posterior_of_many_states_is_that_of_each_alone():
     simulated = simulate_pairs(10, rng=np.random.default_rng(8), decoys=2)
     solved = solve_draw(simulated)
     posterior = pose_posterior(solved.measurements, solved.refined.camera_from_radar, np.zeros(3))
@@ -130,7 +130,7 @@ def test_the_posterior_of_many_states_is_that_of_each_alone() -> None:
     assert posterior.costs(states)[::400] == pytest.approx(alone, rel=1e-12)
 
 
-def test_the_posterior_falls_away_from_the_truth_and_does_not_care_about_outliers() -> None:
+def test_the_posterior_falls_away_from_the_truth_and_does_not_care_about_outliers():
     simulated = simulate_pairs(20, rng=np.random.default_rng(9), outlier_share=0.3)
     solved = solve_draw(simulated)
     posterior = pose_posterior(solved.measurements, solved.refined.camera_from_radar, np.zeros(3))
@@ -142,7 +142,7 @@ def test_the_posterior_falls_away_from_the_truth_and_does_not_care_about_outlier
     assert (terms.outlier_probabilities(0.7)[0][~simulated.outlier] < 0.5).all()
 
 
-def test_a_start_whose_pose_is_not_determined_is_not_sampled(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_start_whose_pose_is_not_determined_is_not_sampled(monkeypatch):
     """Its Hessian is singular, and rounding may turn the zero into a small negative number."""
 
     def with_one_undetermined(*arguments: Any, **options: Any) -> Modes:
@@ -180,7 +180,7 @@ def with_companion(simulated: SimulatedPairs, which: range) -> list[Pair]:
 
 
 @pytest.mark.parametrize("tape", [False, True])
-def test_pairs_of_a_companion_are_found_with_the_place_where_it_stands(tape: bool) -> None:
+def test_pairs_of_a_companion_are_found_with_the_place_where_it_stands(tape):
     simulated = simulate_pairs(20, rng=np.random.default_rng(2), noise="imaging")
     solved = solve_draw(simulated, pairs=with_companion(simulated, range(6)), tape=tape)
     found = find_agreeing_outliers(solved.measurements, solved.refined, rng=np.random.default_rng(1))
@@ -190,14 +190,14 @@ def test_pairs_of_a_companion_are_found_with_the_place_where_it_stands(tape: boo
 
 
 @pytest.mark.parametrize("share", [0.3, 0.5])
-def test_outliers_that_are_just_wrong_do_not_agree(share: float) -> None:
+def test_outliers_that_are_just_wrong_do_not_agree(share):
     for seed in range(6):
         simulated = simulate_pairs(20, rng=np.random.default_rng([5, seed]), outlier_share=share)
         solved = solve_draw(simulated)
         assert find_agreeing_outliers(solved.measurements, solved.refined, rng=np.random.default_rng(1)) is None
 
 
-def test_three_outliers_are_too_few_to_agree() -> None:
+def test_three_outliers_are_too_few_to_agree():
     simulated = simulate_pairs(20, rng=np.random.default_rng(2), noise="imaging")
     solved = solve_draw(simulated, pairs=with_companion(simulated, range(3)))
     assert find_agreeing_outliers(solved.measurements, solved.refined, rng=np.random.default_rng(1)) is None
@@ -227,7 +227,7 @@ def drawn_from(start: Mixture, *, apart: float | None = None) -> WeightedSamples
     return importance_samples(costs, start, per_round=500, rounds=(3, 8), enough=1000.0, rng=np.random.default_rng(1))
 
 
-def test_a_normal_density_gives_its_mean_and_covariance_even_from_a_bad_start() -> None:
+def test_a_normal_density_gives_its_mean_and_covariance_even_from_a_bad_start():
     bad = Mixture(np.ones(1), np.full((1, 3), 1.5), 4.0 * np.eye(3)[None])
     samples = drawn_from(bad)
     mean = samples.weights @ samples.states
@@ -237,14 +237,14 @@ def test_a_normal_density_gives_its_mean_and_covariance_even_from_a_bad_start() 
     assert (away * samples.weights[:, None]).T @ away == pytest.approx(COVARIANCE, abs=0.1)
 
 
-def test_two_peaks_get_their_shares_whatever_the_first_guess_of_them() -> None:
+def test_two_peaks_get_their_shares_whatever_the_first_guess_of_them():
     start = Mixture(np.array([0.1, 0.9]), np.array([[0.0] * 3, [6.0] * 3]), np.stack([COVARIANCE] * 2))
     samples = drawn_from(start, apart=6.0)
     assert samples.weights[samples.states.mean(axis=1) < 3.0].sum() == pytest.approx(0.75, abs=0.05)
     assert samples.mixture.weights == pytest.approx([0.75, 0.25], abs=0.08)
 
 
-def test_a_mixture_s_samples_follow_its_density() -> None:
+def test_a_mixture_s_samples_follow_its_density():
     mixture = Mixture(np.array([0.3, 0.7]), np.array([[0.0], [5.0]]), np.array([[[1.0]], [[4.0]]]))
     states = mixture.draw(4000, np.random.default_rng(2))[:, 0]
     grid = np.linspace(-60.0, 60.0, 12001)

@@ -12,7 +12,7 @@ from calib_core.camera import Camera, CameraCovariance
 from calib_core.errors import OptionError
 from calib_core.evaluation.residuals import residual_test
 from calib_core.interchange import calibration_text, read_calibration
-from calib_core.measurements import Pair, Unsolvable
+from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions, RefiningOptions
 from calib_core.results import Calibration
 from cocalib.view.figures import refined_sentences
@@ -31,7 +31,7 @@ def refined(case: WrongLens = TOLD) -> Calibration:
     return solved(simulated.pairs, given, case.options)
 
 
-def test_a_focal_error_of_2_percent_comes_below_0_3_percent_where_the_scale_is_told() -> None:
+def test_a_focal_error_of_2_percent_comes_below_0_3_percent_where_the_scale_is_told():
     trials = [measure_wrong_lens(TOLD, trial) for trial in range(10)]
     errors = np.array([one["focal"] for one in trials], dtype=np.float64)
     sigmas = np.array([one["focal_sigma"] for one in trials], dtype=np.float64)
@@ -40,7 +40,7 @@ def test_a_focal_error_of_2_percent_comes_below_0_3_percent_where_the_scale_is_t
     assert not any("code lens-or-radar-scale" in one for one in trials)
 
 
-def test_with_the_default_prior_on_the_scale_the_data_cannot_tell_and_sigma_says_so() -> None:
+def test_with_the_default_prior_on_the_scale_the_data_cannot_tell_and_sigma_says_so():
     trials = [measure_wrong_lens(replace(UNTOLD, lens="refining priors"), trial) for trial in range(7)]
     assert all("code lens-or-radar-scale" in one for one in trials)
     errors = np.array([one["focal"] for one in trials], dtype=np.float64)
@@ -51,7 +51,7 @@ def test_with_the_default_prior_on_the_scale_the_data_cannot_tell_and_sigma_says
     assert "radar.azimuth_scale_sigma" in warning.hint
 
 
-def test_refining_with_a_true_covariance_does_not_make_the_pose_worse() -> None:
+def test_refining_with_a_true_covariance_does_not_make_the_pose_worse():
     given, better = (
         [measure_wrong_lens(WrongLens("covariance", refined=one), trial) for trial in range(5)] for one in (False, True)
     )
@@ -60,7 +60,7 @@ def test_refining_with_a_true_covariance_does_not_make_the_pose_worse() -> None:
         assert np.sqrt((after**2).mean()) < 1.02 * np.sqrt((before**2).mean())
 
 
-def test_the_answer_holds_the_refined_camera_how_well_it_is_known_and_what_it_came_from() -> None:
+def test_the_answer_holds_the_refined_camera_how_well_it_is_known_and_what_it_came_from():
     _, given = draw_wrong_lens(TOLD, 0)
     found = refined()
     np.testing.assert_array_equal(found.given_camera.parameters, given.parameters)
@@ -73,20 +73,20 @@ def test_the_answer_holds_the_refined_camera_how_well_it_is_known_and_what_it_ca
     assert focal.sigma < focal.prior_sigma == RefiningOptions().focal_length_sigma
 
 
-def test_residuals_are_those_through_the_refined_camera() -> None:
+def test_residuals_are_those_through_the_refined_camera():
     found = refined()
     for pair in found.pairs:
         np.testing.assert_allclose(pair.projected_px, found.reproject(pair.point_radar_m[None])[0])
 
 
-def test_an_excluded_pair_is_seen_through_the_refined_camera_too() -> None:
+def test_an_excluded_pair_is_seen_through_the_refined_camera_too():
     simulated, given = draw_wrong_lens(TOLD, 0)
     outcome = calibrate_pairs(simulated.pairs, given, TOLD.options, frozenset({"p3"})).unwrap()
     (one,) = [pair for pair in outcome.pairs if pair.excluded]
     np.testing.assert_allclose(one.projected_px, outcome.reproject(one.point_radar_m[None])[0])
 
 
-def test_solving_the_file_again_starts_from_the_given_camera_and_gives_the_same_bytes() -> None:
+def test_solving_the_file_again_starts_from_the_given_camera_and_gives_the_same_bytes():
     text = calibration_text(refined())
     read = read_calibration(text).calibration
     assert read.given_camera is not None
@@ -94,35 +94,34 @@ def test_solving_the_file_again_starts_from_the_given_camera_and_gives_the_same_
     assert calibration_text(again) == text
 
 
-def test_without_refining_the_same_file_is_solved_with_the_given_camera() -> None:
+def test_without_refining_the_same_file_is_solved_with_the_given_camera():
     read = read_calibration(calibration_text(refined())).calibration
     plain = solve_again(read, replace(read.options, refining=RefiningOptions())).unwrap()
     assert plain.given_camera is None
     np.testing.assert_array_equal(plain.camera.matrix_px, draw_wrong_lens(TOLD, 0)[1].matrix_px)
 
 
-def test_a_file_says_nothing_of_refining_if_there_was_none() -> None:
+def test_a_file_says_nothing_of_refining_if_there_was_none():
     simulated, given = draw_wrong_lens(replace(TOLD, refined=False), 0)
     text = calibration_text(solved(simulated.pairs, given, CalibrationOptions()))
     assert "given_camera" not in text
     assert "refining" not in text
 
 
-def test_the_preview_refines_as_well() -> None:
+def test_the_preview_refines_as_well():
     simulated, given = draw_wrong_lens(TOLD, 0)
     first = preview_pairs(simulated.pairs, given, TOLD.options)
-    assert isinstance(first, Calibration)
     assert first.camera.matrix_px[0, 0] == pytest.approx(refined().camera.matrix_px[0, 0], rel=1e-3)
 
 
-def test_other_pairs_are_tested_with_the_refined_camera() -> None:
+def test_other_pairs_are_tested_with_the_refined_camera():
     simulated, _ = draw_wrong_lens(TOLD, 0)
     tested = residual_test(simulated.pairs, refined())
     assert not tested.misfits.any()
     np.testing.assert_allclose(tested.distances_px, [pair.distance_px for pair in refined().pairs], rtol=1e-6)
 
 
-def test_where_a_covariance_and_the_pairs_disagree_the_warning_says_by_how_much() -> None:
+def test_where_a_covariance_and_the_pairs_disagree_the_warning_says_by_how_much():
     simulated, given = draw_wrong_lens(TOLD, 0)
     camera = replace(given, covariance=board_covariance(given))
     for refine in (False, True):
@@ -136,7 +135,7 @@ def test_where_a_covariance_and_the_pairs_disagree_the_warning_says_by_how_much(
         assert "; its calibration said ± 0." in message
 
 
-def test_a_covariance_wide_enough_for_the_error_is_no_reason_for_a_warning() -> None:
+def test_a_covariance_wide_enough_for_the_error_is_no_reason_for_a_warning():
     simulated, given = draw_wrong_lens(TOLD, 0)
     camera = replace(given, covariance=board_covariance(given, size=20.0))
     found = solved(simulated.pairs, camera, replace(TOLD.options, refining=RefiningOptions()))
@@ -151,7 +150,7 @@ def with_lens(camera: Camera, *, focal: float = 1.0, k1: float | None = None) ->
 
 
 @pytest.mark.parametrize("focal", [1.12, 1.15])
-def test_a_lens_refined_far_beyond_its_prior_is_not_passed_off_as_known(focal: float) -> None:
+def test_a_lens_refined_far_beyond_its_prior_is_not_passed_off_as_known(focal):
     simulated, given = draw_wrong_lens(TOLD, 0)
     found = solved(simulated.pairs, with_lens(given, focal=focal), TOLD.options)
     (warning,) = [one for one in found.warnings if one.code == "intrinsics-suspected"]
@@ -161,14 +160,14 @@ def test_a_lens_refined_far_beyond_its_prior_is_not_passed_off_as_known(focal: f
 
 
 @pytest.mark.parametrize("k1", [0.35, 0.4, 0.5, 0.6])
-def test_a_distortion_that_refining_does_not_reach_leaves_residuals_that_name_the_intrinsics(k1: float) -> None:
+def test_a_distortion_that_refining_does_not_reach_leaves_residuals_that_name_the_intrinsics(k1):
     simulated, given = draw_wrong_lens(TOLD, 0)
     found = solved(simulated.pairs, with_lens(given, k1=k1), TOLD.options)
     (warning,) = [one for one in found.warnings if one.code == "residuals-too-large"]
     assert "check that the intrinsics belong to this camera" in warning.hint
 
 
-def test_a_change_that_the_pairs_leave_uncertain_is_stated_all_the_same() -> None:
+def test_a_change_that_the_pairs_leave_uncertain_is_stated_all_the_same():
     simulated, given = draw_wrong_lens(TOLD, 0)
     found = solved(simulated.pairs, with_lens(given, k1=0.3), TOLD.options)
     assert found.camera.matrix_px[0, 0] < 0.95 * given.matrix_px[0, 0]
@@ -176,7 +175,7 @@ def test_a_change_that_the_pairs_leave_uncertain_is_stated_all_the_same() -> Non
     assert "focal length by -" in sentence
 
 
-def test_a_good_lens_is_refined_without_suspicion() -> None:
+def test_a_good_lens_is_refined_without_suspicion():
     assert "intrinsics-suspected" not in {one.code for one in refined().warnings}
 
 
@@ -190,25 +189,22 @@ def test_a_good_lens_is_refined_without_suspicion() -> None:
         (("cy_px", "k1"), 3000.0, True, "cy_px"),
     ],
 )
-def test_a_covariance_that_leaves_nothing_to_refine_or_nothing_known_is_refused(
-    names: tuple[str, ...], sigma_px: float, refine: bool, words: str
-) -> None:
+def test_a_covariance_that_leaves_nothing_to_refine_or_nothing_known_is_refused(names, sigma_px, refine, words):
     simulated, given = draw_wrong_lens(TOLD, 0)
     camera = replace(given, covariance=CameraCovariance(names, sigma_px**2 * np.eye(2)))
     options = CalibrationOptions(refining=RefiningOptions(intrinsics=refine))
     outcome = calibrate_pairs(simulated.pairs, camera, options)
-    assert isinstance(outcome, Unsolvable)
     assert outcome.code == "useless-lens-covariance"
     assert words in outcome.reason
 
 
-def test_exact_intrinsics_that_are_not_to_be_refined_are_used() -> None:
+def test_exact_intrinsics_that_are_not_to_be_refined_are_used():
     simulated, given = draw_wrong_lens(TOLD, 0)
     camera = replace(given, covariance=CameraCovariance(("fx_px", "fy_px"), np.zeros((2, 2))))
     assert isinstance(calibrate_pairs(simulated.pairs, camera), Calibration)
 
 
-def test_residuals_that_an_uncertain_lens_leaves_are_not_blamed_on_the_radar_alone() -> None:
+def test_residuals_that_an_uncertain_lens_leaves_are_not_blamed_on_the_radar_alone():
     simulated, given = draw_wrong_lens(TOLD, 0)
     wrong = with_lens(given, k1=0.1)
     camera = replace(wrong, covariance=CameraCovariance(("fx_px", "fy_px", "k1"), np.diag([1e4, 1e4, 0.4**2])))
@@ -221,14 +217,14 @@ def test_residuals_that_an_uncertain_lens_leaves_are_not_blamed_on_the_radar_alo
     assert not hints[True]
 
 
-def test_the_papers_method_takes_the_intrinsics_as_they_are() -> None:
+def test_the_papers_method_takes_the_intrinsics_as_they_are():
     simulated, given = draw_wrong_lens(TOLD, 0)
     options = CalibrationOptions(method="paper", refining=RefiningOptions(intrinsics=True))
     with pytest.raises(OptionError, match="the method paper takes the intrinsics as they are"):
         calibrate_pairs(simulated.pairs, given, options)
 
 
-def test_nothing_to_refine_is_refused() -> None:
+def test_nothing_to_refine_is_refused():
     simulated, given = draw_wrong_lens(TOLD, 0)
     options = CalibrationOptions(refining=RefiningOptions(True, 0.0, 0.0, 0.0))
     with pytest.raises(OptionError, match="nothing to refine"):

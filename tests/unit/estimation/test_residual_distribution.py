@@ -5,7 +5,7 @@ import numpy as np
 from calib_core.estimation.pair_results import expected_shares
 
 
-def test_round_noise_gives_the_rayleigh_distribution() -> None:
+def test_round_noise_gives_the_rayleigh_distribution():
     edges_px = np.array([0.0, 1.0, 2.0, 4.0, np.inf])
     shares = expected_shares(np.array([np.eye(2) * 4.0]), edges_px)
 
@@ -13,7 +13,7 @@ def test_round_noise_gives_the_rayleigh_distribution() -> None:
     np.testing.assert_allclose(shares.sum(), 1.0)
 
 
-def test_drawn_residuals_of_different_pairs_follow_it() -> None:
+def test_drawn_residuals_of_different_pairs_follow_it():
     rng = np.random.default_rng(2)
     factors = rng.normal(size=(5, 2, 2)) * np.array([3.0, 1.0])
     covariances_px2 = factors @ factors.transpose(0, 2, 1) + 0.5 * np.eye(2)

@@ -181,7 +181,6 @@ def test_own_targets_say_how_many_returns_have_no_box_and_that_the_loss_is_unkno
         crowd.boxes, frames=tuple(dataclasses.replace(frame, boxes=frame.boxes[:1]) for frame in crowd.boxes)
     )
     figures = box_figures(TRUE_POSE, CAMERA, crowd.scans, fewer)
-    assert figures.returns is not None
     boxless = np.isnan(figures.returns.boxes_px).any(axis=1).mean()
     assert boxless > 0.1
     assert figures.rule.count(f"{100.0 * boxless:.1f} ") == 1

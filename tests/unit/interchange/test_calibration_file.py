@@ -105,19 +105,19 @@ def test_a_paper_calibration_with_outliers_passes_its_check():
     assert "the pairs that are used average" in wrong.message
 
 
-def test_a_file_without_a_verdict_stays_without_one(project_root: Path):
+def test_a_file_without_a_verdict_stays_without_one(project_root):
     text = (project_root / "tests/golden/calibration-1-earlier.json").read_text(encoding="utf-8")
     assert read_calibration(text).verdict is None
     assert "verdict" not in json.loads(write_calibration(read_calibration(text)))
 
 
-def test_an_unconfirmed_assumption_makes_the_verdict_in_the_file_weak(truth: Calibration):
+def test_an_unconfirmed_assumption_makes_the_verdict_in_the_file_weak(truth):
     for confirmed, level in ((False, "coarse"), (True, verdict_on(truth).level)):
         provenance = Provenance(assumptions=(AssumptionNote("/radar: z in metres", confirmed),))
         assert calibration_file(truth, provenance=provenance).verdict.level == level
 
 
-def test_results_of_a_later_version_are_kept_and_settings_are_not(golden_text: str):
+def test_results_of_a_later_version_are_kept_and_settings_are_not(golden_text):
     document = json.loads(golden_text)
     value = {"yaw": 0.25, "words": ["weak", None, "\ud800"], "large": 10**30, "small": 1e-300}
     for owner in _results(document):
@@ -145,7 +145,7 @@ def _results(document: dict) -> list[dict]:
     return found
 
 
-def test_what_an_earlier_version_wrote_is_read_and_passes_its_check(project_root: Path):
+def test_what_an_earlier_version_wrote_is_read_and_passes_its_check(project_root):
     text = (project_root / "tests/golden/calibration-1-earlier.json").read_text(encoding="utf-8")
     earlier = json.loads(text)
 
@@ -159,7 +159,7 @@ def test_what_an_earlier_version_wrote_is_read_and_passes_its_check(project_root
         assert again["options"][name] == group or again["options"][name].items() >= group.items()
 
 
-def test_a_file_of_the_required_keys_alone_is_read(golden_text: str):
+def test_a_file_of_the_required_keys_alone_is_read(golden_text):
     whole = json.loads(golden_text)
     required = {key: whole[key] for key in ("schema", "camera_from_radar", "frames", "camera")}
     required["camera_from_radar"] = {key: whole["camera_from_radar"][key] for key in ("rotation", "translation_m")}
@@ -193,7 +193,7 @@ def test_the_radars_angle_errors_are_stored_with_the_calibration_if_correcting_t
         read_calibration(json.dumps(json.loads(text) | {"radar_angle_map": content}))
 
 
-def test_a_pose_that_rests_on_a_fleets_prior_is_read_with_one_warning_and_solved_again_without(project_root: Path):
+def test_a_pose_that_rests_on_a_fleets_prior_is_read_with_one_warning_and_solved_again_without(project_root):
     text = (project_root / "tests/golden/calibration-1-fleet-prior.json").read_text(encoding="utf-8")
     file = read_calibration(text)
     assert [one.code for one in file.calibration.warnings] == ["rests-on-fleet-prior"]
@@ -209,7 +209,7 @@ def test_a_pose_that_rests_on_a_fleets_prior_is_read_with_one_warning_and_solved
     assert "rests-on-fleet-prior" not in [one.code for one in solve_again(file.calibration).unwrap().warnings]
 
 
-def test_a_prior_that_an_older_version_left_out_changes_nothing(project_root: Path):
+def test_a_prior_that_an_older_version_left_out_changes_nothing(project_root):
     content = json.loads((project_root / "tests/golden/calibration-1-fleet-prior.json").read_text(encoding="utf-8"))
     content["fleet_prior"]["used"] = False
     file = read_calibration(json.dumps(content))
@@ -225,11 +225,11 @@ def calibration(*, with_tape: bool = True, method: str = "default") -> Calibrati
     made = simulate_pairs(12, rng=np.random.default_rng(2), noise="imaging")
     forward, left, up = made.camera_from_radar.inverse().translation_m.tolist()
     tape = CameraPositionPrior((forward, left, up), 0.02) if with_tape else None
-    options = CalibrationOptions(method=method, solving=SolvingOptions(camera_position=tape))  # type: ignore[arg-type]
+    options = CalibrationOptions(method=method, solving=SolvingOptions(camera_position=tape))
     return calibrate_pairs(made.pairs, made.camera, options).unwrap()
 
 
-def test_they_are_read_as_they_were_written_and_written_again_as_the_same_bytes() -> None:
+def test_they_are_read_as_they_were_written_and_written_again_as_the_same_bytes():
     text = calibration_text(calibration())
     file = read_calibration(text)
     wrote, read = calibration().covariance_parts, file.calibration.covariance_parts
@@ -238,7 +238,7 @@ def test_they_are_read_as_they_were_written_and_written_again_as_the_same_bytes(
     assert write_calibration(file) == text
 
 
-def test_without_a_tape_its_part_is_not_written_and_of_other_methods_there_are_none() -> None:
+def test_without_a_tape_its_part_is_not_written_and_of_other_methods_there_are_none():
     assert set(json.loads(calibration_text(calibration(with_tape=False)))["covariance_parts"]) == {"systematic"}
     papers = calibration_text(calibration(method="paper"))
     assert "covariance_parts" not in json.loads(papers)
@@ -246,7 +246,7 @@ def test_without_a_tape_its_part_is_not_written_and_of_other_methods_there_are_n
 
 
 @pytest.mark.parametrize("part", ["systematic", "camera_position"])
-def test_a_part_that_is_no_covariance_is_refused_by_its_name(part: str) -> None:
+def test_a_part_that_is_no_covariance_is_refused_by_its_name(part):
     document: dict[str, Any] = json.loads(calibration_text(calibration()))
     document["covariance_parts"][part][2][2] = -1.0
     with pytest.raises(
@@ -264,7 +264,7 @@ def solved() -> Calibration:
     return calibrate_pairs(simulated.pairs, simulated.camera).unwrap()
 
 
-def test_the_errors_come_back_to_the_last_bit(solved: Calibration) -> None:
+def test_the_errors_come_back_to_the_last_bit(solved):
     text = calibration_text(solved)
     read = read_calibration(text).calibration
     assert solved.radar_errors != RadarErrors()
@@ -274,7 +274,7 @@ def test_the_errors_come_back_to_the_last_bit(solved: Calibration) -> None:
     assert write_calibration(read_calibration(text)) == text
 
 
-def test_the_file_applies_its_errors_when_it_is_checked(solved: Calibration) -> None:
+def test_the_file_applies_its_errors_when_it_is_checked(solved):
     text = calibration_text(solved)
     assert check(read_any(text)).ok
     document = json.loads(text)
@@ -282,20 +282,20 @@ def test_the_file_applies_its_errors_when_it_is_checked(solved: Calibration) -> 
     assert "pairs-disagree" in [result.code for result in check(read_any(json.dumps(document))).results]
 
 
-def test_a_check_against_its_own_pairs_gives_its_aed(solved: Calibration) -> None:
+def test_a_check_against_its_own_pairs_gives_its_aed(solved):
     text = calibration_text(solved)
     report = check(read_any(text), pairs=read_check_pairs(text))
     assert f"AED {solved.metrics.aed_px:.3g} px" in str(report)
 
 
-def test_a_bare_export_is_checked_with_the_errors_that_the_pairs_file_states(solved: Calibration) -> None:
+def test_a_bare_export_is_checked_with_the_errors_that_the_pairs_file_states(solved):
     text = calibration_text(solved)
     bare = read_any(export(read_calibration(text), "tf2").data.decode())
     report = check(bare, pairs=read_check_pairs(text))
     assert f"AED {solved.metrics.aed_px:.3g} px" in str(report)
 
 
-def test_every_export_with_comments_states_the_errors_and_reads_back(solved: Calibration) -> None:
+def test_every_export_with_comments_states_the_errors_and_reads_back(solved):
     file = read_calibration(calibration_text(solved))
     for form in FORMATS:
         if form.comment not in ("#", "<!-- -->") or form.name == "colmap":
@@ -306,19 +306,19 @@ def test_every_export_with_comments_states_the_errors_and_reads_back(solved: Cal
             assert check(read_any(text), camera=solved.camera).ok, form.name
 
 
-def test_the_plain_transform_takes_the_check_point_to_its_pixel(solved: Calibration) -> None:
+def test_the_plain_transform_takes_the_check_point_to_its_pixel(solved):
     point = json.loads(calibration_text(solved))["check_point"]
     projected = solved.camera.project(solved.camera_from_radar @ np.array([point["radar_m"]]))[0]
     np.testing.assert_allclose(projected, point["pixel_px"], atol=1e-9)
 
 
-def test_a_file_without_the_keys_has_no_errors_and_stays_without_them(solved: Calibration) -> None:
+def test_a_file_without_the_keys_has_no_errors_and_stays_without_them(solved):
     document = json.loads(calibration_text(replace(solved, radar_errors=RadarErrors(), systematic_errors=())))
     assert not {"radar_errors", "systematic_errors"} & document.keys()
     assert read_calibration(json.dumps(document)).calibration.radar_errors == RadarErrors()
 
 
-def test_a_scale_of_zero_is_refused(solved: Calibration) -> None:
+def test_a_scale_of_zero_is_refused(solved):
     document = json.loads(calibration_text(solved))
     document["radar_errors"]["azimuth_scale"] = -1.0
     with pytest.raises(InputError, match=r"radar_errors\.azimuth_scale"):
@@ -345,7 +345,7 @@ def with_vehicle(vehicle: object) -> str:
 
 @settings(max_examples=20)
 @given(_NOTES, _NOTES)
-def test_any_note_is_read_back_and_goes_before_what_a_file_says(one: VehicleNote, other: VehicleNote) -> None:
+def test_any_note_is_read_back_and_goes_before_what_a_file_says(one, other):
     text = write_calibration(replace(read_calibration(GOLDEN), vehicle=one))
     stated = {key: value for key in KEYS if (value := getattr(one, key)) is not None}
     assert json.loads(text).get("vehicle", {}) == stated
@@ -356,7 +356,7 @@ def test_any_note_is_read_back_and_goes_before_what_a_file_says(one: VehicleNote
     assert all(getattr(both, key) == (getattr(one, key) or getattr(other, key)) for key in KEYS)
 
 
-def test_a_file_of_which_nothing_is_stated_stays_as_it_is(project_root: Path) -> None:
+def test_a_file_of_which_nothing_is_stated_stays_as_it_is(project_root):
     assert write_calibration(read_calibration(GOLDEN)) == GOLDEN
     assert write_calibration(read_calibration(with_vehicle({}))) == GOLDEN
     earlier = (project_root / "tests/golden/calibration-1-earlier.json").read_text(encoding="utf-8")
@@ -365,7 +365,7 @@ def test_a_file_of_which_nothing_is_stated_stays_as_it_is(project_root: Path) ->
 
 
 @pytest.mark.parametrize("vehicle", [{"plate": "F-17"}, {"name": "V017", "plate": "F-17"}])
-def test_what_a_later_version_states_is_kept(vehicle: dict[str, str]) -> None:
+def test_what_a_later_version_states_is_kept(vehicle):
     text = write_calibration(read_calibration(with_vehicle(vehicle)))
     assert json.loads(text)["vehicle"] == vehicle
     assert write_calibration(read_calibration(text)) == text
@@ -382,7 +382,7 @@ def test_what_a_later_version_states_is_kept(vehicle: dict[str, str]) -> None:
         ({"session": ".."}, "vehicle.session: '..' cannot be a name; give one without slashes"),
     ],
 )
-def test_an_invalid_value_is_refused_by_every_reader(vehicle: object, fault: str) -> None:
+def test_an_invalid_value_is_refused_by_every_reader(vehicle, fault):
     for read in (read_calibration, read_any):
         with pytest.raises(InputError) as error:
             read(with_vehicle(vehicle), "mine.json")
@@ -391,13 +391,13 @@ def test_an_invalid_value_is_refused_by_every_reader(vehicle: object, fault: str
 
 @pytest.mark.parametrize("key", KEYS)
 @pytest.mark.parametrize("value", ["", " ", "x" * 121, "a\x00", "\ud800"])
-def test_a_note_that_no_file_can_hold_cannot_be_made(key: str, value: str) -> None:
+def test_a_note_that_no_file_can_hold_cannot_be_made(key, value):
     with pytest.raises(InputError, match=rf"^vehicle\.{key} is "):
         VehicleNote(**{key: value})
     assert getattr(VehicleNote(**{key: "x" * 120}), key) == "x" * 120
 
 
-def test_exports_that_hold_the_calibration_keep_it(file: CalibrationFile) -> None:
+def test_exports_that_hold_the_calibration_keep_it(file):
     stated = replace(file, vehicle=FULL)
     assert export(stated, "json").content == write_calibration(stated)
     for name in ("json", "pack"):
@@ -405,7 +405,7 @@ def test_exports_that_hold_the_calibration_keep_it(file: CalibrationFile) -> Non
         assert adopt(read_any(written.data, written.file_name), written.file_name).vehicle == FULL
 
 
-def test_a_script_states_it_too(file: CalibrationFile, tmp_path: Path) -> None:
+def test_a_script_states_it_too(file, tmp_path):
     path = tmp_path / "calibration.json"
     note = cc.VehicleNote(name="V017", radar_serial="R-0417")
     cc.write_calibration(path, file.calibration, vehicle=note)
@@ -413,7 +413,7 @@ def test_a_script_states_it_too(file: CalibrationFile, tmp_path: Path) -> None:
     assert cc.read_calibration(path).vehicle == note
 
 
-def test_the_schema_says_the_same(file: CalibrationFile, project_root: Path) -> None:
+def test_the_schema_says_the_same(file, project_root):
     path = project_root / "docs/schemas/calibration-1.schema.json"
     schema: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     validator = jsonschema.Draft202012Validator(schema)

@@ -3,7 +3,6 @@
 import io
 import json
 import re
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -207,7 +206,7 @@ def test_a_file_that_cannot_be_read_is_refused(tmp_path):
 
 
 @pytest.mark.real
-def test_opencv_s_own_sample_intrinsics_are_read(shared_data: Path):
+def test_opencv_s_own_sample_intrinsics_are_read(shared_data):
     folder = shared_data / "real_checkerboards"
 
     left = read_camera_file(folder / "left_intrinsics.yml")
@@ -219,7 +218,7 @@ def test_opencv_s_own_sample_intrinsics_are_read(shared_data: Path):
     assert stereo.distortion[0] == -1.6916358306948096e-01
 
 
-def test_binning_and_region_of_interest_of_a_file_are_those_of_the_recorded_picture() -> None:
+def test_binning_and_region_of_interest_of_a_file_are_those_of_the_recorded_picture():
     full = read_camera(ROS)
     part = read_camera(ROS + "binning_x: 2\nbinning_y: 2\nroi: {x_offset: 40, y_offset: 20, width: 320, height: 240}\n")
     assert (part.width_px, part.height_px) == (160, 120)
@@ -245,8 +244,8 @@ def read_back(content: str | bytes) -> Camera:
 
 @pytest.mark.parametrize("model", CAMERA_MODELS)
 @pytest.mark.parametrize("to", CAMERA_FORMATS)
-def test_what_is_written_is_read_again(to: str, model: str) -> None:
-    camera = typical_camera(model)  # type: ignore[arg-type]
+def test_what_is_written_is_read_again(to, model):
+    camera = typical_camera(model)
     if model in WITHOUT.get(to, ()):
         with pytest.raises(InputError, match=r"write|export|(have|has) no"):
             camera_content(camera, to)
@@ -263,7 +262,7 @@ def test_what_is_written_is_read_again(to: str, model: str) -> None:
     st.lists(st.floats(-0.2, 0.2, allow_subnormal=False), min_size=5, max_size=5),
     st.floats(50.0, 5000.0),
 )
-def test_a_plumb_bob_survives_every_format_to_the_last_digit(to: str, distortion: list[float], focal_px: float) -> None:
+def test_a_plumb_bob_survives_every_format_to_the_last_digit(to, distortion, focal_px):
     if to == "kalibr":
         distortion[4] = 0.0
     matrix = np.array([[focal_px, 0.0, 321.25], [0.0, focal_px * 1.01, 238.5], [0.0, 0.0, 1.0]])
@@ -276,7 +275,7 @@ def test_a_plumb_bob_survives_every_format_to_the_last_digit(to: str, distortion
 
 
 @pytest.mark.parametrize("to", ["opencv", "opencv-xml", "opencv-json"])
-def test_opencv_reads_its_own_formats(to: str, tmp_path: Path) -> None:
+def test_opencv_reads_its_own_formats(to, tmp_path):
     camera, path = typical_camera("plumb_bob"), tmp_path / f"camera{CAMERA_FORMATS[to].suffix}"
     path.write_text(str(camera_content(camera, to)), encoding="utf-8")
     storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
@@ -286,7 +285,7 @@ def test_opencv_reads_its_own_formats(to: str, tmp_path: Path) -> None:
     storage.release()
 
 
-def test_scipy_reads_matlabs_with_its_first_pixel_at_one() -> None:
+def test_scipy_reads_matlabs_with_its_first_pixel_at_one():
     from scipy.io import loadmat
 
     camera = typical_camera("plumb_bob")
@@ -299,7 +298,7 @@ def test_scipy_reads_matlabs_with_its_first_pixel_at_one() -> None:
     np.testing.assert_array_equal(found["TangentialDistortion"], camera.distortion[2:4])
 
 
-def test_a_plain_yaml_reader_reads_kalibrs_and_ros() -> None:
+def test_a_plain_yaml_reader_reads_kalibrs_and_ros():
     camera = typical_camera("equidistant")
     chain = yaml.safe_load(camera_content(camera, "kalibr"))["cam0"]
     assert chain["distortion_model"] == "equidistant"
@@ -309,7 +308,7 @@ def test_a_plain_yaml_reader_reads_kalibrs_and_ros() -> None:
     np.testing.assert_array_equal(ros["distortion_coefficients"]["data"], camera.distortion)
 
 
-def test_the_lines_of_colmap_and_kitti_say_what_their_documentation_says() -> None:
+def test_the_lines_of_colmap_and_kitti_say_what_their_documentation_says():
     camera = typical_camera("plumb_bob")
     line = str(camera_content(camera, "colmap")).splitlines()[-1].split()
     assert line[1] == "FULL_OPENCV" if camera.distortion[4] else "OPENCV"
@@ -319,7 +318,7 @@ def test_the_lines_of_colmap_and_kitti_say_what_their_documentation_says() -> No
     np.testing.assert_array_equal(np.array(keyed["D_00"].split(), dtype=float), camera.distortion)
 
 
-def test_mrcals_dictionary_names_model_and_size() -> None:
+def test_mrcals_dictionary_names_model_and_size():
     text = str(camera_content(typical_camera("rational_polynomial"), "mrcal"))
     assert "'LENSMODEL_OPENCV8'" in text
     numbers = re.search(r"'intrinsics': \[ (.*) \]", text)
@@ -329,7 +328,7 @@ def test_mrcals_dictionary_names_model_and_size() -> None:
 
 
 @pytest.mark.parametrize("to", ["ros", "json"])
-def test_the_covariance_travels(to: str) -> None:
+def test_the_covariance_travels(to):
     plain = typical_camera("plumb_bob")
     spread = np.random.default_rng(2).standard_normal((9, 9))
     camera = plain.with_parameters(plain.parameters, CameraCovariance(plain.parameter_names, spread @ spread.T))
@@ -363,12 +362,12 @@ MODEL = "{'lensmodel': 'LENSMODEL_OPENCV4', 'intrinsics': [500, 501, 320, 240, 0
         ),
     ],
 )
-def test_what_cannot_be_read_is_refused_in_words(text: str, words: str) -> None:
+def test_what_cannot_be_read_is_refused_in_words(text, words):
     with pytest.raises(InputError, match=words):
         read_camera(text, "camera")
 
 
-def test_cameras_software_names_its_numbers() -> None:
+def test_cameras_software_names_its_numbers():
     numbers = {"width": 640, "height": 480, "fx": 600.0, "fy": 601.0, "ppx": 321.0, "ppy": 239.0}
     plain = read_camera(json.dumps(numbers | {"model": "distortion.inverse_brown_conrady", "coeffs": [0, 0, 0, 0, 0]}))
     assert plain.model == "pinhole"
@@ -377,14 +376,14 @@ def test_cameras_software_names_its_numbers() -> None:
     assert bent.matrix_px[0, 2] == 321.0
 
 
-def test_a_one_focal_model_of_colmap_has_two_equal_ones() -> None:
+def test_a_one_focal_model_of_colmap_has_two_equal_ones():
     camera = read_camera("# Camera list\n3 SIMPLE_RADIAL 640 480 500 320.5 240.5 -0.1\n")
     assert (camera.model, camera.matrix_px[0, 0], camera.matrix_px[1, 1]) == ("plumb_bob", 500.0, 500.0)
     assert camera.matrix_px[0, 2] == 320.0
     assert camera.distortion.tolist() == [-0.1, 0.0, 0.0, 0.0]
 
 
-def test_a_camera_is_scaled_to_resized_pictures_on_request_only() -> None:
+def test_a_camera_is_scaled_to_resized_pictures_on_request_only():
     content = str(camera_content(typical_camera("plumb_bob", width_px=1280, height_px=720), "ros")).encode()
     half = CameraFile("c.yaml", content, rescale=True).camera(image_size_px=(640, 360))
     assert (half.width_px, half.height_px) == (640, 360)
@@ -393,7 +392,7 @@ def test_a_camera_is_scaled_to_resized_pictures_on_request_only() -> None:
         CameraFile("c.yaml", content, rescale=True).camera(image_size_px=(640, 480))
 
 
-def test_a_mat_file_of_version_7_3_is_named() -> None:
+def test_a_mat_file_of_version_7_3_is_named():
     with pytest.raises(InputError, match="save it with -v7"):
         CameraFile("c.mat", b"MATLAB 7.3 MAT-file, Platform: GLNXA64" + b"\0" * 200).camera()
 
@@ -418,7 +417,7 @@ def test_a_mat_file_of_version_7_3_is_named() -> None:
     ],
     ids=["colmap", "kalibr"],
 )
-def test_a_camera_that_is_not_supported_does_not_hide_the_others(content: str, good: str, bad: str, why: str) -> None:
+def test_a_camera_that_is_not_supported_does_not_hide_the_others(content, good, bad, why):
     assert read_camera(content, name=good).matrix_px[0, 2] == 320.0
     with pytest.raises(InputError, match=why):
         read_camera(content, name=bad)

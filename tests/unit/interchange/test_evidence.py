@@ -173,7 +173,7 @@ def read_back(proven: CalibrationFile, known: Format) -> ImportedCalibration:
 
 
 @pytest.mark.parametrize("known", OTHERS, ids=lambda known: known.name)
-def test_a_file_states_its_evidence_its_calibration_and_its_check_point(proven: CalibrationFile, known: Format) -> None:
+def test_a_file_states_its_evidence_its_calibration_and_its_check_point(proven, known):
     found = read_back(proven, known)
     point, check_point = proven.check_point, found.check_point
 
@@ -193,14 +193,14 @@ def test_a_file_states_its_evidence_its_calibration_and_its_check_point(proven: 
 
 
 @pytest.mark.parametrize("level", EVIDENCE_LEVELS)
-def test_kitti_states_each_level_as_a_number(proven: CalibrationFile, level: str) -> None:
-    one = dataclasses.replace(proven, evidence=level)  # type: ignore[arg-type]
+def test_kitti_states_each_level_as_a_number(proven, level):
+    one = dataclasses.replace(proven, evidence=level)
     kitti = next(known for known in FORMATS if known.name == "kitti")
 
     assert read_back(one, kitti).evidence == level
 
 
-def test_what_is_not_a_number_of_ours_in_a_kitti_file_states_nothing(proven: CalibrationFile) -> None:
+def test_what_is_not_a_number_of_ours_in_a_kitti_file_states_nothing(proven):
     lines = export(proven, "kitti", rectified=True).data.decode().splitlines()
 
     def with_line(key: str, value: str) -> ImportedCalibration:
@@ -211,7 +211,7 @@ def test_what_is_not_a_number_of_ours_in_a_kitti_file_states_nothing(proven: Cal
         assert with_line("cocalib_calibration_sha256", value).calibration_sha256 is None
 
 
-def test_a_file_of_another_tool_states_nothing(proven: CalibrationFile) -> None:
+def test_a_file_of_another_tool_states_nothing(proven):
     archive = zipfile.ZipFile(io.BytesIO(export(proven, "nuscenes", rectified=True).data))
     radar, camera = json.loads(archive.read("calibrated_sensor.json"))
     for key in (None, 3, ["no statement", 4], {"a": 1}):
@@ -220,7 +220,7 @@ def test_a_file_of_another_tool_states_nothing(proven: CalibrationFile) -> None:
         assert found.assumptions
 
 
-def test_the_covariance_survives_arrays_with_its_order(proven: CalibrationFile) -> None:
+def test_the_covariance_survives_arrays_with_its_order(proven):
     covariance = np.diag([1.0, 2, 3, 4, 5, 6]) * 1e-6
     covariance[0, 4] = covariance[4, 0] = 3e-7
     calibration = dataclasses.replace(proven.calibration, covariance=covariance)
@@ -231,7 +231,7 @@ def test_the_covariance_survives_arrays_with_its_order(proven: CalibrationFile) 
     np.testing.assert_array_equal(adopt(found, "file").calibration.covariance, covariance)
 
 
-def test_a_covariance_in_an_unknown_order_is_not_taken_for_ours(proven: CalibrationFile) -> None:
+def test_a_covariance_in_an_unknown_order_is_not_taken_for_ours(proven):
     pose = proven.calibration.camera_from_radar.as_matrix()
     for convention in ({}, {"covariance_convention": np.array("rotX, rotY, rotZ, x, y, z")}):
         buffer = io.BytesIO()
@@ -239,7 +239,7 @@ def test_a_covariance_in_an_unknown_order_is_not_taken_for_ours(proven: Calibrat
         assert read_any(buffer.getvalue()).covariance is None
 
 
-def test_foxglove_s_messages_are_read_as_json_too() -> None:
+def test_foxglove_s_messages_are_read_as_json_too():
     found = load_mcap(kept_file("foxglove"), source="file")
     transforms, camera = (json.loads(message.data) for message in found.messages)
 
@@ -251,7 +251,7 @@ def test_foxglove_s_messages_are_read_as_json_too() -> None:
     )
 
 
-def test_an_mcap_file_that_is_a_recording_or_damaged_is_refused_in_words() -> None:
+def test_an_mcap_file_that_is_a_recording_or_damaged_is_refused_in_words():
     data = kept_file("foxglove")
     other = data.replace(b"foxglove.FrameTransforms", b"std_msgs/FrameTransforms")
     for content, words in (

@@ -207,11 +207,11 @@ def test_a_corrected_rig_keeps_unknown_corrections_out():
         {"name": "r", "protocol": "radar", "nominalSensor2Rig_FLU": {"roll-pitch-yaw": [0, 0, 0], "t": [0, 0, 0]}},
         {"name": "c", "protocol": "camera", "nominalSensor2Rig_FLU": {"roll-pitch-yaw": [0, 0, 0], "t": [0, 0, 1]}},
     ]
-    sensors[1]["correction_rig_T"] = [0, 0, 0.5]  # type: ignore[assignment]
+    sensors[1]["correction_rig_T"] = [0, 0, 0.5]
     found = read_any(json.dumps({"rig": {"sensors": sensors}}))
     np.testing.assert_allclose(found.pose.translation_m, [0, 0, 1.5])
     assert "corrections" in found.assumptions[0]
-    sensors[1]["correction_other_R"] = [0, 0, 0.5]  # type: ignore[assignment]
+    sensors[1]["correction_other_R"] = [0, 0, 0.5]
     assert "correction_other_R is not zero" in refusal({"rig": {"sensors": sensors}})
 
 

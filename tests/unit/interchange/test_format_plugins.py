@@ -12,7 +12,6 @@ from calib_core.errors import InputError
 from calib_core.interchange import (
     CAMERA_ONLY,
     FORMATS,
-    CalibrationFile,
     check,
     export,
     format_named,
@@ -94,9 +93,7 @@ def only_line(caplog: pytest.LogCaptureFixture) -> str:
     return record.getMessage()
 
 
-def test_a_format_of_an_installed_package_is_written_read_and_checked(
-    installed: Install, file: CalibrationFile
-) -> None:
+def test_a_format_of_an_installed_package_is_written_read_and_checked(installed, file):
     installed()
 
     written = export(file, "acme-params")
@@ -106,9 +103,7 @@ def test_a_format_of_an_installed_package_is_written_read_and_checked(
     assert check(read_any(written.data), against=imported(file)).verdict == "right"
 
 
-def test_it_is_listed_after_ours_by_the_command_and_on_the_page(
-    installed: Install, file: CalibrationFile, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_it_is_listed_after_ours_by_the_command_and_on_the_page(installed, file, capsys):
     installed()
 
     assert [known.name for known in written_formats()] == [
@@ -121,7 +116,7 @@ def test_it_is_listed_after_ours_by_the_command_and_on_the_page(
     assert capsys.readouterr().out.splitlines()[-2].split(None, 1) == ["acme-params", "ROS 2 parameters"]
 
 
-def test_one_entry_point_may_name_several(installed: Install) -> None:
+def test_one_entry_point_may_name_several(installed):
     installed(
         module=f"{PARAMETERS}\n    from dataclasses import replace\n    BOTH = (PARAMETERS, replace(PARAMETERS, name='two'))\n",
         value="BOTH",
@@ -130,9 +125,7 @@ def test_one_entry_point_may_name_several(installed: Install) -> None:
     assert [known.name for known in written_formats()[-2:]] == ["acme-params", "two"]
 
 
-def test_a_binary_format_is_recognized_by_its_bytes_and_previewed_by_its_size(
-    installed: Install, file: CalibrationFile
-) -> None:
+def test_a_binary_format_is_recognized_by_its_bytes_and_previewed_by_its_size(installed, file):
     installed(BINARY, "BINARY")
 
     preview = export_preview(file, "binary", "", "drive")
@@ -166,9 +159,7 @@ def test_a_binary_format_is_recognized_by_its_bytes_and_previewed_by_its_size(
         ),
     ],
 )
-def test_a_broken_package_is_skipped_with_one_line_that_names_it(
-    installed: Install, file: CalibrationFile, caplog: pytest.LogCaptureFixture, module: str, value: str, words: str
-) -> None:
+def test_a_broken_package_is_skipped_with_one_line_that_names_it(installed, file, caplog, module, value, words):
     installed(module=module, value=value)
 
     assert written_formats() == (*FORMATS, *CAMERA_ONLY)
@@ -185,9 +176,7 @@ def test_a_broken_package_is_skipped_with_one_line_that_names_it(
         ("return 3 #", "failed (it returned int)"),
     ],
 )
-def test_a_writer_that_fails_gives_a_clear_error(
-    installed: Install, file: CalibrationFile, broken: str, words: str
-) -> None:
+def test_a_writer_that_fails_gives_a_clear_error(installed, file, broken, words):
     installed(module=PARAMETERS.replace("return f", "return unknown + f" if "Name" in words else broken))
 
     with pytest.raises(InputError) as refusal:
@@ -199,8 +188,8 @@ def test_a_writer_that_fails_gives_a_clear_error(
 
 
 def test_a_reader_that_fails_gives_a_clear_error_and_a_recognizer_that_fails_recognizes_nothing(
-    installed: Install, file: CalibrationFile, caplog: pytest.LogCaptureFixture
-) -> None:
+    installed, file, caplog
+):
     installed(module=PARAMETERS.replace("import numpy as np", ""))
     with pytest.raises(InputError, match=r"file: the format acme-params of the package acme-params 1\.2 failed \(Name"):
         read_any(export(file, "acme-params").data, "file")
@@ -211,9 +200,7 @@ def test_a_reader_that_fails_gives_a_clear_error_and_a_recognizer_that_fails_rec
     assert "skipped a plug-in of the package acme-params 1.2: its recognizer failed (TypeError" in only_line(caplog)
 
 
-def test_nothing_is_loaded_before_first_use_nor_for_our_own_formats(
-    installed: Install, file: CalibrationFile, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_nothing_is_loaded_before_first_use_nor_for_our_own_formats(installed, file, caplog):
     installed(module="raise RuntimeError('loaded')")
 
     assert format_named("tf2").name == "tf2"
@@ -224,9 +211,7 @@ def test_nothing_is_loaded_before_first_use_nor_for_our_own_formats(
     assert "RuntimeError: loaded" in only_line(caplog)
 
 
-def test_a_package_in_the_current_folder_is_ignored(
-    installed: Install, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_package_in_the_current_folder_is_ignored(installed, tmp_path, monkeypatch):
     installed()
     monkeypatch.chdir(tmp_path / "site-packages")
     monkeypatch.syspath_prepend("")
@@ -235,8 +220,8 @@ def test_a_package_in_the_current_folder_is_ignored(
 
 
 def test_a_module_in_the_current_folder_does_not_take_the_place_of_the_package_s(
-    installed: Install, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+    installed, tmp_path, monkeypatch, caplog
+):
     installed()
     (tmp_path / "acme_params.py").write_text("raise RuntimeError('taken from here')")
     monkeypatch.chdir(tmp_path)
@@ -249,7 +234,7 @@ def test_a_module_in_the_current_folder_does_not_take_the_place_of_the_package_s
     )
 
 
-def test_a_broken_package_says_so_on_stderr_and_the_command_goes_on(installed: Install, tmp_path: Path) -> None:
+def test_a_broken_package_says_so_on_stderr_and_the_command_goes_on(installed, tmp_path):
     installed(module="raise RuntimeError('worn out')")
     program = f"import sys; sys.path.insert(0, {str(tmp_path / 'site-packages')!r}); from cocalib.cli import run; "
     command = [sys.executable, "-c", program + "sys.exit(run(['export', '--to', 'list']))"]

@@ -19,7 +19,6 @@ import pytest
 from calib_core.interchange import (
     CAMERA_ONLY,
     FORMATS,
-    CalibrationFile,
     Content,
     export,
     read_calibration,
@@ -33,13 +32,13 @@ from calib_core.radar import AngleMap, RadarErrors
 
 
 @pytest.mark.parametrize("name", ["clicks-1.schema.json", "pairs-1.schema.json", "calibration-1.schema.json"])
-def test_the_published_schema_is_generated_from_the_types(project_root: Path, name):
+def test_the_published_schema_is_generated_from_the_types(project_root, name):
     published = (project_root / "docs/schemas" / name).read_text(encoding="utf-8")
 
     assert published == schema_texts()[name], "run: python -m calib_core.interchange.own.schemas docs/schemas"
 
 
-def test_the_page_lists_every_format_as_the_registry_has_it(project_root: Path):
+def test_the_page_lists_every_format_as_the_registry_has_it(project_root):
     page = (project_root / "docs/formats.md").read_text(encoding="utf-8")
     made = runpy.run_path(str(project_root / "docs/make_formats_table.py"))["with_table"](page)
 
@@ -47,7 +46,7 @@ def test_the_page_lists_every_format_as_the_registry_has_it(project_root: Path):
     assert len(re.findall(r"^\| `[\w-]+` \|(?: [^|]+ \|){4}$", page, re.MULTILINE)) == len((*FORMATS, *CAMERA_ONLY))
 
 
-def test_the_examples_on_the_page_are_read(project_root: Path):
+def test_the_examples_on_the_page_are_read(project_root):
     page = (project_root / "docs/formats.md").read_text(encoding="utf-8")
     examples = re.findall(r"```(json|yaml)\n(.*?)```", page, flags=re.DOTALL)
     readers = {"cocalib/clicks-1": read_clicks, "cocalib/pairs-1": read_pairs}
@@ -63,7 +62,7 @@ def test_the_examples_on_the_page_are_read(project_root: Path):
     assert len(read) == 3
 
 
-def test_formats_are_named_once_and_each_notes_what_it_lacks(file: CalibrationFile):
+def test_formats_are_named_once_and_each_notes_what_it_lacks(file):
     names = [known.name for known in FORMATS]
     assert len(set(names)) == len(names)
     assert len({known.file_name for known in FORMATS}) == len(names)
@@ -74,9 +73,7 @@ def test_formats_are_named_once_and_each_notes_what_it_lacks(file: CalibrationFi
         assert known.comment != "none" or any("calibration.json" in note for note in notes)
 
 
-def test_the_recipe_for_the_angle_map_gives_what_the_library_gives(
-    file: CalibrationFile, project_root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_the_recipe_for_the_angle_map_gives_what_the_library_gives(file, project_root, tmp_path, monkeypatch):
     page = (project_root / "docs/formats.md").read_text(encoding="utf-8")
     _, recipe, _ = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
     add = np.deg2rad(np.random.default_rng(2).uniform(-2, 2, (4, 6, 2)))
@@ -93,9 +90,7 @@ def test_the_recipe_for_the_angle_map_gives_what_the_library_gives(
     assert np.abs(names["corrected"] - names["points"]).max() > 0.01
 
 
-def test_the_recipe_for_radar_errors_gives_what_the_library_gives(
-    file: CalibrationFile, project_root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_the_recipe_for_radar_errors_gives_what_the_library_gives(file, project_root, tmp_path, monkeypatch):
     page = (project_root / "docs/formats.md").read_text(encoding="utf-8")
     recipe, _, _ = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
     monkeypatch.chdir(tmp_path)
@@ -109,7 +104,7 @@ def test_the_recipe_for_radar_errors_gives_what_the_library_gives(
         np.testing.assert_allclose(pixels_px, calibration.reproject(names["reported"]), rtol=0, atol=1e-8)
 
 
-def test_the_example_of_a_format_writes_and_reads(file: CalibrationFile, project_root: Path):
+def test_the_example_of_a_format_writes_and_reads(file, project_root):
     page = (project_root / "docs/formats.md").read_text(encoding="utf-8")
     _, _, example = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
     names: dict[str, Any] = {}
@@ -141,7 +136,7 @@ def golden(golden_text: str) -> dict[str, Any]:
     return json.loads(golden_text)
 
 
-def test_what_we_write_and_what_an_earlier_version_wrote_is_valid(project_root: Path, faults, golden):
+def test_what_we_write_and_what_an_earlier_version_wrote_is_valid(project_root, faults, golden):
     earlier = (project_root / "tests/golden/calibration-1-earlier.json").read_text(encoding="utf-8")
 
     assert faults(golden) == []
@@ -151,7 +146,7 @@ def test_what_we_write_and_what_an_earlier_version_wrote_is_valid(project_root: 
     assert faults(json.loads(write_calibration(read_calibration(earlier)))) == []
 
 
-def test_the_examples_on_the_page_are_valid(project_root: Path, faults):
+def test_the_examples_on_the_page_are_valid(project_root, faults):
     page = (project_root / "docs/formats.md").read_text(encoding="utf-8")
     examples = [json.loads(text) for text in re.findall(r"```json\n(.*?)```", page, flags=re.DOTALL)]
 
@@ -192,6 +187,6 @@ print(*learnt)
 """
 
 
-def test_the_types_of_our_files_are_learnt_when_they_are_imported() -> None:
+def test_the_types_of_our_files_are_learnt_when_they_are_imported():
     done = subprocess.run([sys.executable, "-c", _LEARNT], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["ClicksDocument", "PairsDocument", "CalibrationDocument"]

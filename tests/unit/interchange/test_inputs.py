@@ -4,9 +4,7 @@ import dataclasses
 import json
 import math
 import re
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -303,26 +301,26 @@ def test_the_stamp_of_a_pair_comes_from_its_click_where_the_pair_has_none(golden
 CLICKS = tuple(ReflectorClick(TimeNs(time), name, 3.0, 4.0) for time, name in ((1, "a"), (2, "b"), (3, "c")))
 
 
-def test_it_is_read_back() -> None:
+def test_it_is_read_back():
     unconfirmed = UnconfirmedClicks(("a", "c"), 0.875)
     file = read_clicks_file(write_clicks(CLICKS, unconfirmed=unconfirmed))
     assert (file.clicks, file.unconfirmed) == (CLICKS, unconfirmed)
 
 
-def test_a_file_whose_clicks_a_person_placed_says_nothing() -> None:
+def test_a_file_whose_clicks_a_person_placed_says_nothing():
     text = write_clicks(CLICKS)
     assert "unconfirmed" not in text
     assert read_clicks_file(text).unconfirmed is None
 
 
-def test_clicks_that_were_taken_out_of_the_file_no_longer_count() -> None:
+def test_clicks_that_were_taken_out_of_the_file_no_longer_count():
     text = write_clicks(CLICKS[1:], unconfirmed=UnconfirmedClicks(("a", "c"), 0.875))
     assert read_clicks_file(text).unconfirmed == UnconfirmedClicks(("c",), 0.875)
     assert read_clicks_file(write_clicks(CLICKS[1:2], unconfirmed=UnconfirmedClicks(("a",), 0.9))).unconfirmed is None
 
 
 @pytest.mark.parametrize("confidence", ["1.5", "-0.1", "null"])
-def test_a_confidence_that_is_no_probability_is_refused(confidence: str) -> None:
+def test_a_confidence_that_is_no_probability_is_refused(confidence):
     text = write_clicks(CLICKS, unconfirmed=UnconfirmedClicks(("a",), 0.875)).replace("0.875", confidence)
     with pytest.raises(InputError, match=r"unconfirmed\.confidence"):
         read_clicks(text)
@@ -347,7 +345,7 @@ def _with_alternative(pair: Pair) -> tuple[Candidate, Candidate]:
     return best, replace(best, position_radar_m=elsewhere)
 
 
-def test_a_calibration_keeps_which_candidates_are_alternatives(solved: Calibration) -> None:
+def test_a_calibration_keeps_which_candidates_are_alternatives(solved):
     text = calibration_text(solved)
     read = read_calibration(text).calibration
     for pair in read.pairs:
@@ -356,7 +354,7 @@ def test_a_calibration_keeps_which_candidates_are_alternatives(solved: Calibrati
     assert calibration_text(again) == text
 
 
-def test_the_provenance_names_all_topics_of_the_radar_and_why_it_was_used(solved: Calibration) -> None:
+def test_the_provenance_names_all_topics_of_the_radar_and_why_it_was_used(solved):
     provenance = Provenance(radar_topic="/far", radar_topics=("/far", "/near"), radar_choice="/far + /near: 52 returns")
     text = calibration_text(solved, provenance=provenance)
     assert json.loads(text)["provenance"]["topics"] == {
@@ -373,7 +371,7 @@ def test_the_provenance_names_all_topics_of_the_radar_and_why_it_was_used(solved
     assert read_calibration(text).provenance == single
 
 
-def test_clicks_say_which_topics_they_were_made_with_if_there_are_several() -> None:
+def test_clicks_say_which_topics_they_were_made_with_if_there_are_several():
     text = write_clicks([CLICK], radar_topics=("/far", "/near"))
     assert json.loads(text)["radar_topics"] == ["/far", "/near"]
     assert read_clicks(text) == (CLICK,)
@@ -398,7 +396,7 @@ def kept() -> BoardViews:
     return BoardViews(BOARD, SOURCE, views, runs_of({0, 1, 2, 4, 7}))
 
 
-def test_views_come_back_as_they_were() -> None:
+def test_views_come_back_as_they_were():
     text = write_board_views(kept())
     found = read_board_views(text)
     assert (found.board, found.source, found.searched) == (BOARD, SOURCE, ((0, 2), (4, 4), (7, 7)))
@@ -424,14 +422,14 @@ def test_views_come_back_as_they_were() -> None:
         (lambda document: document.update(serched=[]), "unknown key"),
     ],
 )
-def test_a_file_that_cannot_be_right_is_refused(change: Callable[[dict[str, Any]], None], words: str) -> None:
+def test_a_file_that_cannot_be_right_is_refused(change, words):
     document = json.loads(write_board_views(kept()))
     change(document)
     with pytest.raises(InputError, match=words):
         read_board_views(json.dumps(document), "views.json")
 
 
-def test_views_of_another_board_or_of_other_pictures_are_refused() -> None:
+def test_views_of_another_board_or_of_other_pictures_are_refused():
     with pytest.raises(InputError, match=r"22\.14 mm, but the board is a checkerboard of 8 x 6"):
         kept().require_same(board_of_size("8x6", 22.14), SOURCE, file="views.json")
     with pytest.raises(InputError, match="give the same pictures"):

@@ -32,7 +32,7 @@ OTHERS = [known.name for known in FORMATS if known.camera != "matrix"]
 
 
 def through(file: CalibrationFile, model: str, distortion: list[float]) -> CalibrationFile:
-    camera = Camera(model, 640, 480, file.calibration.camera.matrix_px, np.array(distortion))  # type: ignore[arg-type]
+    camera = Camera(model, 640, 480, file.calibration.camera.matrix_px, np.array(distortion))
     calibration = dataclasses.replace(file.calibration, camera=camera)
     return dataclasses.replace(file, calibration=calibration, check_point=choose_check_point(calibration))
 

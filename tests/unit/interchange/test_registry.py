@@ -24,7 +24,7 @@ from calib_core.interchange.syntax.content import Content, readings
 from calib_core.interchange.syntax.zip_archives import pack
 
 
-def test_every_reader_is_tried() -> None:
+def test_every_reader_is_tried():
     assert {known.reads for known in FORMATS} < set(readers())
 
 
@@ -41,11 +41,11 @@ def test_every_reader_is_tried() -> None:
         ("", ["lines", "yaml"]),
     ],
 )
-def test_the_syntax_is_determined_by_the_first_bytes(content: str | bytes, syntaxes: list[str]) -> None:
+def test_the_syntax_is_determined_by_the_first_bytes(content, syntaxes):
     assert [reading.syntax for reading in readings(content, source="file")] == syntaxes
 
 
-def test_what_a_syntax_does_not_have_is_empty() -> None:
+def test_what_a_syntax_does_not_have_is_empty():
     (xml,) = readings("<robot/>", source="file")
     lines, yaml = readings("# words\n\na: 1\n", source="file")
 
@@ -67,7 +67,7 @@ def test_what_a_syntax_does_not_have_is_empty() -> None:
         ("R: [1, 0, 0, 0, 1, 0, 0, 0, 1]\nT: [0, 0, 0]\nchild_frame_id: camera\n", "opencv"),
     ],
 )
-def test_content_that_fits_two_formats_is_read_as_the_more_specific_one(content: str, name: str) -> None:
+def test_content_that_fits_two_formats_is_read_as_the_more_specific_one(content, name):
     if name == "tf2-launch-py":
         content = content.replace("arguments", "static_transform_publisher(arguments") + ")"
 
@@ -75,7 +75,7 @@ def test_content_that_fits_two_formats_is_read_as_the_more_specific_one(content:
 
 
 @pytest.mark.parametrize("name", ["tf2", "tf2-launch-py", "urdf"])
-def test_a_frame_that_a_driver_publishes_gets_a_note_on_its_second_parent(file: CalibrationFile, name: str) -> None:
+def test_a_frame_that_a_driver_publishes_gets_a_note_on_its_second_parent(file, name):
     def notes(camera: str) -> list[str]:
         written = export(dataclasses.replace(file, frames=FrameNames("radar", camera)), name)
         return [note for note in written.notes if "two parents" in note]
@@ -98,7 +98,7 @@ def with_k3(file: CalibrationFile) -> CalibrationFile:
 
 
 @pytest.mark.parametrize("rectified", [False, True])
-def test_each_format_is_written_as_alone_or_refused_as_alone(with_k3: CalibrationFile, rectified: bool) -> None:
+def test_each_format_is_written_as_alone_or_refused_as_alone(with_k3, rectified):
     written, refused = export_all(with_k3, rectified=rectified)
 
     assert {*written, *(one.name for one in refused)} == {known.name for known in written_formats()}
@@ -112,7 +112,7 @@ def test_each_format_is_written_as_alone_or_refused_as_alone(with_k3: Calibratio
         assert one.reason == str(alone.value)
 
 
-def test_two_formats_do_not_write_one_file(with_k3: CalibrationFile, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_two_formats_do_not_write_one_file(with_k3, monkeypatch):
     twin = replace(format_named("matrix"), name="matrix-twin")
     monkeypatch.setattr(registry, "plugin_formats", lambda _reserved: (twin,))
 

@@ -4,7 +4,6 @@ import dataclasses
 import io
 import json
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import cv2
@@ -57,9 +56,7 @@ def in_text(matrix: np.ndarray) -> bytes:
 
 
 @pytest.mark.parametrize("written", [in_npz, in_mat, in_chain, in_text])
-def test_a_matrix_whose_last_row_is_wrong_is_refused_and_a_transposed_one_is_named(
-    file: CalibrationFile, written: Callable[[np.ndarray], bytes]
-) -> None:
+def test_a_matrix_whose_last_row_is_wrong_is_refused_and_a_transposed_one_is_named(file, written):
     matrix = file.calibration.camera_from_radar.as_matrix()
 
     np.testing.assert_array_equal(read_any(written(matrix)).camera_from_radar.as_matrix(), matrix)
@@ -69,7 +66,7 @@ def test_a_matrix_whose_last_row_is_wrong_is_refused_and_a_transposed_one_is_nam
         read_any(written(np.vstack([matrix[:3], [0, 0, 0, 2]])))
 
 
-def test_a_kitti_file_that_gives_a_pose_twice_is_refused(file: CalibrationFile) -> None:
+def test_a_kitti_file_that_gives_a_pose_twice_is_refused(file):
     text = export(file, "kitti", rectified=True).data.decode()
     pose = next(line for line in text.splitlines() if line.startswith("Tr_velo_to_cam"))
 
@@ -104,9 +101,7 @@ def at(file: CalibrationFile, translation_m: list[float]) -> CalibrationFile:
 
 @pytest.mark.parametrize("rule", [decimals(4), decimals(5), decimals(6), significant(6)], ids=["4", "5", "6", "6g"])
 @pytest.mark.parametrize("translation_m", [[0.01, -0.06, 0.02], [12.345678, -3.456789, 1.234567]])
-def test_a_calibration_rounded_as_a_whole_contradicts_nothing(
-    file: CalibrationFile, rule: Callable[[float], float], translation_m: list[float]
-) -> None:
+def test_a_calibration_rounded_as_a_whole_contradicts_nothing(file, rule, translation_m):
     content = rounded(json.loads(write_calibration(at(file, translation_m))), rule)
     del content["check_point"]  # whose pixel is another matter
     text = json.dumps(content)
@@ -117,9 +112,7 @@ def test_a_calibration_rounded_as_a_whole_contradicts_nothing(
 
 
 @pytest.mark.parametrize("rule", [decimals(5), significant(6), decimals(17)], ids=["5", "6g", "all"])
-def test_numbers_that_differ_by_more_than_their_digits_are_a_contradiction(
-    file: CalibrationFile, rule: Callable[[float], float]
-) -> None:
+def test_numbers_that_differ_by_more_than_their_digits_are_a_contradiction(file, rule):
     content = rounded(json.loads(write_calibration(at(file, [0.412345, -0.06, 0.02]))), rule)
     del content["check_point"]
 
@@ -140,7 +133,7 @@ def test_numbers_that_differ_by_more_than_their_digits_are_a_contradiction(
     assert any("different rotations" in fault for fault in faults(turned))
 
 
-def test_a_short_pose_is_not_taken_for_a_rounded_one(file: CalibrationFile) -> None:
+def test_a_short_pose_is_not_taken_for_a_rounded_one(file):
     axes = RigidTransform(np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]]), np.array([0.1, 0.2, 0.3]))
     calibration = dataclasses.replace(file.calibration, camera_from_radar=axes, pairs=())
     content = json.loads(write_calibration(dataclasses.replace(file, calibration=calibration, check_point=None)))
@@ -152,7 +145,7 @@ def test_a_short_pose_is_not_taken_for_a_rounded_one(file: CalibrationFile) -> N
     assert read_any(json.dumps(content)).faults == ("radar_from_camera is not the inverse of camera_from_radar",)
 
 
-def test_a_camera_without_distortion_is_written_for_kalibr_with_the_model_that_it_loads(file: CalibrationFile) -> None:
+def test_a_camera_without_distortion_is_written_for_kalibr_with_the_model_that_it_loads(file):
     text = export(with_camera(file, "pinhole", []), "kalibr").data.decode()
 
     chain = yaml.safe_load(text)["cam0"]
@@ -160,9 +153,7 @@ def test_a_camera_without_distortion_is_written_for_kalibr_with_the_model_that_i
     assert check(read_any(text)).verdict == "right"
 
 
-def test_a_fisheye_file_for_opencv_names_the_function_that_projects_with_it(
-    file: CalibrationFile, tmp_path: Path
-) -> None:
+def test_a_fisheye_file_for_opencv_names_the_function_that_projects_with_it(file, tmp_path):
     fisheye = with_camera(file, "equidistant", [-0.02, 0.01, 0.003, -0.001])
     path = tmp_path / "radar_camera.yml"
     path.write_bytes(export(fisheye, "opencv").data)
@@ -186,7 +177,7 @@ def test_a_fisheye_file_for_opencv_names_the_function_that_projects_with_it(
     assert "cv::fisheye" not in export(file, "opencv").data.decode()
 
 
-def test_text_that_takes_long_to_parse_is_refused_unread() -> None:
+def test_text_that_takes_long_to_parse_is_refused_unread():
     """256 kB of YAML take seconds; transforms in JSON are located by the same parser."""
     transform = {"frame_id": "a"}, {"translation": dict.fromkeys("xyz", 1), "rotation": dict.fromkeys("xyzw", 0.5)}
     stamped = [{"header": transform[0], "child_frame_id": f"f{n}", "transform": transform[1]} for n in range(2000)]
@@ -195,7 +186,7 @@ def test_text_that_takes_long_to_parse_is_refused_unread() -> None:
             read_any(text.encode(), "big")
 
 
-def test_a_repeated_key_is_found_without_comparing_all_keys() -> None:
+def test_a_repeated_key_is_found_without_comparing_all_keys():
     compared = []
 
     class Key(str):

@@ -28,7 +28,7 @@ def stacked(model: str, count: int = 8, seed: int = 1) -> ViewStack:
 
 
 @pytest.mark.parametrize("model", CAMERAS)
-def test_the_slopes_are_those_of_the_residuals(model: str) -> None:
+def test_the_slopes_are_those_of_the_residuals(model):
     stack, camera = stacked(model, 3), CAMERAS[model]
     warp = possible_warps(BOARD.corners_m)
     posed, _ = pose_views(camera, stack)
@@ -51,7 +51,7 @@ def test_the_slopes_are_those_of_the_residuals(model: str) -> None:
         )
 
 
-def test_the_optimum_is_that_of_opencv() -> None:
+def test_the_optimum_is_that_of_opencv():
     stack = stacked("plumb_bob", 10)
     stack = replace(stack, pixels_px=stack.pixels_px.astype(np.float32))  # as OpenCV takes them
     first = start("plumb_bob", stack)
@@ -64,7 +64,7 @@ def test_the_optimum_is_that_of_opencv() -> None:
     np.testing.assert_allclose(ours.camera.distortion, distortion.ravel(), rtol=1e-3, atol=1e-6)
 
 
-def test_at_the_optimum_no_free_number_has_a_gradient() -> None:
+def test_at_the_optimum_no_free_number_has_a_gradient():
     stack = stacked("equidistant")
     first = start("equidistant", stack)
     freedom = Freedom.of(first.camera)
@@ -73,7 +73,7 @@ def test_at_the_optimum_no_free_number_has_a_gradient() -> None:
     assert np.abs(at.gradients.sum(axis=0) / scale).max() < 1e-4
 
 
-def test_rational_coefficients_that_the_views_leave_free_stay_small() -> None:
+def test_rational_coefficients_that_the_views_leave_free_stay_small():
     stack = stacked("plumb_bob", 8)
     first = start("rational_polynomial", stack)
     free = Freedom(np.eye(12))
@@ -84,7 +84,7 @@ def test_rational_coefficients_that_the_views_leave_free_stay_small() -> None:
     assert squares[0] <= squares[1] < 1.001 * squares[0]
 
 
-def test_a_corner_without_weight_changes_nothing() -> None:
+def test_a_corner_without_weight_changes_nothing():
     stack = stacked("pinhole")
     state, _ = pose_views(CAMERAS["pinhole"], stack)
     weights = stack.weights.copy()
@@ -98,7 +98,7 @@ def test_a_corner_without_weight_changes_nothing() -> None:
 
 
 @pytest.mark.parametrize("model", CAMERAS)
-def test_from_the_start_an_adjustment_reaches_the_noise(model: str) -> None:
+def test_from_the_start_an_adjustment_reaches_the_noise(model):
     stack = stack_views(drawn_views(CAMERAS[model], 12, 4), BOARD.corners_m, SIZE_PX)
     first = start(model, stack)
     state = adjust(first, stack, Freedom.of(first.camera))
@@ -106,7 +106,7 @@ def test_from_the_start_an_adjustment_reaches_the_noise(model: str) -> None:
     assert state.camera.matrix_px[0, 0] == pytest.approx(CAMERAS[model].matrix_px[0, 0], rel=0.01)
 
 
-def test_a_fisheye_of_200_degrees_is_found() -> None:
+def test_a_fisheye_of_200_degrees_is_found():
     matrix = np.array([[280.0, 0.0, 500.0], [0.0, 281.0, 490.0], [0.0, 0.0, 1.0]])
     camera = Camera("equidistant", 1000, 1000, matrix, np.array([0.01, -0.004, 0.001, -0.0001]))
     rng, board_m = np.random.default_rng(3), BOARD.corners_m - BOARD.corners_m.mean(axis=0)
@@ -127,7 +127,7 @@ def test_a_fisheye_of_200_degrees_is_found() -> None:
     assert most > 90.0
 
 
-def test_poses_without_noise_are_exact() -> None:
+def test_poses_without_noise_are_exact():
     camera = CAMERAS["plumb_bob"]
     stack = stack_views(drawn_views(camera, 5, 2, Errors(noise_px=0.0)), BOARD.corners_m, SIZE_PX)
     state, posed = pose_views(camera, stack)
@@ -135,7 +135,7 @@ def test_poses_without_noise_are_exact() -> None:
     assert np.abs(residuals_of(state, stack)).max() < 1e-6
 
 
-def test_a_third_of_views_that_show_something_else_does_not_mislead_the_start() -> None:
+def test_a_third_of_views_that_show_something_else_does_not_mislead_the_start():
     views = drawn_views(CAMERAS["plumb_bob"], 12, 6)
     rng = np.random.default_rng(0)
     strange = [
@@ -157,7 +157,7 @@ def fitted(seed: int, errors: Errors, count: int = 12) -> tuple[Camera, SharedCo
 
 
 @pytest.mark.parametrize("errors", [Errors(), Errors(0.05, shared_px=0.1), Errors(motion_px_per_s=60.0)])
-def test_the_stated_sigma_covers_the_truth(errors: Errors) -> None:
+def test_the_stated_sigma_covers_the_truth(errors):
     inside = []
     for seed in range(40):
         camera, covariance = fitted(seed, errors)
@@ -166,12 +166,12 @@ def test_the_stated_sigma_covers_the_truth(errors: Errors) -> None:
     assert 0.90 <= np.mean(inside) <= 0.99  # of 160 numbers, in fours from one fit; 0.95 and two standard errors
 
 
-def test_errors_that_neighbours_share_make_the_sigma_larger_than_counting_corners_would() -> None:
+def test_errors_that_neighbours_share_make_the_sigma_larger_than_counting_corners_would():
     independent, shared = fitted(0, Errors(0.1)), fitted(0, Errors(0.01, shared_px=0.1))
     assert shared[1].matrix[0, 0] > 4.0 * independent[1].matrix[0, 0]
 
 
-def test_a_number_far_from_zero_in_its_sigmas_is_unlikely_to_be_zero() -> None:
+def test_a_number_far_from_zero_in_its_sigmas_is_unlikely_to_be_zero():
     covariance = SharedCovariance(np.diag([1.0, 4.0]), np.array([1e6, 5.0]))
     assert covariance.chances(np.array([1.96, 2.0 * 1.96])) == pytest.approx([0.05, 0.05], abs=1e-4)
     assert covariance.chances(np.array([20.0]), first=1)[0] < 1e-4
@@ -187,7 +187,7 @@ def calibrated(errors: Errors, board_shape: str = "auto", seed: int = 5) -> Cali
     return lens
 
 
-def test_a_bent_board_is_measured_and_does_not_bend_the_lens() -> None:
+def test_a_bent_board_is_measured_and_does_not_bend_the_lens():
     lens = calibrated(Errors(bend_m=0.0014))
     (warning,) = [warning for warning in lens.warnings if warning.code == "bent-board"]
     assert "the board is bent by 1.3" in warning.message
@@ -197,27 +197,27 @@ def test_a_bent_board_is_measured_and_does_not_bend_the_lens() -> None:
     assert lens.camera.matrix_px[0, 0] == pytest.approx(900.0, rel=0.004)
 
 
-def test_squares_that_are_longer_one_way_are_measured() -> None:
+def test_squares_that_are_longer_one_way_are_measured():
     lens = calibrated(Errors(stretch=0.02))
     (warning,) = [warning for warning in lens.warnings if warning.code == "unequal-squares"]
     assert "% wider than high; it was taken into account" in warning.message
     assert np.ptp(lens.board_shape_m[:, 0]) == pytest.approx(1.02 * np.ptp(BOARD.corners_m[:, 0]), rel=1e-3)
 
 
-def test_a_flat_board_stays_as_stated() -> None:
+def test_a_flat_board_stays_as_stated():
     lens = calibrated(Errors())
     np.testing.assert_array_equal(lens.board_shape_m, BOARD.corners_m)
     assert not {warning.code for warning in lens.warnings} & {"bent-board", "unequal-squares"}
 
 
-def test_a_bend_that_must_not_be_modelled_is_warned_about_and_enters_the_sigma() -> None:
+def test_a_bend_that_must_not_be_modelled_is_warned_about_and_enters_the_sigma():
     lens = calibrated(Errors(bend_m=0.0014), "flat")
     assert any("it was not taken into account, because board_shape is flat" in one.message for one in lens.warnings)
     off_px = abs(lens.camera.matrix_px[0, 0] - 900.0)
     assert 5.0 < off_px < 1.96 * lens.camera.covariance.sigma("fx_px")
 
 
-def test_motion_under_a_rolling_shutter_is_told_from_noise() -> None:
+def test_motion_under_a_rolling_shutter_is_told_from_noise():
     still, moving = calibrated(Errors(0.05, shared_px=0.1)), calibrated(Errors(motion_px_per_s=300.0))
     assert "skewed-views" not in {warning.code for warning in still.warnings}
     (warning,) = [warning for warning in moving.warnings if warning.code == "skewed-views"]
@@ -228,7 +228,7 @@ def test_motion_under_a_rolling_shutter_is_told_from_noise() -> None:
 
 
 @pytest.mark.parametrize("model", CAMERAS)
-def test_the_true_model_is_chosen_with_a_reason(model: str) -> None:
+def test_the_true_model_is_chosen_with_a_reason(model):
     lens = calibrate_lens(search_of(drawn_views(CAMERAS[model], 16, 5)))
     assert isinstance(lens, CalibratedLens), lens
     assert lens.camera.model == model
@@ -262,13 +262,13 @@ GOOD = drawn_views(CAMERAS["plumb_bob"], 12, 11)
 @pytest.mark.parametrize(
     "errors", [Errors(), Errors(0.05, shared_px=0.1), Errors(motion_px_per_s=60.0), Errors(noise_px=0.0)]
 )
-def test_no_good_view_and_no_good_corner_is_dropped(errors: Errors) -> None:
+def test_no_good_view_and_no_good_corner_is_dropped(errors):
     lens = solved(*drawn_views(CAMERAS["plumb_bob"], 15, 1, errors))
     assert lens.left_out == ()
     assert all(view.used.all() for view in lens.views)
 
 
-def test_a_mirrored_picture_is_called_mirrored() -> None:
+def test_a_mirrored_picture_is_called_mirrored():
     camera = CAMERAS["plumb_bob"]
     off_middle = camera.with_parameters(camera.parameters - [0, 0, 80, 0, 0, 0, 0, 0, 0])
     good = drawn_views(off_middle, 12, 11)
@@ -278,7 +278,7 @@ def test_a_mirrored_picture_is_called_mirrored() -> None:
     assert lens.left_out[0].reason.startswith("mirrored: with left and right exchanged its corners fit to 0.1")
 
 
-def test_a_board_with_markers_is_never_called_mirrored() -> None:
+def test_a_board_with_markers_is_never_called_mirrored():
     camera = CAMERAS["plumb_bob"]
     views = drawn_views(camera.with_parameters(camera.parameters - [0, 0, 80, 0, 0, 0, 0, 0, 0]), 12, 11)
     views = [*views, planted(views[3], views[3].pixels_px * [-1.0, 1.0] + [SIZE_PX[0] - 1.0, 0.0], "flipped")]
@@ -290,7 +290,7 @@ def test_a_board_with_markers_is_never_called_mirrored() -> None:
         assert reason.startswith("mirrored") is possible
 
 
-def test_of_two_mirror_images_the_mirrored_one_is_named_though_the_lens_is_symmetric() -> None:
+def test_of_two_mirror_images_the_mirrored_one_is_named_though_the_lens_is_symmetric():
     camera = CAMERAS["plumb_bob"]
     middle = 0.5 * (SIZE_PX[0] - 1.0)
     parameters = camera.parameters.copy()
@@ -302,7 +302,7 @@ def test_of_two_mirror_images_the_mirrored_one_is_named_though_the_lens_is_symme
     assert lens.left_out[0].reason.startswith("mirrored: ")
 
 
-def test_two_views_taken_apart_that_look_like_mirror_images_are_both_used() -> None:
+def test_two_views_taken_apart_that_look_like_mirror_images_are_both_used():
     good = drawn_views(CAMERAS["plumb_bob"], 12, 11)
     other = good[3].pixels_px * [-1.0, 1.0] + [SIZE_PX[0] - 1.0, 0.0]
     apart = np.random.default_rng(2).normal(0.0, 1.5, 2)
@@ -312,7 +312,7 @@ def test_two_views_taken_apart_that_look_like_mirror_images_are_both_used() -> N
     assert mirror_twins(copied, 0.2) == ((0, 1),)
 
 
-def test_a_board_with_other_squares_is_called_another_board() -> None:
+def test_a_board_with_other_squares_is_called_another_board():
     camera = CAMERAS["plumb_bob"]
     pose = solved(*GOOD).views[2].camera_from_board
     other = camera.project(pose @ (BOARD.corners_m * [1.0, 1.2, 1.0]))
@@ -322,13 +322,13 @@ def test_a_board_with_other_squares_is_called_another_board() -> None:
     assert "0.83 times as wide as high" in lens.left_out[0].reason
 
 
-def test_a_wrong_detection_fits_no_pose() -> None:
+def test_a_wrong_detection_fits_no_pose():
     lens = solved(*GOOD, planted(GOOD[4], np.roll(GOOD[4].pixels_px, 1, axis=0), "rolled"))
     assert [picture.name for picture in lens.left_out] == ["rolled"]
     assert "another board, or a wrong detection" in lens.left_out[0].reason
 
 
-def test_a_blurred_view_is_called_blurred() -> None:
+def test_a_blurred_view_is_called_blurred():
     rng = np.random.default_rng(8)
     sharp = [replace(view, blur_px=0.9) for view in GOOD]
     blurred = [
@@ -340,7 +340,7 @@ def test_a_blurred_view_is_called_blurred() -> None:
     assert "blurred: edges are 3.0 px wide, those of the others 0.9 px" in lens.left_out[0].reason
 
 
-def test_a_corner_that_jumped_by_a_square_is_left_out_and_its_view_kept() -> None:
+def test_a_corner_that_jumped_by_a_square_is_left_out_and_its_view_kept():
     pixels = GOOD[5].pixels_px.copy()
     pixels[20] = pixels[21]
     lens = solved(*GOOD[:5], replace(GOOD[5], pixels_px=pixels), *GOOD[6:])
@@ -350,7 +350,7 @@ def test_a_corner_that_jumped_by_a_square_is_left_out_and_its_view_kept() -> Non
     assert lens.rms_px < 0.15
 
 
-def test_with_robust_off_every_view_and_corner_counts() -> None:
+def test_with_robust_off_every_view_and_corner_counts():
     pixels = GOOD[5].pixels_px.copy()
     pixels[20] = pixels[21]
     views = (*GOOD[:5], replace(GOOD[5], pixels_px=pixels), *GOOD[6:])
@@ -359,7 +359,7 @@ def test_with_robust_off_every_view_and_corner_counts() -> None:
     assert lens.rms_px > 0.5
 
 
-def test_views_with_some_of_the_corners_are_used() -> None:
+def test_views_with_some_of_the_corners_are_used():
     some = replace(GOOD[0], corner_ids=np.arange(10, 40), pixels_px=GOOD[0].pixels_px[10:40])
     lens = solved(some, *GOOD[1:])
     assert lens.left_out == ()

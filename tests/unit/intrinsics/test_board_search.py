@@ -12,7 +12,6 @@ from calib_core.camera import Camera, CameraModel
 from calib_core.errors import InputError, RecordingError
 from calib_core.intrinsics import (
     Board,
-    BoardKind,
     BoardSearch,
     SearchProgress,
     board_of_size,
@@ -21,7 +20,7 @@ from calib_core.intrinsics import (
 )
 from calib_core.intrinsics.board_detection import blur_px, board_in, find_board
 from calib_core.intrinsics.board_search import PictureOrder
-from calib_core.measurements import TimeNs, Unsolvable
+from calib_core.measurements import TimeNs
 from calib_core.synthetic import typical_camera
 from calib_core.synthetic.boards import BoardFilm, render_board, true_corners, waved_poses
 
@@ -76,10 +75,9 @@ def searched(pictures: Drawn, board: Board = BOARD) -> BoardSearch:
     return search
 
 
-def test_every_picture_of_a_few_is_searched_and_every_good_one_chosen() -> None:
+def test_every_picture_of_a_few_is_searched_and_every_good_one_chosen():
     told: list[SearchProgress] = []
     search = search_boards(Drawn(several()), BOARD, progress=told.append)
-    assert isinstance(search, BoardSearch)
     assert [view.index for view in search.views] == [0, 1, 2, 3, 4]
     assert search.complete
     assert search.left_out == ()
@@ -87,7 +85,7 @@ def test_every_picture_of_a_few_is_searched_and_every_good_one_chosen() -> None:
     assert told[-1].coverage.counts.sum() == 100
 
 
-def test_what_is_not_used_is_named_with_the_reason() -> None:
+def test_what_is_not_used_is_named_with_the_reason():
     def unreadable() -> np.ndarray:
         raise RecordingError("the file is cut off")
 
@@ -122,25 +120,23 @@ def test_what_is_not_used_is_named_with_the_reason() -> None:
         ([], "no-pictures", "there are no pictures"),
     ],
 )
-def test_a_search_without_a_result_says_why(draw: list[Callable[[], np.ndarray]], code: str, words: str) -> None:
+def test_a_search_without_a_result_says_why(draw, code, words):
     found = search_boards(Drawn(draw), BOARD)
-    assert isinstance(found, Unsolvable)
     assert found.code == code
     assert words in found.reason
     assert found.hint
 
 
-def test_a_few_pictures_of_another_size_are_named_and_the_rest_is_used() -> None:
+def test_a_few_pictures_of_another_size_are_named_and_the_rest_is_used():
     search = searched(Drawn([*several(), lambda: drawn(size=(330, 250))]))
     assert len(search.views) == 5
     assert search.left_out[0].reason == "it has 330 x 250 pixels, not 320 x 240"
 
 
-def test_a_cancelled_search_goes_on_where_it_ended() -> None:
+def test_a_cancelled_search_goes_on_where_it_ended():
     first = Drawn(several())
     told: list[SearchProgress] = []
     part = search_boards(first, BOARD, progress=told.append, stopped=lambda: len(told) == 2)
-    assert isinstance(part, BoardSearch)
     assert not part.complete
     again = Drawn(several())
     whole = search_boards(again, BOARD, known=part.found, searched=part.indices)
@@ -150,7 +146,7 @@ def test_a_cancelled_search_goes_on_where_it_ended() -> None:
     assert whole.complete
 
 
-def test_a_long_recording_is_searched_where_the_board_is(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_long_recording_is_searched_where_the_board_is(monkeypatch):
     shown = range(30_000, 31_800)  # a minute of half an hour
 
     def find(picture: np.ndarray, board: Board) -> tuple[np.ndarray, np.ndarray] | None:
@@ -168,30 +164,28 @@ def test_a_long_recording_is_searched_where_the_board_is(monkeypatch: pytest.Mon
     assert not any("as a whole" in one.reason for one in search.left_out)
 
 
-def test_a_search_for_a_board_that_is_another_one_ends_early() -> None:
+def test_a_search_for_a_board_that_is_another_one_ends_early():
     other = Board("checkerboard", 6, 4, 0.03)
     pictures = Drawn([lambda: drawn(board=other)] * 100)
     found = search_boards(pictures, BOARD)
-    assert isinstance(found, Unsolvable)
     assert found.code == "other-board"
     assert len(pictures.asked) < 50
 
 
-def test_one_picture_that_seems_to_show_the_board_does_not_hide_that_the_others_show_another() -> None:
+def test_one_picture_that_seems_to_show_the_board_does_not_hide_that_the_others_show_another():
     other = Board("checkerboard", 6, 4, 0.03)
     found = search_boards(Drawn([drawn, *[lambda s=s: drawn(4.0 * s, board=other) for s in range(7)]]), BOARD)
-    assert isinstance(found, Unsolvable)
     assert found.code == "other-board"
     assert found.reason.startswith("1 of 8 pictures shows a checkerboard of 5 x 4 inner corners; 7 of the 7 ")
     assert found.hint.startswith("state 6x4 ")
 
 
-def test_a_copy_of_a_picture_is_the_same_view_and_no_less_sharp() -> None:
+def test_a_copy_of_a_picture_is_the_same_view_and_no_less_sharp():
     search = searched(Drawn([*several(), several()[2]]))
     assert [(one.index, one.reason) for one in search.left_out] == [(5, "the same view as picture 2")]
 
 
-def test_the_first_pictures_of_a_long_recording_are_far_apart() -> None:
+def test_the_first_pictures_of_a_long_recording_are_far_apart():
     order = PictureOrder(54_000, lambda index: TimeNs(index * 33_333_333))
     first = order.next_batch(())[:8]
     assert min(abs(a - b) for number, a in enumerate(first) for b in first[:number]) > 4_000
@@ -225,7 +219,7 @@ def apart(found: np.ndarray, true: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("model", ["plumb_bob", "equidistant"])
-def test_corners_of_a_checkerboard_are_found_to_three_hundredths_of_a_pixel(model: CameraModel) -> None:
+def test_corners_of_a_checkerboard_are_found_to_three_hundredths_of_a_pixel(model):
     errors = []
     for picture, true in views(CHECKERBOARD, FILM, 5, model):
         found = find_board(picture, CHECKERBOARD)
@@ -234,7 +228,7 @@ def test_corners_of_a_checkerboard_are_found_to_three_hundredths_of_a_pixel(mode
     assert np.abs(errors).max() < 0.2
 
 
-def test_light_that_falls_off_to_one_side_does_not_move_corners() -> None:
+def test_light_that_falls_off_to_one_side_does_not_move_corners():
     film = replace(FILM, gradient=(0.35, -0.2), vignetting=0.4)
     errors = [
         apart(found[1], true)
@@ -247,7 +241,7 @@ def test_light_that_falls_off_to_one_side_does_not_move_corners() -> None:
 
 
 @pytest.mark.parametrize("board", [CHARUCO, APRILGRID], ids=["charuco", "aprilgrid"])
-def test_boards_with_markers_say_which_corner_is_which(board: Board) -> None:
+def test_boards_with_markers_say_which_corner_is_which(board):
     for picture, true in views(board, FILM, 2):
         found = find_board(picture, board)
         assert found is not None
@@ -258,7 +252,7 @@ def test_boards_with_markers_say_which_corner_is_which(board: Board) -> None:
         assert np.abs(pixels - true[ids]).max() < 0.4
 
 
-def test_tags_whose_outline_runs_into_the_squares_between_them_get_their_corners() -> None:
+def test_tags_whose_outline_runs_into_the_squares_between_them_get_their_corners():
     """In small pictures the outline of a tag ends pixels away from its corner, for a third of the corners at once."""
     board = Board("aprilgrid", 6, 6, 0.03, 0.009, "DICT_APRILTAG_36h11")
     camera = typical_camera("plumb_bob", width_px=640, height_px=480)
@@ -273,7 +267,7 @@ def test_tags_whose_outline_runs_into_the_squares_between_them_get_their_corners
 
 
 @pytest.mark.parametrize("board", [CHARUCO, APRILGRID], ids=["charuco", "aprilgrid"])
-def test_a_part_of_a_board_with_markers_suffices(board: Board) -> None:
+def test_a_part_of_a_board_with_markers_suffices(board):
     picture, true = next(views(board, FILM, 1))
     hidden = picture.copy()
     hidden[:, : int(np.median(true[:, 0]))] = 120
@@ -282,7 +276,7 @@ def test_a_part_of_a_board_with_markers_suffices(board: Board) -> None:
     assert np.abs(part[1] - true[part[0]]).max() < 0.5
 
 
-def test_a_grid_of_opencvs_tags_is_found_though_they_are_turned() -> None:
+def test_a_grid_of_opencvs_tags_is_found_though_they_are_turned():
     board = Board("aprilgrid", 3, 2, 0.05, 0.015, "DICT_APRILTAG_36h11")
     dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
     picture = np.full((500, 700), 255, dtype=np.uint8)
@@ -295,7 +289,7 @@ def test_a_grid_of_opencvs_tags_is_found_though_they_are_turned() -> None:
     assert np.abs(found[1] - (corners[found[0]] - 0.5)).max() < 1.0
 
 
-def test_a_checkerboard_is_numbered_with_a_right_hand() -> None:
+def test_a_checkerboard_is_numbered_with_a_right_hand():
     picture, _ = next(views(CHECKERBOARD, FILM, 1))
     for shown in (picture, cv2.rotate(picture, cv2.ROTATE_90_CLOCKWISE), cv2.rotate(picture, cv2.ROTATE_180)):
         found = find_board(shown, CHECKERBOARD)
@@ -304,14 +298,14 @@ def test_a_checkerboard_is_numbered_with_a_right_hand() -> None:
         assert along[0] * down[1] - along[1] * down[0] > 0.0
 
 
-def test_a_large_picture_is_searched_small_and_refined_large() -> None:
+def test_a_large_picture_is_searched_small_and_refined_large():
     camera = typical_camera("plumb_bob", width_px=2560, height_px=1440)
     pose = waved_poses(np.random.default_rng(4), CHECKERBOARD, camera, 1)[0]
     found = find_board(render_board(CHECKERBOARD, camera, pose, FILM, seed=1), CHECKERBOARD)
     assert np.abs(apart(found[1], true_corners(CHECKERBOARD, camera, pose, FILM))).max() < 0.15
 
 
-def test_a_part_of_a_larger_board_is_not_the_board() -> None:
+def test_a_part_of_a_larger_board_is_not_the_board():
     picture, _ = next(views(CHECKERBOARD, FILM, 1))
     for columns, rows in ((8, 6), (10, 7)):
         assert find_board(picture, msgspec.structs.replace(CHECKERBOARD, columns=columns, rows=rows)) is None
@@ -319,7 +313,7 @@ def test_a_part_of_a_larger_board_is_not_the_board() -> None:
     assert board_in(picture, CHECKERBOARD) is None
 
 
-def test_no_board_is_found_where_there_is_none() -> None:
+def test_no_board_is_found_where_there_is_none():
     noise = np.random.default_rng(1).integers(0, 255, (480, 640, 3), dtype=np.uint8)
     stripes = np.tile(np.repeat(np.array([20, 230], dtype=np.uint8), 20), (480, 16))
     for picture in (noise, stripes, np.zeros((480, 640, 3), dtype=np.uint8)):
@@ -329,7 +323,7 @@ def test_no_board_is_found_where_there_is_none() -> None:
 
 
 @pytest.mark.parametrize("board", [CHECKERBOARD, CHARUCO, APRILGRID], ids=["checkerboard", "charuco", "aprilgrid"])
-def test_blur_is_measured_in_pixels(board: Board) -> None:
+def test_blur_is_measured_in_pixels(board):
     measured = []
     for blur in (0.7, 1.4, 2.0):
         picture, true = next(views(board, BoardFilm(blur_px=blur), 1))
@@ -339,7 +333,7 @@ def test_blur_is_measured_in_pixels(board: Board) -> None:
     np.testing.assert_allclose(measured[:known], np.hypot([0.7, 1.4, 2.0], 0.5)[:known], rtol=0.2)
 
 
-def test_motion_blurs_the_edges_across_it() -> None:
+def test_motion_blurs_the_edges_across_it():
     picture, true = next(views(CHECKERBOARD, FILM, 1))
     ids = np.arange(len(true))
     still = blur_px(picture, ids, true, CHECKERBOARD)
@@ -351,14 +345,14 @@ def test_motion_blurs_the_edges_across_it() -> None:
 # Boards: where their corners are, and how they are named.
 
 
-def test_a_checkerboard_is_named_by_its_inner_corners() -> None:
+def test_a_checkerboard_is_named_by_its_inner_corners():
     board = board_of_size(" 9X6 ", 22.14)
     assert (board.columns, board.rows, board.square_m) == (9, 6, 0.02214)
     np.testing.assert_allclose(board.corners_m[10], [0.02214, 0.02214, 0.0])
     assert len(board.corners_m) == 54
 
 
-def test_a_grid_counts_its_tags_from_the_lower_left_and_their_corners_clockwise() -> None:
+def test_a_grid_counts_its_tags_from_the_lower_left_and_their_corners_clockwise():
     board = board_of_size("3x2", 50.0, "aprilgrid", tag_spacing=0.2)
     corners = board.corners_m[:, :2]
     np.testing.assert_allclose(corners[:4], [[0.0, 0.06], [0.05, 0.06], [0.05, 0.11], [0.0, 0.11]], atol=1e-12)
@@ -374,7 +368,7 @@ def test_a_grid_counts_its_tags_from_the_lower_left_and_their_corners_clockwise(
         Board("aprilgrid", 3, 2, 0.03, 0.01, "DICT_APRILTAG_36h11"),
     ],
 )
-def test_edges_are_as_long_as_a_square(board: Board) -> None:
+def test_edges_are_as_long_as_a_square(board):
     ends = board.corners_m[board.edges]
     np.testing.assert_allclose(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), 0.03)
     assert len({tuple(sorted(edge)) for edge in board.edges.tolist()}) == len(board.edges)
@@ -392,7 +386,7 @@ def test_edges_are_as_long_as_a_square(board: Board) -> None:
         (("2x2", 22.0, "charuco"), "squares along a row"),
     ],
 )
-def test_what_is_no_board_is_refused(arguments: tuple[str, float], words: str) -> None:
+def test_what_is_no_board_is_refused(arguments, words):
     with pytest.raises(InputError, match=words):
         board_of_size(*arguments)
 
@@ -407,10 +401,10 @@ def test_what_is_no_board_is_refused(arguments: tuple[str, float], words: str) -
         ("aprilgrid", {"tag_spacing": 0.0}, "gap between two tags"),
     ],
 )
-def test_what_belongs_to_another_board_is_refused(kind: BoardKind, given: dict[str, float], words: str) -> None:
+def test_what_belongs_to_another_board_is_refused(kind, given, words):
     with pytest.raises(InputError, match=words):
-        board_of_size("6x6", 25.0, kind, **given)  # type: ignore[arg-type]
+        board_of_size("6x6", 25.0, kind, **given)
 
 
-def test_a_dictionary_may_be_named_without_its_prefix() -> None:
+def test_a_dictionary_may_be_named_without_its_prefix():
     assert board_of_size("6x6", 25.0, "charuco", dictionary="4x4_50").dictionary == "DICT_4X4_50"

@@ -34,7 +34,7 @@ def calibrated(*views: BoardCorners) -> CalibratedLens:
     return lens
 
 
-def test_each_view_states_its_pose_its_residuals_and_its_error_if_left_out() -> None:
+def test_each_view_states_its_pose_its_residuals_and_its_error_if_left_out():
     lens = calibrated(*VIEWS)
     for view in lens.views:
         projected = lens.camera.project(view.camera_from_board @ BOARD.corners_m)
@@ -45,20 +45,19 @@ def test_each_view_states_its_pose_its_residuals_and_its_error_if_left_out() -> 
     assert lens.rms_px < lens.held_out_rms_px < 0.16
 
 
-def test_the_same_views_give_the_same_bytes() -> None:
+def test_the_same_views_give_the_same_bytes():
     one, other = calibrated(*VIEWS), calibrated(*VIEWS)
     assert one.camera.parameters.tobytes() == other.camera.parameters.tobytes()
     assert one.camera.covariance.matrix.tobytes() == other.camera.covariance.matrix.tobytes()
     assert (one.choice, one.warnings) == (other.choice, other.warnings)
 
 
-def test_two_views_are_too_few() -> None:
+def test_two_views_are_too_few():
     answer = calibrate_lens(search_of(VIEWS[:2]), PINHOLE)
-    assert isinstance(answer, Unsolvable)
     assert (answer.code, answer.reason) == ("few-views", "2 usable views of the board, at least 3 are needed")
 
 
-def test_views_from_one_direction_leave_the_focal_length_open() -> None:
+def test_views_from_one_direction_leave_the_focal_length_open():
     rng, views = np.random.default_rng(1), []
     for index in range(10):
         shift = np.array([*rng.uniform(-0.2, 0.1, 2), rng.uniform(0.5, 0.9)])
@@ -72,7 +71,7 @@ def test_views_from_one_direction_leave_the_focal_length_open() -> None:
     assert "turned by 30 to 45 deg to the left, right, up and down" in answer.hint
 
 
-def test_corners_that_nothing_explains_are_no_calibration() -> None:
+def test_corners_that_nothing_explains_are_no_calibration():
     rng = np.random.default_rng(2)
     noise = tuple(replace(view, pixels_px=rng.uniform(0.0, 700.0, (54, 2))) for view in VIEWS)
     answer = calibrate_lens(search_of(noise))
@@ -80,28 +79,27 @@ def test_corners_that_nothing_explains_are_no_calibration() -> None:
     assert answer.code in ("no-lens", "few-views", "parallel-views")
 
 
-def test_a_picture_of_another_size_is_left_out_by_name() -> None:
+def test_a_picture_of_another_size_is_left_out_by_name():
     lens = calibrated(*VIEWS[:9], replace(VIEWS[9], size_px=(640, 480)))
     (picture,) = lens.left_out
     assert (picture.name, picture.reason) == ("view 9", "it has 640 x 480 pixels, not 1280 x 720")
 
 
-def test_a_corner_of_the_picture_without_views_is_warned_about() -> None:
+def test_a_corner_of_the_picture_without_views_is_warned_about():
     left = [view for view in drawn_views(CAMERAS["pinhole"], 60, 3) if view.pixels_px[:, 0].max() < 700.0]
     assert len(left) >= 5
     (warning,) = [warning for warning in calibrated(*left).warnings if warning.code == "little-covered"]
     assert "% of the picture; beyond them the lens is a guess" in warning.message
 
 
-def test_a_cancelled_calibration_says_so_and_named_its_steps() -> None:
+def test_a_cancelled_calibration_says_so_and_named_its_steps():
     steps: list[str] = []
     answer = calibrate_lens(search_of(VIEWS), PINHOLE, progress=steps.append, stopped=lambda: len(steps) == 2)
-    assert isinstance(answer, Unsolvable)
     assert answer.code == "stopped"
     assert steps == ["comparing the views", "choosing a lens model"]
 
 
-def test_pictures_that_were_resized_out_of_proportion_show_in_the_focal_lengths() -> None:
+def test_pictures_that_were_resized_out_of_proportion_show_in_the_focal_lengths():
     squeezed = tuple(replace(view, pixels_px=view.pixels_px * [0.9, 1.0]) for view in VIEWS)
     codes = {warning.code for warning in calibrated(*squeezed).warnings}
     assert "unequal-focal-lengths" in codes
@@ -114,13 +112,13 @@ def test_pictures_that_were_resized_out_of_proportion_show_in_the_focal_lengths(
         (np.arange(9, 18), "its corners are on one line of the board"),
     ],
 )
-def test_a_view_that_cannot_be_posed_is_left_out_by_name(ids: np.ndarray, reason: str) -> None:
+def test_a_view_that_cannot_be_posed_is_left_out_by_name(ids, reason):
     partial = replace(VIEWS[9], corner_ids=ids, pixels_px=VIEWS[9].pixels_px[ids])
     (picture,) = calibrated(*VIEWS[:9], partial).left_out
     assert (picture.name, picture.reason) == ("view 9", reason)
 
 
-def test_one_view_given_many_times_is_no_calibration() -> None:
+def test_one_view_given_many_times_is_no_calibration():
     answer = calibrate_lens(search_of(tuple(replace(VIEWS[0], index=index) for index in range(6))), PINHOLE)
     assert isinstance(answer, Unsolvable), answer.camera.parameters
     assert answer.code == "parallel-views"
@@ -155,9 +153,7 @@ def covered(*views: BoardCorners) -> Coverage:
     [(0.0, 0.0, "square on"), (35.0, 0.0, "left"), (-35.0, 0.0, "right"), (0.0, 35.0, "down"), (0.0, -35.0, "up")],
 )
 @pytest.mark.parametrize("at", [(0.0, 0.0, 0.5), (0.15, -0.05, 0.5), (-0.1, 0.08, 0.7)])
-def test_a_tilt_is_named_by_where_the_board_faces(
-    pan_deg: float, tip_deg: float, faces: str, at: tuple[float, float, float]
-) -> None:
+def test_a_tilt_is_named_by_where_the_board_faces(pan_deg, tip_deg, faces, at):
     sideways = float(np.degrees(np.arctan2(at[0], at[2])))
     upward = float(np.degrees(np.arctan2(at[1], at[2])))
     tilts = covered(seen(pan_deg + sideways, tip_deg - upward, at)).tilts
@@ -165,7 +161,7 @@ def test_a_tilt_is_named_by_where_the_board_faces(
     assert sum(tilts.values()) == 1
 
 
-def test_the_face_of_the_board_is_where_its_normal_points() -> None:
+def test_the_face_of_the_board_is_where_its_normal_points():
     view = seen(35.0)
     left, right = view.pixels_px[:9:8], view.pixels_px[-9::8]
     heights = np.abs(right[:, 1] - left[:, 1])
@@ -174,13 +170,13 @@ def test_the_face_of_the_board_is_where_its_normal_points() -> None:
     assert covered(view).tilts["left" if nearer_right else "right"] == 1
 
 
-def test_distance_is_told_by_the_share_of_the_picture() -> None:
+def test_distance_is_told_by_the_share_of_the_picture():
     assert covered(seen(at=(0, 0, 0.25))).distances["near"] == 1
     assert covered(seen(at=(0, 0, 0.45))).distances["middle"] == 1
     assert covered(seen(at=(0, 0, 0.9))).distances["far"] == 1
 
 
-def test_what_is_missing_is_said_until_nothing_is() -> None:
+def test_what_is_missing_is_said_until_nothing_is():
     few = covered(seen())
     assert "1 views of the board" in few.missing[0]
     assert any("upper left corner" in sentence for sentence in few.missing)
@@ -194,7 +190,7 @@ def test_what_is_missing_is_said_until_nothing_is() -> None:
     assert covered(*every).share > 0.7
 
 
-def test_counts_are_those_of_all_corners() -> None:
+def test_counts_are_those_of_all_corners():
     coverage = covered(seen(), seen(35.0))
     assert coverage.counts.sum() == 108
     assert covered().share == 0.0
@@ -213,7 +209,7 @@ def calibrated_over_the_picture(model: str, count: int = 12, *, truth: str = "")
 LENS = calibrated_over_the_picture("pinhole")
 
 
-def test_the_slopes_of_far_points_are_those_of_their_pixels() -> None:
+def test_the_slopes_of_far_points_are_those_of_their_pixels():
     camera, pixels = CAMERAS["plumb_bob"], np.array([[100.0, 80.0], [900.0, 600.0]])
     rays = camera.rays(pixels)
     lens, turn = far_point_slopes(camera, pixels)
@@ -227,21 +223,21 @@ def test_the_slopes_of_far_points_are_those_of_their_pixels() -> None:
         np.testing.assert_allclose(turn[:, :, axis], (ahead - behind) / 2e-6, rtol=1e-5, atol=1e-3)
 
 
-def test_the_projection_is_surest_where_corners_are_and_less_sure_at_the_edge() -> None:
+def test_the_projection_is_surest_where_corners_are_and_less_sure_at_the_edge():
     grid = projection_uncertainty(LENS, columns=9, rows=7)
     assert grid.sigma_px.shape == (7, 9)
     assert (grid.x_px[0], grid.x_px[-1], grid.y_px[-1]) == (0.0, SIZE_PX[0] - 1.0, SIZE_PX[1] - 1.0)
     assert grid.sigma_px.min() < 0.3 < 2.0 * np.median(grid.sigma_px) < 2.0 * grid.sigma_px.max()
 
 
-def test_a_shift_of_the_principal_point_that_a_rotation_undoes_is_nearly_no_uncertainty() -> None:
+def test_a_shift_of_the_principal_point_that_a_rotation_undoes_is_nearly_no_uncertainty():
     matrix = np.zeros((4, 4))
     matrix[2, 2] = 100.0  # 10 px
     camera = replace(LENS.camera, covariance=CameraCovariance(LENS.camera.parameter_names, matrix))
     assert np.median(projection_uncertainty(replace(LENS, camera=camera)).sigma_px) < 2.0
 
 
-def test_residuals_of_the_true_model_are_noise() -> None:
+def test_residuals_of_the_true_model_are_noise():
     field = residual_field(LENS)
     assert not field.systematic
     assert abs(field.neighbour_correlation) < 0.15
@@ -249,7 +245,7 @@ def test_residuals_of_the_true_model_are_noise() -> None:
     assert field.sentence == "The residuals show no pattern that is more than noise."
 
 
-def test_a_pattern_that_all_views_share_is_more_than_noise() -> None:
+def test_a_pattern_that_all_views_share_is_more_than_noise():
     def off(view: LensView) -> LensView:
         across = np.sin(view.corners.pixels_px / 150.0)
         return replace(view, residuals_px=view.residuals_px + 0.1 * across)
@@ -260,25 +256,24 @@ def test_a_pattern_that_all_views_share_is_more_than_noise() -> None:
     assert f"the views share a pattern of {field.systematic_px:.3f} px over the picture" in field.sentence
 
 
-def test_residuals_of_a_model_that_is_too_simple_are_alike_in_neighbours() -> None:
+def test_residuals_of_a_model_that_is_too_simple_are_alike_in_neighbours():
     field = residual_field(calibrated_over_the_picture("pinhole", 25, truth="plumb_bob"))
     assert field.neighbour_correlation > 0.5
     assert "neighbouring corners of a view err alike" in field.sentence
 
 
-def test_halves_of_the_views_agree_for_the_true_model() -> None:
+def test_halves_of_the_views_agree_for_the_true_model():
     agreeing = split_difference(LENS)
     assert not isinstance(agreeing, Unsolvable)
     assert agreeing.agrees
     assert agreeing.apart_px.shape == agreeing.expected_px.shape == (10, 16)
 
 
-def test_seven_views_are_not_split() -> None:
+def test_seven_views_are_not_split():
     answer = split_difference(replace(LENS, views=LENS.views[:7]))
-    assert isinstance(answer, Unsolvable)
     assert "7 views cannot be calibrated in halves, 8 can" in answer.reason
 
 
 @pytest.mark.parametrize("columns", [2, 5])
-def test_grids_have_the_wanted_size(columns: int) -> None:
+def test_grids_have_the_wanted_size(columns):
     assert residual_field(LENS, columns=columns, rows=3).means_px.shape == (3, columns, 2)

@@ -74,7 +74,7 @@ def points_ahead() -> np.ndarray:
     return rng.uniform([-3.0, -2.0, 4.0], [3.0, 2.0, 9.0], (40, 3))
 
 
-def test_it_projects_with_the_slope_of_its_projection(camera: Camera) -> None:
+def test_it_projects_with_the_slope_of_its_projection(camera):
     points, step_m = points_ahead(), 1e-5
     pixels, jacobian = camera.project_with_jacobian(points)
     columns = [
@@ -87,14 +87,14 @@ def test_it_projects_with_the_slope_of_its_projection(camera: Camera) -> None:
     assert camera.is_distorted
 
 
-def test_its_pixels_move_with_its_coefficient(camera: Camera) -> None:
+def test_its_pixels_move_with_its_coefficient(camera):
     points, step = points_ahead(), 1e-6 * np.eye(5)[4]
     moved = [camera.with_parameters(camera.parameters + way * step).project(points) for way in (1.0, -1.0)]
     slopes = camera.parameter_planes(points.T)
     np.testing.assert_allclose(slopes[4].T, (moved[0] - moved[1]) / 2e-6, atol=1e-4)
 
 
-def test_a_point_lies_on_the_ray_of_its_pixel(camera: Camera) -> None:
+def test_a_point_lies_on_the_ray_of_its_pixel(camera):
     points = points_ahead()
     directions = points / np.linalg.norm(points, axis=1, keepdims=True)
     np.testing.assert_allclose(camera.rays(camera.project(points)), directions, atol=1e-12)
@@ -102,7 +102,7 @@ def test_a_point_lies_on_the_ray_of_its_pixel(camera: Camera) -> None:
     assert camera.sees(points).tolist() == camera.in_image(camera.project(points)).tolist()
 
 
-def test_pairs_clicked_through_it_are_solved(camera: Camera) -> None:
+def test_pairs_clicked_through_it_are_solved(camera):
     simulated = simulate_pairs(20, rng=np.random.default_rng(4), camera=camera, outlier_share=0.2)
     calibration = calibrate_pairs(simulated.pairs, simulated.camera, MEASURED).unwrap()
     error = simulated.camera_from_radar.error_from(calibration.camera_from_radar)
@@ -110,13 +110,13 @@ def test_pairs_clicked_through_it_are_solved(camera: Camera) -> None:
     assert in_sigmas < np.sqrt(calibration.covariance_quantile)
 
 
-def test_opencv_solves_it_from_undistorted_points(camera: Camera) -> None:
+def test_opencv_solves_it_from_undistorted_points(camera):
     simulated = simulate_pairs(20, rng=np.random.default_rng(3), noise="none", camera=camera)
     solution = solve_pnp_ransac(simulated.points_radar_m, simulated.pixels_px, camera, threshold_px=1.0)
     assert solution.inliers.all()
 
 
-def test_files_and_formats_that_have_a_name_for_it_store_it(camera: Camera, file: CalibrationFile) -> None:
+def test_files_and_formats_that_have_a_name_for_it_store_it(camera, file):
     again = read_camera(camera_info_text(camera))
     assert (again.model, again.distortion.tolist()) == ("division", [-0.2])
     k = camera.matrix_px.ravel().tolist()
@@ -128,9 +128,7 @@ def test_files_and_formats_that_have_a_name_for_it_store_it(camera: Camera, file
     assert (imported.camera.model, imported.camera.distortion.tolist()) == ("division", [-0.2])
 
 
-def test_a_recording_needs_a_name_for_it_in_camera_info(
-    camera: Camera, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_recording_needs_a_name_for_it_in_camera_info(camera, tmp_path, monkeypatch):
     options = SimulationOptions(camera_model="division", placements=1, width_px=160, height_px=90)
     data = write_recording(simulate(options), tmp_path / "named")
     with open_recording(data) as recording:
@@ -143,13 +141,13 @@ def test_a_recording_needs_a_name_for_it_in_camera_info(
     assert not (tmp_path / "unnamed").exists()
 
 
-def test_a_format_without_a_name_for_it_refuses_it_with_a_clear_error(file: CalibrationFile) -> None:
+def test_a_format_without_a_name_for_it_refuses_it_with_a_clear_error(file):
     for name, title in (("kalibr", "Kalibr"), ("opencv", "OpenCV")):
         with pytest.raises(InputError, match=f"{title} has no name for the lens model division; json and matlab"):
             export(file, name)
 
 
-def test_its_pictures_are_rectified_with_maps(file: CalibrationFile) -> None:
+def test_its_pictures_are_rectified_with_maps(file):
     camera = file.calibration.camera
     (maps,) = export(file, "kitti").extra_files
     arrays = np.load(io.BytesIO(maps.data), allow_pickle=False)

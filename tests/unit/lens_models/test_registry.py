@@ -11,7 +11,7 @@ from calib_core.errors import InputError
 from calib_core.interchange import camera_info_text, read_camera
 from calib_core.interchange.own.documents import CameraDocument
 from calib_core.lens_models.brown_conrady import PLUMB_BOB
-from calib_core.lens_models.lens_model import Elsewhere, LensModel, TypicalLens
+from calib_core.lens_models.lens_model import TypicalLens
 from calib_core.lens_models.registry import LENS_MODELS, lenses_named, names_in, opencv_lens, written_lens
 from calib_core.synthetic import SimulationOptions, typical_camera
 
@@ -19,7 +19,7 @@ LENSES = list(LENS_MODELS.values())
 each_lens = pytest.mark.parametrize("lens", LENSES, ids=list(LENS_MODELS))
 
 
-def test_names_are_keys_and_no_other_lens_is_read_from_them() -> None:
+def test_names_are_keys_and_no_other_lens_is_read_from_them():
     assert [lens.name for lens in LENSES] == list(LENS_MODELS)
     in_files = [name for lens in LENSES for name in lens.names_in_files]
     in_messages = [name for lens in LENSES for name in lens.names_in_messages]
@@ -28,7 +28,7 @@ def test_names_are_keys_and_no_other_lens_is_read_from_them() -> None:
     assert [name for name in in_files + in_messages if name != name.lower()] == []
 
 
-def test_the_command_line_and_the_files_accept_what_is_registered() -> None:
+def test_the_command_line_and_the_files_accept_what_is_registered():
     """The published schemas follow; test_formats_page.py says how to regenerate them."""
     (camera_model,) = (field for field in fields(SimulationOptions) if field.name == "camera_model")
     for taken in (CameraModel, camera_model.type, CameraDocument.__annotations__["model"]):
@@ -36,7 +36,7 @@ def test_the_command_line_and_the_files_accept_what_is_registered() -> None:
 
 
 @each_lens
-def test_a_lens_is_read_by_its_own_name_and_by_those_we_write(lens: LensModel) -> None:
+def test_a_lens_is_read_by_its_own_name_and_by_those_we_write(lens):
     assert lens.name in lens.names_in_files
     known = {name: other for other in LENSES for name in other.names_in_files}
     read = {row.where: known[row.name] for row in lens.names_elsewhere if row.where != "colmap"}
@@ -45,12 +45,12 @@ def test_a_lens_is_read_by_its_own_name_and_by_those_we_write(lens: LensModel) -
 
 
 @each_lens
-def test_a_typical_lens_is_distorted_unless_it_cannot_be(lens: LensModel) -> None:
+def test_a_typical_lens_is_distorted_unless_it_cannot_be(lens):
     assert typical_camera(lens.name).is_distorted == bool(lens.coefficients)
 
 
 @each_lens
-def test_the_camera_info_we_write_projects_points_as_the_camera_does(lens: LensModel) -> None:
+def test_the_camera_info_we_write_projects_points_as_the_camera_does(lens):
     camera, points = typical_camera(lens.name), np.array([[0.3, -0.2, 2.0]])
     if any(row.where == "camera_info" for row in lens.names_elsewhere):
         np.testing.assert_array_equal(read_camera(camera_info_text(camera)).project(points), camera.project(points))
@@ -60,7 +60,7 @@ def test_the_camera_info_we_write_projects_points_as_the_camera_does(lens: LensM
 
 
 @each_lens
-def test_without_distortion_a_ray_lands_where_its_angle_says(lens: LensModel) -> None:
+def test_without_distortion_a_ray_lands_where_its_angle_says(lens):
     angles_rad = np.deg2rad([5.0, 25.0, 50.0])
     points = np.array([np.sin(angles_rad), np.zeros(3), np.cos(angles_rad)])
     for count in lens.counts:
@@ -71,7 +71,7 @@ def test_without_distortion_a_ray_lands_where_its_angle_says(lens: LensModel) ->
 
 
 @each_lens
-def test_unprojecting_the_image_plane_gives_the_original_rays(lens: LensModel) -> None:
+def test_unprojecting_the_image_plane_gives_the_original_rays(lens):
     distortion = np.array(lens.typical.distortion)
     points = np.random.default_rng(2).uniform([-2.0, -2.0, 3.0], [2.0, 2.0, 5.0], (30, 3))
     plane, _ = lens.project(np.ascontiguousarray(points.T), distortion)
@@ -92,7 +92,7 @@ def test_unprojecting_the_image_plane_gives_the_original_rays(lens: LensModel) -
         ({"typical": TypicalLens((0.1,))}, "the typical lens has 1 coefficient"),
     ],
 )
-def test_a_lens_model_that_contradicts_itself_is_refused(changes, reason) -> None:
+def test_a_lens_model_that_contradicts_itself_is_refused(changes, reason):
     with pytest.raises(ValueError, match=reason):
         replace(PLUMB_BOB, **changes)
 
@@ -120,9 +120,7 @@ D = [-0.3, 0.1, 0.001, -0.002, 0.01, 0.2, 0.03, 0.004]
         ("equidistant", D[:4], "foxglove", "kannala_brandt", D[:4]),
     ],
 )
-def test_a_lens_is_written_with_the_name_the_format_uses(
-    model: str, distortion: list[float], where: Elsewhere, name: str, coefficients: list[float]
-) -> None:
+def test_a_lens_is_written_with_the_name_the_format_uses(model, distortion, where, name, coefficients):
     written = written_lens(LENS_MODELS[model], np.array(distortion), where)
     assert (written.name, list(written.coefficients)) == (name, coefficients)
 
@@ -130,9 +128,7 @@ def test_a_lens_is_written_with_the_name_the_format_uses(
 @pytest.mark.parametrize(
     ("model", "distortion", "missing"), [("plumb_bob", D[:5], "k3"), ("rational_polynomial", D, "k3 to k6")]
 )
-def test_a_coefficient_that_cannot_be_stored_is_never_dropped(
-    model: str, distortion: list[float], missing: str
-) -> None:
+def test_a_coefficient_that_cannot_be_stored_is_never_dropped(model, distortion, missing):
     with pytest.raises(InputError) as refusal:
         written_lens(LENS_MODELS[model], np.array(distortion), "kalibr")
     assert str(refusal.value) == (
@@ -141,7 +137,7 @@ def test_a_coefficient_that_cannot_be_stored_is_never_dropped(
     )
 
 
-def test_a_name_may_stand_for_several_lenses() -> None:
+def test_a_name_may_stand_for_several_lenses():
     assert [lens.name for lens in lenses_named("colmap", "FULL_OPENCV")] == ["plumb_bob", "rational_polynomial"]
     assert lenses_named("colmap", "OMNI") == ()
     assert names_in("camera_info") == ("plumb_bob", "rational_polynomial", "equidistant")
@@ -151,5 +147,5 @@ def test_a_name_may_stand_for_several_lenses() -> None:
     ("count", "model"),
     [(0, "pinhole"), (1, "plumb_bob"), (5, "plumb_bob"), (6, "rational_polynomial"), (14, "rational_polynomial")],
 )
-def test_opencv_distinguishes_its_lenses_by_the_number_of_coefficients(count: int, model: str) -> None:
+def test_opencv_distinguishes_its_lenses_by_the_number_of_coefficients(count, model):
     assert opencv_lens(count).name == model

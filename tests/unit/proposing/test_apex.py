@@ -27,7 +27,7 @@ def _found(image: np.ndarray, near_px: np.ndarray, **options: float) -> Apex:
     return answer
 
 
-def test_the_apex_is_found_below_a_pixel_at_every_width() -> None:
+def test_the_apex_is_found_below_a_pixel_at_every_width():
     for width_px in (16.0, 30.0, 60.0, 120.0, 180.0):
         look, behind, rng = _look(width_px)
         apex = _found(picture(look, behind, rng), look.apex_px + np.array([5.0, -4.0]))
@@ -36,7 +36,7 @@ def test_the_apex_is_found_below_a_pixel_at_every_width() -> None:
 
 
 @pytest.mark.slow
-def test_errors_are_as_large_as_their_covariance_says() -> None:
+def test_errors_are_as_large_as_their_covariance_says():
     squares = []
     for number in range(60):
         rng = np.random.default_rng([31, number])
@@ -51,7 +51,7 @@ def test_errors_are_as_large_as_their_covariance_says() -> None:
     assert 0.80 < inside[1] < 0.99
 
 
-def test_the_given_pixel_does_not_pull_the_apex() -> None:
+def test_the_given_pixel_does_not_pull_the_apex():
     look, behind, rng = _look()
     image = picture(look, behind, rng)
     first = _found(image, look.apex_px)
@@ -62,14 +62,14 @@ def test_the_given_pixel_does_not_pull_the_apex() -> None:
         assert isinstance(answer, NoApex) or np.hypot(*(answer.pixel_px - first.pixel_px)) < 0.05
 
 
-def test_an_apex_beyond_reach_is_not_taken() -> None:
+def test_an_apex_beyond_reach_is_not_taken():
     look, behind, rng = _look()
     image = picture(look, behind, rng)
     assert isinstance(find_apex(image, look.apex_px + np.array([18.0, 0.0])), NoApex)
     assert isinstance(find_apex(image, look.apex_px + np.array([18.0, 0.0]), reach_px=25.0), Apex)
 
 
-def test_turning_flipping_and_moving_the_picture_turns_flips_and_moves_the_apex() -> None:
+def test_turning_flipping_and_moving_the_picture_turns_flips_and_moves_the_apex():
     look, behind, rng = _look()
     image = picture(look, behind, rng)
     last = image.shape[1] - 1.0
@@ -83,7 +83,7 @@ def test_turning_flipping_and_moving_the_picture_turns_flips_and_moves_the_apex(
     assert moved == pytest.approx(apex + np.array([6.0, 13.0]), abs=0.08)
 
 
-def test_exposure_and_colour_do_not_move_the_apex() -> None:
+def test_exposure_and_colour_do_not_move_the_apex():
     look, behind, rng = _look()
     quiet = replace(look, noise_grey=0.0, jpeg_quality=None)
     apex = _found(picture(quiet, behind, rng), look.apex_px + 3.0).pixel_px
@@ -93,7 +93,7 @@ def test_exposure_and_colour_do_not_move_the_apex() -> None:
     assert _found(coloured, look.apex_px + 3.0).pixel_px == pytest.approx(apex, abs=1e-6)
 
 
-def test_a_reflector_at_the_rim_of_the_picture_is_found_or_refused() -> None:
+def test_a_reflector_at_the_rim_of_the_picture_is_found_or_refused():
     look, behind, rng = _look()
     image = picture(look, behind, rng)
     column, row = (int(v) for v in look.apex_px)
@@ -124,7 +124,7 @@ def _checkerboard(image: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize("draw", [_edge, _line, _box_corner, _t_junction, _checkerboard])
-def test_edges_lines_and_other_corners_are_refused(draw) -> None:
+def test_edges_lines_and_other_corners_are_refused(draw):
     for turn in (0.0, 17.0, 40.0):
         image = np.full((200, 200), 120, np.uint8)
         draw(image)
@@ -139,7 +139,7 @@ def test_edges_lines_and_other_corners_are_refused(draw) -> None:
 
 
 @pytest.mark.slow
-def test_backgrounds_and_the_outer_tips_of_a_reflector_are_refused() -> None:
+def test_backgrounds_and_the_outer_tips_of_a_reflector_are_refused():
     false = 0
     for number in range(30):
         rng = np.random.default_rng([77, number])
@@ -151,7 +151,7 @@ def test_backgrounds_and_the_outer_tips_of_a_reflector_are_refused() -> None:
     assert not any(isinstance(find_apex(picture(look, behind, rng), tip), Apex) for tip in tips)
 
 
-def test_two_reflectors_within_reach_are_refused_by_name() -> None:
+def test_two_reflectors_within_reach_are_refused_by_name():
     look, behind, rng = _look(17.0)
     one = replace(look, apex_px=np.array([92.0, 100.0]), noise_grey=0.0, jpeg_quality=None)
     image = picture(one, behind, rng)
@@ -161,7 +161,7 @@ def test_two_reflectors_within_reach_are_refused_by_name() -> None:
     assert answer.reason.startswith("two corners of three sheets, 18 px apart")
 
 
-def test_a_corner_larger_than_the_reflector_is_refused() -> None:
+def test_a_corner_larger_than_the_reflector_is_refused():
     look, behind, rng = _look(180.0)
     image = picture(look, behind, rng)
     answer = find_apex(image, look.apex_px, size_px=15.0)

@@ -33,7 +33,7 @@ def first_errors_px(views: tuple[DwellView, ...], frames: DrawnFrames) -> list[f
     ]
 
 
-def test_the_reflector_is_the_strongest_candidate_at_its_apex_and_only_frames_of_the_dwells_are_decoded() -> None:
+def test_the_reflector_is_the_strongest_candidate_at_its_apex_and_only_frames_of_the_dwells_are_decoded():
     frames = DrawnFrames(ONE_BY_ONE)
     views = views_of(frames)
     assert max(first_errors_px(views, frames)) < 1.0
@@ -43,12 +43,12 @@ def test_the_reflector_is_the_strongest_candidate_at_its_apex_and_only_frames_of
     assert set(frames.asked) == {int(number) for view in views for number in view.frames}
 
 
-def test_candidates_move_with_the_pictures() -> None:
+def test_candidates_move_with_the_pictures():
     frames = DrawnFrames(ONE_BY_ONE, moved_px=(8, -4))
     assert max(first_errors_px(views_of(frames), frames)) < 1.0
 
 
-def test_light_that_changes_moves_no_candidate() -> None:
+def test_light_that_changes_moves_no_candidate():
     seconds = np.arange(50)
     bright = 0.85 * np.exp(0.2 * np.sin(seconds / 7.0))
     gains = [(0.95 * gain, gain, 1.06 * gain) for gain in bright.tolist()]
@@ -57,14 +57,14 @@ def test_light_that_changes_moves_no_candidate() -> None:
     assert max(first_errors_px(views_of(frames), frames)) < 1.0
 
 
-def test_people_who_stand_or_pass_are_no_candidates_before_the_reflector() -> None:
+def test_people_who_stand_or_pass_are_no_candidates_before_the_reflector():
     standing = [(8.0 * k, 8.0 * k + 7.0, left, 70, 32, 110) for k, left in enumerate([100, 40, 180, 30, 120])]
     passing = [(8.0 * k + 2.0, 8.0 * k + 3.0, 30 + 45 * k, 20, 40, 150) for k in range(5)]
     frames = DrawnFrames(ONE_BY_ONE, people=[*standing, *passing])
     assert max(first_errors_px(views_of(frames), frames)) < 1.0
 
 
-def test_two_reflectors_that_stand_at_once_are_told_apart() -> None:
+def test_two_reflectors_that_stand_at_once_are_told_apart():
     places = [(60.3, 60.8), (150.6, 120.2), (250.1, 80.7), (100.4, 150.1), (210.8, 140.4), (40.2, 120.3)]
     dwells = tuple(DrawnDwell(8.0 * k, 8.0 * k + 14.0, apex_px) for k, apex_px in enumerate(places))
     frames = DrawnFrames(dwells)
@@ -75,14 +75,14 @@ def test_two_reflectors_that_stand_at_once_are_told_apart() -> None:
         assert all(other.strength < 0.5 * view.candidates[0].strength for other in view.candidates[1:])
 
 
-def test_a_broken_frame_is_left_out() -> None:
+def test_a_broken_frame_is_left_out():
     frames = DrawnFrames(ONE_BY_ONE, broken=frozenset({4, 6}))
     views = views_of(frames)
     assert not {4, 6} & set(views[0].frames.tolist())
     assert max(first_errors_px(views, frames)) < 1.0
 
 
-def test_a_dwell_without_frames_has_no_candidate() -> None:
+def test_a_dwell_without_frames_has_no_candidate():
     frames = DrawnFrames(ONE_BY_ONE)
     later = placements_of([*ONE_BY_ONE, DrawnDwell(500.0, 506.0, (50.0, 50.0))])
     last = dwell_views(later, frames, CAMERA)[-1]
@@ -92,18 +92,18 @@ def test_a_dwell_without_frames_has_no_candidate() -> None:
 
 
 @pytest.mark.parametrize("count", [1, 2])
-def test_too_few_dwells_show_no_change(count: int) -> None:
+def test_too_few_dwells_show_no_change(count):
     assert not any(view.candidates for view in views_of(DrawnFrames(ONE_BY_ONE[:count])))
 
 
-def test_progress_brings_candidates_early_and_can_be_stopped() -> None:
+def test_progress_brings_candidates_early_and_can_be_stopped():
     frames, seen = DrawnFrames(ONE_BY_ONE), list[ViewProgress]()
     views = dwell_views(placements_of(ONE_BY_ONE), frames, CAMERA, progress=seen.append, stopped=lambda: len(seen) == 4)
     assert [one.done for one in seen] == [1, 2, 3, 4]
     assert [bool(view.candidates) for view in views] == [True] * 4 + [False] * (len(views) - 4)
 
 
-def test_pictures_of_dwells_long_ago_are_forgotten_and_their_candidates_kept() -> None:
+def test_pictures_of_dwells_long_ago_are_forgotten_and_their_candidates_kept():
     dwells = [DrawnDwell(8.0 * k, 8.0 * k + 2.5, (60.3 + 6.0 * k, 60.8 + 70.0 * (k % 2))) for k in range(27)]
     views = views_of(DrawnFrames(dwells))
     assert [bool(view.stills) for view in views] == [False] * 3 + [True] * 24
@@ -142,19 +142,19 @@ def view(numbers: np.ndarray = NUMBERS) -> DwellView:
 
 
 @pytest.mark.parametrize("off_px", [(0.5, -0.4), (-1.8, 1.5), (3.0, 2.0)])
-def test_a_click_near_the_apex_is_averaged_over_all_clear_frames(off_px: tuple[float, float]) -> None:
+def test_a_click_near_the_apex_is_averaged_over_all_clear_frames(off_px):
     found = averaged_over_dwell(view(), FRAMES, CLICKED, APEX_PX + off_px)
     assert found.frames == len(NUMBERS)
     assert np.hypot(*(found.pixel_px - APEX_PX)) < min(0.3, np.hypot(*off_px))
 
 
-def test_the_answer_does_not_depend_on_the_click() -> None:
+def test_the_answer_does_not_depend_on_the_click():
     one = averaged_over_dwell(view(), FRAMES, CLICKED, APEX_PX + np.array([1.0, 1.0]))
     other = averaged_over_dwell(view(), FRAMES, CLICKED, APEX_PX - np.array([1.3, 0.4]))
     assert np.hypot(*(one.pixel_px - other.pixel_px)) < 0.05
 
 
-def test_noise_is_averaged_but_never_below_what_all_frames_share() -> None:
+def test_noise_is_averaged_but_never_below_what_all_frames_share():
     noisy = Shaken(sigma_grey=8.0)
     alone = averaged_over_dwell(view(NUMBERS[:0]), noisy, CLICKED, APEX_PX)
     averaged = averaged_over_dwell(view(), noisy, CLICKED, APEX_PX)
@@ -163,7 +163,7 @@ def test_noise_is_averaged_but_never_below_what_all_frames_share() -> None:
     assert averaged.sigma_px > 0.12
 
 
-def test_a_shaking_camera_is_followed_and_widens_the_sigma() -> None:
+def test_a_shaking_camera_is_followed_and_widens_the_sigma():
     shifts_px = {int(number): ((-1) ** k, (k % 3) - 1) for k, number in enumerate(NUMBERS)} | {CLICKED: (0, 0)}
     found = averaged_over_dwell(view(), Shaken(shifts_px), CLICKED, APEX_PX + np.array([0.5, 0.5]))
     still = averaged_over_dwell(view(), FRAMES, CLICKED, APEX_PX + np.array([0.5, 0.5]))
@@ -172,20 +172,20 @@ def test_a_shaking_camera_is_followed_and_widens_the_sigma() -> None:
     assert found.sigma_px > 1.5 * still.sigma_px
 
 
-def test_frames_of_another_picture_do_not_enter() -> None:
+def test_frames_of_another_picture_do_not_enter():
     shifts_px = {int(number): (25, 0) for number in NUMBERS[4:]}
     found = averaged_over_dwell(view(), Shaken(shifts_px), CLICKED, APEX_PX)
     assert found.frames == 4
     assert np.hypot(*(found.pixel_px - APEX_PX)) < 0.3
 
 
-def test_frames_in_which_somebody_stands_before_it_do_not_enter() -> None:
+def test_frames_in_which_somebody_stands_before_it_do_not_enter():
     hidden = replace(FRAMES, people=[(3.0, 6.0, 120, 60, 60, 80)])
     found = averaged_over_dwell(view(), hidden, int(NUMBERS[0]), APEX_PX)
     assert found.frames == int((NUMBERS < 6).sum())
 
 
-def test_a_frame_that_cannot_be_read_is_left_out_unless_it_was_clicked() -> None:
+def test_a_frame_that_cannot_be_read_is_left_out_unless_it_was_clicked():
     broken = replace(FRAMES, broken=frozenset({int(NUMBERS[0])}))
     found = averaged_over_dwell(view(), broken, CLICKED, APEX_PX)
     assert found.frames == len(NUMBERS) - 1
@@ -193,7 +193,7 @@ def test_a_frame_that_cannot_be_read_is_left_out_unless_it_was_clicked() -> None
         averaged_over_dwell(view(), broken, int(NUMBERS[0]), APEX_PX)
 
 
-def test_where_no_apex_is_the_click_is_all_there_is() -> None:
+def test_where_no_apex_is_the_click_is_all_there_is():
     assert averaged_over_dwell(view(), FRAMES, CLICKED, np.array([280.0, 180.0])) is None
     assert averaged_over_dwell(view(), FRAMES, CLICKED, APEX_PX + np.array([0.0, 9.0])) is None
 
@@ -229,7 +229,7 @@ def rough(view: DwellView, apex_px: tuple[float, float]) -> DwellView:
     return replace(view, candidates=(wrong, right))
 
 
-def test_the_look_is_found_at_every_range_and_below_a_pixel(views: tuple[DwellView, ...]) -> None:
+def test_the_look_is_found_at_every_range_and_below_a_pixel(views):
     look = look_at(views[0], LOOKED_AT.dwells[0].apex_px)
     blobs = [rough(view, dwell.apex_px) for view, dwell in zip(views, LOOKED_AT.dwells, strict=True)]
     for view, dwell in zip(with_look(blobs, [look], LOOKED_AT, CAMERA), LOOKED_AT.dwells, strict=True):
@@ -240,7 +240,7 @@ def test_the_look_is_found_at_every_range_and_below_a_pixel(views: tuple[DwellVi
 
 
 @pytest.mark.parametrize("thought_m", [0.08, 0.24, 0.6])
-def test_a_click_shows_how_wide_the_reflector_is(thought_m: float) -> None:
+def test_a_click_shows_how_wide_the_reflector_is(thought_m):
     seen = dwell_views(placements_of(LOOKED_AT.dwells), LOOKED_AT, CAMERA, reflector_m=thought_m)
     look = look_at(seen[0], LOOKED_AT.dwells[0].apex_px)
     assert look.larger * thought_m == pytest.approx(0.24, rel=0.4)
@@ -249,7 +249,7 @@ def test_a_click_shows_how_wide_the_reflector_is(thought_m: float) -> None:
         assert np.hypot(*(view.candidates[0].pixel_px - dwell.apex_px)) < 1.0
 
 
-def test_a_click_beside_the_apex_is_carried_as_it_is(views: tuple[DwellView, ...]) -> None:
+def test_a_click_beside_the_apex_is_carried_as_it_is(views):
     low_px = 0.3
     clicked = np.array(LOOKED_AT.dwells[0].apex_px) + np.array([0.0, low_px * views[0].width_px])
     look = look_of(views[0], LOOKED_AT, clicked)
@@ -259,11 +259,11 @@ def test_a_click_beside_the_apex_is_carried_as_it_is(views: tuple[DwellView, ...
     assert np.hypot(*(view.candidates[0].pixel_px - wanted)) < 1.5
 
 
-def test_without_a_look_nothing_changes(views: tuple[DwellView, ...]) -> None:
+def test_without_a_look_nothing_changes(views):
     assert with_look(views, [], LOOKED_AT, CAMERA) == views
 
 
-def test_a_dwell_whose_frames_cannot_be_read_has_no_look(views: tuple[DwellView, ...]) -> None:
+def test_a_dwell_whose_frames_cannot_be_read_has_no_look(views):
     broken = replace(LOOKED_AT, broken=frozenset(views[0].frames.tolist()))
     assert look_of(views[0], broken, np.array(LOOKED_AT.dwells[0].apex_px)) is None
 
@@ -272,6 +272,6 @@ def test_a_dwell_whose_frames_cannot_be_read_has_no_look(views: tuple[DwellView,
 
 
 @given(st.integers(1, 14), st.integers(0, 2**32 - 1), st.sampled_from([np.uint8, np.uint16]))
-def test_the_median_is_numpys(count: int, seed: int, kind: type) -> None:
+def test_the_median_is_numpys(count, seed, kind):
     stack = np.random.default_rng(seed).integers(0, 255, (count, 4, 5, 3)).astype(kind)
     assert np.abs(stack_median(list(stack)) - np.median(stack, axis=0)).max() <= 0.5

@@ -27,13 +27,13 @@ def agreed(rays: CandidateRays, options: CalibrationOptions = OPTIONS) -> PoseAg
     return found
 
 
-def test_a_camera_half_a_metre_away_is_found_there() -> None:
+def test_a_camera_half_a_metre_away_is_found_there():
     drawn = draw_views(1, Drawing(count=16, offset_m=(0.0, 0.5, 0.1)))
     found = agreed(candidate_rays(drawn.views, drawn.camera, OPTIONS))
     assert found.camera_from_radar.inverse().translation_m[1] == pytest.approx(0.5, abs=0.25)
 
 
-def test_a_measured_camera_position_is_kept() -> None:
+def test_a_measured_camera_position_is_kept():
     drawn = draw_views(1, Drawing(count=8, offset_m=(0.0, 0.5, 0.1)))
     measured = CameraPositionPrior(position_m=(0.0, 0.5, 0.1), sigma_m=0.01)
     options = replace(OPTIONS, solving=SolvingOptions(camera_position=measured))
@@ -41,7 +41,7 @@ def test_a_measured_camera_position_is_kept() -> None:
     assert found.camera_from_radar.inverse().translation_m == pytest.approx([0.0, 0.5, 0.1], abs=0.05)
 
 
-def test_without_elevation_the_camera_is_found_above_the_plane_of_the_placements() -> None:
+def test_without_elevation_the_camera_is_found_above_the_plane_of_the_placements():
     """The radar reports what lies 1.2 m below it as if it lay at its own height, so the camera seems to be that much higher."""
     drawn = draw_views(2, Drawing(count=16, is_flat=True))
     rays = candidate_rays(drawn.views, drawn.camera, OPTIONS)
@@ -49,7 +49,7 @@ def test_without_elevation_the_camera_is_found_above_the_plane_of_the_placements
     assert agreed(rays).camera_from_radar.inverse().translation_m[2] == pytest.approx(1.25, abs=0.25)
 
 
-def test_the_noise_of_a_coarse_radar_is_noticed() -> None:
+def test_the_noise_of_a_coarse_radar_is_noticed():
     levels = [
         agreed(candidate_rays(draw_views(3, Drawing(noise=noise)).views, draw_views(3).camera, OPTIONS)).noise
         for noise in (0.3, 4.0)
@@ -57,7 +57,7 @@ def test_the_noise_of_a_coarse_radar_is_noticed() -> None:
     assert levels[0] < levels[1]
 
 
-def test_a_dwell_does_not_vouch_for_its_own_candidate() -> None:
+def test_a_dwell_does_not_vouch_for_its_own_candidate():
     drawn = draw_views(4, Drawing(count=8, decoys=0, clutter=0, listed_share=1.0))
     moved = replace(drawn.views[2].candidates[0], pixel_px=drawn.pixels[2] + [150.0, 100.0])
     views = [replace(view, candidates=(moved,)) if i == 2 else view for i, view in enumerate(drawn.views)]
@@ -66,7 +66,7 @@ def test_a_dwell_does_not_vouch_for_its_own_candidate() -> None:
     assert np.delete(found.probability[:, 0], 2).min() > 0.8
 
 
-def test_one_click_bounds_where_the_other_dwells_may_lie() -> None:
+def test_one_click_bounds_where_the_other_dwells_may_lie():
     drawn = draw_views(9, Drawing(count=8, decoys=0, clutter=0, listed_share=1.0))
     aside = [
         replace(view.candidates[0], pixel_px=view.candidates[0].pixel_px + np.array([0.0, 250.0]))
@@ -82,7 +82,7 @@ def test_one_click_bounds_where_the_other_dwells_may_lie() -> None:
     assert others[:, 1].max() < 0.1
 
 
-def test_a_click_on_what_the_radar_did_not_report_bounds_little() -> None:
+def test_a_click_on_what_the_radar_did_not_report_bounds_little():
     drawn = draw_views(9, Drawing(count=8, decoys=0, clutter=0, listed_share=1.0))
     click = drawn.click(2)
     rays = candidate_rays(drawn.views, drawn.camera, OPTIONS, confirmed=[replace(click, u_px=click.u_px + 300.0)])
@@ -90,7 +90,7 @@ def test_a_click_on_what_the_radar_did_not_report_bounds_little() -> None:
     assert np.delete(found.probability, 2, axis=0).max(axis=1).min() > 0.5
 
 
-def test_what_repeats_itself_at_one_place_counts_less() -> None:
+def test_what_repeats_itself_at_one_place_counts_less():
     drawn = draw_views(5, Drawing(count=10, decoys=2, clutter=1))
     rays = candidate_rays(drawn.views, drawn.camera, OPTIONS)
     true_px = drawn.pixels
@@ -106,7 +106,7 @@ def test_what_repeats_itself_at_one_place_counts_less() -> None:
     assert min(repeated) > 5.0 * float(np.median(moved))
 
 
-def test_a_click_while_two_reflectors_stand_covers_the_one_that_it_shows() -> None:
+def test_a_click_while_two_reflectors_stand_covers_the_one_that_it_shows():
     """All dwells of an even number last until the next one ends, and both reflectors are seen in each."""
     drawn = draw_views(6, Drawing(count=8, decoys=1, clutter=0, listed_share=1.0))
     views: list[DwellView] = []
@@ -124,7 +124,7 @@ def test_a_click_while_two_reflectors_stand_covers_the_one_that_it_shows() -> No
     assert np.linalg.norm(shown[0].pixel_px - drawn.pixels[3]) < 5.0 * shown[0].sigma_px
 
 
-def test_two_dwells_give_every_rotation_that_the_mounting_allows() -> None:
+def test_two_dwells_give_every_rotation_that_the_mounting_allows():
     drawn = draw_views(7, Drawing(count=2, decoys=0, clutter=0, listed_share=1.0))
     rays = candidate_rays(drawn.views, drawn.camera, OPTIONS)
     found = rotation_consensus(rays, mounting_prior(OPTIONS, is_flat=False))
@@ -132,7 +132,7 @@ def test_two_dwells_give_every_rotation_that_the_mounting_allows() -> None:
     assert np.einsum("hij,hkj->hik", found.rotations, found.rotations)[0] == pytest.approx(np.eye(3), abs=1e-9)
 
 
-def test_nothing_to_agree_on_is_none() -> None:
+def test_nothing_to_agree_on_is_none():
     drawn = draw_views(8, Drawing(count=3, decoys=0, clutter=0, listed_share=0.0))
     rays = candidate_rays(drawn.views, drawn.camera, OPTIONS)
     assert pose_agreement(rays, mounting_prior(OPTIONS, is_flat=False)) is None

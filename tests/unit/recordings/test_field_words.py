@@ -13,8 +13,6 @@ from calib_core.recordings.field_words import (
     SUBJECTS,
     UNITS_BY_SPELLING,
     MappedColumn,
-    Spelling,
-    Unit,
     column_meaning,
     is_plain,
     meaning_of,
@@ -30,50 +28,45 @@ MEASURED = {"length": "range", "angle": "azimuth", "speed": "doppler", "level": 
 
 
 @pytest.mark.parametrize("spelling", SPELLINGS, ids=lambda one: one.words)
-def test_a_spelling_means_the_same_as_a_column_and_as_a_field(spelling: Spelling) -> None:
+def test_a_spelling_means_the_same_as_a_column_and_as_a_field(spelling):
     for name in ("_".join(spelling.words.split()), "target." + ".".join(spelling.words.split())):
         column, field = column_meaning(name), meaning_of(name)
         assert column is not None
-        assert field is not None
         assert column.kind == field.kind == spelling.kind
         assert (field.rank, field.sigma, field.second) == (spelling.rank, False, False)
 
 
 @pytest.mark.parametrize("subject", sorted(SUBJECTS))
-def test_the_word_for_a_return_may_precede_columns_and_fields(subject: str) -> None:
+def test_the_word_for_a_return_may_precede_columns_and_fields(subject):
     column, field = column_meaning(f"{subject}.pos.x"), meaning_of(f"{subject}.pos.x")
     assert column is not None
-    assert field is not None
     assert column.quantity == field.quantity == "x"
     time = time_name(f"{subject}.timestamp")
-    assert time is not None
     assert time.quantity == "time"
 
 
-def test_no_words_are_spellings_of_two_kinds() -> None:
+def test_no_words_are_spellings_of_two_kinds():
     for spelling in SPELLINGS:
         (words,) = spelt([spelling])
         assert SPELT[words].kind == spelling.kind, spelling
 
 
 @pytest.mark.parametrize("spelling", AMBIGUOUS, ids=lambda one: one.words)
-def test_an_ambiguous_spelling_is_not_shared(spelling: Spelling) -> None:
+def test_an_ambiguous_spelling_is_not_shared(spelling):
     (words,) = spelt([spelling])
     assert words not in SPELT
     assert meaning_of(spelling.words) is not None
 
 
 @pytest.mark.parametrize(("word", "unit"), UNITS_BY_SPELLING.items())
-def test_a_unit_means_the_same_everywhere(word: str, unit: Unit) -> None:
+def test_a_unit_means_the_same_everywhere(word, unit):
     quantity = MEASURED[unit.dimension]
     written = f"{quantity} [{word}]"
     if quantity == "time":
         time = time_name(written)
-        assert time is not None
         assert (time.quantity, time.unit) == (quantity, unit.flag)
     else:
         column = table_meaning(written)
-        assert column is not None
         assert (column.kind, column.unit) == ("radial" if quantity == "doppler" else quantity, unit)
     assert unit_of_word(word) == unit
     if unit.dimension != "time":
@@ -90,12 +83,10 @@ def test_a_unit_means_the_same_everywhere(word: str, unit: Unit) -> None:
         ("rcs_dbm2", "dbsm"), ("azimuth_cdeg", "cdeg"), ("elevation°", "deg"), ("vx_mmps", "mmps"),
     ],
 )  # fmt: skip
-def test_a_unit_at_the_end_of_a_name_is_the_same_in_tables_and_messages(name: str, flag: str) -> None:
+def test_a_unit_at_the_end_of_a_name_is_the_same_in_tables_and_messages(name, flag):
     column, field = table_meaning(name), meaning_of(name)
     assert column is not None
-    assert field is not None
     assert column.unit == field.unit
-    assert field.unit is not None
     assert field.unit.flag == flag
 
 
@@ -104,7 +95,7 @@ def test_a_unit_at_the_end_of_a_name_is_the_same_in_tables_and_messages(name: st
     ["dx", "lat", "long", "latitude", "longitude", "position_latitude", "gps_x", "height", "altitude", "alpha", "t_x", "x1", "x2",
      "azimuth2", "ego_x", "they", "latest"],
 )  # fmt: skip
-def test_names_of_other_things_are_no_columns_of_returns(name: str) -> None:
+def test_names_of_other_things_are_no_columns_of_returns(name):
     assert table_meaning(name) is None
 
 
@@ -112,12 +103,12 @@ def test_names_of_other_things_are_no_columns_of_returns(name: str) -> None:
     ("name", "quantity", "rank"),
     [("theta", "azimuth", 4), ("angle", "azimuth", 5), ("phi", "azimuth", 3), ("height", "z", 1), ("lat", "y", 1)],
 )
-def test_messages_keep_their_ambiguous_names(name: str, quantity: str, rank: int) -> None:
+def test_messages_keep_their_ambiguous_names(name, quantity, rank):
     meaning = meaning_of(name)
     assert (meaning.quantity, meaning.rank) == (quantity, rank)
 
 
-def test_only_the_documented_spelling_is_plain() -> None:
+def test_only_the_documented_spelling_is_plain():
     names = ("range_m", "f_Range_m", "target.range", "sigma_range_m", "rng_m", "range_filtered", "range_std_m")
     found = {name: meaning for name in names if (meaning := column_meaning(name)) is not None}
     assert [name for name, meaning in found.items() if is_plain(name, meaning)] == [
@@ -129,7 +120,7 @@ def test_only_the_documented_spelling_is_plain() -> None:
     assert len(found) == 7
 
 
-def test_a_unit_with_a_long_s_in_a_comment_is_read_as_any_other() -> None:
+def test_a_unit_with_a_long_s_in_a_comment_is_read_as_any_other():
     unit = unit_in("[m/\u017f]", "speed")
     assert unit.scale == 1.0
 

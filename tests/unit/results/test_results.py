@@ -1,7 +1,6 @@
 """The methods of a result: unwrap, the summary, and the uncertainty in pixels."""
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -27,7 +26,7 @@ def solved(simulated: SimulatedPairs, options: CalibrationOptions | None = None)
     return calibrate_pairs(simulated.pairs, simulated.camera, options).unwrap()
 
 
-def test_unwrap_gives_the_calibration_or_raises_with_reason_and_hint(simulated: SimulatedPairs) -> None:
+def test_unwrap_gives_the_calibration_or_raises_with_reason_and_hint(simulated):
     calibration = solved(simulated)
     assert calibration.unwrap() is calibration
     unsolvable = calibrate_pairs(simulated.pairs[:3], simulated.camera)
@@ -40,7 +39,7 @@ def test_unwrap_gives_the_calibration_or_raises_with_reason_and_hint(simulated: 
 
 
 @pytest.mark.parametrize("method", ["default", "paper"])
-def test_a_calibration_prints_as_nine_lines(simulated: SimulatedPairs, method: str) -> None:
+def test_a_calibration_prints_as_nine_lines(simulated, method):
     lines = str(solved(simulated, CalibrationOptions(method=method))).splitlines()
     assert len(lines) == 9
     assert max(map(len, lines)) < 120
@@ -58,7 +57,7 @@ def test_a_calibration_prints_as_nine_lines(simulated: SimulatedPairs, method: s
         assert word in "\n".join(lines)
 
 
-def test_an_unsolvable_prints_its_reason_its_hint_and_the_clicks_without_radar() -> None:
+def test_an_unsolvable_prints_its_reason_its_hint_and_the_clicks_without_radar():
     text = str(Unsolvable("too-few-pairs", "2 of 4 pairs", "add two", (Unpaired("c3", "no-scan", "no scan", "wait"),)))
     assert text.splitlines() == [
         "No calibration (too-few-pairs): 2 of 4 pairs",
@@ -67,14 +66,14 @@ def test_an_unsolvable_prints_its_reason_its_hint_and_the_clicks_without_radar()
     ]
 
 
-def test_pixel_sigma_is_the_root_of_the_covariances_diagonal(simulated: SimulatedPairs) -> None:
+def test_pixel_sigma_is_the_root_of_the_covariances_diagonal(simulated):
     calibration = solved(simulated)
     covariance = calibration.pixel_covariance(POINT)[0]
     assert calibration.pixel_sigma(POINT)[0] == pytest.approx(np.sqrt(np.diag(covariance)))
     assert calibration.pixel_sigma(np.array([[-5.0, 0.0, 0.0]])) == pytest.approx(np.full((1, 2), np.nan), nan_ok=True)
 
 
-def test_the_pose_jacobian_is_that_of_finite_differences(simulated: SimulatedPairs) -> None:
+def test_the_pose_jacobian_is_that_of_finite_differences(simulated):
     calibration, step = solved(simulated), 1e-6
     jacobian = calibration.camera.pose_jacobian(calibration.camera_from_radar, POINT)[0]
     for k, error in enumerate(np.eye(6) * step):
@@ -83,13 +82,13 @@ def test_the_pose_jacobian_is_that_of_finite_differences(simulated: SimulatedPai
         assert jacobian[:, k] == pytest.approx(slope, rel=1e-5, abs=1e-4)
 
 
-def test_the_advice_of_a_calibration_is_computed_once_and_kept(simulated: SimulatedPairs) -> None:
+def test_the_advice_of_a_calibration_is_computed_once_and_kept(simulated):
     calibration = solved(simulated)
     assert calibration.next_placement is not None
     assert solved(simulated, CalibrationOptions(method="paper")).next_placement is None
 
 
-def test_arrays_become_pairs_that_give_the_same_pose(simulated: SimulatedPairs) -> None:
+def test_arrays_become_pairs_that_give_the_same_pose(simulated):
     points = np.array([pair.candidates[0].position_radar_m for pair in simulated.pairs])
     pixels = np.array([pair.pixel_px for pair in simulated.pairs])
     sigmas = np.array([pair.candidates[0].sigma_polar for pair in simulated.pairs])
@@ -121,14 +120,12 @@ def test_arrays_become_pairs_that_give_the_same_pose(simulated: SimulatedPairs) 
         (np.ones((2, 3)), np.zeros((2, 2)), {"sigma_polar": [0.1, 0.2, 0.0]}, "sigma_polar: every standard deviation"),
     ],
 )
-def test_arrays_that_make_no_pairs_are_refused_with_a_clear_error(
-    points: np.ndarray, pixels: np.ndarray, more: dict[str, object], words: str
-) -> None:
+def test_arrays_that_make_no_pairs_are_refused_with_a_clear_error(points, pixels, more, words):
     with pytest.raises(InputError, match=words):
-        pairs_from_arrays(points, pixels, **more)  # type: ignore[arg-type]
+        pairs_from_arrays(points, pixels, **more)
 
 
-def test_points_of_another_shape_are_refused(simulated: SimulatedPairs) -> None:
+def test_points_of_another_shape_are_refused(simulated):
     with pytest.raises(InputError, match="points_radar_m: expected an array of n x 3, got 3"):
         solved(simulated).pixel_sigma(np.array([5.0, 1.0, 0.0]))
 
@@ -136,18 +133,18 @@ def test_points_of_another_shape_are_refused(simulated: SimulatedPairs) -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (CalibrationOptions(method="magic"), "option method: unknown value 'magic'; choose default or paper"),  # type: ignore[arg-type]
+        (CalibrationOptions(method="magic"), "option method: unknown value 'magic'; choose default or paper"),
         (CalibrationOptions(noise=NoiseOptions(sigma_px=-3.0)), r"option noise\.sigma_px: -3 is out of range"),
-        (CalibrationOptions(noise=NoiseOptions(sigma_px="2")), r"option noise\.sigma_px: expected a number, got '2'"),  # type: ignore[arg-type]
+        (CalibrationOptions(noise=NoiseOptions(sigma_px="2")), r"option noise\.sigma_px: expected a number, got '2'"),
         ({"method": "paper"}, "options: expected CalibrationOptions, got dict"),
     ],
 )
-def test_invalid_options_are_refused_by_name(simulated: SimulatedPairs, options: Any, words: str) -> None:
+def test_invalid_options_are_refused_by_name(simulated, options, words):
     with pytest.raises(OptionError, match=words):
         calibrate_pairs(simulated.pairs, simulated.camera, options)
 
 
-def test_the_housing_is_less_certain_by_the_biases_of_the_angles(simulated: SimulatedPairs) -> None:
+def test_the_housing_is_less_certain_by_the_biases_of_the_angles(simulated):
     calibration = calibrate_pairs(simulated.pairs, simulated.camera).unwrap()
     added = calibration.housing_covariance - calibration.covariance
     about = calibration.camera_from_radar.rotation.T @ added[3:, 3:] @ calibration.camera_from_radar.rotation
@@ -161,12 +158,12 @@ def test_the_housing_is_less_certain_by_the_biases_of_the_angles(simulated: Simu
 LENGTHS = np.array([1.0, 2.0, 6.0])
 
 
-def test_rms_aed_and_cdsd_belong_together() -> None:
+def test_rms_aed_and_cdsd_belong_together():
     n = len(LENGTHS)
     assert n * rms(LENGTHS) ** 2 == pytest.approx(n * aed(LENGTHS) ** 2 + (n - 1) * cdsd(LENGTHS) ** 2)
 
 
-def test_without_pairs_there_are_no_metrics() -> None:
+def test_without_pairs_there_are_no_metrics():
     nothing = np.zeros(0)
     assert math.isnan(aed(nothing))
     assert math.isnan(rms(nothing))
@@ -174,36 +171,36 @@ def test_without_pairs_there_are_no_metrics() -> None:
     assert metrics_of(nothing).n == 0
 
 
-def test_one_pair_has_no_spread() -> None:
+def test_one_pair_has_no_spread():
     assert aed(np.array([3.0])) == 3.0
     assert math.isnan(cdsd(np.array([3.0])))
 
 
-def test_the_metrics_contain_the_held_out_figure_and_the_training_one() -> None:
+def test_the_metrics_contain_the_held_out_figure_and_the_training_one():
     metrics = metrics_of(LENGTHS, held_out_distances_px=LENGTHS + 1.0, acc=0.5, chi2=4.0, degrees_of_freedom=3)
     assert metrics.aed_px == pytest.approx(3.0)
     assert metrics.held_out_aed_px == pytest.approx(4.0)
     assert (metrics.acc, metrics.chi2, metrics.degrees_of_freedom, metrics.n) == (0.5, 4.0, 3, 3)
 
 
-def test_without_held_out_pairs_that_figure_is_unknown() -> None:
+def test_without_held_out_pairs_that_figure_is_unknown():
     metrics = metrics_of(LENGTHS)
     assert math.isnan(metrics.held_out_aed_px)
     assert metrics.acc is None
 
 
-def test_a_pixel_on_a_box_edge_is_inside_and_one_past_it_is_not() -> None:
+def test_a_pixel_on_a_box_edge_is_inside_and_one_past_it_is_not():
     boxes = np.array([[10.0, 20.0, 30.0, 40.0], [100.0, 100.0, 110.0, 110.0]])
     pixels = np.array([[10.0, 40.0], [9.99, 30.0], [105.0, 105.0], [20.0, 105.0], [np.nan, 30.0]])
     assert inside_boxes(pixels, boxes).tolist() == [True, False, True, False, False]
 
 
-def test_no_boxes_contain_no_pixel() -> None:
+def test_no_boxes_contain_no_pixel():
     assert inside_boxes(np.array([[1.0, 2.0]]), np.zeros((0, 4))).tolist() == [False]
     assert inside_boxes(np.zeros((0, 2)), np.array([[0.0, 0.0, 1.0, 1.0]])).tolist() == []
 
 
-def test_acc_without_any_frame_is_unknown() -> None:
+def test_acc_without_any_frame_is_unknown():
     assert acc([]) is None
     assert acc([np.zeros(0, dtype=np.bool_)]) is None
     assert acc([np.array([False])], zero_frames="drop") is None

@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -37,25 +36,25 @@ def warned(calibration: Calibration, *codes: str) -> Calibration:
     return replace(calibration, warnings=tuple(DataWarning(code, f"about {code}", f"mend {code}") for code in codes))
 
 
-def test_before_any_click_there_is_nothing_and_an_action() -> None:
+def test_before_any_click_there_is_nothing_and_an_action():
     verdict = verdict_on(None)
     assert verdict.level == "nothing"
     assert verdict.line.startswith("nothing yet: ")
     assert "click the reflector's inner corner" in verdict.action
 
 
-def test_too_few_pairs_are_nothing_and_the_placements_left_are_the_action() -> None:
+def test_too_few_pairs_are_nothing_and_the_placements_left_are_the_action():
     assert verdict_on(FEW).action == "Click the reflector at more placements"
     assert verdict_on(FEW, left=7).action == "Click the 7 placements that are left"
     lost = replace(FEW, unpaired=(Unpaired("c1", "no-scan", "no scan", "click elsewhere"),))
     assert verdict_on(lost, left=7).action == verdict_on(lost).action
 
 
-def test_pairs_that_agree_on_no_pose_are_contradictory() -> None:
+def test_pairs_that_agree_on_no_pose_are_contradictory():
     assert verdict_on(Unsolvable("no-pose", "they disagree", "check them")).line == "contradictory: they disagree"
 
 
-def test_a_good_calibration_states_its_error_and_is_done(good: Calibration) -> None:
+def test_a_good_calibration_states_its_error_and_is_done(good):
     verdict = verdict_on(good)
     assert re.fullmatch(r"good: within [\d.]+ deg, [\d.]+ cm \(95 %\); [\d.]+ px at \d+ m", verdict.line)
     assert verdict.reason == stated_error(good).text
@@ -63,19 +62,19 @@ def test_a_good_calibration_states_its_error_and_is_done(good: Calibration) -> N
     assert verdict_on(good, left=0).action == DONE
 
 
-def test_a_larger_stated_error_is_usable_then_coarse(good: Calibration) -> None:
+def test_a_larger_stated_error_is_usable_then_coarse(good):
     levels = [verdict_on(replace(good, covariance=good.covariance * factor**2)).level for factor in (1, 2, 20)]
     assert levels == ["good", "usable", "coarse"]
 
 
-def test_the_stated_error_is_larger_than_one_sigma_and_grows_with_the_quantile(good: Calibration) -> None:
+def test_the_stated_error_is_larger_than_one_sigma_and_grows_with_the_quantile(good):
     sigma_deg = np.rad2deg(np.sqrt(np.trace(good.covariance[3:, 3:])))
     stated = stated_error(good)
     assert sigma_deg < stated.rotation_deg < 3.5 * sigma_deg
     assert stated_error(replace(good, covariance_quantile=40.0)).rotation_deg > 1.3 * stated.rotation_deg
 
 
-def test_each_consequence_has_its_level(good: Calibration) -> None:
+def test_each_consequence_has_its_level(good):
     for code, level in (
         ("two-poses", "contradictory"),
         ("intrinsics-suspected", "coarse"),
@@ -87,14 +86,14 @@ def test_each_consequence_has_its_level(good: Calibration) -> None:
     assert verdict_on(warned(good, "clock-chosen-early")).level == "good"
 
 
-def test_the_gravest_warning_decides_whatever_the_order(good: Calibration) -> None:
+def test_the_gravest_warning_decides_whatever_the_order(good):
     codes = ("not-closed", "handedness-assumed", "intrinsics-suspected", "two-poses")
     assert verdict_on(warned(good, *codes)).reason == "about two-poses"
     ordered = by_consequence(warned(good, *codes).warnings)
     assert [warning.code for warning in ordered] == list(reversed(codes))
 
 
-def test_every_documented_warning_of_a_calibration_has_a_consequence(project_root: Path) -> None:
+def test_every_documented_warning_of_a_calibration_has_a_consequence(project_root):
     text = (project_root / "docs" / "warnings.md").read_text(encoding="utf-8")
     table = text.partition("## Of a solved calibration")[2].partition("\n## ")[0]
     codes = re.findall(r"^\| `([a-z0-9-]+)` \|", table, flags=re.MULTILINE)
@@ -102,7 +101,7 @@ def test_every_documented_warning_of_a_calibration_has_a_consequence(project_roo
     assert [code for code in codes if consequence_of(code) == "note"] == []
 
 
-def test_few_pairs_are_counted_in_neutral_words() -> None:
+def test_few_pairs_are_counted_in_neutral_words():
     calibration = replace(solved(6), warnings=())
     verdict = verdict_on(calibration)
     assert verdict.level == "coarse"
@@ -112,7 +111,7 @@ def test_few_pairs_are_counted_in_neutral_words() -> None:
     assert checked.reason.startswith("6 of 8 pairs, looks consistent; uncertain to ")
 
 
-def test_a_free_pose_states_what_no_pair_can_show_and_a_measured_one_nothing(good: Calibration) -> None:
+def test_a_free_pose_states_what_no_pair_can_show_and_a_measured_one_nothing(good):
     assert verdict_on(good).assumes == ""
     free = verdict_on(solved(tape_m=None))
     assert "point that the radar sees" in free.assumes
@@ -120,13 +119,13 @@ def test_a_free_pose_states_what_no_pair_can_show_and_a_measured_one_nothing(goo
     assert "cropped" in free.assumes
 
 
-def test_what_the_figures_cover_does_not_make_them_coarse(good: Calibration) -> None:
+def test_what_the_figures_cover_does_not_make_them_coarse(good):
     for code in ("residuals-too-large", "agreeing-outliers", "weak-geometry", "one-pair-decides", "doubtful-pair"):
         verdict = verdict_on(warned(good, code))
         assert (verdict.level, verdict.reason) == ("usable", stated_error(good).text)
 
 
-def test_the_papers_method_is_never_good_and_blames_no_mark() -> None:
+def test_the_papers_method_is_never_good_and_blames_no_mark():
     verdict = verdict_on(solved(30, method="paper"))
     assert verdict.level == "coarse"
     assert "states no error" in verdict.reason
@@ -135,13 +134,13 @@ def test_the_papers_method_is_never_good_and_blames_no_mark() -> None:
     assert (contradicted.level, contradicted.action) == ("contradictory", verdict.action)
 
 
-def test_what_is_assumed_of_the_recording_must_be_confirmed_first(good: Calibration) -> None:
+def test_what_is_assumed_of_the_recording_must_be_confirmed_first(good):
     verdict = verdict_on(good, unconfirmed=2)
     assert verdict.level == "coarse"
     assert verdict.action.startswith("Confirm")
 
 
-def test_the_action_is_what_gains_most_a_placement_or_a_tape() -> None:
+def test_the_action_is_what_gains_most_a_placement_or_a_tape():
     calibration = solved(tape_m=None)
     near = NextPlacement(np.array([3.0, 1.0, 0.0]), np.array([10.0, 10.0]), 1.05, may_stop=False)
     shared = verdict_on(replace(calibration, next_placement=near))
@@ -150,14 +149,14 @@ def test_the_action_is_what_gains_most_a_placement_or_a_tape() -> None:
     assert placed.action.startswith("Put the reflector 3.0 m ahead, 1.0 m to the left")
 
 
-def test_placements_without_a_click_come_first_and_the_end_is_said() -> None:
+def test_placements_without_a_click_come_first_and_the_end_is_said():
     calibration = solved(tape_m=None)
     assert verdict_on(calibration, left=3).action == "Click the 3 placements that are left"
     assert verdict_on(calibration, left=1).action == "Click the placement that is left"
     assert verdict_on(calibration, left=0).action.startswith(f"{ALL_CLICKED}. ")
 
 
-def test_the_documented_consequences_are_those_of_the_table(project_root: Path) -> None:
+def test_the_documented_consequences_are_those_of_the_table(project_root):
     text = (project_root / "docs" / "warnings.md").read_text(encoding="utf-8")
     for consequence, name in (("contradictory", "contradictory"), ("coarse", "coarse"), ("limited", "not good")):
         [row] = re.findall(rf"^\| {name} \| (`.*) \|$", text, flags=re.MULTILINE)

@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,8 +10,6 @@ from calib_core.measurements import NS_PER_S, Box
 from calib_core.recordings import RecordingOptions, open_recording
 from calib_core.synthetic import (
     PRESETS,
-    Container,
-    RadarMessage,
     SimulatedRecording,
     SimulationOptions,
     Surroundings,
@@ -61,9 +58,7 @@ def _boxes(*places: tuple[ActorLabel, float, float, float]) -> dict[str, Box]:
         ("filled", "jsonl"),
     ],
 )
-def test_labels_are_in_the_order_in_which_the_recording_returns_each_scan(
-    message: RadarMessage, container: Container, tmp_path: Path
-) -> None:
+def test_labels_are_in_the_order_in_which_the_recording_returns_each_scan(message, container, tmp_path):
     recording = simulate(replace(WALK, radar_message=message, width_px=64, height_px=64, camera_rate_hz=1.0))
     write_recording(recording, tmp_path, (container,))
     sent = {scan.time: scan for scan in recording.scans()}
@@ -82,7 +77,7 @@ def test_labels_are_in_the_order_in_which_the_recording_returns_each_scan(
     assert named == {"", "person-1", "person-2"}
 
 
-def test_a_return_named_after_a_person_comes_from_where_that_person_is() -> None:
+def test_a_return_named_after_a_person_comes_from_where_that_person_is():
     recording = simulate(WALK)
     from_world = recording.stage.rig.radar_from_world
     movers = {mover.track: mover for mover in recording.stage.story.movers}
@@ -100,7 +95,7 @@ def test_a_return_named_after_a_person_comes_from_where_that_person_is() -> None
     assert checked > 100
 
 
-def test_a_box_touches_what_the_renderer_draws() -> None:
+def test_a_box_touches_what_the_renderer_draws():
     recording = _standing(simulate(replace(WALK, width_px=640, height_px=360)), ("person", 6.0, 0.4, 2.0))
     stage = recording.stage
     renderer = FrameRenderer.of(stage.scene, stage.rig)
@@ -119,7 +114,7 @@ def test_a_box_touches_what_the_renderer_draws() -> None:
     )  # no shadow on that side
 
 
-def test_a_car_has_a_box_from_its_wheels_to_its_roof_by_the_pinhole_rule() -> None:
+def test_a_car_has_a_box_from_its_wheels_to_its_roof_by_the_pinhole_rule():
     box = _boxes(("car", 20.0, 0.0, 0.0))["car-1"]
     camera = simulate(WALK).camera
     focal_px = float(camera.matrix_px[1, 1])
@@ -127,7 +122,7 @@ def test_a_car_has_a_box_from_its_wheels_to_its_roof_by_the_pinhole_rule() -> No
     assert box.right_px - box.left_px == pytest.approx(focal_px * 1.82 / 17.9, rel=0.08)
 
 
-def test_who_is_behind_another_is_partly_hidden_or_has_no_box() -> None:
+def test_who_is_behind_another_is_partly_hidden_or_has_no_box():
     alone = _boxes(("person", 5.0, 0.0, 0.0), ("person", 9.0, 2.0, 0.0))
     partly = _boxes(("person", 5.0, 0.0, 0.0), ("person", 9.0, 0.45, 0.0))
     behind = _boxes(("person", 5.0, 0.0, 0.0), ("car", 12.0, 0.0, 0.0), ("person", 18.0, 0.0, 0.0))
@@ -137,7 +132,7 @@ def test_who_is_behind_another_is_partly_hidden_or_has_no_box() -> None:
     assert "person-3" not in behind
 
 
-def test_a_box_ends_at_the_border_of_the_picture_and_nobody_outside_has_one() -> None:
+def test_a_box_ends_at_the_border_of_the_picture_and_nobody_outside_has_one():
     options = simulate(WALK).options
     near = _boxes(("car", 5.5, 3.0, 0.0))["car-1"]
     assert near.left_px == -0.5
@@ -147,7 +142,7 @@ def test_a_box_ends_at_the_border_of_the_picture_and_nobody_outside_has_one() ->
     assert not _boxes(("person", -4.0, 0.0, 0.0))
 
 
-def test_the_files_are_written_where_something_moves_that_is_worth_judging(tmp_path: Path) -> None:
+def test_the_files_are_written_where_something_moves_that_is_worth_judging(tmp_path):
     small = replace(WALK, width_px=64, height_px=64, camera_rate_hz=1.0)
     write_recording(simulate(small), tmp_path / "walk")
     boxes = json.loads((tmp_path / "walk" / "boxes.json").read_text())
@@ -168,7 +163,7 @@ def test_the_files_are_written_where_something_moves_that_is_worth_judging(tmp_p
     }
 
 
-def test_who_carries_the_reflector_and_passers_by_have_tracks_of_their_own() -> None:
+def test_who_carries_the_reflector_and_passers_by_have_tracks_of_their_own():
     recording = simulate(
         replace(WALK, placements=2, dwell_s=4.0, traffic=Traffic(), surroundings=Surroundings(passers_by=2))
     )
@@ -181,8 +176,8 @@ def test_who_carries_the_reflector_and_passers_by_have_tracks_of_their_own() -> 
 
 
 @pytest.mark.parametrize(("preset", "beyond_m"), [("cars-near", 12.0), ("cars-far", 45.0)])
-def test_the_radar_sees_cars_of_both_directions_at_their_ranges(preset: str, beyond_m: float) -> None:
-    options = PRESETS[preset]  # type: ignore[index]
+def test_the_radar_sees_cars_of_both_directions_at_their_ranges(preset, beyond_m):
+    options = PRESETS[preset]
     recording = simulate(replace(options, traffic=replace(options.traffic, duration_s=20.0), camera_rate_hz=1.0))
     ranges, speeds = [], []
     for scan, labels in zip(recording.scans(), true_labels(recording).scans, strict=True):

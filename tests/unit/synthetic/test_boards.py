@@ -43,7 +43,7 @@ def found_finely(camera: Camera, film: BoardFilm, pose: RigidTransform = POSE) -
 
 
 @pytest.mark.parametrize("model", ["pinhole", "plumb_bob", "rational_polynomial", "equidistant"])
-def test_corners_are_where_a_detector_finds_them(model: CameraModel) -> None:
+def test_corners_are_where_a_detector_finds_them(model):
     true, found = found_finely(small(model), BoardFilm())
     error = found - true
     assert np.sqrt(np.square(error).mean()) < 0.006
@@ -60,13 +60,13 @@ def test_corners_are_where_a_detector_finds_them(model: CameraModel) -> None:
     ],
     ids=["bent", "unequal squares", "rolling shutter"],
 )
-def test_a_faulty_board_shows_its_faults(film: BoardFilm) -> None:
+def test_a_faulty_board_shows_its_faults(film):
     true, found = found_finely(small(), film)
     assert np.sqrt(np.square(found - true).mean()) < 0.006
     assert np.abs(true - true_corners(BOARD, small(), POSE)).max() > 0.5
 
 
-def test_true_corners_agree_with_opencv() -> None:
+def test_true_corners_agree_with_opencv():
     camera, fisheye = small(), small("equidistant")
     vector = rotation_log(POSE.rotation)
     pixels, _ = cv2.projectPoints(BOARD.corners_m, vector, POSE.translation_m, camera.matrix_px, camera.distortion)
@@ -77,7 +77,7 @@ def test_true_corners_agree_with_opencv() -> None:
     assert true_corners(BOARD, fisheye, POSE) == pytest.approx(round_pixels.reshape(-1, 2), abs=1e-9)
 
 
-def test_the_first_row_sees_the_board_earlier_than_the_last() -> None:
+def test_the_first_row_sees_the_board_earlier_than_the_last():
     camera = small()
     velocity = np.array(MOVING.velocity_mps)
     still = replace(MOVING, turning_radps=(0.0, 0.0, 0.0))
@@ -87,7 +87,7 @@ def test_the_first_row_sees_the_board_earlier_than_the_last() -> None:
     assert moved == pytest.approx(camera.project(places), abs=1e-6)
 
 
-def test_a_pixel_is_the_mean_of_its_finer_pixels() -> None:
+def test_a_pixel_is_the_mean_of_its_finer_pixels():
     camera = small()
     fine = render_board(BOARD, camera.scaled(FINER), POSE, background=np.full((240 * FINER, 320 * FINER), 90.0))
     mean = cv2.resize(fine[..., 0].astype(np.float32), (320, 240), interpolation=cv2.INTER_AREA)
@@ -97,7 +97,7 @@ def test_a_pixel_is_the_mean_of_its_finer_pixels() -> None:
     assert difference.max() < 12.0
 
 
-def test_rays_of_a_grid_are_those_of_the_camera() -> None:
+def test_rays_of_a_grid_are_those_of_the_camera():
     for model in ("plumb_bob", "rational_polynomial", "equidistant"):
         camera = typical_camera(model)
         u, v = np.linspace(-0.5, 1279.5, 17), np.linspace(-0.5, 719.5, 13)
@@ -106,7 +106,7 @@ def test_rays_of_a_grid_are_those_of_the_camera() -> None:
         assert np.abs(smooth - exact).max() * camera.matrix_px[0, 0] < 1e-3, model
 
 
-def test_a_moving_board_is_smeared_while_it_is_exposed() -> None:
+def test_a_moving_board_is_smeared_while_it_is_exposed():
     camera = small()
     sharp = render_board(BOARD, camera, POSE, background=np.full((240, 320), 90.0))
     smeared = render_board(
@@ -121,7 +121,7 @@ def test_a_moving_board_is_smeared_while_it_is_exposed() -> None:
     assert across > along
 
 
-def test_noise_and_light_are_as_asked_for() -> None:
+def test_noise_and_light_are_as_asked_for():
     camera = small()
     grey = np.full((240, 320), 100.0)
     away = RigidTransform(np.eye(3), np.array([0.0, 0.0, -1.0]))
@@ -136,7 +136,7 @@ def test_noise_and_light_are_as_asked_for() -> None:
     assert lit[0, 0, 0] == pytest.approx(80 * 0.7 * 0.6, abs=1)
 
 
-def test_the_same_seed_gives_the_same_picture() -> None:
+def test_the_same_seed_gives_the_same_picture():
     film = BoardFilm(noise_grey=2.0)
     first = render_board(BOARD, small(), POSE, film, seed=3)
     assert np.array_equal(first, render_board(BOARD, small(), POSE, film, seed=3))
@@ -144,7 +144,7 @@ def test_the_same_seed_gives_the_same_picture() -> None:
     assert first.std() > 20.0
 
 
-def test_opencv_reads_a_charuco_board() -> None:
+def test_opencv_reads_a_charuco_board():
     board = Board("charuco", 7, 5, 0.04, 0.03, "DICT_5X5_100")
     camera = typical_camera(width_px=640, height_px=480)
     pose = waved_poses(np.random.default_rng(1), board, camera, 1, Waving(size=(0.6, 0.7), tilt_deg=30.0))[0]
@@ -155,7 +155,7 @@ def test_opencv_reads_a_charuco_board() -> None:
     assert np.abs(pixels.reshape(-1, 2) - true_corners(board, camera, pose)[ids.ravel()]).max() < 0.5
 
 
-def test_opencv_reads_the_tags_of_a_grid() -> None:
+def test_opencv_reads_the_tags_of_a_grid():
     board = Board("aprilgrid", 4, 3, 0.05, 0.015, "DICT_APRILTAG_36h11")
     camera = typical_camera(width_px=640, height_px=480)
     pose = RigidTransform(rotation_exp(np.array([0.2, -0.2, 0.0])), np.array([-0.12, -0.09, 0.4]))

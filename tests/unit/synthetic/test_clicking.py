@@ -24,7 +24,7 @@ QUIET = SimulationOptions(
 
 
 def _session(**how: float) -> SimulatedScans:
-    return simulate_scans(replace(QUIET, clicking=Clicking(**how)))  # type: ignore[arg-type]
+    return simulate_scans(replace(QUIET, clicking=Clicking(**how)))
 
 
 def _offsets(session: SimulatedScans) -> np.ndarray:
@@ -33,7 +33,7 @@ def _offsets(session: SimulatedScans) -> np.ndarray:
     return np.array([[c.click.u_px, c.click.v_px] - pixels[c.placement_id] for c in session.clicked])
 
 
-def test_by_default_there_is_one_faultless_click_per_placement() -> None:
+def test_by_default_there_is_one_faultless_click_per_placement():
     session = simulate_scans(QUIET)
     assert [one.placement_id for one in session.clicked] == [placement.id for placement in session.placements]
     assert [click.image_time for click in session.clicks] == [p.best_image_time for p in session.placements]
@@ -41,7 +41,7 @@ def test_by_default_there_is_one_faultless_click_per_placement() -> None:
     assert "clicks" not in json.loads(truth_text(simulate(QUIET)))
 
 
-def test_people_click_a_placement_several_times_in_different_frames() -> None:
+def test_people_click_a_placement_several_times_in_different_frames():
     session = _session(clicks_per_placement=3)
     frames = set(session.stage.frame_times.header_ns.tolist())
     times = [int(click.image_time) for click in session.clicks]
@@ -55,19 +55,19 @@ def test_people_click_a_placement_several_times_in_different_frames() -> None:
     assert np.abs(_offsets(session)).max() < 2.5
 
 
-def test_people_click_low_in_pixels() -> None:
+def test_people_click_low_in_pixels():
     offsets = _offsets(_session(low_px=6.0))
     assert np.median(offsets, axis=0) == pytest.approx([0.0, 6.0], abs=0.8)
 
 
-def test_people_click_the_mouth_below_the_apex() -> None:
+def test_people_click_the_mouth_below_the_apex():
     session = _session(low_m=0.1)
     scale_px = session.camera.matrix_px[1, 1] / np.linalg.norm(session.points_radar_m, axis=1)
     assert np.median(_offsets(session)[:, 1] / scale_px) == pytest.approx(0.1, abs=0.02)
     assert all(one.faults == ("low",) for one in session.clicked)
 
 
-def test_late_clicks_name_the_old_place_in_a_frame_of_the_next_dwell() -> None:
+def test_late_clicks_name_the_old_place_in_a_frame_of_the_next_dwell():
     session = _session(late_share=0.5)
     late = [one for one in session.clicked if "late" in one.faults]
     assert 2 <= len(late) <= 6
@@ -80,7 +80,7 @@ def test_late_clicks_name_the_old_place_in_a_frame_of_the_next_dwell() -> None:
     assert len(set(times)) == len(times)
 
 
-def test_the_first_click_is_hasty() -> None:
+def test_the_first_click_is_hasty():
     session = _session(hasty_first_px=40.0)
     off_px = np.linalg.norm(_offsets(session), axis=1)
     assert off_px[0] == pytest.approx(40.0, abs=2.5)
@@ -88,7 +88,7 @@ def test_the_first_click_is_hasty() -> None:
     assert [one.faults for one in session.clicked] == [("hasty",), *[()] * 7]
 
 
-def test_the_truth_file_tells_which_placement_each_click_names_and_what_is_wrong_with_it() -> None:
+def test_the_truth_file_tells_which_placement_each_click_names_and_what_is_wrong_with_it():
     careless = Clicking(clicks_per_placement=2, late_share=0.3, hasty_first_px=30.0)
     recording = simulate(replace(QUIET, clicking=careless))
     told = {entry["id"]: entry for entry in json.loads(truth_text(recording))["clicks"]}
@@ -100,7 +100,7 @@ def test_the_truth_file_tells_which_placement_each_click_names_and_what_is_wrong
     assert {fault for entry in told.values() for fault in entry["faults"]} == {"repeated", "late", "hasty"}
 
 
-def test_two_reflectors_may_be_clicked_late_and_twice_too() -> None:
+def test_two_reflectors_may_be_clicked_late_and_twice_too():
     session = simulate_scans(
         replace(QUIET, reflectors=2, islands=True, clicking=Clicking(clicks_per_placement=2, late_share=0.4))
     )

@@ -22,7 +22,6 @@ from calib_core.recordings.containers.writing import RadarReturnMessage, Recorde
 from calib_core.synthetic import (
     PRESETS,
     OtherCamera,
-    PresetName,
     SimulatedFrame,
     SimulatedRecording,
     SimulationOptions,
@@ -69,9 +68,7 @@ def _cloud(message: Any) -> np.ndarray:
     return np.frombuffer(message.data.tobytes(), dtype="<f4").reshape(message.width, len(message.fields))
 
 
-def test_a_ros_1_radar_bag_has_one_message_per_return_and_point_ids_that_restart_in_each_scan(
-    scans: tuple[RadarScan, ...], folder: Path
-) -> None:
+def test_a_ros_1_radar_bag_has_one_message_per_return_and_point_ids_that_restart_in_each_scan(scans, folder):
     messages = [message for _, message in _messages([folder / "radar.bag"], "/ti_mmwave/radar_scan")]
     assert [m.point_id for m in messages] == [i for scan in scans for i in range(len(scan))]
     assert [_stamp(m) for m in messages if m.point_id == 0] == [int(scan.time) for scan in scans if len(scan)]
@@ -85,9 +82,7 @@ def test_a_ros_1_radar_bag_has_one_message_per_return_and_point_ids_that_restart
 
 
 @pytest.mark.parametrize("container", ["mcap", "db3"])
-def test_ros_2_bags_hold_the_same_scans_as_clouds_and_open_as_folder_and_as_file(
-    scans: tuple[RadarScan, ...], folder: Path, container: str
-) -> None:
+def test_ros_2_bags_hold_the_same_scans_as_clouds_and_open_as_folder_and_as_file(scans, folder, container):
     inside = folder / f"recording_{container}"
     for path in (inside, inside / f"recording_{container}.{container}"):
         clouds = [message for _, message in _messages([path], "/ti_mmwave/radar_scan_pcl")]
@@ -101,9 +96,7 @@ def test_ros_2_bags_hold_the_same_scans_as_clouds_and_open_as_folder_and_as_file
 
 
 @pytest.mark.parametrize("name", ["camera.bag", "recording_mcap", "recording_db3"])
-def test_every_container_holds_the_rendered_frames_with_both_stamps(
-    frames: tuple[SimulatedFrame, ...], folder: Path, name: str
-) -> None:
+def test_every_container_holds_the_rendered_frames_with_both_stamps(frames, folder, name):
     images = list(_messages([folder / name], "/camera/image_raw/compressed"))
     assert [time for time, _ in images] == [int(frame.receive_time) for frame in frames]
     for (_, message), frame in zip(images, frames, strict=True):
@@ -115,7 +108,7 @@ def test_every_container_holds_the_rendered_frames_with_both_stamps(
         assert np.abs(decoded.astype(float) - frame.pixels).mean() < 6.0
 
 
-def test_camera_info_carries_the_intrinsics(recording: SimulatedRecording, folder: Path) -> None:
+def test_camera_info_carries_the_intrinsics(recording, folder):
     infos = [message for _, message in _messages([folder / "camera.bag"], "/camera/camera_info")]
     assert len(infos) == len(list(_messages([folder / "camera.bag"], "/camera/image_raw/compressed")))
     assert np.array_equal(infos[0].K.reshape(3, 3), recording.camera.matrix_px)
@@ -123,7 +116,7 @@ def test_camera_info_carries_the_intrinsics(recording: SimulatedRecording, folde
     assert (infos[0].distortion_model, infos[0].width, infos[0].height) == ("plumb_bob", 128, 80)
 
 
-def test_raw_images_contain_the_exact_pixels(tmp_path: Path) -> None:
+def test_raw_images_contain_the_exact_pixels(tmp_path):
     recording = simulate(replace(OPTIONS, placements=1, raw_images=True, camera_rate_hz=1.0))
     write_recording(recording, tmp_path)
     images = [message for _, message in _messages([tmp_path / "camera.bag"], "/camera/image_raw")]
@@ -132,7 +125,7 @@ def test_raw_images_contain_the_exact_pixels(tmp_path: Path) -> None:
         assert np.array_equal(message.data.reshape(message.height, message.width, 3), frame.pixels)
 
 
-def test_the_stock_driver_leaves_four_fields_at_zero(tmp_path: Path) -> None:
+def test_the_stock_driver_leaves_four_fields_at_zero(tmp_path):
     recording = simulate(replace(OPTIONS, placements=1, radar_message="stock", camera_rate_hz=1.0))
     write_recording(recording, tmp_path)
     messages = [message for _, message in _messages([tmp_path / "radar.bag"], "/ti_mmwave/radar_scan")]
@@ -140,14 +133,14 @@ def test_the_stock_driver_leaves_four_fields_at_zero(tmp_path: Path) -> None:
     assert {m.x for m in messages} != {0.0}
 
 
-def test_an_imaging_radar_writes_clouds_to_ros_1_too(tmp_path: Path) -> None:
+def test_an_imaging_radar_writes_clouds_to_ros_1_too(tmp_path):
     recording = simulate(replace(OPTIONS, placements=1, radar="imaging", camera_rate_hz=1.0))
     write_recording(recording, tmp_path)
     clouds = [message for _, message in _messages([tmp_path / "radar.bag"], "/ti_mmwave/radar_scan_pcl")]
     assert len(clouds) == len(list(recording.scans()))
 
 
-def test_truth_and_clicks_agree_with_the_simulation(recording: SimulatedRecording, folder: Path) -> None:
+def test_truth_and_clicks_agree_with_the_simulation(recording, folder):
     truth = json.loads((folder / "truth.json").read_text())
     clicks = json.loads((folder / "clicks.json").read_text())
     assert truth["schema"] == "cocalib/truth-1"
@@ -160,13 +153,13 @@ def test_truth_and_clicks_agree_with_the_simulation(recording: SimulatedRecordin
     assert [entry["image_time"] for entry in clicks["clicks"]] == [e["best_image_time"] for e in truth["placements"]]
 
 
-def test_a_recording_is_never_overwritten(recording: SimulatedRecording, folder: Path) -> None:
+def test_a_recording_is_never_overwritten(recording, folder):
     with pytest.raises(RecordingError, match=r"radar\.bag already exists"):
         write_recording(recording, folder)
 
 
 @pytest.mark.parametrize("compression", ["none", "bz2", "lz4"])
-def test_a_bag_reads_back_whatever_its_compression(tmp_path: Path, compression: Any) -> None:
+def test_a_bag_reads_back_whatever_its_compression(tmp_path, compression):
     body = RadarReturnMessage(TimeNs(7), "radar", 0, 1.0, -2.0, 0.5, 2.25, -0.5, 12, -63.5, 21.0)
     path = write_ros1_bag(tmp_path / "one.bag", [RecordedMessage("/radar", TimeNs(9), body)], compression=compression)
     [(time, message)] = _messages([path], "/radar")
@@ -174,7 +167,7 @@ def test_a_bag_reads_back_whatever_its_compression(tmp_path: Path, compression: 
     assert (message.x, message.y, message.z, message.velocity, message.doppler_bin) == (1.0, -2.0, 0.5, -0.5, 12)
 
 
-def test_a_folder_without_ros_has_dated_pictures_and_every_return(recording, scans, frames, tmp_path) -> None:
+def test_a_folder_without_ros_has_dated_pictures_and_every_return(recording, scans, frames, tmp_path):
     write_recording(recording, tmp_path, ("csv", "jsonl"))
     pictures = sorted((tmp_path / "recording_csv" / "camera").iterdir())
     for path, frame in zip(pictures, frames, strict=True):
@@ -190,7 +183,7 @@ def test_a_folder_without_ros_has_dated_pictures_and_every_return(recording, sca
 
 
 @pytest.mark.parametrize("container", ["ros1", "mcap"])
-def test_a_vendors_packets_hold_the_same_returns(scans, container, tmp_path) -> None:
+def test_a_vendors_packets_hold_the_same_returns(scans, container, tmp_path):
     write_recording(simulate(replace(OPTIONS, radar_message="vendor")), tmp_path, (container,))
     path = tmp_path / ("radar.bag" if container == "ros1" else "recording_mcap")
     messages = [message for _, message in _messages([path], "/acme/packets")]
@@ -200,7 +193,7 @@ def test_a_vendors_packets_hold_the_same_returns(scans, container, tmp_path) -> 
         np.testing.assert_allclose(np.array(found).reshape(-1, 3), scan.points_radar_m, rtol=1e-5, atol=1e-6)
 
 
-def test_a_second_camera_is_written_into_the_same_recording(tmp_path: Path) -> None:
+def test_a_second_camera_is_written_into_the_same_recording(tmp_path):
     recording = simulate(replace(OPTIONS, camera_rate_hz=1.0, other_camera=OtherCamera(present=True)))
     other = recording.other_camera
     assert other is not None
@@ -216,11 +209,10 @@ def test_a_second_camera_is_written_into_the_same_recording(tmp_path: Path) -> N
     assert len(clicks["clicks"]) == len(other.clicks) == OPTIONS.placements
 
 
-def test_the_second_camera_sees_the_same_placements_from_its_own_rig() -> None:
+def test_the_second_camera_sees_the_same_placements_from_its_own_rig():
     options = replace(OPTIONS, placements=8, other_camera=OtherCamera(present=True))
     recording = simulate(options)
     other = recording.other_camera
-    assert other is not None
     assert np.linalg.norm(other.stage.rig.camera_position_radar_m - options.other_camera.offset_m) < 0.06
     assert len(other.placements) == 8
     for here, there in zip(recording.placements, other.placements, strict=True):
@@ -229,7 +221,7 @@ def test_the_second_camera_sees_the_same_placements_from_its_own_rig() -> None:
     assert simulate(OPTIONS).other_camera is None
 
 
-def test_a_folder_of_pictures_has_no_room_for_a_second_camera(tmp_path: Path) -> None:
+def test_a_folder_of_pictures_has_no_room_for_a_second_camera(tmp_path):
     recording = simulate(replace(OPTIONS, other_camera=OtherCamera(present=True)))
     with pytest.raises(InputError, match="write a recording of two cameras as ros1, mcap or db3"):
         write_recording(recording, tmp_path / "new", ("csv",))
@@ -243,16 +235,16 @@ SMALL = {"placements": 4, "dwell_s": 3.5, "radar_rate_hz": 2.0, "camera_rate_hz"
 
 
 @pytest.mark.parametrize("name", PRESETS)
-def test_every_preset_is_a_recording_of_its_own(name: PresetName) -> None:
+def test_every_preset_is_a_recording_of_its_own(name):
     options = PRESETS[name]
     assert (options == SimulationOptions()) == (name == "default")
-    small = replace(options, **SMALL)  # type: ignore[arg-type]
+    small = replace(options, **SMALL)
     recording = simulate(small)
     assert len(recording.placements) == small.standing_places
     assert len(recording.clicks) >= 4
     assert len(next(recording.scans())) > 0
 
 
-def test_the_page_describes_every_preset_and_no_other(project_root: Path) -> None:
+def test_the_page_describes_every_preset_and_no_other(project_root):
     page = (project_root / "docs" / "simulation.md").read_text()
     assert re.findall(r"^\| `([a-z0-9-]+)` \|", page, flags=re.MULTILINE) == list(PRESETS)

@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,7 +26,6 @@ from calib_core.synthetic.files import (
     radar_messages,
     truth_text,
 )
-from calib_core.synthetic.options import SecondAzimuth
 from calib_core.synthetic.radar_returns import Targets, measure, radar_from_reported, second_azimuths
 from calib_core.synthetic.rig import RigOptions, radar_stand
 
@@ -87,26 +85,24 @@ def _strongest(options: SimulationOptions) -> tuple[np.ndarray, np.ndarray]:
         (RadarDefects(elevation_bias_deg=-1.5), (1.0, 1.0, 1.0), (0.0, 0.0, np.deg2rad(-1.5))),
     ],
 )
-def test_scales_and_biases_act_on_range_azimuth_and_elevation(
-    defects: RadarDefects, factor: tuple[float, ...], offset: tuple[float, ...]
-) -> None:
+def test_scales_and_biases_act_on_range_azimuth_and_elevation(defects, factor, offset):
     true = polar_from_cartesian(PLACES)
     assert _reported(defects) == pytest.approx(true[np.argsort(true[:, 0])] * factor + offset, abs=1e-4)
 
 
-def test_a_wrong_element_spacing_scales_the_sines() -> None:
+def test_a_wrong_element_spacing_scales_the_sines():
     reported = _reported(RadarDefects(azimuth_scale=1.03, scaled="sine"))
     true = polar_from_cartesian(PLACES)
     assert np.sin(reported[:, 1]) / np.sin(true[:, 1]) == pytest.approx(1.03, abs=1e-4)
 
 
-def test_a_driver_adds_the_mounting_height_to_z() -> None:
+def test_a_driver_adds_the_mounting_height_to_z():
     lifted, plain = (_reported(RadarDefects(z_offset_m=z_m)) for z_m in (0.5, 0.0))
     height_m = lifted[:, 0] * np.sin(lifted[:, 2]) - plain[:, 0] * np.sin(plain[:, 2])
     assert height_m == pytest.approx(0.5, abs=1e-4)
 
 
-def test_biases_and_a_z_offset_turn_and_move_the_frame_in_which_the_radar_reports() -> None:
+def test_biases_and_a_z_offset_turn_and_move_the_frame_in_which_the_radar_reports():
     defects = RadarDefects(azimuth_bias_deg=3.0, z_offset_m=0.5)
     points_radar = radar_from_reported(defects) @ cartesian_from_polar(_reported(defects))
     assert points_radar == pytest.approx(PLACES[np.argsort(np.linalg.norm(PLACES, axis=1))], abs=1e-3)
@@ -114,7 +110,7 @@ def test_biases_and_a_z_offset_turn_and_move_the_frame_in_which_the_radar_report
     assert polar_from_cartesian(ahead)[0, 2] == pytest.approx(0.1 - np.deg2rad(2.0))
 
 
-def test_the_truth_file_holds_the_pose_of_the_reported_frame_if_it_is_another_one() -> None:
+def test_the_truth_file_holds_the_pose_of_the_reported_frame_if_it_is_another_one():
     plain, biased = (
         json.loads(truth_text(simulate(replace(QUIET, placements=1, defects=RadarDefects(z_offset_m=z_m)))))
         for z_m in (0.0, 0.5)
@@ -125,7 +121,7 @@ def test_the_truth_file_holds_the_pose_of_the_reported_frame_if_it_is_another_on
     assert np.linalg.norm(apart) == pytest.approx(0.5)
 
 
-def test_a_driver_may_report_y_to_the_right_and_millimetres() -> None:
+def test_a_driver_may_report_y_to_the_right_and_millimetres():
     plain, mirrored, fine = (
         cartesian_from_polar(_reported(defects))
         for defects in (RadarDefects(), RadarDefects(mirrored=True), RadarDefects(length_unit_m=0.001))
@@ -134,7 +130,7 @@ def test_a_driver_may_report_y_to_the_right_and_millimetres() -> None:
     assert fine == pytest.approx(plain * 1000.0, rel=1e-5)
 
 
-def test_the_published_intrinsics_may_be_wrong_while_the_pictures_and_the_truth_are_not() -> None:
+def test_the_published_intrinsics_may_be_wrong_while_the_pictures_and_the_truth_are_not():
     wrong = IntrinsicsErrors(focal_length_scale=1.02, principal_point_px=(30.0, -10.0))
     recording = simulate(replace(QUIET, placements=1, intrinsics=wrong, width_px=64, height_px=64, camera_rate_hz=1.0))
     [info, *_] = [m.body for m in camera_messages(recording) if isinstance(m.body, CameraInfoMessage)]
@@ -144,7 +140,7 @@ def test_the_published_intrinsics_may_be_wrong_while_the_pictures_and_the_truth_
     assert json.loads(truth_text(recording))["camera"]["matrix_px"] == true.tolist()
 
 
-def test_in_a_recording_reported_over_true_azimuth_is_the_scale() -> None:
+def test_in_a_recording_reported_over_true_azimuth_is_the_scale():
     true, reported = _strongest(replace(QUIET, placements=12, defects=RadarDefects(azimuth_scale=1.05)))
     assert float(true[:, 1] @ reported[:, 1] / (true[:, 1] @ true[:, 1])) == pytest.approx(1.05, abs=0.01)
 
@@ -157,9 +153,7 @@ def test_in_a_recording_reported_over_true_azimuth_is_the_scale() -> None:
         (RadarDefects(elevation="rounding"), -3e-5, 3e-5),
     ],
 )
-def test_a_2d_radar_reports_no_elevation_but_the_slant_range(
-    defects: RadarDefects, low_m: float, high_m: float
-) -> None:
+def test_a_2d_radar_reports_no_elevation_but_the_slant_range(defects, low_m, high_m):
     tilted = replace(QUIET, rig=replace(QUIET.rig, radar_tilt_deg=10.0), defects=defects)
     z_m = np.concatenate([points[:, 2] for _, points in _windows(tilted)])
     assert low_m <= z_m.min() <= z_m.max() <= high_m
@@ -170,14 +164,14 @@ def test_a_2d_radar_reports_no_elevation_but_the_slant_range(
     assert reported[:, 1] == pytest.approx(true[:, 1], abs=np.deg2rad(1.0))
 
 
-def test_bins_are_as_wide_as_asked() -> None:
+def test_bins_are_as_wide_as_asked():
     defects = RadarDefects(range_bin_m=0.15, azimuth_bins=32, elevation_bins=128)
     r, u, w = direction_cosines(simulate_scans(replace(QUIET, defects=defects)).scans.points_radar_m).T
     for values, width in ((r, 0.15), (u, 2.0 / 32.0), (w, 2.0 / 128.0)):
         assert np.abs(values / width - np.round(values / width)).max() < 1e-4
 
 
-def test_returns_scatter_from_scan_to_scan_as_asked() -> None:
+def test_returns_scatter_from_scan_to_scan_as_asked():
     coarse = RadarDefects(scatter_range_m=0.15, scatter_azimuth_deg=1.5, scatter_elevation_deg=3.0)
     spreads = []
     for true, points in _windows(replace(QUIET, radar_rate_hz=20.0, defects=coarse)):
@@ -187,7 +181,7 @@ def test_returns_scatter_from_scan_to_scan_as_asked() -> None:
     assert np.median(spreads, axis=0) == pytest.approx([0.15, np.deg2rad(1.5), np.deg2rad(3.0)], rel=0.25)
 
 
-def test_near_and_far_scans_may_follow_each_other_in_turn() -> None:
+def test_near_and_far_scans_may_follow_each_other_in_turn():
     defects = RadarDefects(near_and_far=True, in_turn=True)
     far, near = simulate_scans(replace(QUIET, dropped_share=0.0, placements=2, defects=defects)).stage.antennas
     times = np.concatenate([far.times.header_ns, near.times.header_ns])
@@ -196,7 +190,7 @@ def test_near_and_far_scans_may_follow_each_other_in_turn() -> None:
     assert np.diff(times[order]).min() > 0.3 * np.median(np.diff(far.times.header_ns))
 
 
-def test_near_and_far_scans_come_in_two_topics_at_their_own_rates_and_overlap() -> None:
+def test_near_and_far_scans_come_in_two_topics_at_their_own_rates_and_overlap():
     near_and_far = replace(QUIET, clutter="scene", dropped_share=0.0, defects=RadarDefects(near_and_far=True))
     messages = list(radar_messages(simulate(replace(near_and_far, placements=3)), 1))
     assert [m.receive_time for m in messages] == sorted(m.receive_time for m in messages)
@@ -212,7 +206,7 @@ def test_near_and_far_scans_come_in_two_topics_at_their_own_rates_and_overlap() 
     assert {m.topic for m in messages} == {f"{CLOUD_TOPIC}_near", f"{CLOUD_TOPIC}_far"}
 
 
-def test_a_session_without_pictures_has_the_scans_of_both_antennas() -> None:
+def test_a_session_without_pictures_has_the_scans_of_both_antennas():
     session = simulate_scans(replace(QUIET, placements=2, defects=RadarDefects(near_and_far=True)))
     assert len(session.scans) == sum(len(antenna.times) for antenna in session.stage.antennas)
     assert (np.diff(session.scans.times_ns) > 0).all()
@@ -220,7 +214,7 @@ def test_a_session_without_pictures_has_the_scans_of_both_antennas() -> None:
 
 @pytest.mark.parametrize("where", ["column", "topic"])
 @pytest.mark.parametrize("share", [0.0, 1.0])
-def test_one_of_two_azimuths_is_the_true_one(where: SecondAzimuth, share: float) -> None:
+def test_one_of_two_azimuths_is_the_true_one(where, share):
     defects = RadarDefects(second_azimuth=where, second_azimuth_share=share)
     recording = simulate(replace(QUIET, placements=3, defects=defects))
     messages = [m for m in radar_messages(recording, 1) if isinstance(m.body, CloudMessage)]
@@ -244,7 +238,7 @@ def test_one_of_two_azimuths_is_the_true_one(where: SecondAzimuth, share: float)
 
 
 @pytest.mark.parametrize("where", ["column", "topic"])
-def test_a_recording_with_two_azimuths_is_read_with_both_as_alternatives(where: SecondAzimuth, tmp_path: Path) -> None:
+def test_a_recording_with_two_azimuths_is_read_with_both_as_alternatives(where, tmp_path):
     recording = simulate(replace(QUIET, placements=2, clutter="scene", defects=RadarDefects(second_azimuth=where)))
     path = write_ros1_bag(tmp_path / "radar.bag", radar_messages(recording, 1))
     with open_recording([path], RecordingOptions(), require=("radar",)) as opened:
@@ -259,14 +253,14 @@ def test_a_recording_with_two_azimuths_is_read_with_both_as_alternatives(where: 
         assert scan.alternative_of.tolist() == [*range(len(points)), *range(len(points))]
 
 
-def test_without_defects_no_draw_changes() -> None:
+def test_without_defects_no_draw_changes():
     plain, other = simulate_scans(QUIET), simulate_scans(replace(QUIET, defects=RadarDefects(azimuth_scale=1.01)))
     assert np.array_equal(plain.scans.times_ns, other.scans.times_ns)
     assert len(plain.scans.points_radar_m) == pytest.approx(len(other.scans.points_radar_m), abs=5)
     assert plain.clicks == other.clicks
 
 
-def test_a_radar_leans_to_its_right() -> None:
+def test_a_radar_leans_to_its_right():
     left_m, right_m = (
         (radar_stand(RigOptions(radar_roll_deg=5.0)).inverse() @ np.array([[0.0, y_m, 0.0]]))[0, 2]
         for y_m in (1.0, -1.0)

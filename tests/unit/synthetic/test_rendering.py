@@ -7,9 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from calib_core.camera import CameraModel
 from calib_core.synthetic import Rig, SimulationOptions, random_rig, simulate, typical_camera
-from calib_core.synthetic.options import SceneName
 from calib_core.synthetic.rendering.frames import FrameRenderer
 from calib_core.synthetic.rendering.reflector import apex_edges
 from calib_core.synthetic.rendering.still import Still, pixel_rays, trace_still
@@ -81,7 +79,7 @@ def _before_green(rig: Rig) -> FrameRenderer:
 
 @pytest.mark.parametrize("model", ["pinhole", "plumb_bob", "rational_polynomial", "equidistant"])
 @pytest.mark.parametrize("place_m", [(2.0, 0.0), (2.1, 0.8), (2.6, -1.1)])
-def test_the_sheets_in_the_picture_meet_at_the_truth_pixel(model: CameraModel, place_m: tuple[float, float]) -> None:
+def test_the_sheets_in_the_picture_meet_at_the_truth_pixel(model, place_m):
     rig = random_rig(np.random.default_rng(5), camera=typical_camera(model, width_px=1280, height_px=800))
     apex = np.array([*place_m, 0.19])
     facing_rad = float(np.arctan2(-place_m[1], -place_m[0]))
@@ -92,7 +90,7 @@ def test_the_sheets_in_the_picture_meet_at_the_truth_pixel(model: CameraModel, p
     assert np.linalg.norm(_apex_from_picture(picture) - truth) < 0.6
 
 
-def test_the_three_edges_of_a_corner_are_at_right_angles_and_open_towards_the_radar() -> None:
+def test_the_three_edges_of_a_corner_are_at_right_angles_and_open_towards_the_radar():
     edges = apex_edges(facing_rad=2.0, elevation_rad=0.2)
     facing = np.array([np.cos(0.2) * np.cos(2.0), np.cos(0.2) * np.sin(2.0), np.sin(0.2)])
     assert edges @ edges.T == pytest.approx(np.eye(3), abs=1e-12)
@@ -101,7 +99,7 @@ def test_the_three_edges_of_a_corner_are_at_right_angles_and_open_towards_the_ra
 
 
 @pytest.mark.parametrize("model", ["pinhole", "plumb_bob", "rational_polynomial", "equidistant"])
-def test_pixels_look_where_the_lens_says(model: CameraModel) -> None:
+def test_pixels_look_where_the_lens_says(model):
     rig = random_rig(np.random.default_rng(4), camera=typical_camera(model, width_px=320, height_px=240))
     rays = pixel_rays(rig).reshape(-1, 3)
     u, v = np.meshgrid(np.arange(320.0), np.arange(240.0))
@@ -110,12 +108,12 @@ def test_pixels_look_where_the_lens_says(model: CameraModel) -> None:
     assert np.abs(back - pixels).max() < 0.02
 
 
-def test_a_frame_is_the_same_every_time(renderer: FrameRenderer, stage: Stage) -> None:
+def test_a_frame_is_the_same_every_time(renderer, stage):
     moment = stage.story.at(7.3)
     assert np.array_equal(renderer.render(moment), renderer.render(moment))
 
 
-def test_a_person_is_drawn_where_the_story_has_them(renderer: FrameRenderer, stage: Stage) -> None:
+def test_a_person_is_drawn_where_the_story_has_them(renderer, stage):
     resting = stage.story.restings[2]
     moment = stage.story.at(0.5 * (resting.start_s + resting.end_s))
     with_person, without = (renderer.render(moment, person=shown).astype(int) for shown in (True, False))
@@ -127,7 +125,7 @@ def test_a_person_is_drawn_where_the_story_has_them(renderer: FrameRenderer, sta
     assert v.min() < middle[1] < v.max()
 
 
-def test_the_person_carries_the_reflector_between_placements(stage: Stage) -> None:
+def test_the_person_carries_the_reflector_between_placements(stage):
     for first, second in pairwise(stage.story.restings):
         moment = stage.story.at(0.5 * (first.end_s + second.start_s))
         hands = moment.reflector_m[:2] - moment.person.place_m
@@ -135,7 +133,7 @@ def test_the_person_carries_the_reflector_between_placements(stage: Stage) -> No
         assert np.linalg.norm(hands) < 0.8
 
 
-def test_at_rest_the_reflector_does_not_move_and_nobody_teleports(stage: Stage) -> None:
+def test_at_rest_the_reflector_does_not_move_and_nobody_teleports(stage):
     resting = stage.story.restings[1]
     places = [stage.story.at(time_s).reflector_m for time_s in np.linspace(resting.start_s, resting.end_s - 1e-6, 9)]
     assert all(np.array_equal(place, resting.position_m) for place in places)
@@ -147,7 +145,7 @@ def test_at_rest_the_reflector_does_not_move_and_nobody_teleports(stage: Stage) 
 
 
 @pytest.mark.parametrize("scene", ["rooftop", "field", "aisle", "checkerboard"])
-def test_every_scene_has_ground_below_and_light_above(scene: SceneName) -> None:
+def test_every_scene_has_ground_below_and_light_above(scene):
     rig = random_rig(np.random.default_rng(2), camera=typical_camera(width_px=160, height_px=96))
     still = trace_still(scene_named(scene), rig)
     assert np.isfinite(still.levels).all()
@@ -157,7 +155,7 @@ def test_every_scene_has_ground_below_and_light_above(scene: SceneName) -> None:
     assert still.levels.std() > 12.0
 
 
-def test_what_stands_in_front_of_a_person_hides_them(renderer: FrameRenderer, stage: Stage) -> None:
+def test_what_stands_in_front_of_a_person_hides_them(renderer, stage):
     resting = stage.story.restings[2]
     moment = stage.story.at(0.5 * (resting.start_s + resting.end_s))
     before = renderer.render(moment)
@@ -166,7 +164,7 @@ def test_what_stands_in_front_of_a_person_hides_them(renderer: FrameRenderer, st
     assert hidden.sum() > 100
 
 
-def test_sensor_noise_is_as_strong_as_requested_and_seeded() -> None:
+def test_sensor_noise_is_as_strong_as_requested_and_seeded():
     noisy = replace(OPTIONS, width_px=160, height_px=96, sensor_noise_grey=4.0)
     first, again = (next(simulate(noisy).frames(1)).pixels for _ in range(2))
     clean = next(simulate(replace(noisy, sensor_noise_grey=0.0)).frames(1)).pixels
@@ -174,14 +172,14 @@ def test_sensor_noise_is_as_strong_as_requested_and_seeded() -> None:
     assert (first.astype(float) - clean)[20:].std() == pytest.approx(4.0, rel=0.1)
 
 
-def test_lines_cover_their_share_of_a_wide_pixel_and_all_of_a_narrow_one() -> None:
+def test_lines_cover_their_share_of_a_wide_pixel_and_all_of_a_narrow_one():
     wide = line_coverage(np.array([0.0, 0.31]), period_m=0.1, width_m=0.02, footprint_m=np.full(2, 10.0))
     narrow = line_coverage(np.array([0.0, 0.05]), period_m=0.1, width_m=0.02, footprint_m=np.full(2, 1e-3))
     assert wide == pytest.approx([0.2, 0.2], abs=0.01)
     assert narrow == pytest.approx([1.0, 0.0], abs=1e-6)
 
 
-def test_noise_finer_than_a_pixel_is_left_out() -> None:
+def test_noise_finer_than_a_pixel_is_left_out():
     u = np.linspace(0.0, 50.0, 4000).astype(np.float32)
     fine, coarse = (
         fractal_noise(u, u * 0.0, size_m=1.0, octaves=4, footprint_m=np.full(4000, size), seed=1)

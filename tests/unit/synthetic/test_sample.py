@@ -3,7 +3,6 @@
 import importlib.metadata
 import json
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +35,7 @@ def locked(project_root: Path) -> None:
             pytest.skip(f"{package} is {importlib.metadata.version(package)}; the sample is made with {pinned[0]}")
 
 
-def test_the_sample_is_small_enough_to_ship(sample: Path) -> None:
+def test_the_sample_is_small_enough_to_ship(sample):
     files = {path.name: path.stat().st_size for path in sample.iterdir()}
     assert set(files) == {"README.md", "camera.bag", "clicks.json", "radar.bag", "truth.json"}
     assert sum(files.values()) < LARGEST_BYTES
@@ -58,15 +57,11 @@ def nearly(value: Any) -> Any:
 
 
 @pytest.mark.parametrize(("name", "text_of"), [("clicks.json", clicks_text), ("truth.json", truth_text)])
-def test_clicks_and_truth_are_reproduced(
-    name: str, text_of: Callable[[SimulatedRecording], str], sample: Path, again: SimulatedRecording
-) -> None:
+def test_clicks_and_truth_are_reproduced(name, text_of, sample, again):
     assert json.loads(text_of(again)) == nearly(json.loads((sample / name).read_text()))
 
 
-def test_the_command_replaces_the_sample_and_its_text(
-    sample: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_command_replaces_the_sample_and_its_text(sample, tmp_path, monkeypatch):
     def write(recording: SimulatedRecording, folder: Path) -> None:
         assert recording.options == SAMPLE_OPTIONS
         folder.mkdir(parents=True)
@@ -81,7 +76,7 @@ def test_the_command_replaces_the_sample_and_its_text(
 
 
 @pytest.mark.slow
-def test_the_radar_is_reproduced(sample: Path, again: SimulatedRecording, tmp_path: Path) -> None:
+def test_the_radar_is_reproduced(sample, again, tmp_path):
     written = write_ros1_bag(tmp_path / "radar.bag", radar_messages(again, 1))
     with (
         open_recording(sample / "radar.bag", require=("radar",)) as shipped,
@@ -95,7 +90,7 @@ def test_the_radar_is_reproduced(sample: Path, again: SimulatedRecording, tmp_pa
 
 
 @pytest.mark.slow
-def test_the_first_pictures_are_reproduced_to_a_few_grey_levels(sample: Path, again: SimulatedRecording) -> None:
+def test_the_first_pictures_are_reproduced_to_a_few_grey_levels(sample, again):
     """The others differ from them in where the person and the reflector are."""
     with open_recording(sample / "camera.bag", require=("image",)) as shipped:
         assert list(again.stage.frame_times.header_ns) == list(shipped.image_times)

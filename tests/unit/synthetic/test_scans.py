@@ -11,14 +11,12 @@ from calib_core.radar import direction_cosines
 from calib_core.synthetic import (
     PRESETS,
     RADAR_PROFILES,
-    PresetName,
     RadarDefects,
     SimulatedScans,
     SimulationOptions,
     Traffic,
     simulate_scans,
 )
-from calib_core.synthetic.options import SceneName
 
 SHORT = SimulationOptions(placements=4, dwell_s=5.0, seed=3)
 
@@ -28,7 +26,7 @@ def session() -> SimulatedScans:
     return simulate_scans(SHORT)
 
 
-def test_the_same_seed_gives_the_same_scans_and_another_seed_others(session: SimulatedScans) -> None:
+def test_the_same_seed_gives_the_same_scans_and_another_seed_others(session):
     again, other = simulate_scans(SHORT), simulate_scans(replace(SHORT, seed=4))
     assert np.array_equal(session.scans.points_radar_m, again.scans.points_radar_m)
     assert np.array_equal(session.scans.times_ns, again.scans.times_ns)
@@ -36,7 +34,7 @@ def test_the_same_seed_gives_the_same_scans_and_another_seed_others(session: Sim
     assert session.clicks != other.clicks
 
 
-def test_ranges_azimuths_and_speeds_lie_on_the_radars_bins(session: SimulatedScans) -> None:
+def test_ranges_azimuths_and_speeds_lie_on_the_radars_bins(session):
     profile = RADAR_PROFILES["awr1843"]
     r, u, _ = direction_cosines(session.scans.points_radar_m).T
     speed_bins = session.scans.doppler_mps / profile.doppler_bin_mps
@@ -46,15 +44,15 @@ def test_ranges_azimuths_and_speeds_lie_on_the_radars_bins(session: SimulatedSca
     assert np.abs(speed_bins).max() <= 16.001
 
 
-def test_interpolated_azimuths_leave_the_lattice() -> None:
+def test_interpolated_azimuths_leave_the_lattice():
     session = simulate_scans(replace(SHORT, angle_bins=False))
     u = direction_cosines(session.scans.points_radar_m)[:, 1]
     assert np.median(np.abs(32.0 * u - np.round(32.0 * u))) > 0.15
 
 
 def test_the_reflector_shows_in_nearly_every_scan_of_its_dwell_with_doppler_exactly_zero(
-    session: SimulatedScans,
-) -> None:
+    session,
+):
     for placement in session.placements:
         window = session.scans.between(placement.start, placement.end)
         error = direction_cosines(window.points_radar_m) - direction_cosines(placement.position_radar_m[None])
@@ -63,21 +61,21 @@ def test_the_reflector_shows_in_nearly_every_scan_of_its_dwell_with_doppler_exac
         assert seen > 0.8, placement.id
 
 
-def test_without_clutter_and_person_hardly_anything_but_the_reflector_returns() -> None:
+def test_without_clutter_and_person_hardly_anything_but_the_reflector_returns():
     session = simulate_scans(replace(SHORT, clutter="none", person=False))
     assert len(session.scans.points_radar_m) < 2.2 * len(session.scans)
     window = session.scans.between(session.placements[1].end, session.placements[2].start)
     assert len(window.points_radar_m) < 0.5 * len(window)
 
 
-def test_clutter_stays_and_a_walking_person_moves(session: SimulatedScans) -> None:
+def test_clutter_stays_and_a_walking_person_moves(session):
     bare = simulate_scans(replace(SHORT, person=False))
     assert np.mean(bare.scans.doppler_mps == 0.0) > 0.9
     gap = session.scans.between(session.placements[0].end, session.placements[1].start)
     assert np.abs(gap.doppler_mps).max() > 0.5
 
 
-def test_elevation_is_measured_far_worse_than_range_and_azimuth() -> None:
+def test_elevation_is_measured_far_worse_than_range_and_azimuth():
     session = simulate_scans(replace(SHORT, placements=20, clutter="none", person=False, angle_bins=False))
     errors = []
     for placement in session.placements:
@@ -89,7 +87,7 @@ def test_elevation_is_measured_far_worse_than_range_and_azimuth() -> None:
     assert elevation > 2.0 * azimuth
 
 
-def test_an_imaging_radar_is_finer() -> None:
+def test_an_imaging_radar_is_finer():
     session = simulate_scans(replace(SHORT, radar="imaging", clutter="none", person=False))
     placement = session.placements[0]
     window = session.scans.between(placement.start, placement.end)
@@ -98,7 +96,7 @@ def test_an_imaging_radar_is_finer() -> None:
     assert np.abs(np.median(error[near], axis=0)).max() < 0.02
 
 
-def test_a_click_lies_on_its_truth_pixel_within_its_noise(session: SimulatedScans) -> None:
+def test_a_click_lies_on_its_truth_pixel_within_its_noise(session):
     frames = set(session.stage.frame_times.header_ns.tolist())
     for click, placement in zip(session.clicks, session.placements, strict=True):
         assert placement.start < click.image_time < placement.end
@@ -106,13 +104,13 @@ def test_a_click_lies_on_its_truth_pixel_within_its_noise(session: SimulatedScan
         assert np.hypot(*([click.u_px, click.v_px] - placement.pixel_px)) < 4.0 * SHORT.click_sigma_px + 0.01
 
 
-def test_a_truth_pixel_is_the_projection_of_the_true_position(session: SimulatedScans) -> None:
+def test_a_truth_pixel_is_the_projection_of_the_true_position(session):
     projected = session.camera.project(session.camera_from_radar @ session.points_radar_m)
     assert np.abs(projected - session.pixels_px).max() < 1e-9
     assert session.camera.sees(session.camera_from_radar @ session.points_radar_m).all()
 
 
-def test_stamps_rise_and_the_two_sensors_are_not_synchronised(session: SimulatedScans) -> None:
+def test_stamps_rise_and_the_two_sensors_are_not_synchronised(session):
     frames, scans = session.stage.frame_times, session.stage.scan_times
     for times in (frames, scans):
         assert (np.diff(times.header_ns) > 0).all()
@@ -121,7 +119,7 @@ def test_stamps_rise_and_the_two_sensors_are_not_synchronised(session: Simulated
     assert not set(frames.header_ns.tolist()) & set(scans.header_ns.tolist())
 
 
-def test_a_clock_offset_moves_the_radars_stamps_by_that_amount(session: SimulatedScans) -> None:
+def test_a_clock_offset_moves_the_radars_stamps_by_that_amount(session):
     plain, ahead = session, simulate_scans(replace(SHORT, clock_offset_s=0.25))
     assert set((ahead.scans.times_ns - plain.scans.times_ns).tolist()) <= {
         NS_PER_S // 4 - 1,
@@ -132,13 +130,13 @@ def test_a_clock_offset_moves_the_radars_stamps_by_that_amount(session: Simulate
     assert np.array_equal(plain.scans.points_radar_m, ahead.scans.points_radar_m)
 
 
-def test_frames_and_scans_are_dropped_at_the_requested_share() -> None:
+def test_frames_and_scans_are_dropped_at_the_requested_share():
     whole, holed = simulate_scans(replace(SHORT, dropped_share=0.0)), simulate_scans(replace(SHORT, dropped_share=0.3))
     assert len(holed.scans) / len(whole.scans) == pytest.approx(0.7, abs=0.08)
 
 
 @pytest.mark.parametrize("scene", ["rooftop", "field", "aisle", "checkerboard", "open-rooftop", "open-yard", "road"])
-def test_every_scene_has_room_for_twenty_placements(scene: SceneName) -> None:
+def test_every_scene_has_room_for_twenty_placements(scene):
     session = simulate_scans(
         SimulationOptions(scene=scene, clutter="none", person=False, dwell_s=4.0, radar_rate_hz=2.0)
     )
@@ -149,7 +147,7 @@ def test_every_scene_has_room_for_twenty_placements(scene: SceneName) -> None:
     assert heights == pytest.approx(np.full(20, 0.2), abs=0.06)
 
 
-def test_on_a_tripod_the_heights_vary() -> None:
+def test_on_a_tripod_the_heights_vary():
     session = simulate_scans(
         SimulationOptions(heights=True, clutter="none", person=False, dwell_s=4.0, radar_rate_hz=2.0)
     )
@@ -158,7 +156,7 @@ def test_on_a_tripod_the_heights_vary() -> None:
     assert heights.max() - heights.min() > 0.8
 
 
-def test_in_heavy_clutter_something_is_stronger_than_the_reflector() -> None:
+def test_in_heavy_clutter_something_is_stronger_than_the_reflector():
     session = simulate_scans(replace(SHORT, clutter="heavy", person=False, placements=8))
     placement = session.placements[-1]
     window = session.scans.between(placement.start, placement.end)
@@ -186,19 +184,19 @@ def test_in_heavy_clutter_something_is_stronger_than_the_reflector() -> None:
         ),
     ],
 )
-def test_an_option_out_of_range_is_refused_by_name(changes: dict[str, float], text: str) -> None:
+def test_an_option_out_of_range_is_refused_by_name(changes, text):
     with pytest.raises(OptionError, match=text):
-        replace(SHORT, **changes)  # type: ignore[arg-type]
+        replace(SHORT, **changes)
 
 
-def test_traffic_leaves_placements_and_clicks_where_they_are(session: SimulatedScans) -> None:
+def test_traffic_leaves_placements_and_clicks_where_they_are(session):
     busy = simulate_scans(replace(SHORT, traffic=Traffic(walkers=2)))
     assert np.array_equal(busy.points_radar_m, session.points_radar_m)
     assert len(busy.scans.points_radar_m) > len(session.scans.points_radar_m)
     assert np.array_equal(busy.scans.times_ns, session.scans.times_ns)
 
 
-def test_a_reflector_of_twice_the_edge_echoes_12_db_more_and_stands_higher() -> None:
+def test_a_reflector_of_twice_the_edge_echoes_12_db_more_and_stands_higher():
     usual, large = (
         simulate_scans(replace(SHORT, clutter="none", person=False, reflector_edge_m=edge)) for edge in (0.16, 0.32)
     )
@@ -211,7 +209,7 @@ def test_a_reflector_of_twice_the_edge_echoes_12_db_more_and_stands_higher() -> 
     assert heights[1] - heights[0] == pytest.approx(0.32 * 0.16, abs=0.01)
 
 
-def test_placements_at_the_checkerboard_are_at_its_corners_in_the_picture() -> None:
+def test_placements_at_the_checkerboard_are_at_its_corners_in_the_picture():
     options = replace(PRESETS["paper-d2"], placements=2, board_corners=6, dwell_s=4.0, radar_rate_hz=2.0)
     session = simulate_scans(options)
     board = session.stage.scene.board
@@ -221,14 +219,14 @@ def test_placements_at_the_checkerboard_are_at_its_corners_in_the_picture() -> N
     assert not board.hides(world[apart > 0.03]).any()
 
 
-def test_only_the_corners_that_the_camera_sees_can_be_asked_for() -> None:
+def test_only_the_corners_that_the_camera_sees_can_be_asked_for():
     narrow = replace(PRESETS["paper-d2"], board_corners=40, field_of_view_deg=40.0)
     with pytest.raises(OptionError, match=r"board_corners is 40, but the camera sees \d+ inner corners"):
         simulate_scans(narrow)
 
 
 @pytest.mark.parametrize("preset", ["paper-d1", "paper-d2", "paper-d3"])
-def test_while_the_reflector_stands_in_the_papers_scenes_hardly_anything_else_does(preset: PresetName) -> None:
+def test_while_the_reflector_stands_in_the_papers_scenes_hardly_anything_else_does(preset):
     options = replace(PRESETS[preset], placements=4, dwell_s=4.0, radar_rate_hz=4.0)
     session = simulate_scans(replace(options, board_corners=min(options.board_corners, 2)))
     for placement in session.placements:
@@ -242,6 +240,6 @@ def test_while_the_reflector_stands_in_the_papers_scenes_hardly_anything_else_do
         assert far.mean() < 0.3, placement.id
 
 
-def test_a_frame_rate_too_low_for_the_dwell_is_answered_in_words() -> None:
+def test_a_frame_rate_too_low_for_the_dwell_is_answered_in_words():
     with pytest.raises(OptionError, match="no frame shows placement 1: raise the frame rate or the dwell time"):
         simulate_scans(replace(SHORT, camera_rate_hz=0.1))

@@ -19,7 +19,7 @@ BOARD = Board("checkerboard", 9, 6, 0.02214)
 CAMERA = typical_camera()
 
 
-def test_a_waved_board_is_tilted_near_and_far_and_all_over_the_picture() -> None:
+def test_a_waved_board_is_tilted_near_and_far_and_all_over_the_picture():
     poses = waved_poses(np.random.default_rng(1), BOARD, CAMERA, 30)
     pixels = np.concatenate([true_corners(BOARD, CAMERA, pose) for pose in poses])
     assert CAMERA.in_image(pixels).all()
@@ -30,7 +30,7 @@ def test_a_waved_board_is_tilted_near_and_far_and_all_over_the_picture() -> None
     assert np.ptp([pose.rotation[0, 2] for pose in poses]) > 0.8
 
 
-def test_a_badly_held_board_is_neither_tilted_nor_moved() -> None:
+def test_a_badly_held_board_is_neither_tilted_nor_moved():
     held = Waving(tilt_deg=0.0, roll_deg=0.0, size=(0.4, 0.4), cover=0.3)
     poses = waved_poses(np.random.default_rng(1), BOARD, CAMERA, 10, held)
     rays = [(pose @ BOARD.corners_m).mean(axis=0) for pose in poses]
@@ -40,12 +40,12 @@ def test_a_badly_held_board_is_neither_tilted_nor_moved() -> None:
     assert np.ptp(pixels, axis=0)[0] < 0.6 * 1280
 
 
-def test_a_board_that_does_not_fit_is_refused() -> None:
+def test_a_board_that_does_not_fit_is_refused():
     with pytest.raises(ValueError, match="0 of 2 poses"):
         waved_poses(np.random.default_rng(1), BOARD, CAMERA, 2, Waving(size=(1.4, 1.5)))
 
 
-def test_errors_are_as_large_as_asked_for() -> None:
+def test_errors_are_as_large_as_asked_for():
     rng = np.random.default_rng(2)
     poses = waved_poses(rng, BOARD, CAMERA, 60)
     true = [true_corners(BOARD, CAMERA, pose) for pose in poses]
@@ -64,7 +64,7 @@ def test_errors_are_as_large_as_asked_for() -> None:
     assert np.mean(np.linalg.norm(gross, axis=2) > 0.5) == pytest.approx(0.05, abs=0.015)
 
 
-def test_a_rolling_shutter_moves_the_corners_of_a_waved_board() -> None:
+def test_a_rolling_shutter_moves_the_corners_of_a_waved_board():
     poses = waved_poses(np.random.default_rng(3), BOARD, CAMERA, 5)
     waved = CornerErrors(0.0, speed_mps=0.2, turning_radps=0.5)
     for rolling_s, least, most in ((0.0, 0.0, 1e-9), (0.02, 0.3, 40.0)):

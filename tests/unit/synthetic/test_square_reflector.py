@@ -31,14 +31,14 @@ def renderer(stage: Stage) -> FrameRenderer:
     return FrameRenderer(stage.scene, stage.rig, still, sun_direction(stage.scene), design="square")
 
 
-def test_the_edges_are_at_right_angles_and_one_points_down() -> None:
+def test_the_edges_are_at_right_angles_and_one_points_down():
     edges = square_edges(2.0, 0.2)
     assert edges @ edges.T == pytest.approx(0.04 * np.eye(3), abs=1e-12)
     assert np.argmin(edges[:, 2]) == 0
     assert (edges[1:, 2] > 0.0).all()
 
 
-def test_three_sheets_of_different_grey_meet_at_the_true_pixel(renderer: FrameRenderer, stage: Stage) -> None:
+def test_three_sheets_of_different_grey_meet_at_the_true_pixel(renderer, stage):
     nearest = min(stage.story.restings, key=lambda one: float(np.linalg.norm(one.position_m)))
     picture = renderer.render(stage.story.at(0.5 * (nearest.start_s + nearest.end_s)), person=False).astype(float)
     apex_px = stage.rig.camera.project(stage.rig.camera_from_world @ nearest.position_m[None])[0]
@@ -51,7 +51,7 @@ def test_three_sheets_of_different_grey_meet_at_the_true_pixel(renderer: FrameRe
     assert np.diff(sorted(greys)).min() > 8.0
 
 
-def test_the_pole_stands_on_the_ground_and_is_short_while_it_is_carried() -> None:
+def test_the_pole_stands_on_the_ground_and_is_short_while_it_is_carried():
     apex_m = np.array([4.0, 1.0, 1.2])
     pole, foot = pole_limbs(apex_m, 3.0, 0.16, at_rest=True)
     assert pole.end_m[2] == foot.start_m[2] == 0.0
@@ -59,7 +59,7 @@ def test_the_pole_stands_on_the_ground_and_is_short_while_it_is_carried() -> Non
     assert carried.end_m[2] > 0.5
 
 
-def test_the_design_changes_no_echo() -> None:
+def test_the_design_changes_no_echo():
     square, usual = (simulate(replace(OPTIONS, reflector_design=design)) for design in ("square", "triangular"))
     for one, other in zip(square.scans(), usual.scans(), strict=True):
         np.testing.assert_array_equal(one.points_radar_m, other.points_radar_m)

@@ -8,7 +8,6 @@ import subprocess
 import zipfile
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -36,13 +35,13 @@ def members(corrected) -> dict[str, bytes]:
     return unpack(export(corrected, "pack").data, source="pack")
 
 
-def test_the_same_calibration_gives_the_same_bytes(corrected) -> None:
+def test_the_same_calibration_gives_the_same_bytes(corrected):
     again = read_calibration(write_calibration(corrected))
 
     assert export(again, "pack").data == export(corrected, "pack").data
 
 
-def test_calibration_json_is_the_file_that_the_hash_in_every_other_file_names(corrected, members) -> None:
+def test_calibration_json_is_the_file_that_the_hash_in_every_other_file_names(corrected, members):
     sha256 = hashlib.sha256(members["calibration.json"]).hexdigest()
 
     assert members["calibration.json"].decode() == write_calibration(corrected)
@@ -52,13 +51,13 @@ def test_calibration_json_is_the_file_that_the_hash_in_every_other_file_names(co
     assert (found.calibration_sha256, found.evidence) == (sha256, corrected.rests_on)
 
 
-def test_a_pack_is_adopted_as_the_calibration_in_it(golden) -> None:
+def test_a_pack_is_adopted_as_the_calibration_in_it(golden):
     found = read_any(export(golden, "pack").data)
 
     assert write_calibration(adopt(found, "pack")) == write_calibration(golden)
 
 
-def test_the_transforms_and_the_camera_are_those_of_the_calibration(corrected, members) -> None:
+def test_the_transforms_and_the_camera_are_those_of_the_calibration(corrected, members):
     camera = read_camera(members["camera_info.yaml"].decode())
     info = yaml.safe_load(members["camera_info.yaml"])
 
@@ -77,7 +76,7 @@ def test_the_transforms_and_the_camera_are_those_of_the_calibration(corrected, m
     assert info["distortion_model"] == "plumb_bob"
 
 
-def test_the_readme_says_what_is_in_the_pack(corrected, members) -> None:
+def test_the_readme_says_what_is_in_the_pack(corrected, members):
     text = members["README.txt"].decode()
     words = " ".join(text.split())
 
@@ -100,7 +99,7 @@ def test_the_readme_says_what_is_in_the_pack(corrected, members) -> None:
 
 
 @pytest.mark.parametrize("evidence", EVIDENCE_LEVELS)
-def test_the_readme_explains_what_the_pose_rests_on(evidence, golden) -> None:
+def test_the_readme_explains_what_the_pose_rests_on(evidence, golden):
     data = export(replace(golden, evidence=evidence), "pack").data
 
     words = " ".join(unpack(data, source="pack")["README.txt"].decode().split())
@@ -110,7 +109,7 @@ def test_the_readme_explains_what_the_pose_rests_on(evidence, golden) -> None:
     assert read_any(data).evidence == evidence
 
 
-def test_sha256sum_verifies_the_manifest(corrected, unpacked) -> None:
+def test_sha256sum_verifies_the_manifest(corrected, unpacked):
     if shutil.which("sha256sum") is None:
         pytest.skip("sha256sum is not installed")
     folder = unpacked(corrected)
@@ -147,7 +146,7 @@ CHANGES: dict[str, tuple[Callable[[dict[str, bytes]], object], str]] = {
 
 
 @pytest.mark.parametrize("change", CHANGES)
-def test_a_pack_that_contradicts_its_manifest_is_refused(change, members) -> None:
+def test_a_pack_that_contradicts_its_manifest_is_refused(change, members):
     edit, words = CHANGES[change]
     edit(members)
 
@@ -155,7 +154,7 @@ def test_a_pack_that_contradicts_its_manifest_is_refused(change, members) -> Non
         read_any(pack(members), "robot.zip")
 
 
-def test_a_pack_zipped_again_with_its_folder_is_read(corrected, members) -> None:
+def test_a_pack_zipped_again_with_its_folder_is_read(corrected, members):
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.mkdir("robot")
@@ -171,7 +170,7 @@ def test_a_pack_zipped_again_with_its_folder_is_read(corrected, members) -> None
 
 
 @pytest.mark.parametrize("name", [known.name for known in FORMATS])
-def test_a_format_that_cannot_hold_the_angle_map_says_so_first_with_both_figures(name, corrected) -> None:
+def test_a_format_that_cannot_hold_the_angle_map_says_so_first_with_both_figures(name, corrected):
     written = export(corrected, name, rectified=format_named(name).is_for_rectified)
 
     without = [note for note in written.notes if note.startswith("NOT IN THIS FILE: the radar's angle map")]
@@ -182,27 +181,27 @@ def test_a_format_that_cannot_hold_the_angle_map_says_so_first_with_both_figures
         assert "22.9 px off, with it 2.04 px" in without[0]
 
 
-def test_a_calibration_without_a_map_has_no_such_note(golden) -> None:
+def test_a_calibration_without_a_map_has_no_such_note(golden):
     for known in FORMATS:
         notes = export(golden, known.name, rectified=known.is_for_rectified).notes
         assert not any("angle map" in note for note in notes if known.name != "pack")
 
 
-def test_the_contents_are_shown_as_text(corrected) -> None:
+def test_the_contents_are_shown_as_text(corrected):
     text = contents_text(export(corrected, "pack"))
 
     assert "[tf/static_transform.sh]\n#!/bin/sh" in text
     assert "[radar_angle_map.npz]\nazimuth_rad  float64  6" in text
 
 
-def test_the_code_in_the_pack_has_a_licence_and_names_no_other_package(members) -> None:
+def test_the_code_in_the_pack_has_a_licence_and_names_no_other_package(members):
     for name in ("radar_correction.py", "selftest.py", "radar_correction.hpp", "selftest.cpp"):
         text = members[name].decode()
         assert text.startswith(("# SPDX-License-Identifier: Apache-2.0\n", "// SPDX-License-Identifier: Apache-2.0\n"))
         assert not re.search(r"^\s*(import|from) (calib_core|cocalib)", text, re.MULTILINE)
 
 
-def test_the_code_in_the_pack_is_the_installed_files(project_root: Path, members) -> None:
+def test_the_code_in_the_pack_is_the_installed_files(project_root, members):
     delivered = project_root / "calib_core/interchange/formats/delivered"
     names = {path.name for path in delivered.iterdir() if path.is_file() and path.name != "__init__.py"}
 

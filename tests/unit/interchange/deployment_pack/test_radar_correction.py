@@ -71,7 +71,7 @@ def loaded(folder, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     return module
 
 
-def test_python_corrects_one_position_and_many(file, reported_m, true_m, unpacked, monkeypatch) -> None:
+def test_python_corrects_one_position_and_many(file, reported_m, true_m, unpacked, monkeypatch):
     folder = unpacked(file)
     correction = loaded(folder, monkeypatch).RadarCorrection.read(folder)
 
@@ -84,7 +84,7 @@ def test_python_corrects_one_position_and_many(file, reported_m, true_m, unpacke
     assert np.isnan(correction.corrected_array([[np.nan, 1.0, 0.0]])).all()
 
 
-def test_cpp_corrects_the_same(file, reported_m, true_m, unpacked, compiled) -> None:
+def test_cpp_corrects_the_same(file, reported_m, true_m, unpacked, compiled):
     program = compiled("driver", DRIVER)
     text = "\n".join(" ".join(map(repr, row)) for row in reported_m.tolist())
 
@@ -93,7 +93,7 @@ def test_cpp_corrects_the_same(file, reported_m, true_m, unpacked, compiled) -> 
     np.testing.assert_allclose(np.loadtxt(io.StringIO(done.stdout)), true_m, rtol=0, atol=1e-9)
 
 
-def test_a_map_that_is_named_and_missing_is_an_error(corrected, unpacked, monkeypatch) -> None:
+def test_a_map_that_is_named_and_missing_is_an_error(corrected, unpacked, monkeypatch):
     folder = unpacked(corrected)
     (folder / "radar_angle_map.csv").unlink()
 
@@ -101,7 +101,7 @@ def test_a_map_that_is_named_and_missing_is_an_error(corrected, unpacked, monkey
         loaded(folder, monkeypatch).RadarCorrection.read(folder)
 
 
-def test_the_npz_holds_the_same_tables(corrected, angle_map, unpacked) -> None:
+def test_the_npz_holds_the_same_tables(corrected, angle_map, unpacked):
     arrays = np.load(unpacked(corrected) / "radar_angle_map.npz", allow_pickle=False)
 
     np.testing.assert_array_equal(arrays["azimuth_rad"], angle_map.azimuth_rad)

@@ -4,7 +4,6 @@ import csv
 import re
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -34,7 +33,7 @@ def through_opencv(file: CalibrationFile, points_radar_m: np.ndarray) -> np.ndar
 
 
 @pytest.mark.parametrize("lens", LENS_MODELS)
-def test_they_pass_through_every_lens(lens, through_lens, unpacked, selftest) -> None:
+def test_they_pass_through_every_lens(lens, through_lens, unpacked, selftest):
     folder = unpacked(through_lens(lens))
     before = sorted(folder.rglob("*"))
 
@@ -47,7 +46,7 @@ def test_they_pass_through_every_lens(lens, through_lens, unpacked, selftest) ->
 
 
 @pytest.mark.parametrize("lens", LENS_MODELS)
-def test_opencv_projects_the_ten_points_to_the_same_pixels(lens, through_lens) -> None:
+def test_opencv_projects_the_ten_points_to_the_same_pixels(lens, through_lens):
     file = through_lens(lens)
     errors, grid = file.calibration.radar_errors, file.calibration.angle_map
 
@@ -62,7 +61,7 @@ def test_opencv_projects_the_ten_points_to_the_same_pixels(lens, through_lens) -
     assert np.ptp(rows[:, 3:5], axis=0).min() > 0.8 * file.calibration.camera.height_px
 
 
-def test_a_skewed_camera_passes(golden, unpacked, selftest) -> None:
+def test_a_skewed_camera_passes(golden, unpacked, selftest):
     matrix = golden.calibration.camera.matrix_px.copy()
     matrix[0, 1] = 25.0
     camera = Camera("plumb_bob", 640, 480, matrix, golden.calibration.camera.distortion)
@@ -114,7 +113,7 @@ PLANTED = {
 
 
 @pytest.mark.parametrize("slip", PLANTED)
-def test_they_fail_at_a_wrong_number(slip, through_lens, unpacked, selftest) -> None:
+def test_they_fail_at_a_wrong_number(slip, through_lens, unpacked, selftest):
     folder = unpacked(through_lens("rational_polynomial"))
     name, edit = PLANTED[slip]
     text = (folder / name).read_text()
@@ -127,7 +126,7 @@ def test_they_fail_at_a_wrong_number(slip, through_lens, unpacked, selftest) -> 
     assert answer.out.splitlines()[-1].startswith("FAIL: ")
 
 
-def test_they_fail_where_a_table_of_the_angle_map_is_wrong(through_lens, unpacked, selftest) -> None:
+def test_they_fail_where_a_table_of_the_angle_map_is_wrong(through_lens, unpacked, selftest):
     folder = unpacked(through_lens("plumb_bob"))
     path = folder / "radar_angle_map.csv"
     head, *lines = path.read_text().splitlines()
@@ -138,7 +137,7 @@ def test_they_fail_where_a_table_of_the_angle_map_is_wrong(through_lens, unpacke
 
 
 @pytest.mark.parametrize("name", ["calibration.json", "camera_info.yaml", "radar_angle_map.csv", "selftest.csv"])
-def test_they_fail_without_a_file(name, corrected, unpacked, selftest) -> None:
+def test_they_fail_without_a_file(name, corrected, unpacked, selftest):
     folder = unpacked(corrected)
     (folder / name).unlink()
 
@@ -148,7 +147,7 @@ def test_they_fail_without_a_file(name, corrected, unpacked, selftest) -> None:
     assert name in answer.out.splitlines()[-1]
 
 
-def test_inliers_come_first_and_excluded_pairs_are_no_points(golden) -> None:
+def test_inliers_come_first_and_excluded_pairs_are_no_points(golden):
     pairs = golden.calibration.pairs
     inliers = {tuple(np.round(pair.point_radar_m, 3)) for pair in pairs if pair.inlier}
     others = {tuple(np.round(pair.point_radar_m, 3)) for pair in pairs if not pair.inlier}
@@ -161,7 +160,7 @@ def test_inliers_come_first_and_excluded_pairs_are_no_points(golden) -> None:
     assert len(set(points)) == 10
 
 
-def test_of_many_pairs_ten_are_spread_over_directions_and_ranges(golden) -> None:
+def test_of_many_pairs_ten_are_spread_over_directions_and_ranges(golden):
     rng, (pair, *_) = np.random.default_rng(4), golden.calibration.pairs
     points_m = rng.uniform(3.0, 30.0, (60, 1)) * np.column_stack([np.ones(60), rng.uniform(-0.35, 0.35, (60, 2))])
     pairs = tuple(replace(pair, id=f"p{i}", point_radar_m=point, inlier=True) for i, point in enumerate(points_m))
@@ -175,7 +174,7 @@ def test_of_many_pairs_ten_are_spread_over_directions_and_ranges(golden) -> None
     assert {tuple(row) for row in chosen_m} <= {tuple(row) for row in np.round(points_m, 3)}
 
 
-def test_a_lens_that_the_programs_do_not_know_is_refused(golden, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_lens_that_the_programs_do_not_know_is_refused(golden, monkeypatch):
     monkeypatch.setitem(LENS_MODELS, "division", replace(LENS_MODELS["plumb_bob"], name="division"))
     camera = replace(golden.calibration.camera, model="division")
     file = replace(golden, calibration=replace(golden.calibration, camera=camera))
@@ -184,7 +183,7 @@ def test_a_lens_that_the_programs_do_not_know_is_refused(golden, monkeypatch: py
         export(file, "pack")
 
 
-def test_errors_that_leave_no_point_are_refused_in_words(golden) -> None:
+def test_errors_that_leave_no_point_are_refused_in_words(golden):
     errors = RadarErrors(range_bias_m=float("nan"))
     file = replace(golden, calibration=replace(golden.calibration, radar_errors=errors))
 
@@ -192,7 +191,7 @@ def test_errors_that_leave_no_point_are_refused_in_words(golden) -> None:
         export(file, "pack")
 
 
-def test_the_programs_name_no_path_of_this_machine(golden, project_root: Path) -> None:
+def test_the_programs_name_no_path_of_this_machine(golden, project_root):
     members = unpack(export(golden, "pack").data, source="pack")
 
     assert not any(str(project_root).encode() in data for data in members.values())

@@ -31,7 +31,7 @@ def _npy(array: np.ndarray) -> bytes:
 
 def _npz(**arrays: np.ndarray) -> bytes:
     buffer = io.BytesIO()
-    np.savez(buffer, **arrays)  # type: ignore[arg-type]
+    np.savez(buffer, **arrays)
     return buffer.getvalue()
 
 
@@ -103,7 +103,7 @@ def _is_pose(found: RigidTransform, tolerance: float = 1e-6) -> bool:
 
 
 @pytest.mark.parametrize("name", CORPUS)
-def test_a_usual_shape_has_the_pose_as_its_first_hypothesis_and_of_a_usual_mounting_the_meaning_is_clear(name) -> None:
+def test_a_usual_shape_has_the_pose_as_its_first_hypothesis_and_of_a_usual_mounting_the_meaning_is_clear(name):
     file = read_unstated(CORPUS[name], name)
     pose = file.pose_at(None)
     hypotheses = hypotheses_of(pose)
@@ -118,7 +118,7 @@ def test_a_usual_shape_has_the_pose_as_its_first_hypothesis_and_of_a_usual_mount
     assert chosen.key in found.assumptions[0]
 
 
-def test_body_axes_in_both_frames_leave_the_direction_open() -> None:
+def test_body_axes_in_both_frames_leave_the_direction_open():
     file = read_unstated(json.dumps({"T": {"x": 1.2, "y": 0.1, "z": 0.4, "qw": 1, "qx": 0, "qy": 0, "qz": 0}}))
     pose = file.pose_at(None)
     hypotheses = hypotheses_of(pose)
@@ -127,7 +127,7 @@ def test_body_axes_in_both_frames_leave_the_direction_open() -> None:
     assert sorted(directions) == ["camera_from_radar", "radar_from_camera"]
 
 
-def test_several_poses_are_listed_by_their_place() -> None:
+def test_several_poses_are_listed_by_their_place():
     text = json.dumps({"front": {"T": MATRIX.tolist()}, "rear": {"T": MATRIX.tolist()}})
     file = read_unstated(text, "rig.json")
     with pytest.raises(InputError, match=r"contains 2 poses; choose one with --pose NAME: 'front.T', 'rear.T'"):
@@ -137,7 +137,7 @@ def test_several_poses_are_listed_by_their_place() -> None:
     assert file.pose_at("rear.T").place == file.pose_at("rear").place == "rear.T"
 
 
-def test_of_several_radars_that_with_a_camera_matrix_is_read_and_with_its_camera() -> None:
+def test_of_several_radars_that_with_a_camera_matrix_is_read_and_with_its_camera():
     matrix = {"K": [[900, 0, 640], [0, 900, 360], [0, 0, 1]], "width": 1280, "height": 720}
     sensors = {name: {"T": MATRIX.tolist()} for name in ("lidar_top", "radar_front", "radar_rear")}
     sensors["radar_front"] |= matrix
@@ -149,7 +149,7 @@ def test_of_several_radars_that_with_a_camera_matrix_is_read_and_with_its_camera
     assert as_imported(file, file.pose_at("radar_rear"), hypotheses_of(pose)[0], by_hand=True).camera is None
 
 
-def test_the_poses_of_radar_and_camera_in_a_third_frame_are_not_taken_for_one_another() -> None:
+def test_the_poses_of_radar_and_camera_in_a_third_frame_are_not_taken_for_one_another():
     """As Astyx has them: the radar's is the identity, and the camera's stands with its matrix."""
     matrix = {"K": [[900, 0, 640], [0, 900, 360], [0, 0, 1]]}
     poses = [
@@ -164,7 +164,7 @@ def test_the_poses_of_radar_and_camera_in_a_third_frame_are_not_taken_for_one_an
     assert as_imported(file, camera, hypotheses_of(camera)[0], by_hand=True).matrix_px[0, 0] == 900.0
 
 
-def test_each_radar_of_a_mapping_is_a_pose_of_its_own() -> None:
+def test_each_radar_of_a_mapping_is_a_pose_of_its_own():
     text = json.dumps(
         {"R_left": POSE.rotation.tolist(), "t_left": TRANSLATION, "R_right": np.eye(3).tolist(), "t_right": [1, 2, 3]}
     )
@@ -206,12 +206,12 @@ def _set(row: int, column: int, value: float) -> Callable[[np.ndarray], None]:
         (_npy(MATRIX)[:-8], "a damaged npy file"),
     ],
 )
-def test_what_has_the_shape_of_a_pose_and_is_none_is_refused_with_the_reason(text: str, fault: str) -> None:
+def test_what_has_the_shape_of_a_pose_and_is_none_is_refused_with_the_reason(text, fault):
     with pytest.raises(InputError, match=fault):
         read_unstated(text, "file.json")
 
 
-def test_a_file_that_states_its_frames_is_read_by_its_format() -> None:
+def test_a_file_that_states_its_frames_is_read_by_its_format():
     text = json.dumps(
         {
             "header": {"frame_id": "radar"},
@@ -225,7 +225,7 @@ def test_a_file_that_states_its_frames_is_read_by_its_format() -> None:
     assert read_unstated(text) is None
 
 
-def test_a_meaning_is_picked_by_as_many_parts_as_are_needed() -> None:
+def test_a_meaning_is_picked_by_as_many_parts_as_are_needed():
     file = read_unstated(json.dumps({"T": np.linalg.inv(MATRIX).tolist()}), "file.json")
     hypotheses = hypotheses_of(file.pose_at(None))
     assert _is_pose(picked(hypotheses, "radar_from_camera,optical,m", "file.json").camera_from_radar)
@@ -238,7 +238,7 @@ def test_a_meaning_is_picked_by_as_many_parts_as_are_needed() -> None:
         picked(hypotheses, "inches", "file.json")
 
 
-def test_the_camera_in_the_file_comes_along() -> None:
+def test_the_camera_in_the_file_comes_along():
     text = json.dumps(
         {"K": [[500, 0, 320], [0, 500, 240], [0, 0, 1]], "D": [], "width": 640, "height": 480, "T": MATRIX.tolist()}
     )
@@ -265,13 +265,13 @@ LEVEL = RigidTransform(np.eye(3), [1.2, 0.1, 0.4]).as_matrix().tolist()
         ({"description": "extrinsics from the camera to the radar", "matrix": LEVEL}, "radar_from_camera"),
     ],
 )
-def test_names_rank_the_direction_and_decide_nothing(content: dict[str, object], first: str) -> None:
+def test_names_rank_the_direction_and_decide_nothing(content, first):
     hypotheses = hypotheses_of(read_unstated(json.dumps(content)).pose_at(None))
     assert hypotheses[0].meanings[0].direction == first
     assert {one.meanings[0].direction for one in hypotheses if one.fits} == {"camera_from_radar", "radar_from_camera"}
 
 
-def test_the_pose_of_another_sensor_is_not_taken_for_the_radars() -> None:
+def test_the_pose_of_another_sensor_is_not_taken_for_the_radars():
     file = read_unstated(json.dumps({"T_cam_lidar": MATRIX.tolist()}), "file.json")
     pose = file.pose_at(None)
     assert clear_one(pose, hypotheses_of(pose)) is None
@@ -280,21 +280,21 @@ def test_the_pose_of_another_sensor_is_not_taken_for_the_radars() -> None:
         read_clear(json.dumps({"T_cam_lidar": MATRIX.tolist()}), "file.json")
 
 
-def test_of_several_poses_the_only_one_that_names_a_radar_is_taken() -> None:
+def test_of_several_poses_the_only_one_that_names_a_radar_is_taken():
     text = json.dumps({"T_cam_lidar": np.eye(4).tolist(), "T_cam_radar": MATRIX.tolist()})
     found = read_clear(text, "rig.json")
     assert _is_pose(found.camera_from_radar)
     assert found.notes == ("T_cam_radar was read, one of 2 poses in the file",)
 
 
-def test_what_cannot_be_read_beside_a_pose_is_told() -> None:
+def test_what_cannot_be_read_beside_a_pose_is_told():
     mirrored = (MATRIX @ np.diag([1.0, -1, 1, 1])).tolist()
     found = read_clear(json.dumps({"front": mirrored, "rear": MATRIX.tolist()}), "rig.json")
     assert _is_pose(found.camera_from_radar)
     assert found.notes[0].startswith("not read: front: the rotation is left-handed")
 
 
-def test_intrinsics_are_no_pose() -> None:
+def test_intrinsics_are_no_pose():
     projection = [[500.0, 0, 320, 0], [0, 500, 240, 0], [0, 0, 1, 0]]
     text = json.dumps(
         {"projection_matrix": {"rows": 3, "cols": 4, "data": np.ravel(projection).tolist()}, "P2": projection}
@@ -302,14 +302,14 @@ def test_intrinsics_are_no_pose() -> None:
     assert read_unstated(text, "camera.json") is None
 
 
-def test_units_in_names_rank_first() -> None:
+def test_units_in_names_rank_first():
     file = read_unstated(json.dumps({"R": POSE.rotation.tolist(), "t_mm": [120.0, -310.0, 70.0]}), "file.json")
     first = hypotheses_of(file.pose_at(None))[0]
     assert first.meanings[0].unit == "mm"
     assert _is_pose(first.camera_from_radar)
 
 
-def test_numbers_that_contradict_their_name_are_left_to_a_person() -> None:
+def test_numbers_that_contradict_their_name_are_left_to_a_person():
     transposed = RigidTransform(POSE.rotation.T, POSE.translation_m)
     file = read_unstated(json.dumps({"T_camera_radar": transposed.as_matrix().tolist()}), "file.json")
     pose = file.pose_at(None)
@@ -321,7 +321,7 @@ def test_numbers_that_contradict_their_name_are_left_to_a_person() -> None:
 
 
 @pytest.mark.parametrize("name", ["T_robot_camera", "T_base_radar", "cam_to_rig", "gripper_from_camera"])
-def test_the_pose_of_one_of_the_two_in_something_else_is_left_to_a_person(name: str) -> None:
+def test_the_pose_of_one_of_the_two_in_something_else_is_left_to_a_person(name):
     file = read_unstated(json.dumps({name: POSE.inverse().as_matrix().tolist()}), "file.json")
     pose = file.pose_at(None)
     assert pose.hints.other

@@ -52,7 +52,7 @@ def assert_only_numbers_change(patch: Patch, *, lines: int) -> None:
 
 def refusal(*args: object, **options: object) -> str:
     with pytest.raises(InputError) as caught:
-        patched(*args, **options)  # type: ignore[arg-type]
+        patched(*args, **options)
     return str(caught.value)
 
 

@@ -115,7 +115,7 @@ def test_yuv_images_give_the_right_colours(ros1, write, encoding, order):
 
 @pytest.mark.parametrize("big", [False, True])
 @pytest.mark.parametrize("bits", [10, 12, 16])
-def test_grey_of_16_bits_is_stretched_whatever_the_camera_fills(ros1, write, big, bits) -> None:
+def test_grey_of_16_bits_is_stretched_whatever_the_camera_fills(ros1, write, big, bits):
     ramp = np.linspace(0, 2**bits - 1, 64 * 64).astype(np.uint16).reshape(64, 64)
     rows = ramp.astype(">u2" if big else "<u2").view(np.uint8)
     padded = np.pad(rows, ((0, 0), (0, 6)))
@@ -136,7 +136,7 @@ def test_grey_of_16_bits_is_stretched_whatever_the_camera_fills(ros1, write, big
         ("bgra16", (40, 120, 200, 7)),
     ],
 )
-def test_colour_of_16_bits_keeps_its_order_of_channels(ros1, write, encoding, values) -> None:
+def test_colour_of_16_bits_keeps_its_order_of_channels(ros1, write, encoding, values):
     pixels16 = np.zeros((16, 16, len(values)), dtype="<u2")
     pixels16[:8] = np.array(values) * 256
     message = ros1.image(START_NS, pixels16.reshape(16, -1).view(np.uint8), encoding, width=16)
@@ -145,7 +145,7 @@ def test_colour_of_16_bits_keeps_its_order_of_channels(ros1, write, encoding, va
     assert blue < green < red == 255
 
 
-def test_a_png_of_16_bit_grey_that_says_mono16_is_stretched(ros, write) -> None:
+def test_a_png_of_16_bit_grey_that_says_mono16_is_stretched(ros, write):
     ramp = np.linspace(0, 4095, 32 * 32).astype(np.uint16).reshape(32, 32)
     data = cv2.imencode(".png", ramp)[1].tobytes()
     with opened(write, ros, ros.compressed(START_NS, data, "mono16; png compressed ")) as recording:

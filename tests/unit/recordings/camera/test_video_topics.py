@@ -91,7 +91,7 @@ def recorded(write: Any, ros: Any, build: Build, codec: str, packets: list[bytes
 
 
 @pytest.mark.parametrize("build", [foxglove, ffmpeg, image])
-def test_every_frame_of_a_video_topic_is_decoded_correctly_in_any_order(build, coded, ros2, write) -> None:
+def test_every_frame_of_a_video_topic_is_decoded_correctly_in_any_order(build, coded, ros2, write):
     with open_recording(recorded(write, ros2, build, *coded), require=("image",)) as recording:
         assert recording.camera_frame == "cam"
         np.testing.assert_array_equal(recording.image_times, START_NS + 10**8 * np.arange(FRAMES))
@@ -102,7 +102,7 @@ def test_every_frame_of_a_video_topic_is_decoded_correctly_in_any_order(build, c
         assert recording.warnings == ()
 
 
-def test_frames_before_the_first_key_frame_are_skipped_with_a_warning(coded, ros2, write) -> None:
+def test_frames_before_the_first_key_frame_are_skipped_with_a_warning(coded, ros2, write):
     codec, packets = coded
     with open_recording(recorded(write, ros2, foxglove, codec, packets[3:]), require=("image",)) as recording:
         (warning,) = recording.warnings
@@ -112,7 +112,7 @@ def test_frames_before_the_first_key_frame_are_skipped_with_a_warning(coded, ros
         assert number_in(recording.image(0)) == KEY_EVERY
 
 
-def test_a_damaged_frame_does_not_affect_the_next_key_frame(coded, ros2, write) -> None:
+def test_a_damaged_frame_does_not_affect_the_next_key_frame(coded, ros2, write):
     codec, packets = coded
     packets = [*packets[:5], b"", *packets[6:]]
     with open_recording(recorded(write, ros2, foxglove, codec, packets), require=("image",)) as recording:
@@ -124,13 +124,13 @@ def test_a_damaged_frame_does_not_affect_the_next_key_frame(coded, ros2, write) 
         assert number_in(recording.image(3)) == 3
 
 
-def test_video_without_start_codes_is_explained(ros2, write) -> None:
+def test_video_without_start_codes_is_explained(ros2, write):
     path = recorded(write, ros2, foxglove, "h264", [bytes([0, 0, 0, 9]) + bytes(9)])
     with pytest.raises(RecordingError, match=r"are declared as h264 but have no start codes \(Annex B\)"):
         open_recording(path, require=("image",))
 
 
-def test_without_the_extra_the_recording_says_what_to_install(coded, ros2, write, monkeypatch) -> None:
+def test_without_the_extra_the_recording_says_what_to_install(coded, ros2, write, monkeypatch):
     monkeypatch.setattr("calib_core.recordings.camera.video_packets.find_spec", lambda name: None)
     path = recorded(write, ros2, foxglove, *coded)
     with pytest.raises(
@@ -141,14 +141,14 @@ def test_without_the_extra_the_recording_says_what_to_install(coded, ros2, write
         assert "needs PyAV" in str(recording.topics[0].problem)
 
 
-def test_a_jpeg_that_says_h264_is_a_jpeg(ros2, write, jpeg) -> None:
+def test_a_jpeg_that_says_h264_is_a_jpeg(ros2, write, jpeg):
     path = recorded(write, ros2, image, "h264", [jpeg, jpeg])
     with open_recording(path, require=("image",)) as recording:
         assert recording.image_bytes(1).data == jpeg
 
 
 @pytest.mark.parametrize("make", [foxglove, ffmpeg])
-def test_video_is_read_from_bags_without_definitions(coded, ros2, write, make) -> None:
+def test_video_is_read_from_bags_without_definitions(coded, ros2, write, make):
     codec, packets = coded
     rows = [
         ("/video", START_NS + i * NS_PER_S // 10, make(ros2, codec, START_NS + i * NS_PER_S // 10, data))

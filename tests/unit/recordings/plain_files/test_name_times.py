@@ -39,7 +39,7 @@ def epoch_ns(moment: datetime) -> int:
 
 
 @pytest.mark.parametrize("text", DATE_SPELLINGS)
-def test_the_spellings_in_the_documentation_are_one_moment(text) -> None:
+def test_the_spellings_in_the_documentation_are_one_moment(text):
     assert read_time(text) == MOMENT_NS
 
 
@@ -47,7 +47,7 @@ def test_the_spellings_in_the_documentation_are_one_moment(text) -> None:
     moment=st.datetimes(datetime(1971, 1, 1), datetime(2099, 12, 31), timezones=st.just(UTC)),
     pattern=st.sampled_from(sorted(PATTERNS)),
 )
-def test_any_date_in_any_pattern_reads_back_to_the_microsecond(moment, pattern) -> None:
+def test_any_date_in_any_pattern_reads_back_to_the_microsecond(moment, pattern):
     text = written(moment, pattern)
     times = [one.time for one in moments_in(text)]
     assert times == [epoch_ns(moment)]
@@ -60,7 +60,7 @@ def test_any_date_in_any_pattern_reads_back_to_the_microsecond(moment, pattern) 
     pattern=st.sampled_from(sorted(PATTERNS)),
     step_us=st.integers(10_000, 3_000_000),
 )
-def test_the_names_of_a_camera_keep_its_order_and_its_stamps(start, pattern, step_us) -> None:
+def test_the_names_of_a_camera_keep_its_order_and_its_stamps(start, pattern, step_us):
     moments = [start + timedelta(microseconds=step_us * number) for number in range(12)]
     found = times_in_names([written(moment, pattern) for moment in moments])
     assert found.times_ns.tolist() == [epoch_ns(moment) for moment in moments]
@@ -91,7 +91,7 @@ TEN_HZ = [MOMENT + timedelta(milliseconds=100 * number) for number in range(40)]
         (lambda n, m: f"n015-2018-07-24-11-22-45+0800__CAM__{epoch_ns(m) // 1000}", 0, ""),
     ],
 )  # fmt: skip
-def test_names_are_read_right_or_under_a_stated_assumption(text, tolerance_s, assumed) -> None:
+def test_names_are_read_right_or_under_a_stated_assumption(text, tolerance_s, assumed):
     found = times_in_names(names_of(TEN_HZ, text))
     expected = np.array([epoch_ns(moment) for moment in TEN_HZ])
     assert np.abs(found.times_ns - expected).max() <= tolerance_s * NS_PER_S
@@ -109,7 +109,7 @@ def test_names_are_read_right_or_under_a_stated_assumption(text, tolerance_s, as
         ["frame12", "frame13"],
     ],
 )
-def test_names_without_times_of_their_own_have_none(names) -> None:
+def test_names_without_times_of_their_own_have_none(names):
     assert times_in_names(names) is None
 
 
@@ -120,7 +120,7 @@ def folder_of(folder: Path, names: list[str]) -> Path:
     return folder
 
 
-def test_pictures_whose_digits_are_open_are_an_assumption(tmp_path) -> None:
+def test_pictures_whose_digits_are_open_are_an_assumption(tmp_path):
     names = names_of(TEN_HZ, lambda n, m: f"{m:%Y%m%d_%H%M%S}_{n:06d}.png")
     folder = folder_of(tmp_path / "camera", names)
     with open_recording(folder, require=("image",)) as recording:
@@ -130,7 +130,7 @@ def test_pictures_whose_digits_are_open_are_an_assumption(tmp_path) -> None:
     assert "the files of a second are spread evenly over it" in assumption.text
 
 
-def test_numbers_that_contradict_the_times_are_told(tmp_path) -> None:
+def test_numbers_that_contradict_the_times_are_told(tmp_path):
     names = names_of(TEN_HZ, lambda n, m: f"{(n * 7) % 40:04d}_{m:%Y%m%d_%H%M%S}_{m.microsecond:06d}.png")
     with open_recording(folder_of(tmp_path / "camera", names), require=("image",)) as recording:
         (warning,) = recording.warnings
@@ -138,14 +138,14 @@ def test_numbers_that_contradict_the_times_are_told(tmp_path) -> None:
     assert "the times and the numbers in the file names disagree about the order" in warning.message
 
 
-def test_local_times_are_moved_by_the_given_zone(tmp_path) -> None:
+def test_local_times_are_moved_by_the_given_zone(tmp_path):
     names = names_of(TEN_HZ, lambda n, m: f"{m:%Y%m%d_%H%M%S}_{m.microsecond:06d}.png")
     folder = folder_of(tmp_path / "camera", names)
     with open_recording(folder, RecordingOptions(time_zone="+02:00"), require=("image",)) as recording:
         assert recording.image_times[0] == MOMENT_NS - 7200 * NS_PER_S
 
 
-def test_a_folder_without_any_readable_picture_is_refused(tmp_path) -> None:
+def test_a_folder_without_any_readable_picture_is_refused(tmp_path):
     folder = tmp_path / "camera"
     folder.mkdir()
     (folder / "1715938951208.jpg").write_bytes(b"")
@@ -162,7 +162,7 @@ def test_a_folder_without_any_readable_picture_is_refused(tmp_path) -> None:
         (lambda data: b"<html>" + data, "is not a picture (it begins with 3c68746d)"),
     ],
 )
-def test_pictures_that_cannot_be_read_are_counted_and_named(tmp_path, damage, words) -> None:
+def test_pictures_that_cannot_be_read_are_counted_and_named(tmp_path, damage, words):
     folder = folder_of(tmp_path / "camera", [f"{MOMENT_NS + n}.png" for n in range(5)])
     for number in (1, 3):
         path = folder / f"{MOMENT_NS + number}.png"

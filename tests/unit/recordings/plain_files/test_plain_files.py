@@ -58,7 +58,7 @@ def refusal(*paths: Path, **options: str) -> str:
         ("image-12345678901234", None),
     ],
 )
-def test_times_are_found_in_names(stem, expected) -> None:
+def test_times_are_found_in_names(stem, expected):
     assert time_from_name(stem) == expected
 
 
@@ -73,18 +73,18 @@ def test_times_are_found_in_names(stem, expected) -> None:
         ("-1.5", "s", -1_500_000_000),
     ],
 )
-def test_written_times_are_read_exactly(text, unit, expected) -> None:
+def test_written_times_are_read_exactly(text, unit, expected):
     assert read_time(text, unit) == expected
 
 
 @pytest.mark.parametrize(("text", "words"), [("yesterday", "'yesterday' is not a time"), ("12345", "has 5 digits")])
-def test_invalid_times_are_refused(text, words) -> None:
+def test_invalid_times_are_refused(text, words):
     with pytest.raises(RecordingError, match=words):
         read_time(text)
 
 
 # -- pictures
-def test_a_folder_of_pictures_is_a_camera(tmp_path) -> None:
+def test_a_folder_of_pictures_is_a_camera(tmp_path):
     names = [f"{START_NS + i * 10**8}.{suffix}" for i, suffix in enumerate(["jpg", "png", "bmp", "jpg"])]
     folder = pictures(tmp_path / "front", names)
     with open_recording(folder, require=("image",)) as recording:
@@ -102,7 +102,7 @@ def test_a_folder_of_pictures_is_a_camera(tmp_path) -> None:
         assert file.size_bytes == sum(path.stat().st_size for path in folder.iterdir())
 
 
-def test_the_fingerprint_of_a_folder_follows_its_contents(tmp_path) -> None:
+def test_the_fingerprint_of_a_folder_follows_its_contents(tmp_path):
     import hashlib
 
     folder = pictures(tmp_path / "front", [f"{START_NS + i}.png" for i in range(3)])
@@ -123,7 +123,7 @@ def test_the_fingerprint_of_a_folder_follows_its_contents(tmp_path) -> None:
         ("front.txt", "# color images\n# timestamp filename\n1700000000.0 front/a.png\n1700000001.0 front/b.png\n"),
     ],
 )  # fmt: skip
-def test_a_table_next_to_the_files_gives_the_times(tmp_path, table, text) -> None:
+def test_a_table_next_to_the_files_gives_the_times(tmp_path, table, text):
     folder = pictures(tmp_path / "front", ["b.png", "a.png"])
     radar_csv(tmp_path / table, text)
     with open_recording(folder, require=("image",)) as recording:
@@ -131,7 +131,7 @@ def test_a_table_next_to_the_files_gives_the_times(tmp_path, table, text) -> Non
         np.testing.assert_array_equal(recording.image(1), pixels(0))
 
 
-def test_the_times_beside_numbered_stills_are_found_and_told(tmp_path) -> None:
+def test_the_times_beside_numbered_stills_are_found_and_told(tmp_path):
     """As in RADIATE: five stills minutes apart, and their times beside the folder."""
     folder = pictures(tmp_path / "zed_left", [f"{number:06}.png" for number in (1, 40, 92, 137, 201)])
     seconds = {number: 1_574_859_772 + 19 * number for number in range(1, 205)}
@@ -148,7 +148,7 @@ def test_the_times_beside_numbered_stills_are_found_and_told(tmp_path) -> None:
     assert "sound" not in text
 
 
-def test_an_assumed_time_is_never_called_sound_and_has_no_rate(tmp_path) -> None:
+def test_an_assumed_time_is_never_called_sound_and_has_no_rate(tmp_path):
     """Neither those of the camera in use, nor of the other one, nor the radar's."""
     numbers = (1, 15, 29, 43, 570)
     for folder in ("zed_left", "zed_right"):
@@ -166,7 +166,7 @@ def test_an_assumed_time_is_never_called_sound_and_has_no_rate(tmp_path) -> None
     assert "sound" not in text
 
 
-def test_part_of_a_kitti_drive_has_the_lines_of_its_numbers(tmp_path) -> None:
+def test_part_of_a_kitti_drive_has_the_lines_of_its_numbers(tmp_path):
     folder = pictures(tmp_path / "image_02" / "data", ["0000000003.png", "0000000007.png"])
     (tmp_path / "image_02" / "timestamps.txt").write_text(
         "".join(f"2011-09-26 13:02:{second:02}.964389445\n" for second in range(9))
@@ -177,7 +177,7 @@ def test_part_of_a_kitti_drive_has_the_lines_of_its_numbers(tmp_path) -> None:
 
 @pytest.mark.parametrize("stamped", ["pictures", "radar"])
 @pytest.mark.parametrize(("spelling", "what"), [("{:06}", "names"), ("frame{:03}", "numbers")])
-def test_files_without_times_have_those_of_the_other_sensor(tmp_path, stamped, spelling, what) -> None:
+def test_files_without_times_have_those_of_the_other_sensor(tmp_path, stamped, spelling, what):
     pictures(tmp_path / "image_2", [f"{number:06}.png" for number in (4, 5, 9)])
     radar = bin_folder(tmp_path / "radar", [bin_rows("delft", 5) for _ in range(3)])
     for path, number in zip(sorted(radar.iterdir()), (4, 5, 9), strict=True):
@@ -195,7 +195,7 @@ def test_files_without_times_have_those_of_the_other_sensor(tmp_path, stamped, s
     assert f"with the same {what}" in warning.message
 
 
-def test_times_that_do_not_tell_files_apart_are_given_to_no_other(tmp_path) -> None:
+def test_times_that_do_not_tell_files_apart_are_given_to_no_other(tmp_path):
     """A lidar's tables with one and the same time in all of them, beside pictures and a radar's without any."""
     pictures(tmp_path / "camera_front", [f"{number:06}.png" for number in range(4)])
     for folder, head, row in (
@@ -211,7 +211,7 @@ def test_times_that_do_not_tell_files_apart_are_given_to_no_other(tmp_path) -> N
         assert len(set(recording.image_times.tolist())) == 4
 
 
-def test_pictures_without_a_time_are_skipped_with_a_warning(tmp_path) -> None:
+def test_pictures_without_a_time_are_skipped_with_a_warning(tmp_path):
     folder = pictures(tmp_path / "front", [f"{START_NS}.png", "notes.png", "zebra.png"])
     with open_recording(folder, require=("image",)) as recording:
         assert len(recording.image_times) == 1
@@ -220,13 +220,13 @@ def test_pictures_without_a_time_are_skipped_with_a_warning(tmp_path) -> None:
     assert "2 of 3 files have no time and are skipped; the first is notes.png" in warning.message
 
 
-def test_pictures_without_any_times_are_refused_with_a_clear_error(tmp_path) -> None:
+def test_pictures_without_any_times_are_refused_with_a_clear_error(tmp_path):
     text = refusal(pictures(tmp_path / "front", ["a.png", "b.png"]))
     assert "no times in the file names (a.png)" in text
     assert "add a CSV with the columns file,time_ns to the folder" in text
 
 
-def test_a_picture_of_another_size_in_a_folder_is_skipped_and_told(tmp_path) -> None:
+def test_a_picture_of_another_size_in_a_folder_is_skipped_and_told(tmp_path):
     folder = pictures(tmp_path / "front", [f"{START_NS + i}.png" for i in range(4)])
     cv2.imwrite(str(folder / f"{START_NS + 1}.png"), np.zeros((200, 300, 3), dtype=np.uint8))
     with open_recording(folder, require=("image",)) as recording:
@@ -239,7 +239,7 @@ def test_a_picture_of_another_size_in_a_folder_is_skipped_and_told(tmp_path) -> 
 # -- radar files
 
 
-def test_an_ascii_pcd_is_read_and_a_compressed_one_is_explained(tmp_path) -> None:
+def test_an_ascii_pcd_is_read_and_a_compressed_one_is_explained(tmp_path):
     folder = tmp_path / "radar"
     folder.mkdir()
     head = "VERSION .7\nFIELDS x y z velocity snr\nSIZE 4 4 4 4 4\nTYPE F F F F F\nWIDTH 2\nHEIGHT 1\nPOINTS 2\nDATA "
@@ -277,7 +277,7 @@ def bin_folder(folder: Path, scans: Sequence[np.ndarray]) -> Path:
 
 @pytest.mark.parametrize("above", [False, True], ids=["the folder", "the data set"])
 @pytest.mark.parametrize(("layout", "name", "speed"), [("delft", "View-of-Delft", 4), ("tj4d", "TJ4DRadSet", 3)])
-def test_bin_files_are_read_by_the_layout_that_fits_all_of_them(tmp_path, layout, name, speed, above) -> None:
+def test_bin_files_are_read_by_the_layout_that_fits_all_of_them(tmp_path, layout, name, speed, above):
     scans = [bin_rows(layout, 28 + 4 * number, number) for number in range(9)]
     folder = bin_folder(tmp_path / "training" / "velodyne", scans)
     with open_recording(tmp_path if above else folder, require=("radar",)) as recording:
@@ -298,7 +298,7 @@ def test_bin_files_are_read_by_the_layout_that_fits_all_of_them(tmp_path, layout
     ],
     ids=["another size", "beside the radar", "millimetres", "empty"],
 )
-def test_bin_files_that_fit_no_layout_are_refused_with_the_way_out(tmp_path, change, reason) -> None:
+def test_bin_files_that_fit_no_layout_are_refused_with_the_way_out(tmp_path, change, reason):
     folder = bin_folder(tmp_path / "radar", change([bin_rows("tj4d", 21, number) for number in range(4)]))
     with pytest.raises(RecordingError, match="fit no layout of radar returns") as caught:
         inspect_recording(folder)
@@ -307,7 +307,7 @@ def test_bin_files_that_fit_no_layout_are_refused_with_the_way_out(tmp_path, cha
 
 
 # -- radar CSV
-def test_a_radar_csv_is_a_radar(tmp_path) -> None:
+def test_a_radar_csv_is_a_radar(tmp_path):
     path = radar_csv(
         tmp_path / "scan.csv",
         "time_ns,x_m,y_m,z_m,doppler_mps,snr_db,track_id\n"
@@ -330,7 +330,7 @@ def test_a_radar_csv_is_a_radar(tmp_path) -> None:
          f"1700000000000000,500,{np.radians(30)},{np.radians(10)},100,{np.radians(2)}"),
     ],
 )  # fmt: skip
-def test_units_in_the_header_are_followed(tmp_path, header, row) -> None:
+def test_units_in_the_header_are_followed(tmp_path, header, row):
     with open_recording(radar_csv(tmp_path / "a.csv", f"{header}\n{row}\n"), require=("radar",)) as recording:
         scans = recording.radar_scans()
     assert scans.times_ns.tolist() == [START_NS]
@@ -353,7 +353,7 @@ def test_units_in_the_header_are_followed(tmp_path, header, row) -> None:
         ("", "the file is empty"),
     ],
 )
-def test_an_ambiguous_csv_is_refused_with_a_clear_error(tmp_path, text, words) -> None:
+def test_an_ambiguous_csv_is_refused_with_a_clear_error(tmp_path, text, words):
     assert words in refusal(radar_csv(tmp_path / "a.csv", text))
 
 
@@ -380,7 +380,7 @@ def video(path: Path, count: int = 90, rate: float = 20.0) -> Path:
 
 @pytest.mark.parametrize("start", ["1700000000.25", "2023-11-14T22:13:20.25Z"])
 @pytest.mark.parametrize("suffix", [".avi", ".mp4"])
-def test_a_video_with_its_start_is_a_camera(tmp_path, suffix, start) -> None:
+def test_a_video_with_its_start_is_a_camera(tmp_path, suffix, start):
     path = video(tmp_path / f"cam{suffix}")
     with open_recording(path, RecordingOptions(video_start=start), require=("image",)) as recording:
         assert recording.image_topic == "/cam/image"
@@ -393,20 +393,20 @@ def test_a_video_with_its_start_is_a_camera(tmp_path, suffix, start) -> None:
         assert (frame.format, frame.width_px, frame.height_px) == ("jpeg", 64, 48)
 
 
-def test_a_video_without_its_start_or_without_frames_is_refused_with_a_clear_error(tmp_path) -> None:
+def test_a_video_without_its_start_or_without_frames_is_refused_with_a_clear_error(tmp_path):
     assert "give the time of its first frame with --video-start" in refusal(video(tmp_path / "cam.avi"))
     assert "--video-start: 'noon' is not a time" in refusal(tmp_path / "cam.avi", video_start="noon")
     (tmp_path / "b.mp4").write_bytes(b"nothing of the kind")
     assert "not a readable video" in refusal(tmp_path / "b.mp4", video_start="1700000000")
 
 
-def test_a_start_without_a_video_is_refused_rather_than_ignored(project_root: Path) -> None:
+def test_a_start_without_a_video_is_refused_rather_than_ignored(project_root):
     words = refusal(project_root / "sample_data" / "rooftop" / "camera.bag", video_start="1700000000")
     assert "no video among camera.bag" in words
 
 
 # -- together
-def test_plain_files_join_a_bag_as_one_recording(ros1, write, plain, jpeg, tmp_path) -> None:
+def test_plain_files_join_a_bag_as_one_recording(ros1, write, plain, jpeg, tmp_path):
     bag = write(ros1, [row for row in plain(ros1, jpeg) if "radar" not in row[0]])
     text = "time_ns,x_m,y_m,z_m,doppler_mps\n" + "".join(f"{START_NS + i * 10**8},{i},1,{i % 3},0\n" for i in range(20))
     with open_recording([bag, radar_csv(tmp_path / "radar.csv", text)]) as recording:
@@ -416,13 +416,13 @@ def test_plain_files_join_a_bag_as_one_recording(ros1, write, plain, jpeg, tmp_p
         assert len(recording.fingerprint()) == 2
 
 
-def test_folders_with_the_same_name_stay_separate_topics(tmp_path) -> None:
+def test_folders_with_the_same_name_stay_separate_topics(tmp_path):
     folders = [pictures(tmp_path / side / "images", [f"{START_NS}.png"]) for side in ("left", "right")]
     with open_recording(folders, require=("image",)) as recording:
         assert [topic.name for topic in recording.topics] == ["/images/image", "/right/images/image"]
 
 
-def test_mixed_folders_and_single_files_are_explained(tmp_path) -> None:
+def test_mixed_folders_and_single_files_are_explained(tmp_path):
     mixed = pictures(tmp_path / "mixed", [f"{START_NS}.png"])
     (mixed / "a.pcd").write_bytes(b"")
     assert "put pictures and radar files into separate folders" in refusal(mixed)
@@ -437,11 +437,11 @@ def test_mixed_folders_and_single_files_are_explained(tmp_path) -> None:
         ("9200000000000000000", "outside the years 1970 to 2106"),
     ],
 )
-def test_times_that_no_message_can_represent_are_refused_with_a_clear_error(tmp_path, time, words) -> None:
+def test_times_that_no_message_can_represent_are_refused_with_a_clear_error(tmp_path, time, words):
     assert words in refusal(radar_csv(tmp_path / "a.csv", f"time_ns,x_m,y_m\n{time},1,2\n"))
 
 
-def test_the_folder_of_a_data_set_opens_its_contents(tmp_path, ros1, write, plain, jpeg) -> None:
+def test_the_folder_of_a_data_set_opens_its_contents(tmp_path, ros1, write, plain, jpeg):
     root = tmp_path / "drive"
     root.mkdir()
     pictures(root / "camera", ["a.png", "b.png"])
@@ -499,7 +499,7 @@ def view_of_delft(root: Path, count: int = 3) -> Path:
 
 
 @pytest.mark.parametrize("inner", [".", "radar", "radar/training"])
-def test_view_of_delft_brings_its_camera_and_names_its_pose(tmp_path, inner) -> None:
+def test_view_of_delft_brings_its_camera_and_names_its_pose(tmp_path, inner):
     root = view_of_delft(tmp_path / "view_of_delft")
     with open_recording(root / inner) as recording:
         camera = recording.camera()
@@ -516,7 +516,7 @@ def test_view_of_delft_brings_its_camera_and_names_its_pose(tmp_path, inner) -> 
         assert "velodyne (3 lidar clouds, which this program does not use)" in text
 
 
-def test_intrinsics_that_differ_between_frames_are_told(tmp_path) -> None:
+def test_intrinsics_that_differ_between_frames_are_told(tmp_path):
     root = view_of_delft(tmp_path / "drive")
     (root / "radar" / "training" / "calib" / "00002.txt").write_text(calib_text(K * [[1.1], [1.1], [1]]))
     with open_recording(root) as recording:
@@ -546,7 +546,7 @@ def kitti_raw(root: Path, *, rectified: bool) -> tuple[Path, np.ndarray]:
 
 
 @pytest.mark.parametrize("rectified", [True, False])
-def test_raw_kitti_brings_its_camera_and_its_stamps(tmp_path, rectified) -> None:
+def test_raw_kitti_brings_its_camera_and_its_stamps(tmp_path, rectified):
     drive, matrix_px = kitti_raw(tmp_path, rectified=rectified)
     with open_recording(drive, require=("image",)) as recording:
         camera = recording.camera()
@@ -597,7 +597,7 @@ def nuscenes_data_set(root: Path) -> Path:
     return root
 
 
-def test_nuscenes_opens_at_its_front_with_the_camera_of_its_car(tmp_path) -> None:
+def test_nuscenes_opens_at_its_front_with_the_camera_of_its_car(tmp_path):
     with open_recording(nuscenes_data_set(tmp_path / "nuscenes")) as recording:
         camera = recording.camera()
         assert (recording.radar_topic, recording.image_topic) == ("/RADAR_FRONT/radar", "/CAM_FRONT/image")
@@ -614,7 +614,7 @@ def test_nuscenes_opens_at_its_front_with_the_camera_of_its_car(tmp_path) -> Non
     assert "its pose: records of CAM_FRONT and of the radar in" in text
 
 
-def test_a_damaged_calibration_is_no_camera_and_no_crash(tmp_path) -> None:
+def test_a_damaged_calibration_is_no_camera_and_no_crash(tmp_path):
     root = nuscenes_data_set(tmp_path / "nuscenes")
     (root / "v1.0-mini" / "calibrated_sensor.json").write_text('[{"token": 1}]')
     with open_recording(root) as recording:
@@ -622,7 +622,7 @@ def test_a_damaged_calibration_is_no_camera_and_no_crash(tmp_path) -> None:
 
 
 # -- nothing vanishes
-def test_many_files_of_one_kind_that_nobody_reads_are_one_entry(tmp_path) -> None:
+def test_many_files_of_one_kind_that_nobody_reads_are_one_entry(tmp_path):
     picture(tmp_path / "camera" / f"{START_NS}.png", (8, 8))
     (tmp_path / "label_2").mkdir()
     for number in range(30):
@@ -632,7 +632,7 @@ def test_many_files_of_one_kind_that_nobody_reads_are_one_entry(tmp_path) -> Non
     assert "1 file or folder was looked at and not used: 000000.txt (and 29 like it: no header" in warning.message
 
 
-def test_numbers_beside_real_times_are_an_assumption(tmp_path) -> None:
+def test_numbers_beside_real_times_are_an_assumption(tmp_path):
     for number in range(3):
         picture(tmp_path / "camera" / f"{number}.png", (8, 8))
     (tmp_path / "radar.csv").write_text("time_s,x_m,y_m\n1.0,3,1\n1.2,3,1\n")
@@ -641,7 +641,7 @@ def test_numbers_beside_real_times_are_an_assumption(tmp_path) -> None:
     assert (assumption.key, assumption.topic) == ("frame-interval", "/camera/image")
 
 
-def test_what_a_folder_holds_and_nobody_reads_is_named(tmp_path) -> None:
+def test_what_a_folder_holds_and_nobody_reads_is_named(tmp_path):
     for number in range(3):
         picture(tmp_path / "camera" / f"{START_NS + number}.png", (8, 8))
         picture(tmp_path / "thumbnails" / f"{'abc'[number]}.png", (8, 8))
@@ -670,7 +670,7 @@ def test_what_a_folder_holds_and_nobody_reads_is_named(tmp_path) -> None:
         assert words in warning.message
 
 
-def test_pictures_with_wrong_checksums_are_named(tmp_path) -> None:
+def test_pictures_with_wrong_checksums_are_named(tmp_path):
     for number in range(3):
         picture(tmp_path / "camera" / f"{START_NS + number}.png", (8, 8))
     damaged = tmp_path / "camera" / f"{START_NS + 2}.png"
@@ -687,7 +687,7 @@ def test_pictures_with_wrong_checksums_are_named(tmp_path) -> None:
     ("end", "words"),
     [(b"3,1\0\0\0\n", "has zero bytes between its characters"), (b"3,1\n14.5", "its last row is cut off")],
 )
-def test_a_damaged_scan_of_a_folder_of_tables_is_refused_and_not_shortened_in_silence(tmp_path, end, words) -> None:
+def test_a_damaged_scan_of_a_folder_of_tables_is_refused_and_not_shortened_in_silence(tmp_path, end, words):
     for number in range(3):
         picture(tmp_path / "camera" / f"{START_NS + number}.png", (8, 8))
         (tmp_path / "radar").mkdir(exist_ok=True)
@@ -696,7 +696,7 @@ def test_a_damaged_scan_of_a_folder_of_tables_is_refused_and_not_shortened_in_si
         recording.radar_scans()
 
 
-def test_a_picture_that_is_no_file_is_named(tmp_path) -> None:
+def test_a_picture_that_is_no_file_is_named(tmp_path):
     for number in range(3):
         picture(tmp_path / "camera" / f"{START_NS + number}.png", (8, 8))
     (tmp_path / "camera" / f"{START_NS + 9}.png").mkdir()
@@ -707,7 +707,7 @@ def test_a_picture_that_is_no_file_is_named(tmp_path) -> None:
     assert f"{START_NS + 9}.png (a broken link, a pipe or a folder)" in warning.message
 
 
-def test_a_long_list_of_unused_files_is_cut(tmp_path) -> None:
+def test_a_long_list_of_unused_files_is_cut(tmp_path):
     picture(tmp_path / "camera" / f"{START_NS}.png", (8, 8))
     for number in range(20):
         (tmp_path / f"log{'abcdefghijklmnopqrst'[number]}.csv").write_text("a,b\n1,2\n")
@@ -717,7 +717,7 @@ def test_a_long_list_of_unused_files_is_cut(tmp_path) -> None:
     assert warning.message.endswith("; and 14 more")
 
 
-def test_a_missing_radar_is_explained_by_the_file_that_could_not_be_used(tmp_path) -> None:
+def test_a_missing_radar_is_explained_by_the_file_that_could_not_be_used(tmp_path):
     picture(tmp_path / "camera" / f"{START_NS}.png", (8, 8))
     (tmp_path / "radar.csv").write_text("time_ns,links,rechts\n1,2,3\n")
     with pytest.raises(RecordingError) as caught:
@@ -726,7 +726,7 @@ def test_a_missing_radar_is_explained_by_the_file_that_could_not_be_used(tmp_pat
     assert "radar.csv (no position columns" in str(caught.value)
 
 
-def test_a_radar_table_beside_the_pictures_is_found(tmp_path) -> None:
+def test_a_radar_table_beside_the_pictures_is_found(tmp_path):
     for number in range(2):
         picture(tmp_path / f"{START_NS + number * NS_PER_S}.png", (8, 8))
     (tmp_path / "radar.csv").write_text(f"time_ns,x_m,y_m\n{START_NS},3,1\n")

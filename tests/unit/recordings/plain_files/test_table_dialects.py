@@ -225,7 +225,7 @@ def written(folder: Path, kind: str) -> Path:
 
 
 @pytest.mark.parametrize("kind", DIALECTS)
-def test_a_table_is_read_right_or_under_a_stated_assumption(tmp_path, kind) -> None:
+def test_a_table_is_read_right_or_under_a_stated_assumption(tmp_path, kind):
     with open_recording(written(tmp_path, kind), require=("radar",)) as recording:
         found = recording.radar_scans()
         assumed = {assumption.key for assumption in recording.assumptions}
@@ -239,7 +239,7 @@ def test_a_table_is_read_right_or_under_a_stated_assumption(tmp_path, kind) -> N
 
 
 @pytest.mark.parametrize("kind", [kind for kind, (_, _, assumed) in DIALECTS.items() if assumed])
-def test_the_words_of_an_assumption_confirm_it(tmp_path, kind) -> None:
+def test_the_words_of_an_assumption_confirm_it(tmp_path, kind):
     path = written(tmp_path, kind)
     with open_recording(path, require=("radar",)) as recording:
         words = [word for one in recording.assumptions for word in one.confirm.replace("'", "").split("--")[1:]]
@@ -259,14 +259,14 @@ def test_the_words_of_an_assumption_confirm_it(tmp_path, kind) -> None:
         ("time_ns,x_m,y_m\n1,[1;2],[1;2;3]\n", "lists of 2 and 3 numbers in one row"),
     ],
 )
-def test_a_table_that_does_not_say_what_it_holds_is_refused_with_what_to_write(tmp_path, text, words) -> None:
+def test_a_table_that_does_not_say_what_it_holds_is_refused_with_what_to_write(tmp_path, text, words):
     (tmp_path / "a.csv").write_text(text)
     with pytest.raises(RecordingError, match=r"a\.csv") as caught:
         open_recording(tmp_path / "a.csv", require=("radar",))
     assert words in str(caught.value)
 
 
-def test_the_columns_of_a_table_without_a_header_can_be_counted(tmp_path) -> None:
+def test_the_columns_of_a_table_without_a_header_can_be_counted(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("".join(f"{t} {-y} {x} {z}\n" for t, x, y, z, _, _ in T.rows))
     options = RecordingOptions(map=("time=1:ns", "x=3:m", "y=-2:m", "z=4:m"))
@@ -275,13 +275,13 @@ def test_the_columns_of_a_table_without_a_header_can_be_counted(tmp_path) -> Non
         assert recording.assumptions == ()
 
 
-def test_a_mapped_column_that_does_not_exist_is_refused_with_the_nearest(tmp_path) -> None:
+def test_a_mapped_column_that_does_not_exist_is_refused_with_the_nearest(tmp_path):
     path = written(tmp_path, "vendor words")
     with pytest.raises(RecordingError, match=r"--map x=f_PosXX:m: no column 'f_PosXX'; did you mean 'f_PosX \[m\]'\?"):
         open_recording(path, RecordingOptions(map=("x=f_PosXX:m",)), require=("radar",))
 
 
-def test_a_stated_unit_does_not_hide_that_x_points_to_the_right(tmp_path) -> None:
+def test_a_stated_unit_does_not_hide_that_x_points_to_the_right(tmp_path):
     (tmp_path / "a.csv").write_text(table("time_ns,x,y,z", lambda t, x, y, z, *_: f"{t},{-y},{x},{z}"))
     options = RecordingOptions(map=("x=x:m", "y=y:m", "z=z:m"))
     with open_recording(tmp_path / "a.csv", options, require=("radar",)) as recording:
@@ -293,7 +293,7 @@ def test_a_stated_unit_does_not_hide_that_x_points_to_the_right(tmp_path) -> Non
         assert recording.assumptions == ()
 
 
-def test_a_mapped_range_is_used_although_there_are_positions(tmp_path) -> None:
+def test_a_mapped_range_is_used_although_there_are_positions(tmp_path):
     rows = "".join(f"{t},{r},{-a},{e},0,0\n" for t, r, a, e, _ in T.polar)
     (tmp_path / "a.csv").write_text(f"time_ns,range_m,azimuth_deg,elevation_deg,x_m,y_m\n{rows}")
     options = RecordingOptions(map=("range=range_m:m", "azimuth=-azimuth_deg:deg"))
@@ -302,7 +302,7 @@ def test_a_mapped_range_is_used_although_there_are_positions(tmp_path) -> None:
         assert recording.assumptions == ()
 
 
-def test_scans_nested_in_one_object_are_read(tmp_path) -> None:
+def test_scans_nested_in_one_object_are_read(tmp_path):
     frames = [
         {"time": t, "points": dict(zip(NAMES, map(list, zip(*rows, strict=True)), strict=True))} for t, rows in scans()
     ]
@@ -313,7 +313,7 @@ def test_scans_nested_in_one_object_are_read(tmp_path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["ours", "lists in cells", "JSON lines, a return each"])
-def test_a_table_that_ends_within_a_row_is_read_up_to_there(tmp_path, kind) -> None:
+def test_a_table_that_ends_within_a_row_is_read_up_to_there(tmp_path, kind):
     path = written(tmp_path, kind)
     whole = path.read_bytes()
     last = whole.rstrip(b"\n").rfind(b"\n")
@@ -328,7 +328,7 @@ def test_a_table_that_ends_within_a_row_is_read_up_to_there(tmp_path, kind) -> N
         open_recording(path, require=("radar",))
 
 
-def test_gps_time_is_an_assumption(tmp_path) -> None:
+def test_gps_time_is_an_assumption(tmp_path):
     gps_s = START_NS // NS_PER_S - 315_964_800 + 18
     (tmp_path / "a.csv").write_text(f"gps_time,x_m,y_m\n{gps_s}.208764,1,2\n")
     with open_recording(tmp_path / "a.csv", require=("radar",)) as recording:
@@ -336,7 +336,7 @@ def test_gps_time_is_an_assumption(tmp_path) -> None:
         assert [one.key for one in recording.assumptions] == ["time-scale"]
 
 
-def test_the_angle_unit_of_the_axes_option_is_followed(tmp_path) -> None:
+def test_the_angle_unit_of_the_axes_option_is_followed(tmp_path):
     rows = "".join(f"{t},{r},{a / 50},{e / 50}\n" for t, r, a, e, _ in T.polar)
     (tmp_path / "a.csv").write_text(f"time_ns,range_m,azimuth,elevation\n{rows}")
     angles = {}
@@ -347,7 +347,7 @@ def test_the_angle_unit_of_the_axes_option_is_followed(tmp_path) -> None:
     np.testing.assert_allclose(angles["degrees"], np.radians(angles["radians"]))
 
 
-def test_what_was_taken_for_what_and_what_was_left_out_is_shown(tmp_path) -> None:
+def test_what_was_taken_for_what_and_what_was_left_out_is_shown(tmp_path):
     with open_recording(written(tmp_path, "unknown columns"), require=("radar",)) as recording:
         assert "without seq, track_id, label" in describe(recording)
     with open_recording(written(tmp_path, "vendor words"), require=("radar",)) as recording:
@@ -362,7 +362,7 @@ def test_what_was_taken_for_what_and_what_was_left_out_is_shown(tmp_path) -> Non
         assert "; x, y, z computed from Range [m], Azimuth (deg)\n" in describe(recording)
 
 
-def test_two_columns_of_one_quantity_are_an_assumption(tmp_path) -> None:
+def test_two_columns_of_one_quantity_are_an_assumption(tmp_path):
     (tmp_path / "a.csv").write_text("time_ns,range_m,r_m,azimuth_deg\n1,2,3,40\n")
     with open_recording(tmp_path / "a.csv", require=("radar",)) as recording:
         (assumption,) = recording.assumptions
@@ -381,7 +381,7 @@ def per_scan(folder: Path, names: list[str]) -> Path:
     return folder
 
 
-def test_tables_with_one_scan_each_are_stamped_by_their_names(tmp_path) -> None:
+def test_tables_with_one_scan_each_are_stamped_by_their_names(tmp_path):
     names = [f"{iso(t).replace(':', '-').replace('.', '-')}.csv" for t, _ in scans()]
     with open_recording(per_scan(tmp_path / "radar", names), require=("radar",)) as recording:
         found = recording.radar_scans()
@@ -391,7 +391,7 @@ def test_tables_with_one_scan_each_are_stamped_by_their_names(tmp_path) -> None:
 
 
 @pytest.mark.parametrize("word", ["objects", "clusters", "hits", "dets"])
-def test_a_list_of_json_may_have_any_common_word_for_returns(tmp_path, word) -> None:
+def test_a_list_of_json_may_have_any_common_word_for_returns(tmp_path, word):
     lines = [
         json.dumps({"ts": START_NS / 1e9 + 0.1 * number, word: [{"id": 3, "pos": {"x": 9.25, "y": 1.5, "z": 0.5}}]})
         for number in range(4)
@@ -401,7 +401,7 @@ def test_a_list_of_json_may_have_any_common_word_for_returns(tmp_path, word) -> 
         np.testing.assert_allclose(recording.radar_scans().points_radar_m, [[9.25, 1.5, 0.5]] * 4)
 
 
-def test_json_files_with_one_scan_each_are_a_radar(tmp_path) -> None:
+def test_json_files_with_one_scan_each_are_a_radar(tmp_path):
     folder = tmp_path / "radar"
     folder.mkdir()
     for number, (time, rows) in enumerate(scans()):
@@ -414,7 +414,7 @@ def test_json_files_with_one_scan_each_are_a_radar(tmp_path) -> None:
     np.testing.assert_allclose(found.points_radar_m, T.points_m)
 
 
-def test_tables_of_several_drives_are_not_taken_for_scans(tmp_path) -> None:
+def test_tables_of_several_drives_are_not_taken_for_scans(tmp_path):
     for number in (1, 2):
         text = table("time_ns,x_m,y_m,z_m,doppler_mps,snr_db", commas)
         (tmp_path / f"drive_{number}.csv").write_text(text)
@@ -425,7 +425,7 @@ def test_tables_of_several_drives_are_not_taken_for_scans(tmp_path) -> None:
 # -- time zones
 
 
-def test_a_missing_zone_is_an_assumption_only_where_it_matters(tmp_path) -> None:
+def test_a_missing_zone_is_an_assumption_only_where_it_matters(tmp_path):
     import cv2
 
     path = written(tmp_path, "dates with slashes")
@@ -455,7 +455,7 @@ def test_a_missing_zone_is_an_assumption_only_where_it_matters(tmp_path) -> None
 
 
 @pytest.mark.parametrize(("zone", "hours"), [("+02:00", 2), ("-07:00", -7), ("+05:30", 5.5)])
-def test_times_that_are_a_time_zone_apart_are_explained(tmp_path, zone, hours) -> None:
+def test_times_that_are_a_time_zone_apart_are_explained(tmp_path, zone, hours):
     import cv2
 
     shift_ns = int(hours * 3600) * NS_PER_S

@@ -30,12 +30,12 @@ def opened(write: Callable[..., Any], ros: Any, messages: list[Any], **options: 
     return open_recording(write(ros, rows), RecordingOptions(**options), require=("radar",))
 
 
-def test_every_layout_of_the_registry_has_a_sample() -> None:
+def test_every_layout_of_the_registry_has_a_sample():
     assert sorted(NAMES) == sorted([*CLOUDS, *OTHERS])
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_layout_is_recognised_and_read(name: str, ros: Any, write: Callable[..., Any]) -> None:
+def test_a_layout_is_recognised_and_read(name, ros, write):
     expected = sample(ros, name)
     with opened(write, ros, expected.messages) as recording:
         scans = recording.radar_scans()
@@ -70,7 +70,7 @@ def damaged(payload: bytes, rng: random.Random) -> bytes:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_damaged_messages_of_any_layout_give_values_or_one_clear_error(name: str, ros: Any, write: Any) -> None:
+def test_damaged_messages_of_any_layout_give_values_or_one_clear_error(name, ros, write):
     path = write(ros, [("/radar", START_NS, sample(ros, name).messages[0])])
     (source,) = open_sources([path])
     (topic,), _ = join_topics([source])
@@ -89,7 +89,7 @@ def test_damaged_messages_of_any_layout_give_values_or_one_clear_error(name: str
 @pytest.mark.parametrize(
     "name", ["Oculii cloud", "ARS548 detections, 18 fields", "radar_msgs scan", "radar_msgs tracks"]
 )
-def test_types_that_ros_defines_are_read_from_bags_without_definitions(name: str, ros2: Any, write: Any) -> None:
+def test_types_that_ros_defines_are_read_from_bags_without_definitions(name, ros2, write):
     expected = sample(ros2, name)
     path = write(ros2, [("/radar", START_NS, message) for message in expected.messages], "db3")
     database = sqlite3.connect(path)
@@ -140,7 +140,7 @@ def azimuth(xyz: np.ndarray) -> np.ndarray:
         ),
     ],
 )
-def test_columns_that_contradict_the_positions_give_a_warning(columns, code, words, ros1, write, cloud_points) -> None:
+def test_columns_that_contradict_the_positions_give_a_warning(columns, code, words, ros1, write, cloud_points):
     with opened(write, ros1, changed(ros1, cloud_points, **columns)) as recording:
         assert [warning.code for warning in recording.warnings] == ([code] if code else [])
         assert all(words in warning.message for warning in recording.warnings)
@@ -153,7 +153,7 @@ def polar_cloud(ros: Any, azimuths: np.ndarray) -> Any:
     return ros.cloud(START_NS, points)
 
 
-def test_angles_in_degrees_are_recognised_by_their_values_and_only_their_sign_is_assumed(ros1, write) -> None:
+def test_angles_in_degrees_are_recognised_by_their_values_and_only_their_sign_is_assumed(ros1, write):
     angles = np.linspace(-60.0, 60.0, 24)
     message = polar_cloud(ros1, angles)
     with opened(write, ros1, [message]) as recording:
@@ -167,7 +167,7 @@ def test_angles_in_degrees_are_recognised_by_their_values_and_only_their_sign_is
     np.testing.assert_allclose(np.degrees(np.arctan2(points[:, 1], points[:, 0])), -angles, atol=1e-4)
 
 
-def test_angles_that_the_user_states_in_the_wrong_unit_give_a_warning(ros1, write) -> None:
+def test_angles_that_the_user_states_in_the_wrong_unit_give_a_warning(ros1, write):
     message = polar_cloud(ros1, np.linspace(-60.0, 60.0, 24))
     with opened(write, ros1, [message], radar_axes="forward,left,up,radians") as recording:
         (warning,) = recording.warnings
@@ -176,7 +176,7 @@ def test_angles_that_the_user_states_in_the_wrong_unit_give_a_warning(ros1, writ
     assert warning.hint == "if they are degrees: --radar-axes degrees"
 
 
-def test_radians_read_as_degrees_give_a_warning(ros2, write) -> None:
+def test_radians_read_as_degrees_give_a_warning(ros2, write):
     kind = ros2.define(
         "ainstein_radar_msgs/msg/RadarTarget",
         "uint16 target_id\nfloat64 snr\nfloat64 range\nfloat64 speed\nfloat64 azimuth\nfloat64 elevation\n",
@@ -206,7 +206,7 @@ def test_radians_read_as_degrees_give_a_warning(ros2, write) -> None:
         ("degrees", np.eye(3)),
     ],
 )
-def test_the_axes_option_becomes_a_signed_permutation(words, expected) -> None:
+def test_the_axes_option_becomes_a_signed_permutation(words, expected):
     axes = parse_radar_axes(words)
     np.testing.assert_array_equal(axes.matrix, expected)
     assert axes.degrees == {"radians": False, "degrees": True}.get(words.rpartition(",")[2])
@@ -222,13 +222,13 @@ def test_the_axes_option_becomes_a_signed_permutation(words, expected) -> None:
         ("forward,backward,up", "two of the directions lie on the same axis"),
     ],
 )
-def test_invalid_axes_are_refused_with_a_clear_error(words, complaint) -> None:
+def test_invalid_axes_are_refused_with_a_clear_error(words, complaint):
     with pytest.raises(OptionError, match="--radar-axes") as caught:
         parse_radar_axes(words)
     assert complaint in str(caught.value)
 
 
-def test_axes_given_by_the_user_apply_to_positions_and_are_shown(ros, write, cloud_points) -> None:
+def test_axes_given_by_the_user_apply_to_positions_and_are_shown(ros, write, cloud_points):
     points = cloud_points(5)
     messages = [ros.cloud(START_NS + i * 10**8, points[: 5 - i]) for i in range(2)]
     with opened(write, ros, messages, radar_axes="right,forward,up") as recording:
@@ -238,7 +238,7 @@ def test_axes_given_by_the_user_apply_to_positions_and_are_shown(ros, write, clo
     np.testing.assert_array_equal(found, np.stack([points["y"], -points["x"], points["z"]], axis=1))
 
 
-def test_a_mirrored_radar_is_corrected_and_its_assumption_gives_no_warning(ros, write) -> None:
+def test_a_mirrored_radar_is_corrected_and_its_assumption_gives_no_warning(ros, write):
     expected = sample(ros, "UniBw detections")
     with opened(write, ros, expected.messages, radar_axes="forward,right,up,radians") as recording:
         found = recording.radar_scans()
@@ -246,7 +246,7 @@ def test_a_mirrored_radar_is_corrected_and_its_assumption_gives_no_warning(ros, 
     np.testing.assert_allclose(found.points_radar_m, expected.points * [1, -1, 1], rtol=1e-6)
 
 
-def test_the_noise_of_a_track_is_rotated_with_its_axes(ros1, write) -> None:
+def test_the_noise_of_a_track_is_rotated_with_its_axes(ros1, write):
     expected = sample(ros1, "radar_msgs tracks")
     with opened(write, ros1, expected.messages, radar_axes="forward,right,up") as recording:
         sigma = recording.radar_scans().sigma_polar
@@ -259,12 +259,12 @@ def test_the_noise_of_a_track_is_rotated_with_its_axes(ros1, write) -> None:
     )  # straight ahead, azimuth and elevation swap
 
 
-def test_an_invalid_option_is_refused_before_anything_is_read(ros1, write, plain, jpeg) -> None:
+def test_an_invalid_option_is_refused_before_anything_is_read(ros1, write, plain, jpeg):
     with pytest.raises(OptionError, match="'sideways' is unknown"):
         open_recording(write(ros1, plain(ros1, jpeg)), RecordingOptions(radar_axes="sideways"))
 
 
-def test_the_page_of_radar_formats_has_the_tables_of_the_registry() -> None:
+def test_the_page_of_radar_formats_has_the_tables_of_the_registry():
     docs = Path(__file__).parents[4] / "docs"
     page = (docs / "radar-formats.md").read_text(encoding="utf-8")
     made = runpy.run_path(str(docs / "make_radar_formats.py"))["with_tables"](page)
@@ -293,7 +293,7 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Insta
     yield from installing(tmp_path / "site-packages", monkeypatch, "acme-radar", GROUP, all_decoders, ACME, "ACME")
 
 
-def test_a_layout_of_an_installed_package_decodes_its_messages(installed: Install, ros2: Any, write: Any) -> None:
+def test_a_layout_of_an_installed_package_decodes_its_messages(installed, ros2, write):
     installed()
     echo = ros2.define("acme_msgs/msg/Echo", "float32 slant\nfloat32 squint\nfloat32 closing\nfloat32 loudness\n")
     array = ros2.define("acme_msgs/msg/EchoArray", "Header header\nacme_msgs/Echo[] echoes\n")
@@ -328,9 +328,7 @@ def test_a_layout_of_an_installed_package_decodes_its_messages(installed: Instal
         ),
     ],
 )
-def test_a_broken_layout_is_left_out_in_one_line_that_names_its_package(
-    installed: Install, caplog: pytest.LogCaptureFixture, change: tuple[str, str], words: str
-) -> None:
+def test_a_broken_layout_is_left_out_in_one_line_that_names_its_package(installed, caplog, change, words):
     assert change[0] in ACME
     installed(ACME.replace(*change))
 
@@ -340,6 +338,6 @@ def test_a_broken_layout_is_left_out_in_one_line_that_names_its_package(
     assert words in record.getMessage()
 
 
-def test_a_layout_that_uses_a_field_it_does_not_ask_for_is_refused() -> None:
+def test_a_layout_that_uses_a_field_it_does_not_ask_for_is_refused():
     with pytest.raises(ValueError, match="rate must be among its fields, or messages without fit it too"):
         Decoder("a", "b", "list", ("range", "azimuth"), doppler="rate")

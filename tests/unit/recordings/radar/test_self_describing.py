@@ -29,7 +29,7 @@ def joined(name: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", LAYOUTS)
-def test_a_vendors_layout_is_read_right_and_what_it_does_not_state_is_assumed(name: str) -> None:
+def test_a_vendors_layout_is_read_right_and_what_it_does_not_state_is_assumed(name):
     layout = LAYOUTS[name]
     with layout.recording() as recording:
         scans = recording.radar_scans()
@@ -51,7 +51,7 @@ def test_a_vendors_layout_is_read_right_and_what_it_does_not_state_is_assumed(na
 
 
 @pytest.mark.parametrize("name", [name for name, layout in LAYOUTS.items() if layout.assumed])
-def test_confirmed_assumptions_are_no_longer_open_and_give_no_warning(name: str) -> None:
+def test_confirmed_assumptions_are_no_longer_open_and_give_no_warning(name):
     with LAYOUTS[name].recording(confirm_assumptions=True) as recording:
         assert recording.assumptions == ()
         assert [one.confirmed for one in recording.stated_assumptions] == [True] * len(LAYOUTS[name].assumed)
@@ -59,7 +59,7 @@ def test_confirmed_assumptions_are_no_longer_open_and_give_no_warning(name: str)
 
 
 @pytest.mark.parametrize("name", LAYOUTS)
-def test_damaged_messages_of_vendors_give_values_or_one_clear_error(name: str) -> None:
+def test_damaged_messages_of_vendors_give_values_or_one_clear_error(name):
     layout = LAYOUTS[name]
     definition = parse_definition(layout.kind, layout.definition, "ros1")
     payloads = [header_bytes(TimeNs(START_NS), "radar") + layout.body(Truth.of(scan)) for scan in range(3)]
@@ -69,12 +69,12 @@ def test_damaged_messages_of_vendors_give_values_or_one_clear_error(name: str) -
     for _ in range(40):
         worse = damaged(payloads[0], rng)
         with contextlib.suppress(MessageError):
-            recognise(definition, worse, lambda count, worse=worse: [worse, *payloads])  # type: ignore[misc]
+            recognise(definition, worse, lambda count, worse=worse: [worse, *payloads])
         with contextlib.suppress(MessageError):
             reader.returns(worse)
 
 
-def test_a_second_azimuth_is_named_and_not_read() -> None:
+def test_a_second_azimuth_is_named_and_not_read():
     with listed(POLAR + "\nfloat32 azimuth_2 = half # rad").recording(scans=2) as recording:
         (other,) = [one.column for one in recording.radar_columns if one.quantity == "other azimuth"]
         points = recording.radar_scans().points_radar_m
@@ -87,7 +87,7 @@ PREFIXES = ["", "f_", "m_", "s_", "det_", "target_", "f", "radar_", "obj_", "fl"
 
 @settings(max_examples=25, deadline=None)
 @given(st.sampled_from(PREFIXES), st.permutations(range(7)), st.booleans())
-def test_prefixes_and_the_order_of_fields_do_not_change_what_is_read(prefix: str, order: Any, capital: bool) -> None:
+def test_prefixes_and_the_order_of_fields_do_not_change_what_is_read(prefix, order, capital):
     rows = fields(POLAR + "\nuint16 id = id\nfloat32 range_std = half")
     lines = []
     for place in order:
@@ -138,7 +138,7 @@ def opened(path: Any, *maps: str, **options: Any) -> Any:
     return open_recording(path, RecordingOptions(map=maps, **options), require=("radar",))
 
 
-def test_columns_units_and_signs_that_the_user_maps_are_used_and_leave_nothing_assumed(ros, write, rows) -> None:
+def test_columns_units_and_signs_that_the_user_maps_are_used_and_leave_nothing_assumed(ros, write, rows):
     path = write_list(ros, write, rows)
     maps = ("x=alpha1:cm", "y=-alpha2:m", "z=q:mm", "doppler=vel:kmh", "amplitude=dist:db")
     with opened(path, *maps) as recording:
@@ -152,13 +152,13 @@ def test_columns_units_and_signs_that_the_user_maps_are_used_and_leave_nothing_a
     np.testing.assert_allclose(scan.snr_db, column(rows, "dist"), rtol=1e-6)
 
 
-def test_columns_may_be_named_from_the_message_on(ros, write, rows) -> None:
+def test_columns_may_be_named_from_the_message_on(ros, write, rows):
     with opened(write_list(ros, write, rows), "x=body.dets.posX:m", "y=body.dets.posY:m") as recording:
         found = recording.radar_scans().scan(0).points_radar_m
     np.testing.assert_allclose(found[:, 1], column(rows, "posY"), rtol=1e-6)
 
 
-def test_a_polar_position_can_be_mapped_with_the_angle_counted_to_the_right(ros, write, rows) -> None:
+def test_a_polar_position_can_be_mapped_with_the_angle_counted_to_the_right(ros, write, rows):
     path = write_list(ros, write, rows)
     with opened(path, "range=dist:m", "azimuth=-theta:deg", "doppler=vel:mps") as recording:
         found = recording.radar_scans().scan(0).points_radar_m
@@ -168,7 +168,7 @@ def test_a_polar_position_can_be_mapped_with_the_angle_counted_to_the_right(ros,
     np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-6)
 
 
-def test_a_map_combines_with_the_axes(ros, write, rows) -> None:
+def test_a_map_combines_with_the_axes(ros, write, rows):
     with opened(write_list(ros, write, rows), "x=posX:m", "y=posY:m", radar_axes="right,forward,up") as recording:
         found = recording.radar_scans().scan(0).points_radar_m
         assert [one.key for one in recording.assumptions] == ["speed-unit"]
@@ -176,13 +176,13 @@ def test_a_map_combines_with_the_axes(ros, write, rows) -> None:
     np.testing.assert_allclose(found[:, 1], -column(rows, "posX"), rtol=1e-6)
 
 
-def test_a_map_without_a_unit_leaves_the_unit_assumed(ros, write, rows) -> None:
+def test_a_map_without_a_unit_leaves_the_unit_assumed(ros, write, rows):
     with opened(write_list(ros, write, rows), "x=alpha1", "y=alpha2:m", "doppler=vel:mps") as recording:
         (one,) = recording.assumptions
     assert (one.key, one.confirm) == ("length-unit", "--map x=alpha1:m")
 
 
-def test_a_column_that_does_not_exist_is_refused_with_the_nearest_names(ros1, write, rows) -> None:
+def test_a_column_that_does_not_exist_is_refused_with_the_nearest_names(ros1, write, rows):
     path = write_list(ros1, write, rows)
     with pytest.raises(RecordingError, match=r"--map x=pos_X:m: the messages have no column 'pos_X'") as caught:
         opened(path, "x=pos_X:m", "y=posY:m")
@@ -191,7 +191,7 @@ def test_a_column_that_does_not_exist_is_refused_with_the_nearest_names(ros1, wr
         assert "no column 'pos_X'" in str(recording.topics[0].problem)
 
 
-def test_half_a_position_is_refused(ros1, write, rows) -> None:
+def test_half_a_position_is_refused(ros1, write, rows):
     path = write_list(ros1, write, rows)
     with pytest.raises(OptionError, match="azimuth is not known"):
         opened(path, "range=dist:m")
@@ -199,7 +199,7 @@ def test_half_a_position_is_refused(ros1, write, rows) -> None:
         opened(path, "time=q:ns")
 
 
-def test_the_unit_that_was_recognised_stays_when_only_the_sign_is_mapped(ros1, write, cloud_points) -> None:
+def test_the_unit_that_was_recognised_stays_when_only_the_sign_is_mapped(ros1, write, cloud_points):
     points = np.zeros(24, dtype=[(name, "<f4") for name in ("Rng", "Azi_deg", "vRad")])
     points["Rng"], points["Azi_deg"] = np.linspace(5, 60, 24), np.linspace(-50, 50, 24)
     rows = [("/radar", START_NS + i * 10**8, ros1.cloud(START_NS + i * 10**8, points)) for i in range(3)]
@@ -209,7 +209,7 @@ def test_the_unit_that_was_recognised_stays_when_only_the_sign_is_mapped(ros1, w
     np.testing.assert_allclose(np.degrees(np.arctan2(found[:, 1], found[:, 0])), -points["Azi_deg"], atol=1e-4)
 
 
-def test_a_list_of_structs_that_is_not_recognised_is_mentioned_with_its_fields(ros, write) -> None:
+def test_a_list_of_structs_that_is_not_recognised_is_mentioned_with_its_fields(ros, write):
     kind = ros.define("vendor_msgs/msg/Blob", "float32 a1\nfloat32 a2\nfloat32 a3\n")
     outer = ros.define("vendor_msgs/msg/Blobs", "Header header\nvendor_msgs/Blob[] blobs\n")
     message = ros.new(outer, header=ros.header(START_NS), blobs=[ros.new(kind, a1=1.0, a2=2.0, a3=3.0)])
@@ -220,7 +220,7 @@ def test_a_list_of_structs_that_is_not_recognised_is_mentioned_with_its_fields(r
     assert "--map x=FIELD:m" in str(topic.problem)
 
 
-def test_a_list_of_structs_that_are_little_more_than_bytes_is_raw_whatever_its_name(ros, write) -> None:
+def test_a_list_of_structs_that_are_little_more_than_bytes_is_raw_whatever_its_name(ros, write):
     kind = ros.define("vendor_msgs/msg/Chunk", "uint64 stamp\nuint8[] payload\n")
     outer = ros.define("vendor_msgs/msg/Frame", "Header header\nvendor_msgs/Chunk[] chunks\n")
     chunk = ros.new(kind, stamp=3, payload=np.arange(40, dtype=np.uint8))
@@ -229,7 +229,7 @@ def test_a_list_of_structs_that_are_little_more_than_bytes_is_raw_whatever_its_n
         assert "raw sensor packets" in str(recording.topics[0].problem)
 
 
-def test_a_message_without_a_stamp_at_its_start_is_read_by_its_receive_times(ros, write) -> None:
+def test_a_message_without_a_stamp_at_its_start_is_read_by_its_receive_times(ros, write):
     kind = ros.define("vendor_msgs/msg/Ret", "float32 range_m\nfloat32 azimuth_rad\nfloat32 doppler_mps\n")
     outer = ros.define("vendor_msgs/msg/Cycle", "uint32 cycle\nvendor_msgs/Ret[] rets\n")
     rets = [ros.new(kind, range_m=5.0 + k, azimuth_rad=0.02 * k, doppler_mps=0.0) for k in range(30)]

@@ -17,7 +17,7 @@ from calib_core.recordings.radar.merging import Spread, merged, moments_of, spre
 from calib_core.recordings.radar.sensors import sensor_name
 from calib_core.synthetic import simulate
 from calib_core.synthetic.files import SIDE_FRAME, SIDE_TOPIC, radar_messages
-from calib_core.synthetic.presets import PRESETS, PresetName
+from calib_core.synthetic.presets import PRESETS
 
 START_NS = 1_700_000_000 * NS_PER_S
 NAMES = ("x", "y", "z", "intensity", "velocity")
@@ -73,7 +73,7 @@ def near_and_far(everything: np.ndarray) -> tuple[Iterable[RecordedMessage], Ite
     return clouds("/radar/near", near, seed=1, rate_hz=25.0, scans=75), clouds("/radar/far", far, seed=2)
 
 
-def test_near_and_far_scans_are_one_radar(tmp_path: Path) -> None:
+def test_near_and_far_scans_are_one_radar(tmp_path):
     everything = targets(7, 60)
     with opened(bag(tmp_path, *near_and_far(everything))) as recording:
         assert set(recording.radar_topics) == {"/radar/near", "/radar/far"}
@@ -91,7 +91,7 @@ def test_near_and_far_scans_are_one_radar(tmp_path: Path) -> None:
         assert len(around) == pytest.approx(26, abs=2)
 
 
-def test_radars_that_look_elsewhere_stay_apart_although_their_frames_are_named_alike(tmp_path: Path) -> None:
+def test_radars_that_look_elsewhere_stay_apart_although_their_frames_are_named_alike(tmp_path):
     everything = targets(8)
     path = bag(tmp_path, clouds("/a", everything, seed=1), clouds("/b", everything, seed=2, turned_rad=0.5))
     with opened(path) as recording:
@@ -103,7 +103,7 @@ def test_radars_that_look_elsewhere_stay_apart_although_their_frames_are_named_a
         assert "--radar-topic" in warning.hint
 
 
-def test_corner_radars_stay_apart_even_where_they_agree(tmp_path: Path) -> None:
+def test_corner_radars_stay_apart_even_where_they_agree(tmp_path):
     streams = near_and_far(targets(7, 60))
     renamed = [
         [replace(message, topic=name) for message in stream]
@@ -131,7 +131,7 @@ def flat(message: RecordedMessage) -> RecordedMessage:
     return replace(message, body=replace(message.body, values=message.body.values * [1.0, 1.0, 0.0, 1.0, 1.0]))
 
 
-def test_topics_of_one_frame_that_alternate_in_time_are_one_radar(tmp_path: Path) -> None:
+def test_topics_of_one_frame_that_alternate_in_time_are_one_radar(tmp_path):
     near, far = targets(7, 20), targets(17, 6)
     streams = in_turn([clouds("/radar/scan0", near, seed=1), clouds("/radar/scan1", far, seed=2)])
     with opened(bag(tmp_path, *streams)) as recording:
@@ -140,21 +140,21 @@ def test_topics_of_one_frame_that_alternate_in_time_are_one_radar(tmp_path: Path
         assert recording.warnings == ()
 
 
-def test_topics_that_alternate_but_show_the_same_ranges_elsewhere_are_two_radars(tmp_path: Path) -> None:
+def test_topics_that_alternate_but_show_the_same_ranges_elsewhere_are_two_radars(tmp_path):
     everything = targets(8, 30)
     streams = in_turn([clouds("/a", everything, seed=1), clouds("/b", everything, seed=2, turned_rad=0.5)])
     with opened(bag(tmp_path, *streams)) as recording:
         assert len(recording.radar_sensors) == 2
 
 
-def test_near_and_far_scans_without_elevation_are_one_radar(tmp_path: Path) -> None:
+def test_near_and_far_scans_without_elevation_are_one_radar(tmp_path):
     streams = [[flat(message) for message in stream] for stream in near_and_far(targets(7, 60))]
     with opened(bag(tmp_path, *streams)) as recording:
         assert set(recording.radar_topics) == {"/radar/near", "/radar/far"}
         assert np.median(np.diff(recording.radar_scans().first_return)) == pytest.approx(60, abs=2)
 
 
-def test_other_frames_are_other_radars_unless_the_user_joins_them(tmp_path: Path) -> None:
+def test_other_frames_are_other_radars_unless_the_user_joins_them(tmp_path):
     near, far = near_and_far(targets(7, 60))
     moved = [replace(message, body=replace(message.body, frame_id="corner")) for message in near]
     path = bag(tmp_path, moved, far)
@@ -168,14 +168,14 @@ def test_other_frames_are_other_radars_unless_the_user_joins_them(tmp_path: Path
         assert recording.radar_choice.endswith("as requested")
 
 
-def test_one_topic_named_by_the_user_is_used_alone(tmp_path: Path) -> None:
+def test_one_topic_named_by_the_user_is_used_alone(tmp_path):
     with opened(bag(tmp_path, *near_and_far(targets(7, 60))), "/radar/near") as recording:
         assert recording.radar_topics == ("/radar/near",)
         assert len(recording.radar_times) == 75
         assert recording.radar_choice == ""
 
 
-def test_a_radar_can_be_asked_for_by_the_name_that_info_prints(tmp_path: Path) -> None:
+def test_a_radar_can_be_asked_for_by_the_name_that_info_prints(tmp_path):
     path = bag(tmp_path, *near_and_far(targets(7, 60)), clouds("/other", targets(9), seed=5))
     with opened(path) as recording:
         names = [sensor.name for sensor in recording.radar_sensors]
@@ -188,7 +188,7 @@ def test_a_radar_can_be_asked_for_by_the_name_that_info_prints(tmp_path: Path) -
         opened(path, "/radar/near,/radar/mid")
 
 
-def test_a_topic_with_the_same_returns_is_read_once(tmp_path: Path) -> None:
+def test_a_topic_with_the_same_returns_is_read_once(tmp_path):
     everything = targets(7)
     path = bag(tmp_path, clouds("/radar", everything, seed=1), clouds("/radar_copy", everything, seed=1))
     with opened(path) as recording:
@@ -206,7 +206,7 @@ def spoilt(stream: Iterable[RecordedMessage]) -> Iterable[RecordedMessage]:
         yield replace(message, body=replace(message.body, values=values))
 
 
-def test_numbers_that_are_none_neither_warn_nor_decide_what_belongs_together(tmp_path: Path) -> None:
+def test_numbers_that_are_none_neither_warn_nor_decide_what_belongs_together(tmp_path):
     everything, other = targets(7), targets(7)
     other[:, 1] = np.arcsin(np.clip(np.sin(other[:, 1]) + OTHER_RAD, -0.99, 0.99))
     for name, streams, topics, repeats in (
@@ -227,13 +227,13 @@ def test_numbers_that_are_none_neither_warn_nor_decide_what_belongs_together(tmp
         assert (lost.any(axis=1) == lost.all(axis=1)).all(), "a position is whole or none"
 
 
-def test_a_stated_standard_deviation_of_zero_is_no_spread_of_zero() -> None:
+def test_a_stated_standard_deviation_of_zero_is_no_spread_of_zero():
     scans = replace(scans_of(((5.0, 0.0, 0.0),)), sigma_polar=np.zeros((1, 3)))
     assert (spread_of(scans).step > 0).all()
 
 
 @pytest.mark.parametrize("lack", ["stamps and frame", "frame", "Doppler"])
-def test_a_list_and_a_cloud_of_one_sensor_are_one_radar_and_the_better_one_is_read(tmp_path: Path, lack: str) -> None:
+def test_a_list_and_a_cloud_of_one_sensor_are_one_radar_and_the_better_one_is_read(tmp_path, lack):
     """Both arrive together, long after they were measured; the list has the better name."""
     everything = targets(7)
     late_ns = 130_000_000
@@ -264,13 +264,13 @@ def test_a_list_and_a_cloud_of_one_sensor_are_one_radar_and_the_better_one_is_re
     assert f"/radar/scan is not read because it has {reason}" in line
 
 
-def test_a_radar_without_a_frame_that_shows_other_returns_stays_apart(tmp_path: Path) -> None:
+def test_a_radar_without_a_frame_that_shows_other_returns_stays_apart(tmp_path):
     path = bag(tmp_path, clouds("/a", targets(7), seed=1), clouds("/b", targets(8), seed=2, frame=""))
     with opened(path) as recording:
         assert len(recording.radar_sensors) == 2
 
 
-def test_other_azimuths_of_the_same_returns_are_alternatives(tmp_path: Path) -> None:
+def test_other_azimuths_of_the_same_returns_are_alternatives(tmp_path):
     everything = targets(7)
     path = bag(
         tmp_path, clouds("/radar", everything, seed=1), clouds("/radar_2", everything, seed=1, turned_rad=OTHER_RAD)
@@ -290,7 +290,7 @@ def _turn_between_alternatives(scans: RadarScans) -> float:
     return float(np.median(turns))
 
 
-def test_the_front_radar_is_chosen_over_a_side_radar_with_a_better_name_and_fewer_returns(tmp_path: Path) -> None:
+def test_the_front_radar_is_chosen_over_a_side_radar_with_a_better_name_and_fewer_returns(tmp_path):
     front = clouds("/front/points", targets(7, 52), seed=1, frame="front")
     side = clouds("/radar_left/points", targets(8, 8), seed=2, frame="left")
     with opened(bag(tmp_path, front, side)) as recording:
@@ -300,7 +300,7 @@ def test_the_front_radar_is_chosen_over_a_side_radar_with_a_better_name_and_fewe
         assert "not used: /radar_left/points, frame 'left': 8 returns a scan" in recording.radar_choice
 
 
-def test_the_times_of_a_radar_not_in_use_are_by_the_clock_that_is_named_for_it(tmp_path: Path) -> None:
+def test_the_times_of_a_radar_not_in_use_are_by_the_clock_that_is_named_for_it(tmp_path):
     front = clouds("/front/points", targets(7, 52), seed=1, frame="front")
     side = clouds("/radar_left/points", targets(8, 8), seed=2, frame="left")
     late_ns = (15_000_000, 35_000_000)
@@ -318,14 +318,14 @@ def test_the_times_of_a_radar_not_in_use_are_by_the_clock_that_is_named_for_it(t
 
 
 @pytest.mark.parametrize("speed", ["velocity", "doppler_vel"])
-def test_a_cloud_with_doppler_is_no_lidar_whatever_its_topic_and_size(tmp_path: Path, speed: str) -> None:
+def test_a_cloud_with_doppler_is_no_lidar_whatever_its_topic_and_size(tmp_path, speed):
     names = ("x", "y", "z", "intensity", speed)
     dense = clouds("/lidar_top/points", targets(7, 5200), seed=1, scans=6, names=names)
     with opened(bag(tmp_path, dense)) as recording:
         assert [warning.code for warning in recording.warnings] == []
 
 
-def test_info_shows_the_radars_with_their_figures(tmp_path: Path) -> None:
+def test_info_shows_the_radars_with_their_figures(tmp_path):
     path = bag(tmp_path, *near_and_far(targets(7, 60)), clouds("/left", targets(8, 8), seed=2, frame="left"))
     with opened(path) as recording:
         text = describe(recording)
@@ -338,7 +338,7 @@ def test_info_shows_the_radars_with_their_figures(tmp_path: Path) -> None:
     assert summary["sensors"][1]["figures"]["returns_per_scan"] == 8.0
 
 
-def test_info_gives_the_figures_of_a_single_radar_too(tmp_path: Path) -> None:
+def test_info_gives_the_figures_of_a_single_radar_too(tmp_path):
     with opened(bag(tmp_path, clouds("/radar", targets(7), seed=1))) as recording:
         (sensor,) = recording_summary(recording).sensors
         assert "radars" not in describe(recording)
@@ -346,7 +346,7 @@ def test_info_gives_the_figures_of_a_single_radar_too(tmp_path: Path) -> None:
     assert sensor.figures.static_share == pytest.approx(0.9, abs=0.05)
 
 
-def test_names_of_radars_are_what_their_topics_have_in_common() -> None:
+def test_names_of_radars_are_what_their_topics_have_in_common():
     assert sensor_name(["/radar/near", "/radar/far"]) == "/radar"
     assert sensor_name(["/r_far", "/r_far_2"]) == "/r_far,/r_far_2"
     assert sensor_name(["/a/points", "/b/points"]) == "/a/points,/b/points"
@@ -357,9 +357,7 @@ def test_names_of_radars_are_what_their_topics_have_in_common() -> None:
     ("preset", "topics", "alternatives"),
     [("near-far", 2, False), ("near-far-azimuths", 4, True), ("near-far-column", 2, True), ("lidar-name", 1, False)],
 )
-def test_simulated_radars_are_opened_as_what_they_are(
-    tmp_path: Path, preset: PresetName, topics: int, alternatives: bool
-) -> None:
+def test_simulated_radars_are_opened_as_what_they_are(tmp_path, preset, topics, alternatives):
     recording = simulate(replace(PRESETS[preset], placements=2, dwell_s=3.5, seed=5))
     path = write_ros1_bag(tmp_path / "radar.bag", radar_messages(recording, 1))
     with opened(path) as found:
@@ -369,7 +367,7 @@ def test_simulated_radars_are_opened_as_what_they_are(
         assert (scans.alternative_of is not None) == alternatives
 
 
-def test_the_simulated_front_radar_is_chosen_over_the_side_radar(tmp_path: Path) -> None:
+def test_the_simulated_front_radar_is_chosen_over_the_side_radar(tmp_path):
     recording = simulate(replace(PRESETS["two-radars"], placements=2, dwell_s=3.5, seed=5))
     path = write_ros1_bag(tmp_path / "radar.bag", radar_messages(recording, 1))
     with opened(path) as found:
@@ -404,24 +402,24 @@ def times(*seconds: float) -> np.ndarray:
     return np.round(np.array(seconds) * NS_PER_S).astype(np.int64)
 
 
-def test_scans_within_half_a_cycle_of_the_fastest_topic_are_one_moment() -> None:
+def test_scans_within_half_a_cycle_of_the_fastest_topic_are_one_moment():
     moments = moments_of([times(0.0, 0.05, 0.10, 0.15), times(0.0, 0.04, 0.08, 0.12, 0.16)])
     assert moments.times_ns.tolist() == times(0.0, 0.04, 0.08, 0.12, 0.16).tolist()
     assert moments.scan_of.tolist() == [[0, 1, 2, -1, 3], [0, 1, 2, 3, 4]]
 
 
-def test_a_constant_delay_between_two_topics_makes_no_moments_of_their_own() -> None:
+def test_a_constant_delay_between_two_topics_makes_no_moments_of_their_own():
     moments = moments_of([times(0.03, 0.13, 0.23), times(0.0, 0.1, 0.2)])
     assert moments.scan_of.tolist() == [[0, 1, 2], [0, 1, 2]]
 
 
-def test_a_scan_too_far_from_the_others_or_second_in_its_moment_is_a_moment_of_its_own() -> None:
+def test_a_scan_too_far_from_the_others_or_second_in_its_moment_is_a_moment_of_its_own():
     moments = moments_of([times(0.0, 0.1, 0.2, 0.3), times(0.01, 0.02, 0.9)])
     assert moments.times_ns.tolist() == times(0.0, 0.02, 0.1, 0.2, 0.3, 0.9).tolist()
     assert moments.scan_of.tolist() == [[0, -1, 1, 2, 3, -1], [0, 1, -1, -1, -1, 2]]
 
 
-def test_every_scan_is_in_exactly_one_moment() -> None:
+def test_every_scan_is_in_exactly_one_moment():
     rng = np.random.default_rng(4)
     series = [np.unique(rng.integers(0, 10 * NS_PER_S, size)) for size in (90, 55, 70)]
     moments = moments_of(series)
@@ -430,7 +428,7 @@ def test_every_scan_is_in_exactly_one_moment() -> None:
         assert sorted(numbers[numbers >= 0].tolist()) == list(range(len(own)))
 
 
-def test_a_return_that_two_topics_report_counts_once_as_the_finer_one_has_it() -> None:
+def test_a_return_that_two_topics_report_counts_once_as_the_finer_one_has_it():
     near = scans_of([(6.02, 0.11, 0.0), (3.0, -0.2, 0.0)])
     far = scans_of([(6.0, 0.10, 0.0), (15.0, 0.0, 0.0)])
     both = merged([near, far], [COARSE, SPREAD], [0, 1])
@@ -440,17 +438,17 @@ def test_a_return_that_two_topics_report_counts_once_as_the_finer_one_has_it() -
 
 
 @pytest.mark.parametrize("other", [(6.2, 0.10, 0.0), (6.0, 0.25, 0.0), (6.0, 0.10, 0.5)])
-def test_returns_in_different_bins_stay_two(other: Return) -> None:
+def test_returns_in_different_bins_stay_two(other):
     both = merged([scans_of([(6.0, 0.10, 0.0)]), scans_of([other])], [SPREAD, SPREAD], [0, 1])
     assert len(both.points_radar_m) == 2
 
 
-def test_two_returns_near_each_other_are_not_both_taken_for_one() -> None:
+def test_two_returns_near_each_other_are_not_both_taken_for_one():
     one, two = scans_of([(6.0, 0.10, 0.0)]), scans_of([(6.01, 0.10, 0.0), (6.05, 0.11, 0.0)])
     assert len(merged([one, two], [SPREAD, SPREAD], [0, 1]).points_radar_m) == 2
 
 
-def test_other_azimuths_are_alternatives_of_the_same_return_whatever_their_order() -> None:
+def test_other_azimuths_are_alternatives_of_the_same_return_whatever_their_order():
     first = scans_of([(6.0, 0.1, 0.0), (9.0, 0.3, 0.0)], [(4.0, 0.0, 1.0)])
     second = scans_of([(9.0, -0.4, 0.0), (6.0, -0.6, 0.0)], [(4.0, 0.7, 1.0)])
     both = merged([first, second], [SPREAD, SPREAD], [0, 0])
@@ -464,7 +462,7 @@ def test_other_azimuths_are_alternatives_of_the_same_return_whatever_their_order
     assert labelled == [(0, 0, -0.6), (0, 0, 0.1), (0, 1, -0.4), (0, 1, 0.3), (1, 0, 0.0), (1, 0, 0.7)]
 
 
-def test_an_azimuth_given_twice_or_not_at_all_is_no_alternative() -> None:
+def test_an_azimuth_given_twice_or_not_at_all_is_no_alternative():
     first = scans_of([(6.0, 0.1, 0.0), (9.0, 0.3, 0.0), (12.0, 0.0, 0.0)])
     second = scans_of([(6.0, 0.105, 0.0), (9.0, np.nan, 0.0), (12.0, 0.5, 0.0)])
     both = merged([first, second], [SPREAD, SPREAD], [0, 0])
@@ -472,14 +470,14 @@ def test_an_azimuth_given_twice_or_not_at_all_is_no_alternative() -> None:
     assert sorted(both.alternative_of.tolist()) == [-1, -1, 0, 0]
 
 
-def test_a_return_reported_near_and_far_takes_its_alternatives_along() -> None:
+def test_a_return_reported_near_and_far_takes_its_alternatives_along():
     parts = [scans_of([(6.0, 0.1, 0.0)]), scans_of([(6.0, -0.5, 0.0)])]
     four = merged([*parts, *parts], [SPREAD, SPREAD, COARSE, COARSE], [0, 0, 2, 2])
     assert len(four.points_radar_m) == 2
     assert four.alternative_of.tolist() == [0, 0]
 
 
-def test_the_spread_is_measured_in_the_data() -> None:
+def test_the_spread_is_measured_in_the_data():
     rng = np.random.default_rng(1)
     targets = np.array([(4.0, -0.3, 0.0), (7.0, 0.2, 0.0), (11.0, 0.0, 0.0), (15.0, 0.4, 0.25)])
     noise = [0.01, 0.004, 0.0]

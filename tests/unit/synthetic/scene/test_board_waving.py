@@ -40,7 +40,7 @@ def folder(recording: SimulatedRecording, tmp_path_factory: pytest.TempPathFacto
     return folder
 
 
-def test_the_board_is_where_the_truth_says(recording: SimulatedRecording) -> None:
+def test_the_board_is_where_the_truth_says(recording):
     stage = recording.stage
     assert stage.waving is not None
     seen = []
@@ -55,7 +55,7 @@ def test_the_board_is_where_the_truth_says(recording: SimulatedRecording) -> Non
     assert max(seen) < 1.0
 
 
-def test_the_board_is_held_still_between_poses_and_moves_in_between(recording: SimulatedRecording) -> None:
+def test_the_board_is_held_still_between_poses_and_moves_in_between(recording):
     waving = recording.stage.waving
     speeds = [float(np.linalg.norm(moving.film.velocity_mps)) for s in (0.2, 0.7, 1.2, 1.7) if (moving := waving.at(s))]
     assert speeds[0] == speeds[2] == 0.0
@@ -67,7 +67,7 @@ def test_the_board_is_held_still_between_poses_and_moves_in_between(recording: S
     assert waving.at(5.0) is None
 
 
-def test_the_reflector_is_fetched_after_the_board_is_put_away(recording: SimulatedRecording) -> None:
+def test_the_reflector_is_fetched_after_the_board_is_put_away(recording):
     story = recording.stage.story
     assert story.at(2.0).resting is None
     assert story.at(2.0).reflector_m[0] < 0.0
@@ -76,7 +76,7 @@ def test_the_reflector_is_fetched_after_the_board_is_put_away(recording: Simulat
     assert np.linalg.norm(story.at(story.lead_s + 1e-3).person.place_m) > 1.0
 
 
-def test_nothing_in_the_recording_tells_of_the_lens(folder: Path) -> None:
+def test_nothing_in_the_recording_tells_of_the_lens(folder):
     with open_recording([folder / "recording_mcap"]) as recording:
         topics = {topic.name for topic in recording.topics}
     assert "/camera/image_raw/compressed" in topics
@@ -89,14 +89,14 @@ def test_nothing_in_the_recording_tells_of_the_lens(folder: Path) -> None:
     assert truth["placements"][0]["start"]["sec"] >= times[1]
 
 
-def test_a_folder_without_ros_has_no_camera_file_either(recording: SimulatedRecording, tmp_path: Path) -> None:
+def test_a_folder_without_ros_has_no_camera_file_either(recording, tmp_path):
     from calib_core.synthetic.files import write_plain_files
 
     write_plain_files(recording, tmp_path / "plain", "csv", [])
     assert not (tmp_path / "plain" / "camera.yaml").exists()
 
 
-def test_a_board_needs_placements_after_it_and_no_islands() -> None:
+def test_a_board_needs_placements_after_it_and_no_islands():
     with pytest.raises(OptionError, match="placements"):
         SimulationOptions(placements=0, waved_board=BOARD)
     with pytest.raises(OptionError, match="islands"):
@@ -105,12 +105,12 @@ def test_a_board_needs_placements_after_it_and_no_islands() -> None:
         SimulationOptions(waved_board=WavedBoard(duration_s=-1.0))
 
 
-def test_a_board_that_does_not_fit_in_the_picture_is_refused() -> None:
+def test_a_board_that_does_not_fit_in_the_picture_is_refused():
     with pytest.raises(OptionError, match="take a usual one"):
         set_stage(replace(OPTIONS, waved_board=WavedBoard(5.0, columns=3, rows=40)))
 
 
-def test_without_a_board_the_story_is_as_before() -> None:
+def test_without_a_board_the_story_is_as_before():
     plain = set_stage(replace(OPTIONS, waved_board=WavedBoard()))
     assert plain.waving is None
     assert plain.story.lead_s == 0.0

@@ -38,7 +38,7 @@ def _window(session: SimulatedScans, placement: SimulatedPlacement) -> RadarScan
     return session.scans.between(placement.start, placement.end)
 
 
-def test_two_reflectors_stand_at_once_and_are_moved_in_turn() -> None:
+def test_two_reflectors_stand_at_once_and_are_moved_in_turn():
     session = simulate_scans(replace(QUIET, reflectors=2))
     placements = session.placements
     for first, second, third in zip(placements, placements[1:], placements[2:], strict=False):
@@ -48,7 +48,7 @@ def test_two_reflectors_stand_at_once_and_are_moved_in_turn() -> None:
     assert min(_seen(_window(session, placement), placement.position_radar_m) for placement in placements) > 0.7
 
 
-def test_the_further_reflector_of_each_scene_stands_as_much_farther_away_as_asked_for() -> None:
+def test_the_further_reflector_of_each_scene_stands_as_much_farther_away_as_asked_for():
     session = simulate_scans(replace(QUIET, placements=6, reflectors=2, reflectors_apart_m=0.7))
     places_m = np.array([resting.position_m[:2] for resting in session.stage.story.restings])
     ranges_m = np.linalg.norm(places_m, axis=1)
@@ -56,7 +56,7 @@ def test_the_further_reflector_of_each_scene_stands_as_much_farther_away_as_aske
     assert np.linalg.norm(places_m[1::2] - places_m[::2], axis=1).min() >= session.stage.scene.layout.separation_m
 
 
-def test_the_clicks_of_two_reflectors_name_both_in_one_dwell_but_in_different_frames() -> None:
+def test_the_clicks_of_two_reflectors_name_both_in_one_dwell_but_in_different_frames():
     session = simulate_scans(replace(QUIET, reflectors=2))
     times = [int(click.image_time) for click in session.clicks]
     assert len(set(times)) == 6
@@ -65,7 +65,7 @@ def test_the_clicks_of_two_reflectors_name_both_in_one_dwell_but_in_different_fr
         assert session.placements[one].start < times[other] < session.placements[one].end
 
 
-def test_a_cart_stands_behind_the_reflector_at_every_placement_and_echoes_more() -> None:
+def test_a_cart_stands_behind_the_reflector_at_every_placement_and_echoes_more():
     session = simulate_scans(replace(QUIET, surroundings=CARTS))
     from_world = session.stage.rig.radar_from_world
     for placement, resting in zip(session.placements, session.stage.story.restings, strict=True):
@@ -82,7 +82,7 @@ def test_a_cart_stands_behind_the_reflector_at_every_placement_and_echoes_more()
     assert _seen(gap, session.placements[0].position_radar_m) < 0.1
 
 
-def test_parked_cars_a_fence_and_a_target_of_29_dbsm_are_always_there_and_hide_nothing() -> None:
+def test_parked_cars_a_fence_and_a_target_of_29_dbsm_are_always_there_and_hide_nothing():
     strong = Surroundings(parked_cars=3, fence=True, strong_target_dbsm=29.0)
     session = simulate_scans(replace(QUIET, clutter="scene", surroundings=strong))
     plain, scene = scene_named("field"), session.stage.scene
@@ -99,7 +99,7 @@ def test_parked_cars_a_fence_and_a_target_of_29_dbsm_are_always_there_and_hide_n
     assert count > len(simulate_scans(replace(QUIET, clutter="scene")).scans.points_radar_m) / len(session.scans) + 5.0
 
 
-def test_flickering_targets_are_seen_for_a_share_of_the_time_and_by_turns() -> None:
+def test_flickering_targets_are_seen_for_a_share_of_the_time_and_by_turns():
     session = simulate_scans(replace(QUIET, radar_rate_hz=10.0, surroundings=Surroundings(flickering_targets=5)))
     times_s = np.arange(0.0, session.stage.story.duration_s, 0.1)
     for one in session.stage.flickers:
@@ -111,7 +111,7 @@ def test_flickering_targets_are_seen_for_a_share_of_the_time_and_by_turns() -> N
         assert _seen(session.scans, position) == pytest.approx(shown.mean(), abs=0.15)
 
 
-def test_passers_by_cross_the_scene_and_some_stop() -> None:
+def test_passers_by_cross_the_scene_and_some_stop():
     session = simulate_scans(replace(QUIET, radar_rate_hz=10.0, surroundings=Surroundings(passers_by=3)))
     story = session.stage.story
     assert len(story.passers_by) == 3
@@ -128,7 +128,7 @@ def test_passers_by_cross_the_scene_and_some_stop() -> None:
     assert moving.sum() > np.sum(np.abs(alone.scans.doppler_mps) > 0.2) + 50
 
 
-def test_recordings_in_islands_are_short_with_minutes_between() -> None:
+def test_recordings_in_islands_are_short_with_minutes_between():
     session = simulate_scans(replace(QUIET, islands=True, dropped_share=0.0))
     for times in (session.stage.scan_times, session.stage.frame_times):
         gaps_s = np.diff(times.header_ns) / NS_PER_S
@@ -147,13 +147,13 @@ def test_recordings_in_islands_are_short_with_minutes_between() -> None:
         assert _seen(_window(session, placement), placement.position_radar_m) > 0.7
 
 
-def test_an_island_begins_with_the_reflector_already_there_if_it_is_shorter_than_the_dwell() -> None:
+def test_an_island_begins_with_the_reflector_already_there_if_it_is_shorter_than_the_dwell():
     session = simulate_scans(replace(QUIET, islands=True, dwell_s=20.0))
     first = [window for placement in session.placements if len(window := _window(session, placement))]
     assert all(window.times_ns[-1] - window.times_ns[0] < 15.5 * NS_PER_S for window in first)
 
 
-def test_several_reflectors_carts_and_passers_by_are_in_the_picture() -> None:
+def test_several_reflectors_carts_and_passers_by_are_in_the_picture():
     options = replace(
         QUIET, reflectors=2, width_px=320, height_px=200, surroundings=Surroundings(companion=True, passers_by=1)
     )
@@ -174,12 +174,12 @@ def test_several_reflectors_carts_and_passers_by_are_in_the_picture() -> None:
         assert changed[v - 1 : v + 2, u - 1 : u + 2].any()
 
 
-def test_the_aisle_has_no_room_for_cars() -> None:
+def test_the_aisle_has_no_room_for_cars():
     with pytest.raises(OptionError, match="the aisle has no room"):
         SimulationOptions(scene="aisle", surroundings=Surroundings(parked_cars=1))
 
 
-def test_a_value_out_of_its_range_is_refused_by_its_name() -> None:
+def test_a_value_out_of_its_range_is_refused_by_its_name():
     with pytest.raises(OptionError, match=r"surroundings\.parked_cars is 99; it must be 0 to 8"):
         SimulationOptions(surroundings=Surroundings(parked_cars=99))
     with pytest.raises(OptionError, match=r"reflectors is 0; it must be 1 to 4"):
