@@ -15,10 +15,11 @@ from calib_core.association.clustering import (
     window_around,
 )
 from calib_core.association.pairing import scores_of
-from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs
+from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 from calib_core.options import LocatingOptions, NoiseOptions
 from calib_core.synthetic import RADAR_PROFILES, RadarProfile
 from calib_core.synthetic.radar_returns import Targets, measure
+from tests.scans import scan_of
 
 REFLECTOR = (8.0, 1.0, -1.0)
 POST = (5.0, -2.0, 0.3)
@@ -33,9 +34,7 @@ def window(
     for k in range(scans):
         points = np.array(list(objects)) + 0.01 * rng.standard_normal((len(objects), 3))
         snr = np.array(list(objects.values())) + rng.standard_normal(len(objects))
-        time = TimeNs(round((start_s + 0.1 * k) * NS_PER_S))
-        n = len(points)
-        made.append(RadarScan(time, points, np.zeros(n), snr, np.full((n, 3), np.nan)))
+        made.append(scan_of(start_s + 0.1 * k, points, snr_db=snr))
     return RadarScans.from_scans(made)
 
 
@@ -180,7 +179,7 @@ def test_the_scale_has_a_limit():
 
 
 def test_no_scans_one_scan_and_empty_scans_keep_the_least_scale():
-    empty = RadarScan(TimeNs(0), np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros((0, 3)))
+    empty = scan_of(0.0, [])
     for scans in (RadarScans(), scans_by(COARSE, scans=1), RadarScans.from_scans([empty, empty])):
         assert cluster_scale([scans]).tolist() == CLUSTER_SCALE.tolist()
     assert cluster_scale([]).tolist() == CLUSTER_SCALE.tolist()

@@ -32,20 +32,12 @@ from calib_core.measurements import (
 from calib_core.options import CalibrationOptions, GatingOptions, LocatingOptions, NoiseOptions
 from calib_core.results import Calibration
 from calib_core.synthetic import simulate_pairs
+from tests.scans import scan_of
 
 
 def scans_at(times_s: list[float], *, doppler_mps: float = 0.0) -> RadarScans:
     return RadarScans.from_scans(
-        [
-            RadarScan(
-                TimeNs(round(time * NS_PER_S)),
-                np.array([[6.0, 0.5, -1.0]]),
-                np.array([doppler_mps]),
-                np.array([30.0]),
-                np.full((1, 3), np.nan),
-            )
-            for time in times_s
-        ]
+        [scan_of(time_s, [[6.0, 0.5, -1.0]], doppler_mps=doppler_mps, snr_db=30.0) for time_s in times_s]
     )
 
 
@@ -253,8 +245,7 @@ def test_clicks_of_a_reflector_in_front_of_a_cart_prefer_the_reflector():
         cart = place * (1.0 + 1.0 / np.linalg.norm(place))
         for k in range(30):
             points = np.stack([place, cart]) + 0.01 * rng.standard_normal((2, 3))
-            time = TimeNs(20 * i * NS_PER_S + k * NS_PER_S // 10)
-            scans.append(RadarScan(time, points, np.zeros(2), np.array([20.0, 26.0]), np.full((2, 3), np.nan)))
+            scans.append(scan_of(20 * i + k / 10, points, snr_db=[20.0, 26.0]))
         clicks.append(ReflectorClick(TimeNs(20 * i * NS_PER_S + 3 * NS_PER_S // 2), f"c{i}", 100.0 * i, 50.0))
     for pair, place in zip(
         pair_clicks(clicks, RadarScans.from_scans(scans), CalibrationOptions()).pairs, places, strict=True
@@ -276,8 +267,7 @@ def recording(*, dwells: int = 8, seed: int = 0) -> RadarScans:
         there = [POST, PLACES[int(i)]] if i < dwells and 5.0 <= since_s < 11.0 else [POST]
         points = np.array(there) + 0.01 * rng.standard_normal((len(there), 3))
         snr = np.array([45.0, 20.0][: len(there)]) + rng.standard_normal(len(there))
-        n = len(there)
-        scans.append(RadarScan(TimeNs(k * NS_PER_S // 10), points, np.zeros(n), snr, np.full((n, 3), np.nan)))
+        scans.append(scan_of(k / 10, points, snr_db=snr))
     return RadarScans.from_scans(scans)
 
 
@@ -335,8 +325,7 @@ NAN = float("nan")
 def scan(time: int, rows: list[tuple[float, float, float, float]]) -> RadarScan:
     """Rows are x, y, z, Doppler."""
     table = np.array(rows).reshape(-1, 4)
-    n = len(table)
-    return RadarScan(TimeNs(time), table[:, :3], table[:, 3], np.arange(n, dtype=float), np.full((n, 3), np.nan))
+    return scan_of(1e-9 * time, table[:, :3], doppler_mps=table[:, 3], snr_db=np.arange(len(table)))
 
 
 def test_a_moving_return_is_dropped():

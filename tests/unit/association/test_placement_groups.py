@@ -18,6 +18,7 @@ from calib_core.options import CalibrationOptions, GatingOptions
 from calib_core.radar import cartesian_from_polar
 from calib_core.results import Calibration
 from calib_core.synthetic import SimulatedPairs, simulate_pairs
+from tests.scans import scan_of
 
 OPTIONS = CalibrationOptions()
 
@@ -155,9 +156,8 @@ def scans_of(simulated: SimulatedPairs, rng: np.random.Generator) -> RadarScans:
     scans = []
     for i, pair in enumerate(simulated.pairs):
         for k in range(60):
-            time = TimeNs((20 * i + 10) * NS_PER_S + k * NS_PER_S // 10)
             point = pair.candidates[0].position_radar_m + 0.01 * rng.standard_normal(3)
-            scans.append(RadarScan(time, point[None], np.zeros(1), np.array([20.0]), np.full((1, 3), np.nan)))
+            scans.append(scan_of(20 * i + 10 + k / 10, point, snr_db=20.0))
     return RadarScans.from_scans(scans)
 
 
@@ -229,14 +229,7 @@ def scan(time_s: float, *places: Place, seed: int = 0) -> RadarScan:
     n = len(given)
     polar = np.column_stack([np.tile(given, (2, 1)), np.zeros(2 * n)])
     polar[n:, 1] += OTHER_RAD
-    return RadarScan(
-        TimeNs(round(time_s * NS_PER_S)),
-        cartesian_from_polar(polar),
-        np.zeros(2 * n),
-        np.full(2 * n, 20.0),
-        np.full((2 * n, 3), np.nan),
-        np.tile(np.arange(n), 2),
-    )
+    return scan_of(time_s, cartesian_from_polar(polar), snr_db=20.0, alternative_of=np.tile(np.arange(n), 2))
 
 
 def session(stays: dict[Place, tuple[float, float]], duration_s: float) -> RadarScans:

@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 from calib_core.association.placements import FirmSpan, Placement, find_placements, firm_span
-from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs, time_from_parts
+from calib_core.measurements import NS_PER_S, RadarScans, TimeNs, time_from_parts
 from calib_core.options import GatingOptions
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.recordings import open_recording
 from calib_core.synthetic.options import SimulationOptions
 from calib_core.synthetic.scans import simulate_scans
 from calib_core.synthetic.scene.stage import SimulatedPlacement
+from tests.scans import scan_of
 
 REFLECTOR = (6.0, 1.0, -0.8)
 RATE_HZ = 10.0
@@ -29,15 +30,9 @@ def scans_with(
     for time_s in np.arange(0.0, length_s, 1.0 / RATE_HZ):
         there = [dwell for dwell in dwells if dwell[0] <= time_s <= dwell[1] and rng.uniform() < 0.9]
         points = np.array([dwell[2] for dwell in there]).reshape(-1, 3)
-        scans.append(
-            RadarScan(
-                time=TimeNs(round(time_s * NS_PER_S)),
-                points_radar_m=points + 0.01 * rng.standard_normal(points.shape),
-                doppler_mps=np.zeros(len(there)),
-                snr_db=np.array([dwell[3] for dwell in there]) + rng.standard_normal(len(there)),
-                sigma_polar=np.full((len(there), 3), np.nan),
-            )
-        )
+        noisy = points + 0.01 * rng.standard_normal(points.shape)
+        snr = np.array([dwell[3] for dwell in there]) + rng.standard_normal(len(there))
+        scans.append(scan_of(float(time_s), noisy, snr_db=snr))
     return RadarScans.from_scans(scans)
 
 

@@ -14,7 +14,7 @@ from calib_core.diagnostics.clocks import clock_offset
 from calib_core.diagnostics.pose import two_poses
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.estimation.gnc import GncSolution
-from calib_core.measurements import NS_PER_S, Pair, RadarScan, RadarScans, TimeNs, Unsolvable
+from calib_core.measurements import NS_PER_S, Pair, RadarScans, TimeNs, Unsolvable
 from calib_core.options import (
     CalibrationOptions,
     CameraPositionPrior,
@@ -26,6 +26,7 @@ from calib_core.results import Calibration, DataWarning, PairResult
 from calib_core.synthetic import FIELD, RigOptions, SimulatedPairs, simulate_pairs
 from calib_core.synthetic.simulated_pairs import NoiseName
 from tests.rooftop import ClickedSample, read_rooftop
+from tests.scans import scan_of
 
 FREE = CalibrationOptions()
 
@@ -365,10 +366,7 @@ def placed(offsets_s: list[float]) -> tuple[list[PairResult], RadarScans]:
         place = np.array([3.0 + i, 0.5 * (-1) ** i, -0.5])
         middle_s = 100.0 + EVERY_S * i
         for time_s in np.arange(middle_s - DWELL_S / 2, middle_s + DWELL_S / 2, 0.1):
-            nothing = np.full(1, np.nan)
-            point = (place + 0.005 * rng.standard_normal(3))[None]
-            time = TimeNs(round(time_s * NS_PER_S))
-            scans.append(RadarScan(time, point, nothing, nothing, np.full((1, 3), np.nan)))
+            scans.append(scan_of(float(time_s), place + 0.005 * rng.standard_normal(3), doppler_mps=np.nan))
         click_ns = TimeNs(round((middle_s + offset_s) * NS_PER_S))
         pairs.append(PairResult(f"c{i}", np.zeros(2), np.zeros(2), place, inlier=True, image_time=click_ns))
     return pairs, RadarScans.from_scans(scans)

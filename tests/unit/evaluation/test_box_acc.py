@@ -16,12 +16,12 @@ from calib_core.measurements import (
     Boxes,
     FrameBoxes,
     LabelledScan,
-    RadarScan,
     RadarScans,
     ReturnLabels,
     TimeNs,
 )
 from tests.independent_acc import acc as independent_acc
+from tests.scans import scan_of
 from tests.street import CAMERA, OPTICAL_FROM_RADAR, TRUE_POSE, Street, street, turned
 
 AHEAD = RigidTransform(OPTICAL_FROM_RADAR, np.zeros(3))
@@ -33,17 +33,6 @@ def crowd() -> Street:
     return street(people=3, seconds=30.0, seed=2)
 
 
-def scan(time_s: float, points: list[tuple[float, float, float]]) -> RadarScan:
-    nothing = np.full(len(points), np.nan)
-    return RadarScan(
-        TimeNs(int(time_s * NS_PER_S)),
-        np.array(points).reshape(-1, 3),
-        np.ones(len(points)),
-        nothing,
-        np.full((len(points), 3), np.nan),
-    )
-
-
 def by_hand() -> tuple[RadarScans, Boxes, ReturnLabels]:
     """Return three frames: a person with 2 of 3 returns inside, one with 0 of 1, a car with 1 of 1 and a person with 1 of 1.
 
@@ -51,9 +40,9 @@ def by_hand() -> tuple[RadarScans, Boxes, ReturnLabels]:
     """
     scans = RadarScans.from_scans(
         [
-            scan(1.0, [(10, 1, 0), (10, 1.2, 0), (10, 3, 0), (10, -5, 0)]),
-            scan(2.0, [(10, 0, 0)]),
-            scan(3.0, [(20, 0, 0), (10, 4, 1)]),
+            scan_of(1.0, [(10, 1, 0), (10, 1.2, 0), (10, 3, 0), (10, -5, 0)], doppler_mps=1.0),
+            scan_of(2.0, [(10, 0, 0)], doppler_mps=1.0),
+            scan_of(3.0, [(20, 0, 0), (10, 4, 1)], doppler_mps=1.0),
         ]
     )
     labels = ReturnLabels(
@@ -89,7 +78,7 @@ def test_acc_is_the_mean_share_of_frames_and_zero_frames_stay():
 def test_returns_name_their_frames_also_after_a_frame_without_returns_and_boxes():
     scans, boxes, labels = by_hand()
     first = TimeNs(NS_PER_S // 2)
-    scans = RadarScans.from_scans([scan(0.5, []), *(scans.scan(number) for number in range(3))])
+    scans = RadarScans.from_scans([scan_of(0.5, []), *(scans.scan(number) for number in range(3))])
     boxes = dataclasses.replace(boxes, frames=(FrameBoxes(first, ()), *boxes.frames))
     labels = dataclasses.replace(labels, scans=(LabelledScan(first, ()), *labels.scans))
     figures = box_figures(AHEAD, PINHOLE, scans, boxes, labels=labels)

@@ -8,7 +8,8 @@ import pytest
 from calib_core.errors import InputError
 from calib_core.evaluation.moving_returns import TargetOptions
 from calib_core.evaluation.target_tracking import find_targets, moving_targets
-from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs
+from calib_core.measurements import RadarScans, TimeNs
+from tests.scans import scan_of
 from tests.street import Street, street
 
 
@@ -16,12 +17,7 @@ def scans_of(points_of, doppler_of, count: int = 30) -> RadarScans:
     """Return scans at 10 Hz whose returns are functions of the seconds."""
     scans = []
     for step in range(count):
-        points = np.array(points_of(0.1 * step), dtype=np.float64).reshape(-1, 3)
-        nothing = np.full(len(points), np.nan)
-        speeds = np.array(doppler_of(0.1 * step), dtype=np.float64)
-        scans.append(
-            RadarScan(TimeNs(step * NS_PER_S // 10), points, speeds, nothing, np.full((len(points), 3), np.nan))
-        )
+        scans.append(scan_of(0.1 * step, points_of(0.1 * step), doppler_mps=doppler_of(0.1 * step)))
     return RadarScans.from_scans(scans)
 
 

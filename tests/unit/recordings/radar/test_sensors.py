@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from calib_core.errors import RecordingError
-from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs
+from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 from calib_core.radar import cartesian_from_polar
 from calib_core.recordings import Recording, RecordingOptions, describe, open_recording, recording_summary
 from calib_core.recordings.containers.writing import CloudMessage, RecordedMessage, write_ros1_bag
@@ -18,6 +18,7 @@ from calib_core.recordings.radar.sensors import sensor_name
 from calib_core.synthetic import simulate
 from calib_core.synthetic.files import SIDE_FRAME, SIDE_TOPIC, radar_messages
 from calib_core.synthetic.presets import PRESETS
+from tests.scans import scan_of
 
 START_NS = 1_700_000_000 * NS_PER_S
 NAMES = ("x", "y", "z", "intensity", "velocity")
@@ -391,10 +392,7 @@ def scans_of(*scans: Sequence[Return]) -> RadarScans:
     for number, returns in enumerate(scans):
         values = np.array(returns, dtype=float).reshape(-1, 3)
         points = cartesian_from_polar(np.column_stack([values[:, :2], np.zeros(len(values))]))
-        n = len(values)
-        found.append(
-            RadarScan(TimeNs(number * NS_PER_S), points, values[:, 2], np.full(n, 20.0), np.full((n, 3), np.nan))
-        )
+        found.append(scan_of(number, points, doppler_mps=values[:, 2], snr_db=20.0))
     return RadarScans.from_scans(found)
 
 
