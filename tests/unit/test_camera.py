@@ -54,12 +54,6 @@ def test_the_image_ends_half_a_pixel_outside_the_outermost_centres():
     assert pinhole().in_image(pixels, margin_px=-1.0).tolist() == [False] * 5
 
 
-@pytest.mark.parametrize("model", CAMERA_MODELS)
-def test_a_camera_sees_what_is_ahead_and_not_what_is_behind_or_to_the_side(model):
-    points = np.array([[0.1, -0.1, 5.0], [0.0, 0.0, -5.0], [50.0, 0.0, 1.0]])
-    assert typical_camera(model).sees(points).tolist() == [True, False, False]
-
-
 def test_a_point_beyond_the_fold_of_the_distortion_is_not_seen_though_it_projects_into_the_image():
     camera = Camera("plumb_bob", 640, 480, MATRIX_PX, np.array([-0.4, 0.0, 0.0, 0.0]))
     beyond = np.array([[1.6, 0.0, 1.0]])  # r (1 - 0.4 r^2) has its maximum at r = 0.91

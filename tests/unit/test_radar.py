@@ -26,10 +26,6 @@ def test_the_origin_has_no_direction_and_makes_no_nan():
     np.testing.assert_array_equal(direction_cosines(origin), origin)
 
 
-def test_direction_cosines_are_y_and_z_over_range():
-    np.testing.assert_allclose(direction_cosines(np.array([[2.0, 3.0, 6.0]])), [[7.0, 3.0 / 7.0, 6.0 / 7.0]])
-
-
 def test_a_covariance_ahead_has_range_along_x_azimuth_along_y_elevation_along_z():
     sigma = np.array([[0.03, 0.01, 0.02]])
     covariance = covariance_from_sigma_polar(np.array([[10.0, 0.0, 0.0]]), sigma)

@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 
 from calib_core.camera import CAMERA_MODELS, CameraModel
-from calib_core.errors import InputError
-from calib_core.interchange import camera_info_text, read_camera
 from calib_core.interchange.own.documents import CameraDocument
 from calib_core.lens_models.brown_conrady import PLUMB_BOB
 from calib_core.lens_models.lens_model import TypicalLens
@@ -50,16 +48,6 @@ def test_a_typical_lens_is_distorted_unless_it_cannot_be(lens):
 
 
 @each_lens
-def test_the_camera_info_we_write_projects_points_as_the_camera_does(lens):
-    camera, points = typical_camera(lens.name), np.array([[0.3, -0.2, 2.0]])
-    if any(row.where == "camera_info" for row in lens.names_elsewhere):
-        np.testing.assert_array_equal(read_camera(camera_info_text(camera)).project(points), camera.project(points))
-    else:
-        with pytest.raises(InputError, match="ROS has no name for the lens model"):
-            camera_info_text(camera)
-
-
-@each_lens
 def test_without_distortion_a_ray_lands_where_its_angle_says(lens):
     angles_rad = np.deg2rad([5.0, 25.0, 50.0])
     points = np.array([np.sin(angles_rad), np.zeros(3), np.cos(angles_rad)])
@@ -68,15 +56,6 @@ def test_without_distortion_a_ray_lands_where_its_angle_says(lens):
         np.testing.assert_allclose(plane[0], [lens.typical.radius_at(angle) for angle in angles_rad], rtol=1e-12)
         is_pinhole = bool(np.allclose(plane[0], np.tan(angles_rad)))
         assert lens.is_perspective == is_pinhole
-
-
-@each_lens
-def test_unprojecting_the_image_plane_gives_the_original_rays(lens):
-    distortion = np.array(lens.typical.distortion)
-    points = np.random.default_rng(2).uniform([-2.0, -2.0, 3.0], [2.0, 2.0, 5.0], (30, 3))
-    plane, _ = lens.project(np.ascontiguousarray(points.T), distortion)
-    rays = lens.unproject(plane.T, distortion)
-    np.testing.assert_allclose(rays, points / np.linalg.norm(points, axis=1, keepdims=True), atol=1e-12)
 
 
 # A lens model that contradicts itself is refused where it is defined.
@@ -123,18 +102,6 @@ D = [-0.3, 0.1, 0.001, -0.002, 0.01, 0.2, 0.03, 0.004]
 def test_a_lens_is_written_with_the_name_the_format_uses(model, distortion, where, name, coefficients):
     written = written_lens(LENS_MODELS[model], np.array(distortion), where)
     assert (written.name, list(written.coefficients)) == (name, coefficients)
-
-
-@pytest.mark.parametrize(
-    ("model", "distortion", "missing"), [("plumb_bob", D[:5], "k3"), ("rational_polynomial", D, "k3 to k6")]
-)
-def test_a_coefficient_that_cannot_be_stored_is_never_dropped(model, distortion, missing):
-    with pytest.raises(InputError) as refusal:
-        written_lens(LENS_MODELS[model], np.array(distortion), "kalibr")
-    assert str(refusal.value) == (
-        f"Kalibr's radtan model has no {missing}, which this camera uses; export with --to opencv, "
-        "or calibrate the camera with k1 k2 p1 p2 only"
-    )
 
 
 def test_a_name_may_stand_for_several_lenses():

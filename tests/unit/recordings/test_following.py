@@ -42,6 +42,23 @@ def opened(path: Path) -> FollowedRecording:
     return recording
 
 
+@pytest.fixture
+def follow(tmp_path, ros2):
+    """Return the function that opens a recording of rows when a share of it is written, and its writer."""
+    growing, followed = tmp_path / "drive.mcap", []
+
+    def begin(rows, share):
+        finished = write_in_chunks(tmp_path / "whole", ros2, rows, "mcap", per_chunk=3)
+        replay = Replay(finished, growing)
+        replay.write_up_to(round(len(replay) * share))
+        followed.append(opened(growing))
+        return followed[0], replay, finished
+
+    yield begin
+    for one in followed:
+        one.close()
+
+
 @pytest.mark.parametrize("container", ["bag", "bag-bz2", "mcap", "mcap-zstd"])
 def test_the_followed_recording_equals_the_finished_one(tmp_path, container_ros, container, plain, jpeg):
     finished = write_in_chunks(
@@ -118,17 +135,12 @@ def test_a_sensor_that_never_comes_is_waited_for_and_told_at_the_end(tmp_path, c
     awaited.close()
 
 
-@pytest.mark.parametrize("container", ["mcap"])
-def test_a_frame_that_comes_late_does_not_move_the_others(tmp_path, container_ros, plain, jpeg):
-    rows = plain(container_ros, jpeg, n=40)
+def test_a_frame_that_comes_late_does_not_move_the_others(follow, ros2, plain, jpeg):
+    rows = plain(ros2, jpeg, n=40)
     early, late = 31, 94  # the same frame, at its place and three seconds later
     rows.insert(late, rows.pop(early))
     rows[late - 1] = (rows[late - 1][0], rows[late - 2][1] + 1, rows[late - 1][2])
-    finished = write_in_chunks(tmp_path / "whole", container_ros, rows, "mcap", per_chunk=3)
-    growing = tmp_path / "drive.mcap"
-    replay = Replay(finished, growing)
-    replay.write_up_to(len(replay) * 3 // 4)
-    recording = opened(growing)
+    recording, replay, finished = follow(rows, 3 / 4)
     given = recording.image_times.tolist()
     replay.finish()
     recording.grow()
@@ -138,27 +150,20 @@ def test_a_frame_that_comes_late_does_not_move_the_others(tmp_path, container_ro
     assert "1 frame" in warning.message
     with open_recording(finished) as whole:
         assert len(whole.image_times) == len(recording.image_times) + 1
-    recording.close()
 
 
-@pytest.mark.parametrize("container", ["mcap"])
-def test_the_camera_that_was_chosen_stays_although_another_gets_more_frames(tmp_path, container_ros, plain, jpeg):
-    rows = [row for row in plain(container_ros, jpeg, n=60) if row[0] != "/camera/camera_info"]
+def test_the_camera_that_was_chosen_stays_although_another_gets_more_frames(follow, ros2, plain, jpeg):
+    rows = [row for row in plain(ros2, jpeg, n=60) if row[0] != "/camera/camera_info"]
     stamps = [rows[90][1] + 15_000_000 * number for number in range(80)]
-    rows += [("/aside/image/compressed", stamp, container_ros.compressed(stamp, jpeg)) for stamp in stamps]
+    rows += [("/aside/image/compressed", stamp, ros2.compressed(stamp, jpeg)) for stamp in stamps]
     rows.sort(key=lambda row: row[1])
-    finished = write_in_chunks(tmp_path / "whole", container_ros, rows, "mcap", per_chunk=3)
-    growing = tmp_path / "drive.mcap"
-    replay = Replay(finished, growing)
-    replay.write_up_to(len(replay) // 3)
-    recording = opened(growing)
+    recording, replay, finished = follow(rows, 1 / 3)
     replay.finish()
     recording.grow()
     with open_recording(finished) as whole:
         assert whole.image_topic == "/aside/image/compressed"
     assert recording.image_topic == "/camera/image/compressed"
     assert len(recording.image_times) == 60
-    recording.close()
 
 
 @pytest.mark.parametrize("container", ["mcap"])
@@ -173,17 +178,12 @@ def test_what_recording_toml_states_is_followed(tmp_path, container_ros, plain, 
     recording.close()
 
 
-@pytest.mark.parametrize("container", ["mcap"])
-def test_a_clock_that_would_be_chosen_otherwise_is_told_at_the_end(tmp_path, container_ros, plain, jpeg):
-    rows = plain(container_ros, jpeg, n=60)
+def test_a_clock_that_would_be_chosen_otherwise_is_told_at_the_end(follow, ros2, plain, jpeg):
+    rows = plain(ros2, jpeg, n=60)
     lost = [number for number, row in enumerate(rows) if row[0] == "/camera/image/compressed"][40:]
     for number in lost:
-        rows[number] = (*rows[number][:2], container_ros.compressed(0, jpeg))
-    finished = write_in_chunks(tmp_path / "whole", container_ros, rows, "mcap", per_chunk=3)
-    growing = tmp_path / "drive.mcap"
-    replay = Replay(finished, growing)
-    replay.write_up_to(len(replay) // 2)
-    recording = opened(growing)
+        rows[number] = (*rows[number][:2], ros2.compressed(0, jpeg))
+    recording, replay, _ = follow(rows, 1 / 2)
     given = recording.image_times.tolist()
     replay.finish()
     recording.grow()
@@ -191,7 +191,6 @@ def test_a_clock_that_would_be_chosen_otherwise_is_told_at_the_end(tmp_path, con
     assert recording.image_clock == "header"
     (warning,) = [one for one in recording.warnings if one.code == "clock-chosen-early"]
     assert "/camera/image/compressed (receive instead of header)" in warning.message
-    recording.close()
 
 
 @pytest.mark.parametrize("container", ["mcap"])

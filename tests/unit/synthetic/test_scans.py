@@ -10,7 +10,6 @@ from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.radar import direction_cosines
 from calib_core.synthetic import (
     PRESETS,
-    RADAR_PROFILES,
     RadarDefects,
     SimulatedScans,
     SimulationOptions,
@@ -32,16 +31,6 @@ def test_the_same_seed_gives_the_same_scans_and_another_seed_others(session):
     assert np.array_equal(session.scans.times_ns, again.scans.times_ns)
     assert session.clicks == again.clicks
     assert session.clicks != other.clicks
-
-
-def test_ranges_azimuths_and_speeds_lie_on_the_radars_bins(session):
-    profile = RADAR_PROFILES["awr1843"]
-    r, u, _ = direction_cosines(session.scans.points_radar_m).T
-    speed_bins = session.scans.doppler_mps / profile.doppler_bin_mps
-    assert np.abs(r / profile.range_bin_m - np.round(r / profile.range_bin_m)).max() < 1e-4
-    assert np.abs(32.0 * u - np.round(32.0 * u)).max() < 1e-4
-    assert np.abs(speed_bins - np.round(speed_bins)).max() < 1e-4
-    assert np.abs(speed_bins).max() <= 16.001
 
 
 def test_interpolated_azimuths_leave_the_lattice():

@@ -50,14 +50,6 @@ def test_without_noise_the_radar_positions_project_onto_the_clicks():
     assert np.abs(projected - _clicks(simulated)).max() < 1e-8
 
 
-def test_the_same_seed_draws_the_same_pairs_and_another_seed_others():
-    first, again, other = (simulate_pairs(rng=np.random.default_rng(seed), outlier_share=0.3) for seed in (5, 5, 6))
-    assert np.array_equal(_clicks(first), _clicks(again))
-    assert np.array_equal(_radar_points(first), _radar_points(again))
-    assert np.array_equal(first.outlier, again.outlier)
-    assert not np.array_equal(_clicks(first), _clicks(other))
-
-
 def test_clicks_and_radar_errors_have_the_profiles_standard_deviations():
     rng = np.random.default_rng(8)
     profile = NOISE_PROFILES["ti"]
