@@ -23,7 +23,7 @@ from calib_core.radar import RadarErrors
 from calib_core.recordings import open_recording
 from calib_core.recordings.containers.writing import RADAR_SCAN_DEFINITION, RADAR_SCAN_TYPE
 from tests.unit.deployment.conftest import RECORDED, SEEING, START_NS, Ros, calibration_file, exported, without_info
-from tests.unit.recordings.conftest import CONTAINERS
+from tests.unit.recordings.conftest import CONTAINERS, altered
 
 SECOND = 10**9
 ADDED = ("/tf_static", "/cocalib/radar_points", "/cocalib/radar_points_corrected", "/cocalib/camera_info")
@@ -310,11 +310,7 @@ def test_of_a_damaged_recording_what_is_left_is_written_and_the_loss_is_said(con
 def test_messages_that_cannot_be_read_are_counted(rows, write):
     ros = Ros(2)
     path = write(ros, rows(ros, n=60), "db3")
-    import sqlite3
-
-    with sqlite3.connect(path) as database:
-        database.execute("UPDATE messages SET data = 'no bytes' WHERE id IN (33, 36, 39, 42)")
-    database.close()
+    altered(path, "UPDATE messages SET data = 'no bytes' WHERE id IN (33, 36, 39, 42)")
     written = exported(path, calibration_file(RECORDED))
     assert sum(written.said.lost.values()) == 4
     assert written.said.copied == 176

@@ -46,18 +46,13 @@ def test_two_walkers_apart_are_two_targets_with_ids_of_their_own():
     assert [set((target.rows % 2).tolist()) for target in targets] == [{0}, {1}]
 
 
-def test_a_target_that_is_unseen_for_long_ends_and_another_is_born():
-    scans = scans_of(
-        lambda s: [] if 1.0 <= s < 2.5 else [(10 + s, 0, 0)], lambda s: [] if 1.0 <= s < 2.5 else [1.0], 40
-    )
-    assert len(moving_targets(scans)) == 2
+@pytest.mark.parametrize(("seen_again_s", "count"), [(1.5, 1), (2.5, 2)])
+def test_a_target_that_is_unseen_for_long_ends_and_another_is_born(seen_again_s, count):
+    def seen(s):
+        return not 1.0 <= s < seen_again_s
 
-
-def test_a_short_gap_does_not_end_a_target():
-    scans = scans_of(
-        lambda s: [] if 1.0 <= s < 1.5 else [(10 + s, 0, 0)], lambda s: [] if 1.0 <= s < 1.5 else [1.0], 40
-    )
-    assert len(moving_targets(scans)) == 1
+    scans = scans_of(lambda s: [(10 + s, 0, 0)] * seen(s), lambda s: [1.0] * seen(s), 40)
+    assert len(moving_targets(scans)) == count
 
 
 def test_what_is_seen_twice_is_no_target():

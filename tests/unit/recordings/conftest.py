@@ -1,5 +1,6 @@
 """Write recordings with rosbags, message by message, as the counterpart of the reader under test."""
 
+import sqlite3
 from collections.abc import Callable, Iterable, Sequence
 from functools import cache
 from pathlib import Path
@@ -241,6 +242,14 @@ def some_points(n: int = 3, shift: float = 0.0) -> np.ndarray:
     points["velocity"] = 0.1 * np.arange(n)
     points["snr"] = 10.0 + np.arange(n)
     return points
+
+
+def altered(database: Path, statement: str) -> Path:
+    """Change a database by an SQL statement."""
+    with sqlite3.connect(database) as connection:
+        connection.execute(statement)
+    connection.close()
+    return database
 
 
 def plain_rows(

@@ -3,7 +3,6 @@
 import gzip
 import json
 import random
-import sqlite3
 
 import cv2
 import numpy as np
@@ -13,6 +12,7 @@ from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S
 from calib_core.recordings import inspect_recording, verification_text, verify_recording
 from cocalib.cli import run
+from tests.unit.recordings.conftest import altered
 from tests.unit.recordings.containers.damage import KINDS, damaged, read_by_us, records, sound
 
 START_NS = 1_700_000_000 * NS_PER_S
@@ -78,10 +78,7 @@ def test_rows_that_are_absent_are_told(tmp_path):
     file = sound("db3", tmp_path)
     path = tmp_path / "copy.db3"
     path.write_bytes(file.data)
-    with sqlite3.connect(path) as database:
-        database.execute("DELETE FROM messages WHERE id BETWEEN 11 AND 13")
-    database.close()
-    found = verified(path)
+    found = verified(altered(path, "DELETE FROM messages WHERE id BETWEEN 11 AND 13"))
     assert not found.sound
     assert any("3 rows are absent (11 to 13)" in warning.message for warning in found.warnings)
 

@@ -1,6 +1,5 @@
 """H.264 and H.265 topics: frames that depend on those before them."""
 
-import sqlite3
 from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
@@ -11,6 +10,7 @@ import pytest
 from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import NS_PER_S
 from calib_core.recordings import inspect_recording, open_recording
+from tests.unit.recordings.conftest import altered
 
 av = pytest.importorskip("av", reason="needs the extra 'video'")
 
@@ -154,10 +154,6 @@ def test_video_is_read_from_bags_without_definitions(coded, ros2, write, make):
         ("/video", START_NS + i * NS_PER_S // 10, make(ros2, codec, START_NS + i * NS_PER_S // 10, data))
         for i, data in enumerate(packets[:12])
     ]
-    path = write(ros2, rows, "db3")
-    database = sqlite3.connect(path)
-    with database:
-        database.execute("DROP TABLE message_definitions")
-    database.close()
+    path = altered(write(ros2, rows, "db3"), "DROP TABLE message_definitions")
     with open_recording(path, require=("image",)) as recording:
         assert [number_in(recording.image(i)) for i in range(12)] == list(range(12))

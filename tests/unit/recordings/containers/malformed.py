@@ -16,7 +16,7 @@ import lz4.frame
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2.storage_mcap import zstd
 
-from tests.unit.recordings.conftest import START_NS, Ros, plain_rows, write_rows
+from tests.unit.recordings.conftest import START_NS, Ros, altered, plain_rows, write_rows
 from tests.unit.recordings.containers.mcap_writing import mcap, record
 
 FRAMES = 60
@@ -281,15 +281,6 @@ def db3_without_metadata(kit: Kit) -> Path:
 
 
 @case
-def db3_without_definitions(kit: Kit) -> Path:
-    path = db3_without_metadata(kit)
-    with sqlite3.connect(path) as database:
-        database.execute("DROP TABLE message_definitions")
-    database.close()
-    return path
-
-
-@case
 def db3_with_a_log_left_over(kit: Kit) -> Path:
     path = db3_without_metadata(kit)
     with sqlite3.connect(path) as database:
@@ -320,33 +311,6 @@ def db3_with_damaged_definitions(kit: Kit) -> Path:
         poke(raw, raw.index(b"uint32 row_step") // 4096 * 4096, b"\xff" * 4096)
 
     return edit(db3_without_metadata(kit), change)
-
-
-@case
-def db3_with_rows_of_unknown_topics(kit: Kit) -> Path:
-    path = db3_without_metadata(kit)
-    with sqlite3.connect(path) as database:
-        database.execute("UPDATE messages SET topic_id = 77 WHERE id % 9 = 0 AND id > 90")
-    database.close()
-    return path
-
-
-@case
-def db3_with_times_that_are_words(kit: Kit) -> Path:
-    path = db3_without_metadata(kit)
-    with sqlite3.connect(path) as database:
-        database.execute("UPDATE messages SET timestamp = 'noon' WHERE id = 31")
-    database.close()
-    return path
-
-
-@case
-def db3_of_something_else(kit: Kit) -> Path:
-    path = kit.folder / "other.db3"
-    with sqlite3.connect(path) as database:
-        database.execute("CREATE TABLE people (name TEXT)")
-    database.close()
-    return path
 
 
 @case
@@ -491,6 +455,14 @@ CASES |= {
         kit.mcap(), lambda raw: poke(raw, len(raw) - 28, struct.pack("<Q", 1 << 62))
     ),
     "db3_cut_in_half": lambda kit: edit(db3_without_metadata(kit), lambda raw: raw[: len(raw) // 2]),
+    "db3_without_definitions": lambda kit: altered(db3_without_metadata(kit), "DROP TABLE message_definitions"),
+    "db3_with_rows_of_unknown_topics": lambda kit: altered(
+        db3_without_metadata(kit), "UPDATE messages SET topic_id = 77 WHERE id % 9 = 0 AND id > 90"
+    ),
+    "db3_with_times_that_are_words": lambda kit: altered(
+        db3_without_metadata(kit), "UPDATE messages SET timestamp = 'noon' WHERE id = 31"
+    ),
+    "db3_of_something_else": lambda kit: altered(kit.folder / "other.db3", "CREATE TABLE people (name TEXT)"),
     "db3_with_a_damaged_page": lambda kit: edit(db3_without_metadata(kit), damage_a_page),
     "db3_with_a_damaged_page_beside_its_metadata": lambda kit: edit(kit.db3(), damage_a_page).parent,
 }

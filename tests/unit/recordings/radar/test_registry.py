@@ -3,7 +3,6 @@
 import contextlib
 import random
 import runpy
-import sqlite3
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ from calib_core.recordings.radar.layouts import recognise
 from calib_core.recordings.radar.registry import DECODERS, GROUP, Decoder, all_decoders
 from calib_core.recordings.topics import join_topics
 from tests.fake_distribution import installing
+from tests.unit.recordings.conftest import altered
 from tests.unit.recordings.radar.radar_samples import CLOUDS, OTHERS, START_NS, sample
 
 NAMES = [decoder.name for decoder in DECODERS]
@@ -92,11 +92,7 @@ def test_damaged_messages_of_any_layout_give_values_or_one_clear_error(name, ros
 def test_types_that_ros_defines_are_read_from_bags_without_definitions(name, ros2, write):
     expected = sample(ros2, name)
     path = write(ros2, [("/radar", START_NS, message) for message in expected.messages], "db3")
-    database = sqlite3.connect(path)
-    with database:
-        database.execute("DROP TABLE message_definitions")
-    database.close()
-    with open_recording(path, require=("radar",)) as recording:
+    with open_recording(altered(path, "DROP TABLE message_definitions"), require=("radar",)) as recording:
         np.testing.assert_allclose(recording.radar_scans().points_radar_m, expected.points, rtol=1e-6, atol=1e-6)
 
 
