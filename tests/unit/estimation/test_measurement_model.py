@@ -7,9 +7,15 @@ import pytest
 from scipy.optimize import least_squares
 
 from calib_core.calibration import calibrate_pairs, preview_pairs
-from calib_core.estimation.errors_in_variables import fit_errors_in_variables
+from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit, fit_errors_in_variables
 from calib_core.estimation.gnc import GncSolution
-from calib_core.estimation.measurement_model import CameraPrior, PairMeasurements, linearize, pair_measurements
+from calib_core.estimation.measurement_model import (
+    CameraPrior,
+    Linearization,
+    PairMeasurements,
+    linearize,
+    pair_measurements,
+)
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions, without_systematic_errors
@@ -23,21 +29,18 @@ def simulated(decoys: int = 0) -> tuple[SimulatedPairs, PairMeasurements]:
     return pairs, pair_measurements(pairs.pairs, pairs.camera, CalibrationOptions())
 
 
+def linearized(measurements: PairMeasurements, pose: RigidTransform, **drawn: np.ndarray) -> Linearization:
+    """Linearize at a pose, with drawn clicks or radar positions instead of the measured ones."""
+    measured = {name: getattr(measurements, name) for name in ("pixels_px", "sigma_px", "polar", "sigma_polar")}
+    return linearize(pose, measurements.camera, **measured | drawn)
+
+
 def test_the_pose_jacobian_is_the_derivative_of_the_projection():
     pairs, measurements = simulated()
     pose = pairs.camera_from_radar
-    model = linearize(
-        pose,
-        measurements.camera,
-        pixels_px=measurements.pixels_px,
-        sigma_px=measurements.sigma_px,
-        polar=measurements.polar,
-        sigma_polar=measurements.sigma_polar,
-    )
+    model = linearized(measurements, pose)
     points = cartesian_from_polar(measurements.polar)
-    for k in range(6):
-        step = np.zeros(6)
-        step[k] = 1e-6
+    for k, step in enumerate(1e-6 * np.eye(6)):
         ahead, behind = (measurements.camera.project(pose.perturbed(sign * step) @ points) for sign in (1, -1))
         slope = (ahead - behind) / 2e-6
         whitened = (model.whitening @ slope[:, :, None])[:, :, 0]
@@ -53,15 +56,9 @@ def test_whitening_undoes_the_covariance_of_click_and_radar_noise():
     pixels = measurements.camera.project(pose @ cartesian_from_polar(true_polar))
     residuals = []
     for _ in range(2000):
-        model = linearize(
-            pose,
-            measurements.camera,
-            pixels_px=pixels + measurements.sigma_px[:, None] * rng.standard_normal(pixels.shape),
-            sigma_px=measurements.sigma_px,
-            polar=true_polar + measurements.sigma_polar * rng.standard_normal(true_polar.shape),
-            sigma_polar=measurements.sigma_polar,
-        )
-        residuals.append(model.residual)
+        clicked = pixels + measurements.sigma_px[:, None] * rng.standard_normal(pixels.shape)
+        polar = true_polar + measurements.sigma_polar * rng.standard_normal(true_polar.shape)
+        residuals.append(linearized(measurements, pose, pixels_px=clicked, polar=polar).residual)
     stacked = np.array(residuals)
     covariance = np.einsum("kni,knj->nij", stacked, stacked) / len(stacked)
     assert covariance == pytest.approx(np.tile(np.eye(2), (len(measurements), 1, 1)), abs=0.12)
@@ -70,14 +67,7 @@ def test_whitening_undoes_the_covariance_of_click_and_radar_noise():
 def test_a_position_behind_the_camera_has_no_influence():
     pairs, measurements = simulated()
     backwards = RigidTransform(rotation_exp(np.array([0.0, np.pi, 0.0])), np.zeros(3)) @ pairs.camera_from_radar
-    model = linearize(
-        backwards,
-        measurements.camera,
-        pixels_px=measurements.pixels_px,
-        sigma_px=measurements.sigma_px,
-        polar=measurements.polar,
-        sigma_polar=measurements.sigma_polar,
-    )
+    model = linearized(measurements, backwards)
     assert (model.squared > 1e10).all()
     assert not model.pose_jacobian.any()
 
@@ -87,9 +77,7 @@ def test_the_prior_rows_are_the_derivative_of_the_camera_centre():
     pose = pairs.camera_from_radar
     prior = CameraPrior(pose.inverse().translation_m, 0.01, measured=True)  # where its weight does not change
     residual, jacobian = prior.rows(pose)
-    for k in range(6):
-        step = np.zeros(6)
-        step[k] = 1e-6
+    for k, step in enumerate(1e-6 * np.eye(6)):
         slope = (prior.rows(pose.perturbed(step))[0] - residual) / 1e-6
         assert -slope == pytest.approx(jacobian[:, k], abs=1e-3)
 
@@ -103,9 +91,7 @@ def test_a_step_by_the_priors_rows_goes_down_its_cost(measured, height_sigma_m):
     prior = CameraPrior(pose.inverse().translation_m + away_m, 0.03, measured, height_sigma_m)
     residual, jacobian = prior.rows(pose)
     gradient = np.zeros(6)
-    for k in range(6):
-        step = np.zeros(6)
-        step[k] = 1e-6
+    for k, step in enumerate(1e-6 * np.eye(6)):
         ends = (pose.perturbed(step), pose.perturbed(-step))
         up, down = (float(prior.costs(one.rotation, one.translation_m)) for one in ends)
         gradient[k] = (up - down) / 2e-6
@@ -234,6 +220,19 @@ TAPED = without_systematic_errors(
 )
 
 
+def fitted(
+    simulated: SimulatedPairs,
+    options: CalibrationOptions = TAPED,
+    *,
+    estimate_scale: bool,
+    noise_factor: float = 1.0,
+) -> ErrorsInVariablesFit:
+    """Fit from the true pose, assuming so many times the noise of the radar."""
+    measurements = pair_measurements(simulated.pairs, simulated.camera, options).scaled([1.0, *[noise_factor] * 3])
+    start = GncSolution(simulated.camera_from_radar, 0.0, 1.0)
+    return fit_errors_in_variables(measurements, start, estimate_scale=estimate_scale)
+
+
 def test_scipy_finds_the_same_optimum_over_pose_and_true_positions():
     simulated = simulate_pairs(10, rng=np.random.default_rng(1))
     measurements = pair_measurements(simulated.pairs, simulated.camera, TAPED)
@@ -263,12 +262,7 @@ def test_the_camera_is_not_pulled_backwards_by_many_noisy_pairs():
     backwards_m = []
     for seed in range(4):
         simulated = simulate_pairs(300, rng=np.random.default_rng(seed), noise="ti_aisle", layout=crowded)
-        measurements = pair_measurements(
-            simulated.pairs, simulated.camera, without_systematic_errors(CalibrationOptions())
-        )
-        refined = fit_errors_in_variables(
-            measurements, GncSolution(simulated.camera_from_radar, 0.0, 1.0), estimate_scale=False
-        )
+        refined = fitted(simulated, without_systematic_errors(CalibrationOptions()), estimate_scale=False)
         centre = refined.camera_from_radar.inverse().translation_m
         backwards_m.append(simulated.rig.camera_position_radar_m[0] - centre[0])
     assert abs(np.mean(backwards_m)) < 0.02
@@ -277,28 +271,20 @@ def test_the_camera_is_not_pulled_backwards_by_many_noisy_pairs():
 @pytest.mark.parametrize("factor", [0.4, 2.5])
 def test_the_noise_level_is_found_from_either_side(factor):
     simulated = simulate_pairs(60, rng=np.random.default_rng(2))
-    measurements = pair_measurements(simulated.pairs, simulated.camera, TAPED)
-    assumed = measurements.scaled([1.0, factor, factor, factor])
-    refined = fit_errors_in_variables(assumed, GncSolution(simulated.camera_from_radar, 0.0, 1.0), estimate_scale=True)
+    refined = fitted(simulated, estimate_scale=True, noise_factor=factor)
     assert refined.noise_scale[2] == pytest.approx(1.0 / factor, rel=0.3)
     assert refined.noise_scale[3] == pytest.approx(1.0 / factor, rel=0.3)
 
 
 def test_with_the_scale_fixed_the_noise_stays_as_assumed():
     simulated = simulate_pairs(20, rng=np.random.default_rng(3))
-    measurements = pair_measurements(simulated.pairs, simulated.camera, TAPED)
-    refined = fit_errors_in_variables(
-        measurements, GncSolution(simulated.camera_from_radar, 0.0, 1.0), estimate_scale=False
-    )
+    refined = fitted(simulated, estimate_scale=False)
     assert refined.noise_scale.tolist() == [1.0] * 4
     assert refined.degrees_of_freedom == 0.0
 
 
 def test_outliers_get_no_weight_and_inliers_nearly_all():
     simulated = simulate_pairs(30, rng=np.random.default_rng(4), noise="imaging", outlier_share=0.3)
-    measurements = pair_measurements(simulated.pairs, simulated.camera, TAPED)
-    refined = fit_errors_in_variables(
-        measurements, GncSolution(simulated.camera_from_radar, 0.0, 1.0), estimate_scale=True
-    )
+    refined = fitted(simulated, estimate_scale=True)
     assert refined.weights[~simulated.outlier].min() > 0.8
     assert np.median(refined.weights[simulated.outlier]) < 1e-3

@@ -6,26 +6,21 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rosbags.rosbag1 import Writer as Writer1
-from rosbags.rosbag2 import StoragePlugin
-from rosbags.rosbag2 import Writer as Writer2
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from calib_core.errors import RecordingError
 from calib_core.recordings import frame_transforms, holds_recording
+from tests.unit.recordings.conftest import Ros, write_rows
 
 KIND = "tf2_msgs/msg/TFMessage"
 Rows = Sequence[tuple[str, int, Sequence[tuple[str, str, tuple[float, float, float]]]]]
 
 
-def message(store: Any, transforms: Sequence[tuple[str, str, tuple[float, float, float]]], generation: int) -> Any:
+def message(ros: Ros, transforms: Sequence[tuple[str, str, tuple[float, float, float]]]) -> Any:
     """Return a TFMessage of shifts without rotation."""
-    types = store.types
-    time = types["builtin_interfaces/msg/Time"](sec=1, nanosec=0)
-    header = types["std_msgs/msg/Header"]
+    types = ros.store.types
     stamped = [
         types["geometry_msgs/msg/TransformStamped"](
-            header=header(stamp=time, frame_id=parent, **({"seq": 0} if generation == 1 else {})),
+            header=ros.header(10**9, parent),
             child_frame_id=child,
             transform=types["geometry_msgs/msg/Transform"](
                 translation=types["geometry_msgs/msg/Vector3"](*shift),
@@ -34,29 +29,15 @@ def message(store: Any, transforms: Sequence[tuple[str, str, tuple[float, float,
         )
         for parent, child, shift in transforms
     ]
-    return types[KIND](transforms=stamped)
+    return ros.new(KIND, transforms=stamped)
 
 
 def write(path: Path, container: str, rows: Rows) -> Path:
-    generation = 1 if container == "bag" else 2
-    store = get_typestore(Stores.ROS1_NOETIC if generation == 1 else Stores.ROS2_JAZZY)
-    if generation == 1:
-        store.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms\n", KIND))
-    writer: Any = (
-        Writer1(path)
-        if generation == 1
-        else Writer2(
-            path, version=9, storage_plugin=StoragePlugin.MCAP if container == "mcap" else StoragePlugin.SQLITE3
-        )
-    )
-    serialize = store.serialize_ros1 if generation == 1 else store.serialize_cdr
-    with writer:
-        connections: dict[str, Any] = {}
-        for topic, time, transforms in rows:
-            if topic not in connections:
-                connections[topic] = writer.add_connection(topic, KIND, typestore=store)
-            writer.write(connections[topic], time, bytes(serialize(message(store, transforms, generation), KIND)))
-    return path
+    ros = Ros(1 if container == "bag" else 2)
+    if ros.generation == 1:
+        ros.define(KIND, "geometry_msgs/TransformStamped[] transforms\n")
+    messages = [(topic, time, message(ros, transforms)) for topic, time, transforms in rows]
+    return write_rows(path, ros, messages, container)
 
 
 ROWS: Rows = (
@@ -72,7 +53,7 @@ ROWS: Rows = (
 )
 
 
-@pytest.mark.parametrize("container", ["bag", "mcap", "sqlite"])
+@pytest.mark.parametrize("container", ["bag", "mcap", "db3"])
 def test_static_and_still_transforms_are_read_and_moving_ones_said_so(tmp_path, container):
     path = write(tmp_path / ("tf.bag" if container == "bag" else "tf"), container, ROWS)
 
