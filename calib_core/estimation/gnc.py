@@ -24,6 +24,7 @@ _STEPS_PER_RADIUS = 2
 _INLIER_SHARE = 0.8
 _SAME_POSE = 0.25  # squared distance, in standard deviations
 _NOISE_SCALES = (1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0)
+_BEYOND = 1e-6  # weight of what a cost exceeds that of an outlier by: it only orders outliers
 _SCALE_PENALTY = 4.0  # how much better a larger noise level must explain the pairs than the assumed one
 
 
@@ -141,6 +142,10 @@ def _associated(
     rows = np.minimum.reduceat(np.where(cheapest, np.arange(count), count), first, axis=-1)  # of equals, the first
     twice = taken_twice(measurements.returns[rows])
     if twice.any():
+        fits = 2.0 * _log_odds(measurements, np.zeros(1), np.zeros(1), _INLIER_SHARE)[measurements.owner]
+        cost = np.minimum(
+            cost, fits + _BEYOND * (cost - fits)
+        )  # an outlier does not take the return of a pair that fits
         rows[twice] = [exclusive_rows(one, measurements.first, measurements.returns) for one in cost[twice]]
     return rows, model.rows(rows)
 

@@ -10,7 +10,7 @@ from calib_core.estimation.gnc import associate, mixture_cost, solve_gnc
 from calib_core.estimation.initialization import Hypotheses, hypothesis_costs, initial_poses
 from calib_core.estimation.measurement_model import pair_measurements
 from calib_core.geometry import rotation_angle_rad
-from calib_core.measurements import Pair, TimeNs
+from calib_core.measurements import Candidate, Pair, TimeNs
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.synthetic import RigOptions, SimulatedPairs, simulate_pairs
@@ -23,6 +23,24 @@ def test_candidates_are_associated_with_their_clicks_at_the_true_pose():
     measurements = pair_measurements(simulated.pairs, simulated.camera, MEASURED)
     rows, _ = associate(measurements, simulated.camera_from_radar)
     assert tuple(rows - measurements.first[:-1]) == simulated.true_candidate
+
+
+def test_a_click_that_fits_nothing_does_not_take_the_return_of_one_that_fits():
+    simulated = simulate_pairs(6, rng=np.random.default_rng(1), noise="imaging")
+    lost, fitting, *others = simulated.pairs
+    (own,) = fitting.candidates
+    polar = polar_from_cartesian(own.position_radar_m[None])
+
+    def beside(azimuth_rad: float) -> Candidate:
+        return replace(own, position_radar_m=cartesian_from_polar(polar + np.array([0.0, azimuth_rad, 0.0]))[0])
+
+    lost = replace(lost, pixel_px=fitting.pixel_px + np.array([60.0, 0.0]), candidates=(own, beside(0.4)))
+    pairs = [lost, replace(fitting, candidates=(own, beside(0.1))), *others]
+    measurements = pair_measurements(pairs, simulated.camera, MEASURED)
+    labels = np.full(len(measurements.reported), -1)
+    labels[[0, 2]] = 0
+    rows, _ = associate(replace(measurements, returns=labels), simulated.camera_from_radar)
+    assert rows[:2].tolist() == [1, 2]
 
 
 def test_the_true_pose_is_found_with_half_of_the_pairs_wrong():
