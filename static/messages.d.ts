@@ -196,7 +196,7 @@ export interface BoxTrackRow {
   following: boolean;
 }
 
-/** Acc of one class. */
+/** Acc of one class, or of one target. */
 export interface ClassFigure {
   label: string;
   acc: number | null;
