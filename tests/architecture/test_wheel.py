@@ -165,14 +165,19 @@ def test_the_installed_command_solves_its_sample_and_packs_it(installed, tmp_pat
     assert subprocess.run([sys.executable, "-I", "-S", tmp_path / "pack" / "selftest.py"]).returncode == 0
 
 
-def test_the_command_lines_of_readme_tour_and_report_run_from_the_wheel(installed, project_root, tmp_path):
+_READ = re.compile(r"(?<!-out )(?<!-report )(?<!--sheet )(?<![\w/'])[\w/]+\.(?:bag|json|mcap|mp4|urdf|yaml)\b")
+"""The files that a command line reads."""
+
+
+@pytest.mark.timeout(900)  # 28 command lines, three of them whole films
+def test_the_command_lines_of_the_pages_run_from_the_wheel(installed, project_root, tmp_path):
     """In an empty folder with the sample's files, called as the pages call them; windows are left out."""
     for name in ("radar.bag", "camera.bag", "clicks.json"):
         shutil.copy(project_root / "sample_data" / "rooftop" / name, tmp_path)
     clicks = json.loads((tmp_path / "clicks.json").read_text())["clicks"]
     frames = [
-        {"image_time": click["image_time"], "boxes": [{"label": "person", "box_px": [u - 20, v - 20, u + 20, v + 20]}]}
-        for click in clicks
+        {"image_time": click["image_time"], "boxes": [{"label": label, "box_px": [u - 20, v - 20, u + 20, v + 20]}]}
+        for label, click in zip(["pedestrian", "car"] * 10, clicks, strict=True)
         for u, v in [click["pixel_px"]]
     ]
     boxes = {"schema": "cocalib/boxes-1", "image_size_px": [960, 600], "frames": frames}
@@ -192,20 +197,25 @@ def test_the_command_lines_of_readme_tour_and_report_run_from_the_wheel(installe
 
     assert run("cocalib solve radar.bag camera.bag --clicks clicks.json --out calibration.json") == 0
     assert run("cocalib export calibration.json --to mcap --recording radar.bag camera.bag --out drive.mcap") == 0
-    for name, source in (
-        ("old.json", "calibration.json"),
-        ("factory.json", "calibration.json"),
-        ("other.mcap", "drive.mcap"),
-    ):
-        shutil.copy(tmp_path / source, tmp_path / name)
-    pages = [project_root / name for name in ("README.md", "docs/tour.md", "docs/report.md")]
+    assert run("cocalib export calibration.json --to urdf --out robot.urdf") == 0
+    assert run("cocalib export calibration.json --to camera-info --out camera.yaml") == 0
+    for name in ("old", "new", "factory", "march", "july", "a", "b"):
+        shutil.copy(tmp_path / "calibration.json", tmp_path / f"{name}.json")
+    for name in ("other", "recording"):
+        shutil.copy(tmp_path / "drive.mcap", tmp_path / f"{name}.mcap")
+    names = ("tour", "report", "drift", "evaluation", "rerun", "formats", "intrinsics")
+    pages = [project_root / "README.md", *(project_root / "docs" / f"{name}.md" for name in names)]
     lines = dict.fromkeys(line for page in pages for line in command_lines(page))
     shown = [
         line
         for line in lines
-        if line.split()[1] not in ("demo", "open") and not ("show" in line and "--out" not in line)
+        if line.split()[1] not in ("demo", "open")
+        and not ("show" in line and "--out" not in line)
+        and "--tree" not in line  # drive.mcap has the pose in its own tree
+        and (files := _READ.findall(line))
+        and all((tmp_path / file).exists() for file in files)
     ]
-    assert len(shown) > 10
+    assert len(shown) > 25
     for line in shown:
         run(line)
     assert (tmp_path / "report.html").is_file()
