@@ -16,12 +16,13 @@ Written by `COMMAND`; do not edit.
   contains the truth in about 95 % of the draws: with 12 to 40 pairs, one in ten of them wrong, with and without a measured
   camera position.
 - **Measure the camera position.** With a TI radar and 20 pairs it brings the position from about 15 cm to a few, and shows what
-  pairs alone cannot. One that is 3 to 11 cm off is covered by the stated error; one that is 30 cm off is named nine times in
-  ten, and loses its weight in the pose. Of right ones, up to one in 33 is named too.
+  pairs alone cannot. One that is 3 to 11 cm off is covered by the stated error; one that is 30 cm off is named in at least
+  nine of ten draws, and loses its weight in the pose. Of right ones, up to one in 33 is named too.
 - **The radar decides the angles:** about half a degree with an imaging radar, about one degree with a TI radar, several with a
   TI radar in a narrow aisle, where the verdict says coarse.
 - **Some errors no pair can show:** clicks that are all beside the point that the radar sees, elevations that are all wrong
-  alike, a cropped picture. The verdict says that it assumes none of them. A measured position shows them.
+  alike, a cropped picture. The verdict says that it assumes none of them. A measured position shows the first two; a turn, such
+  as that of a cropped picture, it shows with an imaging radar only.
 - An answer that is far off, calls itself good or usable and names no cause is *silently wrong*. The tables count them.
 
 ## How it was measured
