@@ -62,6 +62,13 @@ def test_a_click_far_from_every_scan_stays_unpaired_with_the_gap():
     assert "11.00 s" in pairing.unpaired[0].reason
 
 
+@pytest.mark.parametrize(("share", "pairs"), [(0.9, 1), (1.1, 0)])
+def test_a_click_is_paired_with_scans_as_far_away_as_the_option_allows(share, pairs):
+    options = CalibrationOptions()
+    scans = scans_at([0.0, 0.5, 1.0])
+    assert len(pair_clicks([click("a", 1.0 + share * options.locating.max_time_gap_s)], scans, options).pairs) == pairs
+
+
 def test_a_click_among_moving_returns_stays_unpaired():
     pairing = pair_clicks([click("a", 0.5)], scans_at([0.0, 0.5, 1.0], doppler_mps=1.0), CalibrationOptions())
     assert [one.code for one in pairing.unpaired] == ["no-static-return"]

@@ -15,6 +15,7 @@ from calib_core.estimation.measurement_model import (
     PairMeasurements,
     linearize,
     pair_measurements,
+    prior_rows,
 )
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.measurements import Pair
@@ -45,6 +46,15 @@ def test_the_pose_jacobian_is_the_derivative_of_the_projection():
         slope = (ahead - behind) / 2e-6
         whitened = (model.whitening @ slope[:, :, None])[:, :, 0]
         assert model.pose_jacobian[:, :, k] == pytest.approx(whitened, rel=1e-4, abs=1e-3)
+
+
+def test_the_rows_of_systematic_errors_pull_each_back_to_none():
+    pairs, measurements = simulated()
+    errors = replace(measurements.errors, values=np.arange(1.0, 1.0 + len(measurements.errors)))
+    residual, rows = prior_rows(replace(measurements, errors=errors), pairs.camera_from_radar)
+    pulled = slice(len(residual) - len(errors), None)
+    assert len(errors)
+    assert rows[pulled, 6:] @ errors.values == pytest.approx(-residual[pulled])
 
 
 def test_whitening_undoes_the_covariance_of_click_and_radar_noise():
