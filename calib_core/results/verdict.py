@@ -56,10 +56,9 @@ def stated_error(calibration: Calibration) -> StatedError:
     Args:
         calibration: with a finite covariance.
     """
-    pose, in_plane = calibration.camera_from_radar, not calibration.sees_elevation
+    in_plane = not calibration.sees_elevation
     freedom = degrees_of_freedom(calibration.covariance_quantile)
-    turned = pose.rotation.T
-    to_centre = np.concatenate([-turned, -turned @ skew(pose.translation_m)], axis=1)
+    turned, to_centre = calibration.camera_from_radar.rotation.T, _to_centre(calibration)
     about_axes = np.concatenate([np.zeros((3, 3)), turned], axis=1)[2 if in_plane else 0 :]
     with np.errstate(over="ignore", invalid="ignore"):  # a file may state any number: beyond all numbers is infinite
         of_centre = to_centre @ calibration.covariance @ to_centre.T
@@ -76,6 +75,13 @@ def stated_error(calibration: Calibration) -> StatedError:
         range_m=float(np.median(ranges_m)) if known else float("nan"),
         in_plane=in_plane,
     )
+
+
+def _to_centre(calibration: Calibration) -> np.ndarray:
+    """Return the derivative (3, 6) of the camera centre, in the radar frame, by the pose."""
+    pose = calibration.camera_from_radar
+    turned = pose.rotation.T
+    return np.concatenate([-turned, -turned @ skew(pose.translation_m)], axis=1)
 
 
 def degrees_of_freedom(quantile_95: float) -> float:
@@ -204,14 +210,39 @@ def verdict_on(outcome: Calibration | Unsolvable | None, *, left: int | None = N
 
 
 def _assumption(calibration: Calibration) -> str:
-    """Return what no pair can show without a measured camera position: what moves the pose and leaves every residual as it is."""
-    if calibration.options.solving.camera_position is not None:
-        return ""
+    """Return what no pair can show: what moves the pose and leaves every residual as it is, or a wrong camera position."""
     rest = "its elevations are right and the picture is not cropped"
     mirrored = any(warning.code == _NOT_MIRRORED for warning in calibration.warnings)
     if not calibration.sees_elevation:
         rest = "the picture is not cropped"
-    return f"you clicked the very point that the radar sees, {'no radar axis is mirrored, ' if mirrored else ''}{rest}"
+    first = "you clicked the very point that the radar sees"
+    if calibration.options.solving.camera_position is not None:
+        alone_cm = _alone_cm(calibration)
+        known = f" (the pairs alone place it within {alone_cm:g} cm)" if np.isfinite(alone_cm) else ""
+        first, rest = f"the camera was measured right{known}", rest.replace("its elevations", "the radar's elevations")
+    return f"{first}, {'no radar axis is mirrored, ' if mirrored else ''}{rest}"
+
+
+def _alone_cm(calibration: Calibration) -> float:
+    """Return how well the camera's place would be known without its measurement [cm]; NaN if that is not known.
+
+    With P the covariance of the place and M what of it the measurement leaves, P^-1 (P - M) P^-1 is the information of the pairs.
+    """
+    if calibration.covariance_parts is None or not calibration.sees_elevation:
+        return float("nan")
+    to_centre = _to_centre(calibration)
+    with np.errstate(all="ignore"):  # a file may state any number
+        whole = to_centre @ calibration.covariance @ to_centre.T
+        measured = to_centre @ calibration.covariance_parts.camera_position @ to_centre.T
+        inverse = np.linalg.pinv(whole) if np.isfinite(whole).all() else whole
+        information = inverse @ (whole - measured) @ inverse
+    if not np.isfinite(information).all():
+        return float("nan")
+    values, axes = np.linalg.eigh(information)
+    if not values[0] > 0.0:
+        return float("nan")
+    alone = (axes / values) @ axes.T
+    return _rounded_up(100.0 * _radius(alone, degrees_of_freedom(calibration.covariance_quantile)))
 
 
 def placement_words(best: NextPlacement) -> str:

@@ -111,12 +111,22 @@ def test_few_pairs_are_counted_in_neutral_words():
     assert checked.reason.startswith("6 of 8 pairs, looks consistent; uncertain to ")
 
 
-def test_a_free_pose_states_what_no_pair_can_show_and_a_measured_one_nothing(good):
-    assert verdict_on(good).assumes == ""
-    free = verdict_on(solved(tape_m=None))
-    assert "point that the radar sees" in free.assumes
-    assert "elevations" in free.assumes
-    assert "cropped" in free.assumes
+def test_what_no_pair_can_show_is_stated(good):
+    free, measured = verdict_on(solved(tape_m=None)).assumes, verdict_on(good).assumes
+    assert "point that the radar sees" in free
+    assert "the camera was measured right" in measured
+    for assumes in (free, measured):
+        assert "elevations" in assumes
+        assert "cropped" in assumes
+
+
+@pytest.mark.parametrize("noise", ["ti", "imaging"])
+@pytest.mark.parametrize("tape_m", [0.005, 0.02, 0.05])
+def test_how_well_the_pairs_alone_place_a_measured_camera_is_stated(noise, tape_m):
+    free = stated_error(solved(tape_m=None, noise=noise)).position_cm
+    assumes = verdict_on(solved(tape_m=tape_m, noise=noise)).assumes
+    (alone,) = re.findall(r"the pairs alone place it within ([0-9.]+) cm", assumes)
+    assert float(alone) == pytest.approx(free, rel=0.3)
 
 
 def test_what_the_figures_cover_does_not_make_them_coarse(good):
