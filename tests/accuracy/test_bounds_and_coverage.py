@@ -43,13 +43,20 @@ def binomial_limits(trials: int) -> tuple[int, int]:
 
 
 def allowed_to_fail(case: Case) -> int:
-    """Of right measured positions 3 % may be left out of the pose, which is then as far off as without one; 99.9 % limit."""
+    """Of right measured positions the pairs contradict 3 %, and the pose is then as far off as without one; 99.9 % limit."""
     return 0 if case.tape_m is None else 5
+
+
+def far(case: Case) -> np.ndarray:
+    """Flag trials that failed, and those whose measured position has lost weight: they are counted, not averaged."""
+    trials = measured(case)
+    lost = column(trials, "position_m") > 3.0 * column(trials, "bound_m")
+    return failed(trials) | (lost if case.tape_m is not None else False)
 
 
 @pytest.mark.parametrize("case", KNOWN, ids=lambda case: case.key)
 def test_the_error_is_near_the_bound_and_nothing_fails(case):
-    trials = tuple(one for one, far in zip(measured(case), failed(measured(case)), strict=True) if not far)
+    trials = tuple(one for one, off in zip(measured(case), far(case), strict=True) if not off)
     assert len(trials) >= TRIALS - allowed_to_fail(case)
     aim = (
         1.3 if case.tape_m is not None else 1.15
