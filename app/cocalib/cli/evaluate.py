@@ -234,7 +234,7 @@ class Evaluate:
             clicks=clicks,
             boxes=boxes,
             labels=labels,
-            options=self.judging.evidence.options(),
+            options=options,
         )
         lines = comparison_lines(compared)
         return subject, tuple(line for line in lines if not line.startswith("warning:"))
