@@ -15,9 +15,9 @@ _PIPE = "a named pipe (FIFO)"
 _WRITER_TIMEOUT_S = 5.0
 _MAX_TEXT_BYTES = 64 << 20
 _BEGINNINGS = {
-    b"#ROSBAG": "a recording; give it as RECORDING, or with --recording",
-    b"\x89MCAP": "a recording; give it as RECORDING, or with --recording",
-    b"SQLite format 3": "a recording; give it as RECORDING, or with --recording",
+    **dict.fromkeys(
+        (b"#ROSBAG", b"\x89MCAP", b"SQLite format 3"), "a recording; give it as RECORDING, or with --recording"
+    ),
     b"PK": "an archive or a spreadsheet; unpack it, or save it as CSV",
     b"\x89PNG": "a picture",
     b"\xff\xd8\xff": "a picture",

@@ -211,16 +211,16 @@ def verdict_on(outcome: Calibration | Unsolvable | None, *, left: int | None = N
 
 def _assumption(calibration: Calibration) -> str:
     """Return what no pair can show: what moves the pose and leaves every residual as it is, or a wrong camera position."""
-    rest = "its elevations are right and the picture is not cropped"
-    mirrored = any(warning.code == _NOT_MIRRORED for warning in calibration.warnings)
-    if not calibration.sees_elevation:
-        rest = "the picture is not cropped"
-    first = "you clicked the very point that the radar sees"
-    if calibration.options.solving.camera_position is not None:
+    if calibration.options.solving.camera_position is None:
+        first, whose = "you clicked the very point that the radar sees", "its"
+    else:
         alone_cm = _alone_cm(calibration)
         known = f" (the pairs alone place it within {alone_cm:g} cm)" if np.isfinite(alone_cm) else ""
-        first, rest = f"the camera was measured right{known}", rest.replace("its elevations", "the radar's elevations")
-    return f"{first}, {'no radar axis is mirrored, ' if mirrored else ''}{rest}"
+        first, whose = f"the camera was measured right{known}", "the radar's"
+    mirrored = any(warning.code == _NOT_MIRRORED for warning in calibration.warnings)
+    sides = "no radar axis is mirrored, " if mirrored else ""
+    heights = f"{whose} elevations are right and " if calibration.sees_elevation else ""
+    return f"{first}, {sides}{heights}the picture is not cropped"
 
 
 def _alone_cm(calibration: Calibration) -> float:
