@@ -11,7 +11,7 @@ import io
 import re
 import zipfile
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -23,7 +23,7 @@ from calib_core.boxes.formats.box_format import BoxFile, BoxFormat, FileBoxes, F
 from calib_core.boxes.formats.coco import COCO
 from calib_core.boxes.formats.cvat import CVAT
 from calib_core.boxes.formats.kitti import KITTI_OBJECTS, KITTI_TRACKS
-from calib_core.boxes.formats.nuscenes import NUSCENES
+from calib_core.boxes.formats.nuscenes import ANNOTATIONS, NUSCENES
 from calib_core.boxes.formats.openlabel import OPENLABEL
 from calib_core.boxes.formats.own import OWN
 from calib_core.boxes.formats.yolo import YOLO
@@ -97,7 +97,10 @@ def load_box_file(path: Path, *, image_size_px: tuple[int, int] | None) -> BoxFi
     source = name_text(path.name or path)
     try:
         if path.is_dir():
-            members = _folder(path)
+            files = {name_text(inner.relative_to(path).as_posix()): inner for inner in _text_files(path)}
+            if any(inner.name == f"{ANNOTATIONS}.json" for inner in files.values()):
+                return BoxFile(source, members=dict.fromkeys(files, ""), tables=path, image_size_px=image_size_px)
+            members = _folder(path, files)
         else:
             data = read_input(path, max_bytes=_MAX_BYTES, is_what=_IS_WHAT)
             members = _archive(data, source) if data.startswith(b"PK") else {path.name: data}
@@ -114,20 +117,17 @@ def load_box_file(path: Path, *, image_size_px: tuple[int, int] | None) -> BoxFi
     return BoxFile(source, members=texts, image_size_px=image_size_px)
 
 
-def _folder(path: Path) -> dict[str, bytes]:
+def _folder(path: Path, files: Mapping[str, Path]) -> dict[str, bytes]:
     """Read the text files of a folder and its subfolders."""
-    members: dict[str, bytes] = {}
-    total = 0
-    for inner in _text_files(path):
-        data = read_input(inner, max_bytes=_MAX_BYTES - total, is_what=_IS_WHAT)
-        total += len(data)
-        members[inner.relative_to(path).as_posix()] = data
-        if len(members) > _MOST_MEMBERS:
-            raise InputError(
-                f"{name_text(path)}: has more than {_MOST_MEMBERS} files; give the folder of one recording"
-            )
-    if not members:
+    if len(files) > _MOST_MEMBERS:
+        raise InputError(f"{name_text(path)}: has more than {_MOST_MEMBERS} files; give the folder of one recording")
+    if not files:
         raise InputError(f"{name_text(path)}: has no file of boxes ({', '.join(_SUFFIXES)}); is it the right folder?")
+    members: dict[str, bytes] = {}
+    left = _MAX_BYTES
+    for name, inner in files.items():
+        members[name] = read_input(inner, max_bytes=left, is_what=_IS_WHAT)
+        left -= len(members[name])
     return members
 
 
@@ -149,7 +149,7 @@ def _archive(data: bytes, source: str) -> dict[str, bytes]:
             ]
             if len(wanted) > _MOST_MEMBERS or sum(member.file_size for member in wanted) > _MAX_BYTES:
                 raise InputError(
-                    f"{source}: unpacks to more than {_MAX_BYTES >> 20} MB; give the boxes without pictures"
+                    f"{source}: unpacks to more than {_MAX_BYTES >> 20} MB; unpack it, and give the folder of its boxes"
                 )
             members = {member.filename: archive.open(member).read(member.file_size) for member in wanted}
     except _DAMAGED as error:

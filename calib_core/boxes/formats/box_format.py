@@ -4,6 +4,7 @@ import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element
 
@@ -60,6 +61,7 @@ class BoxFile:
         value: of JSON; None for anything else.
         root: of XML; None for anything else.
         members: the text files of a folder or archive, or a single text file, by their path with forward slashes.
+        tables: the folder whose members are left to be read row by row, their texts here empty; None if these are whole.
         image_size_px: width and height of the recorded pictures, for formats that count in shares of them; None if unknown.
         image_names: of the recorded frames' files without suffix, for sets of several cameras; none if they are not files.
     """
@@ -68,6 +70,7 @@ class BoxFile:
     value: Any = None
     root: Element | None = None
     members: Mapping[str, str] = field(default_factory=dict)
+    tables: Path | None = None
     image_size_px: tuple[int, int] | None = None
     image_names: Sequence[str] = ()
 

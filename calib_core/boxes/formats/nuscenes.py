@@ -1,9 +1,12 @@
 """nuScenes: the tables of one version, such as v1.0-mini, with a cuboid for each object of a keyframe.
 
 A cuboid is in the axes of the map; the vehicle's and the camera's poses of a picture carry it there. Pictures are undistorted.
+Tables of the whole set have up to 1 GB: they are read row by row, and only what belongs to recorded pictures is kept.
 """
 
-from collections.abc import Mapping
+import io
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -21,35 +24,41 @@ from calib_core.boxes.formats.box_format import (
 )
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
-from calib_core.interchange.syntax.strict_json import json_value
+from calib_core.interchange.syntax.strict_json import json_rows
 from calib_core.measurements import TimeNs
 
-_ANNOTATIONS = "sample_annotation"
+ANNOTATIONS = "sample_annotation"
 _Row = Mapping[str, Any]
 
 
 def _recognizes(file: BoxFile) -> bool:
     first = file.value[0] if isinstance(file.value, list) and file.value else None
     alone = isinstance(first, dict) and {"sample_token", "instance_token"} <= first.keys()
-    return alone or any(PurePosixPath(name).name == f"{_ANNOTATIONS}.json" for name in file.members)
+    return alone or any(PurePosixPath(name).name == f"{ANNOTATIONS}.json" for name in file.members)
 
 
 def _read(file: BoxFile) -> FileBoxes:
-    tables = {
-        name: _table(file, name)
-        for name in (_ANNOTATIONS, "sample_data", "calibrated_sensor", "ego_pose", "instance", "category")
-    }
-    of_sample: dict[Any, list[_Row]] = {}
-    for row in tables[_ANNOTATIONS].values():
-        of_sample.setdefault(row.get("sample_token"), []).append(row)
-    keyframes = [row for row in tables["sample_data"].values() if row.get("is_key_frame") and row.get("width")]
-    recorded = set(file.image_names)
-    shown = [row for row in keyframes if _stem(row) in recorded]
+    recorded, seen = set(file.image_names), Counter[bool]()
+
+    def is_shown(row: _Row) -> bool:
+        if not (row.get("is_key_frame") and row.get("width")):
+            return False
+        seen[_stem(row) in recorded] += 1
+        return _stem(row) in recorded
+
+    shown = _table(file, "sample_data", is_shown).values()
     if not shown:
         raise InputError(
-            f"{file.source}: none of its {len(keyframes)} pictures of keyframes is a recorded frame; open the set's own "
+            f"{file.source}: none of its {seen.total()} pictures of keyframes is a recorded frame; open the set's own "
             "pictures, such as samples/CAM_FRONT"
         )
+    samples = {str(row.get("sample_token")) for row in shown}
+    of_sample: dict[Any, list[_Row]] = {}
+    for row in _table(file, ANNOTATIONS, lambda row: str(row.get("sample_token")) in samples).values():
+        of_sample.setdefault(row.get("sample_token"), []).append(row)
+    poses = {str(row.get("ego_pose_token")) for row in shown}
+    tables = {name: _table(file, name, lambda _: True) for name in ("calibrated_sensor", "instance", "category")}
+    tables["ego_pose"] = _table(file, "ego_pose", lambda row: row["token"] in poses)
     frames, sizes = [], set()
     for picture in shown:
         place = f"{file.source}: sample_data {picture.get('token')}"
@@ -62,7 +71,7 @@ def _read(file: BoxFile) -> FileBoxes:
         matrix_px = np.array([numbers(row, 3, f"{place}: camera_intrinsic") for row in rows])
         boxes = []
         for found in of_sample.get(picture.get("sample_token"), ()):
-            where = f"{file.source}: {_ANNOTATIONS} {found.get('token')}"
+            where = f"{file.source}: {ANNOTATIONS} {found.get('token')}"
             width_m, length_m, height_m = numbers(found.get("size"), 3, f"{where}: size")
             instance = _row(tables, "instance", found.get("instance_token"), where)
             label = str(_row(tables, "category", instance.get("category_token"), where).get("name", ""))
@@ -81,8 +90,8 @@ def _stem(picture: _Row) -> str:
     return PurePosixPath(str(picture.get("filename"))).stem
 
 
-def _table(file: BoxFile, name: str) -> dict[Any, _Row]:
-    """Return the rows of a table by their tokens.
+def _table(file: BoxFile, name: str, wanted: Callable[[_Row], bool]) -> dict[str, _Row]:
+    """Return the wanted rows of a table by their tokens.
 
     Raises:
         InputError: it is not there, or is no table.
@@ -92,12 +101,22 @@ def _table(file: BoxFile, name: str) -> dict[Any, _Row]:
         raise InputError(
             f"{file.source}: expected one table {name}.json, found {len(found)}; give the folder with all tables of one version"
         )
-    rows = json_value(file.members[found[0]], source=f"{file.source}/{found[0]}")
-    if not isinstance(rows, list) or not all(
-        isinstance(row, dict) and isinstance(row.get("token"), str) for row in rows
-    ):
-        raise InputError(f"{file.source}/{found[0]}: expected a list of rows with a token each; is it the right file?")
-    return {row["token"]: row for row in rows}
+    return {row["token"]: row for row in _rows(file, found[0]) if wanted(row)}
+
+
+def _rows(file: BoxFile, member: str) -> Iterator[_Row]:
+    place = f"{file.source}/{member}"
+    try:
+        text = io.StringIO(file.members[member])
+        with text if file.tables is None else (file.tables / member).open(encoding="utf-8-sig") as table:
+            for row in json_rows(table, source=place):
+                if not isinstance(row.get("token"), str):
+                    raise InputError(f"{place}: expected a list of rows with a token each; is it the right file?")
+                yield row
+    except OSError as error:
+        raise InputError(f"{place}: cannot be read: {error.strerror}; check its permissions") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{place}: not text in UTF-8; copy the table again") from None
 
 
 def _row(tables: Mapping[str, Mapping[Any, _Row]], name: str, token: Any, place: str) -> _Row:

@@ -1,9 +1,11 @@
 """ASAM OpenLABEL 1.0: objects by frame, each with bbox [centre u, centre v, width, height], a turned rbbox, or a cuboid.
 
 A cuboid [x, y, z, rotation, sizes along x, y and z] is in a coordinate system of the file, whose poses in one another carry it to
-the camera's. Without a rectangle of its own it needs the one camera's pinhole lens, too.
+the camera's; a transform that a frame states, as of a moving vehicle, holds in that frame. With no rectangle of its own it needs
+the one camera's pinhole lens, too.
 """
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import PurePosixPath
@@ -28,6 +30,8 @@ from calib_core.geometry import RigidTransform, rotation_from_euler
 from calib_core.measurements import Box, TimeNs
 from calib_core.recordings.time.written_times import read_time
 
+_Moved = Mapping[tuple[str, str], Any]
+
 
 def _root(file: BoxFile) -> Mapping[str, Any]:
     return _part(file.mapping, "openlabel") or _part(file.mapping, "vcd")
@@ -47,6 +51,7 @@ def _read(file: BoxFile) -> FileBoxes:
     objects = _part(root, "objects")
     cameras: set[str] = set()
     frames = []
+    moving = {pair for frame in _part(root, "frames").values() for pair in _moved(frame)}
     for number, frame in _part(root, "frames").items():
         place = f"{file.source}: frames.{number}"
         boxes: list[Box] = []
@@ -62,7 +67,12 @@ def _read(file: BoxFile) -> FileBoxes:
             if cuboids:
                 system = cuboids[0].get("coordinate_system") or _part(objects, key).get("coordinate_system")
                 camera = _camera(root, [entry.get("coordinate_system") for entry, _ in own])
-                boxes += _with_cuboid(root, cuboids[0], system, camera, [box for _, box in own], label, key, where)
+                lenses = {name: one for name, one in _streams(frame).items() if _lens(one)}
+                now = {**root, "streams": {**_part(root, "streams"), **lenses}}
+                moved = dict.fromkeys(moving) | _moved(frame)
+                boxes += _with_cuboid(
+                    now, moved, cuboids[0], system, camera, [box for _, box in own], label, key, where
+                )
             else:
                 boxes += [box for _, box in own]
         frames.append(FileFrame(tuple(boxes), _stamp(frame, place), whole_number(number, place), _picture(frame)))
@@ -85,8 +95,15 @@ def _lens(stream: Any) -> Mapping[str, Any]:
     return _part(_part(stream, "stream_properties"), "intrinsics_pinhole")
 
 
+def _moved(frame: Any) -> dict[tuple[str, str], Any]:
+    """Return the transforms that a frame states, by the systems that they lead from and to."""
+    stated = _part(_part(frame, "frame_properties"), "transforms").values()
+    return {(str(one.get("src")), str(one.get("dst"))): one for one in stated if isinstance(one, dict)}
+
+
 def _with_cuboid(
     root: Mapping[str, Any],
+    moved: _Moved,
     entry: Mapping[str, Any],
     system: Any,
     camera: str,
@@ -104,18 +121,18 @@ def _with_cuboid(
     if not isinstance(values, list) or len(values) not in (9, 10):
         raise InputError(f"{place}.cuboid.val: expected 9 or 10 numbers; correct it")
     where = numbers(values, len(values), f"{place}.cuboid.val")
-    poses = _root_from(root, str(system), place), _root_from(root, camera, place)
+    camera_from_system = _pose(root, moved, camera, str(system), place)
     lens = _lens(_part(root, "streams").get(camera))
-    if poses[0] is None or poses[1] is None or not (own or lens):
+    if camera_from_system is None or not (own or lens):
         if own:
             return own
         raise InputError(
-            f"{place}: has a cuboid and no bbox, and the file does not state the poses of the coordinate systems {str(system)!r} "
-            "and of one camera with a pinhole lens; export them, or the rectangles of the camera's picture (bbox)"
+            f"{place}: has a cuboid and no bbox, and the file does not state the poses in this frame of the coordinate systems "
+            f"{str(system)!r} and of one camera with a pinhole lens; export them, or the rectangles of the picture (bbox)"
         )
     turn = where[3:-3]
     rotation = np.array([turn[3], *turn[:3]]) if len(turn) == 4 else rotation_from_euler(*turn)
-    camera_from_object = poses[1].inverse() @ poses[0] @ stated_pose(rotation, where[:3], place)
+    camera_from_object = camera_from_system @ stated_pose(rotation, where[:3], place)
     if own:
         return [replace(box, cuboid=cuboid_of(camera_from_object, where[-3:])) for box in own]
     rows = numbers(lens.get("camera_matrix_3x4"), 12, f"{place}: camera_matrix_3x4")
@@ -128,29 +145,65 @@ def _with_cuboid(
     return [box] if box else []
 
 
-def _root_from(root: Mapping[str, Any], system: str, place: str) -> RigidTransform | None:
-    """Return the pose of a coordinate system in the outermost one; None if the file does not state it."""
+def _pose(root: Mapping[str, Any], moved: _Moved, camera: str, system: str, place: str) -> RigidTransform | None:
+    """Return camera_from_system; None if the file does not state it.
+
+    Raises:
+        InputError: a frame's transform leads past a parent, so that the poses of systems may be stated twice.
+    """
     systems = _part(root, "coordinate_systems")
-    pose, seen = RigidTransform.identity(), set[str]()
-    while system not in seen:
-        if system not in systems:
-            return None
-        seen.add(system)
-        own = _part(systems, system)
-        stated, parent = _part(own, "pose_wrt_parent"), own.get("parent")
-        if not parent:
-            return pose
-        where = f"{place}: pose of {system}"
-        if "matrix4x4" in stated:
-            matrix = np.array(numbers(stated["matrix4x4"], 16, where)).reshape(4, 4)
-            pose = stated_pose(matrix[:3, :3], matrix[:3, 3].tolist(), where) @ pose
-        elif "quaternion" in stated and "translation" in stated:
-            x, y, z, w = numbers(stated["quaternion"], 4, where)
-            pose = stated_pose(np.array([w, x, y, z]), numbers(stated["translation"], 3, where), where) @ pose
-        else:
-            return None
-        system = str(parent)
-    raise InputError(f"{place}: the coordinate system {system} is its own parent; correct it")
+    for one, other in moved:
+        parents = _part(systems, one).get("parent"), _part(systems, other).get("parent")
+        if one in systems and other in systems and other != parents[0] and one != parents[1]:
+            raise InputError(
+                f"{place}: a transform leads from {one} to {other}, of which neither is the other's parent in "
+                "coordinate_systems; state the transform from a system to its parent"
+            )
+    above_camera, above_system = (_ancestors(root, name, place) for name in (camera, system))
+    shared = next((name for name in above_camera if name in above_system), None)
+    if shared is None:
+        return None
+    poses = []
+    for above in (above_camera, above_system):
+        shared_from_own = RigidTransform.identity()
+        for child, parent in itertools.pairwise(above[: above.index(shared) + 1]):
+            parent_from_child = _link(root, moved, child, parent, f"{place}: pose of {child}")
+            if parent_from_child is None:
+                return None
+            shared_from_own = parent_from_child @ shared_from_own
+        poses.append(shared_from_own)
+    return poses[0].inverse() @ poses[1]
+
+
+def _ancestors(root: Mapping[str, Any], system: str, place: str) -> list[str]:
+    """Return a coordinate system, its parent and so on; none if the file does not have it."""
+    systems = _part(root, "coordinate_systems")
+    found: list[str] = []
+    while system in systems:
+        if system in found:
+            raise InputError(f"{place}: the coordinate system {system} is its own parent; correct it")
+        found.append(system)
+        system = str(_part(systems, system).get("parent") or "")
+    return found
+
+
+def _link(root: Mapping[str, Any], moved: _Moved, child: str, parent: str, place: str) -> RigidTransform | None:
+    """Return parent_from_child: the frame's, else the one that always holds; None if that is not stated."""
+    for pair in ((child, parent), (parent, child)):
+        if pair in moved:
+            found = _stated(_part(moved[pair], "transform_src_to_dst"), place)
+            return found if found is None or pair[0] == child else found.inverse()
+    return _stated(_part(_part(_part(root, "coordinate_systems"), child), "pose_wrt_parent"), place)
+
+
+def _stated(pose: Mapping[str, Any], place: str) -> RigidTransform | None:
+    if "matrix4x4" in pose:
+        matrix = np.array(numbers(pose["matrix4x4"], 16, place)).reshape(4, 4)
+        return stated_pose(matrix[:3, :3], matrix[:3, 3].tolist(), place)
+    if "quaternion" in pose and "translation" in pose:
+        x, y, z, w = numbers(pose["quaternion"], 4, place)
+        return stated_pose(np.array([w, x, y, z]), numbers(pose["translation"], 3, place), place)
+    return None
 
 
 def _entries(found: Any, kind: str) -> list[Mapping[str, Any]]:
@@ -172,7 +225,7 @@ def _stamp(frame: Any, place: str) -> TimeNs | None:
     """Return the stamp of a frame: its own, else the one stream's."""
     properties = _part(frame, "frame_properties")
     stated = [properties.get("timestamp")]
-    for stream in _part(properties, "streams").values():
+    for stream in _streams(frame).values():
         sync = _part(_part(stream, "stream_properties"), "sync")
         stated.append(sync.get("timestamp"))
     written = next((one for one in stated if isinstance(one, str | int | float) and not isinstance(one, bool)), None)
@@ -184,9 +237,14 @@ def _stamp(frame: Any, place: str) -> TimeNs | None:
         return None
 
 
+def _streams(frame: Any) -> Mapping[str, Any]:
+    return _part(_part(frame, "frame_properties"), "streams")
+
+
 def _picture(frame: Any) -> str:
-    streams = _part(_part(frame, "frame_properties"), "streams").values()
-    uri = next((stream["uri"] for stream in streams if isinstance(stream, dict) and "uri" in stream), "")
+    uri = next(
+        (stream["uri"] for stream in _streams(frame).values() if isinstance(stream, dict) and "uri" in stream), ""
+    )
     return PurePosixPath(str(uri)).stem if uri else ""
 
 

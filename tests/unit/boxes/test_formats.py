@@ -275,6 +275,46 @@ def test_openlabel_cuboids_are_carried_to_the_camera_and_into_its_picture(tmp_pa
     assert (box.label, box.track, box.cuboid) == ("person", "obj-1", cuboid)
 
 
+@pytest.mark.parametrize("direction", ["vehicle to odom", "odom to vehicle"])
+def test_openlabel_cuboids_follow_the_vehicle_that_moves_from_frame_to_frame(tmp_path, direction):
+    """The object stands at (31, 1, 1) of the ground; the vehicle is at (20, 0, 0) in frame 0, at (26, 0, 0) in frame 1."""
+    content = openlabel()
+    root = content["openlabel"]
+    ahead = {"matrix4x4": [0, 0, 1, 1, -1, 0, 0, 0, 0, -1, 0, 2, 0, 0, 0, 1]}
+    root["coordinate_systems"] = {
+        "odom": {"parent": ""},
+        "vehicle": {"parent": "odom", "pose_wrt_parent": {"quaternion": [0, 0, 0, 1], "translation": [0, 0, 0]}},
+        "Camera": {"parent": "vehicle", "pose_wrt_parent": ahead},
+    }
+    cuboid = {"val": [31, 1, 1, 0, 0, 0, 1, 4, 2, 1.5], "coordinate_system": "odom"}
+    root["frames"]["0"]["objects"]["obj-1"]["object_data"]["cuboid"] = [cuboid]
+    root["frames"]["1"] = json.loads(json.dumps(root["frames"]["0"]))
+    source, target = direction.split(" to ")
+    sign = 1 if target == "odom" else -1
+    for number, way_m in (("0", 20), ("1", 26)):
+        pose = {"quaternion": [0, 0, 0, 1], "translation": [sign * way_m, 0, 0]}
+        moved = {"src": source, "dst": target, "transform_src_to_dst": pose}
+        root["frames"][number]["frame_properties"] = {"transforms": {"moved": moved}}
+
+    found = only_boxes(read(write(tmp_path, "moving.json", content)))
+    assert [found[number][0].cuboid.centre_camera_m for number in (0, 1)] == [
+        pytest.approx((-1, 1, 10)),
+        pytest.approx((-1, 1, 4)),
+    ]
+
+    for number in ("0", "1"):
+        del root["frames"][number]["objects"]["obj-1"]["object_data"]["bbox"]
+    del root["frames"]["1"]["frame_properties"]
+    root["streams"] = {"Camera": {"stream_properties": {"intrinsics_pinhole": {"width_px": 640, "height_px": 480}}}}
+    lens = root["streams"]["Camera"]["stream_properties"]["intrinsics_pinhole"]
+    lens["camera_matrix_3x4"] = [500, 0, 320, 0, 0, 500, 240, 0, 0, 0, 1, 0]
+    with pytest.raises(InputError, match=r"frames\.1\..* does not state the poses in this frame"):
+        read(write(tmp_path, "one frame.json", content))
+    root["frames"]["0"]["frame_properties"]["transforms"]["moved"] |= {"src": "odom", "dst": "Camera"}
+    with pytest.raises(InputError, match="a transform leads from odom to Camera"):
+        read(write(tmp_path, "past a parent.json", content))
+
+
 def nuscenes(folder: Path, **changed: Any) -> Path:
     """Write the tables of one keyframe of two cameras, with one car 10 m ahead of the vehicle, which drives north at (5, 50)."""
     poses = {"translation": [1, 0, 2], "rotation": [0.5, -0.5, 0.5, -0.5]}
@@ -328,6 +368,8 @@ def test_nuscenes_cuboids_are_carried_from_the_map_into_the_pictures_of_the_reco
         ({"instance": []}, "names a row of instance.json that is not there"),
         ({"ego_pose": [{"token": "e", "translation": [5, 50, 0], "rotation": [0, 0, 0, 0]}]}, "not a rotation"),
         ({"calibrated_sensor": [{"token": "c", "translation": [0] * 3, "rotation": [1, 0, 0, 0]}]}, "camera_intrinsic"),
+        ({"ego_pose": [{"token": "e"}, 7]}, "something else after 1 of them"),
+        ({"ego_pose": [{"token": 7}]}, "a list of rows with a token each"),
         ({"sample_data": []}, "none of its 0 pictures of keyframes is a recorded frame"),
     ],
 )
@@ -335,6 +377,22 @@ def test_nuscenes_tables_that_do_not_fit_are_refused(tmp_path, changed, words):
     names = [f"n__CAM_FRONT__{time // 1000}" for time in TIMES]
     with pytest.raises(InputError, match=words):
         read_boxes(nuscenes(tmp_path, **changed), image_times=TIMES, image_size_px=SIZE, image_names=names)
+
+
+def test_nuscenes_tables_of_the_whole_set_are_read_row_by_row(tmp_path):
+    """Rows end anywhere in the pieces that are read, braces and brackets in texts are texts, and a cut table is refused."""
+    folder = nuscenes(tmp_path)
+    poses = folder / "v1.0-mini" / "ego_pose.json"
+    wanted = json.loads(poses.read_text())
+    rows = [{"token": f"{place}]}}{{[", "rotation": [1.0, 0.0, 0.0, 0.0]} for place in range(40_000)]
+    poses.write_text(json.dumps([*rows, *wanted], indent=0))
+    names = [f"n__CAM_FRONT__{time // 1000}" for time in TIMES]
+    assert poses.stat().st_size > 2 << 20
+    assert len(only_boxes(read_boxes(folder, image_times=TIMES, image_size_px=SIZE, image_names=names))[2]) == 1
+
+    poses.write_text(poses.read_text()[:-40])
+    with pytest.raises(InputError, match="something else after 40,000 of them"):
+        read_boxes(folder, image_times=TIMES, image_size_px=SIZE, image_names=names)
 
 
 def test_one_table_of_nuscenes_alone_says_to_give_its_folder(tmp_path):
