@@ -429,9 +429,14 @@ def open_recording(
         if file is not None:
             options, file = file.fitting(options, {c.topic for one in sources for c in one.channels}, require)
         return Recording(chosen, sources, _assembled(chosen, sources, options, require), options.video_start, file)
-    except BaseException:
+    except BaseException as error:
         for source in sources:
             source.close()
+        if isinstance(error, OSError):
+            where = error.filename or ", ".join(map(str, chosen))
+            raise RecordingError(
+                f"{where}: cannot be read: {error.strerror or error}; check it and its rights"
+            ) from None
         raise
 
 

@@ -121,9 +121,9 @@ def _with_cuboid(
     if not isinstance(values, list) or len(values) not in (9, 10):
         raise InputError(f"{place}.cuboid.val: expected 9 or 10 numbers; correct it")
     where = numbers(values, len(values), f"{place}.cuboid.val")
-    camera_from_system = _pose(root, moved, camera, str(system), place)
+    camera_from_source = _pose(root, moved, camera, str(system), place)
     lens = _lens(_part(root, "streams").get(camera))
-    if camera_from_system is None or not (own or lens):
+    if camera_from_source is None or not (own or lens):
         if own:
             return own
         raise InputError(
@@ -132,7 +132,7 @@ def _with_cuboid(
         )
     turn = where[3:-3]
     rotation = np.array([turn[3], *turn[:3]]) if len(turn) == 4 else rotation_from_euler(*turn)
-    camera_from_object = camera_from_system @ stated_pose(rotation, where[:3], place)
+    camera_from_object = camera_from_source @ stated_pose(rotation, where[:3], place)
     if own:
         return [replace(box, cuboid=cuboid_of(camera_from_object, where[-3:])) for box in own]
     rows = numbers(lens.get("camera_matrix_3x4"), 12, f"{place}: camera_matrix_3x4")
@@ -146,7 +146,7 @@ def _with_cuboid(
 
 
 def _pose(root: Mapping[str, Any], moved: _Moved, camera: str, system: str, place: str) -> RigidTransform | None:
-    """Return camera_from_system; None if the file does not state it.
+    """Return the pose of a coordinate system in the camera's; None if the file does not state it.
 
     Raises:
         InputError: a frame's transform leads past a parent, so that the poses of systems may be stated twice.

@@ -1,5 +1,6 @@
 """Look at JPEG and PNG files without decoding them: whether they are whole, their size, and repairs that change no pixel."""
 
+import os
 import struct
 import zlib
 from collections.abc import Iterator
@@ -49,6 +50,17 @@ def repaired_jpeg(data: bytes) -> tuple[bytes, int, int]:
 def has_end(data: bytes) -> bool:
     """Return whether a JPEG ends with its end marker, or shortly before its end: some cameras pad with zeros."""
     return _END in data[-1024:]
+
+
+def is_cut_off(path: Path) -> bool:
+    """Return whether a file is a JPEG without its end; its beginning can be decoded."""
+    try:
+        with path.open("rb") as file:
+            is_jpeg = file.read(len(JPEG_MAGIC)) == JPEG_MAGIC
+            file.seek(-min(path.stat().st_size, 1024), os.SEEK_END)
+            return is_jpeg and not has_end(file.read())
+    except OSError:
+        return False
 
 
 def _segments(data: bytes) -> Iterator[tuple[int, int, int]]:

@@ -131,9 +131,9 @@ def stamp_files(
     """
     files, options = sorted(files), options or PlainOptions()
     own = set(files)
-    tables = [path for path in (*sorted(folder.glob("*.csv")), *sorted(folder.glob("*.txt"))) if path not in own]
+    inside = (*sorted(folder.glob("*.csv")), *sorted(folder.glob("*.txt")))
     beside = (folder.with_suffix(".csv"), folder.parent / "timestamps.txt", folder.with_suffix(".txt"))
-    for table in [*tables, *(path for path in beside if path.is_file() and path not in own)]:
+    for table in (path for path in (*inside, *beside) if path.is_file() and path not in own):
         times, zoneless = _from_table(table, files, options.zone_s)
         if times:
             return _stamped(folder, files, times, zoneless=zoneless, times_from=f"those in {table.name}")

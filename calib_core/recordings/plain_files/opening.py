@@ -1,7 +1,7 @@
 """Open folders of pictures and radar files, tables and videos, with or without ROS recordings; what is not used is named."""
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -276,7 +276,7 @@ def contents_of(folder: Path, options: PlainOptions) -> Contents:
         kinds = _kinds(entries)
         contents = Contents()
         if kinds:
-            contents.refused += _no_files(entry for entry in entries if not entry.is_dir())
+            contents.refused += _no_files([entry for entry in entries if not entry.is_dir()])
             contents.sources.append((folder, _one_kind(folder, kinds)))
             _add_radar_tables(entries, contents, options)
             below_pictures = "a folder below pictures or radar files; open it by its own path"
@@ -299,9 +299,11 @@ def _kind(file: Path) -> str:
     return "pictures" if suffix in PICTURE_SUFFIXES else suffix if suffix in (".pcd", ".bin") else ""
 
 
-def _no_files(entries: Iterable[Path]) -> list[tuple[Path, str]]:
-    """Name what has the name of a picture or a scan and is no file, so that it is not lost in silence."""
-    return [(one, "a broken link, a pipe or a folder") for one in entries if _kind(one) and not one.is_file()]
+def _no_files(entries: Sequence[Path]) -> list[tuple[Path, str]]:
+    """Name what has the name of a picture, a scan or a table and is no file, so that it is not lost in silence."""
+    what = "a broken link, a pipe or a folder"
+    tables = [one for one in entries if one.suffix.lower() in TABLE_SUFFIXES and not one.is_dir()]
+    return [(one, what) for one in (*filter(_kind, entries), *tables) if not one.is_file()]
 
 
 def _kinds(entries: Sequence[Path]) -> dict[str, list[Path]]:

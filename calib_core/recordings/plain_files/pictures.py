@@ -7,7 +7,14 @@ import numpy as np
 
 from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import DataWarning, TimeNs
-from calib_core.recordings.camera.jpeg import JPEG_MAGIC, PNG_MAGIC, picture_fault, picture_size_px, png_fault
+from calib_core.recordings.camera.jpeg import (
+    JPEG_MAGIC,
+    PNG_MAGIC,
+    is_cut_off,
+    picture_fault,
+    picture_size_px,
+    png_fault,
+)
 from calib_core.recordings.plain_files.file_stamps import stamp_files
 from calib_core.recordings.plain_files.folder_cameras import FolderCamera, camera_beside
 from calib_core.recordings.plain_files.source import (
@@ -59,7 +66,7 @@ def open_picture_folder(
         picture_channel(topic),
         stamped.times_ns,
         message,
-        (*_about_faults(folder, faults, len(files)), *stamped.warnings),
+        (*_about_faults(folder, faults, len(files)), *_about_ends(folder, sound), *stamped.warnings),
         assumptions=stamped.assumptions(topic),
         zoneless=stamped.zoneless,
         counted=stamped.counted,
@@ -84,6 +91,14 @@ def _about_faults(folder: Path, faults: Mapping[Path, str], count: int) -> tuple
     file, fault = next(iter(faults.items()))
     what = f"{len(faults)} of {count} pictures in {folder.name} cannot be read and are skipped; the first: {file.name} {fault}"
     return (DataWarning("unreadable-pictures", what, "copy them again from their source if they matter"),)
+
+
+def _about_ends(folder: Path, files: Sequence[Path]) -> tuple[DataWarning, ...]:
+    cut = [file.name for file in files if is_cut_off(file)]
+    if not 0 < len(cut) <= len(files) / 2:  # some cameras never write the end
+        return ()
+    what = f"{len(cut)} of {len(files)} pictures in {folder.name} are cut off, and grey below; the first: {cut[0]}"
+    return (DataWarning("unreadable-pictures", what, "copy them again from their source; click nothing in them"),)
 
 
 def _calibration_words(camera: FolderCamera | None) -> str:

@@ -707,6 +707,34 @@ def test_a_picture_that_is_no_file_is_named(tmp_path):
     assert f"{START_NS + 9}.png (a broken link, a pipe or a folder)" in warning.message
 
 
+def test_a_table_that_is_a_broken_link_is_named_and_one_that_cannot_be_read_is_an_error_of_ours(tmp_path, monkeypatch):
+    for number in range(3):
+        (tmp_path / f"{START_NS + number}.csv").write_text("x_m,y_m\n3,1\n")
+    (tmp_path / f"{START_NS + 9}.csv").symlink_to(tmp_path / "nowhere")
+    with inspect_recording(tmp_path) as recording:
+        assert len(recording.radar_scans()) == 3
+        (warning,) = (one for one in recording.warnings if one.code == "unused-files")
+    assert f"{START_NS + 9}.csv (a broken link, a pipe or a folder)" in warning.message
+
+    def refused(path: Path, *_: object, **__: object) -> str:
+        raise PermissionError(13, "Permission denied", str(path))
+
+    monkeypatch.setattr(Path, "open", refused)
+    with pytest.raises(RecordingError, match="cannot be read: Permission denied"):
+        inspect_recording(tmp_path)
+
+
+def test_a_cut_off_jpeg_is_told_and_shown(tmp_path):
+    for number in range(3):
+        picture(tmp_path / "camera" / f"{START_NS + number}.jpg", (64, 64))
+    cut = tmp_path / "camera" / f"{START_NS + 1}.jpg"
+    cut.write_bytes(cut.read_bytes()[:-20])
+    with inspect_recording(tmp_path / "camera") as recording:
+        assert len(recording.image_times) == 3
+        (warning,) = (one for one in recording.warnings if one.code == "unreadable-pictures")
+    assert f"1 of 3 pictures in camera are cut off, and grey below; the first: {cut.name}" in warning.message
+
+
 def test_a_long_list_of_unused_files_is_cut(tmp_path):
     picture(tmp_path / "camera" / f"{START_NS}.png", (8, 8))
     for number in range(20):
