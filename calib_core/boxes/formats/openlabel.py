@@ -165,13 +165,13 @@ def _pose(root: Mapping[str, Any], moved: _Moved, camera: str, system: str, plac
         return None
     poses = []
     for above in (above_camera, above_system):
-        shared_from_own = RigidTransform.identity()
+        pose = RigidTransform.identity()
         for child, parent in itertools.pairwise(above[: above.index(shared) + 1]):
             parent_from_child = _link(root, moved, child, parent, f"{place}: pose of {child}")
             if parent_from_child is None:
                 return None
-            shared_from_own = parent_from_child @ shared_from_own
-        poses.append(shared_from_own)
+            pose = parent_from_child @ pose
+        poses.append(pose)
     return poses[0].inverse() @ poses[1]
 
 
