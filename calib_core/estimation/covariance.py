@@ -75,8 +75,6 @@ def pose_covariance(
 
         I = sum w J^T J - sum w (1 - w) g g^T,   g = J^T e   (whitened).
 
-    A measured camera position that is farther away contributes less, too, by 2 g g^T / (nu - 2).
-
     Args:
         refined: the fit.
         radar: priors of the mounting of a radar that measures no elevation; None takes the defaults.
@@ -87,9 +85,8 @@ def pose_covariance(
     gradients = (np.swapaxes(refined.model.jacobian, 1, 2) @ refined.model.residual[:, :, None])[:, :, 0]
     weight_variance = refined.weights * (1.0 - refined.weights)
     lost = (gradients * weight_variance[:, None]).T @ gradients
-    residuals, priors = prior_rows(refined.measurements, refined.camera_from_radar)
-    pull, prior = priors[:3].T @ residuals[:3], refined.measurements.prior
-    information = _floored(plain, lost + 2.0 * prior.tail * np.outer(pull, pull))
+    priors = prior_rows(refined.measurements, refined.camera_from_radar)[1]
+    information = _floored(plain, lost)
     prior_information = priors.T @ priors
     independent = symmetric_inverse(information)
     spread = pose_spread(refined, plain) if smooth else None
