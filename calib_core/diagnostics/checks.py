@@ -14,7 +14,7 @@ from calib_core.diagnostics.pose import agreeing_outliers, camera_position, poss
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.diagnostics.uncertainty_map import picture_sigma_px
 from calib_core.estimation.beyond_the_fit import NARROW_CONDITION
-from calib_core.estimation.covariance import PoseCovariance
+from calib_core.estimation.covariance import PoseCovariance, symmetric_inverse
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.plausibility import PIXELS_SUSPECTED, implausible_input
 from calib_core.options import RadarOptions
@@ -30,7 +30,13 @@ _NOTABLE_GROWTH = 2.5
 _FEW_INLIERS = 8
 _MANY_PLACES = 500  # of more, neighbours come from a tree: all distances would take too long
 _UNCLEAR = ("two-poses", "camera-far-away", "handedness-open", "many-outliers", "agreeing-outliers", "doubtful-pair")
-_TOLD_BY_MORE = ("handedness-assumed", "weak-geometry", "one-pair-decides", "uncertain-association")
+_TOLD_BY_MORE = (
+    "handedness-assumed",
+    "weak-geometry",
+    "one-pair-decides",
+    "uncertain-association",
+    "radar-errors-suspected",
+)
 _FOLLOWS_FROM_PIXELS = {"mirrored-axes", "handedness-open", "handedness-assumed", "intrinsics-suspected"}
 
 
@@ -96,8 +102,11 @@ def _wrong_lens(fit: SolvedFit) -> list[DataWarning]:
 
 
 def _systematic_errors(fit: SolvedFit) -> list[DataWarning]:
-    errors, prior = fit.uncertainty.systematic_errors, fit.measurements.prior
-    return systematic_error_warnings(errors, flat=fit.measurements.flat, measured=prior.measured)
+    variances = np.diag(symmetric_inverse(fit.uncertainty.information))[6:].tolist()
+    estimated = zip(fit.refined.measurements.errors.estimated, variances, strict=True)
+    by_fit = {error.name: variance**0.5 for error, variance in estimated if error.of_radar}
+    errors, measured = fit.uncertainty.systematic_errors, fit.measurements.prior.measured
+    return systematic_error_warnings(errors, by_fit, flat=fit.measurements.flat, measured=measured)
 
 
 def _flat_radar(fit: SolvedFit) -> list[DataWarning]:

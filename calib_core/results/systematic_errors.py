@@ -20,7 +20,7 @@ comes out too large. A new error is one more entry of `systematic_errors`, and o
 what is known of it (`SystematicErrorResult`); `dominant_errors` and `systematic_error_warnings` say what to do about it.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -807,25 +807,48 @@ def _value_text(error: SystematicErrorResult) -> str:
 
 _CLEAR_SIGMAS = 3.0
 _NOTABLE_SCALE = 0.015
+_LEAST_TOLD = 1e-4  # share of the prior variance that the pairs must take away for their own estimate
 _SCALES = ("azimuth_scale", "elevation_scale")
 
 
 def systematic_error_warnings(
-    errors: Sequence[SystematicErrorResult], *, flat: bool, measured: bool
+    errors: Sequence[SystematicErrorResult], by_fit: Mapping[str, float], *, flat: bool, measured: bool
 ) -> list[DataWarning]:
-    """Warn of scaled angles that the pairs clearly show, with what would look the same.
+    """Warn of what the pairs say of the radar and no prior allows, and of scaled angles that they clearly show.
+
+    An error that the pairs alone put at a, known to s, contradicts its prior p if |a| > 3 sqrt(s^2 + p^2).
 
     Args:
         errors: all that the pairs share, with what is known of them.
+        by_fit: their standard deviations as the fit leaves them, of the radar's estimated errors.
         flat: whether the radar does not measure elevation.
         measured: whether the camera position was measured, so that its error is one of the causes.
     """
     tape = "; so would a camera that is not where it was measured" if measured else ""
-    return [
+    beyond = {
+        one.name: _beyond_its_prior(one, *alone)
+        for one in errors
+        if one.name in by_fit
+        and (alone := _by_pairs_alone(one, by_fit[one.name]))[0] > _BEYOND * np.hypot(alone[1], one.prior_sigma)
+    }
+    scales = [
         _azimuth_scale(one, tape, flat=flat) if one.name == "azimuth_scale" else _elevation_scale(one, tape)
         for one in errors
-        if one.name in _SCALES and _is_clear(one) and abs(one.value) > _NOTABLE_SCALE
+        if one.name in _SCALES and one.name not in beyond and _is_clear(one) and abs(one.value) > _NOTABLE_SCALE
     ]
+    return [*beyond.values(), *scales]
+
+
+def _beyond_its_prior(one: SystematicErrorResult, size: float, sigma: float) -> DataWarning:
+    words = error_words(one.name)
+    found = _value_text(replace(one, value=float(np.copysign(size, one.value)), sigma=sigma))
+    prior = f"± {_two_digits(words.factor * one.prior_sigma)} {words.unit}"
+    return DataWarning(
+        "radar-errors-suspected",
+        f"the pairs put {words.text} at {found}, where {prior} is assumed",
+        "check that each pair has the reflector's return, not one of what stands behind it, and that the intrinsics belong to "
+        "this picture; if the radar is off by so much, give the error a larger sigma among the options",
+    )
 
 
 def _is_clear(one: SystematicErrorResult) -> bool:
@@ -855,12 +878,12 @@ def _elevation_scale(one: SystematicErrorResult, tape: str) -> DataWarning:
     )
 
 
-def _by_pairs_alone(one: SystematicErrorResult) -> tuple[float, float]:
-    """Return size and standard deviation of an error without its prior, which draws the estimate towards 0."""
-    share = 1.0 - min(one.sigma / one.prior_sigma, 0.99) ** 2
-    return abs(one.value) / share, one.sigma / float(np.sqrt(share))
+def _by_pairs_alone(one: SystematicErrorResult, known: float) -> tuple[float, float]:
+    """Return size and standard deviation of an error without its prior, which draws it to 0; `known` is with the prior."""
+    share = max(1.0 - (known / one.prior_sigma) ** 2, _LEAST_TOLD)
+    return abs(one.value) / share, known / float(np.sqrt(share))
 
 
 def _percent(one: SystematicErrorResult) -> str:
-    value, sigma = _by_pairs_alone(one)
+    value, sigma = _by_pairs_alone(one, one.sigma)
     return f"{100.0 * value:.1f} ± {100.0 * sigma:.1f} %"

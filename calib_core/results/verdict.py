@@ -13,6 +13,7 @@ import numpy as np
 from calib_core.geometry import skew
 from calib_core.measurements import DataWarning, Unsolvable
 from calib_core.results.calibration import Calibration, NextPlacement
+from calib_core.results.systematic_errors import PRIOR_WIDTH_PX
 
 _BEYOND = 0.05 / 3.0  # rotation, position and picture hold together, so each may fail in a third of the 5 %
 _LEAST_FREEDOM, _MOST_FREEDOM = 0.5, 1e5
@@ -220,7 +221,16 @@ def _assumption(calibration: Calibration) -> str:
     mirrored = any(warning.code == _NOT_MIRRORED for warning in calibration.warnings)
     sides = "no radar axis is mirrored, " if mirrored else ""
     heights = f"{whose} elevations are right and " if calibration.sees_elevation else ""
-    return f"{first}, {sides}{heights}the picture is not cropped"
+    return f"{first}, {sides}{heights}{_centre_assumed(calibration)}"
+
+
+def _centre_assumed(calibration: Calibration) -> str:
+    """Return what is assumed of the principal point: the rotation absorbs its error, so that no pair shows it."""
+    given, sigma_px = calibration.given_camera or calibration.camera, calibration.options.lens.principal_point_sigma_px
+    if given.covariance is not None or not sigma_px:
+        return "the picture is not cropped"
+    within_px = 2.0 * sigma_px * given.width_px / PRIOR_WIDTH_PX
+    return f"the principal point is right to {within_px:.2g} px (of a cropped picture it is not)"
 
 
 def _alone_cm(calibration: Calibration) -> float:
@@ -354,6 +364,7 @@ _CODES: dict[Consequence, tuple[str, ...]] = {
         "swapped-parts",  # likewise
         "many-outliers",
         "intrinsics-suspected",
+        "radar-errors-suspected",
         "clock-bias-suspected",
         "radar-axes-suspected",
         "repeated-placements",
