@@ -35,7 +35,7 @@ _TOLD_BY_MORE = (
     "weak-geometry",
     "one-pair-decides",
     "uncertain-association",
-    "radar-errors-suspected",
+    "shared-error-suspected",
 )
 _FOLLOWS_FROM_PIXELS = {"mirrored-axes", "handedness-open", "handedness-assumed", "intrinsics-suspected"}
 
@@ -102,11 +102,16 @@ def _wrong_lens(fit: SolvedFit) -> list[DataWarning]:
 
 
 def _systematic_errors(fit: SolvedFit) -> list[DataWarning]:
+    errors, shared = fit.uncertainty.systematic_errors, fit.refined.measurements.errors
     variances = np.diag(symmetric_inverse(fit.uncertainty.information))[6:].tolist()
-    estimated = zip(fit.refined.measurements.errors.estimated, variances, strict=True)
-    by_fit = {error.name: variance**0.5 for error, variance in estimated if error.of_radar}
-    errors, measured = fit.uncertainty.systematic_errors, fit.measurements.prior.measured
-    return systematic_error_warnings(errors, by_fit, flat=fit.measurements.flat, measured=measured)
+    by_fit = {
+        error.name: variance**0.5 for error, variance in zip(shared.estimated, variances, strict=True) if error.of_radar
+    }
+    if fit.uncertainty.growth == 1.0:  # smooth errors of the radar would pass for these
+        by_fit |= {one.name: one.sigma for one in errors if one.name.startswith(("click_", "range_scale"))}
+    return systematic_error_warnings(
+        errors, by_fit, flat=fit.measurements.flat, measured=fit.measurements.prior.measured
+    )
 
 
 def _flat_radar(fit: SolvedFit) -> list[DataWarning]:

@@ -814,22 +814,20 @@ _SCALES = ("azimuth_scale", "elevation_scale")
 def systematic_error_warnings(
     errors: Sequence[SystematicErrorResult], by_fit: Mapping[str, float], *, flat: bool, measured: bool
 ) -> list[DataWarning]:
-    """Warn of what the pairs say of the radar and no prior allows, and of scaled angles that they clearly show.
-
-    An error that the pairs alone put at a, known to s, contradicts its prior p if |a| > 3 sqrt(s^2 + p^2).
+    """Warn of errors that the pairs put where their priors do not allow them, and of scaled angles that they clearly show.
 
     Args:
         errors: all that the pairs share, with what is known of them.
-        by_fit: their standard deviations as the fit leaves them, of the radar's estimated errors.
+        by_fit: of those that are compared with their priors, the standard deviations that independent noise leaves them.
         flat: whether the radar does not measure elevation.
         measured: whether the camera position was measured, so that its error is one of the causes.
     """
     tape = "; so would a camera that is not where it was measured" if measured else ""
+    alone = {one.name: (one, *_by_pairs_alone(one, by_fit[one.name])) for one in errors if one.name in by_fit}
     beyond = {
-        one.name: _beyond_its_prior(one, *alone)
-        for one in errors
-        if one.name in by_fit
-        and (alone := _by_pairs_alone(one, by_fit[one.name]))[0] > _BEYOND * np.hypot(alone[1], one.prior_sigma)
+        name: _beyond_its_prior(one, size, sigma)
+        for name, (one, size, sigma) in alone.items()
+        if size > _BEYOND * np.hypot(sigma, one.prior_sigma)
     }
     scales = [
         _azimuth_scale(one, tape, flat=flat) if one.name == "azimuth_scale" else _elevation_scale(one, tape)
@@ -842,12 +840,11 @@ def systematic_error_warnings(
 def _beyond_its_prior(one: SystematicErrorResult, size: float, sigma: float) -> DataWarning:
     words = error_words(one.name)
     found = _value_text(replace(one, value=float(np.copysign(size, one.value)), sigma=sigma))
-    prior = f"± {_two_digits(words.factor * one.prior_sigma)} {words.unit}"
     return DataWarning(
-        "radar-errors-suspected",
-        f"the pairs put {words.text} at {found}, where {prior} is assumed",
-        "check that each pair has the reflector's return, not one of what stands behind it, and that the intrinsics belong to "
-        "this picture; if the radar is off by so much, give the error a larger sigma among the options",
+        "shared-error-suspected",
+        f"{words.text}: {found} by the pairs, where ± {_two_digits(words.factor * one.prior_sigma)} {words.unit} is assumed",
+        "check that each pair has the reflector's return, not one of what stands behind it, and that the intrinsics are of this "
+        "very picture, uncropped; if the error is really so large, give it a larger sigma among the options",
     )
 
 
@@ -878,10 +875,15 @@ def _elevation_scale(one: SystematicErrorResult, tape: str) -> DataWarning:
     )
 
 
-def _by_pairs_alone(one: SystematicErrorResult, known: float) -> tuple[float, float]:
-    """Return size and standard deviation of an error without its prior, which draws it to 0; `known` is with the prior."""
-    share = max(1.0 - (known / one.prior_sigma) ** 2, _LEAST_TOLD)
-    return abs(one.value) / share, known / float(np.sqrt(share))
+def _by_pairs_alone(one: SystematicErrorResult, by_fit: float) -> tuple[float, float]:
+    """Return size and standard deviation of an error without its prior, which draws the estimate to 0.
+
+    With p the prior and s what independent noise leaves of it, the estimate is k = 1 - s^2 / p^2 times that of the pairs alone,
+    so that with their variance v, smooth errors included, its own is v k^2 + (1 - k)^2 p^2.
+    """
+    prior, share = one.prior_sigma, max(1.0 - (by_fit / one.prior_sigma) ** 2, _LEAST_TOLD)
+    variance = one.sigma**2 - ((1.0 - share) * prior) ** 2
+    return abs(one.value) / share, float(np.sqrt(max(variance, 0.0))) / share
 
 
 def _percent(one: SystematicErrorResult) -> str:

@@ -364,7 +364,7 @@ _CODES: dict[Consequence, tuple[str, ...]] = {
         "swapped-parts",  # likewise
         "many-outliers",
         "intrinsics-suspected",
-        "radar-errors-suspected",
+        "shared-error-suspected",
         "clock-bias-suspected",
         "radar-axes-suspected",
         "repeated-placements",
