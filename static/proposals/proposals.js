@@ -127,12 +127,13 @@ const samePlace = (one, other) => other !== undefined && Math.hypot(one.pixel_px
 /** Whether a placement still waits for a decision. @param {number} placement */
 const isOpen = (placement) => !sent.has(placement) && state.placements[placement] !== undefined && isOffered(state.placements[placement]);
 
-/** The proposals that wait for a decision, the most confident first. @returns {Row[]} */
+/** The proposals that wait for a decision: the sure ones as their placements follow each other, then the others, the most confident first. @returns {Row[]} */
 export function openProposals() {
   if (!state.proposals?.on) return [];
   const rows = state.proposals.rows;
   const kept = [...known.values()].filter((row) => !rows.includes(row));
-  return [...rows, ...kept].filter((row) => isOpen(row.placement));
+  const turn = (/** @type {Row} */ row) => (row.confidence > SURE ? row.placement : state.placements.length);
+  return [...rows, ...kept].filter((row) => isOpen(row.placement)).sort((one, other) => turn(one) - turn(other));
 }
 
 /** How sure the proposals are that wait for a decision, by the number of their placement. @returns {Map<number, number>} */
@@ -149,7 +150,7 @@ export function shownOffer() {
   return { row, place: row.places[number], number, isOpen: taken.has(row.placement) };
 }
 
-/** Go to the proposal that is to be decided next. @returns {boolean} whether there is one */
+/** Go to the proposal that is to be decided next; one on screen that was not decided waits for the next round. @returns {boolean} whether there is one */
 export function nextProposal() {
   const here = shownOffer()?.row.placement;
   if (here !== undefined) skipped.add(here);

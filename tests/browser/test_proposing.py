@@ -135,7 +135,7 @@ def test_twenty_placements_take_at_most_25_keys_and_clicks(
     assert (first["mark"], first["sigma_px"]) == ("snapped", pytest.approx(0.4))
     assert violations(page) == []
 
-    count, accepted = 2, 1
+    count, accepted, order = 2, 1, []
     while (done := page.value("__cocalib.state.view.clicks.length")) < 20:
         page.until(f"{READY} && (({ON_SCREEN}) || !__cocalib.state.proposals.rows.length)")
         if page.value("__cocalib.shownOffer() === null"):
@@ -146,6 +146,8 @@ def test_twenty_placements_take_at_most_25_keys_and_clicks(
             count += 2
         elif off_px(page, pictures) < 3.0:
             assert left(page) <= 20 - done
+            offer = page.value("__cocalib.shownOffer().row")
+            order += [offer["placement"]] if offer["confidence"] > 0.9 else []
             page.page.keyboard.press("Enter")
             count, accepted = count + 1, accepted + 1
         else:
@@ -154,6 +156,7 @@ def test_twenty_placements_take_at_most_25_keys_and_clicks(
         page.until("__cocalib.unconfirmed() === 0")
     assert count <= 25
     assert accepted >= 18
+    assert order == [*sorted(order[:-1]), 0]  # that which N left undecided comes last
     page.settle()
     assert page.view["has_calibration"]
     assert page.value("__cocalib.shownOffer()") is None
