@@ -299,7 +299,7 @@ def _judged(calibration: Calibration, error: StatedError, warning: DataWarning |
         helpful = _most_helpful(calibration, left) if told is None or left else _capitalized(told.hint)
         return Verdict("coarse", f"{seen}; uncertain to {error.text}", helpful)
     if error.rotation_deg > USABLE_DEG or error.position_cm > USABLE_CM:
-        return Verdict("coarse", f"uncertain to {error.text}", _most_helpful(calibration, left))
+        return Verdict("coarse", only_large(error), _most_helpful(calibration, left))
     steady = not calibration.metrics.held_out_aed_px > HELD_OUT_RATIO * calibration.metrics.aed_px
     small = error.rotation_deg <= GOOD_DEG and error.position_cm <= GOOD_CM and steady
     if small and consequence == "note":
@@ -308,6 +308,11 @@ def _judged(calibration: Calibration, error: StatedError, warning: DataWarning |
         _capitalized(warning.hint) if small and warning is not None and not left else _most_helpful(calibration, left)
     )
     return Verdict("usable", error.text, f"{ALL_CLICKED}. {better}" if left == 0 else better)
+
+
+def only_large(error: StatedError) -> str:
+    """Return the reason of a coarse verdict if nothing but the size of the error keeps the calibration from being usable."""
+    return f"uncertain to {error.text}"
 
 
 def _click_the_rest(left: int) -> str:

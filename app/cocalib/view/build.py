@@ -18,7 +18,9 @@ from calib_core.results.verdict import (
     Verdict,
     by_consequence,
     consequence_of,
+    only_large,
     placement_words,
+    stated_error,
     verdict_on,
 )
 from cocalib.session import History, RecordingFacts, Session
@@ -280,19 +282,22 @@ def verdict_row(verdict: Verdict, session: Session, placements: Sequence[Placeme
         if verdict.level in ("good", "usable")
         else _early_line(session) or (left != 0 and _large_so_far(verdict, session))
     )
+    worst = _fits_worst(session) if early else ""
     return VerdictRow(
         level=verdict.level,
         line=with_degree_signs(early or verdict.line),
-        action=sentence(verdict.action),
+        action=f"Is the mark of {worst} on the inner corner?" if worst else sentence(verdict.action),
         assumes=f"Assuming {verdict.assumes}." if verdict.assumes else "",
-        key="N" if early and left else _key(verdict, session, left),
+        key="" if worst else "N" if early and left else _key(verdict, session, left),
         option=_option(verdict, session),
         done=_is_done(verdict),
-        early=bool(early),
+        early=bool(early) and not worst,
     )
 
 
 _MORE_PAIRS_DECIDE = ("few-pairs", "weak-geometry", "one-pair-decides", "two-poses", "handedness-open")
+_SUSPECT = 0.05
+"""A pair that is an outlier with more than this probability is worth a look while there are few: 4 of 100 sound sets have one."""
 
 
 def _early_line(session: Session) -> str:
@@ -311,17 +316,29 @@ def _early_line(session: Session) -> str:
     sound = all(pair.inlier for pair in used) and all(code in _MORE_PAIRS_DECIDE for code in grave)
     if not outcome.options.models_noise or len(used) >= SURE_PAIRS or not sound:
         return ""
+    worst = _fits_worst(session)
     seems = "two answers fit so far" if "two-poses" in grave else "looks consistent"
-    return f"{len(used)} of {SURE_PAIRS} pairs, {seems}"
+    return f"{len(used)} of {SURE_PAIRS} pairs, {f'{worst} fits worst' if worst else seems}"
 
 
 def _large_so_far(verdict: Verdict, session: Session) -> str:
     """Return how many pairs agree, and how large the error still is; "" if a pair does not agree, or something else is wrong."""
-    level, only_size, error = verdict.line.partition("uncertain to ")
-    if not isinstance(session.outcome, Calibration) or level != "coarse: " or not only_size:
+    outcome = session.outcome
+    if verdict.level != "coarse" or not isinstance(outcome, Calibration):
         return ""
-    pairs = [pair for pair in session.outcome.pairs if not pair.excluded]
-    return f"{len(pairs)} pairs agree: so far within {error}" if all(pair.inlier for pair in pairs) else ""
+    error = stated_error(outcome)
+    pairs = [pair for pair in outcome.pairs if not pair.excluded]
+    if verdict.reason != only_large(error) or not all(pair.inlier for pair in pairs):
+        return ""
+    worst = _fits_worst(session)
+    return f"{len(pairs)} pairs{f', {worst} fits worst' if worst else ' agree'}: so far within {error.text}"
+
+
+def _fits_worst(session: Session) -> str:
+    """Return the pair that may be an outlier although the few others cannot tell; "" if there is none."""
+    pairs = session.outcome.pairs if isinstance(session.outcome, Calibration) else ()
+    worst = max((pair for pair in pairs if pair.inlier), key=lambda pair: pair.outlier_probability, default=None)
+    return worst.id if worst is not None and worst.outlier_probability > _SUSPECT else ""
 
 
 def _is_done(verdict: Verdict) -> bool:

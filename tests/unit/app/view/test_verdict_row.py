@@ -8,10 +8,11 @@ import pytest
 from calib_core.association.placements import Placement
 from calib_core.measurements import DataWarning, ReflectorClick, TimeNs, Unpaired, Unsolvable
 from calib_core.options import CalibrationOptions, GatingOptions, NoiseOptions
-from calib_core.results.verdict import DONE, Verdict, verdict_on
+from calib_core.results.verdict import DONE, Verdict, only_large, stated_error, verdict_on
 from cocalib.session import ClickPlaced, History, PlacementDismissed, RecordingFacts, Session, advance
 from cocalib.view.build import placements_left, verdict_row
 from cocalib.view.click_rows import disagreement
+from cocalib.view.wording import with_degree_signs
 from tests.unit.app.view.test_view import FIVE, calibration, pair, shown
 
 FACTS = RecordingFacts("drive", 1_000_000_000 * np.arange(50), width_px=640, height_px=480)
@@ -79,16 +80,29 @@ def test_few_pairs_that_agree_are_counted_and_what_is_wrong_is_said(pairs, warni
 
 def test_an_error_that_is_large_for_want_of_pairs_is_no_alarm_while_placements_are_left() -> None:
     eight = tuple(pair(f"c{number}") for number in range(1, 9))
-    coarse = Verdict("coarse", "uncertain to 4 deg, 40 cm (95 %)", "Click the 3 placements that are left")
+    error = stated_error(calibration(*eight))
+    coarse = Verdict("coarse", only_large(error), "Click the 3 placements that are left")
     more = [placement(1), placement(11)]
     clicked = tuple(ReflectorClick(TimeNs(s * 10**9), f"c{s}", 1.0, 1.0) for s in (2, 12))
     odd = (*eight, pair("c9", inlier=False))
     agreeing, apart = (Session(clicks=clicked[:1], outcome=calibration(*some)) for some in (eight, odd))
     row = verdict_row(coarse, agreeing, more)
-    assert (row.early, row.line) == (True, "8 pairs agree: so far within 4°, 40 cm (95 %)")
+    assert (row.early, row.line) == (True, with_degree_signs(f"8 pairs agree: so far within {error.text}"))
     assert not verdict_row(coarse, apart, more).early
     assert not verdict_row(replace(coarse, reason=f"a warning; {coarse.reason}"), agreeing, more).early
     assert not verdict_row(coarse, replace(agreeing, clicks=clicked), more).early
+    doubted = replace(agreeing, outcome=calibration(*eight[:7], replace(eight[7], outlier_probability=0.1)))
+    row = verdict_row(coarse, doubted, more)
+    assert (row.early, row.key) == (False, "")
+    assert "c8 fits worst" in row.line
+    assert "c8" in row.action
+
+
+def test_of_few_pairs_the_one_that_fits_worst_is_named_in_a_colour() -> None:
+    doubted = calibration(*FIVE[:4], replace(FIVE[4], outlier_probability=0.1))
+    row = shown(5, doubted).verdict
+    assert (row.level, row.early, row.line) == ("coarse", False, f"5 of 8 pairs, {FIVE[4].id} fits worst")
+    assert FIVE[4].id in row.action
 
 
 @pytest.mark.parametrize(
