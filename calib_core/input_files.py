@@ -20,6 +20,7 @@ _BEGINNINGS = {
     ),
     b"PK": "an archive or a spreadsheet; unpack it, or save it as CSV",
     b"\x89PNG": "a picture",
+    b"\x93NUMPY": "an array of another shape; save camera_from_radar as a 4x4 array",
     b"\xff\xd8\xff": "a picture",
 }
 _USES = {
@@ -96,7 +97,8 @@ def read_input(path: Path, *, max_bytes: int, is_what: str, if_missing: str = ""
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}; check its permissions") from None
     if len(data) > max_bytes:
-        raise InputError(f"{path}: larger than {max_bytes >> 20} MB, too large for {is_what}; is it the right file?")
+        limit = f"{max_bytes >> 20} MB" if max_bytes >> 20 else f"{max_bytes >> 10} kB"
+        raise InputError(f"{path}: larger than {limit}, too large for {is_what}; is it the right file?")
     return data
 
 

@@ -45,7 +45,7 @@ _STAMP_BYTES = 12
 
 LOSSES = frozenset({
     "checksum", "damaged-file", "definitions-damaged", "file-left-out", "messages-missing", "missing-file", "not-closed",
-    "packed-file-damaged",
+    "packed-file-damaged", "unreadable-messages",
 })  # fmt: skip
 """The codes of warnings that a part of the recording is damaged or missing."""
 

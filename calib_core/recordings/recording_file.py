@@ -72,8 +72,10 @@ def with_recording_file(
         data = read_input(path, max_bytes=_MOST_BYTES, is_what=f"a {RECORDING_FILE}")
         stated = tomllib.loads(file_text(data))
         typed = msgspec.convert(stated, RecordingOptions)
-    except (InputError, tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
-        raise RecordingError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from None
+    except InputError as error:
+        raise RecordingError(str(error)) from None
+    except (UnicodeDecodeError, RecursionError, tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
+        raise RecordingError(f"{path}: {error}; correct it, or give --no-recording-file") from None
     if unknown := next((key for key in stated if key not in _KEYS), None):
         raise RecordingError(f"{path}: unknown key {unknown[:80]!r}; it may have {', '.join(_KEYS)}")
     unasked = RecordingOptions()

@@ -51,8 +51,8 @@ def lost_returns(lost: int, read: int, where: str) -> DataWarning:
     """
     return DataWarning(
         "lost-returns",
-        f"{lost} of {read} returns of {where} are lost ({100 * lost / read:.3g} %): their positions are not numbers, or their "
-        "messages hold more returns than they state",
+        f"{lost} of {read} returns of {where} are lost ({100 * lost / read:.3g} %): their positions are not numbers or no "
+        "ranges and angles, or their messages hold more returns than they state",
         "look for the fault in the radar's driver or in the program that wrote the recording; the reflector may be among them",
     )
 

@@ -284,13 +284,15 @@ def test_a_recording_toml_beside_the_recording_is_written_read_told_and_kept(coc
         ("x = 1", "unknown key 'x'; it may have radar_topic"),
         ("clock = 'wall'", "recording.toml: Invalid enum value 'wall'"),
         ("clock =", "recording.toml: Invalid value"),
+        ("map = " + "[" * 5000, "recording.toml: maximum recursion depth exceeded; correct it"),
+        ("clock = '\udcff'", "recording.toml: 'utf-8' codec can't decode byte 0xff"),
         ("radar_axes = 'forward,left,up'", "unknown key 'radar_axes'"),
         ("image_topic = '/none'", "no topic /none"),
     ],
 )
 def test_a_recording_toml_that_states_nothing_known_is_refused(cocalib, made, clicks_file, text, words):
     recording = made()
-    (recording.parent / "recording.toml").write_text(text)
+    (recording.parent / "recording.toml").write_bytes(text.encode(errors="surrogateescape"))
     answer = cocalib("solve", recording, "--clicks", clicks_file)
     assert answer.code == 2
     assert words in answer.err

@@ -174,3 +174,11 @@ def test_what_reading_the_boxes_took_for_granted_is_said(cocalib, folder, scene,
     assert f"warning: {notes[0]['message']}" in cocalib("evaluate", *where).out
     assert cocalib("evaluate", *where, "--report", tmp_path / "report.html").code in (0, 3)
     assert "boxes-note" in (tmp_path / "report.html").read_text()
+
+
+def test_what_is_damaged_is_told_of_every_recording_that_is_judged(cocalib, made, solved, clicks_file):
+    recording = made("cut")
+    recording.write_bytes(recording.read_bytes()[:-9])
+    answer = cocalib("evaluate", solved, recording, "--clicks", clicks_file)
+    assert answer.code == 0
+    assert "450 complete messages were recovered" in answer.err

@@ -121,10 +121,11 @@ def recorded_clicks(
 
 
 def tell_choices(recording: "Recording") -> None:
-    """Print to stderr which radar and which camera are used and why, where there are several."""
+    """Print to stderr which radar and which camera are used and why, where there are several, and what is damaged."""
     for what, choice in (("radar", recording.radar_choice), ("camera", recording.image_choice)):
         if choice:
             print(f"{what}: {choice}", file=sys.stderr)
+    _tell_notes([warning.message for warning in recording.damage])
 
 
 def _tell_notes(notes: Sequence[str]) -> None:

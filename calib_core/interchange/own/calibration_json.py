@@ -291,9 +291,12 @@ def _file(
     refuse_repeated_ids([pair.id for pair in document.pairs], source=source, place="pairs")
     check = document.check_point
     scale = document.noise_scale
+    covariance = np.array(document.covariance or np.full((6, 6), np.nan))
+    if (np.diagonal(covariance) < 0.0).any():
+        raise InputError(f"{source}: covariance: a variance on the diagonal is negative; solve the session again")
     calibration = Calibration(
         camera_from_radar=camera_from_radar,
-        covariance=np.array(document.covariance or np.full((6, 6), np.nan)),
+        covariance=covariance,
         camera=camera_of(document.camera, source=source),
         given_camera=_given_camera(document, source=source),
         metrics=document.metrics,

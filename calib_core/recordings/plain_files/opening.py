@@ -346,16 +346,23 @@ def _walk(folder: Path, contents: Contents, options: PlainOptions, depth: int) -
     for inner in folders:
         if inner.name.lower() in _CALIBRATIONS:
             continue  # read with the pictures beside it
-        single = _SUMS.sub("", inner.name)
-        if single != inner.name and (folder / single).is_dir():
-            contents.refused.append((inner, f"sums of several scans of {single}, which are used one by one"))
-            continue
-        if inner.name == "sweeps" and (folder / "samples").is_dir():
-            contents.refused.append((inner, "frames between the annotated ones; open its folders by their own paths"))
-        elif depth >= _DEPTH:
-            contents.refused.append((inner, "too many folders deep: give its path instead"))
+        reason = _unwalked(folder, inner, depth)
+        if reason:
+            contents.refused.append((inner, reason))
         else:
             _walk(inner, contents, options, depth + 1)
+
+
+def _unwalked(folder: Path, inner: Path, depth: int) -> str:
+    """Say why a folder in a data set is not looked into; "" if it is."""
+    if inner.is_symlink() and inner.resolve() in (folder.resolve(), *folder.resolve().parents):
+        return "a link to a folder above it"
+    single = _SUMS.sub("", inner.name)
+    if single != inner.name and (folder / single).is_dir():
+        return f"sums of several scans of {single}, which are used one by one"
+    if inner.name == "sweeps" and (folder / "samples").is_dir():
+        return "frames between the annotated ones; open its folders by their own paths"
+    return "too many folders deep: give its path instead" if depth >= _DEPTH else ""
 
 
 def _add_leaf(folder: Path, kinds: dict[str, list[Path]], contents: Contents) -> None:

@@ -50,9 +50,14 @@ class BinLayout:
         return f"{self.name} ({len(self.columns)} float32 a return: {' '.join(self.columns)})"
 
 
+def _ranges_m(points: np.ndarray) -> np.ndarray:
+    with np.errstate(all="ignore"):  # of what turns out to be no returns
+        return np.sqrt(sum(points[axis].astype(np.float64) ** 2 for axis in "xyz"))
+
+
 def _is_ahead(points: np.ndarray, *, amplitude: str) -> np.ndarray:
     """Return which returns lie ahead within a radar's reach, and have a speed and an amplitude that it can measure."""
-    range_m = np.sqrt(sum(points[axis].astype(np.float64) ** 2 for axis in "xyz"))
+    range_m = _ranges_m(points)
     sound = (points["x"] >= 0) & (range_m <= _FARTHEST_M) & (np.abs(points["v_r"]) <= _FASTEST_MPS)
     return np.asarray(sound & (np.abs(points[amplitude]) <= _LOUDEST_DB))
 
@@ -66,7 +71,7 @@ def _is_delft(points: np.ndarray) -> np.ndarray:
 
 def _is_tj4d(points: np.ndarray) -> np.ndarray:
     """Return which returns can be TJ4DRadSet's: the range is the length of the position, the angles are angles."""
-    range_m = np.sqrt(sum(points[axis].astype(np.float64) ** 2 for axis in "xyz"))
+    range_m = _ranges_m(points)
     angles = (np.abs(points["alpha"]) <= 180) & (np.abs(points["beta"]) <= 90)
     return _is_ahead(points, amplitude="power") & angles & (np.abs(points["range"] - range_m) <= 0.1 + 0.01 * range_m)
 
@@ -208,7 +213,7 @@ def points_of_pcd(path: Path) -> np.ndarray:
     """Read a scan in PCD version 0.7, binary or ascii.
 
     Raises:
-        MessageError: the header is damaged, the points are compressed, or there are fewer than the header says.
+        MessageError: the header is damaged, the points are compressed, or there are not as many as the header says.
     """
     data = _content(path)
     head, body = _head(path, data)
@@ -218,20 +223,20 @@ def points_of_pcd(path: Path) -> np.ndarray:
     if kind == "ascii":
         rows = body.decode("ascii", "replace").split()
         fields = len(dtype.names or ())
-        if len(rows) < count * fields or any(dtype[name].subdtype for name in dtype.names or ()):
+        if len(rows) != count * fields or any(dtype[name].subdtype for name in dtype.names or ()):
             raise MessageError(
                 f"{path.name} has {len(rows)} numbers, but {count * fields} are required: the file is damaged"
             )
-        return _table(path, rows[: count * fields], count, dtype)
+        return _table(path, rows, count, dtype)
     if kind != "binary":
         raise MessageError(
             f"{path.name} has '{kind}' data, but only binary and ascii are supported; "
             "convert it with pcl_convert_pcd_ascii_binary"
         )
-    if len(body) < count * dtype.itemsize:
-        raise MessageError(
-            f"{path.name} has {len(body)} bytes of points, but {count * dtype.itemsize} are required: the file is truncated"
-        )
+    size = count * dtype.itemsize
+    if len(body) < size or len(body) >= size + dtype.itemsize:
+        fault = "the file is truncated" if len(body) < size else "its header states too few points"
+        raise MessageError(f"{path.name} has {len(body)} bytes of points, but {size} are required: {fault}")
     return np.frombuffer(body, dtype=dtype, count=count)
 
 

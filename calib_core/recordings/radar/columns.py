@@ -197,6 +197,8 @@ def _position(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Points3:
         return position
     if plan.degrees:
         position[:, 1:] = np.radians(position[:, 1:])
+        position[(np.abs(position[:, 1:]) > 2 * np.pi).any(axis=1)] = np.nan
+    position[position[:, 0] < 0.0] = np.nan
     position[:, 1] *= plan.azimuth_sign
     return cartesian_from_polar(position)
 

@@ -245,13 +245,12 @@ def test_without_a_tape_its_part_is_not_written_and_of_other_methods_there_are_n
     assert read_calibration(papers).calibration.covariance_parts is None
 
 
-@pytest.mark.parametrize("part", ["systematic", "camera_position"])
+@pytest.mark.parametrize("part", ["covariance", "covariance_parts.systematic", "covariance_parts.camera_position"])
 def test_a_part_that_is_no_covariance_is_refused_by_its_name(part):
     document: dict[str, Any] = json.loads(calibration_text(calibration()))
-    document["covariance_parts"][part][2][2] = -1.0
-    with pytest.raises(
-        InputError, match=rf"file.json: covariance_parts.{part}: a variance on the diagonal is negative"
-    ):
+    whole, _, name = part.partition(".")
+    (document[whole][name] if name else document[whole])[2][2] = -1.0
+    with pytest.raises(InputError, match=rf"file.json: {part}: a variance on the diagonal is negative"):
         read_calibration(json.dumps(document), source="file.json")
 
 

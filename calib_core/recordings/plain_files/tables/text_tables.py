@@ -282,13 +282,15 @@ def _read_numbers(
     table: TextTable, places: Sequence[int], times: TimeReader | None, rows: Iterator[list[str]]
 ) -> TableRows:
     stamps, values = array("q"), array("d")  # eight bytes per number; a Python list would take forty
-    cells, comma = itemgetter(*places), table.decimal_comma
+    cells, comma, width = itemgetter(*places), table.decimal_comma, len(table.names)
     key = times.key if times else _no_time
     known, time = None, 0
     for number, row in enumerate(rows, start=table.skipped_lines + 1):
         if not row or (row[0][:1] in _SUSPECT and not _is_data(row)):
             continue
         try:
+            if len(row) > width and any(map(str.strip, row[width:])):
+                raise ValueError(f"{len(row)} values in {width} columns")
             if (text := key(row)) != known:
                 known, time = text, times.read(text) if times else 0
             written = cells(row)

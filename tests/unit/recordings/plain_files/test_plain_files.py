@@ -247,12 +247,13 @@ def test_an_ascii_pcd_is_read_and_a_compressed_one_is_explained(tmp_path):
     (folder / f"{START_NS + 10**8}.pcd").write_text(head + "binary_compressed\n")
     (folder / f"{START_NS + 2 * 10**8}.pcd").write_text(head + "binary\nshort")
     (folder / f"{START_NS + 3 * 10**8}.pcd").write_text("FIELDS x y z velocity\nSIZE 4\nDATA binary\n")
+    (folder / f"{START_NS + 4 * 10**8}.pcd").write_bytes((head + "binary\n").encode() + bytes(60))  # of three points
     with open_recording(folder, require=("radar",)) as recording:
         scans = recording.radar_scans()
         (warning,) = recording.warnings
     np.testing.assert_array_equal(scans.points_radar_m, [[1, 2, 3], [4, 5, 6]])
-    assert np.diff(scans.first_return).tolist() == [2, 0, 0, 0]
-    assert "3 radar messages could not be read" in warning.message
+    assert np.diff(scans.first_return).tolist() == [2, 0, 0, 0, 0]
+    assert "4 radar messages could not be read" in warning.message
     assert "'binary_compressed' data, but only binary and ascii are supported" in warning.message
 
 
@@ -350,6 +351,7 @@ def test_units_in_the_header_are_followed(tmp_path, header, row):
         ("time_ns,x_m,y_m\n", "the file has a header but no rows"),
         ("time_ns,x_m,y_m\n1,2,3\n2,two,3\n", "line 3: could not convert string to float: 'two'"),
         ("time_ns,x_m,y_m\n1,2\n", "line 2: too few columns"),
+        (f"time_ns,x_m,y_m\n{START_NS},1,5,2,25\n", "line 2: 5 values in 3 columns"),
         ("", "the file is empty"),
     ],
 )
@@ -694,6 +696,25 @@ def test_a_damaged_scan_of_a_folder_of_tables_is_refused_and_not_shortened_in_si
         (tmp_path / "radar" / f"{START_NS + number}.csv").write_bytes(b"x_m,y_m\n" + (end if number == 1 else b"3,1\n"))
     with pytest.raises(RecordingError, match=words), open_recording(tmp_path) as recording:
         recording.radar_scans()
+
+
+def test_ranges_and_angles_that_are_none_are_lost_and_counted(tmp_path):
+    rows = [f"{START_NS + place * 10**8},{range_m},{azimuth}" for place, (range_m, azimuth) in
+            enumerate([(5, 10), (-5, 10), (5, 900), (6, -30)])]  # fmt: skip
+    path = radar_csv(tmp_path / "a.csv", "\n".join(["time_ns,range_m,azimuth_deg", *rows]) + "\n")
+    with open_recording(path, require=("radar",)) as recording:
+        recording.radar_scans()
+        assert any("2 of 4 returns of the radar are lost" in one.message for one in recording.warnings)
+
+
+def test_a_link_to_a_folder_above_is_named_and_not_followed(tmp_path):
+    picture(tmp_path / "drive" / "camera" / f"{START_NS}.png", (8, 8))
+    radar_csv(tmp_path / "drive" / "radar.csv", f"time_ns,x_m,y_m\n{START_NS},3,1\n")
+    (tmp_path / "drive" / "again").symlink_to(tmp_path / "drive")
+    with open_recording(tmp_path / "drive") as recording:
+        (warning,) = (one for one in recording.warnings if one.code == "unused-files")
+        assert len(recording.sources) == 2
+    assert "again (a link to a folder above it)" in warning.message
 
 
 def test_a_picture_that_is_no_file_is_named(tmp_path):
