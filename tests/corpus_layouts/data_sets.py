@@ -71,7 +71,7 @@ def view_of_delft(folder: Path) -> Truth:
         for sensor in ("lidar", "radar", "radar_5frames"):
             (root / sensor / "training" / "calib" / f"{name}.txt").write_text(calibration)
         (root / "lidar" / "training" / "velodyne" / f"{name}.bin").write_bytes(
-            rng.normal(0, 9, (500, 4)).astype("<f4").tobytes()
+            (rng.normal(0, 9, (500, 4)) * [1, 1, 1, 0] + [0, 0, 0, 0.4]).astype("<f4").tobytes()
         )
         (root / "radar" / "training" / "velodyne" / f"{name}.bin").write_bytes(_delft(scans[number : number + 1]))
         (root / "lidar" / "training" / "label_2" / f"{name}.txt").write_text(_kitti_labels(scans[number], pose))
@@ -115,7 +115,7 @@ def kitti_raw_drive(folder: Path) -> Truth:
     for number in range(frames):
         (drive / "image_02" / "data" / f"{number:010d}.png").write_bytes(jpeg(number, ".png"))
         (drive / "velodyne_points" / "data" / f"{number:010d}.bin").write_bytes(
-            rng.normal(0, 9, (300, 4)).astype("<f4").tobytes()
+            (rng.normal(0, 9, (300, 4)) * [1, 1, 1, 0] + [0, 0, 0, 0.4]).astype("<f4").tobytes()
         )
     size = f"{WIDTH_PX:.6e} {HEIGHT_PX:.6e}"
     raw_size, raw = (

@@ -35,6 +35,7 @@ _TIME_NAME = re.compile(r"(?:time|timestamp|stamp|t)(?:[_ ]*[\[(]?\s*(ns|us|ms|s
 
 
 _STEP_NS = NS_PER_S // 10
+_LONGEST_STEP = 1000  # of numbers that count frames, not time
 
 
 _MAX_TABLE_BYTES = 1 << 28
@@ -144,7 +145,9 @@ def stamp_files(
     if matched is not None:
         return matched
     numbers = {file: number for file in files if (number := _number(file)) is not None}
-    if len(numbers) < len(files) or len(set(numbers.values())) < len(files):
+    steps = np.diff(sorted(numbers.values()))
+    counts = not len(steps) or (steps.min() > 0 and np.median(steps) <= _LONGEST_STEP)
+    if len(numbers) < len(files) or not counts:
         raise RecordingError(
             f"{folder}: no times in the file names ({files[0].name}); name the files by their time since 1970 "
             "(19 digits for ns, 16 us, 13 ms, 10 s), or add a CSV with the columns file,time_ns to the folder"

@@ -37,6 +37,9 @@ _FOLDERS: Mapping[str, _Opener] = {
 _MOST_NAMED = 6
 _DEPTH = 5
 _LIDAR = "lidar clouds, which this program does not use"
+_ARRAY_SUFFIXES = (".npy", ".npz", ".h5", ".hdf5", ".mat")
+_ECHOES = re.compile(r"radar|navtech|polar", re.I)
+_CAMERA = re.compile(r"cam|ima?ge?|rgb", re.I)
 _KNOWN_TABLES = re.compile(
     r"timestamps?|times?|calib.*|.*calibration.*|intrinsics|extrinsics|readme.*|licen[cs]e.*|notes.*", re.I
 )
@@ -371,6 +374,11 @@ def _add_leaf(folder: Path, kinds: dict[str, list[Path]], contents: Contents) ->
     except RecordingError as error:
         contents.refused.append((folder, str(error).removeprefix(f"{folder}: ")))
         return
+    if _has_pictures(files) and _ECHOES.search(folder.name) and not _CAMERA.search(folder.name):
+        contents.refused.append(
+            (folder, f"{len(files)} pictures of a radar's echoes by its name; open it by its own path")
+        )
+        return
     lidar = {".bin": is_lidar_bin, ".pcd": is_lidar_pcd}.get(files[0].suffix.lower(), lambda _: False)
     if files[0].name.endswith(".pcd.bin") or lidar(files):
         contents.refused.append((folder, f"{len(files)} {_LIDAR}"))
@@ -405,10 +413,11 @@ def _add_files(
             contents.sources.append((folder, tuple(group)))
         else:
             _add_tables(group, contents, options)
-    for file in files:
-        suffix = file.suffix.lower()
-        if suffix in VIDEO_SUFFIXES:
-            contents.sources.append((file, ()))
+    contents.sources += [(file, ()) for file in files if file.suffix.lower() in VIDEO_SUFFIXES]
+    arrays = [file for file in files if file.suffix.lower() in _ARRAY_SUFFIXES]
+    if arrays and used:
+        what = f"{len(arrays)} {arrays[0].suffix} files, which are not read"
+        contents.refused.append((folder, f"{what}; write the returns of each scan as a table, .pcd or .bin"))
 
 
 def _is_refused(folder: Path, files: Sequence[Path], tables: Sequence[Path], contents: Contents) -> bool:

@@ -177,12 +177,12 @@ def is_lidar_pcd(files: Sequence[Path]) -> bool:
 
 
 def is_lidar_bin(files: Sequence[Path]) -> bool:
-    """Return whether .bin files are a lidar's: four floats a point as KITTI has them, and of no radar's layout."""
+    """Return whether .bin files are a lidar's: x, y, z and an intensity as KITTI has them, and of no radar's layout."""
     if any(file.stat().st_size % 16 for file in files) or bin_layout(files)[0] is not None:
         return False
     points = _sampled(files, np.dtype([(name, "<f4") for name in ("x", "y", "z", "intensity")]))
-    near = [np.abs(points[axis]) <= _FARTHEST_M for axis in "xyz"]
-    return bool(np.mean(np.logical_and.reduce(near)) >= _ENOUGH) if len(points) else False
+    sound = [*(np.abs(points[axis]) <= _FARTHEST_M for axis in "xyz"), points["intensity"] >= 0]
+    return bool(np.mean(np.logical_and.reduce(sound)) >= _ENOUGH) if len(points) else False
 
 
 def _content(path: Path, size: int = -1) -> bytes:

@@ -707,6 +707,30 @@ def test_ranges_and_angles_that_are_none_are_lost_and_counted(tmp_path):
         assert any("2 of 4 returns of the radar are lost" in one.message for one in recording.warnings)
 
 
+def test_what_holds_no_returns_is_named_for_what_it_is(tmp_path):
+    """As in Oxford Radar RobotCar, RadarScenes, CARRADA and Dual Radar: echoes, arrays, other floats, times of no known unit."""
+    rng = np.random.default_rng(3)
+    for number in range(4):
+        picture(tmp_path / "stereo" / f"{START_NS // 1000 + number * 62_500}.png", (8, 8))
+        picture(tmp_path / "radar" / f"{START_NS // 1000 + number * 250_000}.png", (8, 8))
+        picture(tmp_path / "documentary" / f"{156_862_647_501 + number * 100_000}.jpg", (8, 8))
+        rows = np.column_stack([*rng.uniform(3, 30, (3, 90)), rng.normal(0, 2, (5, 90)).T]).astype("<f4")
+        (tmp_path / "ars548").mkdir(exist_ok=True)
+        (tmp_path / "ars548" / f"{number:06}.bin").write_bytes(rows.tobytes())
+    (tmp_path / "maps").mkdir()
+    np.save(tmp_path / "maps" / "000000.npy", np.zeros((4, 4)))
+    with inspect_recording(tmp_path) as recording:
+        assert (recording.image_topic, recording.radar_topic) == ("/stereo/image", None)
+        (warning,) = (one for one in recording.warnings if one.code == "unused-files")
+    for words in (
+        "radar (4 pictures of a radar's echoes by its name",
+        "documentary (no times in the file names",
+        "ars548 (its 4 .bin files fit no layout of radar returns",
+        "maps (1 .npy files, which are not read",
+    ):
+        assert words in warning.message
+
+
 def test_a_link_to_a_folder_above_is_named_and_not_followed(tmp_path):
     picture(tmp_path / "drive" / "camera" / f"{START_NS}.png", (8, 8))
     radar_csv(tmp_path / "drive" / "radar.csv", f"time_ns,x_m,y_m\n{START_NS},3,1\n")
