@@ -7,6 +7,8 @@ import { viewport } from "./geometry.js";
 const SIDE = 156;
 const MAGNIFICATIONS = [4, 6, 8, 12, 16];
 const MARGIN = 8;
+/** Below the chips and the readout, on the largest screens too [CSS px]. */
+const TOP = 50;
 /** The loupe is not needed where the picture itself is magnified nearly as much: above this share. */
 const NEEDLESS_FROM = 0.75;
 /** The borders of pixels are drawn from this magnification on, quarters of the pixel under the cross from the next. */
@@ -26,6 +28,7 @@ let kept = { magnifies: 8, stretched: false };
 
 export function startLoupe() {
   canvas.style.width = canvas.style.height = `${SIDE}px`;
+  canvas.style.top = `${TOP}px`;
   try {
     const before = JSON.parse(localStorage.getItem(KEPT) ?? "{}");
     kept = { magnifies: MAGNIFICATIONS.includes(before.magnifies) ? before.magnifies : 8, stretched: before.stretched === true };
@@ -169,7 +172,6 @@ function place(point) {
   const y = (viewport.top + (point.v + 0.5) * viewport.scale) / viewport.ratio;
   const near = x > viewport.width - SIDE - 60 && y < SIDE + 60;
   canvas.style.left = near ? `${MARGIN}px` : `${viewport.width - SIDE - MARGIN}px`;
-  canvas.style.top = near ? "40px" : `${MARGIN}px`;
 }
 
 /** @param {number} x @param {number} y @param {number} arm @param {number} gap @param {string} colour */

@@ -25,7 +25,7 @@ let chosen = 0;
 
 export function startPalette() {
   field.type = "text";
-  field.placeholder = "Search for an action or an option, or type placement 7, pair 3, frame 120, time 12.5";
+  field.placeholder = "Action or option, placement 7, pair 3, frame 120, time 12.5";
   field.spellcheck = false;
   field.autocomplete = "off";
   const attributes = { role: "combobox", "aria-label": "Search for an action, a placement, a pair or an option", "aria-expanded": "true", "aria-controls": "palette-found", "aria-autocomplete": "list" };
