@@ -24,7 +24,7 @@ _BEGINNINGS = {
     b"\xff\xd8\xff": "a picture",
 }
 _USES = {
-    "calibration-1": "give it as CALIBRATION, before the recording (open: --calibration FILE); solve it again with --pairs FILE",
+    "calibration-1": "give it with --calibration FILE (evaluate: as CALIBRATION, first); solve it again with --pairs FILE",
     "clicks-1": "give them with their recording: cocalib solve (or open) RECORDING --clicks FILE",
     "pairs-1": "solve them without a recording: cocalib solve --pairs FILE",
     "proposals-1": "confirm them on the page, or copy the clicks that you have looked at into a clicks-1 file",

@@ -297,19 +297,7 @@ class CalibrationOptions:
 
 
 LensChoice: TypeAlias = Literal["auto", "pinhole", "plumb_bob", "rational_polynomial", "equidistant"]
-
-
-@dataclass(frozen=True, slots=True)
-class IntrinsicsOptions:
-    """How a lens is calibrated."""
-
-    model: LensChoice = option(
-        "auto", "Lens model; auto takes the simplest that predicts views it has not seen as well as any."
-    )
-    board_shape: Literal["auto", "flat"] = option(
-        "auto", "Shape of the board; auto estimates bending and unequal sides of the squares where the views show them."
-    )
-    robust: bool = option(True, "Leave out views and corners that contradict the others.")
+"""A lens model; auto takes the simplest that predicts views it has not seen as well as any."""
 
 
 def without_systematic_errors(options: CalibrationOptions) -> CalibrationOptions:

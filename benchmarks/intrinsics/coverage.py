@@ -9,7 +9,7 @@ from benchmarks.intrinsics.draws import CHECKERBOARD, LENSES, Pictures, Series, 
 from benchmarks.intrinsics.rendered import scaled_errors
 from benchmarks.intrinsics.tables import Table
 from calib_core.camera import Camera, CameraModel
-from calib_core.intrinsics import BoardSearch, CalibratedLens, IntrinsicsOptions, calibrate_lens
+from calib_core.intrinsics import BoardSearch, CalibratedLens, calibrate_lens
 from calib_core.intrinsics.picture_maps import far_point_slopes, found_pixels, grid_covariance
 from calib_core.synthetic.boards import BoardFilm, BoardShape, CornerErrors, simulated_views, waved_poses
 
@@ -61,7 +61,7 @@ def coverage(first: int, draws: int, lens: CameraModel, case: Case, number: int)
     rows, focal, projected = [], [], []
     for i in range(draws):
         series, search = drawn_search([first + i, 50, number], lens, case)
-        found = calibrate_lens(search, IntrinsicsOptions(model="auto" if case.chosen else lens))  # type: ignore[arg-type]
+        found = calibrate_lens(search, "auto" if case.chosen else lens)  # type: ignore[arg-type]
         if not isinstance(found, CalibratedLens):
             continue
         focal.append(100.0 * abs(found.camera.matrix_px[0, 0] / series.camera.matrix_px[0, 0] - 1.0))

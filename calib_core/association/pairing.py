@@ -236,6 +236,13 @@ def _without_return(click: ReflectorClick, window: RadarScans, options: Calibrat
 
 def _nothing_static(click: ReflectorClick, window: RadarScans, options: CalibrationOptions) -> Unpaired:
     gate = options.gating
+    if not np.isfinite(window.points_radar_m).all(axis=1).any():
+        return Unpaired(
+            click.id,
+            "no-static-return",
+            f"none of the {len(window)} scans within {options.locating.window_s:g} s has a return with a position",
+            "look at what the radar's driver writes: cocalib info RECORDING",
+        )
     return Unpaired(
         click.id,
         "no-static-return",

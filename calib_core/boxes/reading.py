@@ -28,7 +28,7 @@ from calib_core.boxes.formats.openlabel import OPENLABEL
 from calib_core.boxes.formats.own import OWN
 from calib_core.boxes.formats.yolo import YOLO
 from calib_core.errors import InputError
-from calib_core.input_files import file_text, name_text, read_input
+from calib_core.input_files import file_text, name_text, other_kind, read_input
 from calib_core.interchange.syntax.strict_json import json_value
 from calib_core.measurements import Box, Boxes, FrameBoxes, TimeNs
 from calib_core.recordings.box_topics import frames_of_stamps
@@ -63,7 +63,9 @@ def read_boxes(
                 found, file.source, image_times=image_times, image_size_px=image_size_px, image_names=image_names
             )
     names = ", ".join(known.name for known in BOX_FORMATS)
-    raise InputError(f"{name_text(Path(path))}: is no known file of boxes; known: {names}")
+    schema = file.value.get("schema") if isinstance(file.value, dict) else None
+    reason = other_kind(schema, _IS_WHAT) or f"is no known file of boxes; known: {names}"
+    raise InputError(f"{name_text(Path(path))}: {reason}")
 
 
 _MAX_BYTES = 256 * 1024 * 1024

@@ -14,7 +14,6 @@ from calib_core.intrinsics.picture_maps import (
     residual_field,
 )
 from calib_core.intrinsics.split_difference import SplitDifference, split_difference
-from calib_core.options import IntrinsicsOptions
 
 __all__ = [
     "MODEL_ERRORS_UNSEEN",
@@ -25,7 +24,6 @@ __all__ = [
     "BoardSearch",
     "CalibratedLens",
     "Coverage",
-    "IntrinsicsOptions",
     "LeftOutPicture",
     "LensView",
     "ModelTrial",

@@ -36,7 +36,7 @@ from calib_core.intrinsics.model_choice import (
     view_folds,
 )
 from calib_core.measurements import Unsolvable
-from calib_core.options import IntrinsicsOptions
+from calib_core.options import LensChoice
 from calib_core.results import DataWarning
 
 _LEAST_VIEWS = 3
@@ -57,13 +57,13 @@ class _Used:
     views: tuple[BoardCorners, ...]
     stack: ViewStack
     board_m: Points3
-    options: IntrinsicsOptions
+    model: LensChoice
     left_out: tuple[LeftOutPicture, ...]
     starts: Mapping[str, LensState]
 
     def choose(self, warp: BoardWarp) -> ChosenModel | str:
         """Choose a lens model for the board with a shape."""
-        models = MODELS if self.options.model == "auto" else (self.options.model,)
+        models = MODELS if self.model == "auto" else (self.model,)
         return choose_model(
             models,
             self.stack,
@@ -73,7 +73,7 @@ class _Used:
 
 def calibrate_lens(
     search: BoardSearch,
-    options: IntrinsicsOptions | None = None,
+    model: LensChoice = "auto",
     *,
     progress: Callable[[str], None] | None = None,
     stopped: Callable[[], bool] | None = None,
@@ -82,11 +82,11 @@ def calibrate_lens(
 
     Args:
         search: with the views.
-        options: of the calibration.
+        model: of the lens.
         progress: called with what is done next.
         stopped: asked between the parts; once it is true there is no calibration.
     """
-    steps = _steps(search, options or IntrinsicsOptions())
+    steps = _steps(search, model)
     while True:
         try:
             step = next(steps)
@@ -98,21 +98,21 @@ def calibrate_lens(
             return Unsolvable("stopped", "the calibration was stopped", "start it again")
 
 
-def _steps(search: BoardSearch, options: IntrinsicsOptions) -> Generator[str, None, CalibratedLens | Unsolvable]:
+def _steps(search: BoardSearch, model: LensChoice) -> Generator[str, None, CalibratedLens | Unsolvable]:
     """Calibrate in steps; what each of them does is yielded before it."""
     yield "comparing the views"
-    used = _used(search, options)
+    used = _used(search, model)
     if isinstance(used, Unsolvable):
         return used
     yield "choosing a lens model"
     chosen = used.choose(FLAT)
     if isinstance(chosen, str):
-        hint = _FILM if options.model == "auto" else "choose another lens model, or let it be chosen (auto)"
+        hint = _FILM if model == "auto" else "choose another lens model, or let it be chosen (auto)"
         return Unsolvable("no-lens", f"no lens model fits {len(used.views)} views: {chosen}", hint)
     yield "looking at the shape of the board"
     shape = try_shapes(chosen.fit, used.stack, possible_warps(used.board_m))
     modelled = False
-    if len(shape.found) and options.board_shape == "auto":
+    if len(shape.found):
         warped = used.choose(shape.found)
         if isinstance(warped, ChosenModel):
             chosen, modelled = warped, True
@@ -120,7 +120,7 @@ def _steps(search: BoardSearch, options: IntrinsicsOptions) -> Generator[str, No
     return _calibrated(search, used, chosen, shape, modelled=modelled)
 
 
-def _used(search: BoardSearch, options: IntrinsicsOptions) -> _Used | Unsolvable:
+def _used(search: BoardSearch, model: LensChoice) -> _Used | Unsolvable:
     """Find the views to use; too few are no calibration."""
     board_m = search.board.corners_m
     faults = [_fault(view, board_m, search.size_px) for view in search.views]
@@ -131,21 +131,19 @@ def _used(search: BoardSearch, options: IntrinsicsOptions) -> _Used | Unsolvable
     if len(views) < _LEAST_VIEWS:
         return _too_few(len(views), left_out)
     stack = stack_views(views, board_m, search.size_px)
-    starts: dict[str, LensState] = {}
-    if options.robust:
-        states = _starts(stack, options)
-        if not states:
-            return Unsolvable("no-lens", "no focal length of any lens model explains most of the views", _FILM)
-        judged = _judged(views, stack, states, may_be_mirrored=search.board.kind == "checkerboard")
-        reasons = zip(views, judged.reasons, strict=True)
-        left_out += [LeftOutPicture(view.index, view.name, reason) for view, reason in reasons if reason]
-        views = [view for view, reason in zip(views, judged.reasons, strict=True) if not reason]
-        if len(views) < _LEAST_VIEWS:
-            return _too_few(len(views), left_out)
-        stack = judged.stack.of(judged.kept)
-        starts = {state.camera.model: state.of(judged.kept) for state in states}
+    states = _starts(stack, model)
+    if not states:
+        return Unsolvable("no-lens", "no focal length of any lens model explains most of the views", _FILM)
+    judged = _judged(views, stack, states, may_be_mirrored=search.board.kind == "checkerboard")
+    reasons = zip(views, judged.reasons, strict=True)
+    left_out += [LeftOutPicture(view.index, view.name, reason) for view, reason in reasons if reason]
+    views = [view for view, reason in zip(views, judged.reasons, strict=True) if not reason]
+    if len(views) < _LEAST_VIEWS:
+        return _too_few(len(views), left_out)
+    stack = judged.stack.of(judged.kept)
+    starts = {state.camera.model: state.of(judged.kept) for state in states}
     every = sorted((*search.left_out, *left_out), key=lambda picture: picture.index)
-    return _Used(tuple(views), stack, board_m, options, tuple(every), starts)
+    return _Used(tuple(views), stack, board_m, model, tuple(every), starts)
 
 
 def _fault(view: BoardCorners, board_m: Points3, size_px: tuple[int, int]) -> str:
@@ -168,10 +166,10 @@ def _too_few(count: int, left_out: Sequence[LeftOutPicture]) -> Unsolvable:
     return Unsolvable("few-views", f"{count} usable views of the board, at least {_LEAST_VIEWS} are needed{why}", _FILM)
 
 
-def _starts(stack: ViewStack, options: IntrinsicsOptions) -> list[LensState]:
+def _starts(stack: ViewStack, model: LensChoice) -> list[LensState]:
     """Fit each lens model robustly to all views, those that are wrong included."""
-    models = MODELS[1:] if options.model == "auto" else (options.model,)
-    return [state for model in models if (state := start(model, stack)) is not None]
+    models = MODELS[1:] if model == "auto" else (model,)
+    return [state for one in models if (state := start(one, stack)) is not None]
 
 
 def _judged(
@@ -369,7 +367,9 @@ def shape_warnings(test: ShapeTest, amounts: Values, sigmas: Values, *, modelled
         sigmas: (s,) of the same.
         modelled: whether the lens was calibrated with the board's shape as found.
     """
-    done = "it was taken into account" if modelled else "it was not taken into account, because board_shape is flat"
+    done = (
+        "it was taken into account" if modelled else "it was not taken into account, because no lens model fits with it"
+    )
     bends = [
         f"{abs(1e3 * amount):.2f} ± {1e3 * sigma:.2f} mm {_BENDS[name]}"
         for name, amount, sigma in zip(test.found.names, amounts, sigmas, strict=True)
@@ -379,7 +379,7 @@ def shape_warnings(test: ShapeTest, amounts: Values, sigmas: Values, *, modelled
         yield DataWarning(
             "bent-board",
             f"the board is bent by {' and '.join(bends)}; {done}",
-            "fix the board to glass or a stiff plate" + ("" if modelled else ", or set board_shape to auto"),
+            "fix the board to glass or a stiff plate",
         )
     for name, amount, sigma in zip(test.found.names, amounts, sigmas, strict=True):
         if name not in _BENDS:

@@ -8,7 +8,7 @@ from benchmarks.intrinsics.coverage import CASES, drawn_search
 from benchmarks.intrinsics.draws import CHECKERBOARD, FILMS, LENSES, changed_light, drawn_camera, drawn_series, moved
 from benchmarks.intrinsics.rendered import measured, scaled_errors
 from benchmarks.intrinsics.tables import Table
-from calib_core.intrinsics import CalibratedLens, IntrinsicsOptions, calibrate_lens
+from calib_core.intrinsics import CalibratedLens, calibrate_lens
 
 _DRAWS = 6
 
@@ -17,7 +17,7 @@ def test_drawn_corners_give_the_focal_length_and_a_sigma_that_holds():
     scaled, focal = [], []
     for draw in range(_DRAWS):
         series, search = drawn_search([draw, 1], "plumb_bob", CASES["independent 0.1 px"])
-        lens = calibrate_lens(search, IntrinsicsOptions(model="plumb_bob"))
+        lens = calibrate_lens(search, "plumb_bob")
         assert isinstance(lens, CalibratedLens)
         scaled.append(scaled_errors(lens, series))
         focal.append(lens.camera.matrix_px[0, 0] / series.camera.matrix_px[0, 0] - 1.0)

@@ -6,10 +6,9 @@ import msgspec
 import numpy as np
 import pytest
 
-from calib_core.intrinsics import BoardCorners, BoardSearch, CalibratedLens, IntrinsicsOptions, calibrate_lens
+from calib_core.intrinsics import BoardCorners, BoardSearch, CalibratedLens, calibrate_lens
 from tests.unit.intrinsics.corner_draws import BOARD, CAMERAS, SIZE_PX, drawn_views
 
-OPTIONS = IntrinsicsOptions(model="plumb_bob", board_shape="flat")
 VIEWS = drawn_views(CAMERAS["plumb_bob"], 9, 31)
 
 
@@ -17,7 +16,7 @@ def calibrated(
     views: tuple[BoardCorners, ...], *, square_m: float = BOARD.square_m, size_px: tuple[int, int] = SIZE_PX
 ) -> CalibratedLens:
     lens = calibrate_lens(
-        BoardSearch(msgspec.structs.replace(BOARD, square_m=square_m), size_px, views, (), len(views)), OPTIONS
+        BoardSearch(msgspec.structs.replace(BOARD, square_m=square_m), size_px, views, (), len(views)), "plumb_bob"
     )
     assert isinstance(lens, CalibratedLens), lens
     return lens

@@ -88,11 +88,13 @@ class Batch:
 
         results = ResultsFolder(self.out or manifest.source.with_suffix(""))
         try:
+            warnings: list[str] = []
+            engine = chosen_engine(
+                len(manifest.rows), workers=self.workers, scheduler=self.scheduler, tell=warnings.append
+            )
             with progress_bar("reading recordings") as progress_bytes:
                 jobs = jobs_of(manifest.rows, results.path, progress_bytes)
             write_plan(results.path, manifest.source, jobs)
-            warnings: list[str] = []
-            engine = chosen_engine(len(jobs), workers=self.workers, scheduler=self.scheduler, tell=warnings.append)
             with shown_batch(len(jobs)) as show:
                 outcomes = drive(jobs, engine, results, show)
             for warning in warnings:

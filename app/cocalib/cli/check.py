@@ -87,8 +87,10 @@ class Check:
         """
         if not self.calibration:
             raise InputError("CALIBRATION is missing; see cocalib check --help")
-        if {one.resolve() for one in (self.against, self.of) if one} & {one.resolve() for one in self.calibration}:
-            print("note: a file is checked against itself, which proves nothing", file=sys.stderr)
+        if self.against and {self.against.resolve()} == {one.resolve() for one in self.calibration}:
+            raise InputError(
+                f"--against {self.against}: is the checked file itself, which proves nothing; give another"
+            )
         limited = any(limit is not None for limit in (self.max_deg, self.max_cm, self.max_px, self.max_sigma))
         if limited and self.against is None:
             raise InputError("--max-deg, --max-cm, --max-px and --max-sigma are limits for --against FILE; give it too")

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from calib_core.deployment import RecordingWritten
     from calib_core.geometry import RigidTransform
     from calib_core.interchange import CalibrationFile, Provenance
+    from calib_core.interchange import Export as Written
     from calib_core.recordings import Recording
 
 MCAP = "mcap"
@@ -83,31 +84,35 @@ class Export:
         return self._write_one(file, parent)
 
     def _write_one(self, file: "CalibrationFile", parent_from_radar: "RigidTransform | None") -> int:
-        from calib_core.interchange import format_named
-
         renamed = self.frames.renamed(file)
         written = self.trees.export(renamed, self.to, parent_from_radar=parent_from_radar, rectified=self.rectified)
-        _print_warnings(file)
-        for note in written.notes:
-            print(f"note: {note}", file=sys.stderr)
-        if self.out is not None and format_named(self.to).is_unpacked and _is_meant_as_folder(self.out):
-            names = _write_unpacked(self.out, written.data)
-            print(f"written to {self.out}: {', '.join(names)}")
-        elif self.out is not None:
-            target = self.out / written.file_name if self.out.is_dir() else self.out
-            write_whole(target, written.data)
-            print(f"written to {target}")
-            for extra in written.extra_files:
-                write_whole(target.parent / extra.file_name, extra.data)
-                print(f"written to {target.parent / extra.file_name}")
+        if self.out is not None:
+            told = self._written(self.out, written)
         elif isinstance(written.content, bytes):
             raise InputError(f"{self.to} is a binary format and needs a file: --out {written.file_name}")
         elif written.extra_files:
             beside = ", ".join(extra.file_name for extra in written.extra_files)
             raise InputError(f"{self.to} comes with {beside} and needs a file or folder: --out {written.file_name}")
+        _print_warnings(file)
+        for note in written.notes:
+            print(f"note: {note}", file=sys.stderr)
+        if self.out is not None:
+            print("\n".join(told))
         else:
-            print_exactly(written.content)
+            print_exactly(str(written.content))
         return 0
+
+    def _written(self, out: Path, written: "Written") -> list[str]:
+        """Write the files of an export; return what to say of them."""
+        from calib_core.interchange import format_named
+
+        if format_named(self.to).is_unpacked and _is_meant_as_folder(out):
+            return [f"written to {out}: {', '.join(_write_unpacked(out, written.data))}"]
+        target = out / written.file_name if out.is_dir() else out
+        files = {target: written.data} | {target.parent / one.file_name: one.data for one in written.extra_files}
+        for path, data in files.items():
+            write_whole(path, data)
+        return [f"written to {path}" for path in files]
 
     def _calibration(self) -> "CalibrationFile":
         if len(self.calibration) != 1:

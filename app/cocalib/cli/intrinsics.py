@@ -11,7 +11,7 @@ import tyro
 
 from calib_core.errors import InputError
 from calib_core.input_files import name_text
-from calib_core.options import IntrinsicsOptions, LensChoice
+from calib_core.options import LensChoice
 from calib_core.recordings import RecordingOptions
 from cocalib.cli.flags import MORE, File, Folder, Switch, called, same
 from cocalib.cli.output import explain_unsolvable, refuse_input, write_whole
@@ -163,7 +163,7 @@ class Intrinsics:
             search = search_for(pictures, board, _source_name(self.source), self.views)
             with kept_on_interruption(search, self.views):
                 found = searched(search, self.views)
-                lens = found if isinstance(found, Unsolvable) else calibrate_lens(found, IntrinsicsOptions(self.model))
+                lens = found if isinstance(found, Unsolvable) else calibrate_lens(found, self.model)
                 if isinstance(lens, Unsolvable) or isinstance(found, Unsolvable):
                     assert isinstance(lens, Unsolvable)
                     code = explain_unsolvable(lens)

@@ -66,7 +66,9 @@ def refuse_input(out: Path | None, *inputs: Path | None) -> None:
 
 
 def _kind(data: bytes) -> bytes:
-    """Return what tells kinds of output apart: our JSON by its schema, our other texts by our name, the rest by how it begins."""
+    """Return what tells kinds of output apart: our JSON by its schema, our other texts by a word, the rest by how it begins."""
+    if b"camera_matrix:" in data and b"camera_name:" in data:
+        return b"camera_info"
     schema = re.search(rb'"schema": ?"(cocalib/[\w-]+)"', data[:200])
     return schema[1] if schema else b"cocalib" if b"cocalib" in data and b"\0" not in data else data[:4]
 

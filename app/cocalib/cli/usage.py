@@ -31,6 +31,8 @@ _GONE = {
 """Options and values that are gone, each with what replaces it."""
 _MEANT = {"format": "--to", "o": "--out", "file": "--out", "intrinsics": "--camera", "extrinsics": "--calibration"}
 """What people call an option, and its name."""
+_UNASKED = {"Demo": "; for your own recording: cocalib open {}", "Simulate": "; did you mean --out {}?"}
+"""What a word may mean that a command, by its class, does not take."""
 _NUMBERS = {"INT": "a whole number", "FLOAT": "a number"}
 
 
@@ -70,6 +72,8 @@ def _reason(fault: Fault, kind: type[Runnable]) -> str:
             return f"{argument.name} needs a value: {_typed(argument)}"
         case WrongChoice(argument, value, _) if value in _GONE:
             return f"{argument.name} {value} went in 0.1: {_GONE[value]}"
+        case WrongChoice(argument, value, choices) if near := get_close_matches(value.lower(), choices, n=1):
+            return f"{argument.name} {value}: did you mean {near[0]}?"
         case WrongChoice(argument, value, choices):
             return f"{argument.name} takes {_alternatives(choices)}, not '{value}'"
         case BadValue(argument, typed):
@@ -92,7 +96,7 @@ def _alternatives(words: Sequence[str]) -> str:
 def _unknown(token: str, kind: type[Runnable]) -> str:
     """Return a message about an unknown argument, with suggestions."""
     if not token.startswith("-"):
-        return f"unexpected argument '{token}'"
+        return f"unexpected argument '{token}'" + _UNASKED.get(kind.__name__, "").format(token)
     flag = token.split("=")[0].replace("_", "-")
     if flag.removeprefix("--") in _GONE:
         return f"{flag} went in 0.1: {_GONE[flag.removeprefix('--')]}"

@@ -3,7 +3,7 @@
 import logging
 import threading
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
 from calib_core.errors import CalibrationError, InputError
@@ -13,12 +13,12 @@ from calib_core.intrinsics import (
     BoardPictures,
     BoardSearch,
     CalibratedLens,
-    IntrinsicsOptions,
     SearchProgress,
     calibrate_lens,
     search_boards,
 )
 from calib_core.measurements import Unsolvable
+from calib_core.options import LensChoice
 from cocalib.platform.error_boundary import error_boundary
 
 LensStage: TypeAlias = Literal["idle", "searching", "calibrating", "cancelled", "failed", "done"]
@@ -32,7 +32,6 @@ class LensSnapshot:
     Attributes:
         stage: what is being done; "idle" before the first start.
         board: that is looked for; None before the first start.
-        options: of the calibration.
         progress: of the search; None before its first picture.
         doing: what is computed, once the search is over.
         problem: why there is no result, if the stage is "failed".
@@ -43,7 +42,6 @@ class LensSnapshot:
 
     stage: LensStage = "idle"
     board: Board | None = None
-    options: IntrinsicsOptions = field(default_factory=IntrinsicsOptions)
     progress: SearchProgress | None = None
     doing: str = ""
     problem: str = ""
@@ -83,7 +81,7 @@ class LensJob:
         """The present state."""
         return self._snapshot
 
-    def start(self, pictures: BoardPictures, board: Board, options: IntrinsicsOptions) -> None:
+    def start(self, pictures: BoardPictures, board: Board, model: LensChoice) -> None:
         """Start, or go on from the views of a cancelled search for the same board; returns immediately.
 
         Raises:
@@ -99,9 +97,9 @@ class LensJob:
             before = self._snapshot
             known = before.progress if before.can_resume and before.board == board else None
             self._stop = threading.Event()
-            self._snapshot = LensSnapshot("searching", board, options, known, search=before.search, lens=before.lens)
+            self._snapshot = LensSnapshot("searching", board, known, search=before.search, lens=before.lens)
             self._thread = threading.Thread(
-                target=self._run, args=(pictures, board, options, known, self._stop), name="lens", daemon=True
+                target=self._run, args=(pictures, board, model, known, self._stop), name="lens", daemon=True
             )
             self._thread.start()
         self._changed()
@@ -123,7 +121,7 @@ class LensJob:
         self,
         pictures: BoardPictures,
         board: Board,
-        options: IntrinsicsOptions,
+        model: LensChoice,
         known: SearchProgress | None,
         stop: threading.Event,
     ) -> None:
@@ -132,7 +130,7 @@ class LensJob:
                 found = calibrate_from(
                     pictures,
                     board,
-                    options,
+                    model,
                     known=known.views if known else (),
                     searched=known.indices if known else (),
                     progress=self._take,
@@ -169,7 +167,7 @@ class LensJob:
 def calibrate_from(
     pictures: BoardPictures,
     board: Board,
-    options: IntrinsicsOptions | None = None,
+    model: LensChoice = "auto",
     *,
     known: tuple[BoardCorners, ...] = (),
     searched: Collection[int] = (),
@@ -181,7 +179,7 @@ def calibrate_from(
     Args:
         pictures: where to look.
         board: what to look for.
-        options: of the calibration.
+        model: of the lens.
         known: views of an earlier search.
         searched: numbers of the pictures that it looked at.
         progress: called while the board is looked for, and then with what is done next, in words.
@@ -192,5 +190,5 @@ def calibrate_from(
         return search
     if stopped():
         return Unsolvable("stopped", "the calibration was stopped", "start it again")
-    lens = calibrate_lens(search, options, progress=progress, stopped=stopped)
+    lens = calibrate_lens(search, model, progress=progress, stopped=stopped)
     return lens if isinstance(lens, Unsolvable) else (search, lens)

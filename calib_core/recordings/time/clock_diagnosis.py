@@ -249,8 +249,8 @@ def about_clocks(found: Sequence[ClockDiagnosis]) -> list[DataWarning]:
                 DataWarning(
                     "clock-drift",
                     f"the stamps of {one.topic} drift relative to the receive times by {abs(one.drift_s) * 1e3:.0f} ms in total "
-                    f"({abs(one.drift_ppm or 0):.0f} ppm): its clock is not synchronized with the recorder's",
-                    "synchronize the clocks of both sensors (PTP or NTP), or use --clock receive",
+                    f"({abs(one.drift_ppm or 0):.0f} ppm): its clock is not synchronised with the recorder's",
+                    "synchronise the clocks of both sensors (PTP or NTP), or use --clock receive",
                 )
             )
     apart = [one for one in found if one.islands > 1 and not one.is_assumed]

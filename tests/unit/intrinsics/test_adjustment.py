@@ -8,7 +8,7 @@ import pytest
 
 from calib_core.camera import Camera
 from calib_core.geometry import rotation_exp
-from calib_core.intrinsics import BoardCorners, CalibratedLens, IntrinsicsOptions, calibrate_lens
+from calib_core.intrinsics import BoardCorners, CalibratedLens, calibrate_lens
 from calib_core.intrinsics.adjustment import SharedCovariance, adjust, pose_views, reduced, shared_covariance, start
 from calib_core.intrinsics.bad_views import judge_views, mirror_twins
 from calib_core.intrinsics.linearization import (
@@ -180,9 +180,8 @@ def test_a_number_far_from_zero_in_its_sigmas_is_unlikely_to_be_zero():
 # A board that is bent or printed too long is found and taken into account; a flat one stays flat.
 
 
-def calibrated(errors: Errors, board_shape: str = "auto", seed: int = 5) -> CalibratedLens:
-    options = IntrinsicsOptions(model="plumb_bob", board_shape=board_shape)
-    lens = calibrate_lens(search_of(drawn_views(CAMERAS["plumb_bob"], 14, seed, errors)), options)
+def calibrated(errors: Errors, seed: int = 5) -> CalibratedLens:
+    lens = calibrate_lens(search_of(drawn_views(CAMERAS["plumb_bob"], 14, seed, errors)), "plumb_bob")
     assert isinstance(lens, CalibratedLens), lens
     return lens
 
@@ -208,13 +207,6 @@ def test_a_flat_board_stays_as_stated():
     lens = calibrated(Errors())
     np.testing.assert_array_equal(lens.board_shape_m, BOARD.corners_m)
     assert not {warning.code for warning in lens.warnings} & {"bent-board", "unequal-squares"}
-
-
-def test_a_bend_that_must_not_be_modelled_is_warned_about_and_enters_the_sigma():
-    lens = calibrated(Errors(bend_m=0.0014), "flat")
-    assert any("it was not taken into account, because board_shape is flat" in one.message for one in lens.warnings)
-    off_px = abs(lens.camera.matrix_px[0, 0] - 900.0)
-    assert 5.0 < off_px < 1.96 * lens.camera.covariance.sigma("fx_px")
 
 
 def test_motion_under_a_rolling_shutter_is_told_from_noise():
@@ -243,11 +235,8 @@ def test_the_true_model_is_chosen_with_a_reason(model):
 # Views and corners that do not belong to the others are named, and no others.
 
 
-OPTIONS = IntrinsicsOptions(model="plumb_bob")
-
-
-def solved(*views: BoardCorners, options: IntrinsicsOptions = OPTIONS) -> CalibratedLens:
-    lens = calibrate_lens(search_of(views), options)
+def solved(*views: BoardCorners) -> CalibratedLens:
+    lens = calibrate_lens(search_of(views), "plumb_bob")
     assert isinstance(lens, CalibratedLens), lens
     return lens
 
@@ -348,15 +337,6 @@ def test_a_corner_that_jumped_by_a_square_is_left_out_and_its_view_kept():
     assert np.flatnonzero(~lens.views[5].used).tolist() == [20]
     assert all(view.used.all() for row, view in enumerate(lens.views) if row != 5)
     assert lens.rms_px < 0.15
-
-
-def test_with_robust_off_every_view_and_corner_counts():
-    pixels = GOOD[5].pixels_px.copy()
-    pixels[20] = pixels[21]
-    views = (*GOOD[:5], replace(GOOD[5], pixels_px=pixels), *GOOD[6:])
-    lens = solved(*views, options=IntrinsicsOptions(model="plumb_bob", robust=False))
-    assert all(view.used.all() for view in lens.views)
-    assert lens.rms_px > 0.5
 
 
 def test_views_with_some_of_the_corners_are_used():

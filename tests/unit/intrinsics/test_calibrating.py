@@ -11,7 +11,6 @@ from calib_core.intrinsics import (
     BoardCorners,
     CalibratedLens,
     Coverage,
-    IntrinsicsOptions,
     LensView,
     calibrate_lens,
     projection_uncertainty,
@@ -24,7 +23,7 @@ from calib_core.measurements import Unsolvable
 from calib_core.synthetic import typical_camera
 from tests.unit.intrinsics.corner_draws import BOARD, CAMERAS, SIZE_PX, drawn_views, search_of
 
-PINHOLE = IntrinsicsOptions(model="pinhole")
+PINHOLE = "pinhole"
 VIEWS = drawn_views(CAMERAS["pinhole"], 10, 21)
 
 
@@ -201,7 +200,7 @@ def test_counts_are_those_of_all_corners():
 
 def calibrated_over_the_picture(model: str, count: int = 12, *, truth: str = "") -> CalibratedLens:
     views = drawn_views(CAMERAS[truth or model], count, 9)
-    lens = calibrate_lens(search_of(views), IntrinsicsOptions(model=model, board_shape="flat", robust=False))
+    lens = calibrate_lens(search_of(views), model)
     assert isinstance(lens, CalibratedLens), lens
     return lens
 

@@ -16,7 +16,6 @@ from calib_core.intrinsics import (
     Board,
     CalibratedLens,
     Coverage,
-    IntrinsicsOptions,
     LensView,
     ModelTrial,
     PictureGrid,
@@ -96,7 +95,7 @@ class LensDesk:
             CalibrationError: it cannot be done, in words.
         """
         if isinstance(request, LensCalibrate):
-            self._job.start(self._pictures, _board(request), IntrinsicsOptions(request.model))
+            self._job.start(self._pictures, _board(request), request.model)
         elif isinstance(request, LensCancel):
             self._job.cancel()
         else:

@@ -14,14 +14,12 @@ from calib_core.intrinsics import (
     BoardCorners,
     BoardSearch,
     CalibratedLens,
-    IntrinsicsOptions,
     SearchProgress,
 )
 from calib_core.measurements import Unsolvable
 from cocalib.intrinsics import LensJob, LensSnapshot, LensStage
 
 BOARD = Board("checkerboard", 9, 6, 0.025)
-OPTIONS = IntrinsicsOptions()
 CAMERA = Camera("pinhole", 640, 480, np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]]))
 
 
@@ -53,7 +51,7 @@ class Search:
         self,
         pictures: Pictures,
         board: Board,
-        options: object,
+        model: object,
         *,
         known: Any,
         searched: Any,
@@ -120,7 +118,7 @@ def watched(search: Search) -> Iterator[Watched]:
 
 def test_a_job_tells_how_far_it_is_and_ends_with_a_lens(search, watched):
     assert watched.job.snapshot.stage == "idle"
-    watched.job.start(Pictures(), BOARD, OPTIONS)
+    watched.job.start(Pictures(), BOARD, "auto")
     assert watched.job.snapshot.is_running
     search.allowed.release(3)
     assert len(watched.until("searching", 3).progress.views) == 3
@@ -132,9 +130,9 @@ def test_a_job_tells_how_far_it_is_and_ends_with_a_lens(search, watched):
 
 
 def test_only_one_calibration_runs_at_a_time(search, watched):
-    watched.job.start(Pictures(), BOARD, OPTIONS)
+    watched.job.start(Pictures(), BOARD, "auto")
     with pytest.raises(InputError, match="cancel it first"):
-        watched.job.start(Pictures(), BOARD, OPTIONS)
+        watched.job.start(Pictures(), BOARD, "auto")
     search.allowed.release(8)
     watched.until("done")
     assert len(search.known) == 1
@@ -142,7 +140,7 @@ def test_only_one_calibration_runs_at_a_time(search, watched):
 
 @pytest.mark.parametrize(("board", "is_same"), [(BOARD, True), (Board("checkerboard", 8, 6, 0.025), False)])
 def test_a_cancelled_search_goes_on_from_its_views_for_the_same_board_only(search, watched, board, is_same):
-    watched.job.start(Pictures(), BOARD, OPTIONS)
+    watched.job.start(Pictures(), BOARD, "auto")
     search.allowed.release(4)
     watched.until("searching", 4)
     watched.job.cancel()
@@ -150,7 +148,7 @@ def test_a_cancelled_search_goes_on_from_its_views_for_the_same_board_only(searc
     cancelled = watched.until("cancelled")
     assert cancelled.can_resume
     assert cancelled.problem == "", "a person wanted it"
-    watched.job.start(Pictures(), board, OPTIONS)
+    watched.job.start(Pictures(), board, "auto")
     search.allowed.release(8)
     watched.until("done")
     assert [one.index for one in search.known[1]] == ([0, 1, 2, 3] if is_same else [])
@@ -160,7 +158,7 @@ def test_a_cancelled_search_goes_on_from_its_views_for_the_same_board_only(searc
 def test_what_is_wrong_is_said_in_words_and_the_former_result_stays(search, watched, tmp_path):
 
     def ended(stage: LensStage) -> LensSnapshot:
-        watched.job.start(Pictures(), BOARD, OPTIONS)
+        watched.job.start(Pictures(), BOARD, "auto")
         search.allowed.release(8)
         return watched.until(stage)
 
@@ -177,7 +175,7 @@ def test_what_is_wrong_is_said_in_words_and_the_former_result_stays(search, watc
 
 def test_without_pictures_or_after_closing_nothing_is_started(search, watched):
     with pytest.raises(InputError, match="no pictures"):
-        watched.job.start(Pictures(0), BOARD, OPTIONS)
+        watched.job.start(Pictures(0), BOARD, "auto")
     watched.job.close()
     with pytest.raises(InputError, match="being closed"):
-        watched.job.start(Pictures(), BOARD, OPTIONS)
+        watched.job.start(Pictures(), BOARD, "auto")
