@@ -83,9 +83,12 @@ def _counted_up(found: list[DataWarning], inliers: Flags) -> list[DataWarning]:
             *found,
         ]
     clear = bool(inliers.all()) and not any(one.code in _UNCLEAR for one in found)
+    told = f"{count} of {len(inliers)} pairs agree, and {_FEW_INLIERS} are needed"
+    if inliers.all():
+        told = f"{count} of {_FEW_INLIERS} pairs, {'looks consistent' if clear else 'not clear yet'}"
     few = DataWarning(
         "few-pairs",
-        f"{count} of {_FEW_INLIERS} pairs, {'looks consistent' if clear else 'not clear yet'}",
+        told,
         "add placements: ten or more, near and far, on both sides",
     )
     return [*(one for one in found if one.code not in (*_UNCLEAR, *_TOLD_BY_MORE)), few]
@@ -140,7 +143,8 @@ def _noise_excess(fit: SolvedFit) -> list[DataWarning]:
             "residuals-too-large",
             f"residuals are {np.sqrt(fit.chi2_per_degree):.1f} times what the assumed noise explains "
             f"(chi2 / degrees of freedom {fit.chi2_per_degree:.1f})",
-            "check that the intrinsics belong to this camera, lens and image size, then check the assumed radar noise",
+            "check that the intrinsics belong to this camera, lens and image size, that every click is on the reflector's inner "
+            "corner, and the assumed radar noise",
         )
     ]
 

@@ -192,8 +192,8 @@ def camera_position(fit: SolvedFit) -> list[DataWarning]:
             f"the pairs alone place the camera {100 * found.away_m:.0f} cm from the measured position, "
             f"{found.sigmas:.1f} standard deviations{other_unit}; clicks that all lie as far beside the radar's phase centre "
             "would look the same; the pose follows the pairs",
-            "measure again from the radar's antennas to the lens: forward, left, up; and click the reflector's apex, where its "
-            "three sheets meet, not its mouth or its stand",
+            "measure again from the radar's antennas to the lens: forward, left, up; click the reflector's apex, where its three "
+            "sheets meet, not its mouth or its stand; and check that the intrinsics are of this lens, zoom and picture size",
         )
     ]
 

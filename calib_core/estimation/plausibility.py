@@ -23,7 +23,7 @@ _UNITS = {"millimetres": 0.001, "centimetres": 0.01, "feet": 0.3048}
 _SIDEWAYS_RAD = np.deg2rad(60.0)
 _EDGE_PX = 0.5
 _MARGIN_PX = 10.0  # a click may be a few pixels beyond the edge
-_PART_OF_PICTURE = 0.55
+_PART_OF_PICTURE = 0.5
 _LEAST_PAIRS = 8
 
 

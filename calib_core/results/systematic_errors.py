@@ -807,7 +807,7 @@ def _value_text(error: SystematicErrorResult) -> str:
 
 _CLEAR_SIGMAS = 3.0
 _NOTABLE_SCALE = 0.015
-_LEAST_TOLD = 1e-4  # share of the prior variance that the pairs must take away for their own estimate
+_LEAST_TOLD = 0.005  # share of the prior variance that the pairs must take away for an estimate of their own
 _SCALES = ("azimuth_scale", "elevation_scale")
 
 
@@ -827,7 +827,8 @@ def systematic_error_warnings(
     beyond = {
         name: _beyond_its_prior(one, size, sigma)
         for name, (one, size, sigma) in alone.items()
-        if size > _BEYOND * np.hypot(sigma, one.prior_sigma)
+        if by_fit[name] ** 2 < (1.0 - _LEAST_TOLD) * one.prior_sigma**2
+        and size > _BEYOND * np.hypot(sigma, one.prior_sigma)
     }
     scales = [
         _azimuth_scale(one, tape, flat=flat) if one.name == "azimuth_scale" else _elevation_scale(one, tape)
@@ -840,9 +841,10 @@ def systematic_error_warnings(
 def _beyond_its_prior(one: SystematicErrorResult, size: float, sigma: float) -> DataWarning:
     words = error_words(one.name)
     found = _value_text(replace(one, value=float(np.copysign(size, one.value)), sigma=sigma))
+    name = f"{words.family[1]} ({words.label})" if words.family else words.text
     return DataWarning(
         "shared-error-suspected",
-        f"{words.text}: {found} by the pairs, where ± {_two_digits(words.factor * one.prior_sigma)} {words.unit} is assumed",
+        f"{name}: {found} by the pairs, where ± {_two_digits(words.factor * one.prior_sigma)} {words.unit} is assumed",
         "check that each pair has the reflector's return, not one of what stands behind it, and that the intrinsics are of this "
         "very picture, uncropped; if the error is really so large, give it a larger sigma among the options",
     )

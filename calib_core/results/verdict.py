@@ -220,7 +220,7 @@ def _assumption(calibration: Calibration) -> str:
         first, whose = f"the camera was measured right{known}", "the radar's"
     mirrored = any(warning.code == _NOT_MIRRORED for warning in calibration.warnings)
     sides = "no radar axis is mirrored, " if mirrored else ""
-    heights = f"{whose} elevations are right and " if calibration.sees_elevation else ""
+    heights = f"{whose} elevations are right, and " if calibration.sees_elevation else ""
     return f"{first}, {sides}{heights}{_centre_assumed(calibration)}"
 
 
@@ -228,9 +228,9 @@ def _centre_assumed(calibration: Calibration) -> str:
     """Return what is assumed of the principal point: the rotation absorbs its error, so that no pair shows it."""
     given, sigma_px = calibration.given_camera or calibration.camera, calibration.options.lens.principal_point_sigma_px
     if given.covariance is not None or not sigma_px:
-        return "the picture is not cropped"
+        return "the picture is uncropped"
     within_px = 2.0 * sigma_px * given.width_px / PRIOR_WIDTH_PX
-    return f"the principal point is right to {within_px:.2g} px (of a cropped picture it is not)"
+    return f"the picture is uncropped, its principal point right to {within_px:.2g} px"
 
 
 def _alone_cm(calibration: Calibration) -> float:
