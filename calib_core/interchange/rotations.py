@@ -82,9 +82,11 @@ def nearest_rotation(matrix: Matrix33, *, tolerance: float) -> Matrix33:
         ValueError: it is mirrored, or farther from orthonormal than the tolerance.
     """
     matrix = np.asarray(matrix, dtype=np.float64)
-    if np.linalg.det(matrix) < 0:
+    with np.errstate(all="ignore"):  # numbers of any size
+        mirrored = np.linalg.det(matrix) < 0
+        off = np.abs(matrix @ matrix.T - np.eye(3)).max()
+    if mirrored:
         raise ValueError("the rotation is left-handed (determinant -1): an axis is mirrored")
-    off = np.abs(matrix @ matrix.T - np.eye(3)).max()
     if not off <= tolerance:
         raise ValueError(f"the rotation is not orthonormal (off by {off:.2g})")
     if off <= 1e-14:

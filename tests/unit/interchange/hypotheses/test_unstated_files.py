@@ -197,6 +197,10 @@ def _set(row: int, column: int, value: float) -> Callable[[np.ndarray], None]:
         (_with(_set(3, 3, 2.0)), r"T: the last row of the 4x4 matrix is 0 0 0 2 instead of 0 0 0 1"),
         (_with(_set(3, 0, 0.5)), r"instead of 0 0 0 1"),
         (json.dumps({"T": (2 * MATRIX[:3]).tolist()}), r"not orthonormal .* is it scaled"),
+        (
+            json.dumps({"T": [[0, 1e-310, 2e-310, 1], [3e-310, 4e-310, 5e-310, 1], [6e-310, 7e-310, 8e-310, 1]]}),
+            "orthonormal",
+        ),
         (json.dumps({"M": (np.diag([500.0, 500, 1]) @ MATRIX[:3]).tolist()}), r"looks like a projection"),
         (json.dumps({"T": MATRIX.tolist()}).replace("0.12", "NaN"), r"not finite"),
         (json.dumps({"R": POSE.rotation.tolist()}), r"a rotation, and no translation beside it"),
