@@ -30,8 +30,8 @@ from calib_core.boxes.formats.yolo import YOLO
 from calib_core.errors import InputError
 from calib_core.input_files import file_text, name_text, other_kind, read_input
 from calib_core.interchange.syntax.strict_json import json_value
-from calib_core.measurements import Box, Boxes, FrameBoxes, TimeNs
-from calib_core.recordings.box_topics import frames_of_stamps
+from calib_core.measurements import Box, Boxes
+from calib_core.recordings.box_topics import frames_of_stamps, joined_frames
 from calib_core.recordings.plain_files.file_stamps import times_in_names
 
 BOX_FORMATS: tuple[BoxFormat, ...] = (OWN, OPENLABEL, NUSCENES, COCO, CVAT, KITTI_TRACKS, KITTI_OBJECTS, YOLO)
@@ -220,7 +220,7 @@ def matched_boxes(
         places, notes = frames_of_stamps(stamps, source, image_times)
     else:
         places, notes = _by_number(found, source, len(image_times))
-    frames = _joined(found.frames, places, image_times)
+    frames = joined_frames([frame.boxes for frame in found.frames], places, image_times)
     return Boxes(frames, source, image_size_px or found.image_size_px, (*found.notes, *notes))
 
 
@@ -341,12 +341,3 @@ def _first_number(found: FileBoxes, numbers: Indices, count: int) -> tuple[int, 
     if lowest == 1:
         return 1, "the file begins with 1"
     return 0, "assumed; check a box in the overlay"
-
-
-def _joined(frames: Sequence[FileFrame], places: Indices, image_times: TimesNs) -> tuple[FrameBoxes, ...]:
-    """Return the boxes by recorded frame; a box that is given twice counts once."""
-    boxes: dict[int, dict[Box, None]] = {}
-    for frame, place in zip(frames, places.tolist(), strict=True):
-        if place >= 0:
-            boxes.setdefault(place, {}).update(dict.fromkeys(replace(box) for box in frame.boxes))
-    return tuple(FrameBoxes(TimeNs(int(image_times[place])), tuple(boxes[place])) for place in sorted(boxes))

@@ -164,7 +164,7 @@ def boxes_in_topic(topic: Topic, *, stamps_ns: TimesNs, times_ns: TimesNs) -> Bo
         np.array([stamp for stamp, _ in found], dtype=np.int64), f"topic {topic.name}", stamps_ns
     )
     notes = (*notes, *_about_losses(lost, dropped))
-    return Boxes(_joined([boxes for _, boxes in found], places.tolist(), times_ns), topic.name, notes=notes)
+    return Boxes(joined_frames([boxes for _, boxes in found], places, times_ns), topic.name, notes=notes)
 
 
 def _about_losses(lost: Sequence[str], dropped: int) -> Iterator[str]:
@@ -174,10 +174,16 @@ def _about_losses(lost: Sequence[str], dropped: int) -> Iterator[str]:
         yield f"{dropped} boxes without a finite, positive size are left out"
 
 
-def _joined(found: Sequence[tuple[Box, ...]], places: Sequence[int], times_ns: TimesNs) -> tuple[FrameBoxes, ...]:
-    """Return the boxes by recorded frame; a message that was recorded twice counts once."""
+def joined_frames(found: Sequence[tuple[Box, ...]], places: Indices, times_ns: TimesNs) -> tuple[FrameBoxes, ...]:
+    """Return the boxes by recorded frame; a box that is given twice counts once.
+
+    Args:
+        found: of each message or annotated frame.
+        places: (n,) the recorded frame of each; -1 for none.
+        times_ns: (m,) stamps of the recorded frames.
+    """
     boxes: dict[int, dict[Box, None]] = {}
-    for mine, place in zip(found, places, strict=True):
+    for mine, place in zip(found, places.tolist(), strict=True):
         if place >= 0:
             boxes.setdefault(place, {}).update(dict.fromkeys(mine))
     return tuple(FrameBoxes(TimeNs(int(times_ns[place])), tuple(boxes[place])) for place in sorted(boxes))

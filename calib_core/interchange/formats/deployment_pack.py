@@ -4,7 +4,6 @@ Below are its files: the manifest, the radar's corrections, the points of the se
 """
 
 import hashlib
-import io
 import re
 import textwrap
 from collections.abc import Iterator, Mapping
@@ -24,7 +23,7 @@ from calib_core.interchange.formats.urdf import URDF
 from calib_core.interchange.own.calibration_json import CALIBRATION_1, write_calibration
 from calib_core.interchange.syntax.content import Content, readings
 from calib_core.interchange.syntax.yaml_text import number_text, numbers_text, quoted
-from calib_core.interchange.syntax.zip_archives import pack
+from calib_core.interchange.syntax.zip_archives import pack, pack_arrays
 from calib_core.radar import AngleMap, RadarErrors, polar_from_cartesian
 from calib_core.results import Calibration
 
@@ -203,12 +202,7 @@ def _map_npz(grid: AngleMap) -> bytes:
         "aed_px": np.array(grid.raw_aed_px),
         "corrected_aed_px": np.array(grid.corrected_aed_px),
     }
-    members = {}
-    for name, array in arrays.items():
-        buffer = io.BytesIO()
-        np.lib.format.write_array(buffer, np.ascontiguousarray(array), allow_pickle=False)
-        members[f"{name}.npy"] = buffer.getvalue()
-    return pack(members)
+    return pack_arrays({name: np.ascontiguousarray(array) for name, array in arrays.items()})
 
 
 _POINTS = 10

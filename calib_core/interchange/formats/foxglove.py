@@ -25,15 +25,36 @@ def _recognizes(content: Content) -> bool:
     if content.syntax == "mcap":
         return any(message.schema_name in _READ_SCHEMAS for message in content.mcap.messages)
     messages = content.json_mapping
-    return "FrameTransform" in messages or bool(_listed(messages)) or "parent_frame_id" in messages
+    return "FrameTransform" in messages or bool(listed_transforms(messages)) or "parent_frame_id" in messages
 
 
-def _listed(messages: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+def listed_transforms(messages: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     """Return the transforms of a FrameTransforms message, alone or under its name; none if it is another message."""
     named = messages.get("FrameTransforms")
     transforms = (named if isinstance(named, Mapping) else messages).get("transforms")
     listed = transforms if isinstance(transforms, list) else []
     return [one for one in listed if isinstance(one, Mapping) and "parent_frame_id" in one]
+
+
+def posed_frames(transform: Any, *, source: str, place: str) -> tuple[str, str, WrittenPose]:
+    """Return parent and child of a FrameTransform, and the pose.
+
+    Raises:
+        InputError: a frame name or a number is missing.
+    """
+    message = transform if isinstance(transform, Mapping) else {}
+    parent, child = (str(message.get(key) or "") for key in ("parent_frame_id", "child_frame_id"))
+    if not parent or not child:
+        raise InputError(f"{source}: {place}: parent_frame_id or child_frame_id is missing; name both frames")
+    values = []
+    for part, keys in (("translation", "xyz"), ("rotation", "xyzw")):
+        block = message.get(part)
+        if not isinstance(block, Mapping):
+            raise InputError(f"{source}: {place}.{part}: missing; add it")
+        values.append(
+            [floats(block.get(key), source=source, place=f"{place}.{part}.{key}", length=1)[0] for key in keys]
+        )
+    return parent, child, WrittenPose("quaternion_xyzw", np.array(values[1]), np.array(values[0]), "radar_from_camera")
 
 
 def _read(content: Content, source: str) -> ImportedCalibration:
@@ -68,24 +89,11 @@ def _messages(file: McapFile, *, source: str) -> dict[str, Any]:
 
 
 def _read_messages(messages: Mapping[str, Any], stated: FrameNames | None, source: str) -> ImportedCalibration:
-    message, listed = messages.get("FrameTransform", messages), _listed(messages)
+    message, listed = messages.get("FrameTransform", messages), listed_transforms(messages)
     if listed:
         ends = [Ends(str(one.get("parent_frame_id") or ""), str(one.get("child_frame_id") or "")) for one in listed]
         message = listed[choose_transform(ends, stated, source=source)]
-    if not isinstance(message, Mapping):
-        message = {}
-    parent, child = (str(message.get(key) or "") for key in ("parent_frame_id", "child_frame_id"))
-    if not parent or not child:
-        raise InputError(f"{source}: parent_frame_id or child_frame_id is missing; name both frames")
-    numbers = []
-    for part, keys in (("translation", "xyz"), ("rotation", "xyzw")):
-        block = message.get(part)
-        if not isinstance(block, Mapping):
-            raise InputError(f"{source}: FrameTransform.{part}: missing; add it")
-        numbers.append(
-            [floats(block.get(k), source=source, place=f"FrameTransform.{part}.{k}", length=1)[0] for k in keys]
-        )
-    written = WrittenPose("quaternion_xyzw", np.array(numbers[1]), np.array(numbers[0]), "radar_from_camera")
+    parent, child, written = posed_frames(message, source=source, place="FrameTransform")
     roles = posed_between(parent, child, stated or _frames_of(messages, parent, child), written)
     cameras = find_cameras(messages, source=source) if "CameraCalibration" in messages else ()
     return ImportedCalibration(

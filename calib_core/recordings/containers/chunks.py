@@ -10,7 +10,7 @@ import zlib
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 from typing import TypeAlias
@@ -20,7 +20,7 @@ import numpy as np
 from calib_core.arrays import Indices
 from calib_core.errors import RecordingError
 from calib_core.measurements import DataWarning
-from calib_core.recordings.containers.compression import refuse_bomb, unpack, unpack_what_is_there
+from calib_core.recordings.containers.compression import MAX_CHUNK_BYTES, refuse_bomb, unpack, unpack_what_is_there
 from calib_core.recordings.containers.index_cache import (
     KeptIndex,
     cache_of,
@@ -69,6 +69,52 @@ class Chunk:
     def packed(self) -> bool:
         """Return whether it is compressed."""
         return self.compression not in ("", "none")
+
+
+@dataclass(slots=True)
+class Scanned:
+    """What a scan of a file from its beginning finds, without an index.
+
+    Attributes:
+        chunks: with the available bytes; the first represents the whole file, for messages outside chunks.
+        messages: (receive time [ns], chunk, offset) by channel.
+        lost_bytes: number of bytes that could not be parsed, in the file and in decompressed chunks.
+        damaged_chunks: number of chunks that could not be fully decompressed.
+        fault: why the first of those could not.
+        tried: number of attempts to find a record after a damaged stretch; bounded.
+    """
+
+    chunks: list[Chunk]
+    messages: dict[int, list[tuple[int, int, int]]] = field(default_factory=dict)
+    lost_bytes: int = 0
+    damaged_chunks: int = 0
+    fault: str = ""
+    tried: int = 0
+
+    def unpacked(self, file: FileBytes, chunk: Chunk, *, where: str, checksum: int = 0) -> bytes:
+        """Decompress a chunk as far as possible; record what is wrong with it."""
+        try:
+            refuse_bomb(chunk.stored_bytes, chunk.size_bytes, where=where)
+            if chunk.stored_bytes > MAX_CHUNK_BYTES:
+                raise RecordingError(
+                    f"{where}: {chunk.stored_bytes} compressed bytes in one chunk are refused as damaged"
+                )
+        except RecordingError as error:
+            self._damaged(str(error))
+            self.lost_bytes += chunk.stored_bytes
+            return b""
+        data = file.up_to(chunk.position, chunk.stored_bytes)
+        try:
+            whole = unpack(data, chunk.compression, chunk.size_bytes, where=where)
+        except RecordingError as error:
+            self._damaged(str(error))
+            return unpack_what_is_there(data, chunk.compression, chunk.size_bytes)
+        if checksum and zlib.crc32(whole) != checksum:
+            self._damaged(f"{where}: wrong checksum")
+        return whole
+
+    def _damaged(self, fault: str) -> None:
+        self.damaged_chunks, self.fault = self.damaged_chunks + 1, self.fault or fault
 
 
 class ChunkedSource:

@@ -223,7 +223,7 @@ def _log_time(message: StoredMessage) -> int:
 def besides_messages(source: McapSource) -> BesidesMessages:
     """Read what a file holds besides messages; a file without an index is walked through once more."""
     if source.recovered:
-        found = FoundInMcap(Declarations(), [Chunk(0, source.size_bytes, source.size_bytes, "")])
+        found = FoundInMcap([Chunk(0, source.size_bytes, source.size_bytes, "")])
         parts = []
         for part in parts_of_mcap(source.file, found):
             found.messages.clear()

@@ -22,7 +22,7 @@ from calib_core.measurements import DataWarning
 from calib_core.recordings.containers.chunks import ChannelFilter, Chunk
 from calib_core.recordings.containers.compression import packing_of
 from calib_core.recordings.containers.mcap.reader import McapSource
-from calib_core.recordings.containers.mcap.records import MAGIC, Declarations
+from calib_core.recordings.containers.mcap.records import MAGIC
 from calib_core.recordings.containers.mcap.recovery import FoundInMcap, scan_mcap_further
 from calib_core.recordings.containers.positioned_reads import FileBytes
 from calib_core.recordings.containers.rosbag1.reader import Rosbag1Source, channels_of
@@ -329,7 +329,7 @@ class GrowingMcap(McapSource):
         self._kept = None
         self.recovered = True
         self._heads = KeptHeads()
-        self._scanned = FoundInMcap(Declarations(), [Chunk(0, self.size_bytes, self.size_bytes, "")])
+        self._scanned = FoundInMcap([Chunk(0, self.size_bytes, self.size_bytes, "")])
         self.chunks = self._scanned.chunks
         self._read = AppendedFile(self.file, len(MAGIC))
 

@@ -2,7 +2,7 @@
 
 import csv
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +11,7 @@ import numpy as np
 from calib_core.arrays import TimesNs
 from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S, DataWarning, TimeNs
-from calib_core.recordings.containers.sources import Assumption
+from calib_core.recordings.containers.sources import Assumption, Channel
 from calib_core.recordings.plain_files.source import PlainOptions, PlainSource
 from calib_core.recordings.time.written_times import (
     TimeUnit,
@@ -107,6 +107,30 @@ class StampedFiles:
         if not self.assumed:
             return ()
         return (Assumption("name-times", topic, self.assumed, "a CSV with the columns file,time_ns in the folder"),)
+
+    def source(self, folder: Path, what: str, channel: Channel, message: Callable[[int], bytes]) -> PlainSource:
+        """Return the files of a folder as the messages of a topic.
+
+        Args:
+            folder: of the files.
+            what: they are, for the list of files.
+            channel: of the topic.
+            message: builds the message of a file.
+        """
+        return PlainSource(
+            folder,
+            sum(file.stat().st_size for file in self.files),
+            what,
+            channel,
+            self.times_ns,
+            message,
+            self.warnings,
+            assumptions=self.assumptions(channel.topic),
+            zoneless=self.zoneless,
+            counted=self.counted,
+            names=self.names,
+            times_from=self.times_from,
+        )
 
 
 def stamp_files(

@@ -1,6 +1,7 @@
 """Read camera frames from a folder of pictures."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -53,28 +54,15 @@ def open_picture_folder(
         file, fault = next(iter(faults.items()))
         raise RecordingError(f"{folder}: none of its {len(files)} pictures can be read: {file.name} {fault}")
     stamped = stamp_files(folder, sound, options, known)
-    topic = topic_of(folder, "image")
     camera = camera_beside(folder, stamped.files, picture_size_px(stamped.files[0]))
 
     def message(row: int) -> bytes:
         return picture_message(TimeNs(int(stamped.times_ns[row])), _FRAME, _picture(stamped.files[row]))
 
-    return PlainSource(
-        folder,
-        sum(file.stat().st_size for file in stamped.files),
-        f"folder of images, {len(stamped.files)} files{_calibration_words(camera)}",
-        picture_channel(topic),
-        stamped.times_ns,
-        message,
-        (*_about_faults(folder, faults, len(files)), *_about_ends(folder, sound), *stamped.warnings),
-        assumptions=stamped.assumptions(topic),
-        zoneless=stamped.zoneless,
-        counted=stamped.counted,
-        names=stamped.names,
-        times_from=stamped.times_from,
-        camera=camera,
-        unreadable=faults,
-    )
+    text = f"folder of images, {len(stamped.files)} files{_calibration_words(camera)}"
+    source = stamped.source(folder, text, picture_channel(topic_of(folder, "image")), message)
+    warnings = (*_about_faults(folder, faults, len(files)), *_about_ends(folder, sound), *source.warnings)
+    return replace(source, warnings=warnings, camera=camera, unreadable=faults)
 
 
 def _checksum_fault(file: Path) -> str:

@@ -138,27 +138,12 @@ def _sampled(files: Sequence[Path], dtype: "np.dtype[np.void]") -> np.ndarray:
 
 
 def _open(folder: Path, stamped: StampedFiles, what: str, points: Callable[[Path], np.ndarray]) -> PlainSource:
-    topic = topic_of(folder, "radar")
-
     def message(row: int) -> bytes:
         return cloud_message(TimeNs(int(stamped.times_ns[row])), _FRAME, points(stamped.files[row]))
 
-    sizes = [file.stat().st_size for file in stamped.files]
-    empty = sizes.count(0)
-    return PlainSource(
-        folder,
-        sum(sizes),
-        f"{what}, {len(stamped.files)} files" + (f", {empty} of them empty" if empty else ""),
-        cloud_channel(topic),
-        stamped.times_ns,
-        message,
-        stamped.warnings,
-        assumptions=stamped.assumptions(topic),
-        zoneless=stamped.zoneless,
-        counted=stamped.counted,
-        names=stamped.names,
-        times_from=stamped.times_from,
-    )
+    empty = sum(not file.stat().st_size for file in stamped.files)
+    text = f"{what}, {len(stamped.files)} files" + (f", {empty} of them empty" if empty else "")
+    return stamped.source(folder, text, cloud_channel(topic_of(folder, "radar")), message)
 
 
 def is_named_lidar(folder: Path) -> bool:

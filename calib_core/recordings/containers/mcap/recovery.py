@@ -1,13 +1,11 @@
 """Recover MCAP files without a usable index: scan from the beginning, find every complete message, count the losses."""
 
 import re
-import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 from calib_core.errors import RecordingError
-from calib_core.recordings.containers.chunks import Chunk
-from calib_core.recordings.containers.compression import refuse_bomb, unpack, unpack_what_is_there
+from calib_core.recordings.containers.chunks import Chunk, Scanned
 from calib_core.recordings.containers.mcap.records import (
     CHANNEL,
     CHUNK,
@@ -40,30 +38,18 @@ _DATA_AND_ENDS = DATA_KINDS | {CHUNK, *_END_SIZES}
 
 
 @dataclass(slots=True)
-class FoundInMcap:
+class FoundInMcap(Scanned):
     """The result of scanning a file.
 
     Attributes:
         declarations: schemas and channels.
-        chunks: the first represents the whole file, for messages outside chunks.
-        messages: (log time [ns], chunk, offset) by channel.
         ended: whether the scan reached the end of the data without errors.
-        lost_bytes: number of bytes that could not be parsed, in the file and in decompressed chunks.
         private_bytes: number of bytes in records of kinds that the format leaves to other programs.
-        damaged_chunks: number of chunks that could not be fully decompressed.
-        fault: why the first of those could not.
-        tried: number of attempts to find a record after a damaged stretch; bounded.
     """
 
-    declarations: Declarations
-    chunks: list[Chunk]
-    messages: dict[int, list[tuple[int, int, int]]] = field(default_factory=dict)
+    declarations: Declarations = field(default_factory=Declarations)
     ended: bool = False
-    lost_bytes: int = 0
     private_bytes: int = 0
-    damaged_chunks: int = 0
-    fault: str = ""
-    tried: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +75,7 @@ def scan_mcap(file: FileBytes) -> FoundInMcap:
     Args:
         file: the file.
     """
-    found = FoundInMcap(Declarations(), [Chunk(0, file.size_bytes, file.size_bytes, "")])
+    found = FoundInMcap([Chunk(0, file.size_bytes, file.size_bytes, "")])
     for part in parts_of_mcap(file, found):
         if not part.kind:
             found.lost_bytes += part.end - part.place
@@ -219,7 +205,8 @@ def _scan_chunk(file: FileBytes, position: int, stored: int, head: ChunkHead, fo
     size = stored
     stretch: Stretch = FileStretch(file, position, stored)
     if head.compression:
-        stretch = MemoryStretch(_unpacked(file, position, stored, head, found))
+        packed = Chunk(position, stored, head.unpacked_bytes, head.compression)
+        stretch = MemoryStretch(found.unpacked(file, packed, where=f"chunk at byte {position}", checksum=head.checksum))
         size = stretch.size
     found.chunks.append(Chunk(position, stored, size, head.compression))
     end = 0
@@ -234,26 +221,3 @@ def _scan_chunk(file: FileBytes, position: int, stored: int, head: ChunkHead, fo
         found.lost_bytes += after - end
         end = after
     found.lost_bytes += max(0, size - end)
-
-
-def _unpacked(file: FileBytes, position: int, stored: int, head: ChunkHead, found: FoundInMcap) -> bytes:
-    where = f"chunk at byte {position}"
-    try:
-        refuse_bomb(stored, head.unpacked_bytes, where=where)
-        if stored > MAX_RECORD_BYTES:
-            raise RecordingError(f"{where}: {stored} compressed bytes in one chunk are refused as damaged")
-    except RecordingError as error:
-        found.damaged_chunks, found.fault = found.damaged_chunks + 1, found.fault or str(error)
-        found.lost_bytes += stored
-        return b""
-    data = file.up_to(position, stored)
-    try:
-        whole = unpack(data, head.compression, head.unpacked_bytes, where=where)
-    except RecordingError as error:
-        found.damaged_chunks, found.fault = found.damaged_chunks + 1, found.fault or str(error)
-    else:
-        if head.checksum and zlib.crc32(whole) != head.checksum:
-            found.damaged_chunks += 1
-            found.fault = found.fault or f"{where}: wrong checksum"
-        return whole
-    return unpack_what_is_there(data, head.compression, head.unpacked_bytes)

@@ -10,8 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 from calib_core.errors import RecordingError
-from calib_core.recordings.containers.chunks import Chunk
-from calib_core.recordings.containers.compression import refuse_bomb, unpack, unpack_what_is_there
+from calib_core.recordings.containers.chunks import Chunk, Scanned
 from calib_core.recordings.containers.positioned_reads import FileBytes, FileStretch, MemoryStretch, Stretch
 from calib_core.recordings.containers.rosbag1.index import fields_of
 
@@ -19,7 +18,6 @@ _MESSAGE, _CHUNK, _CONNECTION = 2, 5, 7
 _OTHER_KINDS = frozenset({3, 4, 6})  # the bag's header, and its index
 _U32 = struct.Struct("<I")
 _MAX_HEADER_BYTES = 1 << 24
-_MAX_STORED_BYTES = 1 << 28
 _MARK = re.compile(rb"op=[\x02\x05\x07]")
 _MAX_CANDIDATES = 2000
 _BACK_BYTES = 96
@@ -42,26 +40,14 @@ class Record:
 
 
 @dataclass(slots=True)
-class FoundInBag:
+class FoundInBag(Scanned):
     """The result of scanning a bag.
 
     Attributes:
-        chunks: with the available bytes; the first represents the whole file, for messages outside chunks.
         connections: the record of each, with its data.
-        messages: (receive time [ns], chunk, offset) by connection.
-        lost_bytes: number of bytes that could not be parsed, in the file and in decompressed chunks.
-        damaged_chunks: number of chunks that could not be fully decompressed.
-        fault: why the first of those could not.
-        tried: number of attempts to find a record after a damaged stretch; bounded.
     """
 
-    chunks: list[Chunk]
     connections: dict[int, tuple[dict[str, bytes], bytes]] = field(default_factory=dict)
-    messages: dict[int, list[tuple[int, int, int]]] = field(default_factory=dict)
-    lost_bytes: int = 0
-    damaged_chunks: int = 0
-    fault: str = ""
-    tried: int = 0
 
 
 def _record(stretch: Stretch, place: int) -> Record | None:
@@ -189,7 +175,8 @@ def scan_chunk(file: FileBytes, record: Record, found: FoundInBag) -> None:
         stretch: Stretch = FileStretch(file, record.data_place, stored)
         size = stored
     else:
-        data = _unpacked(file, record, stored, compression, size, found)
+        packed = Chunk(record.data_place, stored, size, compression)
+        data = found.unpacked(file, packed, where=f"chunk at byte {record.place}")
         stretch, size = MemoryStretch(data), len(data)
     found.chunks.append(Chunk(record.data_place, stored, size, compression))
     for inner in BagWalk(stretch, found, inside=True).records(0):
@@ -208,25 +195,6 @@ def note_record(stretch: Stretch, record: Record, chunk: int, found: FoundInBag)
     connection = int.from_bytes(fields["conn"], "little")
     found.messages.setdefault(connection, []).append((sec * 1_000_000_000 + nanosec, chunk, record.place))
     return True
-
-
-def _unpacked(file: FileBytes, record: Record, stored: int, compression: str, size: int, found: FoundInBag) -> bytes:
-    """Decompress a chunk as far as possible; record what is wrong with it."""
-    where = f"chunk at byte {record.place}"
-    try:
-        refuse_bomb(stored, size, where=where)
-        if stored > _MAX_STORED_BYTES:
-            raise RecordingError(f"{where}: {stored} compressed bytes in one chunk are refused as damaged")
-    except RecordingError as error:
-        found.damaged_chunks, found.fault = found.damaged_chunks + 1, found.fault or str(error)
-        found.lost_bytes += stored
-        return b""
-    data = file.up_to(record.data_place, stored)
-    try:
-        return unpack(data, compression, size, where=where)
-    except RecordingError as error:
-        found.damaged_chunks, found.fault = found.damaged_chunks + 1, found.fault or str(error)
-    return unpack_what_is_there(data, compression, size)
 
 
 def _note_connection(record: Record, data: bytes, found: FoundInBag) -> bool:

@@ -179,24 +179,13 @@ def open_table_folder(
             TimeNs(int(stamped.times_ns[row])), RADAR_FRAME, _points_of_file(stamped.files[row], columns, options)
         )
 
-    remarks = times.remarks if times and inside else ()
-    return PlainSource(
-        folder,
-        sum(file.stat().st_size for file in stamped.files),
-        f"folder of radar {files[0].suffix}, {len(stamped.files)} files{_table_words(columns, remarks)}",
-        cloud_channel(topic),
-        stamped.times_ns,
-        message,
-        stamped.warnings,
-        assumptions=(
-            *stamped.assumptions(topic),
-            *(times.assumptions if times and inside else ()),
-            *_assumptions(columns, topic),
-        ),
-        zoneless=stamped.zoneless,
-        counted=stamped.counted,
-        names=stamped.names,
-        times_from=stamped.times_from,
+    words = _table_words(columns, times.remarks if times and inside else ())
+    text = f"folder of radar {files[0].suffix}, {len(stamped.files)} files{words}"
+    source = stamped.source(folder, text, cloud_channel(topic), message)
+    of_times = times.assumptions if times and inside else ()
+    return replace(
+        source,
+        assumptions=(*source.assumptions, *of_times, *_assumptions(columns, topic)),
         mapped=bool(options.mapped),
         computed=_computed_words(columns.plan),
     )
