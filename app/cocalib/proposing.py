@@ -20,6 +20,7 @@ from calib_core.proposing import DwellView, FrameSource, Proposals, ViewProgress
 from calib_core.proposing.dwell_views import has_changed
 from calib_core.proposing.look import Look, likeness_elsewhere, look_of, with_look
 from cocalib.platform.error_boundary import error_boundary
+from cocalib.platform.process import go_last
 
 REFLECTOR_M = 0.24
 """Width of the reflector if nothing is said of it [m]."""
@@ -364,6 +365,7 @@ class ProposingJob:
             thread.join()
 
     def _run(self) -> None:
+        go_last()
         while True:
             with self._news:
                 self._news.wait_for(lambda: self._closed or self._wish not in (None, self._answered))

@@ -1,6 +1,7 @@
-"""How the process ends at a signal and handles freed memory: Ctrl+C, SIGTERM and SIGHUP all end it in order, once."""
+"""How the process ends at a signal (Ctrl+C, SIGTERM, SIGHUP: in order, once), handles freed memory, and shares the processor."""
 
 import ctypes
+import os
 import signal
 import sys
 import threading
@@ -13,6 +14,7 @@ _AGAIN_S = 0.02
 _TRIM_THRESHOLD, _MMAP_THRESHOLD, _ARENA_MAX = -1, -3, -8  # as <malloc.h> has them
 _KEPT_BYTES = 64 << 20
 _LARGEST_BYTES = 32 << 20
+_BACKGROUND = 10  # niceness
 
 
 def stop_on_signals() -> None:
@@ -81,3 +83,10 @@ def keep_freed_memory() -> bool:
         return False
     kept = mallopt(_TRIM_THRESHOLD, _KEPT_BYTES) == 1 and mallopt(_ARENA_MAX, 1) == 1
     return bool(mallopt(_MMAP_THRESHOLD, _LARGEST_BYTES) == 1 and kept)
+
+
+def go_last() -> None:
+    """Let other threads and programs, such as the browser, go before this thread, where the system can do that for one."""
+    if sys.platform == "linux":
+        thread = threading.get_native_id()
+        os.setpriority(os.PRIO_PROCESS, thread, max(_BACKGROUND, os.getpriority(os.PRIO_PROCESS, thread)))

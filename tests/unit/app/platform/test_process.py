@@ -1,10 +1,14 @@
 """A signal ends the program, also one that comes where Python drops exceptions."""
 
+import os
 import platform
 import subprocess
 import sys
+import threading
 
 import pytest
+
+from cocalib.platform.process import go_last
 
 _ENDS = """
 import os, signal, threading
@@ -52,3 +56,20 @@ print(faults())
 def test_pictures_reuse_the_memory_of_earlier_ones():
     answer = subprocess.run([sys.executable, "-c", _FAULTS], check=True, capture_output=True, text=True)
     assert int(answer.stdout) < 1000  # 20 pictures of two sizes are over 60 000 pages
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a thread has a priority of its own on Linux only")
+def test_a_thread_in_the_background_gives_way_and_the_others_do_not():
+    main = os.getpriority(os.PRIO_PROCESS, threading.get_native_id())
+    found: list[int] = []
+
+    def run() -> None:
+        for _ in range(2):
+            go_last()
+            found.append(os.getpriority(os.PRIO_PROCESS, threading.get_native_id()))
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    thread.join()
+    assert found == [max(main, 10)] * 2
+    assert os.getpriority(os.PRIO_PROCESS, threading.get_native_id()) == main
