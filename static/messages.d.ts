@@ -259,7 +259,6 @@ export interface View {
   revision: number;
   stage: "collecting" | "solving" | "solved" | "unsolvable";
   status: string;
-  hint: string;
   solving: boolean;
   checking: boolean;
   solved_revision: number;

@@ -41,7 +41,7 @@ function drawAll() {
   const [view, recording] = [state.view, state.recording];
   if (!view || !recording) return;
   const { acknowledged, assumptions } = view;
-  const ofPose = state.looking ? [{ code: "no-camera", message: view.status, hint: view.hint }] : view.warnings.filter((one) => !view.verdict.line.includes(one.message.replace(/\.$/, ""))); // the verdict says it already
+  const ofPose = view.warnings.filter((one) => !view.verdict.line.includes(one.message.replace(/\.$/, ""))); // the verdict says it already
   const text = JSON.stringify([ofPose, recording.warnings, assumptions, acknowledged]);
   if (text === drawn) return;
   drawn = text;

@@ -77,7 +77,7 @@ function doingWords(view) {
   if (!state.connected) return "Not connected";
   if (view.solving) return view.checking ? "Checking…" : "Solving…";
   if (view.reference && !view.has_calibration) return view.status;
-  return [searchWords() || "Connected", ...(view.stage === "solved" ? view.status.split("; ").slice(1) : [])].join("  ·  ");
+  return [searchWords() || "Connected", view.status].filter(Boolean).join("  ·  ");
 }
 
 /** How a recording that is still being written goes on, and where the next placement pays. @returns {string[]} */

@@ -41,8 +41,9 @@ from cocalib.view.model import AccPanel, Advice, AssumptionRow, Figure, Stage, S
 from cocalib.view.reference import Reference, comparison_figures, reference_words, shown_calibration
 from cocalib.view.wording import plain, sentence, warning_in_sentences, with_degree_signs
 
-_WITHOUT_PICTURES = (
-    "No camera in this recording: nothing can be clicked",
+_WITHOUT_PICTURES = DataWarning(
+    "no-camera",
+    "No camera in this recording: nothing can be clicked.",
     "Add the camera's file to calibrate: cocalib open RADAR CAMERA.",
 )
 
@@ -71,14 +72,10 @@ def view(
     shown = shown_calibration(session, reference)
     stage = _stage(session)
     verdict = _shown_verdict(session, facts, placements)
-    status, hint = _words(session, stage, reference, verdict) if facts.has_pictures else _WITHOUT_PICTURES
-    if stage == "solved" and facts.unconfirmed(session):
-        status += "; unconfirmed assumptions"
     return View(
         revision=session.revision,
         stage=stage,
-        status=status,
-        hint=hint,
+        status=_status(session, facts, reference),
         solving=session.needs_solving,
         checking=session.is_checking,
         solved_revision=session.outcome_revision if outcome is not None else -1,
@@ -91,7 +88,7 @@ def view(
         pose=pose_figures(shown) if shown else (),
         pose_assumed=assumed_figures(shown) if shown else (),
         systematic_errors=systematic_errors(shown) if shown else SystematicErrorTable(),
-        warnings=_warnings(calibration) if calibration else (),
+        warnings=_warnings(calibration) if facts.has_pictures else (_WITHOUT_PICTURES,),
         options=session.options,
         residual_limit_px=residual_limit_px(calibration) if calibration else None,
         advice=advice_for(calibration, verdict) if calibration else None,
@@ -140,59 +137,24 @@ def _waits_for_clicks(session: Session) -> bool:
     return _missing(session) > 0 and not blocked
 
 
-def _words(session: Session, stage: Stage, reference: Reference | None, verdict: Verdict) -> tuple[str, str]:
-    """Return the status line and the next thing to do."""
-    missing, outcome = _missing(session), session.outcome
-    if reference is not None and _waits_for_clicks(session) and not isinstance(outcome, Calibration):
-        return reference_words(session, reference), _still_missing(session, missing, verdict)
-    if _waits_for_clicks(session):
-        return f"{missing} more placement{'s' if missing > 1 else ''} needed", _next_click(session, verdict)
-    if session.is_checking and isinstance(outcome, Calibration):
-        return _agreement(outcome, "Checking…") + _changed(session), ""
-    if stage == "solving":
-        return "Solving…", ""
-    if isinstance(outcome, Unsolvable):
-        return sentence(outcome.reason), sentence(outcome.hint)
-    if isinstance(outcome, Calibration):
-        said = _early_line(session) or _agreement(outcome, f"{verdict.level.capitalize()}:")
-        return said + _changed(session), sentence(verdict.action)
-    return "", ""
+def _status(session: Session, facts: RecordingFacts, reference: Reference | None) -> str:
+    """Return what the status line adds to what is going on."""
+    found = session.outcome
+    if not isinstance(found, Calibration):
+        return "" if reference is None else reference_words(session, reference)
+    asked = sum(pair.rival >= 0 and not pair.inlier and not pair.excluded for pair in found.pairs)
+    changed = len({click.id for click in session.clicks} & session.changed_returns)
+    told = (
+        f"{asked} ask{'s' if asked == 1 else ''} which return is right (C)" if asked else "",
+        "" if found.sees_elevation else firm_text(found),
+        "1 click changed its return" if changed == 1 else f"{changed} clicks changed their return" if changed else "",
+        "unconfirmed assumptions" if facts.unconfirmed(session) else "",
+    )
+    return "  ·  ".join(filter(None, told))
 
 
-def _still_missing(session: Session, missing: int, verdict: Verdict) -> str:
-    """Return what a new calibration still needs, once there is a click."""
-    if _unpaired(session):
-        return _next_click(session, verdict)
-    return f"{missing} more placement{'s' if missing > 1 else ''} for a new calibration." if session.clicks else ""
-
-
-def _next_click(session: Session, verdict: Verdict) -> str:
-    unpaired = _unpaired(session)
-    if not unpaired:
-        return sentence(verdict.action)
-    count = "The click has" if len(session.clicks) == 1 else f"{len(unpaired)} of {len(session.clicks)} clicks have"
-    return f"{count} no radar position: {unpaired[0].reason}. {sentence(unpaired[0].hint)}"
-
-
-def _agreement(calibration: Calibration, word: str) -> str:
-    used = [pair for pair in calibration.pairs if not pair.excluded]
-    agreeing = sum(pair.inlier for pair in used)
-    agreed = f"all {len(used)}" if agreeing == len(used) else f"{agreeing} of {len(used)}"
-    asked = sum(pair.rival >= 0 and not pair.inlier for pair in used)
-    asking = f"; {asked} ask{'s' if asked == 1 else ''} which return is right (C)" if asked else ""
-    firm = "" if calibration.sees_elevation else f"; {firm_text(calibration)}"
-    return f"{word} {agreed} clicks agree{asking}{firm}"
-
-
-def _changed(session: Session) -> str:
-    """Say how many clicks have another return since the last answer, because of what is known now."""
-    count = len({click.id for click in session.clicks} & session.changed_returns)
-    words = "1 click changed its return" if count == 1 else f"{count} clicks changed their return"
-    return f"; {words}" if count else ""
-
-
-def _warnings(calibration: Calibration) -> tuple[DataWarning, ...]:
-    return tuple(map(warning_in_sentences, by_consequence(calibration.warnings)))
+def _warnings(calibration: Calibration | None) -> tuple[DataWarning, ...]:
+    return tuple(map(warning_in_sentences, by_consequence(calibration.warnings if calibration else ())))
 
 
 _PAPER_NAMES = {"aed": "AED", "held_out_aed": "held-out AED", "cdsd": "CDSD", "rms": "RMS"}

@@ -265,8 +265,7 @@ class View:
     Attributes:
         revision: of the session; grows with every change.
         stage: how far the session has come.
-        status: the same in a few words: "4 more placements needed", "Solving…", "Usable: 18 of 20 clicks agree".
-        hint: the next thing to do; "" when there is none.
+        status: what the status line says besides: "2 ask which return is right (C)"; or of the calibration under review.
         solving: this revision is being solved; what is shown belongs to an older one, unless it is being checked.
         checking: what is shown is a preview of this revision's answer; warnings and advice are still the previous ones.
         solved_revision: the revision that the figures belong to; -1 without figures.
@@ -297,7 +296,6 @@ class View:
     revision: int
     stage: Stage
     status: str
-    hint: str
     solving: bool
     checking: bool
     solved_revision: int

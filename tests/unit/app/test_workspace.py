@@ -260,7 +260,7 @@ def test_a_recording_without_pictures_can_be_looked_at_and_stores_nothing_and_on
     assert not facts.has_pictures
     assert facts.moments.tolist() == recording.radar_times.tolist()
     workspace = open_workspace(recording, camera=None, session_folder=tmp_path / "s", name="drive")
-    assert workspace.view.status == "No camera in this recording: nothing can be clicked"
+    assert [one.code for one in workspace.view.warnings] == ["no-camera"]
     with pytest.raises(EventError, match="no frame of drive"):
         workspace.dispatch(ClickPlaced(TimeNs(int(recording.radar_times[0])), (1.0, 1.0), "clicked"))
     workspace.close()

@@ -54,8 +54,7 @@ def _while_following() -> Iterator[str]:
 
 def _lines(name: str, seen: View) -> Iterator[str]:
     yield f"# {name}"
-    yield f"status: {seen.status}"
-    yield f"hint: {seen.hint or 'none'}"
+    yield f"status: {seen.status or 'none'}"
     yield f"verdict: {seen.verdict.line}"
     yield f"action: {seen.verdict.action}"
     yield from (f"{one.key}: {one.label}. {one.hint}" for one in seen.metrics)
