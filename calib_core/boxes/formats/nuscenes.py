@@ -4,7 +4,6 @@ A cuboid is in the axes of the map; the vehicle's and the camera's poses of a pi
 Tables of the whole set have up to 1 GB: they are read row by row, and only what belongs to recorded pictures is kept.
 """
 
-import io
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import PurePosixPath
@@ -24,7 +23,8 @@ from calib_core.boxes.formats.box_format import (
 )
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
-from calib_core.interchange.syntax.strict_json import json_rows
+from calib_core.input_files import json_rows
+from calib_core.interchange.syntax.strict_json import json_value
 from calib_core.measurements import TimeNs
 
 ANNOTATIONS = "sample_annotation"
@@ -106,17 +106,13 @@ def _table(file: BoxFile, name: str, wanted: Callable[[_Row], bool]) -> dict[str
 
 def _rows(file: BoxFile, member: str) -> Iterator[_Row]:
     place = f"{file.source}/{member}"
-    try:
-        text = io.StringIO(file.members[member])
-        with text if file.tables is None else (file.tables / member).open(encoding="utf-8-sig") as table:
-            for row in json_rows(table, source=place):
-                if not isinstance(row.get("token"), str):
-                    raise InputError(f"{place}: expected a list of rows with a token each; is it the right file?")
-                yield row
-    except OSError as error:
-        raise InputError(f"{place}: cannot be read: {error.strerror}; check its permissions") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{place}: not text in UTF-8; copy the table again") from None
+    rows = (
+        json_rows(file.tables / member, source=place) if file.tables else json_value(file.members[member], source=place)
+    )
+    for row in rows if file.tables or isinstance(rows, list) else [rows]:
+        if not isinstance(row, dict) or not isinstance(row.get("token"), str):
+            raise InputError(f"{place}: expected a list of rows with a token each; is it the right file?")
+        yield row
 
 
 def _row(tables: Mapping[str, Mapping[Any, _Row]], name: str, token: Any, place: str) -> _Row:

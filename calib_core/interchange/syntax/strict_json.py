@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from functools import cache
 from types import MappingProxyType
-from typing import Any, Literal, TextIO, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import msgspec
 
@@ -119,40 +119,6 @@ def json_value(text: str, *, source: str) -> Any:
     except (ValueError, RecursionError) as error:
         reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)
         raise InputError(f"{source}: {reason}; correct the file") from None
-
-
-_FIRST_ROW, _NEXT_ROW, _NO_ROW = (re.compile(rf"\s*{mark}\s*") for mark in (r"\[\s*(?={)", r",\s*(?={)", r"(\[\s*)?\]"))
-_LONGEST_ROW = 1 << 20
-
-
-def json_rows(stream: TextIO, *, source: str) -> Iterator[dict[str, Any]]:
-    """Yield the objects of a JSON list one by one, of a file of any size; keys may not repeat within one.
-
-    Raises:
-        InputError: it is no list of objects, or one is longer than a megabyte.
-    """
-    decoder = json.JSONDecoder(object_pairs_hook=_without_repeats)
-    text, count = "", 0
-    while len(text) <= 2 * _LONGEST_ROW and (more := stream.read(_LONGEST_ROW)):
-        text, at = text + more, 0
-        while start := (_NEXT_ROW if count else _FIRST_ROW).match(text, at):
-            try:
-                row, at = decoder.raw_decode(text, start.end())
-                if _is_too_deep(row):
-                    raise RecursionError
-            except json.JSONDecodeError:  # as it is where the text read so far ends
-                break
-            except (ValueError, RecursionError) as error:
-                reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)
-                raise InputError(f"{source}: row {count + 1:,}: {reason}; correct the file") from None
-            count += 1
-            yield row
-        text = text[at:]
-    if not (_NO_ROW.fullmatch(text) and bool(count) != ("[" in text)):
-        raise InputError(
-            f"{source}: expected a list of rows in braces, and found something else after {count:,} of them; "
-            "is it the right file, and was it copied completely?"
-        )
 
 
 def _is_too_deep(content: Any) -> bool:

@@ -11,6 +11,8 @@ import numpy as np
 
 from calib_core.arrays import Matrix33, Values
 from calib_core.camera import Camera
+from calib_core.errors import InputError
+from calib_core.input_files import json_rows
 from calib_core.recordings.camera.jpeg import picture_size_px
 
 _MAX_BYTES = 1 << 29
@@ -64,7 +66,7 @@ def camera_beside(folder: Path, files: Sequence[Path], picture_size_px: tuple[in
     try:
         found = _of_kitti_frames(folder, files) or _of_raw_kitti(folder, picture_size_px)
         return found or _of_nuscenes(folder, files) or _of_astyx(folder, files)
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError, AttributeError, InputError):
         return None  # a file of that name but of another form is not a data set's calibration
 
 
@@ -184,9 +186,15 @@ def _of_astyx(folder: Path, files: Sequence[Path]) -> FolderCamera | None:
 
 
 def _tokens_of(path: Path, names: set[str]) -> dict[str, None]:
-    """Return the calibrated sensors of pictures, in the order of the table."""
-    rows = _table(path) if path.is_file() else []
-    return {row["calibrated_sensor_token"]: None for row in rows if Path(row["filename"]).name in names}
+    """Return the calibrated sensors of pictures, in the order of the table, which may have more than 1 GB."""
+    left, found = set(names), dict[str, None]()
+    rows = json_rows(path, source=str(path)) if path.is_file() else iter(())
+    while left and (row := next(rows, None)):
+        name = row["filename"].rpartition("/")[2]
+        if name in left:
+            left.remove(name)
+            found[row["calibrated_sensor_token"]] = None
+    return found
 
 
 def _table(path: Path) -> list[Mapping[str, Any]]:
