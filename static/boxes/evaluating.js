@@ -244,7 +244,7 @@ function drawAcc() {
   const text = JSON.stringify(panel);
   if (text === drawnAcc) return;
   drawnAcc = text;
-  box.classList.toggle("stale", panel.judging);
+  box.classList.toggle("stale", panel.judging && panel.figures.length > 0);
   box.setAttribute("aria-busy", String(panel.judging));
   box.replaceChildren(...(panel.figures.length ? parts(panel) : [make("p", "acc-problem", panel.problem || "Comparing boxes and radar…")]), ...panel.warnings.map(warning));
 }
