@@ -89,7 +89,7 @@ def _warning_list(lens: CalibratedLens) -> Markup:
         for one in lens.warnings
     ]
     body = tag("ul", *items, class_="cautions") if items else tag("p", "No warnings.", class_="note")
-    return tag("section", tag("h2", "Cautions"), body, id="cautions")
+    return tag("section", tag("h2", "Warnings"), body, id="cautions")
 
 
 def _parameter_table(lens: CalibratedLens) -> Markup:

@@ -4,7 +4,7 @@ import numpy as np
 
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 from calib_core.interchange import CalibrationFile
-from calib_core.interchange.formats.statement import corrections_lines
+from calib_core.interchange.own.raw_data import aed_either_way
 from calib_core.results import Calibration
 from calib_core.results.verdict import Verdict, verdict_on
 from cocalib.report.markup import Child, Markup, tag
@@ -217,12 +217,11 @@ def _figures(calibration: Calibration) -> Markup:
         rows.append(("chi2 / degrees of freedom", f"{plain(metrics.chi2)} / {metrics.degrees_of_freedom}"))
     if np.isfinite(metrics.picture_sigma_px):
         rows.append(("in the picture (1 sigma, pose)", f"± {plain(metrics.picture_sigma_px, 2)} px"))
-    uncorrected = [
-        f"{line}: formats other than calibration-1 and the pack cannot hold what the radar gets wrong"
-        for line in corrections_lines(CalibrationFile(calibration))
-    ]
-    notes = (tag("p", sentence(line), class_="note") for line in uncorrected)
-    return tag("div", heading, _table(("figure", "value"), rows), *notes)
+    either = aed_either_way(CalibrationFile(calibration))
+    if differ := either is not None and plain(either[0]) != plain(either[1]):
+        rows.insert(1, ("AED without the corrections", f"{plain(either[1])} px"))
+    note = "Corrections: what the radar gets wrong, which only calibration-1 and the pack can hold."
+    return tag("div", heading, _table(("figure", "value"), rows), tag("p", note, class_="note") if differ else None)
 
 
 def _table(heads: tuple[str, str], rows: list[tuple[str, str]]) -> Markup:

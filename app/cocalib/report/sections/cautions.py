@@ -27,7 +27,7 @@ def cautions(subject: ReportSubject) -> Markup:
     if len(unpaired) > _MOST_UNPAIRED:
         items.append(tag("li", f"{len(unpaired) - _MOST_UNPAIRED} more clicks have no pair."))
     body = tag("ul", *items, class_="cautions") if items else tag("p", _no_warnings(subject), class_="note")
-    return tag("section", tag("h2", "Cautions"), body, id="cautions")
+    return tag("section", tag("h2", "Warnings"), body, id="cautions")
 
 
 def _no_warnings(subject: ReportSubject) -> str:

@@ -127,7 +127,7 @@ def test_a_method_without_a_noise_model_gets_no_error_bars_and_no_map(project_ro
     assert "The method states no error of its pose" in words
     assert "No error bars: this calibration states no covariance." in words
     assert "This method states no uncertainty, so there is nothing to draw." in words
-    assert " ± " not in words.split("Cautions")[0].replace("Bars: ± two", "")
+    assert " ± " not in words.split("Warnings")[0].replace("Bars: ± two", "")
 
 
 def test_an_imported_calibration_is_not_judged(subject, project_root):
