@@ -62,6 +62,8 @@ def no_such(path: Path, *, if_missing: str = "") -> str:
         )
     except OSError:
         near = []
+    if re.match(r"\w{2,}:/", str(path)):
+        return f"{name_text(path)}: is an address; copy it to this machine first"
     step = f"did you mean {name_text(path.with_name(near[0]))}?" if near else if_missing or "check the path"
     return f"{name_text(path)}: no such file or folder; {step}"
 

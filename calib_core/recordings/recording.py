@@ -437,6 +437,8 @@ def open_recording(
             raise RecordingError(
                 f"{where}: cannot be read: {error.strerror or error}; check it and its rights"
             ) from None
+        if file is not None and file.used and isinstance(error, RecordingError):
+            raise type(error)(f"{error} ({file.words}; --no-recording-file ignores it)") from error
         raise
 
 

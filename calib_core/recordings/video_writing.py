@@ -68,7 +68,7 @@ def video_format(path: Path) -> str:
     """
     form = _FORMATS.get(path.suffix.lower())
     if form is None:
-        raise InputError(f"{path}: unsupported video format; use {', '.join(_FORMATS)}")
+        raise InputError(f"{path}: unsupported video format; use {', '.join(_FORMATS)}, or for Rerun .rrd")
     if find_spec("av") is None:
         raise InputError("writing a video needs PyAV, which is not installed: pip install 'cocalib[video]'")
     return form

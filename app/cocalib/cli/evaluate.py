@@ -1,5 +1,6 @@
 """`cocalib evaluate`: judge a calibration on a recording, and write a report on it."""
 
+import re
 import sys
 import typing
 from collections.abc import Sequence
@@ -70,8 +71,8 @@ class Evaluate:
 
     def _with_places(self) -> "Evaluate":
         """Take what follows --require and is no limit as files of the recording."""
-        if alone := next((one for one in self.require if one.startswith(("max-", "max_")) and "=" not in one), None):
-            raise InputError(f"--require {alone}: give its number with it, such as max-deg=1")
+        if alone := next((one for one in self.require if re.match(r"max[-_]\w+$|[\d.]+\w*$", one)), None):
+            raise InputError(f"--require {alone}: give a limit with its number, such as max-deg=1")
         limits = tuple(one for one in self.require if one in _LEVELS or "=" in one)
         places = tuple(Path(one) for one in self.require if one not in limits)
         recorded = replace(self.judging.recorded, recording=(*self.judging.recorded.recording, *places))

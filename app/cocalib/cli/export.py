@@ -69,6 +69,8 @@ class Export:
             code = self.trees.patch(file, self.frames, to=self.to, out=self.out)
             _print_warnings(file)
             return code
+        if self.to == "list" and len(self.calibration) > 1:
+            raise InputError(f"export takes one calibration; did you mean --to {self.calibration[1]}?")
         if self.to == "list":
             formats = written_formats()
             width = max(len(known.name) for known in formats)

@@ -124,8 +124,8 @@ class Intrinsics:
         unused = (self.views, self.report, self.rectified)
         if any(unused) or self.json or self.board != BoardFlags() or self.image_topic:
             raise InputError(
-                f"{self.source[0]} is a file with intrinsics, which is printed or converted (--to, --out); the other options "
-                "apply to pictures of a board"
+                f"{self.source[0]} is a file with intrinsics, which is printed or converted (--to, --out), if any; for the other "
+                "options, give the recording, video or pictures of the board"
             )
         require_format(self.to)
         refuse_input(self.out, Path(self.source[0]))

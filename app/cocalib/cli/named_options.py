@@ -128,6 +128,8 @@ def _changed(options: Named, tree: Mapping[str, Any], prefix: str, known: Sequen
             changed[name] = msgspec.convert(value, hints[name], strict=not typed)
         except msgspec.ValidationError as error:
             wanted = {float: "a number with a decimal point", int: "a whole number"}.get(hints[name])
+            if typing.get_origin(hints[name]) is typing.Literal:
+                wanted = " or ".join(map(str, typing.get_args(hints[name])))
             reason = f"takes {wanted}, not {value!r}" if wanted else f"{str(error)[:1].lower()}{str(error)[1:]}"
             raise OptionError(f"option {path}: {reason}") from None
     return replace(options, **changed)  # type: ignore[type-var]

@@ -48,7 +48,9 @@ def document_in(content: Mapping[str, Any], document: type[Document], *, source:
     wanted = _schema_of(document)
     found = content.get("schema")
     if found != wanted:
-        reason = f"schema: expected {wanted!r}, found {_shown(found)}; give a file of that format"
+        same = str(found).rpartition("-")[0] == wanted.rpartition("-")[0]
+        step = "another version of cocalib wrote it: use that one" if same else "give a file of that format"
+        reason = f"schema: expected {wanted!r}, found {_shown(found)}; {step}"
         raise InputError(f"{source}: {other_kind(found, wanted) or reason}")
     return checked(content, document, source=source)
 
@@ -245,7 +247,8 @@ def _from_msgspec(message: str, outer: str) -> str:
     if missing:
         return f"{f'{place}.' if place else ''}{missing.group(1)}: missing; add it"
     text = re.sub(r"expected (\S+), got null", r"is null, expected \1; give its value or remove the entry", text)
-    return f"{place or 'the file'}: {text}"
+    step = '; write {"sec": 1700000000, "nanosec": 0}' if place.endswith("time") and "expected object" in text else ""
+    return f"{place or 'the file'}: {text}{step}"
 
 
 _WIDTH = 118
