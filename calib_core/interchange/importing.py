@@ -32,7 +32,7 @@ from calib_core.results import Calibration, DataWarning, Metrics
 
 _MAX_BYTES = 256 * 1024 * 1024
 _MAX_BESIDE_BYTES = 1024 * 1024
-_KNOWN = "docs/formats.md lists what is read"
+_KNOWN = "docs/formats.md (Files and formats under Help) lists what is read"
 
 _OF_FOLDERS = ("calib_velo_to_cam.txt", "images.txt")  # of KITTI and COLMAP, read with the file beside it
 _OF_TREES = (

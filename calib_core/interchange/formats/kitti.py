@@ -14,7 +14,7 @@ from calib_core.interchange.syntax.yaml_text import numbers_text
 _NOTES = (
     "Tr_velo_to_cam maps radar points to the camera frame: p_camera = R p_radar + t (as in View-of-Delft)",
     "a comment would break KITTI readers, so the check point, the evidence and the calibration's hash are numbers in "
-    "lines of their own after KITTI's seven, explained in docs/formats.md",
+    "lines of their own after KITTI's seven, explained in docs/formats.md (Files and formats under Help)",
 )
 _SHA256_BYTES, _BYTE_DIGITS = 32, 3
 _ASSUMPTION = "the format names no frames and assumes undistorted images"

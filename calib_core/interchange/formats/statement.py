@@ -61,7 +61,8 @@ def statement(file: CalibrationFile, meaning: str, *, rectified: bool = False) -
     errors = file.calibration.radar_errors
     if errors != RadarErrors():
         lines.append(
-            "p_radar is a true position; first take the radar's errors out of a reported one, as in docs/formats.md: "
+            "p_radar is a true position; first take the radar's errors out of a reported one, as in docs/formats.md "
+            "(Files and formats under Help): "
             + ", ".join(f"{one.name} {getattr(errors, one.name):.6g}" for one in fields(errors))
         )
     lines += corrections_lines(file)
