@@ -12,7 +12,7 @@ __all__ = sorted([*calib_core.__all__, "sample_recording"])
 
 
 def sample_recording() -> "Recording":
-    """Open the simulated recording that comes with cocalib; its clicks are in `clicks.json` beside its files."""
+    """Open the simulated recording that comes with cocalib; its clicks are in `clicks.json` beside its files, `.paths`."""
     from calib_core.recordings import open_recording
     from cocalib.platform.resources import sample_folder
 

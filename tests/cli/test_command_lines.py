@@ -53,7 +53,7 @@ _TABLE = [
     (
         2,
         "solve made.mcap --clicks outside.json --out o.json",
-        "320 x 240 px; give the clicks of this recording, column first",
+        "320 x 240 px; give the clicks of this recording, in its pixels, column first",
     ),
     (2, "solve made.mcap --clicks no-list.json --out o.json", "no-list.json: clicks"),
     (2, "solve made.mcap --clicks click.json", "click.json: no such file or folder; did you mean clicks.json?"),

@@ -56,7 +56,7 @@ def _require_inside(clicks: Sequence[ReflectorClick], camera: Camera, *, source:
         if not camera.in_image(np.array([[click.u_px, click.v_px]]))[0]:
             raise InputError(
                 f"{source}: click {click.id} at ({click.u_px:g}, {click.v_px:g}) px is outside the image of "
-                f"{camera.width_px} x {camera.height_px} px; give the clicks of this recording, column first"
+                f"{camera.width_px} x {camera.height_px} px; give the clicks of this recording, in its pixels, column first"
             )
 
 
