@@ -146,7 +146,7 @@ COMMANDS: Mapping[str, Command] = {
             "List the sessions of recordings, repair a damaged one, or export its clicks.",
             (
                 "list",
-                "repair drive.cocalib-session --yes",
+                "repair drive.mcap --yes",
             ),
         ),
         Command(
