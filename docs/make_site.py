@@ -22,9 +22,9 @@ _MOST_MB = 10.0
 _PAGES = {
     "Tour": "tour gallery first-steps",
     "How to": "radar-formats intrinsics drift fleet proposals boxes evaluation report rerun simulation",
-    "Concepts": "method accuracy conventions GLOSSARY apex paper security",
+    "Concepts": "method conventions GLOSSARY apex paper reliability security",
     "Reference": "commands python formats warnings",
-    "Studies": "paper-experiments reliability speed",
+    "Studies": "accuracy paper-experiments speed",
     "Project": "CHANGELOG CONTRIBUTING ARCHITECTURE SECURITY",
 }
 _FONT = "system-ui, sans-serif"
