@@ -214,7 +214,7 @@ def _box(layout: BoxLayout, element: Any) -> Box | None:
     if not all(map(math.isfinite, values)):
         return None
     if layout.centre:
-        values = _upright(values, _number(element, layout.angle) if layout.angle else 0.0)
+        values = upright(values, _number(element, layout.angle) if layout.angle else 0.0)
     left_px, top_px, right_px, bottom_px = (value - _HALF_PX for value in values)
     if not (right_px >= left_px and bottom_px >= top_px):
         return None
@@ -223,8 +223,13 @@ def _box(layout: BoxLayout, element: Any) -> Box | None:
     return Box(left_px, top_px, right_px, bottom_px, label, score, "" if track.startswith("-") else track)
 
 
-def _upright(values: Sequence[float], angle_rad: float) -> list[float]:
-    """Return the edges of the upright box around a rectangle that is given by centre and size, and may be turned."""
+def upright(values: Sequence[float], angle_rad: float) -> list[float]:
+    """Return the edges of the upright box around a rectangle that may be turned.
+
+    Args:
+        values: u and v of its centre, its width and height.
+        angle_rad: of the turn about its centre.
+    """
     u_px, v_px, width_px, height_px = values
     cosine, sine = (abs(math.cos(angle_rad)), abs(math.sin(angle_rad))) if math.isfinite(angle_rad) else (1.0, 0.0)
     half_u_px, half_v_px = (width_px * cosine + height_px * sine) / 2, (width_px * sine + height_px * cosine) / 2

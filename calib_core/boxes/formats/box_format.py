@@ -14,6 +14,7 @@ from calib_core.arrays import Matrix33
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, matrix_from_quaternion_wxyz
 from calib_core.measurements import Box, Cuboid, TimeNs
+from calib_core.recordings.box_topics import upright
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,10 +205,7 @@ def rotated_box(
     u_px, v_px, width_px, height_px = (finite_number(value, place) for value in (*centre, *size))
     if width_px < 0 or height_px < 0:
         raise InputError(f"{place}: a box has a negative width or height; correct it")
-    cosine, sine = abs(math.cos(angle_rad)), abs(math.sin(angle_rad))
-    half_u_px = (width_px * cosine + height_px * sine) / 2
-    half_v_px = (width_px * sine + height_px * cosine) / 2
-    edges = (u_px - half_u_px, v_px - half_v_px, u_px + half_u_px, v_px + half_v_px)
+    edges = upright((u_px, v_px, width_px, height_px), angle_rad)
     return edge_box(edges, place, label=label, score=score, track=track)
 
 

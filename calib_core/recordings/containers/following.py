@@ -19,7 +19,7 @@ import numpy as np
 
 from calib_core.errors import RecordingError
 from calib_core.measurements import DataWarning
-from calib_core.recordings.containers.chunks import ChannelFilter, Chunk
+from calib_core.recordings.containers.chunks import ChannelFilter, Chunk, ChunkedSource, Scanned
 from calib_core.recordings.containers.compression import packing_of
 from calib_core.recordings.containers.mcap.reader import McapSource
 from calib_core.recordings.containers.mcap.records import MAGIC
@@ -322,16 +322,45 @@ class KeptHeads:
         self._lengths = np.concatenate([self._lengths, heads.lengths])[order]
 
 
-class GrowingMcap(McapSource):
-    """An MCAP file that is still being written: its complete records are indexed as they come."""
+class _Growing(ChunkedSource):
+    """A file of chunks that is still being written: its complete records are indexed as they come."""
 
-    def _open(self) -> None:
+    def _begin(self, scanned: Scanned, start: int) -> None:
         self._kept = None
         self.recovered = True
         self._heads = KeptHeads()
+        self._so_far = scanned
+        self.chunks = scanned.chunks
+        self._read = AppendedFile(self.file, start)
+
+    @property
+    def later_warnings(self) -> tuple[DataWarning, ...]:
+        """Chunks that could not be decompressed, or have the wrong checksum."""
+        return damaged_chunks(self.path, self._so_far.damaged_chunks, self._so_far.fault)
+
+    def _indexed(self, place: int) -> int:
+        """Index the messages that were found up to a place; return how many there are."""
+        self._read.move_to(place)
+        found, self._so_far.messages = self._so_far.messages, {}
+        for channel, entries in found.items():
+            self.indexes[channel] = with_messages(self.index(channel), entries)
+        return sum(map(len, found.values()))
+
+    def heads(self, index: MessageIndex, size: int, *, keep: bool = False) -> Heads:
+        """Read the first bytes of messages; those to be kept are read once while the file grows."""
+        return self._heads.read(index, size, super().heads) if keep else super().heads(index, size)
+
+    def renamed(self, path: Path) -> None:
+        """Take note that the writer has renamed the file, as a bag's recorder does when it closes it."""
+        self.file.path = path
+
+
+class GrowingMcap(_Growing, McapSource):
+    """An MCAP file that is still being written: its complete records are indexed as they come."""
+
+    def _open(self) -> None:
         self._scanned = FoundInMcap([Chunk(0, self.size_bytes, self.size_bytes, "")])
-        self.chunks = self._scanned.chunks
-        self._read = AppendedFile(self.file, len(MAGIC))
+        self._begin(self._scanned, len(MAGIC))
 
     def restore(self) -> bool:
         """Return False: the index of a growing file is not cached."""
@@ -343,43 +372,22 @@ class GrowingMcap(McapSource):
         end = self.file.size_bytes - len(MAGIC)
         return self._scanned.ended and end > self._read.place and self.file.up_to(end, len(MAGIC)) == MAGIC
 
-    @property
-    def later_warnings(self) -> tuple[DataWarning, ...]:
-        """Chunks that could not be decompressed, or have the wrong checksum."""
-        return damaged_chunks(self.path, self._scanned.damaged_chunks, self._scanned.fault)
-
     def grow(self) -> int:
         """Index the messages that have been written completely since; return how many there are."""
         if not self._read.look_again() or self._scanned.ended:
             return 0
-        place = scan_mcap_further(self.file, self._read.place, self._scanned)
-        self._read.move_to(place)
-        found, self._scanned.messages = self._scanned.messages, {}
-        for channel, entries in found.items():
-            self.indexes[channel] = with_messages(self.index(channel), entries)
+        count = self._indexed(scan_mcap_further(self.file, self._read.place, self._scanned))
         self.channels = self._scanned.declarations.channels
-        return sum(map(len, found.values()))
-
-    def heads(self, index: MessageIndex, size: int, *, keep: bool = False) -> Heads:
-        """Read the first bytes of messages; those to be kept are read once while the file grows."""
-        return self._heads.read(index, size, super().heads) if keep else super().heads(index, size)
-
-    def renamed(self, path: Path) -> None:
-        """Take note that the writer has renamed the file."""
-        self.file.path = path
+        return count
 
 
-class GrowingBag(Rosbag1Source):
+class GrowingBag(_Growing, Rosbag1Source):
     """A bag that is still being written: its complete records are indexed as they come."""
 
     def _open(self, header: Mapping[str, bytes], start: int, first_of: ChannelFilter | None) -> None:
         self.file.at(0, start)  # the whole header
-        self._kept = None
-        self.recovered = True
-        self._heads = KeptHeads()
         self._scanned = FoundInBag([Chunk(0, self.size_bytes, self.size_bytes, "none")])
-        self.chunks = self._scanned.chunks
-        self._read = AppendedFile(self.file, start)
+        self._begin(self._scanned, start)
 
     @property
     def is_complete(self) -> bool:
@@ -388,30 +396,13 @@ class GrowingBag(Rosbag1Source):
         position = int.from_bytes(found[1], "little") if found else 0
         return 0 < position <= self._read.place
 
-    @property
-    def later_warnings(self) -> tuple[DataWarning, ...]:
-        """Chunks that could not be decompressed."""
-        return damaged_chunks(self.path, self._scanned.damaged_chunks, self._scanned.fault)
-
     def grow(self) -> int:
         """Index the messages that have been written completely since; return how many there are."""
         if not self._read.look_again():
             return 0
-        place = scan_bag_further(self.file, self._read.place, self._scanned)
-        self._read.move_to(place)
-        found, self._scanned.messages = self._scanned.messages, {}
-        for connection, entries in found.items():
-            self.indexes[connection] = with_messages(self.index(connection), entries)
+        count = self._indexed(scan_bag_further(self.file, self._read.place, self._scanned))
         self.channels = tuple(channels_of(self._scanned).values())
-        return sum(map(len, found.values()))
-
-    def heads(self, index: MessageIndex, size: int, *, keep: bool = False) -> Heads:
-        """Read the first bytes of messages; those to be kept are read once while the file grows."""
-        return self._heads.read(index, size, super().heads) if keep else super().heads(index, size)
-
-    def renamed(self, path: Path) -> None:
-        """Take note that the recorder has renamed the file, as it does when it closes a bag."""
-        self.file.path = path
+        return count
 
 
 class GrowingDatabase(SqliteSource):
