@@ -24,8 +24,10 @@ _ALIKE, _LIKE = 13.0, 0.58
 They are those of a fit to simulated recordings, a little less sure.
 """
 _LEAST_MISSING = 0.03
-_CLICK_IS_RIGHT = 0.97
-"""Probability that a confirmed click shows what the radar saw, shared between the dwells that it may belong to."""
+_CLICK_IS_RIGHT = 0.85
+"""Probability that a confirmed click is of a dwell, shared between those of its time: a weak reflector may give none."""
+_CLICKED = 0.5
+"""A candidate within so many widths of a click is what was clicked."""
 _WEAKER_DB, _WEAKER_STEP_DB = 9.0, 1.5
 """Echo below the typical one at which a dwell is as likely something else as the reflector, and how fast that changes."""
 _MOST_LOG_ODDS = 30.0
@@ -195,10 +197,11 @@ def _choices(
     ]
     share = 1.0 / (1.0 + float(np.exp(min((below_db - _WEAKER_DB) / _WEAKER_STEP_DB, _MOST_LOG_ODDS))))
     share *= 1.0 - min(sum(one.odds for one in clicks), _CLICK_IS_RIGHT)
-    found = [
-        _Choice(float(one.pixel_px[0]), float(one.pixel_px[1]), one.sigma_px, float(share * odds))
-        for one, odds in zip(view.candidates, _odds(view.candidates), strict=True)
-    ]
+    found = []
+    for one, odds in zip(view.candidates, _odds(view.candidates), strict=True):
+        u_px, v_px = one.pixel_px.tolist()
+        clicked = any(np.hypot(u_px - own.u_px, v_px - own.v_px) <= _CLICKED * view.width_px for own in clicks)
+        found.append(_Choice(u_px, v_px, one.sigma_px, 0.0 if clicked else float(share * odds)))
     return [*(replace(one, odds=one.odds / len(clicks)) for one in clicks), *found]
 
 

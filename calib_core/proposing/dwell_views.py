@@ -156,7 +156,7 @@ def _with_blobs(number: int, views: Sequence[DwellView]) -> DwellView:
     view = views[number]
     stills = [still for other in views for still in other.stills if still.picture.shape == view.picture.shape]
     others = nearest_others(number, view.image_time, stills)
-    if not view.stills or len(others) < least_others():
+    if not view.stills or len(others) < _LEAST_OTHERS:
         return view
     at_once = frozenset().union(*(still.standing for still in view.stills)) - {number}
     without = [still for still in others if still.standing & at_once]
@@ -237,6 +237,7 @@ def _full(candidate: PictureCandidate, factor: float) -> PictureCandidate:
 
 _OTHERS = 9
 _LEAST_OTHERS = 2
+"""Other still pictures that are needed to say what changed."""
 _LEVELS_PER_GREY = 64.0
 _FLOOR_GREY = 3.0
 """Scatter of a pixel at least: compression and sensor."""
@@ -259,11 +260,6 @@ _BODY = (1.6, 3.0)
 """Width and height of what is taken for a body below a head, in widths of the reflector."""
 _SPARSE = 0.4
 """What is changed by less than this share, such as the legs of a tripod, is no body."""
-
-
-def least_others() -> int:
-    """Return how many other still pictures are needed to say what changed."""
-    return _LEAST_OTHERS
 
 
 def nearest_others(number: int, time: TimeNs, stills: Iterable[StillPicture]) -> list[StillPicture]:

@@ -216,9 +216,7 @@ def clicks_agreement(rays: CandidateRays, prior: MountingPrior) -> ClicksAgreeme
     poses = _from_first_click(only, prior)
     for _ in range(2 * _STEPS):
         poses = _stepped(only, prior, poses)
-    information = normal_equations(only, prior, poses)[0]
-    if int(only.click.max()) == 0:
-        poses, information = _with_nominal(poses, information, prior)
+    poses, information = _with_nominal(poses, normal_equations(only, prior, poses)[0], prior)
     seen = expectation(rays, poses)
     left_open = np.einsum("mnkap,mpq,mnkbq->mnkab", seen.jacobian, np.linalg.inv(information), seen.jacobian)
     gain = sum(densities(seen.off_rad, seen.covariance + left_open)) * rays.odds / rays.density
@@ -231,7 +229,7 @@ def clicks_agreement(rays: CandidateRays, prior: MountingPrior) -> ClicksAgreeme
 
 
 def _with_nominal(poses: RoughPoses, information: np.ndarray, prior: MountingPrior) -> tuple[RoughPoses, np.ndarray]:
-    """Add the mounting itself, as far as it is known: the click may be of something that the radar did not report."""
+    """Add the mounting itself, as far as it is known: the clicks may be of what the radar did not report."""
     count = len(prior.starts_m)
     _, precision = _prior_offsets(prior, poses)
     return RoughPoses.of_rotations(

@@ -29,7 +29,7 @@ _WEAK, _UNSURE = 0.8, 0.9
 _CHANCE_SCORE, _CHANCE_STEP = 20.0, 2.0
 """Score that a pose needs to be as probable as not, and how fast that changes: the radar of one recording with the pictures
 of another reaches up to 19, whatever the number of dwells; ten placements of one recording reach 54 and more."""
-_CHANCE_AFTER_CLICK = 10.0
+_CHANCE_AFTER_CLICK = 5.0
 """The same once a click says where one dwell lies: fewer poses are left that could agree by chance."""
 _TEMPER = 1.6
 """By how much log-odds were too large in simulated recordings, where dwells share errors that the model does not know."""
@@ -108,13 +108,18 @@ def proposals_of(
 
 
 def _covered(rays: CandidateRays, judged: "_Judged", clicks: int) -> dict[int, list[int]]:
-    """Return the dwells with the rows of their confirmed clicks: each click is of the one of its dwells that it suits best."""
+    """Return the dwells with the rows of their confirmed clicks: each click is of the one of its dwells that it suits best.
+
+    If something else there is probably the reflector, it is of none: the radar shows another one at that time.
+    """
     found: dict[int, list[int]] = {}
     for row in range(clicks):
         dwells, which = np.nonzero(rays.click == row)
         if len(dwells):
             fits = judged.probability[dwells, which] + 1e-6 * rays.odds[dwells, which]
-            found.setdefault(int(dwells[np.argmax(fits)]), []).append(row)
+            dwell = int(dwells[np.argmax(fits)])
+            if judged.probability[dwell][rays.click[dwell] < 0].max(initial=0.0) < LEAST_CONFIDENCE:
+                found.setdefault(dwell, []).append(row)
     return found
 
 

@@ -16,7 +16,7 @@ from calib_core.proposing.pose_agreement import (
     pose_agreement,
     rotation_consensus,
 )
-from tests.drawn_views import Drawing, draw_views
+from tests.drawn_views import Drawing, DrawnViews, draw_views
 
 OPTIONS = CalibrationOptions()
 
@@ -106,7 +106,7 @@ def test_what_repeats_itself_at_one_place_counts_less():
     assert min(repeated) > 5.0 * float(np.median(moved))
 
 
-def test_a_click_while_two_reflectors_stand_covers_the_one_that_it_shows():
+def two_at_once() -> tuple[DrawnViews, list[DwellView]]:
     """All dwells of an even number last until the next one ends, and both reflectors are seen in each."""
     drawn = draw_views(6, Drawing(count=8, decoys=1, clutter=0, listed_share=1.0))
     views: list[DwellView] = []
@@ -116,10 +116,17 @@ def test_a_click_while_two_reflectors_stand_covers_the_one_that_it_shows():
         placement = replace(view.placement, start=both[0], end=both[1])
         candidates = (*first.candidates, *second.candidates)
         views.append(replace(view, placement=placement, image_time=second.image_time, candidates=candidates))
+    return drawn, views
+
+
+@pytest.mark.parametrize("reported", [True, False])
+def test_a_click_while_two_reflectors_stand_covers_the_one_that_it_shows_if_the_radar_reports_it(reported):
+    drawn, views = two_at_once()
     click = replace(drawn.click(2), image_time=views[2].image_time)
-    proposals = proposals_of(views, drawn.camera, OPTIONS, confirmed=[click])
+    other = views[3].placement
+    proposals = proposals_of(views if reported else [*views[:2], *views[3:]], drawn.camera, OPTIONS, confirmed=[click])
     assert len(proposals.ranked) + len(proposals.unproposed) == 7
-    shown = [one for one in proposals.ranked if one.placement is views[3].placement]
+    shown = [one for one in proposals.ranked if one.placement is other]
     assert len(shown) == 1
     assert np.linalg.norm(shown[0].pixel_px - drawn.pixels[3]) < 5.0 * shown[0].sigma_px
 
