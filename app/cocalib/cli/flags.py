@@ -24,7 +24,6 @@ def same(options: type[Any], name: str) -> Any:
 
 
 File: TypeAlias = Annotated[Path | None, called("FILE")]
-NewFile: TypeAlias = Annotated[Path, tyro.conf.arg(metavar="FILE")]
 Folder: TypeAlias = Annotated[Path | None, called("FOLDER")]
 Switch: TypeAlias = Annotated[bool, called()]
 MoreSwitch: TypeAlias = Annotated[bool, called(), MORE]

@@ -53,10 +53,8 @@ def _assumed(subject: ReportSubject) -> tuple[DataWarning, ...]:
 
 
 def _item(warning: DataWarning) -> Markup:
-    sign = tag("span", _SIGNS[consequence_of(warning.code)], class_="sign", aria_hidden="true")
-    return tag(
-        "li", sign, tag("code", warning.code), " ", sentence(warning.message), " ", tag("b", sentence(warning.hint))
-    )
+    sign, said = _sign(_SIGNS[consequence_of(warning.code)]), sentence(warning.message)
+    return tag("li", sign, tag("code", warning.code), " ", said, " ", tag("b", sentence(warning.hint)))
 
 
 def _sign(shape: str) -> Markup:
