@@ -120,10 +120,11 @@ function nextAction() {
   if (key === "N" && view.clicks.length && !state.placements.some(isOffered)) return null; // the last one is on its way
   if (key === "N") return [{ key, label: proposalAdvice(), action: "next-placement" }];
   const met = view.clicks.find(({ id }) => new RegExp(`\\b${id}\\b`).test(action));
-  if (met) return [action, { key: "", label: `show #${nameOf(met.id)}`, pair: met.id }, ...(state.placements.some(isOffered) ? [NEXT] : [])];
+  const goOn = state.placements.some(isOffered) ? [NEXT] : [];
+  if (met) return [action, { key: "", label: `show #${nameOf(met.id)}`, pair: met.id }, ...goOn];
   if (key === "J") return [action, SHOW];
   const edge = action.includes("edges of the picture") ? state.placements.filter(isOffered).sort((a, b) => Math.abs(b.azimuth_deg) - Math.abs(a.azimuth_deg))[0] : undefined;
-  if (view.clicks.length) return [action, ...by, ...(edge ? [{ key: "", label: `show placement ${state.placements.indexOf(edge) + 1}`, frame: edge.frame }] : [])];
+  if (view.clicks.length) return [action, ...by, ...(edge ? [{ key: "", label: `show placement ${state.placements.indexOf(edge) + 1}`, frame: edge.frame }] : goOn)];
   if (!state.placementsKnown) return ["Looking for the places where the reflector stood. You can click meanwhile"];
   return state.placements.length ? [action] : [`${state.placementSummary}. ${action}`];
 }

@@ -180,13 +180,18 @@ def _returns(calibration: Calibration, scan: RadarScan, options: GatingOptions) 
     return returns.rows(seen).messages(pixels[seen])
 
 
+_MOST_UNSURE = 1 / 12
+"""Nothing is expected where its standard deviation is above this part of the picture's width: the page zooms in there."""
+
+
 def _guesses(calibration: Calibration, placements: Sequence[Placement]) -> tuple[OverlayGuess, ...]:
     if not placements:
         return ()
     positions = np.stack([placement.position_radar_m for placement in placements])
     pixels = calibration.reproject(positions)
     ranges_m = np.linalg.norm(positions, axis=1)
-    inside = calibration.camera.in_image(pixels)
+    unsure = calibration.pixel_sigma(positions).max(axis=1) > _MOST_UNSURE * calibration.camera.width_px
+    inside = calibration.camera.in_image(pixels) & ~unsure
     return tuple(
         OverlayGuess((float(u), float(v)), float(range_m))
         for (u, v), range_m in zip(pixels[inside], ranges_m[inside], strict=True)

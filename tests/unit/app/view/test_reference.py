@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from calib_core.association.placements import Placement
 from calib_core.errors import InputError
 from calib_core.interchange import (
     FORMATS,
@@ -55,6 +56,14 @@ def test_without_clicks_the_screen_shows_the_file_and_says_so(facts, reference):
     assert (seen.has_calibration, seen.comparison) == (False, ())
     assert overlay_of(0, Session(), None, (), reference).returns == ()
     assert overlay_of(0, Session(), None, ()).returns is None
+
+
+def test_a_pose_that_is_hardly_known_expects_the_reflector_nowhere(file):
+    others = {name: 0 for name in Placement.__dataclass_fields__}
+    ahead = Placement(**(others | {"position_radar_m": np.array([6.0, 0.5, -0.4])}))
+    for covariance, count in ((1e-6, 1), (1.0, 0)):
+        pose = Reference("other.yaml", dataclasses.replace(file.calibration, covariance=covariance * np.eye(6)))
+        assert len(overlay_of(0, Session(), None, (ahead,), pose).guesses) == count
 
 
 def test_the_first_click_already_has_a_residual_against_it(facts, reference):
