@@ -192,6 +192,7 @@ _TABLE = [
     (2, "batch unrun.toml --workers 2 --scheduler tcp://127.0.0.1:1", "give one of them"),
     (2, "batch unrun.toml --workers 0", "there must be at least 1"),
     (2, "batch unrun.toml --scheduler tcp://10.0.0.7:8786", "without TLS is refused"),
+    (2, "batch good.toml --scheduler host:8786", "not an address of a Dask scheduler"),
     (2, "batch good.toml --init nothing", "exists already"),
     (2, "batch fleet.csv --init nothing", ".toml"),
     (11, "batch broken.toml", "2 sessions: 1 solved, 1 refused"),

@@ -104,7 +104,6 @@ def _connected(address: str) -> Iterator[_Connection]:
     Raises:
         InputError: Dask is not installed, or the scheduler cannot be used.
     """
-    checked_address(address)
     try:
         import dask
         from distributed import Client

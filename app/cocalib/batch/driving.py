@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from calib_core.errors import InputError, OptionError
-from cocalib.batch.dask_scheduler import DaskScheduler
+from cocalib.batch.dask_scheduler import DaskScheduler, checked_address
 from cocalib.batch.engine import Engine, InProcess
 from cocalib.batch.job import Job
 from cocalib.batch.outcome import Outcome
@@ -115,7 +115,7 @@ def chosen_engine(
             f"--workers {workers} and --scheduler {scheduler}: give one of them; the scheduler has its own workers"
         )
     if scheduler is not None:
-        return DaskScheduler(scheduler)
+        return DaskScheduler(checked_address(scheduler))
     if workers is not None and workers < 1:
         raise OptionError(f"--workers {workers}: there must be at least 1")
     chosen = workers or ((os.cpu_count() or 1) if count >= _SMALL else 1)
