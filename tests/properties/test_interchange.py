@@ -177,7 +177,7 @@ def test_whatever_a_calibration_contains_the_file_is_json_and_reads_back_the_sam
         ),
     )
     metrics = Metrics(a, b, c, n=3, held_out_aed_px=d, acc=None, chi2=e, degrees_of_freedom=2)
-    covariance = np.full((6, 6), f)
+    covariance = np.full((6, 6), abs(f))  # a negative variance is refused
     calibration = Calibration(
         pose,
         covariance,
