@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from calib_core.association.clustering import candidate_at
-from calib_core.estimation.measurement_model import CameraPrior
+from calib_core.geometry import camera_position_jacobian
 from calib_core.measurements import Pair
 from calib_core.options import (
     CalibrationOptions,
@@ -142,7 +142,7 @@ def bound_of(
     radar = covariance_from_sigma_polar(points, np.tile(sigma_polar_of(profile), (len(points), 1)))
     spread = d_point @ radar @ np.swapaxes(d_point, 1, 2) + profile.sigma_px**2 * np.eye(2)
     information = (np.swapaxes(jacobian, 1, 2) @ np.linalg.solve(spread, jacobian)).sum(axis=0)
-    to_centre = CameraPrior(np.zeros(3), 1.0, measured=True).centre_jacobian(pose)
+    to_centre = camera_position_jacobian(pose)
     if tape_m is not None:
         information = information + to_centre.T @ to_centre / tape_m**2
     covariance = np.linalg.inv(information)

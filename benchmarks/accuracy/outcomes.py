@@ -6,8 +6,7 @@ import numpy as np
 
 from benchmarks.accuracy.rows import Figures
 from calib_core.errors import InputError
-from calib_core.estimation.measurement_model import CameraPrior
-from calib_core.geometry import RigidTransform
+from calib_core.geometry import RigidTransform, camera_position_jacobian
 from calib_core.measurements import Unsolvable
 from calib_core.results import Calibration
 
@@ -32,7 +31,7 @@ def outcome_figures(outcome: Calibration | Unsolvable, truth: RigidTransform) ->
         return {f"{_CODE}{outcome.code}": 1.0, "squared": None}
     pose, covariance = outcome.camera_from_radar, outcome.covariance
     error = truth.error_from(pose)
-    to_centre = CameraPrior(np.zeros(3), 1.0, measured=True).centre_jacobian(pose)  # d centre / d (dt, dtheta)
+    to_centre = camera_position_jacobian(pose)
     away_m = pose.inverse().translation_m - truth.inverse().translation_m
     stated = bool(np.isfinite(covariance).all())
     codes: Figures = {f"{_CODE}{warning.code}": 1.0 for warning in outcome.warnings}

@@ -13,7 +13,7 @@ import numpy as np
 from calib_core.arrays import Points3, Values, Vector3
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.estimation.best_fit import MIRRORED_GAIN, NOT_MIRRORED_GAIN
-from calib_core.geometry import skew
+from calib_core.geometry import camera_position_jacobian
 from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar
 from calib_core.results import DataWarning
 
@@ -159,9 +159,8 @@ def _expected_sides(plane: _Plane, fit: SolvedFit) -> GroundSides | None:
 
 def _sides_of(plane: _Plane, fit: SolvedFit) -> GroundSides:
     pose = fit.refined.camera_from_radar
-    turned = pose.rotation.T
     centre_m = pose.inverse().translation_m
-    normal = np.concatenate([-turned, -turned @ skew(pose.translation_m)], axis=1).T @ plane.axes[2]
+    normal = camera_position_jacobian(pose).T @ plane.axes[2]
     radar_m, radar_sigma_m = plane.height_m(np.zeros(3))
     camera_m, plane_sigma_m = plane.height_m(centre_m)
     camera_sigma_m = float(np.sqrt(plane_sigma_m**2 + normal @ fit.uncertainty.covariance @ normal))

@@ -23,7 +23,7 @@ from calib_core.estimation.covariance import pose_covariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit, fit_errors_in_variables
 from calib_core.estimation.gnc import GncSolution
 from calib_core.estimation.measurement_model import CameraPrior, PairMeasurements
-from calib_core.geometry import RigidTransform
+from calib_core.geometry import RigidTransform, camera_position_jacobian
 
 _LEVEL = 0.03  # probability that a right position is farther from that of the pairs
 _HALF_BELIEVED, _STEEPNESS = 1.05, 6.0
@@ -123,7 +123,7 @@ class _Centre:
     @classmethod
     def of(cls, camera_from_radar: RigidTransform, covariance: Matrix66) -> "_Centre":
         """Take it from a pose."""
-        jacobian = CameraPrior.centre_jacobian(camera_from_radar)
+        jacobian = camera_position_jacobian(camera_from_radar)
         mixed = covariance @ jacobian.T
         return cls(camera_from_radar.inverse().translation_m, jacobian @ mixed, mixed)
 

@@ -32,7 +32,7 @@ import numpy as np
 from calib_core.arrays import Indices, Points2, Points3, Values, Vector3, frozen_array
 from calib_core.association.exclusive_returns import shared_returns
 from calib_core.camera import Camera
-from calib_core.geometry import RigidTransform, rotation_jacobian, skew
+from calib_core.geometry import RigidTransform, camera_position_jacobian, rotation_jacobian
 from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions
 from calib_core.radar import polar_from_cartesian, position_planes
@@ -214,13 +214,7 @@ class CameraPrior:
         """Return the whitened residual (3,) and its Jacobian (3, 6) for (dt, dtheta)."""
         away_m = self.position_m + camera_from_radar.rotation.T @ camera_from_radar.translation_m
         sigma_m = np.sqrt(self._variance_m2(away_m))
-        return away_m / sigma_m, self.centre_jacobian(camera_from_radar) / sigma_m[:, None]
-
-    @staticmethod
-    def centre_jacobian(camera_from_radar: RigidTransform) -> np.ndarray:
-        """Return d centre / d (dt, dtheta), (3, 6): the centre is c = -R^T t, so dc = -R^T dt - R^T [t]x dtheta."""
-        turned = camera_from_radar.rotation.T
-        return np.concatenate([-turned, -turned @ skew(camera_from_radar.translation_m)], axis=1)
+        return away_m / sigma_m, camera_position_jacobian(camera_from_radar) / sigma_m[:, None]
 
     @property
     def _near_m2(self) -> float:

@@ -13,7 +13,7 @@ from calib_core.arrays import Flags, Points2, Points3
 from calib_core.camera import Camera
 from calib_core.estimation.measurement_model import Linearization, linearize
 from calib_core.estimation.plausibility import implausible_input
-from calib_core.geometry import RigidTransform, skew
+from calib_core.geometry import RigidTransform, camera_position_jacobian
 from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
 from calib_core.radar import polar_from_cartesian, sigma_polar_of
@@ -167,8 +167,7 @@ def _spread(fit: _Modelled, camera_from_radar: RigidTransform) -> list[DataWarni
     inverse = np.linalg.pinv(np.einsum("nij,nik->jk", jacobian, jacobian))
     carried = np.swapaxes(jacobian, 1, 2) @ unwhitened
     covariance = fit.excess * inverse @ np.einsum("nij,nkj->ik", carried, carried) @ inverse
-    turned = camera_from_radar.rotation.T
-    centre = np.concatenate([-turned, -turned @ skew(camera_from_radar.translation_m)], axis=1)
+    centre = camera_position_jacobian(camera_from_radar)
     rotation_rad = float(np.sqrt(np.trace(covariance[3:, 3:])))
     position_m = float(np.sqrt(np.trace(centre @ covariance @ centre.T)))
     if _SURE_SIGMAS * rotation_rad <= _TRUSTED_ROTATION_RAD and _SURE_SIGMAS * position_m <= _TRUSTED_POSITION_M:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.arrays import Matrix66, Vector3, frozen_array
-from calib_core.geometry import RigidTransform, skew
+from calib_core.geometry import RigidTransform, camera_position_jacobian
 from calib_core.options import RadarOptions
 
 
@@ -48,12 +48,8 @@ def camera_axes_text(covariance: Matrix66) -> str:
 
 
 def sigma_in_radar_axes(camera_from_radar: RigidTransform, covariance: Matrix66) -> RadarAxesSigma:
-    """Turn the covariance (6, 6) of (dt, dtheta) into standard deviations in the radar's axes.
-
-    The camera centre c = -R^T t moves by -R^T dt - R^T [t]x dtheta.
-    """
-    turned = camera_from_radar.rotation.T
-    centre = np.concatenate([-turned, -turned @ skew(camera_from_radar.translation_m)], axis=1)
+    """Turn the covariance (6, 6) of (dt, dtheta) into standard deviations in the radar's axes."""
+    turned, centre = camera_from_radar.rotation.T, camera_position_jacobian(camera_from_radar)
     position_m2 = np.diag(centre @ covariance @ centre.T)
     rotation_rad2 = np.diag(turned @ covariance[3:, 3:] @ turned.T)
     return RadarAxesSigma(np.sqrt(np.maximum(position_m2, 0.0)), np.sqrt(np.maximum(rotation_rad2, 0.0)))

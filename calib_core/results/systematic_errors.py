@@ -151,7 +151,7 @@ def radial_distortion(sigma: float) -> SystematicError:
     return SystematicError("distortion", sigma, column)
 
 
-PRIOR_WIDTH_PX = 1920.0
+_PRIOR_WIDTH_PX = 1920.0
 """Width of the picture that the priors of the principal point are stated for."""
 
 _NO_AXIS = 1e-10  # variance along an axis, of the largest, up to which the covariance has no such axis
@@ -376,8 +376,13 @@ def _click_sigma_px(options: CalibrationOptions, camera: Camera, lens: LensPrior
     """
     if lens is not None:
         return options.reflector.click_offset_sigma_px
-    principal_point_px = options.lens.principal_point_sigma_px * camera.width_px / PRIOR_WIDTH_PX
+    principal_point_px = scaled_px(options.lens.principal_point_sigma_px, camera)
     return float(np.hypot(options.reflector.click_offset_sigma_px, principal_point_px))
+
+
+def scaled_px(sigma_px: float, camera: Camera) -> float:
+    """Return a standard deviation of the principal point in a camera's pixels, as the options state it for a usual width."""
+    return sigma_px * camera.width_px / _PRIOR_WIDTH_PX
 
 
 def _default_lens(options: CalibrationOptions, camera: Camera, lens: LensPrior | None) -> list[SystematicError]:
@@ -407,7 +412,7 @@ def lens_prior(options: CalibrationOptions, camera: Camera) -> LensPrior | None:
     if not options.refining.intrinsics:
         return None
     refining, count = options.refining, len(camera.parameters)
-    principal_point_px = refining.principal_point_sigma_px * camera.width_px / PRIOR_WIDTH_PX
+    principal_point_px = scaled_px(refining.principal_point_sigma_px, camera)
     sigma = [refining.focal_length_sigma, principal_point_px, principal_point_px, refining.distortion_sigma]
     names = ("focal_length", "principal_right_px", "principal_down_px", "distortion")
     moves = np.zeros((count, 4))

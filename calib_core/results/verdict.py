@@ -10,10 +10,10 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from calib_core.geometry import skew
+from calib_core.geometry import camera_position_jacobian
 from calib_core.measurements import DataWarning, Unsolvable
 from calib_core.results.calibration import Calibration, NextPlacement
-from calib_core.results.systematic_errors import PRIOR_WIDTH_PX
+from calib_core.results.systematic_errors import scaled_px
 
 _BEYOND = 0.05 / 3.0  # rotation, position and picture hold together, so each may fail in a third of the 5 %
 _LEAST_FREEDOM, _MOST_FREEDOM = 0.5, 1e5
@@ -59,7 +59,8 @@ def stated_error(calibration: Calibration) -> StatedError:
     """
     in_plane = not calibration.sees_elevation
     freedom = degrees_of_freedom(calibration.covariance_quantile)
-    turned, to_centre = calibration.camera_from_radar.rotation.T, _to_centre(calibration)
+    turned = calibration.camera_from_radar.rotation.T
+    to_centre = camera_position_jacobian(calibration.camera_from_radar)
     about_axes = np.concatenate([np.zeros((3, 3)), turned], axis=1)[2 if in_plane else 0 :]
     with np.errstate(over="ignore", invalid="ignore"):  # a file may state any number: beyond all numbers is infinite
         of_centre = to_centre @ calibration.covariance @ to_centre.T
@@ -76,13 +77,6 @@ def stated_error(calibration: Calibration) -> StatedError:
         range_m=float(np.median(ranges_m)) if known else float("nan"),
         in_plane=in_plane,
     )
-
-
-def _to_centre(calibration: Calibration) -> np.ndarray:
-    """Return the derivative (3, 6) of the camera centre, in the radar frame, by the pose."""
-    pose = calibration.camera_from_radar
-    turned = pose.rotation.T
-    return np.concatenate([-turned, -turned @ skew(pose.translation_m)], axis=1)
 
 
 def degrees_of_freedom(quantile_95: float) -> float:
@@ -229,7 +223,7 @@ def _centre_assumed(calibration: Calibration) -> str:
     given, sigma_px = calibration.given_camera or calibration.camera, calibration.options.lens.principal_point_sigma_px
     if given.covariance is not None or not sigma_px:
         return "the picture is uncropped"
-    within_px = 2.0 * sigma_px * given.width_px / PRIOR_WIDTH_PX
+    within_px = 2.0 * scaled_px(sigma_px, given)
     return f"the picture is uncropped, its principal point right to {within_px:.2g} px"
 
 
@@ -240,7 +234,7 @@ def _alone_cm(calibration: Calibration) -> float:
     """
     if calibration.covariance_parts is None or not calibration.sees_elevation:
         return float("nan")
-    to_centre = _to_centre(calibration)
+    to_centre = camera_position_jacobian(calibration.camera_from_radar)
     with np.errstate(all="ignore"):  # a file may state any number
         whole = to_centre @ calibration.covariance @ to_centre.T
         measured = to_centre @ calibration.covariance_parts.camera_position @ to_centre.T

@@ -7,7 +7,7 @@ import rerun as rr
 
 from calib_core.arrays import Points2
 from calib_core.camera import Camera
-from calib_core.geometry import RigidTransform, skew
+from calib_core.geometry import RigidTransform, camera_position_jacobian
 from calib_core.radar import covariance_from_sigma_polar
 from calib_core.results import Calibration, PairResult
 from cocalib.colours import residual_colours
@@ -97,8 +97,7 @@ def _log_camera_position(stream: rr.RecordingStream, calibration: Calibration) -
     if not np.isfinite(covariance).all():
         return
     pose: RigidTransform = calibration.camera_from_radar
-    turned = pose.rotation.T
-    moves = np.concatenate([-turned, -turned @ skew(pose.translation_m)], axis=1)
+    moves = camera_position_jacobian(pose)
     heavier = max(1.0, float(np.nan_to_num(calibration.covariance_quantile)) / _CHI2_95_6D)
     position_m2 = (moves @ covariance @ moves.T)[None] * heavier
     centre = pose.inverse().translation_m[None]

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib_core.arrays import Matrix33, Vector3, frozen_array
-from calib_core.geometry import skew
+from calib_core.geometry import camera_position_jacobian
 from calib_core.results import Calibration
 from calib_core.results.radar_axes import sigma_in_radar_axes
 from calib_core.results.systematic_errors import SystematicErrorResult, error_words, is_determined
@@ -196,7 +196,7 @@ def mounting_of(calibration: Calibration) -> Mounting:
     translation_m = calibration.camera_from_radar.translation_m
     radar_from_body = rotation.T @ OPTICAL_FROM_BODY
     roll, pitch, yaw = _roll_pitch_yaw(radar_from_body)
-    position_jacobian = np.hstack([-rotation.T, -rotation.T @ skew(translation_m)])
+    position_jacobian = camera_position_jacobian(calibration.camera_from_radar)
     angle_jacobian = np.hstack([np.zeros((3, 3)), -_angle_rates(roll, pitch) @ OPTICAL_FROM_BODY.T])
     return Mounting(
         position_m=-rotation.T @ translation_m,

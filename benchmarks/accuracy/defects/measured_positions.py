@@ -11,7 +11,7 @@ from benchmarks.accuracy.figures import at_least, column, share
 from benchmarks.accuracy.outcomes import codes_in, outcome_figures, quantile_999, silently_wrong
 from benchmarks.accuracy.rows import Claim, Figures, Kept, Part, Row, Section
 from calib_core.calibration import calibrate_pairs
-from calib_core.estimation.measurement_model import CameraPrior
+from calib_core.geometry import camera_position_jacobian
 from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions, CameraPositionPrior, HowMeasured, SolvingOptions
 from calib_core.results.verdict import stated_error, verdict_on
@@ -111,7 +111,7 @@ def _possible(simulated: SimulatedPairs, position_m: np.ndarray, sigma_m: float)
     alone = calibrate_pairs(simulated.pairs, simulated.camera)
     if isinstance(alone, Unsolvable):
         return {"can name": 0.0, "can place": 0.0}
-    to_centre = CameraPrior.centre_jacobian(alone.camera_from_radar)
+    to_centre = camera_position_jacobian(alone.camera_from_radar)
     covariance = to_centre @ alone.covariance @ to_centre.T
     off_m = position_m - simulated.rig.camera_position_radar_m
     squared = float(off_m @ np.linalg.solve(covariance + sigma_m**2 * np.eye(3), off_m))
