@@ -150,7 +150,8 @@ class Workspace:
         self._lock = threading.Lock()
         self._subscribers: tuple[Subscriber, ...] = ()
         self._pending: deque[tuple[View, tuple[Subscriber, ...]]] = deque()
-        self._notifying = False
+        self._turn = threading.Lock()
+        self._notifier: int | None = None
         self._answered = threading.Event()
         self._ask_for_answer(restored.history.present)
 
@@ -365,19 +366,25 @@ class Workspace:
             self._solver.request(session.revision, session.clicks, session.options, self.dispatch, camera)
 
     def _notify(self) -> None:
-        """Send pending Views to their subscribers, one thread at a time and in order."""
-        while True:
-            with self._lock:
-                if self._notifying or not self._pending:
-                    return
-                shown, subscribers = self._pending.popleft()
-                self._notifying = True
+        """Send pending Views to their subscribers, in order; return once they have them.
+
+        So a page has the View of its change before it is told that the change is done. A subscriber's own change is sent when the
+        subscriber has returned.
+        """
+        if self._notifier == threading.get_ident():
+            return
+        with self._turn:
+            self._notifier = threading.get_ident()
             try:
-                for subscriber in subscribers:
-                    subscriber(shown)
+                while True:
+                    with self._lock:
+                        if not self._pending:
+                            return
+                        shown, subscribers = self._pending.popleft()
+                    for subscriber in subscribers:
+                        subscriber(shown)
             finally:
-                with self._lock:
-                    self._notifying = False
+                self._notifier = None
 
 
 def recording_facts(recording: Recording, name: str) -> RecordingFacts:

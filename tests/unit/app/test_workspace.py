@@ -205,6 +205,33 @@ def test_many_threads_at_once_lose_no_step_and_views_come_in_order(workspace, jo
     assert seen == list(range(49))
 
 
+def test_a_change_is_shown_before_it_is_done_also_while_another_is_being_shown(workspace):
+    seen: list[int] = []
+    when_done: list[int] = []
+    showing, going_on = threading.Event(), threading.Event()
+
+    def slow(shown: View) -> None:
+        seen.append(len(shown.clicks))
+        if len(shown.clicks) == 1:
+            showing.set()
+            assert going_on.wait(10)
+
+    def click_again() -> None:
+        workspace.dispatch(ClickPlaced(TIMES[4], (1.0, 2.0), "clicked"))
+        when_done.append(seen[-1])
+
+    workspace.subscribe(slow)
+    threads = [threading.Thread(target=lambda: workspace.dispatch(CLICK)), threading.Thread(target=click_again)]
+    threads[0].start()
+    assert showing.wait(10)
+    threads[1].start()
+    threads[1].join(0.1)
+    going_on.set()
+    for thread in threads:
+        thread.join()
+    assert when_done == [2]
+
+
 def test_downloaded_clicks_can_be_imported_again(workspace):
     for frame in (3, 5):
         workspace.dispatch(ClickPlaced(TIMES[frame], (1.5, 2.5), "clicked"))
