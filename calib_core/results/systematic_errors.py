@@ -679,14 +679,16 @@ class DominantError:
         position_share: its part of the variance of the translation; 0 if below a third.
         rotation_share: the same of the rotation.
         label: a few words: which error it is, and what is known of it.
-        sentence: its part in the uncertainty, what is known of it, and what would reduce it.
-        action: what would reduce it, as a sentence of its own without a full stop.
+        sentence: its part in the uncertainty, and what is known of it.
+        remedy: what would reduce it, as the end of that sentence.
+        action: the same as a sentence of its own without a full stop.
     """
 
     position_share: float
     rotation_share: float
     label: str
     sentence: str
+    remedy: str
     action: str
 
 
@@ -760,8 +762,9 @@ def _dominant(
         position_share=position_share,
         rotation_share=rotation_share,
         label=f"{label} {_value_text(largest) if is_determined(largest) else known.partition(f' {words.stated}')[0]}",
-        sentence=f"{' and '.join(parts)} {come} from {name}: {known}; {remedy}",
-        action=f"{whole} would help most: {parts[0]} comes from {name}",
+        sentence=f"{' and '.join(parts)} {come} from {name}: {known}",
+        remedy=remedy,
+        action=f"{whole} would help most",
     )
 
 

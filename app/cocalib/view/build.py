@@ -188,6 +188,7 @@ def summary_lines(calibration: Calibration) -> tuple[str, ...]:
     lines += [
         f"warning: {sentence(warning.message)} {sentence(warning.hint)}"
         for warning in by_consequence(calibration.warnings)
+        if (warning.message, sentence(warning.hint)) != (verdict.reason, sentence(verdict.action))
     ]
     lines += [f"unpaired: {row.id}: {sentence(row.reason)} {sentence(row.hint)}" for row in calibration.unpaired]
     return (*head, *lines)

@@ -10,6 +10,7 @@ from calib_core.geometry import camera_position_jacobian
 from calib_core.results import Calibration
 from calib_core.results.radar_axes import sigma_in_radar_axes
 from calib_core.results.systematic_errors import SystematicErrorResult, error_words, is_determined
+from calib_core.results.verdict import verdict_on
 from cocalib.view.click_rows import reprojections
 from cocalib.view.model import Figure, Level, SystematicErrorRow, SystematicErrorTable
 from cocalib.view.wording import plain, sentence, with_sigma
@@ -229,8 +230,12 @@ _DOMINANT_SHARE = 1.0 / 3.0
 
 
 def uncertainty_sentences(calibration: Calibration) -> tuple[str, ...]:
-    """Say which errors make up a third or more of the uncertainty, and what would reduce them; empty if none does."""
-    return tuple(sentence(one.sentence) for one in calibration.dominant_errors())
+    """Say which errors make up a third or more of the uncertainty, and what the verdict does not say of reducing them."""
+    told = verdict_on(calibration).action
+    return tuple(
+        sentence(one.sentence if one.action == told else f"{one.sentence}; {one.remedy}")
+        for one in calibration.dominant_errors()
+    )
 
 
 def refined_sentences(calibration: Calibration) -> tuple[str, ...]:

@@ -119,9 +119,7 @@ def _change_text(change: PoseChange) -> str:
     found = pose_difference(change.first, pose, change.covariance)
     turned = f"{shown(found.rotation_deg)} deg{_plus_minus(found.rotation_sigma_deg, 'deg')}"
     moved = f"{shown(found.position_cm)} cm{_plus_minus(found.position_sigma_cm, 'cm')}"
-    return (
-        f"turned by {turned}, moved by {moved}: p = {change.p_value:.2g} if nothing changed, {change.sigmas:.3g} sigma"
-    )
+    return f"turned by {turned}, moved by {moved}"
 
 
 def noticed_text(change: PoseChange, level: float) -> str:

@@ -69,6 +69,7 @@ def test_the_command_line_says_the_same_as_the_page(calibration):
     assert [line.removeprefix("uncertainty: ") for line in lines if line.startswith("uncertainty: ")] == list(
         systematic_errors(calibration).sentences
     )
+    assert " ".join(lines).casefold().count("a tape-measured camera position") == 1
     assert any(line.startswith("in the picture") for line in lines)
     assert assumed_figures(calibration) == ()
 

@@ -290,6 +290,13 @@ def test_the_summary_for_the_command_line_has_the_same_figures_and_all_warnings(
     assert lines[-2:] == ("warning: B. C.", "unpaired: c9: No scan. Click elsewhere.")
 
 
+def test_the_summary_says_a_contradiction_once():
+    contradiction = DataWarning("units-suspected", "the ranges look like feet", "give them in metres")
+    lines = summary_lines(calibration(*FIVE, warnings=(contradiction, DataWarning("a", "b", "c"))))
+    assert (lines[0], lines[1]) == ("verdict: contradictory: the ranges look like feet", "next: Give them in metres.")
+    assert [line for line in lines if line.startswith("warning")] == ["warning: B. C."]
+
+
 def test_a_plain_number_has_three_significant_digits():
     texts = {12.4321: "12.4", 0.0314159: "0.0314", 1234.6: "1235", 99.96: "100", 0.0: "0", -5.5: "-5.50", NAN: "–"}
     assert {value: plain(value) for value in texts} == texts
