@@ -19,7 +19,7 @@ from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.diagnostics.uncertainty_map import picture_sigma_px
 from calib_core.errors import InputError
 from calib_core.estimation import unsolved
-from calib_core.estimation.best_fit import BestFit, best_fit, quick_fit
+from calib_core.estimation.best_fit import best_fit, quick_fit
 from calib_core.estimation.beyond_the_fit import look_beyond
 from calib_core.estimation.covariance import PoseCovariance, pose_covariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
@@ -34,7 +34,6 @@ from calib_core.results import Calibration
 from calib_core.results.systematic_errors import useless_covariance
 
 _UNDETERMINED_ROTATION_RAD = 0.5  # a larger standard deviation means that the pairs do not determine the rotation
-_AGREEING_SHARE = 0.9
 
 
 def calibrate(
@@ -423,16 +422,9 @@ def _described(
 def _explained(
     outcome: Unsolvable, used: Sequence[Pair], measurements: PairMeasurements, options: CalibrationOptions
 ) -> Unsolvable:
-    """Say what may be the cause: a measured camera position that the pairs contradict, or implausible input."""
+    """Say where the input is implausible, which may be the cause."""
     ids, points = [pair.id for pair in used], cartesian_from_polar(measurements.polar)
     suspected = implausible_input(ids, points, measurements.pixels_px, measurements.camera, options)
-    if not suspected and options.solving.camera_position is not None:
-        free = replace(options, solving=replace(options.solving, camera_position=None))
-        fit = best_fit(pair_measurements(used, measurements.camera, free), free)
-        if isinstance(fit, BestFit) and fit.refined.inliers.mean() >= _AGREEING_SHARE:
-            found_m = fit.refined.camera_from_radar.inverse().translation_m
-            agreeing = fit.refined.inliers
-            return unsolved.contradicted(options.solving.camera_position, found_m, int(agreeing.sum()), len(agreeing))
     hints = [f"{warning.message}; {warning.hint}" for warning in suspected]
     return replace(outcome, hint="; ".join([*hints, outcome.hint]))
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit, fit_errors_in_variables
-from calib_core.estimation.gnc import GncSolution, associate, mixture_cost, solve_gnc
+from calib_core.estimation.gnc import RADII, GncSolution, associate, mixture_cost, solve_gnc
 from calib_core.estimation.initialization import initial_poses
 from calib_core.estimation.measured_position import WeighedPosition, weighed_position
 from calib_core.estimation.measurement_model import PairMeasurements
@@ -116,11 +116,9 @@ class BestFit:
 
 def best_fit(measurements: PairMeasurements, options: CalibrationOptions) -> BestFit | Unsolvable:
     """Run GNC from several initial poses and fit errors in variables from the most likely solution."""
-    estimate_scale, seed = options.noise.estimate_scale, options.solving.seed
-    few = _some_pairs(measurements)
+    estimate_scale = options.noise.estimate_scale
     most = _STARTS_MEASURED if measurements.prior.measured else _STARTS_FREE
-    starts = initial_poses(few, most=most, rng=np.random.default_rng(seed))
-    found = solve_gnc(few, starts, estimate_scale=estimate_scale)
+    found = _found(measurements, options, most=most)
     if not found:
         return degenerate(len(measurements))
     if measurements.prior.measured:
@@ -134,6 +132,23 @@ def best_fit(measurements: PairMeasurements, options: CalibrationOptions) -> Bes
         reason = f"only {inliers} of {len(measurements)} pairs agree on any pose"
         return mirrored(reason) if best.mirror_gain(options) > MIRRORED_GAIN else no_pose(reason)
     return best
+
+
+def _found(measurements: PairMeasurements, options: CalibrationOptions, *, most: int) -> tuple[GncSolution, ...]:
+    """Run GNC from a few initial poses; also from poses free of a measured camera position that most pairs disagree with."""
+    few, estimate_scale = _some_pairs(measurements), options.noise.estimate_scale
+    rng = np.random.default_rng(options.solving.seed)
+    starts = initial_poses(few, most=most, rng=rng)
+    found = solve_gnc(few, starts, estimate_scale=estimate_scale)
+    if not measurements.prior.measured or (found and _mostly_agreeing(few, found[0])):
+        return found
+    free = replace(few, prior=few.prior.weakened())
+    return solve_gnc(few, (*starts, *initial_poses(free, most=_STARTS_FREE, rng=rng)), estimate_scale=estimate_scale)
+
+
+def _mostly_agreeing(measurements: PairMeasurements, found: GncSolution) -> bool:
+    """Return whether most pairs are as near as the assumed noise lets them be."""
+    return bool(np.median(associate(measurements, found.camera_from_radar)[1].squared) < RADII[-1] ** 2)
 
 
 def quick_fit(
@@ -157,9 +172,7 @@ def quick_fit(
         )
         if near.inliers.mean() >= _STILL_AGREEING_SHARE:
             return near
-    few = _some_pairs(measurements)
-    starts = initial_poses(few, most=_STARTS_QUICK, rng=np.random.default_rng(options.solving.seed))
-    found = solve_gnc(few, starts, estimate_scale=estimate_scale)
+    found = _found(measurements, options, most=_STARTS_QUICK)
     if not found:
         return None
     fit = fit_errors_in_variables(measurements, found[0], estimate_scale=estimate_scale, coarse=True)

@@ -1,8 +1,6 @@
 """The outcomes of a solve without an answer: what is missing, with figures, and what to do."""
 
-from calib_core.arrays import Vector3
 from calib_core.measurements import MIN_PAIRS, Unsolvable
-from calib_core.options import CameraPositionPrior
 
 DEGENERATE = "degenerate-placements"
 """The code of placements that leave part of the pose open."""
@@ -54,18 +52,4 @@ def no_pose(reason: str) -> Unsolvable:
         reason,
         "check that clicks and radar data are from the same times, that the intrinsics belong to this camera at this "
         "image size, and that the placements are spread over the picture",
-    )
-
-
-def contradicted(measured: CameraPositionPrior, found_m: Vector3, agreeing: int, count: int) -> Unsolvable:
-    """The pairs agree on a pose, but not with the measured camera position."""
-    given, found = (
-        "(" + ", ".join(f"{value:.2f}" for value in position) + ") m"
-        for position in (measured.position_m, found_m.tolist())
-    )
-    return Unsolvable(
-        "camera-position-contradicted",
-        f"no pose fits the pairs and the measured camera position {given}; without it, {agreeing} of {count} "
-        f"pairs agree on a pose with the camera at {found}",
-        "measure again from the radar's antennas to the lens: forward, left, up, in metres",
     )

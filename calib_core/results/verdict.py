@@ -136,7 +136,7 @@ SURE_PAIRS = 8
 HELD_OUT_RATIO = 2.0
 """With a held-out error above this many times the fitted one, single pairs decide: the verdict is not good."""
 
-_CONTRADICTIONS = ("mirrored-axes", "no-pose", "camera-position-contradicted", "no-consensus", "refinement-diverged")
+_CONTRADICTIONS = ("mirrored-axes", "no-pose", "no-consensus", "refinement-diverged")
 _MORE_PAIRS_HELP = ("many-outliers", "repeated-placements")
 _NOT_MIRRORED = "handedness-assumed"
 _FEW = "few-pairs"

@@ -10,7 +10,7 @@ from calib_core.calibration import calibrate_pairs
 from calib_core.options import HOW_MEASURED, CalibrationOptions, CameraPositionPrior, SolvingOptions
 from calib_core.results import Calibration
 from calib_core.results.verdict import stated_error
-from calib_core.synthetic import SimulatedPairs, simulate_pairs
+from calib_core.synthetic import RigOptions, SimulatedPairs, simulate_pairs
 from calib_core.synthetic.simulated_pairs import draw_systematic_errors
 
 CONTRADICTED = "camera-position-contradicted"
@@ -57,6 +57,25 @@ def test_a_contradicted_position_is_named_and_has_no_weight(slip_m):
             assert CONTRADICTED in codes(answer)
             assert off_m(answer, simulated) < 0.12
             assert not answer.covariance_parts.camera_position.any()
+
+
+@pytest.mark.parametrize("count", [6, 20])
+@pytest.mark.parametrize("noise", ["ti", "imaging"])
+def test_a_position_metres_off_is_named_and_the_pose_is_that_of_the_pairs_alone(noise, count):
+    rng = np.random.default_rng([291, count])
+    on_a_car = RigOptions(camera_offset_m=(-1.9, 0.4, 0.8))
+    simulated = simulate_pairs(
+        count, rng=rng, noise=noise, rig_options=on_a_car, systematic=draw_systematic_errors(rng)
+    )
+    alone = calibrate_pairs(simulated.pairs, simulated.camera).unwrap()
+    right_m = simulated.rig.camera_position_radar_m
+    forward, left, up = right_m
+    slips_m = [(3.0, 0.0, 0.0), (0.0, -11.0, 0.0), (0.0, 0.0, 30.0), (-8.0, 8.0, -5.0), (-20.0, 0.0, 0.0)]
+    other_axes_m = [np.array([-left, -up, forward]), np.array([left, forward, up])]
+    for slip_m in (*slips_m, *(other - right_m for other in (*other_axes_m, -right_m, 12.0 * right_m))):
+        answer = solved(simulated, tuple(slip_m))
+        assert CONTRADICTED in codes(answer)
+        assert step(alone, answer) < 1.0
 
 
 def step(before: Calibration, after: Calibration) -> float:
