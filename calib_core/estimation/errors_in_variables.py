@@ -112,16 +112,17 @@ class _State:
     """factor on their priors' information in a step, which shortens it and does not move the optimum"""
 
     def take_care(self, step: Values, prior_information: np.ndarray) -> None:
-        """Make the next steps of the systematic errors shorter if this one only undoes the previous one.
+        """Make the next steps of the systematic errors shorter if this one undoes the previous one, longer if it repeats it.
 
         An elevation scale on flat ground is nearly a shift of the camera, so that only its prior determines it, and steps
-        from many pairs overshoot. If a step is -q times the previous one, the curvature is 1 + q times that assumed.
+        from many pairs overshoot. If a step is -q times the previous one, the curvature is 1 + q times that assumed, and the
+        other way around: a step undoes another, too, where the noise level has changed in between.
         """
         if len(self.step):
             length = float(self.step @ prior_information @ self.step)
             undone = -float(step @ prior_information @ self.step) / max(length, 1e-300)
-            if length > _SMALL_STEP and undone > _UNDONE:
-                self.caution = min(self.caution * (1.0 + undone), _MOST_CAUTION)
+            if undone < -_UNDONE or (undone > _UNDONE and length > _SMALL_STEP):
+                self.caution = min(max(self.caution * (1.0 + undone), 1.0), _MOST_CAUTION)
         self.step = step
 
     def rescale(self, scale: Values, *, extrapolate: bool) -> float:
