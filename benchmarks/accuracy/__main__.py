@@ -13,7 +13,6 @@ from benchmarks.accuracy import (
     clutter,
     coverage,
     efficiency,
-    keystrokes,
     many,
     mirrored,
     real,
@@ -68,36 +67,36 @@ TABLES: dict[str, tuple[Row, ...]] = {
 """The rows by their name for --only, in the order they are measured: the longest table is last."""
 
 
-_SECTIONS: dict[str, tuple[Callable[[Kept], Section], ...]] = {
-    "verdict": (verdicts.section,),
-    "shared": (shared_errors.section,),
-    "clean": (shared_errors.clean_section,),
-    "measured": (measured_positions.section,),
-    "lens": (wrong_lens.section,),
-    "adversarial": (adversarial.section,),
-    "wolf": (crying_wolf.section,),
-    "flat": (flat_radars.section,),
-    "handedness": (handedness.section,),
-    "drag": (dragging.section,),
-    "placements": (two_reflectors.section,),
-    "returns": (two_reflectors.returns_section,),
-    "topics": (several_topics.section,),
-    "efficiency": (efficiency.section, keystrokes.section),
-    "peers": (efficiency.peer_section,),
-    "coverage": (coverage.section,),
-    "clutter": (clutter.section,),
-    "smooth": (smooth.section,),
-    "many": (many.section,),
-    "real": (real.section,),
-    "mirrored": (mirrored.section,),
-    "advice": (advice.section,),
+_SECTIONS: dict[str, Callable[[Kept], Section]] = {
+    "verdict": verdicts.section,
+    "shared": shared_errors.section,
+    "clean": shared_errors.clean_section,
+    "measured": measured_positions.section,
+    "lens": wrong_lens.section,
+    "adversarial": adversarial.section,
+    "wolf": crying_wolf.section,
+    "flat": flat_radars.section,
+    "handedness": handedness.section,
+    "drag": dragging.section,
+    "placements": two_reflectors.section,
+    "returns": two_reflectors.returns_section,
+    "topics": several_topics.section,
+    "efficiency": efficiency.section,
+    "peers": efficiency.peer_section,
+    "coverage": coverage.section,
+    "clutter": clutter.section,
+    "smooth": smooth.section,
+    "many": many.section,
+    "real": real.section,
+    "mirrored": mirrored.section,
+    "advice": advice.section,
 }
-"""The sections of each table, in the order of the page."""
+"""The section of each table, in the order of the page."""
 
 
 def sections(kept: Kept, only: Collection[str] = ()) -> tuple[Section, ...]:
     """Return the sections of all tables, or of some only, in the order of the page."""
-    return tuple(write(kept) for name, several in _SECTIONS.items() if not only or name in only for write in several)
+    return tuple(write(kept) for name, write in _SECTIONS.items() if not only or name in only)
 
 
 def _arguments() -> argparse.Namespace:

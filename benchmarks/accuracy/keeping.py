@@ -11,7 +11,7 @@ from benchmarks.accuracy.rows import Figures
 __all__ = ["Keeper", "digest_of_sources", "sources"]
 
 _ROOT = Path(__file__).resolve().parents[2]
-_WRITING_ONLY = {"__main__.py", "figures.py", "fresh_seeds.py", "keeping.py", "keystrokes.py", "page.py", "running.py"}
+_WRITING_ONLY = {"__main__.py", "figures.py", "fresh_seeds.py", "keeping.py", "page.py", "running.py"}
 
 
 def digest_of_sources() -> str:

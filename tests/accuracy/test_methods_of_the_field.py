@@ -1,4 +1,4 @@
-"""The methods written from other papers do what the papers say, and the keystroke table counts what the page's ways take."""
+"""The methods written from other papers do what the papers say."""
 
 from dataclasses import replace
 
@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from benchmarks.accuracy.cases import Case, draw
-from benchmarks.accuracy.keystrokes import WAYS, section
 from benchmarks.accuracy.methods import NOT_RUN, PEERS, sqpnp_lm
 from benchmarks.accuracy.reproduced import bias_compensated_pnp, gmlpnp, unbiased_positions
 from calib_core.geometry import RigidTransform, rotation_exp
@@ -98,20 +97,3 @@ def simulated_at(simulated: SimulatedPairs, points: np.ndarray) -> SimulatedPair
 def test_methods_without_a_row_say_why():
     assert all("not reproduced" in why for why in NOT_RUN.values())
     assert not set(NOT_RUN) & set(PEERS)
-
-
-def test_seconds_are_the_sum_of_keys_clicks_and_thoughts():
-    mouse, keys, guesses = WAYS
-    assert (mouse.keys(20), mouse.clicks(20), keys.clicks(20), guesses.clicks(20)) == (20, 20, 0, 4)
-    assert mouse.seconds(20) == pytest.approx(0.4 + 20 * (0.28 + 1.35 + 1.1 + 0.2))
-    assert keys.keys(20) <= 160  # what the page's own test allows
-    assert guesses.seconds(20) == pytest.approx(0.4 + 4 * 2.93 + 16 * (4 * 0.28 + 1.35))
-    assert guesses.seconds(4) == mouse.seconds(4)
-
-
-def test_the_table_stands_only_where_the_errors_were_measured():
-    assert section({}).parts[0].cells == ()
-    key = f"ours-{Case('ti', 10, 0.1, tape_m=None).key}"
-    cells = section({key: [{"rotation_rad": np.deg2rad(1.0), "position_m": 0.1}] * 3}).parts[0].cells
-    assert [cell[0] for cell in cells] == ["10"] * 3
-    assert all("1.00 deg, 10.0 cm (3 trials)" in cell for cell in cells)
