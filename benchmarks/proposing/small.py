@@ -1,5 +1,6 @@
 """Small cases for tests: few placements, small pictures, and a backdrop that is not traced ray by ray."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
@@ -40,11 +41,13 @@ def small_case(seed: int) -> Case:
     return replace(case, options=options)
 
 
-def draw_small(seed: int) -> Drawn:
+def draw_small(seed: int, renderer: Callable[..., FrameRenderer] = FrameRenderer) -> Drawn:
     """Simulate a small case; nothing is kept on the disk."""
     case = small_case(seed)
     recording = simulate(case.options)
-    return drawn_from(recording, case, None, _Remembered(SimulatedPictures(recording, _renderer(recording))))
+    return drawn_from(
+        recording, case, None, _Remembered(SimulatedPictures(recording, _rendered_by(renderer, recording)))
+    )
 
 
 class _Remembered:
@@ -55,7 +58,7 @@ class _Remembered:
         self.image = cache(source.image)
 
 
-def _renderer(recording: SimulatedRecording) -> FrameRenderer:
+def _rendered_by(renderer: Callable[..., FrameRenderer], recording: SimulatedRecording) -> FrameRenderer:
     """Return a renderer with soft spots of grey in place of the scene."""
     rig, options = recording.stage.rig, recording.options
     width_px, height_px = rig.camera.width_px, rig.camera.height_px
@@ -70,4 +73,4 @@ def _renderer(recording: SimulatedRecording) -> FrameRenderer:
         rig.camera_position_world_m,
     )
     scene = recording.stage.scene
-    return FrameRenderer(scene, rig, still, sun_direction(scene), options.surroundings, options.reflector_edge_m)
+    return renderer(scene, rig, still, sun_direction(scene), options.surroundings, options.reflector_edge_m)
