@@ -117,7 +117,7 @@ def handedness(fit: SolvedFit) -> list[DataWarning]:
         return [
             DataWarning(
                 "handedness-open",
-                "a mirrored radar axis would explain the pairs about as well, or better fits where radar and camera stand",
+                "a mirrored radar axis would explain the pairs about as well, or put radar and camera on one side of the floor",
                 "measure the camera position with a tape, or add placements at other heights (a tripod)",
             )
         ]

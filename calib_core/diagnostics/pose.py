@@ -141,8 +141,8 @@ def possible_poses(fit: SolvedFit) -> list[DataWarning]:
             return [
                 DataWarning(
                     "two-poses",
-                    f"another pose, {_away(error)}, has a probability of {100 * other.probability:.0f} %: which of the pairs "
-                    "are wrong is not clear",
+                    f"another pose, {_away(error)}, may be the right one (probability {100 * other.probability:.0f} %): it is "
+                    "not clear which of the pairs are wrong",
                     "measure the camera position with a tape, or add placements nearer and farther than the present ones",
                 )
             ]

@@ -513,12 +513,13 @@ _APEX = (
     "clicking the reflector's apex, where its three sheets meet, and stating a smaller sigma for it, would reduce it"
 )
 _PRINCIPAL_POINT = (
-    "a camera calibration that determines the principal point well, and its sigma among the options, would reduce it"
+    "a camera calibration that determines the principal point well, and its error as lens.principal_point_sigma_px, "
+    "would reduce it"
 )
 _REFINED_CENTRE = ("principal point", "the principal point")
 _CALIBRATED_LENS = ("lens", "the lens, as far as its calibration knows it")
 _BOARD = "a camera calibration with more views of the board, over the whole picture, would reduce it"
-_LENS = "a better camera calibration, and its sigma among the options, would reduce it"
+_LENS = "a better camera calibration, and its error as lens.focal_length_sigma, would reduce it"
 
 ERROR_WORDS: dict[str, ErrorWords] = {
     "azimuth_scale": ErrorWords(

@@ -222,9 +222,9 @@ def _centre_assumed(calibration: Calibration) -> str:
     """Return what is assumed of the principal point: the rotation absorbs its error, so that no pair shows it."""
     given, sigma_px = calibration.given_camera or calibration.camera, calibration.options.lens.principal_point_sigma_px
     if given.covariance is not None or not sigma_px:
-        return "the picture is uncropped"
+        return "the picture is neither cropped nor resized"
     within_px = 2.0 * scaled_px(sigma_px, given)
-    return f"the picture is uncropped, its principal point right to {within_px:.2g} px"
+    return f"the picture is neither cropped nor resized, its principal point right to {within_px:.2g} px"
 
 
 def _alone_cm(calibration: Calibration) -> float:
@@ -252,10 +252,9 @@ def _alone_cm(calibration: Calibration) -> float:
 def placement_words(best: NextPlacement) -> str:
     """Say where a placement is: "4.5 m ahead, 2.1 m to the left"."""
     x_m, y_m, _ = best.position_radar_m
-    side = (
-        "straight ahead" if abs(y_m) < 0.1 * abs(x_m) else f"{abs(y_m):.1f} m to the {'left' if y_m > 0 else 'right'}"
-    )
-    return f"{x_m:.1f} m ahead, {side}"
+    if abs(y_m) < 0.1 * abs(x_m):
+        return f"{x_m:.1f} m straight ahead"
+    return f"{x_m:.1f} m ahead, {abs(y_m):.1f} m to the {'left' if y_m > 0 else 'right'}"
 
 
 def _capitalized(phrase: str) -> str:
@@ -335,7 +334,7 @@ def _most_helpful(calibration: Calibration, left: int | None) -> str:
     if best is not None and not best.may_stop:
         percent = 100.0 * (1.0 - 1.0 / best.gain)
         return f"Put the reflector {placement_words(best)}: that would reduce the pose uncertainty by {percent:.0f} %"
-    return "No further placement would help noticeably: state less noise among the options if the radar is better than that"
+    return "No further placement would help noticeably: the radar's noise allows no more"
 
 
 Consequence: TypeAlias = Literal["contradictory", "coarse", "limited", "note"]
