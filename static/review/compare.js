@@ -29,6 +29,8 @@ const chosen = { a: "now", b: "" };
 let file = null;
 let fileSent = false;
 let asked = "";
+/** Whether the answer to that has not come yet. */
+let waiting = false;
 /** Whether the tab was shown when it was looked at last. */
 let open = false;
 /** @type {Compared|null} */
@@ -125,13 +127,14 @@ function refresh() {
     fileSent = true;
   }
   asked = JSON.stringify([state.view.revision, chosen, pair, file?.name, fileSent]);
-  verdict.textContent = "Comparing…";
-  tell(message);
+  waiting = tell(message);
+  draw();
 }
 
 /** @param {Compared} message */
 export function takeCompared(message) {
   answer = message;
+  waiting = false;
   draw();
   emit("layers");
 }
@@ -140,8 +143,9 @@ function draw() {
   const known = answer && chosen.b ? answer : null;
   blending.hidden = !known?.marks.length;
   verdict.hidden = !chosen.b;
+  if (waiting) verdict.textContent = "Comparing…";
+  else if (known) verdict.textContent = known.problem || `${known.verdict} A: ${known.a}. B: ${known.b}.`;
   if (!known) return rows.replaceChildren();
-  verdict.textContent = known.problem || `${known.verdict} A: ${known.a}. B: ${known.b}.`;
   rows.replaceChildren(...known.rows.map((row) => make("tr", "", [make("td", "", row.label), make("td", "", row.text)])));
 }
 

@@ -55,14 +55,17 @@ class Driver:
         self.complaints[:] = [text for text in self.complaints if not any(words in text for words in expected)]
 
     def until(self, condition: str, seconds: float = 40) -> None:
-        """Wait until a JavaScript condition holds. The page's policy forbids eval, so the condition goes in as a function."""
+        """Wait until a JavaScript condition holds and what the page draws because of it is drawn.
+
+        The page's policy forbids eval, so the condition goes in as a function.
+        """
         self.page.evaluate(
             f"""() => new Promise((resolve, reject) => {{
                 const end = performance.now() + {seconds * 1000};
                 const look = () => {{
                     let holds = false;
                     try {{ holds = Boolean({condition}); }} catch {{ holds = false; }}
-                    if (holds) resolve(true);
+                    if (holds) requestAnimationFrame(() => setTimeout(() => resolve(true)));
                     else if (performance.now() > end) reject(new Error({condition!r} + " never came"));
                     else setTimeout(look, 15);
                 }};
@@ -76,7 +79,9 @@ class Driver:
 
     def drawn(self) -> None:
         """Wait until the browser has laid out and drawn twice, so that earlier changes are on the screen."""
-        self.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        self.page.evaluate(
+            "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done))))"
+        )
 
     @property
     def view(self) -> Any:

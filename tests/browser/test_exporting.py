@@ -255,8 +255,9 @@ def test_a_format_that_cannot_store_distortion_comes_with_maps_until_pictures_ar
     expect(page.locator(RECTIFIED)).to_be_hidden()
     for name in ("kitti", "nuscenes"):
         page.click(f'{DIALOG} [data-export="{name}"]')
+        with_maps = f"{format_named(name).file_name.partition('.')[0]}_and_maps.zip"
+        solved.until(f"document.querySelector('{DIALOG} .name input').value.endsWith('{with_maps}')")
         expect(page.locator(f"{DIALOG} .notes")).to_contain_text("the maps in rectification.npz")
-        solved.until(f"document.querySelector('{DIALOG} .name input').value.endsWith('_and_maps.zip')")
         expect(page.locator(RECTIFIED)).not_to_be_checked()
         with zipfile.ZipFile(saved(solved, tmp_path)) as archive:
             assert archive.namelist() == [format_named(name).file_name, "rectification.npz"]

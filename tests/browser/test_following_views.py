@@ -71,6 +71,7 @@ def test_the_page_applies_changes_as_the_server_means_them(page: Driver) -> None
 def test_a_page_that_missed_a_change_asks_for_a_whole_view(
     page: Driver, workspace: Workspace, truth: dict[str, object]
 ) -> None:
+    page.until("__cocalib.state.placementsKnown")
     page.click_sample(truth, 2)
     page.value("(__cocalib.follower.changes = 1000, null)")
     page.go_to(0)
@@ -83,6 +84,7 @@ def test_a_page_that_missed_a_change_asks_for_a_whole_view(
 def test_after_a_calibration_the_page_has_what_a_new_page_gets_and_shows_the_same_frame_when_reloaded(
     page: Driver, workspace: Workspace, truth: dict[str, object]
 ) -> None:
+    page.until("__cocalib.state.placementsKnown")
     page.click_sample(truth, 6)
     page.press("x", "Control+z", "Delete", "Control+z")
     page.until("__cocalib.state.view.stage === 'solved'")

@@ -110,6 +110,7 @@ def test_a_lens_is_calibrated_on_the_page_and_the_clicks_give_a_pose(
     page.until("__cocalib.state.lens.stage === 'searching' && __cocalib.state.lens.views > 2")
     assert page.value("document.activeElement.textContent") == "Cancel", "kept while the progress changes"
     page.page.keyboard.press("Enter")
+    page.until("__cocalib.unconfirmed() === 0")
     gate.set()
     page.until("__cocalib.state.lens.stage === 'cancelled'")
     kept = page.value("__cocalib.state.lens.views")

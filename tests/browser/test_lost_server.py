@@ -31,14 +31,17 @@ def test_the_export_says_that_the_server_is_gone_or_fails_and_tries_again(page: 
     for control in (save, user.get_by_role("button", name="Copy"), user.get_by_label("File name")):
         expect(control).to_be_disabled()
     user.unroute_all()
+    _await_status(user, "api/preview/none", 404)
     user.get_by_role("button", name="Try again").click()
     expect(user.locator(f"{DIALOG} .text")).to_contain_text("camera_from_radar")
     expect(save).to_be_enabled()
     user.route(re.compile(r"/api/export/"), lambda route: route.abort("connectionreset"))
+    _await_status(user, "api/export/none", 0)
     save.click()
     expect(user.locator(f"{DIALOG} .text")).to_contain_text(GONE)
     expect(save).to_be_disabled()
     user.unroute_all()
+    _await_status(user, "api/export/none", 404)
     user.get_by_role("button", name="Try again").click()
     expect(save).to_be_enabled()
     with user.expect_download() as saving:
@@ -52,7 +55,7 @@ def test_the_export_says_that_the_server_is_gone_or_fails_and_tries_again(page: 
     expect(save).to_be_disabled()
     page.drawn()
     page.forget_lost_connections()
-    expected = ("ERR_CONNECTION_RESET", "status of 500")
+    expected = ("ERR_CONNECTION_RESET", "status of 500", "status of 404")
     page.complaints[:] = [text for text in page.complaints if not any(words in text for words in expected)]
 
 

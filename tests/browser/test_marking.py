@@ -26,10 +26,10 @@ def answer(page: Driver) -> Any:
 
 
 def test_guesses_leave_the_answer_as_the_clicks_gave_it(page: Driver, truth: Any) -> None:
+    page.until("__cocalib.state.placementsKnown")
     page.load_sample(truth, 4)
     before = answer(page)
     assert page.view["has_calibration"]
-    page.until("__cocalib.state.placementsKnown")
     guesses = 0
     for _ in range(8):
         page.press("n")

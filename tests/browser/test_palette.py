@@ -21,6 +21,8 @@ def found(page: Driver, query: str) -> list[str]:
 
 
 def opened(page: Driver) -> None:
+    """Open the palette; it lists what is known when one types."""
+    page.until("__cocalib.state.placementsKnown")
     expect(page.page.locator("dialog[open]")).to_have_count(0)
     page.page.keyboard.press("Control+k")
     expect(page.page.locator("#palette input")).to_be_focused()

@@ -29,10 +29,14 @@ class Outbox:
         self._number = 0
 
     def put(self, message: Message, *, kind: str | None = None) -> None:
-        """Queue a message. One with a kind replaces a waiting one of the same kind; all others are sent."""
+        """Queue a message. One with a kind replaces a waiting one of the same kind; all others are sent.
+
+        A function keeps the place of the one it replaces: what was queued behind it may rely on it.
+        """
         self._number += 1
         key: Hashable = kind if kind is not None else self._number
-        self._waiting.pop(key, None)
+        if not callable(message):
+            self._waiting.pop(key, None)
         self._waiting[key] = message
         self._something.set()
 

@@ -35,6 +35,15 @@ def test_of_one_kind_only_the_newest_is_sent_and_answers_are_all_sent():
     assert delivered(outbox, 4) == ["done 1", "view 2", "done 2", "frame 2"]
 
 
+def test_a_change_is_shown_before_it_is_confirmed_also_if_a_newer_one_comes_while_both_wait():
+    outbox, newest = Outbox(), ["view 1"]
+    outbox.put(lambda: newest[0], kind="view")
+    outbox.put("done 1")
+    newest[0] = "view 2"
+    outbox.put(lambda: newest[0], kind="view")
+    assert delivered(outbox, 2) == ["view 2", "done 1"]
+
+
 def test_a_page_that_reads_nothing_is_given_up():
     outbox = Outbox()
     for number in range(2001):
