@@ -37,10 +37,10 @@ export function startPairs() {
   page.addEventListener("click", pressed);
 }
 
-/** Clicks in the order of the table. */
+/** Clicks in the order of the table, as the server has them, and new marks: a mark that is dragged leaves its row as it is. */
 function sorted() {
   const sign = sorting.descending ? -1 : 1;
-  return [...clicks()].sort((a, b) => sign * ((a[sorting.key] ?? -1) - (b[sorting.key] ?? -1)) || a.frame - b.frame);
+  return [...(state.view?.clicks ?? []), ...clicks().filter(({ id }) => !id)].sort((a, b) => sign * ((a[sorting.key] ?? -1) - (b[sorting.key] ?? -1)) || a.frame - b.frame);
 }
 
 /** The click that nextWorst went to last. @type {string|null} */

@@ -6,15 +6,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Playwright, sync_playwright
+from playwright.sync_api import Browser, Playwright, expect, sync_playwright
 
 from calib_core.recordings import Recording, open_recording
 from cocalib.web.port.link import ServerOptions
 from cocalib.web.port.server import RunningServer, start
 from cocalib.workspace import Workspace, open_workspace
-from tests.browser.driving import FLAGS, Driver
+from tests.browser.driving import FLAGS, PATIENCE_S, Driver
 from tests.find_browser import find_browser
 from tests.serving import serving
+
+expect.set_options(timeout=PATIENCE_S * 1000)
 
 EMPTY_3D_VIEW = """document.addEventListener("readystatechange", () => {
   if (document.readyState === "interactive") document.getElementById("space-view")?.setAttribute("src", "about:blank");

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from playwright.sync_api import Page
 
-__all__ = ["FLAGS", "Driver"]
+__all__ = ["FLAGS", "PATIENCE_S", "Driver"]
 
 FLAGS = [
     "--no-sandbox",
@@ -28,6 +28,9 @@ FLAGS = [
     "PreconnectToSearch,"
     "WebUIOmniboxPopup,WebUIOmniboxAimPopup,WebUIOmniboxFullPopup,SpareRendererForSitePerProcess",
 ]
+
+PATIENCE_S = 40
+"""How long is waited for anything: the machine may be busy with something else."""
 
 
 class Driver:
@@ -54,7 +57,7 @@ class Driver:
         expected = ("WebSocket connection", "ERR_CONNECTION_REFUSED", "status of 401", "status of 503")
         self.complaints[:] = [text for text in self.complaints if not any(words in text for words in expected)]
 
-    def until(self, condition: str, seconds: float = 40) -> None:
+    def until(self, condition: str, seconds: float = PATIENCE_S) -> None:
         """Wait until a JavaScript condition holds and what the page draws because of it is drawn.
 
         The page's policy forbids eval, so the condition goes in as a function.

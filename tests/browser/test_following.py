@@ -85,9 +85,7 @@ def test_placements_and_advice_appear_while_the_file_grows(page, writer):
     writer.write_until(_DWELL_END_S + 2.0)
     page.until("__cocalib.state.placements.length >= 1")
     page.until("document.getElementById('status-text').textContent.includes('next:')")
-    words = page.page.locator("#status-text").inner_text()
-    assert "Following" in words
-    assert " of 20 placements; next: " in words
+    assert " of 20 placements; next: " in page.text("#status-text")
 
 
 def test_a_click_made_while_following_belongs_to_its_frame_and_stays(page, writer, workspace, followed, tmp_path):
