@@ -109,7 +109,7 @@ function outlierWords(click) {
 /** The next thing to do: the verdict's action, with its key; null when there is nothing to say. @returns {Words|null} */
 function nextAction() {
   const view = state.view;
-  if (!view || view.stage === "solving") return null;
+  if (!view) return null;
   const { action, key, option, done } = view.verdict;
   const guesses = clicks().filter((click) => click.state === "untouched").length;
   if (guesses && !state.placements.some(isOffered)) return [`${guesses} ${guesses > 1 ? "marks are guesses" : "mark is a guess"} and ${guesses > 1 ? "do" : "does"} not count: move ${guesses > 1 ? "each" : "it"} to the inner corner`];

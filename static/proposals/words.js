@@ -8,11 +8,11 @@ import { heldBack, isSearching, openProposals, saidWords, say, shownOffer } from
 
 /** @typedef {import("../pairs/guide.js").Words} Words */
 
-/** How many placements wait: with proposals those that were found, without any all. */
-function leftWords() {
-  const left = openProposals().length || state.placements.filter(isOffered).length;
-  return `${left} left${isSearching() ? " so far" : ""}`;
-}
+/** So many clicks show what the reflector looks like, where the pictures alone propose nothing. */
+const FIRST = 2;
+
+/** How many placements wait: with proposals those that were found, without any all; nothing while they are being searched for. */
+const leftWords = () => (isSearching() ? "" : `, ${openProposals().length || state.placements.filter(isOffered).length} left`);
 
 /** N found no proposal: say why, if that is not because all are decided. */
 export function sayNone() {
@@ -22,7 +22,7 @@ export function sayNone() {
 }
 
 /** What N does. */
-export const proposalAdvice = () => `${state.view?.clicks.length ? "next" : "first"} place where the reflector stood, ${leftWords()}`;
+export const proposalAdvice = () => `${state.view?.clicks.length ? "next" : "first"} place where the reflector stood${leftWords()}`;
 
 /** What is proposed, and what to do, for the line on the frame; null if nothing is. @returns {Words|null} */
 export function proposalWords() {
@@ -34,7 +34,7 @@ export function proposalWords() {
   const sure = number ? `place ${number + 1} of ${row.places.length}` : surely(row.confidence);
   const why = row.reason && !number ? `: ${row.reason}` : "";
   return [
-    `${saidWords()} Placement ${row.placement + 1}, ${state.placements[row.placement].range_m.toFixed(1)} m away, ${sure}${why}, ${leftWords()}.`.trim(),
+    `${saidWords()} Placement ${row.placement + 1}, ${state.placements[row.placement].range_m.toFixed(1)} m away, ${sure}${why}${leftWords()}.`.trim(),
     { key: "Enter", label: "accept", action: "place-mark" },
     ...(row.places.length > 1 ? [{ key: "C", label: "other place", action: "next-candidate" }] : []),
     { key: "X", label: "no reflector", action: "exclude" },
@@ -51,6 +51,7 @@ export function silentWords(placement) {
   if (!news?.on) return "";
   if (isSearching()) return ""; // the status line says so
   const reason = news.unproposed.find((one) => one.placement === placement)?.reason;
+  if (reason && !news.rows.length && (state.view?.clicks.length ?? 0) < FIRST) return "No proposals yet: click the first two places yourself.";
   return reason ? `Not proposed: ${reason}.` : "";
 }
 

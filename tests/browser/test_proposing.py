@@ -250,7 +250,7 @@ def test_only_what_is_seen_is_decided_and_the_line_says_how_far_the_search_is(
     page.go_to(page.value("__cocalib.state.placements[15].frame"))
     assert page.text("#status-text") == "Searching, 8 of 20"
     page.press("Enter")  # leads to one of those that are ready
-    assert " left so far." in guide(page)
+    assert " left." not in guide(page), "how many there are is not known yet"
     assert page.view["clicks"] == []
     assert page.value("__cocalib.state.cross") is None
     page.value("dispatchEvent(new KeyboardEvent('keydown', {key: 'x', bubbles: true}))")

@@ -270,7 +270,7 @@ def _early_line(session: Session) -> str:
     """
     outcome = session.outcome if session.clicks else None
     if outcome is None:
-        return "" if session.clicks else "No clicks yet"
+        return "No answer yet" if session.clicks else "No clicks yet"
     if isinstance(outcome, Unsolvable):
         waits = outcome.code == "too-few-pairs" and not outcome.unpaired
         return f"{len(outcome.pairs)} of {SURE_PAIRS} pairs" if waits else ""
