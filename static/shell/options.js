@@ -63,9 +63,12 @@ const METHOD_HINTS = {
 /** @type {Map<string, (value: any) => void>} */
 const writers = new Map();
 
+/** Changes that the server has not confirmed: a View made before them would put the old values back. */
+let sending = 0;
+
 export function startOptions() {
   on(["recording"], build);
-  onPainted(["view"], fill);
+  onPainted(["view"], () => void (sending || fill()));
 }
 
 function build() {
@@ -288,9 +291,12 @@ async function change(path, value) {
   if (typeof value === "number" && !Number.isFinite(value)) return fill();
   const [name, ...groups] = path.split(".").reverse();
   const options = groups.reduce((tree, group) => ({ [group]: tree }), /** @type {Record<string, any>} */ ({ [name]: value }));
+  sending += 1;
   const refusal = await send({ type: "options_changed", options });
-  if (!refusal) return settled(path);
-  toast(inLabels(refusal), "The option keeps its previous value.", path);
-  /** @type {HTMLElement|null} */ (document.activeElement)?.blur();
-  fill();
+  sending -= 1;
+  if (refusal) {
+    toast(inLabels(refusal), "The option keeps its previous value.", path);
+    /** @type {HTMLElement|null} */ (document.activeElement)?.blur();
+  } else settled(path);
+  if (!sending) fill();
 }

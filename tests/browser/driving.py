@@ -44,8 +44,8 @@ class Driver:
         page.on("pageerror", lambda error: self.complaints.append(f"error: {error}"))
         page.on("request", lambda request: self.addresses.add(request.url))
         page.on("websocket", lambda socket: self.addresses.add(socket.url))
-        page.goto(url)
-        page.wait_for_url(re.compile(r"^http[^?]*$"))  # the link leads on to the page
+        page.goto(url, wait_until="commit")
+        page.wait_for_url(re.compile(r"^http[^?]*$"), wait_until="commit")  # the link leads on to the page
         self.until(ready)
 
     def _console(self, message: Any) -> None:

@@ -39,7 +39,9 @@ def served(tmp_path: Path) -> Iterator[tuple[str, np.ndarray, tuple[int, int, in
 
 def picture_in(page: Page) -> tuple[np.ndarray, tuple[int, int, int, int]]:
     """Return what the page shows, red first, and the rectangle of the recorded picture in it (left, top, width, height)."""
-    shown = cv2.imdecode(np.frombuffer(page.screenshot(timeout=LATEST_S * 1000), np.uint8), cv2.IMREAD_COLOR)[:, :, ::-1]
+    shown = cv2.imdecode(np.frombuffer(page.screenshot(timeout=LATEST_S * 1000), np.uint8), cv2.IMREAD_COLOR)[
+        :, :, ::-1
+    ]
     left_half = shown[:, : shown.shape[1] // 2].astype(int)
     grey = (np.abs(left_half - GREY).max(axis=2) <= 3).astype(np.uint8)
     _, _, regions, _ = cv2.connectedComponentsWithStats(grey)
