@@ -146,7 +146,7 @@ async function loadActivity() {
   const found = answer && (await content(answer.json()));
   if (!found) return;
   Object.assign(activity, found);
-  emit("cursor");
+  emit("lanes");
 }
 
 /** Draw over the frame, from the bottom to the top: the rectified picture shows no marks, and boxes stand alone. */

@@ -3,7 +3,7 @@
 /** @typedef {import("../messages.js").View} View */
 /** @typedef {import("../messages.js").ClickRow} Click */
 /** A decoded frame. @typedef {{index: number, bitmap: ImageBitmap, scale: number, width: number, height: number, rectified: boolean}} Shown */
-/** @typedef {"opening"|"recording"|"view"|"progress"|"placements"|"overlay"|"look"|"radar_map"|"shown"|"selected"|"layers"|"connection"|"playing"|"cursor"|"hover"|"theme"|"box"|"grown"|"following"|"candidates"|"cross"|"boxes"|"lens"|"proposals"} Topic */
+/** @typedef {"opening"|"recording"|"view"|"progress"|"placements"|"overlay"|"look"|"radar_map"|"shown"|"selected"|"layers"|"connection"|"playing"|"cursor"|"hover"|"theme"|"box"|"grown"|"following"|"candidates"|"cross"|"boxes"|"lens"|"proposals"|"lanes"} Topic */
 
 export const state = {
   /** While the recording is being opened. @type {import("../messages.js").Opening|null} */ opening: null,

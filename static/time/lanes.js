@@ -251,6 +251,6 @@ async function fetchChanges() {
   const ready = state.connected && !state.opening; // the banner says that the server is gone, the status that it is still opening
   const answer = ready ? await fetch("api/picture_changes.json").catch(() => null) : null;
   if (answer?.ok) Object.assign(changes, await answer.json());
-  emit("cursor");
+  emit("lanes");
   if (!changes.complete && !state.following) timer = window.setTimeout(fetchChanges, EVERY);
 }

@@ -33,7 +33,7 @@ export function startTimeline() {
     showAll();
   });
   on(["grown"], extend);
-  onPainted(["view", "placements", "shown", "selected", "cursor", "theme", "proposals"], redraw);
+  onPainted(["view", "placements", "shown", "selected", "cursor", "theme", "proposals", "lanes"], redraw);
   canvas.addEventListener("pointerdown", pressed);
   canvas.addEventListener("pointermove", moved);
   canvas.addEventListener("pointerup", released);

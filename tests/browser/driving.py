@@ -44,6 +44,7 @@ class Driver:
         page.on("pageerror", lambda error: self.complaints.append(f"error: {error}"))
         page.on("request", lambda request: self.addresses.add(request.url))
         page.on("websocket", lambda socket: self.addresses.add(socket.url))
+        page.set_default_timeout(PATIENCE_S * 1000)
         page.goto(url, wait_until="commit")
         page.wait_for_url(re.compile(r"^http[^?]*$"), wait_until="commit")  # the link leads on to the page
         self.until(ready)

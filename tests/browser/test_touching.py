@@ -98,6 +98,29 @@ def test_a_tap_places_a_mark_and_a_long_press_moves_it_under_the_loupe(page: Dri
     assert too_small_for_a_finger(page) == []
 
 
+STILL_COMPARING = """(() => {
+  const ask = window.fetch;
+  const told = () => new Response(JSON.stringify({ seconds: [], grey_levels: [], complete: false }));
+  const isAsked = (address) => String(address).includes("picture_changes");
+  window.fetch = (address, ...more) => (isAsked(address) ? Promise.resolve(told()) : ask(address, ...more));
+})()"""
+"""The server never gets to the end of comparing the pictures, so that the page asks again and again."""
+
+
+def test_a_long_press_goes_on_while_the_timeline_is_still_being_filled(
+    open_page: Callable[..., Driver], server: RunningServer
+) -> None:
+    page = open_page(server.url, script=STILL_COMPARING, **TABLET)
+    page.until("__cocalib.state.placementsKnown")
+    fingers = Fingers(page)
+    fingers.put("touchStart", page.place_of(500, 400))
+    page.until("!document.getElementById('touch-cross').hidden")
+    page.value("import('/shell/state.js').then(({ emit }) => emit('placements'))")
+    page.drawn()
+    assert not page.value("document.getElementById('touch-cross').hidden")
+    fingers.put("touchEnd")
+
+
 def click_of(page: Driver) -> Any:
     """Return the only click, as the server has it."""
     (click,) = page.view["clicks"]
