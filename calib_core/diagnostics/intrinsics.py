@@ -1,9 +1,11 @@
 """Warnings about the intrinsics: contradicted by the residuals, changed too far by refining, or not told apart from the radar.
 
-Score test of the given ones: how much of the residuals another focal length or radial distortion would explain.
+Score test of the given ones: how much of the residuals another focal length or radial distortion would explain, or angles of
+the radar that change with the range, as where floor or walls reflect it.
 
 To first order, a focal length longer by a share a moves a pixel by a d, with d its offset from the principal point; a
-radial distortion that is off by b moves it by b |d / f|^2 d, whatever the lens model. With whitened residuals e, whitened
+radial distortion that is off by b moves it by b |d / f|^2 d, whatever the lens model; an angle that changes by c per metre
+moves the pixel as an angle larger by c (r - mean r) does. With whitened residuals e, whitened
 Jacobians J of the pose and of the estimated errors, priors included, g of such an unknown, and M = I - J (J^T J)^-1 J^T,
 which removes what these can explain,
 
@@ -41,11 +43,11 @@ _LEAST_REDUNDANCY = 0.05  # share of the residual's degrees of freedom that must
 
 
 @dataclass(frozen=True, slots=True)
-class LensError:
-    """The estimated error of one of the intrinsics.
+class ScoreTest:
+    """The estimate of an error that is no unknown of the fit.
 
     Attributes:
-        amount: to be added to the given value; a share of the focal length, or a radial coefficient.
+        amount: to be added to the given value; a share of the focal length, a radial coefficient, or an angle's slope [rad/m].
         sigma: its standard deviation.
         chance: probability of an amount as large if the intrinsics were as right as their covariance says (p-value).
         allowed: standard deviation of the amount that this covariance alone would make; 0 if they have none.
@@ -58,7 +60,7 @@ class LensError:
 
 
 def intrinsics(fit: SolvedFit) -> list[DataWarning]:
-    """Warn of the focal length or the distortion, whichever explains more of the residuals.
+    """Warn of the focal length, the distortion or angles that change with the range, whichever explains most of the residuals.
 
     The given intrinsics are tested, not refined ones; who refines those that come without a covariance expects them wrong.
     """
@@ -66,9 +68,12 @@ def intrinsics(fit: SolvedFit) -> list[DataWarning]:
         return []
     if fit.options.refining.intrinsics and fit.measurements.camera.covariance is None:
         return []
-    focal, radial = lens_errors(fit)
-    if min(focal.chance, radial.chance) >= _LEVEL:
+    focal, radial, *angles = _score_tests(fit)
+    of_lens, of_angles = min(focal.chance, radial.chance), min(one.chance for one in angles)
+    if min(of_lens, of_angles) >= _LEVEL:
         return []
+    if of_angles < of_lens:
+        return [_by_range(*angles)]
     what = _focal_text(fit, focal) if focal.chance <= radial.chance else _radial_text(fit, radial)
     return [
         DataWarning(
@@ -80,7 +85,17 @@ def intrinsics(fit: SolvedFit) -> list[DataWarning]:
     ]
 
 
-def _focal_text(fit: SolvedFit, focal: LensError) -> str:
+def _by_range(azimuth: ScoreTest, elevation: ScoreTest) -> DataWarning:
+    name, found = min(("azimuths", azimuth), ("elevations", elevation), key=lambda one: one[1].chance)
+    slope, sigma = np.rad2deg((-found.amount, found.sigma))
+    return DataWarning(
+        "shared-error-suspected",
+        f"the radar's {name} change with the range, by {slope:+.2f} ± {sigma:.2f} deg per metre more than the reflector's",
+        "check what was clicked at near and at far placements, and whether the floor or a wall reflects the radar there",
+    )
+
+
+def _focal_text(fit: SolvedFit, focal: ScoreTest) -> str:
     return (
         f"residuals grow with the distance from the picture's centre: the given focal length seems "
         f"{100 * abs(focal.amount):.1f} ± {100 * focal.sigma:.1f} % too {'short' if focal.amount > 0 else 'long'}"
@@ -93,7 +108,7 @@ def _said(fit: SolvedFit, sigma: float, unit: str) -> str:
     return f"; its calibration said ± {sigma:.2g} {unit}" if fit.measurements.camera.covariance is not None else ""
 
 
-def _radial_text(fit: SolvedFit, radial: LensError) -> str:
+def _radial_text(fit: SolvedFit, radial: ScoreTest) -> str:
     offset_px, share = _offsets(fit)
     outermost = int(np.argmax(np.where(fit.inliers, share, 0.0)))
     reach_px = float(share[outermost] * np.linalg.norm(offset_px[outermost]))
@@ -104,8 +119,8 @@ def _radial_text(fit: SolvedFit, radial: LensError) -> str:
     )
 
 
-def lens_errors(fit: SolvedFit) -> tuple[LensError, LensError]:
-    """Estimate the errors of the given focal length and radial distortion, each as if the other were right."""
+def _score_tests(fit: SolvedFit) -> tuple[ScoreTest, ...]:
+    """Estimate the errors of focal length and radial distortion, and slopes of azimuth and elevation, each as if alone."""
     refined = fit.refined
     offset_px, share = _offsets(fit)
     root = np.sqrt(refined.weights)[:, None]
@@ -116,17 +131,19 @@ def lens_errors(fit: SolvedFit) -> tuple[LensError, LensError]:
     rows = np.concatenate([of_pose, kept[6:]])
     prior_residual, prior_jacobian = prior_residual[rows], prior_jacobian[rows][:, kept]
     moves_px = np.stack([offset_px, offset_px * share[:, None]], axis=2)
-    gains = ((refined.model.whitening @ moves_px) * root[:, :, None]).reshape(-1, 2)
+    from_mean_m = refined.polar[0] - refined.polar[0].mean()
+    by_range = from_mean_m[:, None, None] * refined.model.point_jacobian[:, :, 1:]
+    moves = np.concatenate([refined.model.whitening @ moves_px, by_range], axis=2)
+    gains = (moves * root[:, :, None]).reshape(-1, 4)
     unknowns = prior_jacobian.shape[1]
     fitted = np.concatenate([(jacobian * root[:, :, None]).reshape(-1, unknowns), prior_jacobian])
     residual = np.concatenate([(residual * root).reshape(-1), prior_residual])
     explained, _ = np.linalg.qr(fitted)
-    gains = np.concatenate([gains, np.zeros((len(prior_residual), 2))])
+    gains = np.concatenate([gains, np.zeros((len(prior_residual), 4))])
     gains = gains - explained @ (explained.T @ gains)
-    moves = np.zeros((len(gains), lens.shape[2]))
-    moves[: 2 * len(lens)] = (lens * root[:, :, None]).reshape(2 * len(lens), -1)
-    focal, radial = (_lens_error(gain, residual, moves, refined.degrees_of_freedom) for gain in gains.T)
-    return focal, radial
+    of_lens = np.zeros((len(gains), lens.shape[2]))
+    of_lens[: 2 * len(lens)] = (lens * root[:, :, None]).reshape(2 * len(lens), -1)
+    return tuple(_score_test(gain, residual, of_lens, refined.degrees_of_freedom) for gain in gains.T)
 
 
 def _not_of_lens(fit: SolvedFit) -> Flags:
@@ -164,11 +181,11 @@ def _offsets(fit: SolvedFit) -> tuple[np.ndarray, Values]:
     return offset_px, np.asarray(((offset_px / matrix_px[[0, 1], [0, 1]]) ** 2).sum(axis=1))
 
 
-def _lens_error(gain: Values, residual: Values, lens: np.ndarray, degrees_of_freedom: float) -> LensError:
+def _score_test(gain: Values, residual: Values, lens: np.ndarray, degrees_of_freedom: float) -> ScoreTest:
     """Evaluate equation (8); with the noise known, nu is infinite. What the lens may do (n, r) is added to the variance."""
     information = float(gain @ gain)
     if information <= 0.0:
-        return LensError(0.0, float("inf"), 1.0)
+        return ScoreTest(0.0, float("inf"), 1.0)
     amount = float(gain @ residual) / information
     squared, shrink = amount**2 * information, 1.0
     if degrees_of_freedom > 2.0:
@@ -176,7 +193,7 @@ def _lens_error(gain: Values, residual: Values, lens: np.ndarray, degrees_of_fre
         shrink = left / (degrees_of_freedom - 1.0)
     own, allowed = shrink / information, float((((gain @ lens) / information) ** 2).sum())
     tested = squared / shrink if not allowed else amount**2 / (own + allowed)
-    return LensError(amount, float(np.sqrt(own)), _chance(tested, degrees_of_freedom), float(np.sqrt(allowed)))
+    return ScoreTest(amount, float(np.sqrt(own)), _chance(tested, degrees_of_freedom), float(np.sqrt(allowed)))
 
 
 def _chance(squared: float, degrees_of_freedom: float) -> float:

@@ -137,6 +137,30 @@ def test_a_distortion_that_was_forgotten_is_suspected():
         assert "grow with" in text
 
 
+@pytest.mark.parametrize("options", [CalibrationOptions(), CalibrationOptions(solving=POSITION)])
+@pytest.mark.parametrize("angle", ["azimuths", "elevations"])
+@pytest.mark.parametrize("slope_deg", [-0.4, 0.4])
+def test_angles_that_change_with_the_range_are_reported_with_amount_and_sign(slope_deg, angle, options):
+    for seed in range(3):
+        simulated = simulate_pairs(30, rng=np.random.default_rng([9, seed]), noise="imaging")
+        axis = np.eye(3)[1 if angle == "azimuths" else 2]
+        pairs = []
+        for pair in simulated.pairs:
+            polar = polar_from_cartesian(pair.candidates[0].position_radar_m[None])[0]
+            bent_m = cartesian_from_polar((polar + axis * np.deg2rad(slope_deg * (polar[0] - 6.0)))[None])[0]
+            pairs.append(replace(pair, candidates=(replace(pair.candidates[0], position_radar_m=bent_m),)))
+        warnings = calibrate_pairs(pairs, simulated.camera, options).unwrap().warnings
+        (text,) = [
+            one.message for one in warnings if one.code == "shared-error-suspected" and "per metre" in one.message
+        ]
+        assert angle in text
+        amount, sigma = map(float, re.findall(r"([-+][\d.]+) ± ([\d.]+) deg", text)[0])
+        assert abs(amount - slope_deg) < 4.0 * sigma + 0.3 * abs(slope_deg)
+        assert not any(
+            "per metre" in one.message for one in calibrate_pairs(simulated.pairs, simulated.camera).unwrap().warnings
+        )
+
+
 @pytest.mark.parametrize("options", [FREE, MEASURED, CalibrationOptions(), CalibrationOptions(solving=POSITION)])
 @pytest.mark.parametrize("noise", ["ti", "imaging"])
 def test_right_intrinsics_are_not_suspected(noise, options):
