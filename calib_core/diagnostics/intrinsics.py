@@ -90,7 +90,7 @@ def _by_range(azimuth: ScoreTest, elevation: ScoreTest) -> DataWarning:
     slope, sigma = np.rad2deg((-found.amount, found.sigma))
     return DataWarning(
         "shared-error-suspected",
-        f"the radar's {name} change with the range, by {slope:+.2f} ± {sigma:.2f} deg per metre more than the reflector's",
+        f"the radar's {name} are off by an amount that changes with the range: {slope:+.2f} ± {sigma:.2f} deg per metre",
         "check what was clicked at near and at far placements, and whether the floor or a wall reflects the radar there",
     )
 
