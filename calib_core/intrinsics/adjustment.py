@@ -8,7 +8,6 @@ errors of corners in one view belong together.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 
 from calib_core.arrays import Values, frozen_array
 from calib_core.camera import Camera
@@ -307,10 +306,12 @@ class SharedCovariance:
             values: (n,) estimates of the free numbers from one on.
             first: the number of that one.
         """
+        from scipy.special import stdtr
+
         places = slice(first, first + len(values))
         freedom = self.freedom[places]
         sigma = np.sqrt(np.diag(self.matrix)[places]) / _grown(freedom)
-        return np.asarray(2.0 * stats.t.sf(np.abs(values) / np.maximum(sigma, 1e-300), freedom))
+        return np.asarray(2.0 * stdtr(freedom, -np.abs(values) / np.maximum(sigma, 1e-300)))
 
 
 def shared_covariance(at: Reduced) -> SharedCovariance:
@@ -354,7 +355,9 @@ def _at_least(middle: np.ndarray, least: float) -> np.ndarray:
 
 def _grown(freedom: Values) -> Values:
     """Return the ratio of Student's quantile of 95 % to the normal one."""
-    return np.asarray(stats.t.ppf(0.975, freedom) / _NORMAL_95)
+    from scipy.special import stdtrit
+
+    return np.asarray(stdtrit(freedom, 0.975) / _NORMAL_95)
 
 
 def _degrees_of_freedom(white: np.ndarray, shares: np.ndarray, freed: np.ndarray) -> Values:

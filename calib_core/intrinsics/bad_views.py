@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from calib_core.arrays import Flags, Values, frozen_array
 from calib_core.camera import Camera
@@ -270,4 +269,6 @@ def mirror_twins(stack: ViewStack, typical_px: float) -> tuple[tuple[int, int], 
 
 def _distances_px(points: Values, others: Values) -> Values:
     """Return the distance (n,) of each point (n, 2) to the nearest of the others (m, 2)."""
+    from scipy.spatial import cKDTree
+
     return np.asarray(cKDTree(others).query(points)[0])

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from calib_core.arrays import Points3, Values
 from calib_core.camera import Camera, CameraCovariance
@@ -352,10 +352,8 @@ def _about_numbers(camera: Camera, rms_px: float) -> Iterator[DataWarning]:
 def _covered_share(stack: ViewStack) -> float:
     """Return which share of the picture lies in the convex hull of all corners."""
     found = np.moveaxis(stack.pixels_px, 1, 2)[stack.weights > 0]
-    try:
-        return float(ConvexHull(found).volume / (stack.size_px[0] * stack.size_px[1]))
-    except QhullError:
-        return 0.0
+    hull = cv2.convexHull(found.astype(np.float32))
+    return float(cv2.contourArea(hull) / (stack.size_px[0] * stack.size_px[1]))
 
 
 def shape_warnings(test: ShapeTest, amounts: Values, sigmas: Values, *, modelled: bool) -> Iterator[DataWarning]:

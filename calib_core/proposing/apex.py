@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.special import ndtr
 
 from calib_core.arrays import Matrix22, Values, Vector2, Vector3, frozen_array
 
@@ -417,6 +416,8 @@ def _linearize(disc: _Disc, state: Values) -> _Linearized:
 
     A sector is the product of two blurred half-planes, which is exact away from the apex; the shares are scaled to sum to 1.
     """
+    from scipy.special import ndtr
+
     x, y, blur = disc.x - state[0], disc.y - state[1], state[5]
     cos, sin = np.cos(state[2:5, None]), np.sin(state[2:5, None])
     across, along = (cos * y - sin * x) / blur, cos * x + sin * y

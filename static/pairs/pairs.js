@@ -105,6 +105,7 @@ function drawRows(rows) {
   }
   /** @type {Element|null} */
   let next = body.firstElementChild;
+  const follower = (/** @type {Element} */ row) => (row.nextElementSibling === choices ? choices.nextElementSibling : row.nextElementSibling);
   for (const click of rows) {
     const before = made.get(keyOf(click));
     const from = [click, click.id === state.selected, state.placements, state.seconds];
@@ -116,7 +117,7 @@ function drawRows(rows) {
       made.set(keyOf(click), { from, row });
       changed = true;
     }
-    if (row === next) next = row.nextElementSibling;
+    if (row === next) next = follower(row);
     else {
       body.insertBefore(row, next);
       changed = true;
