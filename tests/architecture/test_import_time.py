@@ -59,5 +59,10 @@ def test_the_borders_of_the_core_import_nothing_heavy(package):
     assert heavy_modules_after(f"import {package}") == ""
 
 
+def test_a_page_opens_before_scipy_is_needed():
+    """Importing `scipy.stats` for the lens took a second of every start."""
+    assert "scipy" not in heavy_modules_after("import cocalib.opening").split()
+
+
 def test_a_heavy_import_would_be_seen():
     assert heavy_modules_after("import cv2") == "cv2"
