@@ -32,12 +32,12 @@ _OTHER_UNIT_SIGMAS = 4.0
 _AGREEING_SIGMAS = 3.0
 
 _UNIT_SLIPS = (
-    ("the measured position looks like centimetres", 0.01, 2.0),
-    ("the measured position looks like millimetres", 0.001, 2.0),
-    ("the measured position looks like feet", 0.3048, 0.0),
-    ("the radar's ranges look like feet", 1.0 / 0.3048, 0.0),
+    ("the measured position looks like centimetres", 0.01),
+    ("the measured position looks like millimetres", 0.001),
+    ("the measured position looks like feet", 0.3048),
+    ("the radar's ranges look like feet", 1.0 / 0.3048),
 )
-"""What would remove a contradiction, the factor on the measured position, and the smallest position [m] it is said of."""
+"""What would remove a contradiction, and the factor on the measured position."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -138,11 +138,13 @@ class _Centre:
 
 
 def _other_unit(centre: _Centre, prior: CameraPrior) -> str:
-    """Return in words which other unit would remove the contradiction; empty if none would."""
-    measured_m, sigma_m = prior.position_m, prior.sigma_m
-    size_m = float(np.linalg.norm(measured_m))
-    for text, factor, least_m in _UNIT_SLIPS:
-        clear = centre.sigmas_from(np.zeros(3), sigma_m) > _OTHER_UNIT_SIGMAS or least_m > 0.0
-        if clear and size_m > least_m and centre.sigmas_from(factor * measured_m, sigma_m) < _AGREEING_SIGMAS:
+    """Return in words which other unit would remove the contradiction; empty if none would.
+
+    Divided by a hundred, any position is at the radar: only a camera that the pairs place away from it tells a unit.
+    """
+    if centre.sigmas_from(np.zeros(3), prior.sigma_m) <= _OTHER_UNIT_SIGMAS:
+        return ""
+    for text, factor in _UNIT_SLIPS:
+        if centre.sigmas_from(factor * prior.position_m, prior.sigma_m) < _AGREEING_SIGMAS:
             return text
     return ""

@@ -69,7 +69,7 @@ def _camera_units(options: CalibrationOptions) -> list[DataWarning]:
     return [
         DataWarning(
             "units-suspected",
-            f"the measured camera position is {away_m:,.0f} m from the radar: it looks like centimetres or millimetres",
+            f"the measured camera position is {away_m:,.0f} m from the radar: is it in metres?",
             "the camera position must be in metres",
         )
     ]

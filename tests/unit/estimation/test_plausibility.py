@@ -96,6 +96,15 @@ def test_a_position_in_centimetres_is_blamed_rather_than_the_placements():
         assert "degenerate-placements" not in found
 
 
+def test_a_unit_is_named_only_if_the_pairs_place_the_camera_clearly_away_from_the_radar(simulated):
+    for seed in range(3):
+        near = simulate_pairs(20, rng=np.random.default_rng([93, seed]))
+        found = said(near, *arrays(near), position_m=near.rig.camera_position_radar_m + np.array([0.0, 11.0, 0.0]))
+        assert "looks like" not in found["camera-position-contradicted"]
+    found = said(simulated, *arrays(simulated), position_m=100.0 * simulated.rig.camera_position_radar_m)
+    assert "looks like centimetres" in found["camera-position-contradicted"]
+
+
 def changed(pair: Pair, **values: object) -> Pair:
     candidate: Candidate = replace(pair.candidates[0], **values)
     return replace(pair, candidates=(candidate,))
