@@ -13,7 +13,7 @@ from calib_core.association.placement_groups import PlacementGroup, placement_gr
 from calib_core.camera import Camera
 from calib_core.diagnostics.angle_map import learn_angle_map
 from calib_core.diagnostics.checks import flat_radar, warnings_of
-from calib_core.diagnostics.clocks import CLOCK_CODES, clocks
+from calib_core.diagnostics.clocks import CLOCK_CODES, clocks, clocks_apart
 from calib_core.diagnostics.next_placement import next_placement
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.diagnostics.uncertainty_map import picture_sigma_px
@@ -351,9 +351,11 @@ def _answer(task: _Task, groups: Sequence[PlacementGroup], measurements: PairMea
         beyond=beyond,
     )
     angle_map = learn_angle_map(calibration)
+    pose, agreeing = calibration.camera_from_radar, int(solved_fit.inliers.sum())
+    apart = clocks_apart(used, task.camera, options, pose=pose, agreeing=agreeing)
     return replace(
         calibration,
-        warnings=warnings_of(solved_fit),
+        warnings=(*apart, *warnings_of(solved_fit)),
         angle_map=angle_map if angle_map is not None and angle_map.pays else None,
         next_placement=next_placement(calibration),
     )
@@ -425,6 +427,7 @@ def _explained(
     """Say where the input is implausible, which may be the cause."""
     ids, points = [pair.id for pair in used], cartesian_from_polar(measurements.polar)
     suspected = implausible_input(ids, points, measurements.pixels_px, measurements.camera, options)
+    suspected = (*suspected, *clocks_apart(used, measurements.camera, options))
     hints = [f"{warning.message}; {warning.hint}" for warning in suspected]
     return replace(outcome, hint="; ".join([*hints, outcome.hint]))
 

@@ -5,18 +5,26 @@ inside its dwell does no harm, and the pairs do not show it. What shows is a cli
 that moment, but only later or only earlier. One such click may be a mistimed one; several, all to the same side, mean a
 clock offset, or a clicking habit with the same effect. With [a_i, b_i] the dwell around click i by the radar's stamps,
 relative to the click, an offset s of the radar's stamps satisfies a_i <= s <= b_i.
+
+Clocks that differ by a dwell or more give each click the return of another placement. Where placements follow a pattern, such
+as the rows of a grid, that is a shift which most pairs agree on; only the ends of the rows do not. So where pairs disagree, the
+clicks are also tried with the returns of the placements after and before their own.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calib_core.arrays import Points3, TimesNs, Values
 from calib_core.association.clustering import CLUSTER_SCALE
 from calib_core.association.gating import static_returns
-from calib_core.measurements import NS_PER_S, RadarScans
-from calib_core.options import GatingOptions
+from calib_core.camera import Camera
+from calib_core.estimation.best_fit import quick_fit
+from calib_core.estimation.measurement_model import pair_measurements
+from calib_core.geometry import RigidTransform
+from calib_core.measurements import NS_PER_S, Pair, RadarScans
+from calib_core.options import CalibrationOptions, GatingOptions
 from calib_core.radar import direction_cosines
 from calib_core.results import Calibration, DataWarning, PairResult
 
@@ -32,6 +40,14 @@ _SHORTEST_DWELL_S = 0.5
 _REACH = 1.5  # steps of CLUSTER_SCALE from the candidate to a return of the same reflector
 _STEP_S = 0.05
 _AROUND_S = 4.0  # as far as the scans around a click reach by default
+_STEPS_TRIED = (1, -1, 2, -2, 3, -3)
+_LEAST_AGREEING = 8
+_AGREEING_SHARE = 0.7
+_MORE_AGREEING = 2
+_LARGEST_NOISE = 2.5  # times the assumed one; pairs that agree by chance reach 5
+_SHIFT_ROUNDS = 8
+_LEAST_ANGLE_RAD = np.deg2rad(0.1)
+_NEAR_RAD = np.deg2rad(4.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +98,78 @@ def clocks(calibration: Calibration, scans: RadarScans) -> list[DataWarning]:
             "middle of each dwell",
         )
     ]
+
+
+def clocks_apart(
+    pairs: Sequence[Pair],
+    camera: Camera,
+    options: CalibrationOptions,
+    *,
+    pose: RigidTransform | None = None,
+    agreeing: int = 0,
+) -> list[DataWarning]:
+    """Warn if more clicks agree with the returns of the placements after or before their own: the clocks differ by placements.
+
+    Args:
+        pairs: one for each placement, in order of time.
+        camera: the intrinsics.
+        options: of the solver.
+        pose: the answer, camera_from_radar; None without one.
+        agreeing: how many pairs agree with it.
+    """
+    times = [pair.image_time for pair in pairs if pair.image_time is not None]
+    if len(times) < len(pairs):
+        return []
+    for step in _STEPS_TRIED:
+        count = len(pairs) - abs(step)
+        if count < max(_LEAST_AGREEING, agreeing + 1):
+            continue
+        clicks, seen = pairs[max(0, -step) :][:count], pairs[max(0, step) :][:count]
+        moved = [replace(click, candidates=other.candidates) for click, other in zip(clicks, seen, strict=True)]
+        if (
+            pose is not None
+            and agreeing > _AGREEING_SHARE * len(pairs)
+            and _most_once_shifted(moved, camera, pose) <= agreeing
+        ):
+            continue
+        fit = quick_fit(pair_measurements(moved, camera, options), options, None)
+        found = 0 if fit is None or fit.noise_scale.max() > _LARGEST_NOISE else int(fit.inliers.sum())
+        more = 1 if found == count else _MORE_AGREEING
+        if found < max(_LEAST_AGREEING, agreeing + more, _AGREEING_SHARE * count):
+            continue
+        apart_s = float(np.median(np.subtract(times[abs(step) :], times[: -abs(step)]))) / NS_PER_S
+        which = "after" if step > 0 else "before"
+        place = f"the placement {which} its own" if abs(step) == 1 else f"{abs(step)} placements {which} its own"
+        return [
+            DataWarning(
+                "clocks-apart",
+                f"{found} of {count} clicks agree with what the radar saw at {place}, {agreeing} of {len(pairs)} with their own: "
+                f"the radar's stamps seem to be about {apart_s:.0f} s {'ahead of' if step > 0 else 'behind'} the camera's",
+                "compare both clocks (cocalib info); if one computer recorded both sensors, use the times of receipt; else "
+                "correct the stamps of one recording",
+            )
+        ]
+    return []
+
+
+def _most_once_shifted(pairs: Sequence[Pair], camera: Camera, pose: RigidTransform) -> int:
+    """Return about how many pairs can agree if the pose is shifted and not turned, which is what a grid's step does to it."""
+    rays = camera.rays(np.array([pair.pixel_px for pair in pairs]))
+    known = np.isfinite(rays).all(axis=1)  # the lens model has none outside its picture
+    turned_m = np.array([pair.candidates[0].position_radar_m for pair in pairs])[known] @ pose.rotation.T
+    rays = rays[known]
+    across = np.eye(3) - rays[:, :, None] * rays[:, None, :]
+    weights = 1.0 / np.linalg.norm(turned_m, axis=1)
+    for _ in range(_SHIFT_ROUNDS):  # the shift with the least sum of angles
+        squared = across * (weights**2)[:, None, None]
+        shift_m = -np.linalg.lstsq(squared.sum(axis=0), (squared @ turned_m[:, :, None]).sum(axis=0), rcond=None)[0][
+            :, 0
+        ]
+        placed_m = turned_m + shift_m
+        range_m = np.linalg.norm(placed_m, axis=1)
+        angles = np.linalg.norm((across @ placed_m[:, :, None])[:, :, 0], axis=1) / range_m
+        weights = 1.0 / (range_m * np.sqrt(angles + _LEAST_ANGLE_RAD))
+    return int((angles < _NEAR_RAD).sum())
 
 
 def clock_offset(pairs: Sequence[PairResult], scans: RadarScans, gating: GatingOptions) -> ClockOffset | None:

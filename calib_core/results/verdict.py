@@ -343,6 +343,7 @@ not hold; it rests on an assumption, so it cannot be called good; nothing."""
 
 _CODES: dict[Consequence, tuple[str, ...]] = {
     "contradictory": (
+        "clocks-apart",
         "behind-camera",
         "outside-picture",  # in files of earlier versions only
         "mirrored-axes",

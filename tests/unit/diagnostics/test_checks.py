@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import calib_core.calibration
+from calib_core.association.clustering import candidate_at
 from calib_core.calibration import calibrate, calibrate_pairs
 from calib_core.camera import Camera
 from calib_core.diagnostics.clocks import clock_offset
@@ -23,8 +24,10 @@ from calib_core.options import (
     without_systematic_errors,
 )
 from calib_core.results import Calibration, DataWarning, PairResult
+from calib_core.results.verdict import verdict_on
 from calib_core.synthetic import FIELD, RigOptions, SimulatedPairs, simulate_pairs
-from calib_core.synthetic.simulated_pairs import NoiseName
+from calib_core.synthetic.rig import random_rig
+from calib_core.synthetic.simulated_pairs import NOISE_PROFILES, NoiseName, study_camera
 from tests.rooftop import ClickedSample, read_rooftop
 from tests.scans import scan_of
 
@@ -398,3 +401,64 @@ def test_without_scans_or_stamps_there_is_no_warning():
     pairs, scans = placed([-2.9, -3.0, -2.8])
     assert clock_offset(pairs, RadarScans(), GatingOptions()) is None
     assert clock_offset([replace(pair, image_time=None) for pair in pairs], scans, GatingOptions()) is None
+
+
+# Clocks that differ by whole placements.
+
+
+def apart_codes(outcome: Calibration) -> list[str]:
+    return [one.message for one in outcome.warnings if one.code == "clocks-apart"]
+
+
+@pytest.mark.parametrize(("ahead_s", "words"), [(9.5, "s ahead of the camera's"), (-9.5, "s behind the camera's")])
+def test_stamps_that_are_a_placement_off_are_named(rooftop, ahead_s, words):
+    clicks, scans, camera = rooftop
+    moved_scans = replace(scans, times_ns=scans.times_ns + round(ahead_s * NS_PER_S))
+    outcome = calibrate(clicks, moved_scans, camera)
+    assert words in (outcome.hint if isinstance(outcome, Unsolvable) else outcome.warnings[0].message)
+
+
+ROWS, PER_ROW = 4, 6
+
+
+def walked_grid(later: int, *, timed: bool = True, wrong: Sequence[int] = ()) -> tuple[list[Pair], Camera]:
+    """Walk a grid row by row, each in the same direction; each click is given the return of a placement that much later."""
+    rng = np.random.default_rng(3)
+    rig = random_rig(rng, camera=study_camera())
+    places = [(4.0 + 2.0 * row, column - 2.5, 0.025) for row in range(ROWS) for column in range(PER_ROW)]
+    points_m = rig.radar_from_world @ np.array(places)
+    pixels_px = rig.camera.project(rig.camera_from_radar @ points_m) + rng.standard_normal((len(places), 2))
+    pixels_px[list(wrong)] += 90.0
+    seen = np.clip(np.arange(len(places)) + later, 0, len(places) - 1)
+    noise = NOISE_PROFILES["imaging"]
+    reported_m = points_m + 0.01 * rng.standard_normal(points_m.shape)
+    pairs = [
+        Pair(
+            f"c{i:02}",
+            pixels_px[i],
+            (candidate_at(reported_m[seen[i]], noise),),
+            image_time=TimeNs((100 + 9 * i) * NS_PER_S) if timed else None,
+        )
+        for i in range(len(places))
+    ]
+    return pairs, rig.camera
+
+
+@pytest.mark.parametrize(("later", "words"), [(1, "behind the camera's"), (-1, "ahead of the camera's")])
+def test_a_grid_walked_row_by_row_does_not_hide_clocks_that_are_a_placement_off(later, words):
+    """Most pairs agree on a pose that is off by a whole step; only the ends of the rows do not."""
+    outcome = calibrate_pairs(*walked_grid(later)).unwrap()
+    assert sum(pair.inlier for pair in outcome.pairs) >= (ROWS - 1) * PER_ROW
+    (text,) = apart_codes(outcome)
+    assert "23 of 23 clicks agree" in text
+    assert f"about 9 s {words}" in text
+    assert verdict_on(outcome).level == "contradictory"
+
+
+@pytest.mark.parametrize("wrong", [(), (5, 11), (2, 5, 9, 17, 20)])
+def test_a_grid_with_wrong_clicks_is_not_a_matter_of_the_clocks(wrong):
+    assert apart_codes(calibrate_pairs(*walked_grid(0, wrong=wrong)).unwrap()) == []
+
+
+def test_pairs_without_times_say_nothing_of_clocks():
+    assert apart_codes(calibrate_pairs(*walked_grid(1, timed=False)).unwrap()) == []
