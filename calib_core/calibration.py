@@ -340,6 +340,7 @@ def _answer(task: _Task, groups: Sequence[PlacementGroup], measurements: PairMea
     metrics = calibration.metrics
     solved_fit = SolvedFit(
         ids=tuple(pair.id for pair in used),
+        times=tuple(pair.image_time for pair in used),
         measurements=measurements,
         refined=solution.refined,
         uncertainty=solution.uncertainty,

@@ -1,7 +1,7 @@
 """Warnings about the intrinsics: contradicted by the residuals, changed too far by refining, or not told apart from the radar.
 
 Score test of the given ones: how much of the residuals another focal length or radial distortion would explain, or angles of
-the radar that change with the range, as where floor or walls reflect it.
+the radar that change with the range, as where floor or walls reflect it, or a turn of a sensor on the way (`_turn_test`).
 
 To first order, a focal length longer by a share a moves a pixel by a d, with d its offset from the principal point; a
 radial distortion that is off by b moves it by b |d / f|^2 d, whatever the lens model; an angle that changes by c per metre
@@ -32,6 +32,7 @@ import numpy as np
 
 from calib_core.arrays import Flags, Values
 from calib_core.diagnostics.solved_fit import SolvedFit
+from calib_core.estimation.covariance import smooth_rows, weighted_rows
 from calib_core.estimation.measurement_model import prior_rows
 from calib_core.results import DataWarning
 from calib_core.results.systematic_errors import LensPrior, error_words, is_beyond_its_prior, knowledge_text
@@ -40,6 +41,9 @@ _LEVEL = 0.0025  # false-alarm probability of each unknown
 _LEAST_PAIRS = 10
 _LEAST_SQUARED = 8.0  # a smaller statistic is never significant, whatever the degrees of freedom
 _LEAST_REDUNDANCY = 0.05  # share of the residual's degrees of freedom that must stay unexplained
+_TURN_LEVEL = 0.015  # of all splits together, which share most pairs: alarms are five times rarer
+_MOST_SPLITS, _LEAST_PLACEMENTS = 15, 4  # tried; on each side
+_SMOOTH_RAD, _SMOOTH_VARIANCE = np.deg2rad(14.0), 4.0  # of errors that neighbouring placements share; over the noise's
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +63,18 @@ class ScoreTest:
     allowed: float = 0.0
 
 
+@dataclass(frozen=True, slots=True)
+class TurnTest:
+    """A turn of camera or radar between two placements: its angle [rad], the pairs before and after, and its p-value."""
+
+    angle_rad: float = 0.0
+    before: int = 0
+    after: int = 0
+    chance: float = 1.0
+
+
 def intrinsics(fit: SolvedFit) -> list[DataWarning]:
-    """Warn of the focal length, the distortion or angles that change with the range, whichever explains most of the residuals.
+    """Warn of focal length, distortion, angles that change with the range, or a turn, whichever explains most of the residuals.
 
     The given intrinsics are tested, not refined ones; who refines those that come without a covariance expects them wrong.
     """
@@ -70,6 +84,9 @@ def intrinsics(fit: SolvedFit) -> list[DataWarning]:
         return []
     focal, radial, *angles = _score_tests(fit)
     of_lens, of_angles = min(focal.chance, radial.chance), min(one.chance for one in angles)
+    turn = _turn_test(fit)
+    if turn.chance < min(_TURN_LEVEL, of_lens, of_angles):
+        return [_turned(fit, turn)]
     if min(of_lens, of_angles) >= _LEVEL:
         return []
     if of_angles < of_lens:
@@ -92,6 +109,16 @@ def _by_range(azimuth: ScoreTest, elevation: ScoreTest) -> DataWarning:
         "shared-error-suspected",
         f"the radar's {name} are off by an amount that changes with the range: {slope:+.2f} ± {sigma:.2f} deg per metre",
         "check what was clicked at near and at far placements, and whether the floor or a wall reflects the radar there",
+    )
+
+
+def _turned(fit: SolvedFit, turn: TurnTest) -> DataWarning:
+    before, after = fit.ids[turn.before], fit.ids[turn.after]
+    return DataWarning(
+        "shared-error-suspected",
+        f"the camera or the radar seems to have turned by about {np.rad2deg(turn.angle_rad):.1f} deg near {before} and {after}: "
+        "the placements up to there agree on another pose than the later ones",
+        f"solve the placements up to {before} and from {after} on apart, and check both mounts",
     )
 
 
@@ -196,13 +223,49 @@ def _score_test(gain: Values, residual: Values, lens: np.ndarray, degrees_of_fre
     return ScoreTest(amount, float(np.sqrt(own)), _chance(tested, degrees_of_freedom), float(np.sqrt(allowed)))
 
 
-def _chance(squared: float, degrees_of_freedom: float) -> float:
+def _chance(squared: float, degrees_of_freedom: float, count: float = 1.0) -> float:
     if squared < _LEAST_SQUARED:
         return 1.0
     from scipy.special import chdtrc, fdtrc
 
     nu = degrees_of_freedom
-    return float(fdtrc(1.0, nu - 1.0, squared) if nu > 2.0 else chdtrc(1.0, squared))
+    return float(fdtrc(count, nu - count, squared / count) if nu > count + 1.0 else chdtrc(count, squared))
+
+
+def _turn_test(fit: SolvedFit) -> TurnTest:
+    """Estimate a turn by equation (8) with three unknowns, after each of some placements in time, and return the likeliest.
+
+    Where the placements walk across the view, an error of the angles that changes with direction looks like a turn. So the
+    score's variance grows by what smooth errors (`covariance`), twice the noise, add to it over independent ones.
+    """
+    refined, inliers = fit.refined, np.flatnonzero(fit.inliers)
+    times = [fit.times[i] or 0 for i in inliers]
+    residual, jacobian = weighted_rows(refined, inliers)
+    priors, prior_jacobian = prior_rows(refined.measurements, refined.camera_from_radar)
+    residual = np.concatenate([residual, priors])
+    explained, _ = np.linalg.qr(np.concatenate([jacobian, prior_jacobian]))
+    smooth = smooth_rows(refined, inliers, _SMOOTH_RAD).reshape(len(inliers), 2, -1)
+    nu, found = refined.degrees_of_freedom, TurnTest()
+    tried = np.linspace(_LEAST_PLACEMENTS, len(inliers) - _LEAST_PLACEMENTS, _MOST_SPLITS).round().astype(np.int64)
+    splits = [k for k in np.unique(tried).tolist() if 0 < times[k - 1] < times[k]]
+    for k in splits:
+        gain = np.zeros((len(residual), 3))
+        gain[2 * k : len(jacobian)] = jacobian[2 * k :, 3:6]
+        gain = gain - explained @ (explained.T @ gain)
+        information = gain.T @ gain
+        white = np.linalg.inv(np.linalg.cholesky(information + 1e-9 * np.trace(information) * np.eye(3)))
+        score = white @ (gain.T @ residual)
+        each = np.einsum("nrk,nrs->nks", smooth, (gain[: len(jacobian)] @ white.T).reshape(-1, 2, 3))
+        shared = each.sum(axis=0)
+        added, axes = np.linalg.eigh(shared.T @ shared - np.einsum("nks,nkt->st", each, each))
+        left = max(nu - float(score @ score), _LEAST_REDUNDANCY * nu)
+        shrink = left / (nu - 3.0) if nu > 4.0 else 1.0
+        tested = float(((score @ axes) ** 2 / (shrink + _SMOOTH_VARIANCE * np.maximum(added, 0.0))).sum())
+        chance = len(splits) * _chance(tested, nu, 3.0)
+        if chance < found.chance:
+            angle_rad = float(np.linalg.norm(white.T @ score))
+            found = TurnTest(angle_rad, int(inliers[k - 1]), int(inliers[k]), chance)
+    return found
 
 
 _SCALES = ("azimuth_scale", "elevation_scale")

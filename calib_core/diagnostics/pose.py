@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from calib_core.arrays import Values
+from calib_core.arrays import Indices, Values
 from calib_core.diagnostics.pairs import listed
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.estimation.errors_in_variables import fit_errors_in_variables
@@ -168,11 +168,21 @@ def agreeing_outliers(fit: SolvedFit) -> list[DataWarning]:
     return [
         DataWarning(
             "agreeing-outliers",
-            f"{len(names)} pairs are off in the same way and were set aside: {listed(names)}",
+            f"{len(names)} pairs are off in the same way and were set aside: {listed(names)}{_turned(fit, found.pairs)}",
             f"look at the returns of {names[0]}: a cart beside the reflector, a second reflector, or elevations that jump "
             "give such a group",
         )
     ]
+
+
+def _turned(fit: SolvedFit, pairs: Indices) -> str:
+    """Say that pairs are the first or the last in time, as after a turn of camera or radar; "" if others lie between."""
+    times = np.array([time or 0 for time in fit.times])
+    aside, used = times[pairs], times[fit.inliers]
+    if 0 < aside.max() < used.min() or 0 < used.max() < aside.min():
+        when = "first" if aside.max() < used.min() else "last"
+        return f"; they are the {when} in time, so the camera or the radar seems to have turned: solve them apart"
+    return ""
 
 
 def _away(error: Values) -> str:

@@ -9,6 +9,7 @@ from calib_core.estimation.covariance import PoseCovariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.leave_one_out import LeaveOneOut
 from calib_core.estimation.measurement_model import PairMeasurements
+from calib_core.measurements import TimeNs
 from calib_core.options import CalibrationOptions
 
 
@@ -18,6 +19,7 @@ class SolvedFit:
 
     Attributes:
         ids: of the used pairs, in the order of the measurements.
+        times: of their frames, ascending; None for pairs from a pairs file.
         measurements: with the assumed noise.
         refined: the fit.
         uncertainty: of its pose.
@@ -30,6 +32,7 @@ class SolvedFit:
     """
 
     ids: tuple[str, ...]
+    times: tuple[TimeNs | None, ...]
     measurements: PairMeasurements
     refined: ErrorsInVariablesFit
     uncertainty: PoseCovariance

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib_core.arrays import Matrix66, Points2, Values
+from calib_core.arrays import Indices, Matrix66, Points2, Values
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.gnc import normal_equations
 from calib_core.estimation.measurement_model import prior_rows
@@ -351,15 +351,14 @@ def pose_spread(refined: ErrorsInVariablesFit, information: np.ndarray) -> np.nd
     if refined.weights.sum() < _LEAST_PAIRS or refined.degrees_of_freedom <= 0:
         return None
     inliers = np.flatnonzero(refined.weights > 0.5)  # an outlier's down-weighted residual would look like a perfect one
-    residual, jacobian = _weighted_rows(refined, inliers)
+    residual, jacobian = weighted_rows(refined, inliers)
     prior = prior_rows(refined.measurements, refined.camera_from_radar)
     levels = [(independent, smooth) for independent in _INDEPENDENT for smooth in _SMOOTH]
     nothing = np.zeros((len(residual), 0))
     likelihoods = [_log_likelihoods(residual, jacobian, prior, nothing, [(1.0, 0.0)]) + _INDEPENDENT_LOG_ODDS]
     middles = [(jacobian.T @ jacobian)[None]]
-    directions = _directions(refined, inliers)
     for length_rad in _LENGTHS_RAD:
-        shape = _shape(refined, inliers, directions, length_rad)
+        shape = smooth_rows(refined, inliers, length_rad)
         shared = shape.T @ jacobian
         likelihoods.append(_log_likelihoods(residual, jacobian, prior, shape, levels))
         parts = np.array(levels)[:, :, None, None]
@@ -373,14 +372,16 @@ def pose_spread(refined: ErrorsInVariablesFit, information: np.ndarray) -> np.nd
     return np.asarray(inverse @ middle @ inverse)
 
 
-def _weighted_rows(refined: ErrorsInVariablesFit, inliers: np.ndarray) -> tuple[Values, np.ndarray]:
+def weighted_rows(refined: ErrorsInVariablesFit, inliers: Indices) -> tuple[Values, np.ndarray]:
+    """Return residuals (2 n,) and Jacobian (2 n, 6 + k) of n inliers, whitened and weighted."""
     root = np.sqrt(refined.weights[inliers])[:, None]
     jacobian = refined.model.jacobian[inliers] * root[:, :, None]
     return (refined.model.residual[inliers] * root).reshape(-1), jacobian.reshape(2 * len(inliers), -1)
 
 
-def _shape(refined: ErrorsInVariablesFit, inliers: np.ndarray, directions: Points2, length_rad: float) -> np.ndarray:
+def smooth_rows(refined: ErrorsInVariablesFit, inliers: Indices, length_rad: float) -> np.ndarray:
     """Return B (2 n, 2 k) of the inliers, with the kernel's square root taken on at most _MOST_CENTRES directions (Nystrom)."""
+    directions = _directions(refined, inliers)
     chosen = np.linspace(0, len(inliers) - 1, min(len(inliers), _MOST_CENTRES)).round().astype(np.int64)
     centres = directions[chosen]
     values, vectors = np.linalg.eigh(_kernel(centres, centres, length_rad))
@@ -394,7 +395,7 @@ def _shape(refined: ErrorsInVariablesFit, inliers: np.ndarray, directions: Point
     return np.concatenate(parts, axis=1)
 
 
-def _directions(refined: ErrorsInVariablesFit, inliers: np.ndarray) -> Points2:
+def _directions(refined: ErrorsInVariablesFit, inliers: Indices) -> Points2:
     """Return azimuth and elevation (n, 2) of each inlier from its click: the measured angles contain the errors in question."""
     rays = refined.measurements.rays[inliers] @ refined.camera_from_radar.rotation
     directions = polar_from_cartesian(rays)[:, 1:]

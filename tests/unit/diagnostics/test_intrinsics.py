@@ -8,10 +8,12 @@ import pytest
 
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
+from calib_core.geometry import RigidTransform, rotation_exp
+from calib_core.measurements import NS_PER_S, Pair, TimeNs
 from calib_core.options import CalibrationOptions, CameraPositionPrior, RadarOptions, SolvingOptions
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.results import DataWarning
-from calib_core.synthetic import RigOptions, simulate_pairs
+from calib_core.synthetic import RigOptions, SimulatedPairs, simulate_pairs
 
 EXACT_RADAR = RadarOptions(
     azimuth_scale_sigma=0.0, elevation_scale_sigma=0.0, range_bias_sigma_m=0.0, range_scale_sigma=0.0
@@ -94,3 +96,43 @@ def test_a_focal_length_that_the_radars_scale_explains_is_not_blamed_on_the_lens
 
 def test_a_few_pairs_are_not_tested():
     assert suspected(0, "imaging", MEASURED, focal=1.03, count=8) is None
+
+
+def turned(simulated: SimulatedPairs, *, first: int, turn_deg: float = 3.0, timed: bool = True) -> list[Pair]:
+    """Turn the camera upwards before pair `first`."""
+    turn = RigidTransform(rotation_exp(np.deg2rad([turn_deg, 0.0, 0.0])), np.zeros(3))
+    points = simulated.camera_from_radar @ simulated.points_radar_m
+    moves_px = simulated.camera.project(turn @ points) - simulated.camera.project(points)
+    return [
+        replace(
+            pair,
+            pixel_px=pair.pixel_px + (moves_px[i] if i >= first else 0.0),
+            image_time=TimeNs((i + 1) * 20 * NS_PER_S) if timed else None,
+        )
+        for i, pair in enumerate(simulated.pairs)
+    ]
+
+
+def said_of_a_turn(pairs: list[Pair], simulated: SimulatedPairs, code: str = "shared-error-suspected") -> list[str]:
+    warnings = calibrate_pairs(pairs, simulated.camera).unwrap().warnings
+    return [one.message for one in warnings if one.code == code and "to have turned" in one.message]
+
+
+def test_a_turn_between_two_placements_is_reported_with_its_angle_and_its_place():
+    for seed in range(3):
+        simulated = simulate_pairs(30, rng=np.random.default_rng([10, seed]), noise="imaging")
+        (text,) = said_of_a_turn(turned(simulated, first=15, turn_deg=1.5), simulated)
+        angle, before, after = map(float, re.findall(r"about ([\d.]+) deg near p(\d+) and p(\d+)", text)[0])
+        assert angle == pytest.approx(1.5, abs=0.6)
+        assert abs(before - 15) <= 3
+        assert after == before + 1
+        assert said_of_a_turn(turned(simulated, first=15, turn_deg=0.0), simulated) == []
+        assert said_of_a_turn(turned(simulated, first=15, turn_deg=1.5, timed=False), simulated) == []
+        assert said_of_a_turn(turned(simulated, first=28, turn_deg=1.5), simulated) == []
+
+
+def test_pairs_that_were_set_aside_after_a_turn_are_said_to_be_the_last():
+    simulated = simulate_pairs(30, rng=np.random.default_rng([11, 0]), noise="imaging")
+    (text,) = said_of_a_turn(turned(simulated, first=25), simulated, "agreeing-outliers")
+    assert "they are the last in time" in text
+    assert said_of_a_turn(turned(simulated, first=25, timed=False), simulated, "agreeing-outliers") == []
