@@ -120,17 +120,14 @@ def clocks_apart(
     times = [pair.image_time for pair in pairs if pair.image_time is not None]
     if len(times) < len(pairs):
         return []
+    near = pose if agreeing > _AGREEING_SHARE * len(pairs) else None
     for step in _STEPS_TRIED:
         count = len(pairs) - abs(step)
         if count < max(_LEAST_AGREEING, agreeing + 1):
             continue
         clicks, seen = pairs[max(0, -step) :][:count], pairs[max(0, step) :][:count]
         moved = [replace(click, candidates=other.candidates) for click, other in zip(clicks, seen, strict=True)]
-        if (
-            pose is not None
-            and agreeing > _AGREEING_SHARE * len(pairs)
-            and _most_once_shifted(moved, camera, pose) <= agreeing
-        ):
+        if near is not None and _most_once_shifted(moved, camera, near) <= agreeing:
             continue
         fit = quick_fit(pair_measurements(moved, camera, options), options, None)
         found = 0 if fit is None or fit.noise_scale.max() > _LARGEST_NOISE else int(fit.inliers.sum())
@@ -138,13 +135,13 @@ def clocks_apart(
         if found < max(_LEAST_AGREEING, agreeing + more, _AGREEING_SHARE * count):
             continue
         apart_s = float(np.median(np.subtract(times[abs(step) :], times[: -abs(step)]))) / NS_PER_S
-        which = "after" if step > 0 else "before"
-        place = f"the placement {which} its own" if abs(step) == 1 else f"{abs(step)} placements {which} its own"
+        away = "one placement" if abs(step) == 1 else f"{abs(step)} placements"
+        later, ahead = ("later", "ahead of") if step > 0 else ("earlier", "behind")
         return [
             DataWarning(
                 "clocks-apart",
-                f"{found} of {count} clicks agree with what the radar saw at {place}, {agreeing} of {len(pairs)} with their own: "
-                f"the radar's stamps seem to be about {apart_s:.0f} s {'ahead of' if step > 0 else 'behind'} the camera's",
+                f"{found} of {count} clicks agree with what the radar saw {away} {later}, {agreeing} of {len(pairs)} with what "
+                f"it saw at their time: its stamps seem to be about {apart_s:.0f} s {ahead} the camera's",
                 "compare both clocks (cocalib info); if one computer recorded both sensors, use the times of receipt; else "
                 "correct the stamps of one recording",
             )
