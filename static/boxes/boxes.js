@@ -72,7 +72,7 @@ export function handleAt([left, top, right, bottom], [across, along]) {
 /** Draw the returns of moving targets: filled triangles are in their box, hollow ones are not, crosses belong to no box. @param {CanvasRenderingContext2D} pen */
 export function drawBoxedReturns(pen) {
   const returns = boxing.frame?.index === state.shown?.index ? (boxing.frame?.returns ?? []) : [];
-  const size = 5 * viewport.ratio;
+  const size = 5 * viewport.unit;
   for (const [u, v, box, isInside] of returns) {
     const [x, y] = toDevice(u, v);
     const colour = box ? colourOf(box) : ink.grey;
@@ -86,14 +86,14 @@ export function drawBoxedReturns(pen) {
       pen.moveTo(x - 0.7 * size, y - side * 0.7 * size);
       pen.lineTo(x + 0.7 * size, y + side * 0.7 * size);
     }
-    pen.lineWidth = 4 * viewport.ratio;
+    pen.lineWidth = 4 * viewport.unit;
     pen.strokeStyle = ink.edge;
     pen.stroke();
     if (isInside) {
       pen.fillStyle = colour;
       pen.fill();
     }
-    pen.lineWidth = 1.6 * viewport.ratio;
+    pen.lineWidth = 1.6 * viewport.unit;
     pen.strokeStyle = isInside ? "#ffffff" : colour;
     pen.stroke();
   }

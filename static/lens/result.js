@@ -173,12 +173,12 @@ export function drawLensMarks(pen) {
   const lens = state.lens;
   if (lens?.coverage && lens.stage === "searching") veilEmpty(pen, lens.coverage, toDevice, viewport.imageWidth, viewport.imageHeight);
   if (shown.frame !== state.shown?.index) return;
-  const radius = 3.4 * viewport.ratio;
+  const radius = 3.4 * viewport.unit;
   for (const [u, v, du, dv, used] of shown.corners) {
     const [x, y] = toDevice(u, v);
     for (const [colour, width] of /** @type {[string, number][]} */ ([[ink.edge, 3], [used ? rampColour(Math.hypot(du, dv) / LARGE_PX) : ink.grey, 1.5]])) {
       pen.strokeStyle = colour;
-      pen.lineWidth = width * viewport.ratio;
+      pen.lineWidth = width * viewport.unit;
       pen.beginPath();
       pen.arc(x, y, radius, 0, 2 * Math.PI);
       if (!used) pen.moveTo(x - radius, y - radius), pen.lineTo(x + radius, y + radius);

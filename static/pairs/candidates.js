@@ -4,7 +4,7 @@
  */
 
 import { toCss, toDevice, viewport } from "../picture/geometry.js";
-import { ink, smallFont, smallPx } from "../shell/colours.js";
+import { growth, ink, smallFont } from "../shell/colours.js";
 import { toast } from "../shell/notices.js";
 import { send } from "../shell/socket.js";
 import { emit, on, selectedClick, stampOf, state } from "../shell/state.js";
@@ -44,14 +44,15 @@ function drawn() {
 /** Where the number of a candidate stands [CSS px]. @param {Candidate} row @returns {[number, number]} */
 function badge(row) {
   const [x, y] = toCss(Number(row.u_px), Number(row.v_px));
-  return [x + ASIDE * 0.8, y - ASIDE * 0.8];
+  const aside = ASIDE * 0.8 * growth();
+  return [x + aside, y - aside];
 }
 
 /** The candidate whose number is at a point of the canvas box [CSS px]; -1 if there is none. @param {number} x @param {number} y */
 export function candidateNear(x, y) {
   const here = drawn();
   if (here.length < 2) return -1;
-  const near = here.find(({ row }) => Math.hypot(badge(row)[0] - x, badge(row)[1] - y) <= RADIUS);
+  const near = here.find(({ row }) => Math.hypot(badge(row)[0] - x, badge(row)[1] - y) <= RADIUS * growth());
   return near ? near.number - 1 : -1;
 }
 
@@ -59,24 +60,24 @@ export function candidateNear(x, y) {
 export function drawCandidates(pen) {
   const here = drawn();
   if (here.length < 2) return;
-  const { ratio } = viewport;
+  const { ratio, unit } = viewport;
   for (const { row, number } of here) {
     const [x, y] = toDevice(Number(row.u_px), Number(row.v_px));
     const suggested = number - 1 === state.candidates?.suggested;
     if (!row.used) ring(pen, x, y, suggested);
     const [bx, by] = badge(row).map((value) => value * ratio);
     pen.beginPath();
-    pen.arc(bx, by, RADIUS * 0.85 * (smallPx() / 11) * ratio, 0, 2 * Math.PI);
+    pen.arc(bx, by, RADIUS * 0.85 * unit, 0, 2 * Math.PI);
     pen.fillStyle = row.used ? ink.ring : suggested ? ink.guess : "rgb(20 26 32 / 85%)";
     pen.fill();
-    pen.lineWidth = ratio;
+    pen.lineWidth = unit;
     pen.strokeStyle = ink.guess;
     pen.stroke();
     pen.font = smallFont(0.9 * ratio, "600");
     pen.textAlign = "center";
     pen.textBaseline = "middle";
     pen.fillStyle = row.used || suggested ? "#10161c" : "#ffffff";
-    pen.fillText(row.chosen ? "✓" : String(number), bx, by + 0.5 * ratio);
+    pen.fillText(row.chosen ? "✓" : String(number), bx, by + 0.5 * unit);
     pen.textBaseline = "alphabetic";
   }
 }
@@ -85,9 +86,9 @@ export function drawCandidates(pen) {
 function ring(pen, x, y, suggested) {
   for (const [colour, width] of /** @type {[string, number][]} */ ([[ink.edge, 3], [ink.guess, suggested ? 1.8 : 1.1]])) {
     pen.beginPath();
-    pen.setLineDash(suggested ? [] : [2 * viewport.ratio, 2.5 * viewport.ratio]);
-    pen.arc(x, y, 8 * viewport.ratio, 0, 2 * Math.PI);
-    pen.lineWidth = width * viewport.ratio;
+    pen.setLineDash(suggested ? [] : [2 * viewport.unit, 2.5 * viewport.unit]);
+    pen.arc(x, y, 8 * viewport.unit, 0, 2 * Math.PI);
+    pen.lineWidth = width * viewport.unit;
     pen.strokeStyle = colour;
     pen.stroke();
   }

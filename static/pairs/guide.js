@@ -10,6 +10,7 @@ import { make } from "../shell/notices.js";
 import { openOption } from "../shell/options.js";
 import { clickIn, clicks, isDismissed, isOffered, named, nameOf, on, placementAt, placementsAt, state } from "../shell/state.js";
 import { goToPair } from "./pairs.js";
+import { OF_THE_LENS } from "./warnings.js";
 
 const guide = /** @type {HTMLElement} */ (document.getElementById("guide"));
 
@@ -52,6 +53,7 @@ const EXCLUDE = { key: "X", label: "exclude it", action: "exclude" };
 const REMOVE = { key: "Del", label: "delete it", action: "delete" };
 const SHOW = { key: "J", label: "show it", action: "worst" };
 const POSITION = { key: "", label: "enter the camera position", option: "solving.camera_position" };
+const LENS = { key: "", label: "open Lens", action: "lens" };
 const RANGE = { key: "", label: "change it", option: "gating.max_range_m" };
 /** @type {Words} */
 const BEYOND = ["No radar return within the maximum range.", RANGE];
@@ -113,7 +115,8 @@ function nextAction() {
   const { action, key, option, done } = view.verdict;
   const guesses = clicks().filter((click) => click.state === "untouched").length;
   if (guesses && !state.placements.some(isOffered)) return [`${guesses} ${guesses > 1 ? "marks are guesses" : "mark is a guess"} and ${guesses > 1 ? "do" : "does"} not count: move ${guesses > 1 ? "each" : "it"} to the inner corner`];
-  const by = option === POSITION.option ? [POSITION] : [];
+  const ofLens = view.warnings.some(({ code, hint }) => OF_THE_LENS.includes(code) && hint === action);
+  const by = option === POSITION.option ? [POSITION] : ofLens ? [LENS] : [];
   const leftOut = clicks().filter((click) => click.state === "outlier").map(({ id }) => `#${nameOf(id)}`);
   if (done) return ["Done.", { key: "E", label: "export", action: "export" }, ...(leftOut.length ? [`Left out: ${leftOut.join(", ")}`, SHOW] : by.length ? ["Better:", ...by] : [])];
   if (option === RANGE.option) return BEYOND;

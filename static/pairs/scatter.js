@@ -1,6 +1,6 @@
 /** Scatter plot of the residuals: how far right (du) and down (dv) each reprojection is from its click. An off-centre cloud indicates a bias. */
 
-import { ink, residualColour, smallFont, themeColour } from "../shell/colours.js";
+import { ink, residualColour, smallFont, smallPx, themeColour } from "../shell/colours.js";
 import { make } from "../shell/notices.js";
 import { clicks, onPainted, select, state } from "../shell/state.js";
 import { goTo, pause } from "../time/player.js";
@@ -67,7 +67,7 @@ function draw() {
   pen.fillStyle = themeColour("faint");
   pen.font = smallFont();
   pen.textAlign = "right";
-  pen.fillText(`${most} px`, side - 5, 14); // in the corner, where no mark is
+  pen.fillText(`${most} px`, side - 5, smallPx() + 3); // in the corner, where no mark is
   const shown = clicks().filter((click) => click.projected_px);
   for (const click of shown) mark(click, most);
   canvas.setAttribute("aria-label", describe(shown));

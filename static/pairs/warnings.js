@@ -22,7 +22,7 @@ const openCodes = new Set(["no-camera", "assumed", "calibration-ambiguous"]);
 /** What leaves open what a calibration means: a person picks. */
 const TO_PICK = ["calibration-ambiguous", "calibration-picked"];
 /** What speaks of the lens. */
-const OF_THE_LENS = ["intrinsics-suspected", "lens-or-radar-scale"];
+export const OF_THE_LENS = ["intrinsics-suspected", "lens-or-radar-scale"];
 let drawn = "";
 
 export function startWarnings() {
@@ -41,7 +41,8 @@ function drawAll() {
   const [view, recording] = [state.view, state.recording];
   if (!view || !recording) return;
   const { acknowledged, assumptions } = view;
-  const ofPose = view.warnings.filter((one) => !view.verdict.line.includes(one.message.replace(/\.$/, ""))); // the verdict says it already
+  const said = view.verdict.line.toLowerCase();
+  const ofPose = view.warnings.filter((one) => !said.includes(one.message.replace(/\.$/, "").toLowerCase()));
   const text = JSON.stringify([ofPose, recording.warnings, assumptions, acknowledged]);
   if (text === drawn) return;
   drawn = text;

@@ -103,10 +103,10 @@ function trace(pen, line) {
   pen.beginPath();
   line.forEach(([x, y], index) => (index ? pen.lineTo(x, y) : pen.moveTo(x, y)));
   pen.lineJoin = "round";
-  pen.lineWidth = 3.4 * viewport.ratio;
+  pen.lineWidth = 3.4 * viewport.unit;
   pen.strokeStyle = "rgb(0 0 0 / 45%)";
   pen.stroke();
-  pen.lineWidth = 1.4 * viewport.ratio;
+  pen.lineWidth = 1.4 * viewport.unit;
   pen.strokeStyle = COLOUR;
   pen.stroke();
 }
@@ -127,9 +127,9 @@ function label(pen, words, [x, y]) {
   pen.font = smallFont(viewport.ratio, "600");
   pen.textAlign = "center";
   pen.textBaseline = "middle";
-  const half = pen.measureText(words).width / 2 + 5 * viewport.ratio;
+  const half = pen.measureText(words).width / 2 + 5 * viewport.unit;
   pen.fillStyle = "rgb(0 0 0 / 72%)";
-  pen.fillRect(x - half, y - 8 * viewport.ratio, 2 * half, 16 * viewport.ratio);
+  pen.fillRect(x - half, y - 8 * viewport.unit, 2 * half, 16 * viewport.unit);
   pen.fillStyle = COLOUR;
   pen.fillText(words, x, y);
   pen.textBaseline = "alphabetic";

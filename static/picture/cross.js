@@ -169,12 +169,12 @@ export function enterCross() {
 export function drawCross(pen) {
   const cross = state.cross;
   if (!cross || cross.frame !== state.shown?.index) return;
-  const { ratio } = viewport;
+  const { unit } = viewport;
   const field = cross.fields[cross.fields.length - 1];
   const [left, top] = toDevice(field.u - field.wide / 2, field.v - field.high / 2);
   const [right, bottom] = toDevice(field.u + field.wide / 2, field.v + field.high / 2);
   pen.save();
-  pen.lineWidth = ratio;
+  pen.lineWidth = unit;
   pen.strokeStyle = "rgb(255 255 255 / 45%)";
   pen.beginPath();
   for (let part = 0; part <= 3; part++) {
@@ -185,13 +185,13 @@ export function drawCross(pen) {
     pen.lineTo(right, y);
   }
   pen.stroke();
-  pen.font = smallFont(ratio, "600");
+  pen.font = smallFont(viewport.ratio, "600");
   pen.textAlign = "left";
   pen.textBaseline = "top";
   DIGITS.forEach((digit, index) => {
-    const x = left + ((right - left) * (index % 3)) / 3 + 5 * ratio;
-    const y = top + ((bottom - top) * Math.floor(index / 3)) / 3 + 4 * ratio;
-    pen.lineWidth = 3 * ratio;
+    const x = left + ((right - left) * (index % 3)) / 3 + 5 * unit;
+    const y = top + ((bottom - top) * Math.floor(index / 3)) / 3 + 4 * unit;
+    pen.lineWidth = 3 * unit;
     pen.strokeStyle = ink.edge;
     pen.strokeText(digit, x, y);
     pen.fillStyle = "rgb(255 255 255 / 85%)";
@@ -199,13 +199,13 @@ export function drawCross(pen) {
   });
   const [x, y] = toDevice(cross.u, cross.v);
   for (const [colour, width] of /** @type {[string, number][]} */ ([[ink.edge, 3], [cross.touched ? ink.click : ink.guess, 1.3]])) {
-    pen.lineWidth = width * ratio;
+    pen.lineWidth = width * unit;
     pen.strokeStyle = colour;
-    pen.setLineDash(cross.touched ? [] : [3 * ratio, 3 * ratio]);
+    pen.setLineDash(cross.touched ? [] : [3 * unit, 3 * unit]);
     pen.beginPath();
     for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
-      pen.moveTo(x + dx * 4 * ratio, y + dy * 4 * ratio);
-      pen.lineTo(x + dx * 26 * ratio, y + dy * 26 * ratio);
+      pen.moveTo(x + dx * 4 * unit, y + dy * 4 * unit);
+      pen.lineTo(x + dx * 26 * unit, y + dy * 26 * unit);
     }
     pen.stroke();
   }

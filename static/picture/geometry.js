@@ -3,6 +3,8 @@
  * edge is at -0.5. The half pixel appears only in `toDevice` and its inverse.
  */
 
+import { growth } from "../shell/colours.js";
+
 /** Canvas boxes are multiples of this many CSS px, so that they end on device pixels at 100, 125, 150 and 200 %. */
 const GRID = 4;
 const MAX_SCALE = 64;
@@ -13,6 +15,7 @@ export const viewport = {
   /** CSS size of the canvas box. */ width: GRID,
   height: GRID,
   /** Device px per CSS px. */ ratio: 1,
+  /** Device px per px of a mark, which grows on a 4K monitor as the small text does. */ unit: 1,
   /** Device px per image px. */ scale: 1,
   /** Device px of the picture's top-left edge. */ left: 0,
   top: 0,
@@ -51,12 +54,13 @@ export function resize(width, height) {
   const ratio = window.devicePixelRatio || 1;
   if (box[0] === viewport.width && box[1] === viewport.height && ratio === viewport.ratio) return false;
   const middle = toImage(viewport.width / 2, viewport.height / 2);
-  const growth = ratio / viewport.ratio;
+  const before = viewport.ratio;
   [viewport.width, viewport.height] = box;
   viewport.ratio = ratio;
+  viewport.unit = ratio * growth();
   if (viewport.fitted) fit();
   else {
-    viewport.scale *= growth;
+    viewport.scale *= ratio / before;
     lookAt(middle[0], middle[1]);
   }
   return true;

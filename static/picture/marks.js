@@ -4,7 +4,7 @@
  */
 
 import { drawBoxedReturns, drawBoxes } from "../boxes/boxes.js";
-import { ink, residualColour, smallFont, smallPx } from "../shell/colours.js";
+import { ink, residualColour, smallFont } from "../shell/colours.js";
 import { make } from "../shell/notices.js";
 import { clicks, clicksIn, emit, isOffered, on, placementsAt, state } from "../shell/state.js";
 import { toCss, toDevice, viewport, zoom } from "./geometry.js";
@@ -15,6 +15,8 @@ import { toggleRectified, withoutRectified } from "./rectified.js";
 
 /** Within this distance of a mark, the pointer counts as being at the reflector [CSS px]. */
 const CLOSE = 36;
+/** The line on what to do covers so much of the lower edge [CSS px]. */
+const PILL = 60;
 /** From this many screen px per image px on, the view counts as being close to the reflector. */
 const CLOSE_ZOOM = 2;
 
@@ -45,7 +47,7 @@ const isOpen = (index, range) => placementsAt(index).some((one) => Math.abs(one.
 
 /** @param {Ink} pen @param {import("../messages.js").RadarReturn[]} returns */
 function drawReturns(pen, returns) {
-  const size = 3.2 * viewport.ratio;
+  const size = 3.2 * viewport.unit;
   for (const [u, v, , , , isStill] of returns) {
     const [x, y] = toDevice(u, v);
     pen.beginPath();
@@ -55,7 +57,7 @@ function drawReturns(pen, returns) {
     pen.globalAlpha = 0.85;
     pen.fill();
     pen.globalAlpha = 1;
-    pen.lineWidth = viewport.ratio;
+    pen.lineWidth = viewport.unit;
     pen.strokeStyle = ink.edge;
     pen.stroke();
   }
@@ -72,40 +74,41 @@ function triangle(pen, x, y, size) {
 /** Where the radar and the pose expect the reflector. @param {Ink} pen @param {number} u @param {number} v */
 function drawGuess(pen, u, v) {
   const [x, y] = toDevice(u, v);
-  const dashes = [4 * viewport.ratio, 3.5 * viewport.ratio];
-  outlined(pen, ink.guess, 1.4, () => pen.arc(x, y, 15 * viewport.ratio, 0, 2 * Math.PI), dashes);
+  const dashes = [4 * viewport.unit, 3.5 * viewport.unit];
+  outlined(pen, ink.guess, 1.4, () => pen.arc(x, y, 15 * viewport.unit, 0, 2 * Math.PI), dashes);
 }
 
 /** The best next placement: a dashed diamond, since it lies on the ground. @param {Ink} pen @param {import("../messages.js").Advice} advice */
 function drawAdvice(pen, advice) {
   if (advice.best.may_stop) return;
   const [x, y] = toDevice(advice.best.pixel_px[0], advice.best.pixel_px[1]);
-  const [wide, high] = [18 * viewport.ratio, 9 * viewport.ratio];
+  const [wide, high] = [18 * viewport.unit, 9 * viewport.unit];
   outlined(pen, ink.guess, 1.4, () => {
     pen.moveTo(x - wide, y);
     pen.lineTo(x, y - high);
     pen.lineTo(x + wide, y);
     pen.lineTo(x, y + high);
     pen.closePath();
-  }, [4 * viewport.ratio, 3.5 * viewport.ratio]);
+  }, [4 * viewport.unit, 3.5 * viewport.unit]);
   pen.font = smallFont(viewport.ratio);
   pen.textAlign = "center";
-  pen.lineWidth = 3 * viewport.ratio;
+  pen.lineWidth = 3 * viewport.unit;
   pen.strokeStyle = ink.edge;
   const words = `next ${advice.range_m.toFixed(1)} m`;
-  const below = y + high + 13 * viewport.ratio;
-  pen.strokeText(words, x, below);
+  const low = y + high + 13 * viewport.unit;
+  const at = low < pen.canvas.height - PILL * viewport.unit ? low : y - high - 4 * viewport.unit;
+  pen.strokeText(words, x, at);
   pen.fillStyle = ink.guess;
-  pen.fillText(words, x, below);
+  pen.fillText(words, x, at);
 }
 
 /** A click of another frame, small and dimmed. @param {Ink} pen @param {Click} click */
 function drawOther(pen, click) {
   const [x, y] = toDevice(click.u_px, click.v_px);
-  const arm = 4 * viewport.ratio;
+  const arm = 4 * viewport.unit;
   pen.globalAlpha = click.id !== "" && click.id === state.selected ? 1 : 0.65;
   const colour = residualColour(click.residual_px);
-  outlined(pen, colour, 1.3, () => cross(pen, x, y, arm, 0), isHollow(click) ? [2 * viewport.ratio, 2 * viewport.ratio] : []);
+  outlined(pen, colour, 1.3, () => cross(pen, x, y, arm, 0), isHollow(click) ? [2 * viewport.unit, 2 * viewport.unit] : []);
   pen.globalAlpha = 1;
 }
 
@@ -115,8 +118,8 @@ function drawClick(pen, click) {
   const closeUp = looksClosely(click);
   if (click.projected_px) drawReprojection(pen, click, x, y, closeUp);
   const hollow = isHollow(click);
-  const arm = (closeUp ? 22 : 13) * viewport.ratio;
-  const gap = (closeUp ? 10 : 3) * viewport.ratio;
+  const arm = (closeUp ? 22 : 13) * viewport.unit;
+  const gap = (closeUp ? 10 : 3) * viewport.unit;
   if (closeUp) pen.globalAlpha = 0.9;
   if (hollow) outlined(pen, ink.click, 1.2, () => hollowCross(pen, x, y, arm, gap));
   else outlined(pen, ink.click, closeUp ? 1.2 : 1.6, () => cross(pen, x, y, arm, gap), [], closeUp ? 1.4 : 2);
@@ -152,10 +155,10 @@ function drawReprojection(pen, click, x, y, closeUp) {
     pen.globalAlpha = 1;
   }
   const length = Math.hypot(px - x, py - y);
-  const radius = (closeUp ? 12 : 7) * viewport.ratio;
+  const radius = (closeUp ? 12 : 7) * viewport.unit;
   if (length > radius) {
     const end = (length - radius) / length;
-    const start = Math.min(end, closeUp ? (10 * viewport.ratio) / length : 0);
+    const start = Math.min(end, closeUp ? (10 * viewport.unit) / length : 0);
     outlined(pen, colour, 2, () => {
       pen.moveTo(x + (px - x) * start, y + (py - y) * start);
       pen.lineTo(x + (px - x) * end, y + (py - y) * end);
@@ -172,11 +175,10 @@ export function outlined(pen, colour, width, path, dashes = [], edge = 2) {
   pen.setLineDash(dashes);
   pen.beginPath();
   path();
-  const thick = (viewport.ratio * smallPx()) / 11;
-  pen.lineWidth = (width + edge) * thick;
+  pen.lineWidth = (width + edge) * viewport.unit;
   pen.strokeStyle = ink.edge;
   pen.stroke();
-  pen.lineWidth = width * thick;
+  pen.lineWidth = width * viewport.unit;
   pen.strokeStyle = colour;
   pen.stroke();
   pen.setLineDash([]);
@@ -192,7 +194,7 @@ export function cross(pen, x, y, arm, gap) {
 
 /** @param {Ink} pen @param {number} x @param {number} y @param {number} arm @param {number} gap */
 function hollowCross(pen, x, y, arm, gap) {
-  const half = 2 * viewport.ratio;
+  const half = 2 * viewport.unit;
   for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
     const [from, to] = [gap, arm];
     pen.moveTo(x + dx * from - dy * half, y + dy * from - dx * half);

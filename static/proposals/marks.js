@@ -2,7 +2,7 @@
 
 import { toDevice, viewport } from "../picture/geometry.js";
 import { cross, outlined } from "../picture/marks.js";
-import { ink, smallFont, smallPx } from "../shell/colours.js";
+import { ink, smallFont } from "../shell/colours.js";
 import { shownOffer } from "./proposals.js";
 
 /** A ring of this many standard deviations contains 95 %. */
@@ -15,32 +15,32 @@ const RADIUS = 8;
 export function drawProposal(pen) {
   const offer = shownOffer();
   if (!offer) return;
-  const { ratio, scale } = viewport;
+  const { unit, scale } = viewport;
   offer.row.places.forEach((place, index) => {
     if (offer.isOpen && index !== offer.number) drawOther(pen, place, index + 1);
   });
   const [x, y] = toDevice(...offer.place.pixel_px);
-  const radius = Math.max(3 * ratio, RING * offer.place.sigma_px * scale);
-  const gap = Math.max(4 * ratio, radius + 2 * ratio, CLEAR * offer.row.width_px * scale);
+  const radius = Math.max(3 * unit, RING * offer.place.sigma_px * scale);
+  const gap = Math.max(4 * unit, radius + 2 * unit, CLEAR * offer.row.width_px * scale);
   outlined(pen, ink.guess, 1.2, () => pen.arc(x, y, radius, 0, 2 * Math.PI), [], 1.6);
-  outlined(pen, ink.click, 1.8, () => cross(pen, x, y, gap + 1.6 * smallPx() * ratio, gap), [4 * ratio, 3 * ratio]);
+  outlined(pen, ink.click, 1.8, () => cross(pen, x, y, gap + 17.6 * unit, gap), [4 * unit, 3 * unit]);
 }
 
 /** @param {CanvasRenderingContext2D} pen @param {import("../messages.js").ProposalPlace} place @param {number} number */
 function drawOther(pen, place, number) {
-  const { ratio } = viewport;
+  const { ratio, unit } = viewport;
   const [x, y] = toDevice(...place.pixel_px);
   pen.globalAlpha = 0.7;
-  outlined(pen, ink.guess, 1, () => pen.arc(x, y, 3 * ratio, 0, 2 * Math.PI), [2 * ratio, 2 * ratio], 1.4);
-  const [bx, by] = [x + 11 * ratio, y - 11 * ratio];
+  outlined(pen, ink.guess, 1, () => pen.arc(x, y, 3 * unit, 0, 2 * Math.PI), [2 * unit, 2 * unit], 1.4);
+  const [bx, by] = [x + 11 * unit, y - 11 * unit];
   pen.beginPath();
-  pen.arc(bx, by, RADIUS * (smallPx() / 11) * ratio, 0, 2 * Math.PI);
+  pen.arc(bx, by, RADIUS * unit, 0, 2 * Math.PI);
   pen.fillStyle = "rgb(20 26 32 / 75%)";
   pen.fill();
   pen.font = smallFont(0.9 * ratio, "600");
   [pen.textAlign, pen.textBaseline] = ["center", "middle"];
   pen.fillStyle = "#ffffff";
-  pen.fillText(String(number), bx, by + 0.5 * ratio);
+  pen.fillText(String(number), bx, by + 0.5 * unit);
   pen.textBaseline = "alphabetic";
   pen.globalAlpha = 1;
 }

@@ -187,8 +187,8 @@ export function drawCompared(pen) {
   for (const [id, a, b] of answer.marks) {
     const strong = here.has(id) || id === state.selected;
     if (!strong && !state.layers.others) continue;
-    const size = (strong ? 8 : 4.5) * viewport.ratio;
-    pen.lineWidth = (strong ? 2 : 1.4) * viewport.ratio;
+    const size = (strong ? 8 : 4.5) * viewport.unit;
+    pen.lineWidth = (strong ? 2 : 1.4) * viewport.unit;
     const [shareA, shareB] = [Math.min(1, 2 - 2 * blend), Math.min(1, 2 * blend)];
     if (a && b) {
       pen.globalAlpha = Math.min(shareA, shareB) * (strong ? 0.9 : 0.5);
@@ -212,7 +212,7 @@ function shape(pen, at, size, colour, alpha, square) {
   if (square) pen.rect(x - size, y - size, 2 * size, 2 * size);
   else pen.arc(x, y, size, 0, 2 * Math.PI);
   const width = pen.lineWidth;
-  pen.lineWidth = width + 2 * viewport.ratio;
+  pen.lineWidth = width + 2 * viewport.unit;
   pen.strokeStyle = "rgb(0 0 0 / 70%)";
   pen.stroke();
   pen.lineWidth = width;

@@ -3,7 +3,7 @@
  * to it with the arrow keys, tells the owner, which highlights the same pairs in every plot.
  */
 
-import { smallFont, themeColour } from "../shell/colours.js";
+import { growth, smallFont, themeColour } from "../shell/colours.js";
 import { hideTip, make, showTip } from "../shell/notices.js";
 
 /** @typedef {"agreeing"|"outlier"|"excluded"|"untouched"} Kind */
@@ -15,10 +15,13 @@ import { hideTip, make, showTip } from "../shell/notices.js";
 
 const COLOURS = ["accent", "accent-soft", "attention", "ink", "line", "line-strong", "muted"];
 const EDGE = { left: 38, right: 8, top: 18, bottom: 28 };
-/** A mark this close to the pointer is meant [CSS px]. */
+/** A mark this close to the pointer is meant [px of the plot]. */
 const REACH = 12;
 /** A press that moves farther than this selects a region [CSS px]. */
 const THRESHOLD = 4;
+
+/** Where an event is on a plot [px of the plot]. @param {MouseEvent} event @returns {[number, number]} */
+const at = (event) => [event.offsetX / growth(), event.offsetY / growth()];
 
 /** One plot. */
 export class Plot {
@@ -54,12 +57,12 @@ export class Plot {
     this.draw();
   }
 
-  /** CSS size of the canvas, which its box gives. @returns {[number, number]} */
+  /** Size of the plot, which the canvas's box gives: in CSS px, or in larger ones on a 4K monitor. @returns {[number, number]} */
   get size() {
-    return [this.canvas.clientWidth, this.canvas.clientHeight];
+    return [this.canvas.clientWidth / growth(), this.canvas.clientHeight / growth()];
   }
 
-  /** Data to CSS px, kept on the plot. @param {number} x @param {number} y @returns {[number, number]} */
+  /** Data to px of the plot, kept on the plot. @param {number} x @param {number} y @returns {[number, number]} */
   place(x, y) {
     const [width, height] = this.size;
     const { x: across, y: up } = this.content;
@@ -76,7 +79,7 @@ export class Plot {
     const [width, height] = this.size;
     if (!width || !height) return;
     this.colour = Object.fromEntries(COLOURS.map((name) => [name, themeColour(name)]));
-    const ratio = window.devicePixelRatio || 1;
+    const ratio = (window.devicePixelRatio || 1) * growth();
     const [wide, high] = [Math.round(width * ratio), Math.round(height * ratio)];
     if (this.canvas.width !== wide || this.canvas.height !== high) [this.canvas.width, this.canvas.height] = [wide, high];
     this.pen.setTransform(ratio, 0, 0, ratio, 0, 0);
@@ -100,7 +103,7 @@ export class Plot {
   drawAxes(width, height) {
     const { pen, content } = this;
     const [floor, right] = [height - EDGE.bottom, width - EDGE.right];
-    pen.font = smallFont();
+    pen.font = smallFont(1 / growth());
     pen.lineWidth = 1;
     pen.textBaseline = "alphabetic";
     for (const [axis, upright] of /** @type {[Axis, boolean][]} */ ([[content.x, false], [content.y, true]])) {
@@ -207,14 +210,15 @@ export class Plot {
   /** The mark under the pointer. @param {MouseEvent} event @returns {Mark|null} */
   near(event) {
     const { marks, bar } = this.content;
+    const [across, along] = at(event);
     if (bar) {
-      return marks.find((mark) => mark.ids.length && Math.abs(this.place(mark.x, 0)[0] - event.offsetX) <= (this.place(mark.x + bar, 0)[0] - this.place(mark.x, 0)[0]) / 2) ?? null;
+      return marks.find((mark) => mark.ids.length && Math.abs(this.place(mark.x, 0)[0] - across) <= (this.place(mark.x + bar, 0)[0] - this.place(mark.x, 0)[0]) / 2) ?? null;
     }
     /** @type {Mark|null} */ let best = null;
     let least = REACH;
     for (const mark of marks) {
       const [x, y] = this.place(mark.x, mark.y);
-      const far = Math.hypot(x - event.offsetX, y - event.offsetY);
+      const far = Math.hypot(x - across, y - along);
       if (far < least) [best, least] = [mark, far];
     }
     return best;
@@ -228,7 +232,7 @@ export class Plot {
       else hideTip();
       return this.listener.hover(mark);
     }
-    [this.press.toX, this.press.toY] = [event.offsetX, event.offsetY];
+    [this.press.toX, this.press.toY] = at(event);
     this.draw();
   }
 
@@ -241,7 +245,8 @@ export class Plot {
   pressed(event) {
     if (event.button !== 0) return;
     this.canvas.setPointerCapture(event.pointerId);
-    this.press = { x: event.offsetX, y: event.offsetY, toX: event.offsetX, toY: event.offsetY };
+    const [x, y] = at(event);
+    this.press = { x, y, toX: x, toY: y };
   }
 
   /** @param {PointerEvent} event */
@@ -249,8 +254,9 @@ export class Plot {
     const done = this.press;
     this.press = null;
     if (!done) return;
-    const [left, right] = [Math.min(done.x, event.offsetX), Math.max(done.x, event.offsetX)];
-    const [top, bottom] = [Math.min(done.y, event.offsetY), Math.max(done.y, event.offsetY)];
+    const [x, y] = at(event);
+    const [left, right] = [Math.min(done.x, x), Math.max(done.x, x)];
+    const [top, bottom] = [Math.min(done.y, y), Math.max(done.y, y)];
     if (Math.max(right - left, bottom - top) > THRESHOLD) return this.listener.brush(this.inside(left, right, top, bottom));
     const mark = this.near(event);
     if (mark) this.listener.go(mark);

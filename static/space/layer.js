@@ -184,7 +184,7 @@ function drawLook(look, place, board) {
     const at = place(position_m, pixel_px);
     if (!at) return;
     if (spaceOptions.camera && known !== "clicked") ring(at[0], at[1], RING, themeColour(known === "open" ? "accent" : "faint"), 1.2, [3, 3]);
-    label(board, String(index + 1), at[0] + 11, at[1] - 10, known === "open" ? "accent" : "faint");
+    label(board, String(index + 1), at[0] + smallPx(), at[1] - 0.9 * smallPx(), known === "open" ? "accent" : "faint");
   });
   if (spaceOptions.camera) return;
   const words = (/** @type {number} */ range) => `${Number(range.toPrecision(3))} m`;

@@ -3,13 +3,18 @@
 import re
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from playwright.sync_api import expect
 
+from calib_core.recordings import Recording
 from cocalib.web.port.server import RunningServer
 from tests.browser.driving import Driver
+from tests.serving import serving
 
 pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
@@ -69,7 +74,8 @@ def test_the_verdict_is_in_sight_from_nothing_to_done(page: Driver, truth: Any) 
 
     page.page.click("#sheet-close")
     verdict = page.view["verdict"]
-    codes = [one["code"] for one in page.view["warnings"] if one["message"].rstrip(".") not in verdict["line"]]
+    said = verdict["line"].lower()
+    codes = [one["code"] for one in page.view["warnings"] if one["message"].rstrip(".").lower() not in said]
     page.page.click("#warning-count")
     shown = page.page.locator("#warnings > .warning")
     assert [shown.nth(place).get_attribute("data-code") for place in range(len(codes))] == codes
@@ -211,3 +217,22 @@ def test_no_sentence_is_said_twice_and_the_first_screen_has_few_words(
         ear.dialog(key, dialog)
     assert len(ear.found) >= 25
     assert {state: twice for state, twice in ear.found.items() if twice} == {}
+
+
+def test_a_wrong_focal_length_is_said_once_and_wholly_and_the_lens_is_one_press_away(
+    open_page: Callable[..., Driver], sample: Recording, tmp_path: Path, truth: Any
+) -> None:
+    camera = sample.camera()
+    wrong = replace(camera, matrix_px=np.diag([1.12, 1.12, 1.0]) @ camera.matrix_px)
+    with serving(sample, tmp_path / "s", camera=wrong, name="sample", token="test") as (running, _):
+        page = open_page(running.url, script=CANVAS_WORDS)
+        page.load_sample(truth)
+        page.until("!__cocalib.state.view.checking")
+        assert page.view["warnings"][0]["code"] == "intrinsics-suspected"
+        page.page.click("#warning-count")
+        assert said_twice(spoken(page)) == []
+        assert page.value(
+            "((line) => line.scrollHeight <= line.clientHeight)(document.querySelector('#verdict .line'))"
+        )
+        page.page.click("#guide >> text=open Lens")
+        expect(page.page.locator("#sheet-title")).to_have_text("Lens")

@@ -21,4 +21,4 @@ def field_of_view_text(camera: Camera) -> str:
     across, down = field_of_view_deg(camera)
     if not np.isfinite([across, down]).all():
         return "not known: the distortion folds back before the edges of the picture"
-    return f"{across:.1f}° x {down:.1f}°"
+    return f"{across:.1f}° × {down:.1f}°"

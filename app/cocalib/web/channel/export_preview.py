@@ -173,9 +173,9 @@ def _exported(file: CalibrationFile, key: str, fields: Fields) -> Export:
 def _evidence(file: CalibrationFile) -> str:
     """Return what the pose rests on, with the verdict, in one or two sentences."""
     clicks = sum(1 for pair in file.calibration.pairs if pair.inlier)
-    count = f" ({clicks} clicks)" if file.rests_on == "clicked" and clicks else ""
+    words = f"Rests on {clicks} clicks" if file.rests_on == "clicked" and clicks else _EVIDENCE[file.rests_on]
     verdict = f" {sentence(f'verdict: {file.verdict.line}')}" if file.verdict is not None else ""
-    return f"{_EVIDENCE[file.rests_on]}{count}.{verdict}"
+    return f"{words}.{verdict}"
 
 
 def _read_back(report: CheckReport) -> str:

@@ -25,7 +25,7 @@ def test_each_format_stands_once_under_the_heading_of_where_it_is_used():
 def test_the_evidence_is_said_with_the_verdict(file):
     inliers = sum(pair.inlier for pair in file.calibration.pairs)
     for evidence, words in (
-        (file.evidence, f"Rests on clicks ({inliers} clicks)."),
+        (file.evidence, f"Rests on {inliers} clicks."),
         ("imported_assumed", "nothing proves it"),
         ("imported_proven", "proved"),
     ):

@@ -167,7 +167,7 @@ def test_intrinsics_are_shown_with_what_is_known_of_them():
     table = camera_table(CAMERA, "camera.yaml")
     first = [(row.label, row.value, row.unit) for row in table.parameters[:2]]
     assert first == [("fx", "500.0 ± 0.5", "px"), ("fy", "500.0 ± 0.5", "px")]
-    assert (table.known, table.field) == (True, "65.2° x 51.3°")
+    assert (table.known, table.field) == (True, "65.2° × 51.3°")
     unknown = camera_table(Camera("pinhole", 640, 480, MATRIX), "camera.yaml")
     assert (unknown.known, unknown.parameters[0].value) == (False, "500.000")
 
