@@ -11,6 +11,8 @@
   const TOUCH = 1200;
   /** How long after something arrived or moved it may still change what is drawn [ms]: pictures are decoded meanwhile. */
   const AWAKE = 3000;
+  /** So often is drawn after that however long it takes: viser shows some of what arrives with the second drawing only. */
+  const LEAST = 3;
 
   const frame = window.requestAnimationFrame.bind(window);
   /** @type {Map<number, FrameRequestCallback>} */
@@ -20,10 +22,12 @@
   let touched = -TOUCH;
   let coming = false;
   let woken = performance.now();
+  let owed = LEAST;
 
   /** Something has arrived, moved or changed size. */
   function wake() {
     woken = performance.now();
+    owed = LEAST;
     if (waiting.size) schedule();
   }
 
@@ -36,7 +40,7 @@
 
   /** Draw when it is time, with all callbacks in one frame; while nothing happens, they wait. */
   function schedule() {
-    if (coming || performance.now() - Math.max(woken, touched) > AWAKE) return;
+    if (coming || (owed <= 0 && performance.now() - Math.max(woken, touched) > AWAKE)) return;
     coming = true;
     const now = performance.now();
     const wait = next(now) - now;
@@ -49,6 +53,7 @@
     coming = false;
     if (next(performance.now()) > performance.now()) return schedule();
     drawn = performance.now();
+    owed -= 1;
     const callbacks = [...waiting.values()];
     waiting.clear();
     for (const callback of callbacks) callback(time);

@@ -256,3 +256,28 @@ PICKING = """async () => {
         crowded: ringPlaces([5, 10, 15], 0, () => [50, 50], new Board(400, 300), size).length,
     };
 }"""
+
+
+@pytest.mark.no_3d_view
+def test_a_slow_3d_view_draws_three_times_after_what_arrives_and_then_rests(page: Driver) -> None:
+    assert page.page.evaluate(SLOW_DRAWINGS) == [3, 6]
+
+
+SLOW_DRAWINGS = """async () => {
+    const frame = document.body.appendChild(document.createElement("iframe"));
+    const view = frame.contentWindow;
+    let [now, drawings] = [0, 0];
+    const due = [];
+    view.performance.now = () => now;
+    view.requestAnimationFrame = (callback) => due.push(callback);
+    view.setTimeout = (callback, wait) => due.push(() => { now += wait; callback(); });
+    const script = frame.contentDocument.createElement("script");
+    script.src = "/space/pace.js";
+    await new Promise((done) => { script.onload = done; frame.contentDocument.head.append(script); });
+    const draw = () => { drawings += 1; now += 10000; view.requestAnimationFrame(draw); };
+    const rest = () => { while (due.length) due.shift()(now); return drawings; };
+    view.requestAnimationFrame(draw);
+    const first = rest();
+    view.cocalibWake();
+    return [first, rest()];
+}"""
