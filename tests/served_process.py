@@ -1,5 +1,6 @@
 """Run `cocalib open`, or `cocalib demo`, in its own process, as a user does; its address is used as that of a RunningServer."""
 
+import http.client
 import os
 import re
 import signal
@@ -42,7 +43,9 @@ class ServedProcess:
 
 @contextmanager
 def served_process(*arguments: object, state: Path, command: str = "open", port: int = 0) -> Iterator[ServedProcess]:
-    """Start the command without proposals, and wait for its link; it is ended with the `with` block.
+    """Start the command without proposals, and wait until it answers; it is ended with the `with` block.
+
+    The link is printed before the server is imported: a page that opens it at once would wait for that, too.
 
     Args:
         arguments: those after the command.
@@ -65,7 +68,11 @@ def served_process(*arguments: object, state: Path, command: str = "open", port:
         for line in process.stdout:
             printed.append(line)
             if found := re.search(r"Open (http\S+)", line):
-                yield ServedProcess(process, found[1])
+                served = ServedProcess(process, found[1])
+                connection = http.client.HTTPConnection("127.0.0.1", served.port)
+                connection.request("GET", "/")
+                connection.getresponse().read()
+                yield served
                 break
         else:
             raise AssertionError(f"no link was printed: {''.join(printed)}")
