@@ -292,7 +292,7 @@ def _judged(calibration: Calibration, error: StatedError, warning: DataWarning |
         helpful = _most_helpful(calibration, left) if told is None or left else _capitalized(told.hint)
         return Verdict("coarse", f"{seen}; uncertain to {error.text}", helpful)
     if error.rotation_deg > USABLE_DEG or error.position_cm > USABLE_CM:
-        return Verdict("coarse", only_large(error), _most_helpful(calibration, left))
+        return Verdict("coarse", f"uncertain to {error.text}", _most_helpful(calibration, left))
     steady = not calibration.metrics.held_out_aed_px > HELD_OUT_RATIO * calibration.metrics.aed_px
     small = error.rotation_deg <= GOOD_DEG and error.position_cm <= GOOD_CM and steady
     if small and consequence == "note":
@@ -303,9 +303,14 @@ def _judged(calibration: Calibration, error: StatedError, warning: DataWarning |
     return Verdict("usable", error.text, f"{ALL_CLICKED}. {better}" if left == 0 else better)
 
 
-def only_large(error: StatedError) -> str:
-    """Return the reason of a coarse verdict if nothing but the size of the error keeps the calibration from being usable."""
-    return f"uncertain to {error.text}"
+def is_only_large(verdict: Verdict, calibration: Calibration) -> bool:
+    """Return whether nothing but the size of its error makes a calibration coarse: no warning, too few pairs, or what is assumed.
+
+    A coarse verdict that says what the stated error assumes judges that error.
+    """
+    judged = verdict.level == "coarse" and verdict.assumes != ""
+    warned = any(consequence_of(one.code) == "coarse" for one in calibration.warnings)
+    return judged and not warned and sum(pair.inlier for pair in calibration.pairs) >= SURE_PAIRS
 
 
 def _click_the_rest(left: int) -> str:

@@ -18,7 +18,7 @@ from calib_core.results.verdict import (
     Verdict,
     by_consequence,
     consequence_of,
-    only_large,
+    is_only_large,
     placement_words,
     stated_error,
     verdict_on,
@@ -287,14 +287,13 @@ def _early_line(session: Session) -> str:
 def _large_so_far(verdict: Verdict, session: Session) -> str:
     """Return how many pairs agree, and how large the error still is; "" if a pair does not agree, or something else is wrong."""
     outcome = session.outcome
-    if verdict.level != "coarse" or not isinstance(outcome, Calibration):
+    if not isinstance(outcome, Calibration) or not is_only_large(verdict, outcome):
         return ""
-    error = stated_error(outcome)
     pairs = [pair for pair in outcome.pairs if not pair.excluded]
-    if verdict.reason != only_large(error) or not all(pair.inlier for pair in pairs):
+    if not all(pair.inlier for pair in pairs):
         return ""
     worst = _fits_worst(session)
-    return f"{len(pairs)} pairs{f', {worst} fits worst' if worst else ' agree'}: so far within {error.text}"
+    return f"{len(pairs)} pairs{f', {worst} fits worst' if worst else ' agree'}: so far within {stated_error(outcome).text}"
 
 
 def _fits_worst(session: Session) -> str:

@@ -8,7 +8,7 @@ import pytest
 from calib_core.association.placements import Placement
 from calib_core.measurements import DataWarning, ReflectorClick, TimeNs, Unpaired, Unsolvable
 from calib_core.options import CalibrationOptions, GatingOptions, NoiseOptions
-from calib_core.results.verdict import DONE, Verdict, only_large, stated_error, verdict_on
+from calib_core.results.verdict import DONE, Verdict, stated_error, verdict_on
 from cocalib.session import ClickPlaced, History, PlacementDismissed, RecordingFacts, Session, advance
 from cocalib.view.build import placements_left, verdict_row
 from cocalib.view.click_rows import disagreement
@@ -59,6 +59,7 @@ def test_an_action_that_an_option_does_names_it():
 
 
 TWO_POSES = DataWarning("two-poses", "another pose explains the pairs almost as well", "check the return of c2")
+OF_THE_LENS = DataWarning("intrinsics-suspected", "residuals grow outwards", "check the intrinsics")
 MIRRORED = DataWarning("mirrored-axes", "an axis is mirrored", "turn it round")
 
 
@@ -81,7 +82,7 @@ def test_few_pairs_that_agree_are_counted_and_what_is_wrong_is_said(pairs, warni
 def test_an_error_that_is_large_for_want_of_pairs_is_no_alarm_while_placements_are_left() -> None:
     eight = tuple(pair(f"c{number}") for number in range(1, 9))
     error = stated_error(calibration(*eight))
-    coarse = Verdict("coarse", only_large(error), "Click the 3 placements that are left")
+    coarse = Verdict("coarse", "large", "Click the 3 placements that are left", "nothing is mirrored")
     more = [placement(1), placement(11)]
     clicked = tuple(ReflectorClick(TimeNs(s * 10**9), f"c{s}", 1.0, 1.0) for s in (2, 12))
     odd = (*eight, pair("c9", inlier=False))
@@ -89,7 +90,9 @@ def test_an_error_that_is_large_for_want_of_pairs_is_no_alarm_while_placements_a
     row = verdict_row(coarse, agreeing, more)
     assert (row.early, row.line) == (True, with_degree_signs(f"8 pairs agree: so far within {error.text}"))
     assert not verdict_row(coarse, apart, more).early
-    assert not verdict_row(replace(coarse, reason=f"a warning; {coarse.reason}"), agreeing, more).early
+    warned = replace(agreeing, outcome=replace(calibration(*eight), warnings=(OF_THE_LENS,)))
+    assert not verdict_row(coarse, warned, more).early
+    assert not verdict_row(replace(coarse, assumes=""), agreeing, more).early, "a unit is not confirmed"
     assert not verdict_row(coarse, replace(agreeing, clicks=clicked), more).early
     doubted = replace(agreeing, outcome=calibration(*eight[:7], replace(eight[7], outlier_probability=0.1)))
     row = verdict_row(coarse, doubted, more)
