@@ -142,7 +142,7 @@ def clocks_apart(
                 "clocks-apart",
                 f"{found} of {count} clicks agree with what the radar saw {away} {later}, {agreeing} of {len(pairs)} with what "
                 f"it saw at their time: its stamps seem to be about {apart_s:.0f} s {ahead} the camera's",
-                "compare both clocks (cocalib info); if one computer recorded both sensors, use the times of receipt; else "
+                "compare both clocks (cocalib info); if one computer recorded both sensors, open them with --clock receive; else "
                 "correct the stamps of one recording",
             )
         ]
