@@ -352,8 +352,7 @@ def _answer(task: _Task, groups: Sequence[PlacementGroup], measurements: PairMea
         beyond=beyond,
     )
     angle_map = learn_angle_map(calibration)
-    pose, agreeing = calibration.camera_from_radar, int(solved_fit.inliers.sum())
-    apart = clocks_apart(used, task.camera, options, pose=pose, agreeing=agreeing)
+    apart = clocks_apart(used, task.camera, options, solution.refined)
     return replace(
         calibration,
         warnings=(*apart, *warnings_of(solved_fit)),

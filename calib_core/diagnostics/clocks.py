@@ -21,6 +21,7 @@ from calib_core.association.clustering import CLUSTER_SCALE
 from calib_core.association.gating import static_returns
 from calib_core.camera import Camera
 from calib_core.estimation.best_fit import quick_fit
+from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.measurement_model import pair_measurements
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import NS_PER_S, Pair, RadarScans
@@ -43,6 +44,8 @@ _AROUND_S = 4.0  # as far as the scans around a click reach by default
 _STEPS_TRIED = (1, -1, 2, -2, 3, -3)
 _LEAST_AGREEING = 8
 _AGREEING_SHARE = 0.7
+_SOUND_SHARE = 0.6  # a pose with which more pairs agree than this, no noisier, may be off by a step, but is not turned
+_SOUND_NOISE = 1.8  # times the assumed one
 _MORE_AGREEING = 2
 _LARGEST_NOISE = 2.5  # times the assumed one; pairs that agree by chance reach 5
 _SHIFT_ROUNDS = 8
@@ -101,12 +104,7 @@ def clocks(calibration: Calibration, scans: RadarScans) -> list[DataWarning]:
 
 
 def clocks_apart(
-    pairs: Sequence[Pair],
-    camera: Camera,
-    options: CalibrationOptions,
-    *,
-    pose: RigidTransform | None = None,
-    agreeing: int = 0,
+    pairs: Sequence[Pair], camera: Camera, options: CalibrationOptions, fit: ErrorsInVariablesFit | None = None
 ) -> list[DataWarning]:
     """Warn if more clicks agree with the returns of the placements after or before their own: the clocks differ by placements.
 
@@ -114,23 +112,23 @@ def clocks_apart(
         pairs: one for each placement, in order of time.
         camera: the intrinsics.
         options: of the solver.
-        pose: the answer, camera_from_radar; None without one.
-        agreeing: how many pairs agree with it.
+        fit: the answer to them; None without one.
     """
     times = [pair.image_time for pair in pairs if pair.image_time is not None]
     if len(times) < len(pairs):
         return []
-    near = pose if agreeing > _AGREEING_SHARE * len(pairs) else None
+    agreeing = 0 if fit is None else int(fit.inliers.sum())
+    sound = fit is not None and agreeing > _SOUND_SHARE * len(pairs) and fit.noise_scale.max() < _SOUND_NOISE
     for step in _STEPS_TRIED:
         count = len(pairs) - abs(step)
         if count < max(_LEAST_AGREEING, agreeing + 1):
             continue
         clicks, seen = pairs[max(0, -step) :][:count], pairs[max(0, step) :][:count]
-        moved = [replace(click, candidates=other.candidates) for click, other in zip(clicks, seen, strict=True)]
-        if near is not None and _most_once_shifted(moved, camera, near) <= agreeing:
+        moved = [replace(click, candidates=late.candidates) for click, late in zip(clicks, seen, strict=True)]
+        if fit is not None and sound and _most_once_shifted(moved, camera, fit.camera_from_radar) <= agreeing:
             continue
-        fit = quick_fit(pair_measurements(moved, camera, options), options, None)
-        found = 0 if fit is None or fit.noise_scale.max() > _LARGEST_NOISE else int(fit.inliers.sum())
+        other = quick_fit(pair_measurements(moved, camera, options), options, None)
+        found = 0 if other is None or other.noise_scale.max() > _LARGEST_NOISE else int(other.inliers.sum())
         more = 1 if found == count else _MORE_AGREEING
         if found < max(_LEAST_AGREEING, agreeing + more, _AGREEING_SHARE * count):
             continue
