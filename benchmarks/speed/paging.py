@@ -39,7 +39,7 @@ _FLAGS = [
 _HERE = Path(__file__).resolve().parents[2]
 _EARLIER = "c35a642"
 """The commit to compare with: the last one before answers came in two steps, and before there were proposals."""
-_ROUNDS = 3
+_ROUNDS = 4
 _CLICKS = 20
 _STEPS = 40
 _PLAY_S = 20.0
