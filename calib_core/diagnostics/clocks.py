@@ -41,7 +41,8 @@ _SHORTEST_DWELL_S = 0.5
 _REACH = 1.5  # steps of CLUSTER_SCALE from the candidate to a return of the same reflector
 _STEP_S = 0.05
 _AROUND_S = 4.0  # as far as the scans around a click reach by default
-_STEPS_TRIED = (1, -1, 2, -2, 3, -3)
+_MOST_STEPS = 3  # tried where the pose may be turned, which takes a fit each; else up to half of the placements
+_LEAST_APART = 2
 _LEAST_AGREEING = 8
 _AGREEING_SHARE = 0.7
 _SOUND_SHARE = 0.6  # a pose with which more pairs agree than this, no noisier, may be off by a step, but is not turned
@@ -106,7 +107,7 @@ def clocks(calibration: Calibration, scans: RadarScans) -> list[DataWarning]:
 def clocks_apart(
     pairs: Sequence[Pair], camera: Camera, options: CalibrationOptions, fit: ErrorsInVariablesFit | None = None
 ) -> list[DataWarning]:
-    """Warn if more clicks agree with the returns of the placements after or before their own: the clocks differ by placements.
+    """Warn if more clicks agree with the returns of placements after or before their own: the clocks differ by placements.
 
     Args:
         pairs: one for each placement, in order of time.
@@ -119,32 +120,37 @@ def clocks_apart(
         return []
     agreeing = 0 if fit is None else int(fit.inliers.sum())
     sound = fit is not None and agreeing > _SOUND_SHARE * len(pairs) and fit.noise_scale.max() < _SOUND_NOISE
-    for step in _STEPS_TRIED:
-        count = len(pairs) - abs(step)
-        if count < max(_LEAST_AGREEING, agreeing + 1):
+    if len(pairs) - agreeing < _LEAST_APART:
+        return []
+    best, count, step = agreeing, len(pairs), 0
+    most = len(pairs) // 2 if sound else _MOST_STEPS
+    for tried in (sign * size for size in range(1, most + 1) for sign in (1, -1)):
+        left = len(pairs) - abs(tried)
+        if left < max(_LEAST_AGREEING, best):
             continue
-        clicks, seen = pairs[max(0, -step) :][:count], pairs[max(0, step) :][:count]
+        clicks, seen = pairs[max(0, -tried) :][:left], pairs[max(0, tried) :][:left]
         moved = [replace(click, candidates=late.candidates) for click, late in zip(clicks, seen, strict=True)]
-        if fit is not None and sound and _most_once_shifted(moved, camera, fit.camera_from_radar) <= agreeing:
+        if fit is not None and sound and _most_once_shifted(moved, camera, fit.camera_from_radar) < best:
             continue
         other = quick_fit(pair_measurements(moved, camera, options), options, None)
         found = 0 if other is None or other.noise_scale.max() > _LARGEST_NOISE else int(other.inliers.sum())
-        more = 1 if found == count else _MORE_AGREEING
-        if found < max(_LEAST_AGREEING, agreeing + more, _AGREEING_SHARE * count):
-            continue
-        apart_s = float(np.median(np.subtract(times[abs(step) :], times[: -abs(step)]))) / NS_PER_S
-        away = "one placement" if abs(step) == 1 else f"{abs(step)} placements"
-        later, ahead = ("later", "ahead of") if step > 0 else ("earlier", "behind")
-        return [
-            DataWarning(
-                "clocks-apart",
-                f"{found} of {count} clicks agree with what the radar saw {away} {later}, {agreeing} of {len(pairs)} with what "
-                f"it saw at their time: its stamps seem to be about {apart_s:.0f} s {ahead} the camera's",
-                "compare both clocks (cocalib info); if one computer recorded both sensors, open them with --clock receive; else "
-                "correct the stamps of one recording",
-            )
-        ]
-    return []
+        more = 0 if found == left else _MORE_AGREEING
+        if found >= max(_LEAST_AGREEING, best + more, _AGREEING_SHARE * left):
+            best, count, step = found, left, tried
+    if not step:
+        return []
+    apart_s = float(np.median(np.subtract(times[abs(step) :], times[: -abs(step)]))) / NS_PER_S
+    away = "one placement" if abs(step) == 1 else f"{abs(step)} placements"
+    later, ahead = ("later", "ahead of") if step > 0 else ("earlier", "behind")
+    return [
+        DataWarning(
+            "clocks-apart",
+            f"{best} of {count} clicks agree with what the radar saw {away} {later}, {agreeing} of {len(pairs)} with what it saw "
+            f"at their time: its stamps seem to be about {apart_s:.0f} s {ahead} the camera's",
+            "compare both clocks (cocalib info); if one computer recorded both sensors, open them with --clock receive; else "
+            "correct the stamps of one recording",
+        )
+    ]
 
 
 def _most_once_shifted(pairs: Sequence[Pair], camera: Camera, pose: RigidTransform) -> int:

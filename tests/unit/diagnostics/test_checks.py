@@ -406,7 +406,7 @@ def test_without_scans_or_stamps_there_is_no_warning():
 # Clocks that differ by whole placements.
 
 
-def apart_codes(outcome: Calibration) -> list[str]:
+def said_of_clocks(outcome: Calibration) -> list[str]:
     return [one.message for one in outcome.warnings if one.code == "clocks-apart"]
 
 
@@ -449,16 +449,22 @@ def test_a_grid_walked_row_by_row_does_not_hide_clocks_that_are_a_placement_off(
     """Most pairs agree on a pose that is off by a whole step; only the ends of the rows do not."""
     outcome = calibrate_pairs(*walked_grid(later)).unwrap()
     assert sum(pair.inlier for pair in outcome.pairs) >= (ROWS - 1) * PER_ROW
-    (text,) = apart_codes(outcome)
+    (text,) = said_of_clocks(outcome)
     assert "23 of 23 clicks agree" in text
     assert f"about 9 s {words}" in text
     assert verdict_on(outcome).level == "contradictory"
 
 
+@pytest.mark.parametrize("later", [2, PER_ROW])
+def test_clocks_that_are_several_placements_or_a_whole_row_off_are_named_with_the_number(later):
+    (text,) = said_of_clocks(calibrate_pairs(*walked_grid(later)).unwrap())
+    assert f"saw {later} placements earlier" in text
+
+
 @pytest.mark.parametrize("wrong", [(), (5, 11), (2, 5, 9, 17, 20)])
 def test_a_grid_with_wrong_clicks_is_not_a_matter_of_the_clocks(wrong):
-    assert apart_codes(calibrate_pairs(*walked_grid(0, wrong=wrong)).unwrap()) == []
+    assert said_of_clocks(calibrate_pairs(*walked_grid(0, wrong=wrong)).unwrap()) == []
 
 
 def test_pairs_without_times_say_nothing_of_clocks():
-    assert apart_codes(calibrate_pairs(*walked_grid(1, timed=False)).unwrap()) == []
+    assert said_of_clocks(calibrate_pairs(*walked_grid(1, timed=False)).unwrap()) == []
