@@ -41,7 +41,8 @@ _SHORTEST_DWELL_S = 0.5
 _REACH = 1.5  # steps of CLUSTER_SCALE from the candidate to a return of the same reflector
 _STEP_S = 0.05
 _AROUND_S = 4.0  # as far as the scans around a click reach by default
-_MOST_STEPS = 3  # tried where the pose may be turned, which takes a fit each; else up to half of the placements
+_MOST_STEPS = 3  # placements tried where the pose may be turned, which takes a fit each
+_MOST_CHEAP_STEPS = 20  # where it is not: the longest row
 _LEAST_APART = 2
 _LEAST_AGREEING = 8
 _AGREEING_SHARE = 0.7
@@ -123,15 +124,17 @@ def clocks_apart(
     if len(pairs) - agreeing < _LEAST_APART:
         return []
     best, count, step = agreeing, len(pairs), 0
-    most = len(pairs) // 2 if sound else _MOST_STEPS
+    rays = camera.rays(np.array([pair.pixel_px for pair in pairs]))
+    points_m = np.array([pair.candidates[0].position_radar_m for pair in pairs])
+    most = _MOST_CHEAP_STEPS if sound else _MOST_STEPS
     for tried in (sign * size for size in range(1, most + 1) for sign in (1, -1)):
         left = len(pairs) - abs(tried)
         if left < max(_LEAST_AGREEING, best):
             continue
-        clicks, seen = pairs[max(0, -tried) :][:left], pairs[max(0, tried) :][:left]
-        moved = [replace(click, candidates=late.candidates) for click, late in zip(clicks, seen, strict=True)]
-        if fit is not None and sound and _most_once_shifted(moved, camera, fit.camera_from_radar) < best:
+        clicks, seen = (slice(max(0, way), max(0, way) + left) for way in (-tried, tried))
+        if fit is not None and sound and _most_once_shifted(rays[clicks], points_m[seen], fit.camera_from_radar) < best:
             continue
+        moved = [replace(a, candidates=b.candidates) for a, b in zip(pairs[clicks], pairs[seen], strict=True)]
         other = quick_fit(pair_measurements(moved, camera, options), options, None)
         found = 0 if other is None or other.noise_scale.max() > _LARGEST_NOISE else int(other.inliers.sum())
         more = 0 if found == left else _MORE_AGREEING
@@ -153,12 +156,10 @@ def clocks_apart(
     ]
 
 
-def _most_once_shifted(pairs: Sequence[Pair], camera: Camera, pose: RigidTransform) -> int:
+def _most_once_shifted(rays: Points3, points_m: Points3, pose: RigidTransform) -> int:
     """Return about how many pairs can agree if the pose is shifted and not turned, which is what a grid's step does to it."""
-    rays = camera.rays(np.array([pair.pixel_px for pair in pairs]))
     known = np.isfinite(rays).all(axis=1)  # the lens model has none outside its picture
-    turned_m = np.array([pair.candidates[0].position_radar_m for pair in pairs])[known] @ pose.rotation.T
-    rays = rays[known]
+    rays, turned_m = rays[known], points_m[known] @ pose.rotation.T
     across = np.eye(3) - rays[:, :, None] * rays[:, None, :]
     weights = 1.0 / np.linalg.norm(turned_m, axis=1)
     for _ in range(_SHIFT_ROUNDS):  # the shift with the least sum of angles
