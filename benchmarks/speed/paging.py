@@ -18,6 +18,7 @@ import psutil
 from playwright.sync_api import Page, sync_playwright
 
 from benchmarks.speed.rows import Row, Table, section
+from benchmarks.speed.starting import as_installed
 from calib_core.synthetic import SimulationOptions, simulate, write_recording
 from cocalib.platform.resources import sample_folder
 from tests.find_browser import find_browser
@@ -173,10 +174,8 @@ def _playing(opened: _Opened) -> Table:
 @contextmanager
 def _opened(version: Path, command: list[str], scratch: Path, name: str) -> Iterator[_Opened]:
     package = "cocalib" if (version / "app" / "cocalib").is_dir() else "app"
-    # Bytecode is kept, as in any installation, whatever this shell says about it.
-    environment = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
+    environment = as_installed(scratch / "bytecode")
     environment |= {"PYTHONUNBUFFERED": "1", "PYTHONPATH": f"{version / 'app'}{os.pathsep}{version}"}
-    environment["PYTHONPYCACHEPREFIX"] = str(scratch / "bytecode")
     with sync_playwright() as playwright:
         started = time.perf_counter()
         server = subprocess.Popen(

@@ -5,7 +5,6 @@ Alone: `python -m benchmarks.speed.serving`.
 
 import http.client
 import json
-import os
 import re
 import subprocess
 import sys
@@ -21,6 +20,7 @@ from websockets.sync.client import ClientConnection, connect
 
 from benchmarks.speed.recordings import write_bag
 from benchmarks.speed.rows import Row, Table, section
+from benchmarks.speed.starting import as_installed
 
 __all__ = ["measure_serving"]
 
@@ -96,8 +96,7 @@ def measure_serving(scratch: Path) -> Table:
 
 @contextmanager
 def _served(arguments: list[str], session: Path) -> Iterator[_Serving]:
-    environment = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
-    environment |= {"PYTHONUNBUFFERED": "1", "PYTHONPYCACHEPREFIX": str(session.with_name("bytecode"))}
+    environment = as_installed(session.with_name("bytecode")) | {"PYTHONUNBUFFERED": "1"}
     started = time.perf_counter()
     server = subprocess.Popen(
         [sys.executable, "-m", "cocalib", *arguments, "--session", str(session), "--port", "0", "--no-browser"],

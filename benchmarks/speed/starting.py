@@ -9,7 +9,7 @@ from pathlib import Path
 
 from benchmarks.speed.rows import Row, Table
 
-__all__ = ["measure_starting"]
+__all__ = ["as_installed", "measure_starting"]
 
 _REPEATS = 7
 _AIM_RATIO = 2.0
@@ -31,9 +31,7 @@ def measure_starting(sample: Path) -> Table:
         "`cocalib solve` on the sample, 20 clicks": [*command, "solve", *bags, "--clicks", str(sample / "clicks.json")],
     }
     with tempfile.TemporaryDirectory() as bytecode:
-        # Bytecode is kept, as in any installation, whatever this shell says about it; the first round writes it.
-        environment = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
-        environment["PYTHONPYCACHEPREFIX"] = bytecode
+        environment = as_installed(Path(bytecode))  # the first round writes the bytecode
         rounds = [{name: _processor_s(job, environment) for name, job in jobs.items()} for _ in range(_REPEATS + 1)][1:]
     seconds = {name: min(times[name] for times in rounds) for name in jobs}
     base_s = seconds["`import numpy`"]
@@ -43,6 +41,12 @@ def measure_starting(sample: Path) -> Table:
     )
     how = f"A fresh process each time, in turn; time of the processor, user and system, the least of {_REPEATS}."
     return Table("Starting", how, rows)
+
+
+def as_installed(bytecode: Path) -> dict[str, str]:
+    """Return the environment with bytecode kept in a folder, as any installation keeps it, whatever this shell says about it."""
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
+    return environment | {"PYTHONPYCACHEPREFIX": str(bytecode)}
 
 
 def _aim(name: str, value_s: float, base_s: float) -> tuple[str, bool]:
