@@ -872,7 +872,7 @@ export interface ClickPlaced {
   type: "click_placed";
   image_time: Stamp;
   pixel_px: [number, number];
-  mark?: "clicked" | "moved" | "snapped" | "untouched" | null;
+  mark?: "clicked" | "moved" | "snapped" | "untouched";
   sigma_px?: number | null;
   request?: number;
 }

@@ -17,7 +17,6 @@ from calib_core.errors import OptionError
 from calib_core.options import (
     HOW_MEASURED,
     RANGES,
-    RETIRED_METHODS,
     UNITS,
     CalibrationOptions,
     CameraPositionPrior,
@@ -122,18 +121,6 @@ def changed_options(options: CalibrationOptions, changes: Sequence[OptionChange]
     changed = {group: replace(getattr(options, group), **values) for group, values in groups.items()}
     options = replace(options, **ungrouped, **changed)
     return checked_options(options)
-
-
-def kept_options(tree: object) -> CalibrationOptions:
-    """Parse the options that a session kept; what older versions offered and this one does not is left out.
-
-    Raises:
-        OptionError: an option is unknown, of the wrong type or out of range.
-    """
-    if isinstance(tree, Mapping):
-        retired = tree.get("method") in RETIRED_METHODS
-        tree = {name: value for name, value in tree.items() if name != "board" and not (name == "method" and retired)}
-    return options_from_tree(tree)
 
 
 @cache

@@ -130,15 +130,10 @@ def _session_folder(place: Path) -> Path:
 
 def _findings(found: "Repair") -> list[str]:
     """Return what a session proves and what is wrong with it, line by line."""
-    source = (
-        "the snapshot and the steps after it"
-        if found.from_snapshot
-        else f"{_counted(found.steps, 'step')} of the journal"
-    )
     lines = [f"{found.folder}: session of {found.recording}", *(f"  {fault}" for fault in found.faults)]
-    lines.append(f"  proven: {_counted(len(found.clicks), 'click')}, from {source}")
-    if found.from_snapshot:
-        lines.append("  what was done before the snapshot can no longer be undone")
+    lines.append(
+        f"  proven: {_counted(len(found.clicks), 'click')}, from {_counted(found.steps, 'step')} of the journal"
+    )
     if found.unproven:
         lines.append(f"  not proven, and left out: {_counted(found.unproven, 'line')} of the journal")
     elif found.faults and found.is_complete:

@@ -150,11 +150,7 @@ def _placed(event: ClickPlaced, session: Session, facts: RecordingFacts) -> Sess
     _require_frame(event.image_time, facts)
     u_px, v_px = _require_pixel(event.pixel_px, facts)
     for click in session.clicks:
-        if click.image_time != event.image_time:
-            continue
-        if event.mark is None:
-            return _with_click(session, replace(click, u_px=u_px, v_px=v_px))
-        if (click.u_px, click.v_px) == event.pixel_px:
+        if click.image_time == event.image_time and (click.u_px, click.v_px) == event.pixel_px:
             return _with_click(session, _marked(click, event.mark, event.sigma_px))
     click = ReflectorClick(
         event.image_time,
@@ -162,7 +158,7 @@ def _placed(event: ClickPlaced, session: Session, facts: RecordingFacts) -> Sess
         u_px,
         v_px,
         sigma_px=event.sigma_px,
-        mark=event.mark or "clicked",
+        mark=event.mark,
     )
     _require_sigma(click)
     return replace(_with_click(session, click), next_click=session.next_click + 1)

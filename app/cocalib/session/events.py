@@ -31,14 +31,13 @@ class ClickPlaced(_Journalled, frozen=True):
     Attributes:
         image_time: stamp of the frame.
         pixel_px: column and row.
-        mark: how it came to this pixel; None in journals of versions that kept one click per frame: a click that the frame
-            already has is then moved.
+        mark: how it came to this pixel.
         sigma_px: its standard deviation per axis; None takes the options' value.
     """
 
     image_time: TimeNs
     pixel_px: tuple[float, float]
-    mark: Mark | None = None
+    mark: Mark = "clicked"
     sigma_px: float | None = None
 
 

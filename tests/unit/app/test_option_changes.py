@@ -23,7 +23,6 @@ from cocalib.option_changes import (
     OptionChange,
     changed_options,
     changes_from_tree,
-    kept_options,
     option_groups,
     options_from_tree,
 )
@@ -90,16 +89,6 @@ def test_what_is_not_understood_or_out_of_range_is_refused_with_a_clear_error(tr
 def test_no_number_may_be_infinite_or_missing(path, value):
     with pytest.raises(OptionError, match="out of range"):
         changed_options(CalibrationOptions(), [OptionChange(path, value)])
-
-
-@pytest.mark.parametrize("method", ["pmm", "ccm"])
-def test_what_older_versions_offered_is_left_out_of_the_options_that_a_session_kept(method):
-    kept = kept_options(
-        {"method": method, "board": {"columns": 9, "registration": "linear"}, "noise": {"sigma_px": 3.0}}
-    )
-    assert kept == options_from_tree({"noise": {"sigma_px": 3.0}})
-    with pytest.raises(OptionError, match="board"):
-        options_from_tree({"board": {"columns": 9}})
 
 
 def test_a_choice_that_was_set_directly_is_checked_too():

@@ -15,10 +15,9 @@ from cocalib.session.file.contents import inspect_session
 from cocalib.session.file.guarded_folder import GuardedFolder, SessionFileError, lock_holder
 from cocalib.session.file.identity import RecordingForm, has_dates, is_same_recording
 from cocalib.session.file.journal import COPY, JOURNAL, read_journal
-from cocalib.session.file.snapshot import SNAPSHOT, read_snapshot
 
 _HEAD_BYTES = 1 << 16
-_FILES = (JOURNAL, COPY, SNAPSHOT)
+_FILES = (JOURNAL, COPY)
 _SET_ASIDE = re.compile(re.escape(SESSION_SUFFIX) + r"\.[0-9]+$")
 
 
@@ -154,13 +153,12 @@ def _candidate(path: Path) -> _Candidate | None:
 
 
 def _recording(folder: GuardedFolder) -> RecordingForm | None:
-    for name in (JOURNAL, COPY):
+    for name in _FILES:
         head = (folder.read(name, at_most=_HEAD_BYTES) or b"").partition(b"\n")[0]
         recording = read_journal(head + b"\n", str(folder.path / name)).recording if head else None
         if recording is not None:
             return recording
-    data = folder.read(SNAPSHOT)
-    return None if data is None else read_snapshot(data, SNAPSHOT).recording
+    return None
 
 
 def holds_session_files(folder: Path) -> bool:
@@ -265,7 +263,7 @@ def _summary(path: Path) -> SessionSummary:
     try:
         folder = GuardedFolder(path)
         try:
-            changed = max(filter(None, map(folder.changed_at_s, (JOURNAL, COPY, SNAPSHOT))), default=None)
+            changed = max(filter(None, map(folder.changed_at_s, _FILES)), default=None)
             holder = lock_holder(folder)
         finally:
             folder.close()

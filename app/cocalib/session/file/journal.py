@@ -15,14 +15,12 @@ import msgspec
 
 from calib_core.errors import CalibrationError
 from calib_core.json_forms import from_json, to_json
-from cocalib.option_changes import kept_options
-from cocalib.session import JournalStep, OptionsChanged, Step
+from cocalib.session import JournalStep, Step
 from cocalib.session.file.guarded_folder import GuardedFolder, SessionFileError
 from cocalib.session.file.identity import RecordingForm
 
 JOURNAL, COPY = "journal.jsonl", "journal-copy.jsonl"
-SCHEMA, SCHEMA_1 = "cocalib/session-2", "cocalib/session-1"
-"""What is written, and what older versions wrote: lines without checksums."""
+SCHEMA = "cocalib/session-2"
 _DIGITS = 16
 _BEFORE, _AFTER = b',"sum":"', b'"}'
 _SUM_LENGTH = len(_BEFORE) + _DIGITS + len(_AFTER)
@@ -30,13 +28,12 @@ _STEPS_PER_FLUSH = 10
 _log = logging.getLogger(__name__)
 
 
-class _Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """The first line; `continues` is the checksum of the snapshot it was started from."""
+class _Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The first line."""
 
     schema: str
     cocalib: str
     recording: RecordingForm
-    continues: str = ""
 
 
 class _Version(msgspec.Struct, frozen=True):
@@ -95,21 +92,14 @@ def _checksum(previous: str, content: bytes) -> str:
     return hashlib.sha256(previous.encode() + b"\n" + content).hexdigest()[:_DIGITS]
 
 
-def new_lines(
-    recording: RecordingForm, steps: Sequence[Step], *, cocalib: str, continues: str = ""
-) -> tuple[SealedLine, ...]:
-    """Return the lines of a new journal.
+def first_line(recording: RecordingForm, *, cocalib: str) -> SealedLine:
+    """Return the first line of a new journal.
 
     Args:
         recording: the recording it belongs to.
-        steps: its initial steps.
         cocalib: version of the program.
-        continues: checksum of the snapshot that the steps come from; "" if they do not.
     """
-    lines = [sealed(msgspec.json.encode(_Head(SCHEMA, cocalib, recording, continues)))]
-    for number, step in enumerate(steps, start=1):
-        lines.append(sealed(_content(number, step), lines[-1].sum))
-    return tuple(lines)
+    return sealed(msgspec.json.encode(_Head(SCHEMA, cocalib, recording)))
 
 
 def bytes_of(lines: Sequence[SealedLine]) -> bytes:
@@ -127,7 +117,7 @@ def _content(number: int, step: Step) -> bytes:
     if not isinstance(step, JournalStep):
         raise TypeError(f"{type(step).__name__} is not journalled")
     content = msgspec.json.encode(Line(number, step), enc_hook=to_json)
-    _step(content, number)
+    _step(content)
     return content
 
 
@@ -294,8 +284,6 @@ class FoundJournal:
 
     Attributes:
         recording: the recording it belongs to; None if the first line is damaged.
-        schema: which format it is in.
-        continues: checksum of the snapshot it was started from; "" if it was started empty.
         head: its first line.
         lines: all lines after the first.
         proven: those of them that follow from the first line.
@@ -304,8 +292,6 @@ class FoundJournal:
     """
 
     recording: RecordingForm | None
-    schema: str
-    continues: str
     head: SealedLine
     lines: tuple[SealedLine, ...]
     proven: "tuple[ProvenLine, ...]"
@@ -314,8 +300,8 @@ class FoundJournal:
 
     @property
     def sums(self) -> tuple[str, ...]:
-        """The checksums of the first line and of the proven ones; empty for session-1."""
-        return () if self.schema == SCHEMA_1 else (self.head.sum, *(one.line.sum for one in self.proven))
+        """The checksums of the first line and of the proven ones."""
+        return (self.head.sum, *(one.line.sum for one in self.proven))
 
     @property
     def steps(self) -> tuple[Step, ...]:
@@ -335,10 +321,10 @@ class FoundJournal:
     def why(self, index: int) -> str:
         """Return why the line at a position is not proven."""
         line = self.lines[index]
-        if not line.sum and self.schema == SCHEMA:
+        if not line.sum:
             return "it has no checksum"
         try:
-            _step(line.content, index + 1 if self.schema == SCHEMA_1 else None)
+            _step(line.content)
         except ValueError as error:
             return str(error)
         return "its checksum is wrong, or it does not follow the line before"
@@ -378,14 +364,11 @@ def read_journal(data: bytes, place: str) -> FoundJournal:
     if head is None:
         faults.insert(0, f"line 1 is damaged ({why})")
     first, *lines = [taken_apart(line) for line in raw] or [SealedLine(b"", "")]
-    schema = head.schema if head else SCHEMA
     return FoundJournal(
         recording=head.recording if head else None,
-        schema=schema,
-        continues=head.continues if head else "",
         head=first,
         lines=tuple(lines),
-        proven=_numbered(raw[1:]) if schema == SCHEMA_1 else following(lines, first.sum),
+        proven=following(lines, first.sum),
         faults=tuple(faults),
         torn_bytes=len(tail),
     )
@@ -398,21 +381,10 @@ def following(lines: Sequence[SealedLine], previous: str) -> tuple[ProvenLine, .
         if not (previous and line.follows(previous)):
             continue
         try:
-            found.append(ProvenLine(index, line, _step(line.content, None)))
+            found.append(ProvenLine(index, line, _step(line.content)))
         except ValueError:
             break  # the checksum is right, so another version wrote it
         previous = line.sum
-    return tuple(found)
-
-
-def _numbered(raw: Sequence[bytes]) -> tuple[ProvenLine, ...]:
-    """Read lines without checksums up to the first one that is damaged."""
-    found: list[ProvenLine] = []
-    for index, line in enumerate(raw):
-        try:
-            found.append(ProvenLine(index, SealedLine(line, ""), _step(line, index + 1)))
-        except ValueError:
-            break
     return tuple(found)
 
 
@@ -431,7 +403,7 @@ def _head(line: bytes, place: str) -> tuple[_Head | None, str]:
         return None, "its checksum is wrong"
     try:
         written = msgspec.json.decode(found.content, type=_Version)
-        if written.schema not in (SCHEMA, SCHEMA_1):
+        if written.schema != SCHEMA:
             raise SessionFileError(
                 f"{place}: written as '{written.schema}' by cocalib {written.cocalib}, but this version reads '{SCHEMA}'; "
                 "open it with that version, or give another --session folder"
@@ -439,24 +411,16 @@ def _head(line: bytes, place: str) -> tuple[_Head | None, str]:
         head = msgspec.json.decode(found.content, type=_Head)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         return None, str(error)
-    if head.schema != (SCHEMA if found.sum else SCHEMA_1):
-        return None, "its checksum is missing"
-    return head, ""
+    return (head, "") if found.sum else (None, "its checksum is missing")
 
 
-def _step(content: bytes, number: int | None) -> Step:
+def _step(content: bytes) -> Step:
     """Parse a step.
 
     Raises:
-        ValueError: it is none, or has another number.
+        ValueError: it is none.
     """
     try:
-        read = msgspec.json.decode(content, type=Line, dec_hook=from_json)
-        step: Step = read.step
-        if isinstance(step, OptionsChanged):
-            step = OptionsChanged.of(kept_options(step.options))
+        return msgspec.json.decode(content, type=Line, dec_hook=from_json).step
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError, CalibrationError) as error:
         raise ValueError(str(error)) from error
-    if number is not None and read.n != number:
-        raise ValueError(f"found step {read.n}, expected step {number}")
-    return step

@@ -12,8 +12,7 @@ from cocalib.session import AxesStated, History, RecordingFacts, Step
 from cocalib.session.file.contents import Contents, read_contents, rewrite
 from cocalib.session.file.guarded_folder import FolderLock, GuardedFolder, SessionFileError
 from cocalib.session.file.identity import recording_form
-from cocalib.session.file.journal import COPY, JOURNAL, Journal, bytes_of, new_lines
-from cocalib.session.file.snapshot import SNAPSHOT
+from cocalib.session.file.journal import COPY, JOURNAL, Journal, SealedLine, bytes_of, first_line
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +24,6 @@ class Restored:
         history: the session, with what can be undone and redone.
         steps: how many steps the journal held; 0 for a new session.
         torn_bytes: length of a half-written last line that was dropped; it had never been confirmed.
-        from_snapshot: of an earlier version, whose journal was missing or shorter than its snapshot, which was used.
         warnings: what else the user must know before continuing.
     """
 
@@ -33,14 +31,11 @@ class Restored:
     history: History
     steps: int = 0
     torn_bytes: int = 0
-    from_snapshot: bool = False
     warnings: tuple[DataWarning, ...] = ()
 
     @property
     def note(self) -> str:
         """A sentence about anything unusual; "" if there is nothing."""
-        if self.from_snapshot:
-            return "The journal was missing or damaged. The clicks are from the last snapshot; earlier changes cannot be undone."
         if self.torn_bytes:
             return "The program stopped while the last change was being written; it is not in the session."
         return ""
@@ -214,7 +209,7 @@ def _opened(
 ) -> SessionFile:
     found = read_contents(folder, facts)
     if found is None:
-        lines = new_lines(recording_form(facts), (), cocalib=version())
+        lines: tuple[SealedLine, ...] = (first_line(recording_form(facts), cocalib=version()),)
         folder.replace(JOURNAL, bytes_of(lines))
         restored = Restored(folder.path, History(), warnings=warnings)
     else:
@@ -223,10 +218,9 @@ def _opened(
         if not found.is_written:
             rewrite(folder, found)
         elif found.faults:
-            for name in (COPY, SNAPSHOT):
-                folder.back_up(name)
+            folder.back_up(COPY)
         torn = found.torn_bytes if found.is_written else 0
-        restored = Restored(folder.path, found.history, len(lines) - 1, torn, found.from_snapshot, about)
+        restored = Restored(folder.path, found.history, len(lines) - 1, torn, about)
     journal = Journal(folder, lines)
     opened = SessionFile(folder, lock, journal, restored, facts.name)
     if found is not None and found.stated_axes != facts.radar_axes:
@@ -254,9 +248,8 @@ def _about(found: Contents, facts: RecordingFacts, folder: GuardedFolder) -> tup
 
 def _about_faults(found: Contents) -> tuple[DataWarning, ...]:
     clicks = len(found.history.present.clicks)
-    source = "the snapshot, with what follows it in the journal" if found.from_snapshot else "the journal and its copy"
     message = (
-        f"the session was damaged: {'; '.join(found.faults)}; it continues with the {clicks} clicks in {source}; "
+        f"the session was damaged: {'; '.join(found.faults)}; it continues with the {clicks} clicks in the journal and its copy; "
         "as far as the files show, none is missing"
     )
     hint = "the damaged files are kept next to the new ones, with .backup-1 or the next number in their names"

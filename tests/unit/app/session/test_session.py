@@ -74,7 +74,6 @@ def ids(session: Session) -> list[str]:
     ("events", "expected"),
     [
         ((place(3),), PLACED),
-        ((place(3), ClickPlaced(TIMES[3], (99.5, 88.25), mark=None)), replace(PLACED, u_px=99.5, v_px=88.25)),
         ((GUESSED, place(3)), PLACED),
         ((GUESSED, ClickMoved("c1", (3.5, 1.0))), replace(PLACED, u_px=3.5, mark="moved")),
         ((place(3), ClickMoved("c1", (1.5, 2.5))), replace(PLACED, u_px=1.5, v_px=2.5, mark="moved")),
@@ -82,7 +81,7 @@ def ids(session: Session) -> list[str]:
         ((place(3), ClickExcluded("c1", True), ClickExcluded("c1", False)), PLACED),
         ((place(3), imported(3, "p1", sigma_px=0.5)), ReflectorClick(TIMES[3], "p1", 5.0, 5.0, sigma_px=0.5)),
     ],
-    ids=["placed", "older journal", "guess marked", "guess moved", "moved", "excluded", "included", "imported"],
+    ids=["placed", "guess marked", "guess moved", "moved", "excluded", "included", "imported"],
 )
 def test_a_frames_only_click_is_what_the_last_event_made_it(events, expected):
     session = session_of(*events)

@@ -260,15 +260,9 @@ class Killed(BaseException):
 
 
 @pytest.mark.parametrize("survived", range(4))
-@pytest.mark.parametrize(("kind", "expected"), [("cut", [1.0, 2.0, 3.0]), ("session-1", [0.30000000000000004, 5.0])])
-def test_a_kill_between_the_writes_of_a_repair_loses_nothing(
-    folder, monkeypatch, project_root, kind, expected, survived
-):
-    if kind == "cut":
-        kept(folder, *map(place, (1, 2, 3)))
-        (folder / JOURNAL).write_bytes(lines_of(folder)[0] + b"\n")
-    else:
-        shutil.copytree(project_root / "tests" / "golden" / kind, folder)
+def test_a_kill_between_the_writes_of_a_repair_loses_nothing(folder, monkeypatch, survived):
+    kept(folder, *map(place, (1, 2, 3)))
+    (folder / JOURNAL).write_bytes(lines_of(folder)[0] + b"\n")
     real, calls = GuardedFolder.create, []
 
     def create(self: GuardedFolder, name: str, data: bytes) -> None:
@@ -281,7 +275,7 @@ def test_a_kill_between_the_writes_of_a_repair_loses_nothing(
         patch.setattr(GuardedFolder, "create", create)
         with pytest.raises(Killed):
             open_session_file(folder, FACTS)
-    assert clicks_in(folder) == expected
+    assert clicks_in(folder) == [1.0, 2.0, 3.0]
 
 
 @POSIX

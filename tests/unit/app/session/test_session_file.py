@@ -9,7 +9,6 @@ import subprocess
 import sys
 from collections import Counter
 from dataclasses import replace
-from functools import reduce
 from pathlib import Path
 
 import numpy as np
@@ -59,9 +58,9 @@ from tests.unit.app.session.drive import (
 )
 from tests.unit.app.session.test_session import CHOSEN
 
-EARLIER_STEPS = (
-    ClickPlaced(TIMES[3], (100.1, 200.2), None),
-    ClickPlaced(TIMES[1], (0.1 + 0.2, 1e-17), None),
+STEPS = (
+    ClickPlaced(TIMES[3], (100.1, 200.2)),
+    ClickPlaced(TIMES[1], (0.1 + 0.2, 1e-17)),
     ClickMoved("c1", (101.0, 201.0)),
     OptionsChanged.of(
         CalibrationOptions(method="paper", solving=SolvingOptions(CameraPositionPrior((0.1, 0.2, 0.3), 0.01)))
@@ -73,10 +72,6 @@ EARLIER_STEPS = (
     ClickRemoved("c1"),
     Cleared(),
     Undo(),
-)
-"""Those of tests/golden/session-1, of a version that kept one click per frame."""
-STEPS = (
-    *EARLIER_STEPS,
     Undo(),
     ClickPlaced(TIMES[3], (300.5, 20.25), "snapped", 0.3),
     ClickPlaced(TIMES[4], (30.5, 20.25), "untouched"),
@@ -286,62 +281,20 @@ def test_a_copy_of_another_journal_is_refused_until_a_person_decides(tmp_path, f
     refused(tmp_path / "a", r"do not belong together.*cocalib session repair")
 
 
-WITH_SNAPSHOT = {
-    "whole": (33, "", ""),
-    "killed": (33, "", ""),
-    "killed-early": (4, "", ""),
-    "repaired": (8, "", ""),
-    "torn": (33, "not in the session", ""),
-    "cut": (8, "from the last snapshot", "the journal holds 6 steps, its snapshot 33"),
-    "damaged": (10, "from the last snapshot", "line 6 is damaged"),
-    "snapshot-only": (8, "from the last snapshot", ""),
-}
-"""Steps, note and warning of the sessions in tests/golden/session-2, of a version that kept a snapshot."""
+def test_a_session_that_was_written_once_is_opened_as_it_is(tmp_path, project_root):
+    history = kept(tmp_path / "new", *STEPS)
+    golden = project_root / "tests" / "golden" / "session-2" / JOURNAL
+    shutil.copytree(golden.parent, tmp_path / "old")
+    found = restored(tmp_path / "old")
+    assert (found.history, found.steps, found.note, found.warnings) == (history, len(STEPS), "", ())
+    assert files(tmp_path / "old")[JOURNAL] == golden.read_bytes()
 
 
-@pytest.fixture
-def golden(project_root: Path) -> Path:
-    return project_root / "tests" / "golden"
-
-
-@pytest.mark.parametrize("case", WITH_SNAPSHOT)
-def test_a_session_of_a_version_with_snapshots_is_opened(tmp_path, golden, case):
-    steps, note, warning = WITH_SNAPSHOT[case]
-    shutil.copytree(golden / "session-2" / case, tmp_path, dirs_exist_ok=True)
-    before = files(tmp_path)
-    found = restored(tmp_path)
-    present = found.history.present
-    assert len(present.clicks) == (2 if case == "killed-early" else 6)
-    if case != "killed-early":
-        assert (present.column_map, present.confirmed, len(present.boxes)) == (("x=a",), ("metres",), 1)
-        assert present.intrinsics is not None
-    assert found.steps == steps
-    assert note in found.note
-    assert [warning in one.message for one in found.warnings] == [True] * bool(warning)
-    for name, content in files(tmp_path).items():
-        assert before.get(name.removesuffix(".backup-1"), content) == content or not name.endswith(".backup-1")
-    if not found.from_snapshot and case != "torn":
-        assert {name: content for name, content in files(tmp_path).items() if "copy" not in name} == before
-    again = restored(tmp_path)
-    assert (again.history, again.warnings) == (found.history, ())
-
-
-def test_a_session_of_the_earlier_version_is_opened_and_written_again_with_checksums(tmp_path, golden):
-    shutil.copytree(golden / "session-1", tmp_path / "whole")
-    shutil.copytree(golden / "session-1", tmp_path / "cut")
-    before = files(tmp_path / "whole")
-    history = reduce(lambda history, step: advance(history, step, FACTS), EARLIER_STEPS, History())
-    found = restored(tmp_path / "whole")
-    assert (found.history, found.warnings) == (history, ())
-    assert {name: files(tmp_path / "whole")[f"{name}.backup-1"] for name in before} == before
-    assert b"cocalib/session-2" in files(tmp_path / "whole")[JOURNAL]
-    assert restored(tmp_path / "whole").history == history
-    (tmp_path / "cut" / JOURNAL).write_bytes(lines_of(tmp_path / "cut")[0] + b"\n")
-    found = restored(tmp_path / "cut")
-    assert [click.id for click in found.history.present.clicks] == ["c2", "p1"], "those of the snapshot"
-    assert found.warnings[0].code == "session-damaged"
-    shutil.copytree(golden / "session-2" / "damaged-at-the-end", tmp_path / "damaged")
-    refused(tmp_path / "damaged", "line 34 is damaged")
+def test_a_journal_without_checksums_is_damaged(tmp_path):
+    kept(tmp_path, place(1))
+    (tmp_path / JOURNAL).write_bytes(b"".join(taken_apart(line).content + b"\n" for line in lines_of(tmp_path)))
+    (tmp_path / COPY).unlink()
+    refused(tmp_path, "its checksum is missing")
 
 
 def test_the_copy_has_every_step_when_it_is_confirmed(tmp_path):
