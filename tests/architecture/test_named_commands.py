@@ -86,7 +86,6 @@ def test_every_option_that_the_program_names_exists(texts):
     unknown = {
         path: names
         for path, strings in texts.items()
-        if not path.endswith("cli/old_names.py")
         if (names := {flag for text in strings for flag in _FLAG.findall(text)} - ANY_FLAG - OTHER_PROGRAMS)
     }
     assert unknown == {}

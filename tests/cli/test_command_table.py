@@ -88,28 +88,6 @@ def test_a_tyro_without_those_events_still_runs_commands_and_prints_its_own_erro
     assert "--bogus" in answer.err
 
 
-@pytest.mark.parametrize(
-    ("typed", "today"),
-    [
-        ("propose a.bag --json", "solve --propose a.bag --json"),
-        ("compare a.json b.json", "check b.json --against a.json"),
-        ("compare --same-sensors a b c d --boxes e", "check b --against a --same-sensors --boxes e --recording c d"),
-        ("report a.json --out b.html", "evaluate a.json --report b.html"),
-        ("report a.json b.bag --out c.html --pdf", "evaluate a.json b.bag --report c.html --report c.pdf"),
-        ("video a.bag --overlay --calibration b.json --out c.mp4", "show a.bag --calibration b.json --out c.mp4"),
-        ("record-rrd a.bag --calibration b.json --out c.rrd", "show a.bag --calibration b.json --out c.rrd"),
-        ("rerun a.bag --calibration b.json --web", "show a.bag --calibration b.json --web"),
-        ("fleet history V1 out", "batch history V1 out"),
-    ],
-)
-def test_an_old_name_runs_and_says_what_to_type_now(cocalib, tmp_path, monkeypatch, typed, today):
-    monkeypatch.chdir(tmp_path)
-    answer = cocalib(*typed.split())
-    assert answer.code == 2, "there are no such files"
-    assert answer.err.splitlines()[0] == f"cocalib: this is now: cocalib {today}"
-    assert answer.err.splitlines()[1:] == cocalib(*today.split()).err.splitlines()
-
-
 def imported_after(*arguments: str) -> set[str]:
     """Run the command in a fresh interpreter and return what it imported."""
     code = (

@@ -6,7 +6,6 @@ A command imports only what it needs: `--version` and `--help` need neither NumP
 
 import contextlib
 import os
-import shlex
 import signal
 import sys
 from collections.abc import Sequence
@@ -14,7 +13,6 @@ from collections.abc import Sequence
 from calib_core.errors import CalibrationError, InputError, NoAnswerError, meant
 from cocalib.cli.commands import COMMANDS, PROGRAM, Command, overview
 from cocalib.cli.exit_codes import NO_ANSWER
-from cocalib.cli.old_names import OLD_NAMES, OldName
 from cocalib.platform.error_boundary import INTERNAL_ERROR, error_boundary
 from cocalib.platform.terminal import escaped_output
 
@@ -81,8 +79,6 @@ def _run(first: str = "--help", *others: str) -> int:
 
         print(f"{PROGRAM} {version()}")
         return 0
-    if first in OLD_NAMES:
-        return _run_old(OLD_NAMES[first], others)
     if first not in COMMANDS:
         raise InputError(f"{_unknown(first)}; see {PROGRAM} --help")
     if "-h" in others or "--help" in others:
@@ -90,14 +86,6 @@ def _run(first: str = "--help", *others: str) -> int:
     from cocalib.cli.usage import read_command
 
     return read_command(COMMANDS[first], others).run()
-
-
-def _run_old(old: OldName, arguments: Sequence[str]) -> int:
-    """Print the command line of today, and run it."""
-    today = (old.command, *old.arguments(arguments))
-    print(f"{PROGRAM}: this is now: {PROGRAM} {shlex.join(today)}", file=sys.stderr)
-    code = _run(*today)
-    return code if old.told_by_code(arguments) else 0
 
 
 def _help(command: Command, *, everything: bool) -> int:

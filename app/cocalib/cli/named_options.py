@@ -3,7 +3,6 @@
 A name is its path in the dataclass of options, as in the `options` of calibration.json.
 """
 
-import re
 import tomllib
 import typing
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,7 +23,6 @@ Settings: TypeAlias = Annotated[
 Named = TypeVar("Named")
 
 _UNSET = "none"
-_FLAG = re.compile(r"--([a-z][\w-]*(?:\.[a-z][\w-]*)*)(?:=(.*))?", re.DOTALL)
 
 
 def with_named(options: Named, settings: Sequence[str], file: Path | None = None) -> Named:
@@ -63,42 +61,6 @@ def names_of(kind: type[Any], prefix: str = "") -> Iterator[str]:
             yield from names_of(hints[field.name], f"{prefix}{field.name}.")
         else:
             yield f"{prefix}{field.name}"
-
-
-def flags_to_settings(arguments: Sequence[str], kind: type[Any], flags: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Replace flags that were options of their own in earlier versions, by `--set`: with a group, as in --GROUP.NAME 3.
-
-    Args:
-        arguments: as typed.
-        kind: the dataclass of options.
-        flags: of the command today.
-
-    Returns:
-        The arguments to parse, and the replacements.
-    """
-    known = {f"--{name.replace('_', '-')}": name for name in names_of(kind)}
-    taken, told = [], []
-    left = list(arguments)
-    while left:
-        token = left.pop(0)
-        match = _FLAG.fullmatch(token)
-        flag = "" if match is None else f"--{match[1]}".replace("_", "-")
-        if match is None or flag not in known or flag in flags or (match[2] is None and not left):
-            taken.append(token)
-            continue
-        count = len(typing.get_args(_tuple_of(kind, known[flag]))) or 1
-        value = ",".join(left[:count]) if match[2] is None else match[2]
-        del left[: count if match[2] is None else 0]
-        taken += ["--set", f"{known[flag]}={value}"]
-        told.append(f"--set {known[flag]}={value}")
-    return taken, told
-
-
-def _tuple_of(kind: type[Any], name: str) -> Any:
-    """Return the type of an option if it is a tuple, else None."""
-    for part in name.split("."):
-        kind = typing.get_type_hints(kind)[part]
-    return kind if typing.get_origin(kind) is tuple else None
 
 
 def _put(tree: dict[str, Any], path: Sequence[str], value: str) -> None:

@@ -1,13 +1,11 @@
 """Parse a command's arguments; report wrong usage in one line that suggests a correction."""
 
-import sys
 from collections.abc import Sequence
 from difflib import get_close_matches
 from typing import NoReturn
 
 from calib_core.errors import InputError
 from cocalib.cli.commands import PROGRAM, Command, Runnable
-from cocalib.cli.named_options import flags_to_settings
 from cocalib.cli.tyro_hook import (
     Argument,
     BadValue,
@@ -21,14 +19,6 @@ from cocalib.cli.tyro_hook import (
 )
 from cocalib.platform.terminal import with_colours
 
-_GONE = {
-    "fleet-prior": "each pose rests on its own pairs; add placements, or give --camera-position-m",
-    "prior": "each pose rests on its own pairs; batch compare shows how vehicles differ",
-    "parquet": "use --csv, which has the same columns",
-    "shard": "give --scheduler ADDRESS, or batches with manifests of their own and one --out",
-    "engine": "use --workers 1 for none, --scheduler ADDRESS for dask",
-}
-"""Options and values that are gone, each with what replaces it."""
 _MEANT = {"format": "--to", "o": "--out", "file": "--out", "intrinsics": "--camera", "extrinsics": "--calibration"}
 """What people call an option, and its name."""
 _UNASKED = {"Demo": "; for your own recording: cocalib open {}", "Simulate": "; did you mean --out {}?"}
@@ -52,11 +42,6 @@ def read_command(command: Command, arguments: Sequence[str]) -> Runnable:
     def refuse(fault: Fault) -> NoReturn:
         raise InputError(f"{_reason(fault, kind)}; see {program} --help")
 
-    named = getattr(kind, "NAMED", None)
-    if named is not None:
-        arguments, settings = flags_to_settings(arguments, named, tuple(flags_of(kind)))
-        if settings:
-            print(f"{PROGRAM}: options are set by name now: {' '.join(settings)}", file=sys.stderr)
     with with_colours():  # of the help
         return parse(kind, arguments, program=program, refuse=refuse)
 
@@ -70,8 +55,6 @@ def _reason(fault: Fault, kind: type[Runnable]) -> str:
             return f"{' and '.join(map(_typed, arguments))} {'is' if len(arguments) == 1 else 'are'} missing"
         case MissingValue(argument):
             return f"{argument.name} needs a value: {_typed(argument)}"
-        case WrongChoice(argument, value, _) if value in _GONE:
-            return f"{argument.name} {value} went in 0.1: {_GONE[value]}"
         case WrongChoice(argument, value, choices) if near := get_close_matches(value.lower(), choices, n=1):
             return f"{argument.name} {value}: did you mean {near[0]}?"
         case WrongChoice(argument, value, choices):
@@ -98,8 +81,6 @@ def _unknown(token: str, kind: type[Runnable]) -> str:
     if not token.startswith("-"):
         return f"unexpected argument '{token}'" + _UNASKED.get(kind.__name__, "").format(token)
     flag = token.split("=")[0].replace("_", "-")
-    if flag.removeprefix("--") in _GONE:
-        return f"{flag} went in 0.1: {_GONE[flag.removeprefix('--')]}"
     known = sorted({"--help", *flags_of(kind)})
     near = [other for other in known if other == _MEANT.get(flag.lstrip("-"))]
     near = near or [other for other in known if flag.strip("-") and other.endswith(flag.lstrip("-"))]
