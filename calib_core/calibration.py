@@ -233,7 +233,7 @@ def solve_again(calibration: Calibration, options: CalibrationOptions | None = N
     if len(kept) < len(calibration.pairs):
         raise InputError(
             f"{len(calibration.pairs) - len(kept)} of {len(calibration.pairs)} pairs have no candidates, as in files that "
-            "older versions and other tools wrote; solve from the recording and the clicks"
+            "other tools wrote; solve from the recording and the clicks"
         )
     options = options or calibration.options
     if options.models_noise:

@@ -16,9 +16,6 @@ from calib_core.errors import OptionError
 Method: TypeAlias = Literal["default", "paper"]
 """The names of `METHODS`, in `calib_core.calibration`."""
 
-RETIRED_METHODS = ("pmm", "ccm")
-"""Methods of older versions. Calibrations that were made by them are still read, and cannot be solved again by them."""
-
 
 def option(default: Any, text: str, *, low: float = -math.inf, high: float = math.inf) -> Any:
     """Make the field of an option; its text and range are kept in the field's metadata.
@@ -392,8 +389,8 @@ def _check_type(leaf: OptionField, value: object) -> None:
     """
     kind = kind_of(leaf)
     if kind == "choice" and value not in typing.get_args(leaf.type):
-        fault = f"'{value}' was of older versions only" if value in RETIRED_METHODS else f"unknown value '{value}'"
-        raise OptionError(f"option {leaf.path}: {fault}; choose {' or '.join(typing.get_args(leaf.type))}")
+        choices = " or ".join(typing.get_args(leaf.type))
+        raise OptionError(f"option {leaf.path}: unknown value '{value}'; choose {choices}")
     if kind == "camera-position":
         words = "a CameraPositionPrior or None"
         fits = value is None or isinstance(value, CameraPositionPrior)

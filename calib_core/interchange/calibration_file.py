@@ -227,8 +227,8 @@ class CalibrationFile:
         provenance: where it comes from.
         kept: what stays as it was read when the file is rewritten: results unknown to this version, and those that follow from
             others, which another processor would round differently.
-        verdict: how far to trust it, as it was judged when it was solved; None in files of older versions and other tools.
-        evidence: what the pose rests on, as the file states it; None in files of older versions.
+        verdict: how far to trust it, as it was judged when it was solved; None in files of other tools.
+        evidence: what the pose rests on, as the file states it; None if it states nothing.
         vehicle: what is stated of the vehicle and its sensors.
         corrected: the calibration that this one was made from, if its pose is for radar data as reported, without corrections.
         aed_either_way_px: what `raw_data.aed_either_way` found through the lens, of a file for rectified pictures; else None.

@@ -219,9 +219,6 @@ def _refusal(content: Content, source: str) -> InputError:
         return InputError(f"{source}: {no_text(content.data, 'a calibration')}; {_KNOWN}")
     if content.syntax == "xml" and content.value is None:
         return InputError(f"{source}: XML with <{content.root.tag}>; expected OpenCV's <opencv_storage>")
-    if content.syntax == "mcap":
-        names = ", ".join(message.schema_name for message in content.mcap.messages[:12])
-        return InputError(f"{source}: MCAP without foxglove.FrameTransforms (found {names or 'no message'}); {_KNOWN}")
     if not content.text.strip():
         return InputError(f"{source}: the file is empty; {_KNOWN}")
     value = content.value

@@ -350,7 +350,6 @@ _CODES: dict[Consequence, tuple[str, ...]] = {
     "contradictory": (
         "clocks-apart",
         "behind-camera",
-        "outside-picture",  # in files of earlier versions only
         "mirrored-axes",
         "units-suspected",
         "pixels-suspected",
@@ -365,7 +364,6 @@ _CODES: dict[Consequence, tuple[str, ...]] = {
         "lost-returns",
         "rests-on-fleet-prior",
         "off-its-kind",
-        "swapped-parts",  # likewise
         "many-outliers",
         "intrinsics-suspected",
         "shared-error-suspected",

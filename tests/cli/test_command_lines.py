@@ -211,7 +211,7 @@ _TABLE = [
     (2, "export good.json --to urdf --out good.json", "holds something else, which is not overwritten"),
     (2, "export good.json --to urdf --out word.yaml", "holds something else, which is not overwritten"),
     *((0, f"export good.json --to {to} --out {to}", "") for to in 2 * ("urdf", "matlab", "matrix", "colmap")),
-    (2, "export a.json --to tf1-launch", "format 'tf1-launch' went in 0.1: use tf2 or tf2-launch-py"),
+    (2, "export a.json --to tf1-launch", "unknown format 'tf1-launch'"),
     (
         2,
         "export golden.json --to kitti",

@@ -81,21 +81,6 @@ def test_solve_refines_the_intrinsics_and_solves_its_file_again(cocalib, pairs_f
     assert cocalib("check", again, "--of", out).code == 0
 
 
-def test_a_calibration_by_a_method_of_older_versions_is_read_and_solved_again_by_another(cocalib, pairs_file, tmp_path):
-    old, again = tmp_path / "old.json", tmp_path / "again.json"
-    assert cocalib("solve", "--pairs", pairs_file, "--out", old).code == 0
-    document = json.loads(old.read_text())
-    document["options"] |= {"method": "ccm", "board": {"columns": 9, "registration": "linear"}}
-    old.write_text(json.dumps(document))
-    assert cocalib("check", old).code == 0
-    answer = cocalib("solve", "--pairs", old, "--out", again)
-    assert answer.code == 2
-    assert "'ccm' was of older versions" in answer.err
-    assert "choose default or paper" in answer.err
-    assert cocalib("solve", "--pairs", old, "--out", again, "--method", "default").code == 0
-    assert json.loads(again.read_text())["camera_from_radar"] == document["camera_from_radar"]
-
-
 def test_info_names_the_topics_as_text_and_as_json(cocalib, made):
     names = {"/radar/points", "/camera/image/compressed", "/camera/camera_info"}
     text, data = cocalib("info", made()), cocalib("info", made("again"), "--json")

@@ -1,4 +1,4 @@
-"""Our files in the hands of readers that are not ours, and files that earlier versions wrote.
+"""Our files in the hands of readers that are not ours.
 
 xacro, pytransform3d, pyquaternion, PyYAML, SciPy, OpenCV, COLMAP."""
 
@@ -19,15 +19,12 @@ from scipy.spatial.transform import Rotation
 from calib_core.errors import InputError
 from calib_core.interchange import (
     CalibrationFile,
-    check,
     export,
     format_named,
-    imported,
     parent_pose,
     read_any,
     read_camera,
 )
-from tests.kept_files import KEPT, kept_file
 
 BODY_FROM_OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 POINT_RADAR_M = np.array([8.0, -1.5, 0.4])
@@ -171,34 +168,3 @@ def test_camera_info_is_loaded_as_ros_does_and_by_camera_option(file):
     camera = read_camera(text)
     assert np.array_equal(camera.matrix_px, file.calibration.camera.matrix_px)
     assert np.array_equal(camera.distortion, file.calibration.camera.distortion)
-
-
-# Formats that are no longer written: what earlier versions exported is read as the calibration that it was made from.
-
-
-@pytest.mark.parametrize("name", KEPT)
-def test_it_is_read_as_its_calibration(file, name):
-    found = read_any(kept_file(name))
-
-    assert (found.format, found.frames, found.evidence, found.assumptions) == (name, file.frames, "clicked", ())
-    np.testing.assert_allclose(
-        found.camera_from_radar.as_matrix(), file.calibration.camera_from_radar.as_matrix(), rtol=0, atol=1e-12
-    )
-    np.testing.assert_array_equal(found.check_point.radar_m, file.check_point.radar_m)
-    report = check(found, of=imported(file), camera=file.calibration.camera)
-    assert report.verdict == "right"
-
-
-@pytest.mark.parametrize("name", ["koide3", "openlabel", "foxglove", "numpy"])
-def test_its_lens_is_read(file, name):
-    camera, wanted = read_any(kept_file(name)).camera, file.calibration.camera
-
-    assert (camera.width_px, camera.height_px) == (wanted.width_px, wanted.height_px)
-    np.testing.assert_array_equal(camera.matrix_px, wanted.matrix_px)
-    np.testing.assert_array_equal(camera.distortion, wanted.distortion)
-
-
-@pytest.mark.parametrize("name", KEPT)
-def test_it_is_no_longer_written(file, name):
-    with pytest.raises(InputError, match=f"format '{name}' went in 0.1: use "):
-        export(file, name)

@@ -126,10 +126,10 @@ def test_a_pose_without_pairs_says_so(solved):
         solve_again(replace(solved, pairs=()))
 
 
-def test_pairs_without_candidates_cannot_be_solved_again_and_the_error_says_so(project_root):
-    earlier = (project_root / "tests" / "golden" / "calibration-1-earlier.json").read_text(encoding="utf-8")
-    with pytest.raises(InputError, match=r"^earlier\.json: .* pairs have no candidates") as refusal:
-        solve_pairs(GivenPairs.read(earlier, "earlier.json"))
+def test_pairs_without_candidates_cannot_be_solved_again_and_the_error_says_so(solved):
+    bare = calibration_text(replace(solved, pairs=tuple(replace(pair, measured=None) for pair in solved.pairs)))
+    with pytest.raises(InputError, match=r"^bare\.json: .* pairs have no candidates") as refusal:
+        solve_pairs(GivenPairs.read(bare, "bare.json"))
     assert "\n" not in str(refusal.value)
 
 

@@ -1,4 +1,4 @@
-"""Foxglove's FrameTransforms and CameraCalibration messages, as JSON or in an MCAP file of JSON messages."""
+"""Foxglove's FrameTransforms and CameraCalibration messages as JSON."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -10,20 +10,10 @@ from calib_core.interchange.calibration_file import FrameNames
 from calib_core.interchange.cameras.fields import find_cameras, floats
 from calib_core.interchange.format import ImportedCalibration, Reads, WrittenPose, posed_between
 from calib_core.interchange.formats.pose_parts import Ends, choose_transform
-from calib_core.interchange.formats.statement import STATEMENT_KEY, stated_frames, with_statement
-from calib_core.interchange.syntax.content import Content, decoded
-from calib_core.interchange.syntax.mcap_file import McapFile
-from calib_core.interchange.syntax.strict_json import json_value
-
-_TRANSFORMS, _CAMERA = "foxglove.FrameTransforms", "foxglove.CameraCalibration"
-_TRANSFORM = "foxglove.FrameTransform"
-_READ_SCHEMAS = (_TRANSFORMS, _TRANSFORM)
-_TEXT = "statement"
+from calib_core.interchange.syntax.content import Content
 
 
 def _recognizes(content: Content) -> bool:
-    if content.syntax == "mcap":
-        return any(message.schema_name in _READ_SCHEMAS for message in content.mcap.messages)
     messages = content.json_mapping
     return "FrameTransform" in messages or bool(listed_transforms(messages)) or "parent_frame_id" in messages
 
@@ -58,43 +48,18 @@ def posed_frames(transform: Any, *, source: str, place: str) -> tuple[str, str, 
 
 
 def _read(content: Content, source: str) -> ImportedCalibration:
-    """Read an MCAP file that we wrote, or as JSON a FrameTransform or the one of FrameTransforms between a radar and a camera.
-
-    A CameraCalibration may be with it.
+    """Read a FrameTransform, or the one of FrameTransforms between a radar and a camera; a CameraCalibration may be with it.
 
     Raises:
         InputError: a frame name or a number is missing, or there are several transforms.
     """
-    if content.syntax != "mcap":
-        return _read_messages(content.json_mapping, None, source)
-    text = content.mcap.metadata.get(STATEMENT_KEY, {}).get(_TEXT, "")
-    found = _read_messages(_messages(content.mcap, source=source), stated_frames(text), source)
-    return with_statement(found, text)
-
-
-def _messages(file: McapFile, *, source: str) -> dict[str, Any]:
-    """Return the transforms and the CameraCalibration of an MCAP file, as they are called in JSON."""
-    found: dict[str, Any] = {}
-    transforms: list[Any] = []
-    for message in file.messages:
-        value = json_value(decoded(message.data, source=source), source=source)
-        if message.schema_name == _TRANSFORMS and isinstance(value, Mapping):
-            listed = value.get("transforms")
-            transforms += listed if isinstance(listed, list) else []
-        elif message.schema_name == _TRANSFORM:
-            transforms.append(value)
-        elif message.schema_name == _CAMERA:
-            found["CameraCalibration"] = value
-    return {"FrameTransforms": {"transforms": transforms}, **found}
-
-
-def _read_messages(messages: Mapping[str, Any], stated: FrameNames | None, source: str) -> ImportedCalibration:
+    messages = content.json_mapping
     message, listed = messages.get("FrameTransform", messages), listed_transforms(messages)
     if listed:
         ends = [Ends(str(one.get("parent_frame_id") or ""), str(one.get("child_frame_id") or "")) for one in listed]
-        message = listed[choose_transform(ends, stated, source=source)]
+        message = listed[choose_transform(ends, None, source=source)]
     parent, child, written = posed_frames(message, source=source, place="FrameTransform")
-    roles = posed_between(parent, child, stated or _frames_of(messages, parent, child), written)
+    roles = posed_between(parent, child, _frames_of(messages, parent, child), written)
     cameras = find_cameras(messages, source=source) if "CameraCalibration" in messages else ()
     return ImportedCalibration(
         "foxglove",

@@ -10,12 +10,6 @@ from calib_core.interchange.cameras.camera_format import FoundCamera
 from calib_core.interchange.cameras.fields import floats, lens_model_named
 from calib_core.interchange.format import ImportedCalibration, Reads, WrittenPose
 from calib_core.interchange.formats.pose_parts import pinhole_matrix, with_camera
-from calib_core.interchange.formats.statement import (
-    STATEMENT_KEY,
-    stated_check_point,
-    stated_frames,
-    stated_lines,
-)
 from calib_core.interchange.syntax.content import Content
 
 _KEY = "T_lidar_camera"
@@ -40,8 +34,6 @@ def _read(content: Content, source: str) -> ImportedCalibration:
             f"the file that has {_KEY}"
         )
     numbers = floats(results[_KEY], source=source, place=f"results.{_KEY}", length=7)
-    text = stated_lines(content.mapping.get(STATEMENT_KEY))
-    frames = stated_frames(text)
     meta = content.mapping.get("meta")
     topic = str(meta.get("points_topic") or "") if isinstance(meta, Mapping) else ""
     points = f"the points of {topic}" if topic else "the points it was made with"
@@ -49,9 +41,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     found = ImportedCalibration(
         "koide3",
         WrittenPose("quaternion_xyzw", np.array(numbers[3:]), np.array(numbers[:3]), "radar_from_camera"),
-        frames=frames,
-        check_point=stated_check_point(text),
-        assumptions=() if frames else (f"assumed that {points} are the radar's, x forward, y left, z up",),
+        assumptions=(f"assumed that {points} are the radar's, x forward, y left, z up",),
         notes=notes,
     ).checked(source)
     return with_camera(found, camera, source=source)
@@ -65,13 +55,12 @@ def _camera(block: Any, *, source: str) -> tuple[FoundCamera | None, tuple[str, 
     if model not in _MODELS:
         return None, (f"the camera model {model!r} is not supported and was left out",)
     intrinsics = floats(block["intrinsics"], source=source, place="camera.intrinsics", length=4)
-    size = floats(block.get("image_size", ()), source=source, place="camera.image_size")
     camera = FoundCamera(
         name="camera",
         model=lens_model_named(model, source=source),
         matrix_px=pinhole_matrix(*intrinsics),
         distortion=floats(block.get("distortion_coeffs", ()), source=source, place="camera.distortion_coeffs"),
-        size_px=(int(size[0]), int(size[1])) if len(size) == 2 else None,
+        size_px=None,
     )
     return camera, ()
 

@@ -12,12 +12,6 @@ from calib_core.interchange.cameras.camera_format import FoundCamera
 from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.format import ImportedCalibration, Reads, WrittenPose, looks_like_camera, looks_like_radar
 from calib_core.interchange.formats.pose_parts import direction_by_facing, rigid, rigid_matrix, with_camera
-from calib_core.interchange.formats.statement import (
-    STATEMENT_KEY,
-    stated_check_point,
-    stated_frames,
-    stated_lines,
-)
 from calib_core.interchange.syntax.content import Content
 
 _ASSUMPTIONS = (
@@ -40,17 +34,14 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     """
     label = content.mapping["openlabel"]
     systems = {str(name): system for name, system in _mapping(label, "coordinate_systems").items()}
-    streams, metadata = _mapping(label, "streams"), _mapping(label, "metadata")
-    text = stated_lines(metadata.get(STATEMENT_KEY))
-    stated = stated_frames(text)
-    radar = stated.radar if stated and stated.radar in systems else _one(systems, streams, "radar", source=source)
-    camera = stated.camera if stated and stated.camera in systems else _one(systems, streams, "camera", source=source)
+    streams = _mapping(label, "streams")
+    radar, camera = (_one(systems, streams, role, source=source) for role in ("radar", "camera"))
     radar_parent, parent_from_radar = _rooted(radar, systems, source=source)
     camera_parent, parent_from_camera = _rooted(camera, systems, source=source)
     if radar_parent != camera_parent:
         raise InputError(f"{source}: {radar!r} and {camera!r} have no common parent; give both in one frame")
     radar_from_camera = parent_from_radar.inverse() @ parent_from_camera
-    if stated is None and direction_by_facing(radar_from_camera.rotation) == "camera_from_radar":
+    if direction_by_facing(radar_from_camera.rotation) == "camera_from_radar":
         raise InputError(
             f"{source}: coordinate_systems: {camera!r} looks away from {radar!r}, and would not if pose_wrt_parent were "
             "inverted, as some data sets write it; write it as the pose in the parent"
@@ -58,9 +49,8 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     found = ImportedCalibration(
         "openlabel",
         WrittenPose("matrix", radar_from_camera.rotation, radar_from_camera.translation_m, "radar_from_camera"),
-        frames=stated or FrameNames(radar, camera),
-        check_point=stated_check_point(text),
-        assumptions=() if stated else _ASSUMPTIONS,
+        frames=FrameNames(radar, camera),
+        assumptions=_ASSUMPTIONS,
     ).checked(source)
     return with_camera(found, _camera(_mapping(streams, camera), source=source), source=source)
 

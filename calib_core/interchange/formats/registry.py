@@ -109,16 +109,6 @@ def is_ours(reader: Reads | None) -> bool:
     return reader is not None and reader in tuple(_reads(*_OURS))
 
 
-_GONE = {
-    "tf1-launch": "tf2 or tf2-launch-py",
-    "tf2-launch-xml": "tf2-launch-py",
-    "koide3": "tf2 or urdf",
-    "numpy": "matlab or matrix",
-    "npz": "matlab or matrix",
-    "foxglove": "mcap",
-    "openlabel": "tf2 or urdf",
-}
-"""Formats that are not written any more, each with what replaces it."""
 _OTHER_NAMES = {"ros": "tf2", "ros1": "tf2", "ros2": "tf2", "tf": "tf2"}
 """What people call a format, and its name."""
 
@@ -132,8 +122,6 @@ def format_named(name: str) -> Format:
     for known in _written():
         if known.name == name:
             return known
-    if name in _GONE:
-        raise InputError(f"format {name!r} went in 0.1: use {_GONE[name]}; its files are still read")
     names = [known.name for known in written_formats()]
     raise InputError(f"unknown format {name!r}; {meant(_OTHER_NAMES.get(name, name), names)}")
 

@@ -59,6 +59,7 @@ from calib_core.interchange.syntax.strict_json import (
     json_text,
 )
 from calib_core.measurements import Candidate, Pair, ReflectorClick
+from calib_core.options import CalibrationOptions
 from calib_core.radar import AngleMap, RadarErrors, covariance_from_sigma_polar
 from calib_core.results import Calibration, CheckPoint, DataWarning, PairResult
 from calib_core.results.calibration import CovarianceParts
@@ -155,7 +156,7 @@ def write_calibration(file: CalibrationFile) -> str:
         camera=camera_document(calibration.camera),
         given_camera=camera_document(calibration.given_camera) if calibration.given_camera is not None else None,
         vehicle=_stated_vehicle(file),
-        options=documents.StatedOptions.of(calibration.options),
+        options=calibration.options,
         provenance=provenance_document(file.provenance),
     )
     content = builtins_of(document)
@@ -165,9 +166,9 @@ def write_calibration(file: CalibrationFile) -> str:
         if not pair["candidates"]:
             for key in _SOLVED_FROM_KEYS:
                 del pair[key]
-    unset = documents.StatedOptions()
-    for group in ("mounting", "board", "refining"):
-        if getattr(document.options, group) == getattr(unset, group):
+    unset = CalibrationOptions()
+    for group in ("mounting", "refining"):
+        if getattr(calibration.options, group) == getattr(unset, group):
             del content["options"][group]
     absent = set() if calibration.angle_map is not None else {"radar_angle_map"}
     absent |= {"verdict"} if file.verdict is None else set()
@@ -237,14 +238,6 @@ def consistent_file(found: ImportedCalibration, source: str) -> CalibrationFile:
     return found.file
 
 
-def _with_levels_of_today(content: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the content of a file; older versions called a coarse calibration weak."""
-    verdict = content.get("verdict")
-    if not isinstance(verdict, dict) or verdict.get("level") != "weak":
-        return content
-    return {**content, "verdict": {**verdict, "level": "coarse"}}
-
-
 def _recognizes(content: Content) -> bool:
     return str(content.json_mapping.get("schema", "")).startswith("cocalib/calibration-")
 
@@ -259,7 +252,7 @@ def _imported(content: Mapping[str, Any], source: str) -> ImportedCalibration:
     Raises:
         InputError: invalid content; the message names the file, the place and what to do.
     """
-    document = document_in(_with_levels_of_today(content), documents.CalibrationDocument, source=source)
+    document = document_in(content, documents.CalibrationDocument, source=source)
     stated, inverse = document.camera_from_radar, document.radar_from_camera
     bare = documents.TransformDocument(stated.rotation, stated.translation_m)
     pose = transform_of(bare, source=source, place="camera_from_radar")
@@ -303,7 +296,7 @@ def _file(
         pairs=tuple(solved_pair_of(pair, source=source, place=f"pairs[{i}]") for i, pair in enumerate(document.pairs)),
         unpaired=tuple(document.unpaired),
         warnings=_warnings(document),
-        options=document.options.options(),
+        options=document.options,
         noise_scale=(scale.click, scale.range, scale.azimuth, scale.elevation),
         covariance_quantile=nan_if_none(document.covariance_quantile),
         iterative_px=nan_if_none(document.paper.iterative_px),

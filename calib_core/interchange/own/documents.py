@@ -3,9 +3,7 @@
 JSON Schema is generated from these types (docs/schemas). Inputs and settings refuse unknown keys; results may contain more.
 """
 
-import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass
 from decimal import Decimal
 from typing import Annotated, Any, Final, Literal
 
@@ -20,7 +18,7 @@ from calib_core.interchange.calibration_file import AssumptionNote, Evidence, Ve
 from calib_core.interchange.rotations import nearest_rotation
 from calib_core.json_forms import Count, Measured, Name, Pixel, Position, Positive, Share
 from calib_core.measurements import ChosenReturn, Mark, TimeNs, Unpaired
-from calib_core.options import RETIRED_METHODS, CalibrationOptions
+from calib_core.options import CalibrationOptions
 from calib_core.radar import RadarErrors
 from calib_core.results import DataWarning, InputFile, Metrics, UnconfirmedClicks
 from calib_core.results.systematic_errors import SystematicErrorResult
@@ -282,42 +280,6 @@ class FleetPriorDocument(Struct, frozen=True):
     used: bool
 
 
-@dataclass(frozen=True, slots=True)
-class BoardOptions:
-    """The checkerboard of the method ccm, which older versions had."""
-
-    columns: int = 8
-    rows: int = 5
-    square_m: float = 0.1
-    reach_squares: float = 0.35
-    registration: Literal["rigid", "linear"] = "rigid"
-
-
-@dataclass(frozen=True, slots=True)
-class StatedOptions(CalibrationOptions):
-    """The options that a file states: those of a calibration, and what older versions had as well."""
-
-    method: Literal["default", "paper", "pmm", "ccm"] = "default"  # type: ignore[assignment]
-    board: BoardOptions = dataclasses.field(default_factory=BoardOptions)
-
-    @classmethod
-    def of(cls, options: CalibrationOptions) -> "StatedOptions":
-        """Return the options of a calibration as a file states them."""
-        return (
-            options
-            if isinstance(options, cls)
-            else cls(**{one.name: getattr(options, one.name) for one in dataclasses.fields(options)})
-        )
-
-    def options(self) -> CalibrationOptions:
-        """Return the options of a calibration; those of a method of older versions stay as they were stated."""
-        if self.method in RETIRED_METHODS:
-            return self
-        return CalibrationOptions(
-            **{one.name: getattr(self, one.name) for one in dataclasses.fields(CalibrationOptions)}
-        )
-
-
 class CalibrationDocument(Struct, frozen=True):
     """A solved extrinsic calibration with its uncertainty."""
 
@@ -347,7 +309,7 @@ class CalibrationDocument(Struct, frozen=True):
     given_camera: CameraDocument | None = None
     fleet_prior: FleetPriorDocument | None = None
     vehicle: VehicleNote | None = None
-    options: StatedOptions = field(default_factory=StatedOptions)
+    options: CalibrationOptions = field(default_factory=CalibrationOptions)
     provenance: ProvenanceDocument = field(default_factory=ProvenanceDocument)
 
 

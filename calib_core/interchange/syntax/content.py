@@ -8,17 +8,15 @@ from xml.etree.ElementTree import Element
 
 from calib_core.errors import InputError
 from calib_core.interchange.syntax.mat_file import load_mat
-from calib_core.interchange.syntax.mcap_file import MCAP_MAGIC, McapFile, load_mcap
 from calib_core.interchange.syntax.strict_json import json_value
 from calib_core.interchange.syntax.xml_places import is_file_storage, opencv_values, parse_xml
 from calib_core.interchange.syntax.yaml_text import joined_documents, load_yaml_documents
 from calib_core.interchange.syntax.zip_archives import unpack
 
-Syntax = Literal["archive", "mat", "mcap", "bytes", "json", "xml", "lines", "yaml"]
-"""zip archive, MATLAB's mat, a small MCAP of JSON messages, other bytes, JSON, XML, text by its lines, text as YAML."""
+Syntax = Literal["archive", "mat", "bytes", "json", "xml", "lines", "yaml"]
+"""zip archive, MATLAB's mat, other bytes, JSON, XML, text by its lines, text as YAML."""
 
 _NO_XML = Element("")
-_NO_MCAP = McapFile((), {})
 _LOGGED = re.compile(r"\s*\[(DEBUG|INFO|WARN|ERROR|FATAL)\]")  # a line of ROS's log, as tf2_echo prints first
 
 
@@ -32,7 +30,6 @@ class Content:
         data: all bytes, if the syntax is "bytes".
         members: of an archive, by name.
         variables: of a mat file, by name: arrays, str, and dicts of them.
-        mcap: the messages and metadata of an MCAP file.
         value: of JSON, of YAML with one document, or of OpenCV's FileStorage XML.
         documents: of YAML, such as the messages that `ros2 topic echo` prints.
         root: of XML.
@@ -45,7 +42,6 @@ class Content:
     data: bytes = b""
     members: Mapping[str, bytes] = field(default_factory=dict)
     variables: Mapping[str, Any] = field(default_factory=dict)
-    mcap: McapFile = _NO_MCAP
     value: Any = None
     documents: tuple[Any, ...] = ()
     root: Element = _NO_XML
@@ -77,9 +73,6 @@ def readings(content: str | bytes, *, source: str) -> Iterator[Content]:
         yield Content("archive", members=unpack(content, source=source))
     elif isinstance(content, bytes) and content.startswith(b"MATLAB"):
         yield Content("mat", variables=load_mat(content, source=source))
-    elif isinstance(content, bytes) and content.startswith(MCAP_MAGIC):
-        found = load_mcap(content, source=source)
-        yield Content("bytes", data=content) if found is None else Content("mcap", mcap=found)
     else:
         try:
             text = decoded(content, source=source)

@@ -36,7 +36,6 @@ from calib_core.interchange.rotations import quaternion_xyzw_from_matrix
 from calib_core.interchange.syntax.mat_file import load_mat
 from calib_core.interchange.syntax.zip_archives import pack, unpack
 from calib_core.synthetic import simulate_pairs
-from tests.kept_files import KEPT, kept_file
 
 
 def text_of(file: CalibrationFile, name: str) -> str:
@@ -45,6 +44,12 @@ def text_of(file: CalibrationFile, name: str) -> str:
 
 def without_comments(text: str) -> str:
     return "".join(line for line in text.splitlines(keepends=True) if not line.startswith("#"))
+
+
+def npz(**arrays: np.ndarray) -> bytes:
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays)
+    return buffer.getvalue()
 
 
 def codes(text: str | bytes, against: CalibrationFile | None = None) -> list[str]:
@@ -57,10 +62,8 @@ def codes(text: str | bytes, against: CalibrationFile | None = None) -> list[str
 def test_a_left_handed_rotation_is_refused_in_every_format_of_matrices(file, name):
     first_row = file.calibration.camera_from_radar.rotation[0]
     if name == "numpy":
-        arrays = dict(np.load(io.BytesIO(kept_file(name))))
-        arrays["camera_from_radar"][0] *= -1
-        np.savez(buffer := io.BytesIO(), **arrays)
-        data = buffer.getvalue()
+        matrix = file.calibration.camera_from_radar.as_matrix()
+        data = npz(camera_from_radar=np.diag([-1.0, 1.0, 1.0, 1.0]) @ matrix)
     elif name == "matlab":
         data = export(file, name).data
         for number in first_row.tolist():
@@ -410,10 +413,21 @@ TWO_MORE = {
 }
 
 
+LAUNCH = {"tf2-launch-xml": 'pkg="tf2_ros" exec', "tf1-launch": 'pkg="tf" type'}
+
+
+def launch_of(file: CalibrationFile, name: str) -> str:
+    """Return a launch file in XML that publishes the pose, without and with names of the arguments."""
+    arguments = text_of(file, "tf2").partition("static_transform_publisher ")[2].replace("\\\n", " ").split()
+    if name == "tf1-launch":
+        arguments = arguments[1::2]
+    return f'<launch><node {LAUNCH[name]}="static_transform_publisher" args="{" ".join(arguments)}"/></launch>'
+
+
 @pytest.mark.parametrize("with_comments", [True, False])
 @pytest.mark.parametrize("name", TWO_MORE)
 def test_among_other_transforms_the_one_between_radar_and_camera_is_read(file, name, with_comments):
-    text = kept_file(name).decode() if name in KEPT else text_of(file, name)
+    text = launch_of(file, name) if name in LAUNCH else text_of(file, name)
     if not with_comments:
         text = re.sub(r"<!--.*?-->", "", without_comments(text), flags=re.DOTALL)
     for start in ("ros2 run", "<launch>", '<robot name="radar_camera">', "def generate"):
@@ -492,9 +506,9 @@ def test_another_matrix_in_a_file_of_rectified_pictures_misses_its_check_point(c
     assert [result.code for result in check(other).results if result.level == "error"] == ["other-lens"]
 
 
-@pytest.mark.parametrize("name", ["koide3", "openlabel"])
+@pytest.mark.parametrize("name", ["kalibr", "colmap"])
 def test_another_distortion_is_seen_at_the_check_point(clicked, name):
-    found = read_any(kept_file(name))
+    found = read_any(export(clicked, name).data)
     other = dataclasses.replace(
         found, camera=dataclasses.replace(found.camera, distortion=found.camera.distortion * 0.9)
     )
@@ -505,11 +519,9 @@ def test_another_distortion_is_seen_at_the_check_point(clicked, name):
 
 @pytest.mark.parametrize("key", ["R", "t"])
 def test_numbers_beside_the_matrix_of_an_npz_must_be_its_own(clicked, key):
-    arrays = dict(np.load(io.BytesIO(kept_file("numpy"))))
-    buffer = io.BytesIO()
-    np.savez(buffer, **{**arrays, key: arrays[key].T + (0.01 if key == "t" else 0.0)})
-
-    report = check(read_any(buffer.getvalue()))
+    pose = clicked.calibration.camera_from_radar
+    beside = {"R": pose.rotation.T, "t": pose.translation_m + 0.01}
+    report = check(read_any(npz(camera_from_radar=pose.as_matrix(), **{key: beside[key]})))
     assert report.verdict == "wrong"
     assert any(f"{key} is not that of camera_from_radar" in result.message for result in report.results)
 
@@ -535,12 +547,9 @@ def test_the_rotation_vector_beside_a_matrix_must_be_its_own(clicked):
 
 
 def test_swapped_frame_names_are_an_error_and_renamed_ones_are_not(clicked):
-    data = kept_file("numpy")
-    names = {"radar_frame": clicked.frames.radar, "camera_frame": clicked.frames.camera}
-    arrays = dict(np.load(io.BytesIO(data)))
-    buffer = io.BytesIO()
-    np.savez(buffer, **{**arrays, "radar_frame": names["camera_frame"], "camera_frame": names["radar_frame"]})
-    swapped = check(read_any(buffer.getvalue()), of=imported(clicked))
+    pose, frames = clicked.calibration.camera_from_radar.as_matrix(), clicked.frames
+    data = npz(camera_from_radar=pose, radar_frame=np.array(frames.camera), camera_frame=np.array(frames.radar))
+    swapped = check(read_any(data), of=imported(clicked))
     renamed = check(
         read_any(export(clicked, "matlab", frames=FrameNames("front", "eye_optical")).data), of=imported(clicked)
     )

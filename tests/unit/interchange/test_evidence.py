@@ -29,8 +29,6 @@ from calib_core.interchange import (
 from calib_core.interchange.calibration_file import EVIDENCE_LEVELS
 from calib_core.interchange.formats.statement import stated_origin
 from calib_core.interchange.own.calibration_json import calibration_sha256
-from calib_core.interchange.syntax.mcap_file import load_mcap
-from tests.kept_files import kept_file
 
 
 def text_of(file: CalibrationFile, name: str) -> str:
@@ -237,27 +235,3 @@ def test_a_covariance_in_an_unknown_order_is_not_taken_for_ours(proven):
         buffer = io.BytesIO()
         np.savez(buffer, camera_from_radar=pose, covariance=np.eye(6), **convention)
         assert read_any(buffer.getvalue()).covariance is None
-
-
-def test_foxglove_s_messages_are_read_as_json_too():
-    found = load_mcap(kept_file("foxglove"), source="file")
-    transforms, camera = (json.loads(message.data) for message in found.messages)
-
-    earlier = read_any(json.dumps({"FrameTransform": transforms["transforms"][0], "CameraCalibration": camera}))
-
-    assert earlier.format == "foxglove"
-    np.testing.assert_array_equal(
-        earlier.camera_from_radar.as_matrix(), read_any(kept_file("foxglove")).camera_from_radar.as_matrix()
-    )
-
-
-def test_an_mcap_file_that_is_a_recording_or_damaged_is_refused_in_words():
-    data = kept_file("foxglove")
-    other = data.replace(b"foxglove.FrameTransforms", b"std_msgs/FrameTransforms")
-    for content, words in (
-        (other, "MCAP without foxglove.FrameTransforms .found std_msgs/FrameTransforms"),
-        (data.replace(b"\x04\x00\x00\x00json", b"\x04\x00\x00\x00ros1"), "not a text file but a recording"),
-        (data[:200], "damaged MCAP file"),
-    ):
-        with pytest.raises(InputError, match=words):
-            read_any(content, "file.mcap")

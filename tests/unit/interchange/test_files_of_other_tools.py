@@ -10,12 +10,19 @@ import pytest
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.interchange import WantedFrames, export, read_any, read_any_file
+from calib_core.interchange import FrameNames, WantedFrames, export, read_any, read_any_file
 from calib_core.interchange.formats.pose_parts import direction_by_facing
-from tests.kept_files import KEPT, kept_file
 
 FORWARD = [0.1, -0.2, 0.3, -0.5, 0.5, -0.5, 0.5]  # a camera that looks along the radar's x axis, x y z qx qy qz qw
 POSITION, TURN = FORWARD[:3], FORWARD[3:]
+KOIDE3 = {
+    "camera": {
+        "camera_model": "plumb_bob",
+        "intrinsics": [500.0, 501.0, 320.0, 240.0],
+        "distortion_coeffs": [-0.1, 0.02, 1e-3, -1e-3, 0.0],
+    },
+    "results": {"T_lidar_camera": FORWARD},
+}
 MATRIX = [[0, 0, 1, 0.1], [-1, 0, 0, -0.2], [0, -1, 0, 0.3], [0, 0, 0, 1]]
 ECHO = "At time 0.0\n- Translation: [{}]\n- Rotation: in Quaternion [{}]\n"
 
@@ -43,14 +50,13 @@ def extrinsic(sensor: str, target: str, matrix: Any = MATRIX) -> dict[str, Any]:
     return {"sensor_name": sensor, "target_sensor_name": target, "param": {"sensor_calib": {"data": matrix}}}
 
 
-@pytest.mark.parametrize("name", ["pjlab", "koide3", "openlabel"])
-def test_without_our_statement_a_file_is_read_the_same_and_its_meaning_is_assumed(file, name):
+def test_without_our_statement_a_file_is_read_the_same_and_its_meaning_is_assumed(file):
     def stripped(value: Any) -> Any:
         if isinstance(value, dict):
             return {key: stripped(inner) for key, inner in value.items() if key != "cocalib"}
         return value
 
-    ours = (kept_file(name) if name in KEPT else export(file, name).data).decode()
+    ours = export(file, "pjlab").data.decode()
     bare = read_any(json.dumps(stripped(json.loads(ours))))
     whole = read_any(ours)
 
@@ -60,22 +66,40 @@ def test_without_our_statement_a_file_is_read_the_same_and_its_meaning_is_assume
     assert bare.check_point is None
 
 
-def test_a_lens_without_an_image_size_is_completed_with_it(file):
-    content = json.loads(kept_file("koide3"))
-    del content["camera"]["image_size"]
-    found = read_any(json.dumps(content))
+def test_a_lens_without_an_image_size_is_completed_with_it():
+    found = read_any(json.dumps(KOIDE3))
     assert found.camera is None
     camera = found.camera_for((640, 480))
-    point = np.array([[0.4, -0.2, 5.0]])
-    np.testing.assert_allclose(camera.project(point), file.calibration.camera.project(point), rtol=0, atol=1e-9)
+    assert (camera.model, camera.width_px, camera.height_px) == ("plumb_bob", 640, 480)
+    np.testing.assert_array_equal(camera.matrix_px, [[500.0, 0.0, 320.0], [0.0, 501.0, 240.0], [0.0, 0.0, 1.0]])
+    np.testing.assert_array_equal(camera.distortion, KOIDE3["camera"]["distortion_coeffs"])
 
 
-def test_a_lens_of_another_kind_is_left_out_with_a_note(file):
-    content = json.loads(kept_file("koide3"))
-    content["camera"]["camera_model"] = "omnidir"
-    found = read_any(json.dumps(content))
+def test_a_lens_of_another_kind_is_left_out_with_a_note():
+    found = read_any(json.dumps(KOIDE3 | {"camera": KOIDE3["camera"] | {"camera_model": "omnidir"}}))
     assert (found.camera, found.matrix_px) == (None, None)
     assert any("omnidir" in note for note in found.notes)
+
+
+def test_a_foxglove_camera_calibration_tells_which_frame_is_the_cameras_and_its_lens():
+    transform = {
+        "parent_frame_id": "front",
+        "child_frame_id": "eye",
+        "translation": dict(zip("xyz", POSITION, strict=True)),
+        "rotation": dict(zip("xyzw", TURN, strict=True)),
+    }
+    camera = {
+        "frame_id": "eye",
+        "width": 640,
+        "height": 480,
+        "distortion_model": "plumb_bob",
+        "D": [0.1, 0.0, 0.0, 0.0, 0.0],
+    }
+    camera |= {"K": [500.0, 0.0, 320.0, 0.0, 501.0, 240.0, 0.0, 0.0, 1.0]}
+    found = read_any(json.dumps({"FrameTransform": transform, "CameraCalibration": camera}))
+    assert (found.format, found.frames, found.assumptions) == ("foxglove", FrameNames("front", "eye"), ())
+    assert (found.camera.width_px, found.camera.distortion[0]) == (640, 0.1)
+    np.testing.assert_allclose(found.pose.as_written().translation_m, POSITION)
 
 
 def test_of_several_extrinsics_the_one_of_the_radar_is_taken():
