@@ -1,8 +1,5 @@
 /** The page: wires the modules together and passes the server's messages to those that draw them. */
 
-import { boxing, drawBoxes, takeFrameBoxes } from "./boxes/boxes.js";
-import { startBoxing } from "./boxes/boxing.js";
-import { startEvaluating } from "./boxes/evaluating.js";
 import { startDelivering, startExporting } from "./export/exporting.js";
 import { startLens, takeLens, takeResult } from "./lens/lens.js";
 import { drawLensMarks, startLensResult } from "./lens/result.js";
@@ -19,7 +16,7 @@ import { drawContours, startContours, takeUncertainty } from "./picture/contours
 import { drawCross, startCross } from "./picture/cross.js";
 import { onImage, toCss, toImage, viewport, zoom } from "./picture/geometry.js";
 import { startLoupe } from "./picture/loupe.js";
-import { drawEvaluated, drawMarks, startLayers } from "./picture/marks.js";
+import { drawMarks, startLayers } from "./picture/marks.js";
 import { addLayer, startDescribing, startPicture } from "./picture/picture.js";
 import { drawRectified, startRectified } from "./picture/rectified.js";
 import { startTouch } from "./picture/touch.js";
@@ -27,6 +24,7 @@ import { drawProposal } from "./proposals/marks.js";
 import { justMoved, shownOffer, startProposals, takeProposals } from "./proposals/proposals.js";
 import { startSwitch as startProposalSwitch } from "./proposals/words.js";
 import { drawCompared, startCompare, takeCompared } from "./review/compare.js";
+import { startEvaluating, takeAcc } from "./review/evaluating.js";
 import { plots, startReview, takePair, takeReview } from "./review/review.js";
 import { registerActions } from "./shell/action_table.js";
 import { act, actionNamed } from "./shell/actions.js";
@@ -79,7 +77,7 @@ const readers = {
     state.overlay = message;
     emit("overlay");
   },
-  frame_boxes: takeFrameBoxes,
+  acc: takeAcc,
   radar_look(message) {
     state.look = message;
     emit("look");
@@ -149,13 +147,11 @@ async function loadActivity() {
   emit("lanes");
 }
 
-/** Draw over the frame, from the bottom to the top: the rectified picture shows no marks, and boxes stand alone. */
+/** Draw over the frame, from the bottom to the top: the rectified picture shows no marks. */
 function addLayers() {
   const isRectified = () => state.rectified || state.shown?.rectified === true;
-  const isMarked = () => !isRectified() && !boxing.on;
   addLayer(drawRectified, isRectified);
-  addLayer(drawEvaluated, () => !isRectified() && boxing.on);
-  for (const draw of [drawLensMarks, drawContours, drawMarks, drawCandidates, drawProposal, drawCross, drawCompared, drawBoxes]) addLayer(draw, isMarked);
+  for (const draw of [drawLensMarks, drawContours, drawMarks, drawCandidates, drawProposal, drawCross, drawCompared]) addLayer(draw, () => !isRectified());
 }
 
 registerActions();
@@ -170,7 +166,6 @@ startProposals();
 startLoupe();
 startLive();
 startClicking();
-startBoxing();
 startTouch();
 startCandidates();
 startCross();
@@ -216,5 +211,5 @@ startSpace();
 
 /** Exposed for the browser tests. */
 Object.assign(window, {
-  __cocalib: { state, viewport, zoom, toCss, toImage, onImage, clicks, clickIn, clicksIn, goTo, unconfirmed, follower, plots, boxing, shownOffer, justMoved, stampOf },
+  __cocalib: { state, viewport, zoom, toCss, toImage, onImage, clicks, clickIn, clicksIn, goTo, unconfirmed, follower, plots, shownOffer, justMoved, stampOf },
 });

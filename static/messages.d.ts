@@ -183,50 +183,6 @@ export interface DismissedPlacement {
   position_m: [number, number, number];
 }
 
-/** One object with a box: its row in the table. */
-export interface BoxTrackRow {
-  id: string;
-  label: string;
-  first: number;
-  last: number;
-  boxes: number;
-  keyframes: number[];
-  hidden: number[];
-  note: string;
-  following: boolean;
-}
-
-/** Acc of one class, or of one target. */
-export interface ClassFigure {
-  label: string;
-  acc: number | null;
-  frames: number;
-  returns: number;
-  inside: number;
-}
-
-/** Acc of the calibration turned about one axis of the camera. */
-export interface SensitivityRow {
-  axis: "roll" | "pitch" | "yaw";
-  angles_deg: number[];
-  acc_percent: number[];
-  values: string[];
-  words: string;
-  is_flat: boolean;
-}
-
-/** What the boxes of the page say about the calibration on the page. */
-export interface AccPanel {
-  figures: Figure[];
-  classes: ClassFigure[];
-  sensitivity: SensitivityRow[];
-  caution: string;
-  rule: string;
-  problem: string;
-  warnings: DataWarning[];
-  judging: boolean;
-}
-
 /** One error that all pairs share, as a row of a table. */
 export interface SystematicErrorRow {
   figure: Figure;
@@ -279,9 +235,6 @@ export interface View {
   assumptions: AssumptionRow[];
   dismissed: DismissedPlacement[];
   acknowledged: string[];
-  boxes: BoxTrackRow[];
-  box_labels: string[];
-  acc: AccPanel;
   systematic_errors: SystematicErrorTable;
   verdict: VerdictRow;
 }
@@ -564,18 +517,39 @@ export interface Overlay {
   guesses: OverlayGuess[];
 }
 
-/** One box in a frame; written as an array, since it is sent with every frame. */
-export type BoxInFrame = [id: string, label: string, edges_px: [number, number, number, number], kind: "stated" | "followed" | "between", confidence: number];
+/** Acc of one class, or of one target. */
+export interface ClassFigure {
+  label: string;
+  acc: number | null;
+  frames: number;
+  returns: number;
+  inside: number;
+}
 
-/** A return of a moving target on the picture; written as an array. */
-export type BoxedReturn = [u_px: number, v_px: number, box: string, inside: boolean];
+/** Acc of the calibration turned about one axis of the camera. */
+export interface SensitivityRow {
+  axis: "roll" | "pitch" | "yaw";
+  angles_deg: number[];
+  acc_percent: number[];
+  values: string[];
+  words: string;
+  is_flat: boolean;
+}
 
-/** The boxes of the frame that a page shows. */
-export interface FrameBoxes {
-  type: "frame_boxes";
-  index: number;
-  boxes: BoxInFrame[];
-  returns: BoxedReturn[];
+/** What boxes say about the calibration on the page. */
+export interface AccPanel {
+  type: "acc";
+  source: string;
+  boxes: number;
+  frames: number;
+  figures: Figure[];
+  classes: ClassFigure[];
+  sensitivity: SensitivityRow[];
+  caution: string;
+  rule: string;
+  problem: string;
+  warnings: DataWarning[];
+  busy: boolean;
 }
 
 /** One radar return that may belong to a click. */
@@ -1004,77 +978,6 @@ export interface AssumptionsConfirmed {
   request?: number;
 }
 
-/** A box was drawn around an object that had none so far. */
-export interface BoxDrawn {
-  type: "box_drawn";
-  image_time: Stamp;
-  box_px: [number, number, number, number];
-  label: string;
-  request?: number;
-}
-
-/** The box of an object was corrected in a frame, which makes that frame a keyframe. */
-export interface BoxMoved {
-  type: "box_moved";
-  id: string;
-  image_time: Stamp;
-  box_px: [number, number, number, number];
-  request?: number;
-}
-
-/** An object is hidden, or out of the picture, from a frame on until its next keyframe. */
-export interface BoxHidden {
-  type: "box_hidden";
-  id: string;
-  image_time: Stamp;
-  request?: number;
-}
-
-/** What was said about an object in a frame was taken back; with its last box, the track goes. */
-export interface BoxKeyframeRemoved {
-  type: "box_keyframe_removed";
-  id: string;
-  image_time: Stamp;
-  request?: number;
-}
-
-/** All boxes of an object were deleted. */
-export interface BoxRemoved {
-  type: "box_removed";
-  id: string;
-  request?: number;
-}
-
-/** An object was given another class. */
-export interface BoxLabelled {
-  type: "box_labelled";
-  id: string;
-  label: string;
-  request?: number;
-}
-
-/** A frame in which a person said where an object is. */
-export interface BoxKeyframe {
-  image_time: Stamp;
-  box_px: [number, number, number, number] | null;
-}
-
-/** The boxes of one object. */
-export interface BoxTrack {
-  id: string;
-  label: string;
-  keyframes: BoxKeyframe[];
-  carried?: boolean;
-}
-
-/** Boxes from a file took the place of all boxes. */
-export interface BoxesLoaded {
-  type: "boxes_loaded";
-  tracks: BoxTrack[];
-  empty_frames?: Stamp[];
-  request?: number;
-}
-
 /** Undo the last change. */
 export interface Undo {
   type: "undo";
@@ -1208,17 +1111,17 @@ export interface SnapWanted {
   request?: number;
 }
 
-/** A page wants boxes to be followed no farther than they have been. */
-export interface FollowingStopped {
-  type: "stop_following";
-  request?: number;
-}
-
-/** A page read a file of boxes; they take the place of all boxes. */
+/** A page read a file of boxes; the calibration is judged by them. */
 export interface BoxesWanted {
   type: "load_boxes";
   name: string;
   content_base64: string;
+  request?: number;
+}
+
+/** The calibration is to be judged by boxes around what moves before the camera. */
+export interface MovingBoxesWanted {
+  type: "find_moving";
   request?: number;
 }
 
@@ -1279,7 +1182,7 @@ export type FromServer =
   | RadarMap
   | SpaceLook
   | Overlay
-  | FrameBoxes
+  | AccPanel
   | PairCandidates
   | Review
   | PairReview
@@ -1308,13 +1211,6 @@ export type FromPage =
   | ColumnsMapped
   | AxesStated
   | AssumptionsConfirmed
-  | BoxDrawn
-  | BoxMoved
-  | BoxHidden
-  | BoxKeyframeRemoved
-  | BoxRemoved
-  | BoxLabelled
-  | BoxesLoaded
   | Undo
   | Redo
   | Hello
@@ -1332,8 +1228,8 @@ export type FromPage =
   | LensUse
   | ProposingSwitch
   | SnapWanted
-  | FollowingStopped
   | BoxesWanted
+  | MovingBoxesWanted
   | ChoicesWanted
   | FolderWanted
   | RecentForgotten

@@ -62,6 +62,9 @@ class PictureRecording:
         height_px, width_px = self.pictures[index].shape[:2]
         return Picture(self._data[index], "png", width_px, height_px)
 
+    def image(self, index: int) -> np.ndarray:
+        return self.pictures[index]
+
     def camera(self) -> Camera | None:
         height_px, width_px = self.pictures[0].shape[:2]
         return Camera(

@@ -11,7 +11,7 @@ from calib_core.interchange import read_calibration
 from calib_core.measurements import Box, RadarScans, TimeNs
 from cocalib.view import Reference
 from tests.picture_recording import PictureRecording
-from tests.street import CAMERA, TRUE_POSE, Street, street
+from tests.street import CAMERA, TRUE_POSE, street
 
 _GOLDEN = Path(__file__).parent / "golden" / "calibration-1.json"
 
@@ -57,9 +57,3 @@ def reference_calibration() -> Reference:
     """The true pose, as a calibration that was given for review."""
     golden = read_calibration(_GOLDEN.read_text(encoding="utf-8")).calibration
     return Reference("true.json", replace(golden, camera=CAMERA, camera_from_radar=TRUE_POSE, pairs=()))
-
-
-def true_edges(recording_street: Street, frame: int) -> tuple[float, float, float, float]:
-    """The person's box in a frame."""
-    [box] = recording_street.boxes.frames[frame].boxes
-    return box.left_px, box.top_px, box.right_px, box.bottom_px

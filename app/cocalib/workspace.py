@@ -1,29 +1,25 @@
 """The only mutable state of the program: the history of the session, and how every change is made."""
 
-import re
-import tempfile
 import threading
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol, TypeAlias
 
 from calib_core.arrays import TimesNs
 from calib_core.association.placements import Placement
-from calib_core.boxes import read_boxes
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.input_files import name_text
 from calib_core.interchange import CameraFile, camera_info_text, read_clicks, write_clicks
-from calib_core.measurements import NS_PER_S, Boxes, ReflectorClick, TimeNs
+from calib_core.measurements import NS_PER_S, ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording, assumption_hint
-from calib_core.results import Calibration, DataWarning
+from calib_core.results import DataWarning
 from cocalib.hypothesis_sheet import OpenMeaning
 from cocalib.session import (
     AssumedReading,
-    BoxTrack,
     ChosenIntrinsics,
     ClicksImported,
     History,
@@ -37,15 +33,12 @@ from cocalib.session import (
     advance,
     settled,
 )
-from cocalib.session.boxes_in_frames import CarriedTrack, Followed, Start, boxes_loaded, carried_boxes, carried_tracks
 from cocalib.session.file import Closed, Restored, open_session_file
 from cocalib.solving.worker import SolverWorker
-from cocalib.view import AccPanel, Reference, View, shown_calibration, view
+from cocalib.view import Reference, View, view
 
 _LONGEST_WAIT_S = 1.0
 Subscriber: TypeAlias = Callable[[View], None]
-Judged: TypeAlias = tuple[tuple[CarriedTrack, ...], Calibration | None]
-"""Boxes and a calibration that they say something about."""
 
 
 class Journal(Protocol):
@@ -118,12 +111,10 @@ class Workspace:
         restored: what was found in the session's folder at the start.
         reference: a calibration to show until the clicks give a new one; None if there is none.
         given: the intrinsics that the recording was opened with.
-        acc: what the boxes say about the calibration, as last judged.
         open_meaning: a calibration that does not state what its numbers mean, for a person to pick; None if there is none.
     """
 
     open_meaning: OpenMeaning | None = None
-    acc: AccPanel = AccPanel()
 
     def __init__(
         self,
@@ -141,10 +132,6 @@ class Workspace:
         self._chosen: tuple[ChosenIntrinsics, Camera] | None = None
         self._history = restored.history
         self._placements: tuple[Placement, ...] | None = None
-        self._followed: Mapping[Start, Followed] = {}
-        self._judged: Judged = ((), None)
-        self._carried: tuple[CarriedTrack, ...] = ()
-        self._carried_from: tuple[tuple[BoxTrack, ...], RecordingFacts, Mapping[Start, Followed]] = ((), facts, {})
         self._journal = journal
         self._solver = solver
         self._lock = threading.Lock()
@@ -200,55 +187,12 @@ class Workspace:
         return kept[1]
 
     def _view_of(self, history: History) -> View:
-        carried = self._carried_of(history.present)
-        is_old = bool(self.acc.figures) and self._judged != self._to_judge(history.present)
-        acc = replace(self.acc, judging=True) if is_old else self.acc
-        return view(history, self.facts, self.reference, self._placements, carried, acc)
+        return view(history, self.facts, self.reference, self._placements)
 
     def show_placements(self, placements: Sequence[Placement]) -> None:
         """Take in the placements that were found in the radar data, so that the View says how many have no click."""
         with self._lock:
             self._placements = tuple(placements)
-            self._pending.append((self._view_of(self._history), self._subscribers))
-        self._notify()
-
-    @property
-    def carried(self) -> tuple[CarriedTrack, ...]:
-        """The boxes of the session in every frame, as far as they have been followed."""
-        return self._carried_of(self.session)
-
-    def _carried_of(self, session: Session) -> tuple[CarriedTrack, ...]:
-        """Return the boxes of a session in every frame; those of the last one are kept, since every View needs them."""
-        made_from = (session.boxes, self.facts, self._followed)
-        if any(one is not other for one, other in zip(made_from, self._carried_from, strict=True)):
-            self._carried, self._carried_from = carried_tracks(*made_from), made_from
-        return self._carried
-
-    @property
-    def boxes(self) -> Boxes:
-        """The same as a file of boxes would state them."""
-        return carried_boxes(self.carried, self.session, self.facts)
-
-    @property
-    def to_judge(self) -> Judged:
-        """The boxes and the calibration that they say something about: none while it is being checked."""
-        return self._to_judge(self.session)
-
-    def _to_judge(self, session: Session) -> Judged:
-        found = shown_calibration(session, self.reference)
-        return self._carried_of(session), None if found is None or found.checking else found
-
-    def show_acc(self, acc: AccPanel, judged: Judged) -> None:
-        """Take in what the boxes say about the calibration, and which boxes and calibration were judged."""
-        with self._lock:
-            self.acc, self._judged = acc, judged
-            self._pending.append((self._view_of(self._history), self._subscribers))
-        self._notify()
-
-    def show_followed(self, followed: Mapping[Start, Followed]) -> None:
-        """Take in what following the boxes through the pictures has given so far."""
-        with self._lock:
-            self._followed = dict(followed)
             self._pending.append((self._view_of(self._history), self._subscribers))
         self._notify()
 
@@ -329,19 +273,6 @@ class Workspace:
         """
         self.dispatch(ClicksImported.of(read_clicks(text, source)))
 
-    def load_boxes(self, data: bytes, name: str) -> None:
-        """Put the boxes of a file in the place of all boxes.
-
-        Args:
-            data: the content of the file, of any known format.
-            name: its name.
-
-        Raises:
-            InputError: it cannot be read, is of no known format, or belongs to another recording.
-            EventError: a box does not fit the recording; nothing changed.
-        """
-        self.dispatch(boxes_loaded(read_sent_boxes(data, name, self.facts), self.facts))
-
     def wait_for_answer(self) -> None:
         """Wait until the clicks are answered, a second at most: for work in the background, which would make the answer late."""
         self._answered.wait(_LONGEST_WAIT_S)
@@ -409,7 +340,6 @@ def recording_facts(recording: Recording, name: str) -> RecordingFacts:
         recording.radar_times,
         recording.radar_topics,
         tuple(AssumedReading(one.words, assumption_hint(one.confirm)) for one in recording.assumptions),
-        recording.image_names,
     )
 
 
@@ -459,26 +389,3 @@ def _source_of(camera: Camera | None, camera_file: CameraFile | None, recording:
     if camera_file is not None:
         return name_text(Path(camera_file.source).name)
     return recording.camera_info_topic or "the recording"
-
-
-def read_sent_boxes(data: bytes, name: str, facts: RecordingFacts) -> Boxes:
-    """Read a file of boxes that a page has sent.
-
-    Args:
-        data: its content.
-        name: its name, for messages and for what its ending says.
-        facts: the recording's frames.
-
-    Raises:
-        InputError: it cannot be read, is of no known format, or belongs to another recording.
-    """
-    plain = re.sub(r"[^A-Za-z0-9._-]", "_", Path(name).name).lstrip(".")[-80:] or "boxes"
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / plain
-        path.write_bytes(data)
-        return read_boxes(
-            path,
-            image_times=facts.image_times,
-            image_size_px=(facts.width_px, facts.height_px),
-            image_names=facts.image_names,
-        )

@@ -55,17 +55,45 @@ def read_boxes(
     Raises:
         InputError: it cannot be read, is of no known format, or belongs to another recording.
     """
-    file = replace(load_box_file(Path(path), image_size_px=image_size_px), image_names=tuple(image_names))
+    file = load_box_file(Path(path), image_size_px=image_size_px)
+    return _boxes_in(file, image_times, image_names)
+
+
+def boxes_from_bytes(
+    data: bytes, name: str, *, image_times: TimesNs, image_size_px: tuple[int, int], image_names: Sequence[str] = ()
+) -> Boxes:
+    """Read boxes from the content of a file or of a zip archive, as `read_boxes` does.
+
+    Args:
+        data: the content.
+        name: the file's, for messages and for what its ending says.
+        image_times: (m,) stamps of the recorded frames, ascending.
+        image_size_px: width and height of the recorded pictures.
+        image_names: (m,) of the frames' files without suffix; none if they are not files.
+
+    Raises:
+        InputError: it cannot be read, is of no known format, or belongs to another recording.
+    """
+    source = name_text(Path(name).name) or "boxes"
+    members = _archive(data, source) if data.startswith(b"PK") else {source: data}
+    return _boxes_in(_box_file(source, members, image_size_px), image_times, image_names)
+
+
+def _boxes_in(file: BoxFile, image_times: TimesNs, image_names: Sequence[str]) -> Boxes:
+    file = replace(file, image_names=tuple(image_names))
     for known in BOX_FORMATS:
         if known.recognizes(file):
-            found = known.read(file)
             return matched_boxes(
-                found, file.source, image_times=image_times, image_size_px=image_size_px, image_names=image_names
+                known.read(file),
+                file.source,
+                image_times=image_times,
+                image_size_px=file.image_size_px,
+                image_names=image_names,
             )
     names = ", ".join(known.name for known in BOX_FORMATS)
     schema = file.value.get("schema") if isinstance(file.value, dict) else None
     reason = other_kind(schema, _IS_WHAT) or f"is no known file of boxes; known: {names}"
-    raise InputError(f"{name_text(Path(path))}: {reason}")
+    raise InputError(f"{file.source}: {reason}")
 
 
 _MAX_BYTES = 256 * 1024 * 1024
@@ -108,6 +136,11 @@ def load_box_file(path: Path, *, image_size_px: tuple[int, int] | None) -> BoxFi
             members = _archive(data, source) if data.startswith(b"PK") else {path.name: data}
     except OSError as error:
         raise InputError(f"{name_text(path)}: cannot be read: {error.strerror}; check the path") from None
+    return _box_file(source, members, image_size_px)
+
+
+def _box_file(source: str, members: Mapping[str, bytes], image_size_px: tuple[int, int] | None) -> BoxFile:
+    """Parse the content of a file, or of the files of a folder or archive by their names."""
     alone = next(iter(members.items())) if len(members) == 1 else None
     text = _text(alone[1], source) if alone else ""
     start = text.lstrip()[:1]

@@ -1,7 +1,5 @@
 /** The line on the frame: the one thing to do now, with its keys, which are buttons; by finger only their words are shown. */
 
-import { boxing } from "../boxes/boxes.js";
-import { boxAdvice } from "../boxes/evaluating.js";
 import { comeTo } from "../picture/arriving.js";
 import { saidWords } from "../proposals/proposals.js";
 import { proposalAdvice, proposalWords, silentWords } from "../proposals/words.js";
@@ -19,7 +17,7 @@ const guide = /** @type {HTMLElement} */ (document.getElementById("guide"));
 /** What the line says; `act` if something is to be done in this frame. @typedef {{text: Words, act: boolean}} Advice */
 
 export function startGuide() {
-  on(["opening", "shown", "view", "placements", "playing", "overlay", "candidates", "cross", "selected", "boxes", "layers", "proposals", "connection"], drawGuide);
+  on(["opening", "shown", "view", "placements", "playing", "overlay", "candidates", "cross", "selected", "layers", "proposals", "connection"], drawGuide);
 }
 
 /** The focus stays where it is. @param {Key} key */
@@ -62,7 +60,6 @@ const NEXT = { key: "N", label: "next place", action: "next-placement" };
 /** @param {number} index @returns {Advice|null} */
 function advice(index) {
   if (state.rectified) return { text: ["Straight edges must be straight: drag a line along one.", { key: "U", label: "picture as taken", action: "rectify" }], act: false };
-  if (boxing.on) return boxAdvice();
   const placement = placementAt(index);
   const here = clickIn(index);
   if (state.cross) return atCross(state.cross);

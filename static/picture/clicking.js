@@ -3,8 +3,6 @@
  * within 15 px; a click on a candidate's number chooses it, a drag elsewhere pans, the wheel zooms at the cursor.
  */
 
-import { boxing } from "../boxes/boxes.js";
-import { boxesTake, cancelBox, cursorOver, dragBox, dropBox, pressBox } from "../boxes/boxing.js";
 import { candidateNear, choose } from "../pairs/candidates.js";
 import { correctProposal, shownOffer } from "../proposals/proposals.js";
 import { toast } from "../shell/notices.js";
@@ -25,8 +23,6 @@ const REST = 250;
 
 /** @type {{x: number, y: number, lastX: number, lastY: number, u: number, v: number, moved: boolean, mark: import("../messages.js").ClickRow|null, candidate: number, pointer: number}|null} */
 let press = null;
-/** Whether the press is about a box. */
-let boxed = false;
 /** Whether it draws a line along an edge of the rectified picture. */
 let ruling = false;
 /** @type {{click: import("../messages.js").ClickRow, u: number, v: number, timer: number}|null} */
@@ -42,8 +38,7 @@ export function startClicking() {
   marks.addEventListener("pointerup", released);
   marks.addEventListener("pointercancel", () => {
     press = null;
-    boxed = ruling = false;
-    cancelBox();
+    ruling = false;
   });
   marks.addEventListener("pointerleave", () => hover(null));
   marks.addEventListener("wheel", wheeled, { passive: false });
@@ -65,12 +60,6 @@ function pressed(event) {
   flushNudge();
   leaveLive();
   const [x, y] = inBox(event);
-  boxed = boxesTake() && event.button === 0 && !event.shiftKey;
-  if (boxed) {
-    pressBox(x, y, REACH);
-    marks.setPointerCapture(event.pointerId);
-    return /** @type {HTMLElement} */ (marks.parentElement).focus({ preventScroll: true });
-  }
   ruling = state.rectified && event.button === 0 && !event.shiftKey;
   if (ruling) {
     pressRuler(x, y);
@@ -78,8 +67,8 @@ function pressed(event) {
     return /** @type {HTMLElement} */ (marks.parentElement).focus({ preventScroll: true });
   }
   const [u, v] = toImage(x, y);
-  const mark = boxing.on || state.rectified ? null : event.button === 0 ? markNear(x, y) : null;
-  const candidate = event.button === 0 && !mark && !boxing.on && !state.rectified && !state.playing ? candidateNear(x, y) : -1;
+  const mark = state.rectified ? null : event.button === 0 ? markNear(x, y) : null;
+  const candidate = event.button === 0 && !mark && !state.rectified && !state.playing ? candidateNear(x, y) : -1;
   press = { x, y, lastX: x, lastY: y, u, v, moved: false, mark, candidate, pointer: event.button };
   marks.setPointerCapture(event.pointerId);
   /** @type {HTMLElement} */ (marks.parentElement).focus({ preventScroll: true });
@@ -99,10 +88,7 @@ export function markNear(x, y, reach = REACH) {
 /** @param {PointerEvent} event */
 function moved(event) {
   const [x, y] = inBox(event);
-  if (boxed) return dragBox(x, y);
   if (ruling) return dragRuler(x, y);
-  if (boxing.on && !press) return void (marks.style.cursor = cursorOver(x, y));
-  marks.style.cursor = "";
   const [u, v] = toImage(x, y);
   if (!press) {
     marks.classList.toggle("grab", markNear(x, y) !== null);
@@ -124,10 +110,6 @@ function moved(event) {
 
 /** @param {PointerEvent} event */
 function released(event) {
-  if (boxed) {
-    boxed = false;
-    return dropBox();
-  }
   if (ruling) {
     ruling = false;
     return dropRuler();
@@ -143,7 +125,7 @@ function released(event) {
     hold(null);
   } else if (done.mark) select(done.mark.id);
   else if (done.candidate >= 0 && !done.moved) choose(done.candidate);
-  else if (!done.moved && !boxing.on && done.pointer === 0 && onImage(done.u, done.v)) place(done.u, done.v);
+  else if (!done.moved && done.pointer === 0 && onImage(done.u, done.v)) place(done.u, done.v);
 }
 
 /** @param {{u: number, v: number}|null} point */

@@ -3,7 +3,6 @@
  * 95 % of good residuals = ellipse, radar returns = dots (static) and triangles (moving); and the chips that switch them.
  */
 
-import { drawBoxedReturns, drawBoxes } from "../boxes/boxes.js";
 import { ink, residualColour, smallFont } from "../shell/colours.js";
 import { make } from "../shell/notices.js";
 import { clicks, clicksIn, emit, isOffered, on, placementsAt, state } from "../shell/state.js";
@@ -33,13 +32,6 @@ export function drawMarks(pen) {
   const here = clicks();
   if (state.layers.others) for (const click of here) if (click.frame !== index) drawOther(pen, click);
   for (const click of clicksIn(index)) drawClick(pen, click);
-}
-
-/** What moves, and the boxes around it; the clicks are out of the way. @param {Ink} pen */
-export function drawEvaluated(pen) {
-  drawBoxes(pen);
-  if (!state.layers.returns || drawBoxedReturns(pen)) return;
-  drawReturns(pen, (overlayHere()?.returns ?? []).filter(([, , , , , isStill]) => !isStill));
 }
 
 /** Whether a placement in a frame still wants a click. @param {number} index @param {number} range its own [m] */

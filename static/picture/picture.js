@@ -33,7 +33,7 @@ export function startPicture() {
     takeSize();
     redraw();
   });
-  on(["view", "overlay", "selected", "layers", "hover", "placements", "theme", "candidates", "cross", "boxes", "lens", "proposals"], redrawMarks);
+  on(["view", "overlay", "selected", "layers", "hover", "placements", "theme", "candidates", "cross", "lens", "proposals"], redrawMarks);
   on(["theme"], redraw);
   measure();
 }

@@ -45,7 +45,7 @@ export function toggleRectified() {
 }
 
 /** @param {boolean} on */
-export function setRectified(on) {
+function setRectified(on) {
   if (on === state.rectified) return;
   state.rectified = on;
   rulers = [];

@@ -3,7 +3,6 @@
  * Only what fingers do is here; clicking.js has the mouse and the pen, and what a click is.
  */
 
-import { boxesTake, cancelBox, dragBox, dropBox, pressBox } from "../boxes/boxing.js";
 import { make } from "../shell/notices.js";
 import { emit, on, select, state } from "../shell/state.js";
 import { leaveLive } from "../time/player.js";
@@ -30,7 +29,7 @@ const loupe = /** @type {HTMLCanvasElement} */ (document.getElementById("loupe")
 const cross = make("div", "", []);
 /** Where each finger is [CSS px of the canvas]. @type {Map<number, {x: number, y: number}>} */
 const fingers = new Map();
-/** What the fingers do. @type {"idle"|"tap"|"pan"|"pinch"|"aim"|"box"} */
+/** What the fingers do. @type {"idle"|"tap"|"pan"|"pinch"|"aim"} */
 let doing = "idle";
 let start = { x: 0, y: 0 };
 let timer = 0;
@@ -71,14 +70,12 @@ function down(event) {
   clearTimeout(timer);
   if (fingers.size === 2) {
     stopAiming();
-    cancelBox();
     doing = "pinch";
     return;
   }
   pane.focus({ preventScroll: true });
   start = inBox(event);
-  doing = boxesTake() ? "box" : "tap";
-  if (doing === "box") return pressBox(start.x, start.y, REACH);
+  doing = "tap";
   if (!state.playing) timer = window.setTimeout(startAiming, LONG_MS);
 }
 
@@ -88,7 +85,6 @@ function move(event) {
   if (!before) return;
   const now = inBox(event);
   if (doing === "pinch") pinch(event.pointerId, before, now);
-  if (doing === "box") dragBox(now.x, now.y);
   fingers.set(event.pointerId, now);
   if (doing === "aim") moveAim(now.x - before.x, now.y - before.y, event.timeStamp);
   if (doing === "tap" && Math.hypot(now.x - start.x, now.y - start.y) >= THRESHOLD) {
@@ -120,8 +116,7 @@ function up(event) {
   if (!fingers.delete(event.pointerId)) return;
   const done = doing;
   doing = fingers.size ? "pan" : "idle"; // after a pinch, the finger that stays pans
-  if (done === "box") dropBox();
-  else if (done === "tap") tap();
+  if (done === "tap") tap();
   else if (done === "aim") drop();
 }
 
@@ -130,7 +125,6 @@ function cancel(event) {
   clearTimeout(timer);
   fingers.delete(event.pointerId);
   if (!fingers.size) doing = "idle";
-  cancelBox();
   stopAiming();
 }
 

@@ -3,7 +3,6 @@
  * takes another place, X says that it is not the reflector, a click puts the mark elsewhere. They are found on the server.
  */
 
-import { boxing } from "../boxes/boxes.js";
 import { lookAt, lookInto, pan, toCss, viewport, zoom } from "../picture/geometry.js";
 import { fit, redraw } from "../picture/picture.js";
 import { toast } from "../shell/notices.js";
@@ -141,7 +140,7 @@ export const confidences = () => new Map(openProposals().map(({ placement, confi
 
 /** The proposal on screen: that which N went to, or else the most confident one of the frame. @returns {Offer|null} */
 export function shownOffer() {
-  if (!state.shown || state.playing || state.rectified || boxing.on) return null;
+  if (!state.shown || state.playing || state.rectified) return null;
   const seconds = state.seconds[state.shown.index];
   const here = openProposals().filter(({ placement }) => state.placements[placement].start_s <= seconds && seconds <= state.placements[placement].end_s);
   const row = here.find(({ placement }) => placement === current) ?? here[0];

@@ -1,8 +1,5 @@
 /** The table of actions, once: words, keys, what runs and when it can be done. */
 
-import { boxing, selectBox } from "../boxes/boxes.js";
-import { forgetHere, goToKeyframe, hideHere, newBox, nextBox, nudgeBox, removeBox, withoutBox } from "../boxes/boxing.js";
-import { chooseBoxes, downloadBoxes, editLabel, stopFollowing, toggleEvaluate } from "../boxes/evaluating.js";
 import { loadClicks, openExport } from "../export/exporting.js";
 import { saveCamera } from "../lens/result.js";
 import { choose, nextCandidate, withoutCandidates } from "../pairs/candidates.js";
@@ -19,6 +16,7 @@ import { toggleRectified, withoutRectified } from "../picture/rectified.js";
 import { dismissHere, withoutPlacement } from "../proposals/dismissing.js";
 import { acceptProposal, nextPlace, nextProposal, previousProposal, rejectProposal, takesEnter, takesKeys } from "../proposals/proposals.js";
 import { sayNone, toggleProposals } from "../proposals/words.js";
+import { chooseBoxes, findMoving, toggleEvaluate } from "../review/evaluating.js";
 import { lookFrom, setCamera, toggleHidden, toggleLarge } from "../space/space.js";
 import { goLive, goTo, pause, play, step } from "../time/player.js";
 import { register } from "./actions.js";
@@ -38,20 +36,18 @@ const withSelected = () => withPictures() || (selectedClick() ? "" : "No pair is
 const withResiduals = () => withPictures() || (clicks().some((click) => click.residual_px !== null) ? "" : "There is no calibration yet");
 const undoable = () => withPictures() || (state.view?.can_undo ? "" : "There is nothing to undo");
 const redoable = () => withPictures() || (state.view?.can_redo ? "" : "There is nothing to redo");
-const withBoxes = () => withPictures() || (boxing.on ? "" : "Open Evaluate first (A)");
-const withBox = () => withPictures() || withoutBox();
 const following = () => (state.following && !["complete", "ended"].includes(state.following.state) ? "" : "The recording is complete: no new frames come");
 
 /** @param {number} du @param {number} dv image px */
-const nudge = (du, dv) => () => (boxing.on ? nudgeBox(10 * du, 10 * dv) : nudgeBy(du, dv));
+const nudge = (du, dv) => () => nudgeBy(du, dv);
 const zoom = (/** @type {number} */ factor) => (state.looking ? zoomEye(factor) : zoomBy(factor));
 
 const FRAMES = { help: "Step one frame", when: withFrames };
 const TENS = { help: "Step ten frames", when: withFrames };
 const ENDS = { help: "First or last frame", when: withFrames };
 const PLACES = { help: "Next or previous placement", when: withPlacements };
-const FINE = { group: "Mark", help: "Move the mark by 0.1 px", also: "nudge shift subpixel fine", when: () => (boxing.on ? withBox() : withMark()) };
-const COARSE = { group: "Mark", help: "Move the mark by 1 px", also: "nudge shift", when: () => (boxing.on ? withBox() : withMark()) };
+const FINE = { group: "Mark", help: "Move the mark by 0.1 px", also: "nudge shift subpixel fine", when: withMark };
+const COARSE = { group: "Mark", help: "Move the mark by 1 px", also: "nudge shift", when: withMark };
 const ZOOM = { group: "Picture", help: "Zoom", when: opened };
 const OVERLAY = { group: "Picture", help: "Toggle overlays", when: withPictures };
 const SPACE = { group: "3D view", when: opened };
@@ -70,7 +66,7 @@ export function registerActions() {
     { id: "previous-placement", group: "Time", words: "Previous placement", keys: ["P"], also: "reflector position back", run: () => previousProposal() || toPlacement(-1), ...PLACES },
     { id: "live", group: "Time", words: "Show the newest frame as it comes", also: "live follow recording now", run: goLive, when: following },
 
-    { id: "place-mark", group: "Mark", words: "Accept what is proposed; without a proposal, mark with the keyboard's cross", keys: ["Enter"], also: "click place add confirm yes", run: () => (boxing.on ? newBox() : takesEnter() && !state.cross ? acceptProposal() : enterCross()), when: withPictures },
+    { id: "place-mark", group: "Mark", words: "Accept what is proposed; without a proposal, mark with the keyboard's cross", keys: ["Enter"], also: "click place add confirm yes", run: () => (takesEnter() && !state.cross ? acceptProposal() : enterCross()), when: withPictures },
     { id: "cross", group: "Mark", words: "Keyboard's cross: 1 to 9 zoom into a field, arrows move it, Backspace zooms out, Esc ends", keys: ["G"], also: "grid nine fields marking without mouse", run: toggleCross, when: withPictures },
     { id: "next-candidate", group: "Mark", words: "Take another place, or with a mark another return", keys: ["C"], also: "candidate choose radar association other next", run: () => (takesKeys() ? nextPlace() : nextCandidate()), when: () => withPictures() || (takesKeys() ? "" : withoutCandidates()) },
     { id: "free-candidate", group: "Mark", words: "Automatic return", keys: ["Shift+C"], also: "candidate automatic unchoose", run: () => choose(-1), when: () => withPictures() || (selectedClick()?.chosen ? "" : "No return was chosen for this mark") },
@@ -83,7 +79,7 @@ export function registerActions() {
     { id: "mark-right-1", words: "Move the mark right by 1 px", keys: ["Alt+Shift+ArrowRight"], run: nudge(1, 0), ...COARSE },
     { id: "mark-up-1", words: "Move the mark up by 1 px", keys: ["Alt+Shift+ArrowUp"], run: nudge(0, -1), ...COARSE },
     { id: "mark-down-1", words: "Move the mark down by 1 px", keys: ["Alt+Shift+ArrowDown"], run: nudge(0, 1), ...COARSE },
-    { id: "delete", group: "Mark", words: "Delete the click", keys: ["Delete", "Backspace"], also: "remove mark erase", run: () => (boxing.on ? removeBox() : removeSelected()), when: () => (boxing.on ? withBox() : withSelected()) },
+    { id: "delete", group: "Mark", words: "Delete the click", keys: ["Delete", "Backspace"], also: "remove mark erase", run: removeSelected, when: withSelected },
     { id: "undo", group: "Mark", words: "Undo", keys: ["Ctrl+Z"], also: "back revert take back", run: () => turnBack("undo"), when: undoable },
     { id: "redo", group: "Mark", words: "Redo", keys: ["Ctrl+Shift+Z", "Ctrl+Y"], also: "again repeat", run: () => turnBack("redo"), when: redoable },
 
@@ -91,20 +87,6 @@ export function registerActions() {
 
     { id: "worst", group: "Pairs", words: "Next worst pair", keys: ["J"], also: "outlier residual largest wrong bad", run: nextWorst, when: withResiduals },
     { id: "exclude", group: "Pairs", words: "No: exclude the pair, or include it again; without a mark, dismiss the placement", keys: ["X"], also: "leave out use ignore disable spurious", run: () => (takesKeys() ? rejectProposal() : clickIn(state.cursor) ? toggleExcluded() : dismissHere()), when: () => withPictures() || (takesKeys() ? "" : clickIn(state.cursor) ? withSelected() : withoutPlacement()) },
-
-    { id: "evaluate", group: "Boxes", words: "Draw boxes and judge the calibration by them, or go back to the clicks", keys: ["A"], also: "tab evaluate annotate acc accuracy bounding people cars moving", run: toggleEvaluate, when: withPictures },
-    { id: "next-box", group: "Boxes", words: "Select the next box in this frame", keys: ["Q"], also: "object cycle", run: nextBox, when: withBoxes },
-    { id: "deselect-box", group: "Boxes", words: "Select no box, so that the next one is another object (Esc)", also: "unselect none", run: () => selectBox(null), when: withBox },
-    { id: "new-box", group: "Boxes", words: "New box in the middle; Alt+arrows move it by 1 px, with Shift by 10", also: "draw add keyboard enter", run: newBox, when: withBoxes },
-    { id: "box-class", group: "Boxes", words: "Name the class of the box", keys: ["R"], also: "label rename person car", run: editLabel, when: withBoxes },
-    { id: "hide-box", group: "Boxes", words: "The object is hidden from this frame on", keys: ["H"], also: "end occluded left gone", run: hideHere, when: withBox },
-    { id: "keyframe-back", group: "Boxes", words: "Previous keyframe of the box", keys: [","], help: "Previous or next keyframe", also: "correction jump", run: () => goToKeyframe(-1), when: withBox },
-    { id: "keyframe-forward", group: "Boxes", words: "Next keyframe of the box", keys: ["."], help: "Previous or next keyframe", also: "correction jump", run: () => goToKeyframe(1), when: withBox },
-    { id: "forget-keyframe", group: "Boxes", words: "Take back what was said about the box in this frame", keys: ["Shift+Delete"], also: "keyframe remove correction", run: forgetHere, when: withBox },
-    { id: "stop-following", group: "Boxes", words: "Follow the boxes no farther", also: "cancel tracking stop", run: stopFollowing, when: () => withPictures() || (state.view?.boxes.some((track) => track.following) ? "" : "No box is being followed") },
-    { id: "load-boxes", group: "Boxes", words: "Load boxes from a file", also: "import open coco yolo cvat kitti openlabel annotations", run: chooseBoxes, when: withPictures },
-    { id: "save-boxes", group: "Boxes", words: "Download the boxes", also: "export save boxes.json annotations", run: downloadBoxes, when: () => withPictures() || (state.view?.boxes.length ? "" : "There are no boxes yet") },
-    { id: "remove-box", group: "Boxes", words: "Delete all boxes of the object", also: "track erase", run: removeBox, when: withBox },
 
     { id: "fit", group: "Picture", words: "Fit the picture", keys: ["F"], also: "zoom reset whole 100", run: () => (state.looking ? fitEye() : fit()), when: opened },
     { id: "zoom-in", words: "Zoom in", keys: ["+", "="], also: "magnify closer larger", run: () => zoom(1.25), ...ZOOM },
@@ -114,7 +96,7 @@ export function registerActions() {
     { id: "show-ellipses", words: "Show or hide the 95 % ellipses", keys: ["3"], also: "overlay layer uncertainty covariance", run: () => toggleLayer("ellipses"), ...OVERLAY },
     { id: "show-predictions", words: "Show or hide the expected positions", keys: ["4"], also: "overlay layer predicted guess next placement", run: () => toggleLayer("predictions"), ...OVERLAY },
     { id: "show-uncertainty", words: "Show or hide the uncertainty in the picture", keys: ["5"], also: "overlay layer contours map 95 % lines", run: toggleContours, ...OVERLAY },
-    { id: "rectify", group: "Picture", words: "Show the picture rectified, or as taken; drag lines along straight edges", keys: ["U"], also: "undistort distortion lens straight ruler grid intrinsics", run: toggleRectified, when: () => withPictures() || (boxing.on ? "Leave Evaluate first" : withoutRectified()) },
+    { id: "rectify", group: "Picture", words: "Show the picture rectified, or as taken; drag lines along straight edges", keys: ["U"], also: "undistort distortion lens straight ruler grid intrinsics", run: toggleRectified, when: () => withPictures() || withoutRectified() },
     { id: "loupe-more", group: "Picture", words: "Loupe: magnify more", keys: ["]"], help: "Loupe: 4 to 16 times", also: "zoom magnifier larger", run: () => magnify(1), when: withPictures },
     { id: "loupe-less", group: "Picture", words: "Loupe: magnify less", keys: ["["], help: "Loupe: 4 to 16 times", also: "zoom magnifier smaller", run: () => magnify(-1), when: withPictures },
     { id: "loupe-contrast", group: "Picture", words: "Loupe: stretch the contrast, or not", keys: ["L"], also: "magnifier brightness enhance dark", run: stretchContrast, when: withPictures },
@@ -129,6 +111,8 @@ export function registerActions() {
     { id: "mark", group: "Panel", words: "Mark: the pairs and the returns that each may use", also: "tab table list clicks placements candidates", run: () => showPage("mark") },
     { id: "check", group: "Panel", words: "Check: the pose, the review of all pairs, and two solutions compared", also: "tab transform extrinsics rotation translation errors advice plots residuals histogram influence rms cdsd a b", run: () => showPage("check"), when: withPictures },
     { id: "deliver", group: "Panel", words: "Deliver", also: "tab save download file export report clicks", run: () => showPage("deliver"), when: withPictures },
+    { id: "evaluate", group: "Panel", words: "Evaluate: judge the calibration by boxes around what moves, or go back", keys: ["A"], also: "sheet boxes annotations acc accuracy bounding people cars moving", run: toggleEvaluate, when: withPictures },
+    { id: "find-moving", group: "Panel", words: "Evaluate: find what moves before a camera that stands still", also: "boxes motion detect", run: findMoving, when: withPictures },
     { id: "lens", group: "Panel", words: "Lens: intrinsics, and calibrating them from a board", also: "sheet camera intrinsics checkerboard charuco aprilgrid calibrate focal length distortion", run: () => showPage("lens"), when: withPictures },
     { id: "options", group: "Panel", words: "Options", also: "sheet settings parameters method", run: () => showPage("options"), when: withPictures },
     { id: "close-sheet", group: "Panel", words: "Close the sheet: go back to the tab before", also: "leave evaluate lens options", run: closeSheet },
@@ -139,6 +123,7 @@ export function registerActions() {
     { id: "recording", group: "File", words: "Choose another recording, other topics, intrinsics or session", also: "open file folder recent camera radar topic intrinsics", run: chooseRecording },
     { id: "save-camera", group: "File", words: "Save the intrinsics in use as camera.yaml", also: "export download camera_info lens", run: () => saveCamera(true), when: () => withPictures() || (state.lens?.intrinsics ? "" : "There are no intrinsics yet") },
     { id: "load-clicks", group: "File", words: "Load clicks from a file", also: "import open clicks.json", run: loadClicks, when: withPictures },
+    { id: "load-boxes", group: "File", words: "Load boxes from a file", also: "import open coco yolo cvat kitti openlabel annotations", run: chooseBoxes, when: withPictures },
 
     { id: "palette", group: "Help", words: "Search for an action, placement, pair or option", keys: ["Ctrl+K"], also: "command palette find go to", run: togglePalette },
     { id: "help", group: "Help", words: "Help", keys: ["?"], also: "keys mouse marks shortcuts legend manual", run: () => toggleHelp() },

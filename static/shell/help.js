@@ -12,7 +12,6 @@ const MOUSE = [
   ["drag", "Pan the picture"],
   ["click", "Place the mark for this frame"],
   ["drag a mark", "Move it"],
-  ["drag", "With Evaluate open: draw, move or resize a box; Shift+drag pans"],
   ["drag", "In the rectified picture: a line along a straight edge; Shift+drag pans"],
   ["Alt wheel", "Loupe: magnify more or less"],
   ["wheel", "On the timeline: zoom; with Shift: pan"],
@@ -29,9 +28,7 @@ const MARKS = [
   ["M1 8 8 4.5 15 8 8 11.5z|2.5 2.5|guess", "dashed diamond (ring in 3D): best next placement"],
   ["M8 1v4M8 11v4M1 8h4M11 8h4|2 1.5", "dashed cross: proposal, with a ring that contains 95 % of its error; numbers: other places"],
   ["M8 5.5a2.5 2.5 0 1 0 .01 0z|fill|still", "dot: static radar return"],
-  ["M8 4.5 12 11.5H4z|fill|moving", "triangle: moving radar return; with boxes, one in its target's box"],
-  ["M8 4.5 12 11.5H4z||moving", "hollow triangle: one outside its target's box; cross: its target has no box"],
-  ["M2 3h12v10H2z", "box: drawn or followed; dashed: straight on where it was lost"],
+  ["M8 4.5 12 11.5H4z|fill|moving", "triangle: moving radar return"],
 ];
 
 export function toggleHelp() {

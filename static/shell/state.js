@@ -3,7 +3,7 @@
 /** @typedef {import("../messages.js").View} View */
 /** @typedef {import("../messages.js").ClickRow} Click */
 /** A decoded frame. @typedef {{index: number, bitmap: ImageBitmap, scale: number, width: number, height: number, rectified: boolean}} Shown */
-/** @typedef {"opening"|"recording"|"view"|"progress"|"placements"|"overlay"|"look"|"radar_map"|"shown"|"selected"|"layers"|"connection"|"playing"|"cursor"|"hover"|"theme"|"box"|"grown"|"following"|"candidates"|"cross"|"boxes"|"lens"|"proposals"|"lanes"} Topic */
+/** @typedef {"opening"|"recording"|"view"|"progress"|"placements"|"overlay"|"look"|"radar_map"|"shown"|"selected"|"layers"|"connection"|"playing"|"cursor"|"hover"|"theme"|"box"|"grown"|"following"|"candidates"|"cross"|"lens"|"proposals"|"lanes"} Topic */
 
 export const state = {
   /** While the recording is being opened. @type {import("../messages.js").Opening|null} */ opening: null,
@@ -29,7 +29,7 @@ export const state = {
   connected: false,
   /** @type {import("../messages.js").Progress|null} */ progress: null,
   /** @type {{u: number, v: number}|null} */ hover: null,
-  layers: { returns: true, others: true, ellipses: true, predictions: true, boxes: true },
+  layers: { returns: true, others: true, ellipses: true, predictions: true },
   /** Seconds of each frame from the first one. @type {Float64Array} */ seconds: new Float64Array(0),
   /** Marks as the user left them, until the server's view has them: by the click's id, or a name for one that is new. @type {Map<string, Draft>} */ local: new Map(),
   /** The returns that may belong to the selected click. @type {import("../messages.js").PairCandidates|null} */ candidates: null,

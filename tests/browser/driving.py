@@ -136,9 +136,9 @@ class Driver:
         self.settle()
 
     def settle(self) -> None:
-        """Wait until nothing is pending: no unconfirmed event, no local mark, no solve, no figure of the boxes."""
+        """Wait until nothing is pending: no unconfirmed event, no local mark, no solve."""
         self.until("__cocalib.unconfirmed() === 0 && __cocalib.state.local.size === 0")
-        self.until("!__cocalib.state.view.solving && !__cocalib.state.view.acc.judging")
+        self.until("!__cocalib.state.view.solving")
 
     def click_sample(self, truth: dict[str, Any], count: int | None = None) -> None:
         """Click the reflector in every placement of the sample, where it was rendered."""

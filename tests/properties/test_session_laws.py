@@ -15,15 +15,6 @@ from calib_core.errors import CalibrationError
 from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions
 from cocalib.session import (
-    BoxDrawn,
-    BoxesLoaded,
-    BoxHidden,
-    BoxKeyframe,
-    BoxKeyframeRemoved,
-    BoxLabelled,
-    BoxMoved,
-    BoxRemoved,
-    BoxTrack,
     Cleared,
     ClickExcluded,
     ClickMoved,
@@ -60,35 +51,7 @@ clicks_of_files = st.lists(
     max_size=4,
     unique_by=(lambda click: click.image_time, lambda click: click.id),
 ).map(tuple)
-box_ids = st.integers(1, 5).map(lambda number: f"b{number}")
-labels = st.sampled_from(["person", "car", " robot ", "", "Kä\u0000"])
-edges = st.tuples(columns, rows, columns, rows).map(
-    lambda box: (min(box[0], box[2]), min(box[1], box[3]), max(box[0], box[2]), max(box[1], box[3]))
-)
-box_steps = st.one_of(
-    st.builds(BoxDrawn, frames, edges, labels),
-    st.builds(BoxMoved, box_ids, frames, edges),
-    st.builds(BoxHidden, box_ids, frames),
-    st.builds(BoxKeyframeRemoved, box_ids, frames),
-    st.builds(BoxRemoved, box_ids),
-    st.builds(BoxLabelled, box_ids, labels),
-    st.builds(
-        BoxesLoaded,
-        st.lists(
-            st.builds(
-                BoxTrack,
-                st.one_of(box_ids, st.just("person-1")),
-                labels,
-                st.lists(st.builds(BoxKeyframe, frames, st.one_of(edges, st.none())), max_size=3).map(tuple),
-                st.booleans(),
-            ),
-            max_size=2,
-        ).map(tuple),
-        st.lists(frames, max_size=2, unique=True).map(lambda times: tuple(sorted(times))),
-    ),
-)
 steps = st.one_of(
-    box_steps,
     st.builds(ClickPlaced, frames, st.tuples(columns, rows), st.just("clicked")),
     st.builds(ClickMoved, ids, st.tuples(columns, rows)),
     st.builds(ClickRemoved, ids),
@@ -136,7 +99,7 @@ class HeldSolver:
 
 def kept_of(session: Session) -> tuple[object, ...]:
     """What the user decided, without the answer and the counters."""
-    return (session.clicks, session.options, session.boxes, session.empty_frames)
+    return (session.clicks, session.options)
 
 
 class SessionLaws(RuleBasedStateMachine):
@@ -203,17 +166,6 @@ class SessionLaws(RuleBasedStateMachine):
         names = [click.id for click in self.workspace.session.clicks]
         assert len(set(names)) == len(names)
         assert f"c{self.workspace.session.next_click}" not in names
-
-    @invariant()
-    def every_track_of_boxes_has_its_own_id_and_begins_with_a_box(self) -> None:
-        session = self.workspace.session
-        names = [track.id for track in session.boxes]
-        assert len(set(names)) == len(names)
-        assert f"b{session.next_box}" not in names
-        for track in session.boxes:
-            times = [keyframe.image_time for keyframe in track.keyframes]
-            assert track.keyframes[0].edges_px is not None
-            assert times == sorted(set(times))
 
     @invariant()
     def an_answer_belongs_to_the_clicks_and_options_it_is_shown_with(self) -> None:

@@ -12,7 +12,7 @@ from calib_core.interchange.own.documents import ClickDocument
 from calib_core.measurements import ChosenReturn, Mark, ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions
 from calib_core.results import PairResult
-from cocalib.session.state import BoxEdges, BoxLabel, BoxTrack, ChosenIntrinsics, Outcome
+from cocalib.session.state import ChosenIntrinsics, Outcome
 
 Id: TypeAlias = Annotated[str, Meta(min_length=1, max_length=100)]
 
@@ -117,73 +117,6 @@ class ClicksImported(_Journalled, frozen=True):
         return cls(tuple(map(click_document, clicks)))
 
 
-class BoxDrawn(_Journalled, frozen=True, rename={"edges_px": "box_px"}):
-    """A box was drawn around an object that had none so far.
-
-    Attributes:
-        image_time: stamp of the frame.
-        edges_px: of the box.
-        label: the object's class, such as "person".
-    """
-
-    image_time: TimeNs
-    edges_px: BoxEdges
-    label: BoxLabel
-
-
-class BoxMoved(_Journalled, frozen=True, rename={"edges_px": "box_px"}):
-    """The box of an object was corrected in a frame, which makes that frame a keyframe.
-
-    Attributes:
-        id: of the track.
-        image_time: stamp of the frame.
-        edges_px: of the box.
-    """
-
-    id: Id
-    image_time: TimeNs
-    edges_px: BoxEdges
-
-
-class BoxHidden(_Journalled, frozen=True):
-    """An object is hidden, or out of the picture, from a frame on until its next keyframe."""
-
-    id: Id
-    image_time: TimeNs
-
-
-class BoxKeyframeRemoved(_Journalled, frozen=True):
-    """What was said about an object in a frame was taken back; with its last box, the track goes."""
-
-    id: Id
-    image_time: TimeNs
-
-
-class BoxRemoved(_Journalled, frozen=True):
-    """All boxes of an object were deleted."""
-
-    id: Id
-
-
-class BoxLabelled(_Journalled, frozen=True):
-    """An object was given another class."""
-
-    id: Id
-    label: BoxLabel
-
-
-class BoxesLoaded(_Journalled, frozen=True):
-    """Boxes from a file took the place of all boxes.
-
-    Attributes:
-        tracks: one per object.
-        empty_frames: stamps of the frames that were annotated and have no box.
-    """
-
-    tracks: tuple[BoxTrack, ...]
-    empty_frames: tuple[TimeNs, ...] = ()
-
-
 class ColumnsMapped(_Journalled, frozen=True):
     """The recording was opened with these values of --map; the next opening uses them again. Not undone with clicks."""
 
@@ -245,13 +178,6 @@ JournalStep: TypeAlias = (
     | ColumnsMapped
     | AxesStated
     | AssumptionsConfirmed
-    | BoxDrawn
-    | BoxMoved
-    | BoxHidden
-    | BoxKeyframeRemoved
-    | BoxRemoved
-    | BoxLabelled
-    | BoxesLoaded
     | Undo
     | Redo
 )

@@ -1,4 +1,4 @@
-"""The session as a value: its intrinsics, its boxes, what it must know about the recording."""
+"""The session as a value: its intrinsics, what it must know about the recording."""
 
 from dataclasses import dataclass, field
 from typing import Annotated, TypeAlias
@@ -66,43 +66,6 @@ class ChosenIntrinsics(msgspec.Struct, frozen=True, forbid_unknown_fields=True, 
         return Camera(self.model, *self.size_px, np.array(self.matrix_px), np.array(self.distortion), known)
 
 
-BoxEdges: TypeAlias = tuple[float, float, float, float]
-"""Left, top, right and bottom edge of a box [px]; pixel (0, 0) is the centre of the top-left pixel."""
-
-
-TrackId: TypeAlias = Annotated[str, Meta(min_length=1, max_length=100)]
-BoxLabel: TypeAlias = Annotated[str, Meta(max_length=100)]
-
-
-class BoxKeyframe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename={"edges_px": "box_px"}):
-    """A frame in which a person said where an object is.
-
-    Attributes:
-        image_time: stamp of the frame.
-        edges_px: of its box; None: the object is hidden from this frame on.
-    """
-
-    image_time: TimeNs
-    edges_px: BoxEdges | None
-
-
-class BoxTrack(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename={"is_carried": "carried"}):
-    """The boxes of one object.
-
-    Attributes:
-        id: unique in the session, such as "b3"; it becomes Box.track.
-        label: the object's class, such as "person"; "" if a file states none.
-        keyframes: sorted by time, at least one, each stamp once.
-        is_carried: the box is followed through the frames after each keyframe; boxes from a file are only in the frames
-            for which the file states them.
-    """
-
-    id: TrackId
-    label: BoxLabel
-    keyframes: tuple[BoxKeyframe, ...]
-    is_carried: bool = True
-
-
 Outcome: TypeAlias = Calibration | Unsolvable
 
 
@@ -132,7 +95,6 @@ class RecordingFacts:
         radar_times: (k,) stamps of the radar's scans [ns], ascending; they identify a recording without frames.
         radar_topics: all topics of the radar.
         assumptions: what its files do not state and the user has not confirmed on opening it.
-        image_names: (m,) of the frames' files without suffix; none if the frames are not files.
     """
 
     name: str
@@ -143,7 +105,6 @@ class RecordingFacts:
     radar_times: TimesNs = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     radar_topics: tuple[str, ...] = ()
     assumptions: tuple[AssumedReading, ...] = ()
-    image_names: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("image_times", "radar_times"):
@@ -209,10 +170,7 @@ class Session:
         confirmed: texts of the assumptions about the recording that the user has confirmed.
         dismissed: placements that are not the reflector.
         acknowledged: codes of the warnings that the user has read.
-        boxes: around moving objects, one track per object, in the order in which they were drawn.
-        empty_frames: stamps of the frames that a file of boxes says are without any, ascending.
         intrinsics: chosen for this session; None to use those that it was opened with.
-        next_box: number of the next track's id ("b7"); it only increases.
     """
 
     clicks: tuple[ReflectorClick, ...] = ()
@@ -227,9 +185,6 @@ class Session:
     confirmed: tuple[str, ...] = ()
     dismissed: tuple[DismissedPlacement, ...] = ()
     acknowledged: tuple[str, ...] = ()
-    boxes: tuple[BoxTrack, ...] = ()
-    empty_frames: tuple[TimeNs, ...] = ()
-    next_box: int = 1
     intrinsics: ChosenIntrinsics | None = None
 
     @property

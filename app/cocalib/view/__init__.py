@@ -3,12 +3,11 @@
 from cocalib.view.build import is_dismissed, summary_lines, view
 from cocalib.view.candidates import CandidateRow, PairCandidates, click_candidates, pair_of_click
 from cocalib.view.following import FollowState, Pace, advice_words, pace_words
-from cocalib.view.model import AccPanel, Advice, ClickRow, ClickState, Ellipse, Figure, Level, Stage, View
+from cocalib.view.model import Advice, ClickRow, ClickState, Ellipse, Figure, Level, Stage, View
 from cocalib.view.reference import Reference, shown_calibration
 from cocalib.view.wording import sentence, warning_in_sentences
 
 __all__ = [
-    "AccPanel",
     "Advice",
     "CandidateRow",
     "ClickRow",

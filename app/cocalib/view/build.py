@@ -24,8 +24,6 @@ from calib_core.results.verdict import (
     verdict_on,
 )
 from cocalib.session import History, RecordingFacts, Session
-from cocalib.session.boxes_in_frames import CarriedTrack, carried_tracks
-from cocalib.view.box_rows import box_rows, known_labels
 from cocalib.view.click_rows import click_rows
 from cocalib.view.figures import (
     assumed_figures,
@@ -37,7 +35,7 @@ from cocalib.view.figures import (
     systematic_errors,
     uncertainty_sentences,
 )
-from cocalib.view.model import AccPanel, Advice, AssumptionRow, Figure, Stage, SystematicErrorTable, VerdictRow, View
+from cocalib.view.model import Advice, AssumptionRow, Figure, Stage, SystematicErrorTable, VerdictRow, View
 from cocalib.view.reference import Reference, comparison_figures, reference_words, shown_calibration
 from cocalib.view.wording import plain, sentence, warning_in_sentences, with_degree_signs
 
@@ -53,8 +51,6 @@ def view(
     facts: RecordingFacts,
     reference: Reference | None = None,
     placements: Sequence[Placement] | None = None,
-    carried: Sequence[CarriedTrack] | None = None,
-    acc: AccPanel | None = None,
 ) -> View:
     """Return everything there is to draw about the current session.
 
@@ -63,8 +59,6 @@ def view(
         facts: the recording's frames.
         reference: a calibration to review; None if there is none.
         placements: found in the radar data; None before they have been looked for.
-        carried: the session's boxes through the frames; None as long as they have not been followed.
-        acc: what the boxes say about the calibration; None before they have been judged.
     """
     session = history.present
     outcome = session.outcome
@@ -98,9 +92,6 @@ def view(
         verdict=verdict_row(verdict, session, placements),
         dismissed=session.dismissed,
         acknowledged=session.acknowledged,
-        boxes=box_rows(session.boxes, carried_tracks(session.boxes, facts) if carried is None else carried, facts),
-        box_labels=known_labels(session.boxes),
-        acc=acc or AccPanel(),
     )
 
 

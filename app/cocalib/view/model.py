@@ -5,7 +5,6 @@ from typing import Literal, TypeAlias
 
 import msgspec
 
-from calib_core.evaluation.figures import Axis, ClassFigure
 from calib_core.measurements import Mark, Stamp
 from calib_core.options import CalibrationOptions, Method
 from calib_core.results import DataWarning, NextPlacement
@@ -186,79 +185,6 @@ class AssumptionRow:
 
 
 @dataclass(frozen=True, slots=True)
-class BoxTrackRow:
-    """One object with a box: its row in the table.
-
-    Attributes:
-        id: of its track.
-        label: its class.
-        first: index of the first frame with its box.
-        last: index of the last one.
-        boxes: number of frames with its box.
-        keyframes: indices of the frames in which a person stated something about it; empty for boxes from a file.
-        hidden: those of them from which on it is hidden.
-        note: where and why its box ends; "" when there is nothing to say.
-        following: it is being followed through the frames.
-    """
-
-    id: str
-    label: str
-    first: int
-    last: int
-    boxes: int
-    keyframes: tuple[int, ...]
-    hidden: tuple[int, ...]
-    note: str
-    following: bool
-
-
-@dataclass(frozen=True, slots=True)
-class SensitivityRow:
-    """Acc of the calibration turned about one axis of the camera.
-
-    Attributes:
-        axis: turned about.
-        angles_deg: ascending.
-        acc_percent: at each angle.
-        values: at -1, 0 and +1 deg, formatted with their unit.
-        words: what Acc sees of this axis, as a sentence.
-        is_flat: it sees nothing of it.
-    """
-
-    axis: Axis
-    angles_deg: tuple[float, ...]
-    acc_percent: tuple[float, ...]
-    values: tuple[str, ...]
-    words: str
-    is_flat: bool
-
-
-@dataclass(frozen=True, slots=True)
-class AccPanel:
-    """What the boxes of the page say about the calibration on the page.
-
-    Attributes:
-        figures: Acc with its standard error, the frames that count, and what chance would give.
-        classes: by label.
-        sensitivity: one row per axis; empty where there is too little to judge the calibration by.
-        caution: that Acc is not accuracy, or that there is too little to judge by; "" without figures.
-        rule: which returns count and how they were matched; "" without figures.
-        problem: why there are no figures; "" if there are, or nothing was judged so far.
-        warnings: what the reader of the figures must know.
-        judging: figures are being computed; these belong to earlier boxes or an earlier calibration.
-    """
-
-    figures: tuple[Figure, ...] = ()
-    classes: tuple[ClassFigure, ...] = ()
-    sensitivity: tuple[SensitivityRow, ...] = ()
-    caution: str = ""
-    rule: str = ""
-    problem: str = ""
-    warnings: tuple[DataWarning, ...] = ()
-    judging: bool = False
-
-
-@dataclass(frozen=True, slots=True)
 class View:
     """Everything a client draws about the session.
 
@@ -288,9 +214,6 @@ class View:
         verdict: how far the calibration can be trusted, and what to do next.
         dismissed: the placements that the user dismissed.
         acknowledged: the codes of the warnings that the user has read.
-        boxes: around moving objects, one row per object.
-        box_labels: the classes to choose from.
-        acc: what the boxes say about the calibration.
     """
 
     revision: int
@@ -316,8 +239,5 @@ class View:
     assumptions: tuple[AssumptionRow, ...] = ()
     dismissed: tuple[DismissedPlacement, ...] = ()
     acknowledged: tuple[str, ...] = ()
-    boxes: tuple[BoxTrackRow, ...] = ()
-    box_labels: tuple[str, ...] = ()
-    acc: AccPanel = field(default_factory=AccPanel)
     systematic_errors: SystematicErrorTable = field(default_factory=SystematicErrorTable)
     verdict: VerdictRow = VerdictRow("nothing", "No clicks yet", "", early=True)

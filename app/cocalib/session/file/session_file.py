@@ -123,7 +123,7 @@ class SessionFile:
     def _rescued(self, fault: str) -> Closed:
         """Write the session to the user's folder, or to the system's folder for temporary files."""
         path, count = self._folder.path, len(self._present.clicks)
-        if not count and not self._present.boxes:
+        if not count:
             return Closed(path, 0, fault)
         for home in (user_session_folder(f"{self._name}-rescued").parent, Path(tempfile.gettempdir())):
             try:

@@ -18,7 +18,6 @@ from cocalib.platform.error_boundary import error_boundary
 from cocalib.session import Session, Step
 from cocalib.solving.solving import window_candidates
 from cocalib.view import PairCandidates, click_candidates, pair_of_click, sentence
-from cocalib.view.box_rows import boxes_in_frame
 from cocalib.web.channel.desk import answer_of
 from cocalib.web.channel.hub import Hub
 from cocalib.web.channel.outbox import NewestWins, Outbox, Shown
@@ -31,13 +30,12 @@ from cocalib.web.messages import (
     Command,
     CursorMoved,
     Done,
-    FollowingStopped,
-    FrameBoxes,
     FrameWanted,
     Hello,
     ImportWanted,
     Incoming,
     LensRequest,
+    MovingBoxesWanted,
     OpeningCommand,
     Problem,
     ProposingSwitch,
@@ -84,7 +82,6 @@ class Channel:
         self._candidates = NewestWins(self._send_candidates, self._report)
         self._forward = True
         self._has_candidates = False
-        self._has_boxes = False
 
     async def run(self, socket: Socket) -> None:
         """Serve the page until it disconnects; the socket's exception is then raised to the caller."""
@@ -119,15 +116,6 @@ class Channel:
         self._space.give(self._cursor)
         if not self._cursor.playing:
             self._candidates.give(self._cursor)
-
-    def show_boxes(self) -> None:
-        """Send the boxes of the frame on the page; nothing as long as there are none, as before."""
-        carried = self._hub.workspace.carried
-        if carried or self._has_boxes:
-            self._has_boxes = bool(carried)
-            index = self._cursor.index
-            returns = self._hub.box_judging.returns(index)
-            self.outbox.put(encode(FrameBoxes(index, boxes_in_frame(carried, index), returns)), kind="boxes")
 
     async def _read(self, socket: Socket) -> None:
         while True:
@@ -164,11 +152,10 @@ class Channel:
             self._give(command)
         elif isinstance(command, CursorMoved):
             self._move(command)
-        elif isinstance(command, ViewpointWanted):
-            if self.scene is not None:
-                self.scene.look_from(command.viewpoint)
-        elif isinstance(command, FollowingStopped | ProposingSwitch):
-            self._switch(command)
+        elif isinstance(command, ViewpointWanted | ProposingSwitch):
+            self._set(command)
+        elif isinstance(command, BoxesWanted | MovingBoxesWanted):
+            await self._hub.boxes.obey(command)
         elif isinstance(command, SnapWanted):
             self.outbox.put(encode(await self._snapped(command)))
         elif isinstance(command, LensRequest):
@@ -187,12 +174,12 @@ class Channel:
             return await hub.proposing.averaged(wanted)
         return await snapped(wanted, hub.moments, hub.frames, hub.executor)
 
-    def _switch(self, command: FollowingStopped | ProposingSwitch) -> None:
-        """Start or stop what goes on in the background."""
+    def _set(self, command: ViewpointWanted | ProposingSwitch) -> None:
+        """Change what the page looks at, or whether there are proposals."""
         if isinstance(command, ProposingSwitch):
             self._hub.proposing.switch(command)
-        else:
-            self._hub.box_following.stop()
+        elif self.scene is not None:
+            self.scene.look_from(command.viewpoint)
 
     def _give(self, command: FrameWanted | Hello | ViewWanted | ReviewRequest) -> None:
         """Hand over what a newer request of the same kind supersedes."""
@@ -205,7 +192,7 @@ class Channel:
         else:
             self._review.give(command)
 
-    async def _change(self, command: Step | ImportWanted | BoxesWanted) -> None:
+    async def _change(self, command: Step | ImportWanted) -> None:
         """Change the session, off the event loop.
 
         Raises:
@@ -214,8 +201,6 @@ class Channel:
         workspace = self._hub.workspace
         if isinstance(command, ImportWanted):
             change = partial(workspace.import_clicks, command.text, command.name)
-        elif isinstance(command, BoxesWanted):
-            change = partial(workspace.load_boxes, command.content, command.name)
         else:
             change = partial(workspace.dispatch, command)
         await asyncio.get_running_loop().run_in_executor(self._hub.steps, change)
@@ -229,7 +214,6 @@ class Channel:
         if not 0 <= command.index < len(self._hub.moments):
             return
         self._cursor = command
-        self.show_boxes()
         self.refresh()
 
     async def _greet(self, _wanted: Hello) -> None:

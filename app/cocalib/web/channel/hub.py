@@ -15,8 +15,8 @@ from calib_core.recordings import FollowedRecording, Recording, TopicSummary, cl
 from calib_core.results import DataWarning
 from cocalib.platform.error_boundary import error_boundary
 from cocalib.platform.resources import version
-from cocalib.view import AccPanel, View, warning_in_sentences
-from cocalib.web.channel.boxes import BoxFollowing, BoxJudging
+from cocalib.view import View, warning_in_sentences
+from cocalib.web.channel.boxes import BoxDesk
 from cocalib.web.channel.desk import ClosedDesk, Desk
 from cocalib.web.channel.lens import LensDesk
 from cocalib.web.channel.live_edge import LiveEdge
@@ -54,9 +54,6 @@ class Tab(Protocol):
     def show(self) -> None:
         """Send the newest View, or what differs from the one that the page has."""
 
-    def show_boxes(self) -> None:
-        """Send the boxes of the frame on the page."""
-
     def refresh(self) -> None:
         """Draw the overlay and the 3D view again, after a change of the session."""
 
@@ -87,10 +84,7 @@ class Hub:
         self.tabs: set[Tab] = set()
         self.steps = ThreadPoolExecutor(max_workers=1, thread_name_prefix="steps")
         self.feed = ViewFeed(workspace.view)
-        self.box_following = BoxFollowing(
-            workspace, recording, executor, lambda progress: self.broadcast(progress, "progress")
-        )
-        self.box_judging = BoxJudging(workspace, recording, executor, lambda: self.box_following.is_busy)
+        self.boxes = BoxDesk(workspace, recording, executor, self.broadcast)
         self.lens = LensDesk(workspace, recording, self.broadcast)
         self.proposing = ProposingDesk(workspace, recording, self.broadcast, on=proposes)
         self._searching: asyncio.Task[None] | None = None
@@ -116,8 +110,7 @@ class Hub:
             await asyncio.gather(self._searching, return_exceptions=True)
         await self.lens.close()
         await self.proposing.close()
-        await self.box_following.close()
-        await self.box_judging.close()
+        await self.boxes.close()
         await self.frames.close()
 
     @property
@@ -137,6 +130,7 @@ class Hub:
         tab.show()
         self.lens.greet(outbox)
         self.proposing.greet(outbox)
+        self.boxes.greet(outbox)
         if self.survey is not None:
             for kind, message in self._found(self.survey):
                 outbox.put(encode(message), kind=kind)
@@ -171,16 +165,13 @@ class Hub:
             tab.outbox.put(text, kind=kind)
 
     def _take(self, view: View) -> None:
-        only_boxes = _without_boxes(view) == _without_boxes(self.feed.newest)
         self.feed.take(view)
-        self.box_following.follow()
-        self.box_judging.judge()
+        self.boxes.follow()
         self.lens.follow()
         self.proposing.follow()
         for tab in self.tabs:
             tab.show()
-            tab.show_boxes()
-        if view.solving or only_boxes:
+        if view.solving:
             return  # overlay and 3D view show the last answer until the next one; redrawing would only slow the solver
         for tab in self.tabs:
             tab.refresh()
@@ -241,11 +232,6 @@ class Hub:
             opening=self._opening,
             intrinsics=self.workspace.intrinsics,
         )
-
-
-def _without_boxes(view: View) -> View:
-    """Return what the overlay and the 3D view depend on."""
-    return replace(view, boxes=(), box_labels=(), acc=AccPanel(), can_undo=False, can_redo=False)
 
 
 def _settled(recording: Recording) -> list[DataWarning]:

@@ -114,7 +114,7 @@ class SnapWanted(_Request, frozen=True, tag="snap_wanted"):
 
 
 class BoxesWanted(_Request, frozen=True, tag="load_boxes", rename={"content": "content_base64"}):
-    """A page read a file of boxes; they take the place of all boxes.
+    """A page read a file of boxes; the calibration is judged by them.
 
     Attributes:
         name: of the file.
@@ -125,8 +125,8 @@ class BoxesWanted(_Request, frozen=True, tag="load_boxes", rename={"content": "c
     content: bytes
 
 
-class FollowingStopped(_Request, frozen=True, tag="stop_following"):
-    """A page wants boxes to be followed no farther than they have been."""
+class MovingBoxesWanted(_Request, frozen=True, tag="find_moving"):
+    """The calibration is to be judged by boxes around what moves before the camera."""
 
 
 class ProposingSwitch(_Request, frozen=True, tag="propose"):
@@ -177,8 +177,8 @@ Command: TypeAlias = (
     | LensRequest
     | ProposingSwitch
     | SnapWanted
-    | FollowingStopped
     | BoxesWanted
+    | MovingBoxesWanted
 )
 Message: TypeAlias = Command | ChoicesWanted | FolderWanted | RecentForgotten | OpenWith
 

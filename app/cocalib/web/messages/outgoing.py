@@ -15,7 +15,7 @@ from calib_core.results import DataWarning
 from cocalib.option_changes import OptionGroup, option_groups
 from cocalib.proposing import ProposingProgress
 from cocalib.view import ClickRow, FollowState, PairCandidates, View
-from cocalib.view.box_rows import BoxedReturn, BoxInFrame
+from cocalib.view.acc_panel import AccPanel
 from cocalib.view.contours import ContourMap
 from cocalib.view.review import Compared, PairReview, Review
 from cocalib.web.messages.lens_messages import LensResult, LensState
@@ -147,21 +147,6 @@ class Uncertainty:
 
     revision: int
     maps: tuple[ContourMap, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class FrameBoxes:
-    """The boxes of the frame that a page shows.
-
-    Attributes:
-        index: of the frame.
-        boxes: around objects in it.
-        returns: of moving targets at its time.
-    """
-
-    index: int
-    boxes: tuple[BoxInFrame, ...]
-    returns: tuple[BoxedReturn, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -413,7 +398,7 @@ Outgoing: TypeAlias = (
     | RadarMap
     | SpaceLook
     | Overlay
-    | FrameBoxes
+    | AccPanel
     | PairCandidates
     | Review
     | PairReview
@@ -442,7 +427,7 @@ TYPES: Mapping[type, str] = {
     RadarMap: "radar_map",
     SpaceLook: "space",
     Overlay: "overlay",
-    FrameBoxes: "frame_boxes",
+    AccPanel: "acc",
     PairCandidates: "candidates",
     Review: "review",
     PairReview: "pair_review",

@@ -14,7 +14,6 @@ from typing import Protocol
 import msgspec
 import numpy as np
 
-from calib_core.boxes import boxes_text
 from calib_core.errors import CalibrationError
 from calib_core.interchange import CalibrationFile, read_calibration, written_formats
 from calib_core.measurements import MIN_PAIRS, Unsolvable
@@ -196,7 +195,6 @@ class _Downloads:
             "/api/calibration.json": self._calibration,
             "/api/clicks.json": self._clicks,
             "/api/report.html": self._report,
-            "/api/boxes.json": self._boxes,
             "/api/formats.json": _formats,
             "/api/activity.json": self._activity,
             "/api/camera.yaml": self._camera,
@@ -263,9 +261,6 @@ class _Downloads:
 
     def _clicks(self, _query: str) -> Reply:
         return _download(self._workspace.clicks_text().encode(), "clicks.json")
-
-    def _boxes(self, _query: str) -> Reply:
-        return _download(boxes_text(self._workspace.boxes).encode(), "boxes.json")
 
     def _camera(self, query: str) -> Reply:
         """Return the calibrated lens, or with the query "in_use" the intrinsics that the session is solved with."""

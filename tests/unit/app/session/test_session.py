@@ -12,8 +12,6 @@ from calib_core.errors import CalibrationError, OptionError
 from calib_core.measurements import ChosenReturn, ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions, NoiseOptions
 from cocalib.session import (
-    BoxDrawn,
-    BoxesLoaded,
     ChosenIntrinsics,
     Cleared,
     ClickExcluded,
@@ -143,12 +141,6 @@ def test_acknowledged_warnings_stay_so_when_clicks_are_undone():
 )
 def test_an_id_is_not_given_again(steps, expected):
     assert ids(history_of(*steps).present) == expected
-
-
-@pytest.mark.parametrize("gone", [Undo(), BoxesLoaded((), ())], ids=["undone", "replaced by a file's"])
-def test_the_id_of_a_box_that_is_gone_is_not_given_again(gone):
-    drawn = BoxDrawn(TIMES[3], (1.0, 1.0, 20.0, 30.0), "car")
-    assert [box.id for box in history_of(drawn, gone, drawn).present.boxes] == ["b2"]
 
 
 def test_clearing_removes_the_clicks_and_the_answer_and_keeps_the_options():

@@ -255,6 +255,7 @@ def reseal(folder: Path, line: int, content: bytes) -> None:
         (b'{"n":2,"step":{"type":"click_removed","id":"c9"}}', "there is no click 'c9'"),
         (b'{"n":2,"step":{"type":"options_changed","options":{"nois":{}}}}', "unknown option 'nois'"),
         (b'{"n":2,"step":{"type":"juggled"}}', "Invalid value 'juggled'"),
+        (b'{"n":2,"step":{"type":"box_removed","id":"b1"}}', "'box_removed'.*cocalib session repair"),
     ],
 )
 def test_a_step_that_this_version_does_not_understand_is_refused(tmp_path, content, words):

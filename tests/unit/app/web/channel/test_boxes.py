@@ -1,93 +1,144 @@
-"""Boxes are followed a few pictures at a time, the newest first, and what was followed is kept."""
+"""The desk of the sheet Evaluate: boxes of a file or around what moves, and what pages are told of them."""
 
-import numpy as np
+import asyncio
+import json
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
 import pytest
 
+from calib_core.boxes import boxes_text
 from calib_core.errors import InputError
-from cocalib.session.boxes_in_frames import Start, Stretch
-from cocalib.web.channel.boxes import BoxFollower
-from tests.unit.boxes.test_tracking import edges, picture
+from calib_core.measurements import Box, Boxes, FrameBoxes, TimeNs
+from cocalib.view.acc_panel import AccPanel
+from cocalib.web.channel.boxes import BoxDesk
+from cocalib.web.messages import BoxesWanted, MovingBoxesWanted, Outgoing, Progress
+from cocalib.workspace import Workspace, open_workspace
+from tests.street_recording import StreetRecording, reference_calibration
 
-WAY = [(60 + 3.0 * step, 100.0) for step in range(60)]
-
-
-class Pictures:
-    """The moving rectangle; counts which pictures are decoded."""
-
-    def __init__(self, scale: float = 1.0, broken: int | None = None) -> None:
-        self.read: list[int] = []
-        self._scale = scale
-        self._broken = broken
-
-    def __call__(self, frame: int) -> tuple[np.ndarray, float]:
-        self.read.append(frame)
-        if frame == self._broken:
-            raise InputError(f"frame {frame + 1} cannot be decoded")
-        return picture(WAY[frame], seed=frame), self._scale
+PERSON = Box(10.0, 20.0, 60.0, 200.0, "person")
 
 
-def follower(pictures: Pictures) -> BoxFollower:
-    return BoxFollower(pictures, lambda: len(WAY))
+@pytest.fixture(scope="module")
+def walk() -> StreetRecording:
+    return StreetRecording()
 
 
-def stretch(first: int, last: int) -> Stretch:
-    return Stretch(Start(first, edges(WAY[first])), last)
+@pytest.fixture
+def workspace(walk: StreetRecording, tmp_path: Path) -> Iterator[Workspace]:
+    opened = open_workspace(
+        walk, camera=walk.camera(), session_folder=tmp_path / "s", name="street", reference=reference_calibration()
+    )
+    yield opened
+    opened.close()
 
 
-def test_a_box_is_followed_to_the_end_of_its_stretch_and_no_farther():
-    pictures = Pictures()
-    work = follower(pictures)
-    work.want([stretch(5, 20)])
-    while not work.is_done:
-        work.go_on(0.0)
-    found = work.followed[Start(5, edges(WAY[5]))]
-    assert [box.frame for box in found.boxes] == [*range(6, 21)]
-    assert found.boxes[-1].edges_px == pytest.approx(edges(WAY[20]), abs=2.0)
-    assert max(pictures.read) == 20
-    assert work.progress == (15, 15)
+@pytest.fixture
+def threads() -> Iterator[Executor]:
+    with ThreadPoolExecutor(2) as made:
+        yield made
 
 
-def test_a_longer_stretch_goes_on_where_the_shorter_one_ended():
-    pictures = Pictures()
-    work = follower(pictures)
-    work.want([stretch(0, 10)])
-    work.go_on(60.0)
-    before = len(pictures.read)
-    work.want([stretch(0, 14)])
-    assert not work.is_done
-    work.go_on(60.0)
-    assert pictures.read[before:] == [11, 12, 13, 14]
+def sent(boxes: Boxes, name: str = "boxes.json") -> BoxesWanted:
+    return BoxesWanted(name, boxes_text(boxes).encode())
 
 
-def test_the_last_of_those_wanted_comes_first_and_others_are_dropped():
-    pictures = Pictures()
-    work = follower(pictures)
-    work.want([stretch(0, 30), stretch(40, 45)])
-    work.go_on(0.0)
-    assert min(pictures.read) == 40
-    work.want([stretch(0, 30)])
-    work.go_on(0.0)
-    assert list(work.followed) == [Start(0, edges(WAY[0]))]
+def at_desk(
+    workspace: Workspace, walk: StreetRecording, threads: Executor, *commands: BoxesWanted | MovingBoxesWanted
+) -> list[Outgoing]:
+    """Send commands one after the other, each when the one before has been answered; return what pages were told."""
+    told: list[Outgoing] = []
+
+    async def run() -> None:
+        desk = BoxDesk(workspace, walk, threads, lambda message, _kind: told.append(message))
+        desk.follow()
+        for command in commands:
+            before = len(told)
+            await desk.obey(command)
+            async with asyncio.timeout(40):
+                while not any(is_answer(message) for message in told[before:]):
+                    await asyncio.sleep(0.005)
+        desk.follow()
+        await desk.close()
+
+    asyncio.run(run())
+    return told
 
 
-@pytest.mark.parametrize(("broken", "count", "words"), [(None, 3, "stopped"), (8, 7, "frame 9 cannot be decoded")])
-def test_stopping_and_a_frame_that_cannot_be_decoded_end_the_box_with_the_reason(broken, count, words):
-    work = follower(Pictures(broken=broken))
-    work.want([stretch(0, 40)])
-    for _ in range(3 if broken is None else 40):
-        work.go_on(0.0)
-    work.stop()
-    assert work.is_done
-    [found] = work.followed.values()
-    assert len(found.boxes) == count
-    assert words in found.ended
+def is_answer(message: Outgoing) -> bool:
+    return isinstance(message, AccPanel) and not message.busy
 
 
-def test_boxes_of_halved_pictures_are_those_of_the_recorded_ones():
-    work = follower(Pictures(scale=0.5))
-    left, top, right, bottom = (2 * (value + 0.5) - 0.5 for value in edges(WAY[0]))
-    start = Start(0, (left, top, right, bottom))
-    work.want([Stretch(start, 20)])
-    work.go_on(60.0)
-    expected = [2 * (value + 0.5) - 0.5 for value in edges(WAY[20])]
-    assert work.followed[start].boxes[-1].edges_px == pytest.approx(expected, abs=3.0)
+def panels(told: Sequence[Outgoing]) -> list[AccPanel]:
+    return [message for message in told if isinstance(message, AccPanel)]
+
+
+def test_boxes_of_a_file_are_judged_once_and_named(workspace, walk, threads):
+    told = panels(at_desk(workspace, walk, threads, sent(walk.street.boxes)))
+    assert [panel.busy for panel in told] == [True, False]
+    assert (told[-1].source, told[-1].boxes, told[-1].frames) == ("boxes.json", 40, 40)
+    assert [figure.key for figure in told[-1].figures] == ["acc", "acc_frames", "acc_targets", "acc_chance"]
+    assert told[-1].problem == ""
+
+
+def test_other_boxes_replace_the_first_and_what_stands_meanwhile_is_marked(workspace, walk, threads):
+    half = Boxes(walk.street.boxes.frames[:20], "half.json")
+    told = panels(at_desk(workspace, walk, threads, sent(walk.street.boxes), sent(half, "half.json")))
+    assert [(panel.source, panel.frames, panel.busy) for panel in told[1:]] == [
+        ("boxes.json", 40, False),
+        ("boxes.json", 40, True),
+        ("half.json", 20, False),
+    ]
+
+
+def test_what_moves_is_found_with_its_progress(workspace, walk, threads):
+    told = at_desk(workspace, walk, threads, MovingBoxesWanted())
+    progress = [message for message in told if isinstance(message, Progress)]
+    assert progress
+    assert progress[-1].done == progress[-1].total
+    assert panels(told)[-1].boxes > 20
+    assert panels(told)[-1].figures
+
+
+def test_why_nothing_moves_is_told(workspace, walk, threads, monkeypatch):
+    still = walk.image(0)
+    monkeypatch.setattr(walk, "image", lambda _index: still)
+    [*_, last] = panels(at_desk(workspace, walk, threads, MovingBoxesWanted()))
+    assert (bool(last.problem), last.figures, last.busy) == (True, (), False)
+
+
+def test_without_a_calibration_there_are_boxes_and_no_figures(walk, tmp_path, threads):
+    with_nothing = open_workspace(walk, camera=walk.camera(), session_folder=tmp_path / "s", name="street")
+    [*_, last] = panels(at_desk(with_nothing, walk, threads, sent(walk.street.boxes)))
+    with_nothing.close()
+    assert (last.source, last.figures, bool(last.problem)) == ("boxes.json", (), True)
+
+
+ELSEWHERE = Boxes((FrameBoxes(TimeNs(1_500_000_000_000_000_000), (PERSON,)),), "boxes.json")
+OTHER_FILES = (
+    boxes_text(ELSEWHERE).encode(),
+    b"%PDF-1.4",
+    b"",
+    b"PK\x03\x04 cut off",
+    json.dumps({"schema": "cocalib/clicks-1"}).encode(),
+)
+
+
+@pytest.mark.parametrize("data", OTHER_FILES)
+def test_boxes_of_another_recording_and_other_files_are_refused_and_nothing_is_told(data, workspace, walk, threads):
+    with pytest.raises(InputError):
+        at_desk(workspace, walk, threads, BoxesWanted("../boxes.json", data))
+
+
+def test_a_page_that_opens_later_gets_the_figures(workspace, walk, threads):
+    told: list[Any] = []
+
+    class Page:
+        def put(self, text: str, *, kind: str) -> None:
+            told.append((kind, json.loads(text)))
+
+    BoxDesk(workspace, walk, threads, lambda *_: None).greet(Page())
+    [(kind, panel)] = told
+    assert (kind, panel["type"], panel["source"], panel["figures"]) == ("acc", "acc", "", [])
