@@ -1,4 +1,4 @@
-"""What a pose rests on beside its pairs: unconfirmed clicks, a damaged recording, lost returns, a fleet prior."""
+"""What a pose rests on beside its pairs: unconfirmed clicks, a damaged recording, lost returns."""
 
 from calib_core.results import DataWarning, UnconfirmedClicks
 
@@ -54,18 +54,4 @@ def lost_returns(lost: int, read: int, where: str) -> DataWarning:
         f"{lost} of {read} returns of {where} are lost ({100 * lost / read:.3g} %): their positions are not numbers or no "
         "ranges and angles, or their messages hold more returns than they state",
         "look for the fault in the radar's driver or in the program that wrote the recording; the reflector may be among them",
-    )
-
-
-def rests_on_fleet_prior(vehicle_type: str) -> DataWarning:
-    """Warn that an older version drew the pose of a file to the mean of other vehicles.
-
-    Args:
-        vehicle_type: of the vehicles.
-    """
-    return DataWarning(
-        "rests-on-fleet-prior",
-        f"an older version drew this pose to a fleet's prior of type {vehicle_type}, so it may hide how this vehicle differs "
-        "from the others",
-        "solve it again, from its recording or with solve --pairs from this file: the pose then rests on its own pairs",
     )

@@ -362,8 +362,6 @@ _CODES: dict[Consequence, tuple[str, ...]] = {
     "coarse": (
         "damaged-recording",
         "lost-returns",
-        "rests-on-fleet-prior",
-        "off-its-kind",
         "many-outliers",
         "intrinsics-suspected",
         "shared-error-suspected",

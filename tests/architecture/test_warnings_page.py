@@ -8,7 +8,7 @@ from pathlib import Path
 def _warnings(project_root: Path) -> dict[str, list[ast.Call]]:
     found: dict[str, list[ast.Call]] = {}
     core = project_root / "calib_core"
-    rooms = [path for room in ("diagnostics", "paper", "fleet", "results") for path in (core / room).rglob("*.py")]
+    rooms = [path for room in ("diagnostics", "paper", "results") for path in (core / room).rglob("*.py")]
     for path in sorted([*rooms, core / "estimation" / "plausibility.py"]):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "DataWarning":

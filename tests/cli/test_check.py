@@ -24,17 +24,6 @@ def moved(solved: Path, tmp_path: Path) -> Path:
     return tmp_path / "moved.txt"
 
 
-def test_a_pose_that_rests_on_a_fleets_prior_is_warned_of(cocalib, project_root, tmp_path):
-    drawn = project_root / "tests/golden/calibration-1-fleet-prior.json"
-    checked = cocalib("check", drawn)
-    assert checked.code in (0, 3)
-    assert "warning: an older version drew this pose to a fleet's prior" in checked.out
-    (file,) = json.loads(cocalib("check", drawn, "--json").out)["files"]
-    assert "rests-on-fleet-prior" in [result["code"] for result in file["results"]]
-    read = cocalib("import", drawn, "--out", tmp_path / "calibration.json")
-    assert "warning: an older version drew this pose to a fleet's prior" in read.err
-
-
 def test_a_difference_fails_the_gate_unless_the_limits_allow_it(cocalib, solved, moved, tmp_path):
     differs = cocalib("check", moved, "--against", solved)
     assert differs.code == 1

@@ -1,7 +1,7 @@
 """What the latest batch of each manifest wanted: its sessions in order, each with the digest of its job; beside the results.
 
 Results alone do not say which of two jobs of a session counts (the inputs may have been changed and changed back), which
-sessions have no result yet, and which results belong to a name that was mistyped once.
+sessions have no result yet, and which results belong to a name that was mistyped.
 """
 
 from collections.abc import Mapping, Sequence
@@ -38,30 +38,16 @@ class PlanDocument(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
-    """What is wanted of one session.
-
-    Attributes:
-        place: in its manifest, from 0.
-        digest: of its job; None if that is not known.
-    """
-
-    place: int
-    digest: str | None = None
-
-
-@dataclass(frozen=True, slots=True)
 class Plan:
     """What all manifests want together.
 
     Attributes:
-        sessions: by vehicle and session; of one that several manifests name, as the latest batch wants it.
-        manifests: their names, in order.
+        digests: of the job of each session, by vehicle and session; of one that several manifests name, as the latest batch
+            wants it.
         unread: records of manifests that cannot be read.
     """
 
-    sessions: Mapping[tuple[str, str], Wanted]
-    manifests: tuple[str, ...] = ()
+    digests: Mapping[tuple[str, str], str]
     unread: tuple[UnreadResult, ...] = ()
 
 
@@ -90,15 +76,13 @@ def read_plans(folder: Path) -> Plan:
         folder: of the results.
     """
     read, hint = msgspec.json.Decoder(PlanDocument).decode, "run the batch of its manifest again"
-    found, unread = [], []
+    documents, unread = [], []
     for path in sorted((folder / PLANS).glob("*.json")):
         document = ResultsFolder(folder).read_as(read, PLANS, path.name, schema=_SCHEMA, hint=hint)
         if isinstance(document, UnreadResult):
             unread.append(document)
         elif document is not None:
-            found.append((document, path.name.removesuffix(".json")))
-    sessions: dict[tuple[str, str], Wanted] = {}
-    for document, _ in sorted(found, key=lambda one: one[0].started):
-        for place, one in enumerate(document.sessions):
-            sessions[(one.vehicle, one.session)] = Wanted(place, one.digest)
-    return Plan(sessions, tuple(name for _, name in found), tuple(unread))
+            documents.append(document)
+    documents.sort(key=lambda document: document.started)
+    digests = {(row.vehicle, row.session): row.digest for document in documents for row in document.sessions}
+    return Plan(digests, tuple(unread))

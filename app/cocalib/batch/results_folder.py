@@ -44,12 +44,10 @@ class UnreadResult:
     Attributes:
         place: relative to the folder that holds results/.
         reason: what was found, and what to do.
-        session: vehicle and session that it is of, as the manifests say; None if they do not.
     """
 
     place: str
     reason: str
-    session: tuple[str, str] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,12 +70,6 @@ class ResultsFolder:
         """Return where the result of a job lies, or will lie."""
         return self.path / RESULTS / digest
 
-    def digests(self) -> tuple[str, ...]:
-        """Return the names of the results in order; what a job is still writing has a hidden name."""
-        folder = self.folder_of("")
-        names = sorted(one.name for one in folder.iterdir()) if folder.is_dir() else []
-        return tuple(one for one in names if one[0] != "." and os.path.lexists(folder / one / OUTCOME_FILE))
-
     def outcome(self, digest: str) -> Outcome | None:
         """Return what came of a job; None if it is to be run: it is not finished, damaged, or may go well another time.
 
@@ -89,7 +81,7 @@ class ResultsFolder:
             if found.digest != digest or not found.is_final:
                 return None
             return found if all(self._sha256(digest, file.name) == file.sha256 for file in found.files) else None
-        except (OSError, ValueError, msgspec.DecodeError):
+        except (OSError, ValueError, msgspec.DecodeError, RecursionError):
             return None
 
     def read_as(
@@ -115,7 +107,7 @@ class ResultsFolder:
             return UnreadResult(place, str(error))
         except OSError as error:
             return UnreadResult(place, f"{error.strerror or error}; check its permissions")
-        except (UnicodeDecodeError, msgspec.DecodeError) as error:
+        except (UnicodeDecodeError, msgspec.DecodeError, RecursionError) as error:
             return UnreadResult(place, f"is no {schema}: {error}; {hint}")
 
     def result_file(self, digest: str, name: str) -> bytes | None:

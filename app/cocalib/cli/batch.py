@@ -1,6 +1,7 @@
 """`cocalib batch`: calibrate the sessions of a manifest."""
 
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -8,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from calib_core.errors import InputError
-from cocalib.cli.exit_codes import batch_exit_code
+from cocalib.cli.exit_codes import DONE, IN_DOUBT, batch_exit_code
 from cocalib.cli.flags import File, Folder, Require, Switch, called
-from cocalib.cli.fleet import ACTIONS, fleet
 from cocalib.cli.output import progress_bar, write_whole
+from cocalib.platform.terminal import print_exactly
 
 if TYPE_CHECKING:
     from cocalib.batch.manifest import Manifest
@@ -20,15 +21,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """Calibrate many sessions, finished ones are skipped; status, history, compare, summary: what their results say.
+    """Calibrate many sessions, finished ones are skipped; batch status: what came of each.
 
-    `batch status OUT`: where each vehicle stands. `batch history VEHICLE OUT`: its sessions and what changed in between.
-    `batch compare A B OUT`: two sessions VEHICLE/SESSION, or two vehicles of one type. `batch summary OUT`: write
-    OUT/summary.html. `batch export OUT --csv FILE`: all sessions as a table. OUT is the folder that batch wrote to.
+    OUT/results.csv and OUT/results.json have a row for each session; `batch status OUT` prints them as a table. Exit code 3: one
+    has no calibration, or one in doubt.
     """
 
-    given: Annotated[tuple[str, ...], tyro.conf.Positional, called("MANIFEST|ACTION...")] = ()
-    """Sessions to calibrate (.toml), or an action: status OUT, history VEHICLE OUT, compare A B OUT, summary OUT, export OUT."""
+    given: Annotated[tuple[str, ...], tyro.conf.Positional, called("MANIFEST|status OUT")] = ()
+    """Sessions to calibrate (.toml); or status and the folder that batch wrote to."""
     out: Folder = None
     """Folder for the results; beside the manifest, with its name, unless given."""
     init: Folder = None
@@ -38,9 +38,9 @@ class Batch:
     require: Require = None
     """Count sessions below this verdict as failed in the exit code."""
     json: Switch = False
-    """With status, history, compare: print one JSON object instead of text."""
+    """With status: print one JSON object instead of text."""
     csv: File = None
-    """With export: CSV file to write."""
+    """With status: CSV file to write instead of printing the table."""
     scheduler: Annotated[str | None, called("ADDRESS")] = None
     """Address of your own Dask scheduler, such as tls://host:8786 (needs cocalib[cluster]); who reaches it can run code."""
 
@@ -48,14 +48,12 @@ class Batch:
         """Calibrate, print a table of what came of it; return the exit code."""
         if not self.given:
             raise InputError("MANIFEST is missing; see cocalib batch --help")
-        action, *names = self.given
-        if action in ACTIONS:
-            if Batch(given=self.given, json=self.json, csv=self.csv) != self:
-                raise InputError(f"batch {action} takes --json or --csv only; see cocalib batch --help")
-            return fleet(action, names, json=self.json, csv=self.csv)
-        if names or self.json or self.csv is not None:
-            raise InputError(f"batch takes one MANIFEST, or an action: {', '.join(ACTIONS)}; see cocalib batch --help")
-        manifest = Path(action)
+        first, *others = self.given
+        if first == "status":
+            return self._status(others)
+        if others or self.json or self.csv is not None:
+            raise InputError("batch takes one MANIFEST, or status OUT; see cocalib batch --help")
+        manifest = Path(first)
         if self.init is not None:
             return self._write_first(manifest, self.init)
         from cocalib.batch.manifest import read_manifest
@@ -77,14 +75,35 @@ class Batch:
         )
         return 0
 
+    def _status(self, folders: Sequence[str]) -> int:
+        """Show the results of a folder; return 0 if all sessions are solved and none is in doubt."""
+        from cocalib.batch.results_table import csv_bytes, json_bytes, read_results
+        from cocalib.cli.batch_text import status_lines
+
+        if Batch(given=self.given, json=self.json, csv=self.csv) != self or (self.json and self.csv is not None):
+            raise InputError("batch status takes --json or --csv FILE only; see cocalib batch --help")
+        if len(folders) != 1:
+            raise InputError(f"batch status takes OUT, the folder that batch wrote to; {len(folders)} given")
+        folder = Path(folders[0])
+        if not folder.is_dir():
+            raise InputError(f"{folder}: no such folder; give the one that batch wrote to")
+        table = read_results(folder)
+        if self.json:
+            print_exactly(json_bytes(table).decode())
+        elif self.csv is not None:
+            write_whole(self.csv, csv_bytes(table))
+            print(f"{self.csv} written", file=sys.stderr)
+        else:
+            print("\n".join(status_lines(table)))
+        return DONE if table.all_solved else IN_DOUBT
+
     def _calibrate(self, manifest: "Manifest") -> int:
         from cocalib.batch.driving import chosen_engine, drive
         from cocalib.batch.job import jobs_of
         from cocalib.batch.plan import write_plan
         from cocalib.batch.results_folder import ResultsFolder
+        from cocalib.batch.results_table import CSV_FILE, JSON_FILE, read_results, write_results
         from cocalib.cli.batch_text import batch_lines, shown_batch
-        from cocalib.fleet.reading import read_fleet
-        from cocalib.fleet.summary_page import write_summary
 
         results = ResultsFolder(self.out or manifest.source.with_suffix(""))
         try:
@@ -99,21 +118,15 @@ class Batch:
                 outcomes = drive(jobs, engine, results, show)
             for warning in warnings:
                 print(f"warning: {warning}", file=sys.stderr)
-            if results.digests():
-                write_summary(results.path, read_fleet(results.path))
+            write_results(results.path, read_results(results.path))
         except OSError as error:
             raise InputError(f"{results.path}: cannot be written: {error.strerror or error}") from error
-        print("\n".join([*batch_lines(outcomes), "", _next_line(results.path)]))
+        print("\n".join(batch_lines(outcomes)))
+        print(f"\nresults: {results.path / CSV_FILE}, {results.path / JSON_FILE}")
+        print(f"as a table: cocalib batch status {results.path}")
         return batch_exit_code([_level(one) for one in outcomes], self.require)
 
 
 def _level(outcome: "Outcome") -> str | None:
     """Return the level of the verdict on a session's calibration; None without one."""
     return (outcome.verdict or "nothing") if outcome.status in ("solved", "weak") else None
-
-
-def _next_line(results: Path) -> str:
-    """Say where the results are, and what comes next."""
-    from cocalib.fleet.summary_page import SUMMARY_FILE
-
-    return f"results: {results}; summary: {results / SUMMARY_FILE}; which vehicles need attention: cocalib batch status {results}"

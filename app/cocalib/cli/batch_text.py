@@ -1,16 +1,25 @@
-"""What `cocalib batch` prints: progress while it runs, and a table of what came of it."""
+"""What `cocalib batch` prints: progress while it runs, what came of it, and the table of results."""
 
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from cocalib.platform.terminal import terminal_stream
+from cocalib.view.wording import plain
 
 if TYPE_CHECKING:
     from cocalib.batch.driving import BatchProgress
     from cocalib.batch.outcome import Outcome
+    from cocalib.batch.results_table import BatchResults, SessionRow
 
+_DASH = "–"
+_LONGEST = 32
+_STATUSES = {
+    **{"solved": "solved", "weak": "in doubt", "refused": "refused"},
+    **{"failed": "failed", "missing": "missing", "unreadable": "unreadable"},
+}
 _KEYS_OF = {
     "--map": "map under [session.topics]",
     "--confirm-assumptions": "confirm_assumptions = true under [session.topics]",
@@ -24,28 +33,49 @@ _KEYS_OF = {
 
 
 def batch_lines(outcomes: "Sequence[Outcome]") -> list[str]:
-    """Say what came of a batch: how many of each kind, then why there is no calibration, or a weak one, a line for each."""
-    counts = {
-        status: sum(one.status == status for one in outcomes) for status in ("solved", "weak", "refused", "failed")
-    }
-    kinds = ", ".join(f"{count} {status}" for status, count in counts.items() if count)
-    head = f"{len(outcomes)} session{'' if len(outcomes) == 1 else 's'}: {kinds}"
-    rows = [(one.vehicle, one.session, one.status, _why(one)) for one in outcomes if one.status != "solved"]
-    if not rows:
-        return [head]
-    titles = ("vehicle", "session", "status", "why")
-    widths = [max(len(row[column]) for row in (titles, *rows)) for column in range(3)]
-    lines = [
-        "  ".join([*(cell.ljust(width) for cell, width in zip(row, widths, strict=False)), row[3]])
-        for row in (titles, *rows)
-    ]
-    named = [flag for flag in _KEYS_OF if any(flag in row[3] for row in rows)]
-    keys = [f"in a manifest, {flag} is {_KEYS_OF[flag]}" for flag in named]
-    return [head, "", *lines, *([""] if keys else []), *keys]
+    """Say what came of a batch: how many of each kind, then why there is no calibration, or one in doubt."""
+    lines = [_counts(outcomes), *_why_lines(outcomes)]
+    named = [flag for flag in _KEYS_OF if any(flag in f"{one.reason} {one.hint}" for one in outcomes)]
+    return lines + [f"in a manifest, {flag} is {_KEYS_OF[flag]}" for flag in named]
 
 
-def _why(outcome: "Outcome") -> str:
-    return f"{outcome.reason}; {outcome.hint}" if outcome.hint else outcome.reason
+def status_lines(table: "BatchResults") -> "Iterator[str]":
+    """Return the table of results, and why there is no calibration, or one in doubt."""
+    heads = ("vehicle", "session", "recorded", "verdict", "deg 95 %", "cm 95 %", "AED px")
+    rows = [heads, *map(_cells, table.sessions)]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        yield "  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip()
+    yield ""
+    yield _counts(table.sessions)
+    yield from _why_lines(table.sessions)
+    yield from (f"{unread.place} {unread.reason}" for unread in table.unread)
+
+
+def _cells(row: "SessionRow") -> tuple[str, ...]:
+    recorded = _DASH if row.recorded is None else row.recorded[:16].replace("T", " ")
+    figures = (row.rotation_95_deg, row.position_95_cm, row.aed_px)
+    numbers = (_DASH if figure is None else plain(figure, 2) for figure in figures)
+    return _short(row.vehicle), _short(row.session), recorded, row.verdict or row.status, *numbers
+
+
+def _short(name: str) -> str:
+    return name if len(name) <= _LONGEST else f"{name[: _LONGEST - 1]}…"
+
+
+def _counts(rows: "Sequence[Outcome | SessionRow]") -> str:
+    """Say how many sessions there are of each status."""
+    counts = Counter[str](row.status for row in rows)
+    kinds = ", ".join(f"{counts[status]} {name}" for status, name in _STATUSES.items() if counts[status])
+    return f"{len(rows)} session{'' if len(rows) == 1 else 's'}: {kinds}"
+
+
+def _why_lines(rows: "Sequence[Outcome | SessionRow]") -> "Iterator[str]":
+    """Say of each session that is not solved why, and what to do."""
+    for row in rows:
+        if row.status != "solved":
+            why = "; ".join(filter(None, (row.reason, row.hint)))
+            yield f"  {row.vehicle}/{row.session}: {row.verdict or row.status}: {why}"
 
 
 @contextmanager

@@ -134,9 +134,9 @@ COMMANDS: Mapping[str, Command] = {
         Command(
             "batch",
             "cocalib.cli.batch:Batch",
-            "Calibrate many sessions, finished ones are skipped; status, history, compare, summary: what their results say.",
+            "Calibrate many sessions, finished ones are skipped; batch status: what came of each.",
             (
-                "fleet.toml --out out --workers 8",
+                "sessions.toml --out out --workers 8",
                 "status out",
             ),
         ),

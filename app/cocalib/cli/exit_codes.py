@@ -25,7 +25,7 @@ _LAW: Final = (
     (
         "batch",
         "0 done; 10 + the number of failed sessions, at most 99; a session in doubt fails only with --require; "
-        "status and compare: 3 needs a look",
+        "status: 3 unless all are solved and none is in doubt",
     ),
     ("the others", "0 done; 1 nothing found, or damage found; 3 needs a look"),
     (

@@ -193,11 +193,6 @@ def check(
     tested = [result for result in results if result.code not in untested]
     if not tested or (against is None and not any(result.level == "error" for result in tested)):
         results += by_plausibility(imported.pose, verified=bool(tested))
-    if imported.file is not None:
-        own = imported.file.calibration.warnings
-        results += [
-            CheckResult("warning", one.code, one.message, one.hint) for one in own if one.code == "rests-on-fleet-prior"
-        ]
     return CheckReport(imported, tuple(results), comparison, judgement, no_proof)
 
 

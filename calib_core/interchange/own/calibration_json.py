@@ -61,12 +61,12 @@ from calib_core.interchange.syntax.strict_json import (
 from calib_core.measurements import Candidate, Pair, ReflectorClick
 from calib_core.options import CalibrationOptions
 from calib_core.radar import AngleMap, RadarErrors, covariance_from_sigma_polar
-from calib_core.results import Calibration, CheckPoint, DataWarning, PairResult
+from calib_core.results import Calibration, CheckPoint, PairResult
 from calib_core.results.calibration import CovarianceParts
-from calib_core.results.confirmation import rests_on_fleet_prior
 from calib_core.results.verdict import verdict_on
 
-_ABOUT_PRIOR = ("fleet-prior-untested", "fleet-prior-decides", "far-from-its-kind")
+_SHOWN = 200
+"""Characters of unknown keys."""
 COVARIANCE_CONVENTION = (
     "6x6, row-major, order (x, y, z, rotX, rotY, rotZ) [m, rad], of the error (dt, dtheta) of camera_from_radar "
     "in camera axes: t = t_hat + dt, R = Exp(dtheta) R_hat"
@@ -270,7 +270,9 @@ def _imported(content: Mapping[str, Any], source: str) -> ImportedCalibration:
     kept = kept_results(content, documents.CalibrationDocument)
     as_written = WrittenPose("matrix", np.array(stated.rotation), np.array(stated.translation_m), "camera_from_radar")
     found = imported(dataclasses.replace(file, kept=kept))
-    return dataclasses.replace(found, pose=as_written, faults=tuple(faults))
+    unknown = [key for key in content if key not in (fields_of(documents.CalibrationDocument) or ())]
+    notes = (f"unknown keys, kept as they are: {', '.join(unknown)[:_SHOWN]}",) if unknown else ()
+    return dataclasses.replace(found, pose=as_written, faults=tuple(faults), notes=notes)
 
 
 def _file(
@@ -295,7 +297,7 @@ def _file(
         metrics=document.metrics,
         pairs=tuple(solved_pair_of(pair, source=source, place=f"pairs[{i}]") for i, pair in enumerate(document.pairs)),
         unpaired=tuple(document.unpaired),
-        warnings=_warnings(document),
+        warnings=tuple(document.warnings),
         options=document.options,
         noise_scale=(scale.click, scale.range, scale.azimuth, scale.elevation),
         covariance_quantile=nan_if_none(document.covariance_quantile),
@@ -306,7 +308,6 @@ def _file(
         systematic_errors=tuple(document.systematic_errors),
         covariance_parts=covariance_parts_of(document.covariance_parts, source=source),
     )
-    rests_on_prior = document.fleet_prior is not None and document.fleet_prior.used
     try:
         frames = FrameNames(document.frames.radar, document.frames.camera)
     except InputError as error:
@@ -316,19 +317,10 @@ def _file(
         frames=frames,
         check_point=CheckPoint(np.array(check.radar_m), np.array(check.pixel_px)) if check else None,
         provenance=provenance_of(document.provenance),
-        verdict=verdict_on(calibration) if rests_on_prior else document.verdict,
+        verdict=document.verdict,
         evidence=document.evidence,
         vehicle=document.vehicle or VehicleNote(),
     )
-
-
-def _warnings(document: documents.CalibrationDocument) -> tuple[DataWarning, ...]:
-    """Return the warnings; of a pose that rests on a fleet's prior one says so, instead of those about the prior."""
-    warnings = tuple(document.warnings)
-    prior = document.fleet_prior
-    if prior is None or not prior.used:
-        return warnings
-    return (rests_on_fleet_prior(prior.vehicle_type), *(one for one in warnings if one.code not in _ABOUT_PRIOR))
 
 
 CALIBRATION_1 = Format(

@@ -273,13 +273,6 @@ class CovariancePartsDocument(Struct, frozen=True, omit_defaults=True):
     camera_position: Matrix66 | None = None
 
 
-class FleetPriorDocument(Struct, frozen=True):
-    """What versions before this one wrote of a fleet's prior: read, so that a pose that rests on it is told, and not written."""
-
-    vehicle_type: Name
-    used: bool
-
-
 class CalibrationDocument(Struct, frozen=True):
     """A solved extrinsic calibration with its uncertainty."""
 
@@ -307,7 +300,6 @@ class CalibrationDocument(Struct, frozen=True):
     unpaired: list[Unpaired] = []
     pairs: list[SolvedPairDocument] = []
     given_camera: CameraDocument | None = None
-    fleet_prior: FleetPriorDocument | None = None
     vehicle: VehicleNote | None = None
     options: CalibrationOptions = field(default_factory=CalibrationOptions)
     provenance: ProvenanceDocument = field(default_factory=ProvenanceDocument)

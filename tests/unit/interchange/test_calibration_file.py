@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import calib_core as cc
-from calib_core.calibration import calibrate_pairs, solve_again
+from calib_core.calibration import calibrate_pairs
 from calib_core.errors import InputError
 from calib_core.interchange import (
     FORMATS,
@@ -179,28 +179,12 @@ def test_the_radars_angle_errors_are_stored_with_the_calibration_if_correcting_t
         read_calibration(json.dumps(json.loads(text) | {"radar_angle_map": content}))
 
 
-def test_a_pose_that_rests_on_a_fleets_prior_is_read_with_one_warning_and_solved_again_without(project_root):
-    text = (project_root / "tests/golden/calibration-1-fleet-prior.json").read_text(encoding="utf-8")
-    file = read_calibration(text)
-    assert [one.code for one in file.calibration.warnings] == ["rests-on-fleet-prior"]
-    assert "of type van" in file.calibration.warnings[0].message
-    assert file.verdict.level == "coarse"
-    assert check(read_any(text)).ok
-
-    written = write_calibration(file)
-    assert "fleet_prior" not in json.loads(written)
-    again = read_calibration(written)
-    assert [one.code for one in again.calibration.warnings] == ["rests-on-fleet-prior"]
-    assert write_calibration(again) == written
-    assert "rests-on-fleet-prior" not in [one.code for one in solve_again(file.calibration).unwrap().warnings]
-
-
-def test_a_prior_that_an_older_version_left_out_changes_nothing(project_root):
-    content = json.loads((project_root / "tests/golden/calibration-1-fleet-prior.json").read_text(encoding="utf-8"))
-    content["fleet_prior"]["used"] = False
-    file = read_calibration(json.dumps(content))
-    assert [one.code for one in file.calibration.warnings] == [one["code"] for one in content["warnings"]]
-    assert "fleet_prior" not in json.loads(write_calibration(file))
+def test_a_key_that_this_version_does_not_have_is_read_told_and_kept(golden_text):
+    content = json.loads(golden_text) | {"fleet_prior": {"vehicle_type": "van", "used": True}}
+    (note,) = read_any(json.dumps(content)).notes
+    assert note.endswith(": fleet_prior")
+    assert json.loads(write_calibration(read_calibration(json.dumps(content)))) == content
+    assert read_any(golden_text).notes == ()
 
 
 # What of the covariance rests on stated sigmas, in a calibration's file.

@@ -4,7 +4,7 @@ import msgspec
 import pytest
 
 from cocalib.batch.outcome import OUTCOME_SCHEMA, Outcome, OutcomeFile, OutcomeRun, outcome_text, read_outcome
-from cocalib.batch.outcome_schema import write_outcome_schema
+from cocalib.batch.schemas import write_batch_schemas
 
 OUTCOME = Outcome(
     OUTCOME_SCHEMA,
@@ -48,9 +48,8 @@ def test_anything_else_is_refused(text):
         read_outcome(text)
 
 
-def test_the_published_schema_is_that_of_the_type(tmp_path, project_root):
-    written = write_outcome_schema(tmp_path)
-    published = project_root / "docs" / "schemas" / written.name
-    assert published.read_text(encoding="utf-8") == written.read_text(encoding="utf-8"), (
-        "run: python -m cocalib.batch.outcome_schema docs/schemas"
-    )
+def test_the_published_schemas_are_those_of_the_types(tmp_path, project_root):
+    write_batch_schemas(tmp_path)
+    written = {path.name: path.read_text(encoding="utf-8") for path in tmp_path.iterdir()}
+    published = {name: (project_root / "docs" / "schemas" / name).read_text(encoding="utf-8") for name in written}
+    assert published == written, "run: python -m cocalib.batch.schemas docs/schemas"

@@ -11,12 +11,12 @@ from calib_core.errors import CalibrationError
 from cocalib.batch import inputs
 from cocalib.batch.driving import drive
 from cocalib.batch.engine import InProcess
-from cocalib.batch.job import jobs_of
+from cocalib.batch.job import Job, jobs_of
 from cocalib.batch.manifest import ManifestRow
 from cocalib.batch.outcome import read_outcome
 from cocalib.batch.plan import read_plans, write_plan
 from cocalib.batch.results_folder import OUTCOME_FILE, ResultsFolder
-from cocalib.cli import run
+from cocalib.batch.results_table import SessionRow, read_results
 from tests.batch_calls import quick_jobs
 from tests.unit.app.batch.test_results_folder import DIGEST, write
 
@@ -43,6 +43,13 @@ def put(kind: str, place: Path) -> None:
         place.mkdir()
 
 
+def row_of(out: Path) -> SessionRow:
+    """Return the row of the one result in a folder."""
+    write_plan(out, Path("all.toml"), [Job(ManifestRow("van", "1", ()), DIGEST)])
+    (row,) = read_results(out).sessions
+    return row
+
+
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", [OUTCOME_FILE, "calibration.json", "export/tf2.sh"])
 def test_a_result_with_something_else_than_files_is_refused_and_stays(kind, name, tmp_path):
@@ -57,16 +64,17 @@ def test_a_result_with_something_else_than_files_is_refused_and_stays(kind, name
     assert not list(folder.folder_of("").glob(".*"))
 
 
-def test_a_batch_refuses_a_result_that_status_refuses(tmp_path, capsys):
+def test_a_batch_refuses_a_result_that_status_cannot_read(tmp_path):
     out, jobs = tmp_path / "out", quick_jobs(tmp_path, 1)
     drive(jobs, InProcess(), ResultsFolder(out))
+    write_plan(out, Path("all.toml"), jobs)
     put("link to a file", place := ResultsFolder(out).folder_of(jobs[0].digest) / OUTCOME_FILE)
-    assert run(["batch", "status", str(out)]) == 2
-    words = capsys.readouterr().err.partition("outcome.json: ")[2].strip()
+    (row,) = read_results(out).sessions
+    words = row.reason.partition("outcome.json ")[2]
     with pytest.raises(CalibrationError) as refused:
         drive(jobs, InProcess(), ResultsFolder(out))
+    assert (row.status, str(refused.value)) == ("unreadable", f"{place}: {words}")
     assert words
-    assert str(refused.value) == f"{place}: {words}"
     assert place.is_symlink()
 
 
@@ -89,7 +97,7 @@ def test_an_outcome_that_lists_what_is_not_in_its_folder_is_none(name, tmp_path)
 
 
 @pytest.mark.parametrize("below", ["", "export"])
-def test_a_folder_of_a_result_that_is_a_link_is_not_followed(below, tmp_path, capsys):
+def test_a_folder_of_a_result_that_is_a_link_is_not_followed(below, tmp_path):
     folder = ResultsFolder(tmp_path / "out")
     write(folder)
     place = folder.folder_of(DIGEST) / below
@@ -101,8 +109,7 @@ def test_a_folder_of_a_result_that_is_a_link_is_not_followed(below, tmp_path, ca
     assert place.is_symlink()
     assert not list(folder.folder_of("").glob(".*"))
     assert list((tmp_path / "theirs").iterdir())
-    assert below or run(["batch", "status", str(tmp_path / "out")]) == 2
-    assert below or f"no result can be read: results/{DIGEST}: is a symbolic link" in capsys.readouterr().err
+    assert below or row_of(tmp_path / "out").status == "unreadable"
 
 
 def test_results_behind_a_link_are_neither_read_nor_written_but_the_folder_itself_may_be_one(tmp_path):
@@ -136,35 +143,23 @@ def test_digests_of_inputs_are_never_read_or_written_through_something_else(kind
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_a_manifest_wants_is_never_read_or_written_through_something_else(kind, tmp_path):
     (tmp_path / "out" / "manifests").mkdir(parents=True)
-    put(kind, tmp_path / "out" / "manifests" / "fleet.toml.json")
+    put(kind, tmp_path / "out" / "manifests" / "all.toml.json")
     plan = read_plans(tmp_path / "out")
-    assert (plan.sessions, plan.manifests) == ({}, ())
+    assert plan.digests == {}
     (unread,) = plan.unread
-    assert unread.place == "manifests/fleet.toml.json"
+    assert unread.place == "manifests/all.toml.json"
     assert "neither read nor changed" in unread.reason
-    with pytest.raises(
-        CalibrationError, match=r"fleet\.toml\.json: is .*, not a file; it was neither read nor changed"
-    ):
-        write_plan(tmp_path / "out", Path("fleet.toml"), ())
+    with pytest.raises(CalibrationError, match=r"all\.toml\.json: is .*, not a file; it was neither read nor changed"):
+        write_plan(tmp_path / "out", Path("all.toml"), ())
     if kind == "link to a file":
         assert (tmp_path / "out" / "elsewhere.json").read_text() == "theirs"
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_the_summary_is_never_written_through_something_else(kind, tmp_path, capsys):
-    out = tmp_path / "out"
-    write(ResultsFolder(out))
-    put(kind, out / "summary.html")
-    assert run(["batch", "summary", str(out)]) == 2
-    assert "summary.html: is " in capsys.readouterr().err
-    if kind == "link to a file":
-        assert (tmp_path / "elsewhere.json").read_text() == "theirs"
-
-
 @pytest.mark.parametrize("kind", KINDS[:3])
-def test_an_outcome_that_is_no_file_is_named_and_left_out(kind, tmp_path, capsys):
+def test_an_outcome_that_is_no_file_is_named(kind, tmp_path):
     folder = ResultsFolder(tmp_path / "out")
     write(folder)
     put(kind, folder.folder_of(DIGEST) / OUTCOME_FILE)
-    assert run(["batch", "status", str(tmp_path / "out")]) == 2
-    assert f"results/{DIGEST}/outcome.json: is a " in capsys.readouterr().err
+    row = row_of(tmp_path / "out")
+    assert row.status == "unreadable"
+    assert f"results/{DIGEST}/outcome.json is a " in row.reason

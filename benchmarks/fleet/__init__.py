@@ -1,1 +1,0 @@
-"""Simulated fleets: their mathematics at the level of poses, and whole batches of recordings."""
