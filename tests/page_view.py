@@ -1,4 +1,4 @@
-"""The View as a page has it, from the messages it gets: the same steps as static/shell/state.js, on decoded JSON."""
+"""The View as a page has it, from the messages it gets: the same steps as static/base/state.js, on decoded JSON."""
 
 import json
 from typing import Any

@@ -3,10 +3,10 @@
  * a file.
  */
 
-import { ask, BROKE_OFF, content, saveFile } from "../shell/asking.js";
-import { icon, make, shape, toast } from "../shell/notices.js";
-import { send } from "../shell/socket.js";
-import { on, state } from "../shell/state.js";
+import { ask, BROKE_OFF, content, saveFile } from "../base/asking.js";
+import { icon, make, shape, toast } from "../base/notices.js";
+import { send } from "../base/socket.js";
+import { on, state } from "../base/state.js";
 import { frameDrawing, IDENTITY, nameFields, parentFields, rectifiedBox } from "./fields.js";
 import { drawFormats, focusFormats, formatColumn } from "./list.js";
 

@@ -3,7 +3,7 @@
  * drawing of the axes with the direction of the file's transform.
  */
 
-import { make, shape } from "../shell/notices.js";
+import { make, shape } from "../base/notices.js";
 
 /** @typedef {Record<string, any>} Preview ExportPreview of app/cocalib/web/channel/export_preview.py */
 const TYPING_MS = 250;

@@ -1,7 +1,7 @@
 /** The list of the export panel: formats under the heading of where they are used, and a field to find one by typing. */
 
-import { make } from "../shell/notices.js";
-import { fitOf } from "../shell/searching.js";
+import { make } from "../base/notices.js";
+import { fitOf } from "../base/searching.js";
 
 /** FormatRow in app/cocalib/web/exports.py. @typedef {{key: string, label: string, group: string, also: string, takes_parent: boolean, takes_rectified: boolean}} Format */
 /** How much of the best fit a format must reach to be shown: a name that is met exactly hides the similar ones. */

@@ -1,6 +1,6 @@
 /** The form that describes the board, remembered from one recording to the next. */
 
-import { make } from "../shell/notices.js";
+import { make } from "../base/notices.js";
 
 /** What the form says. @typedef {{kind: "checkerboard"|"charuco"|"aprilgrid", size: string, square_mm: number, marker_mm: number, dictionary: string, model: string}} Described */
 const KEPT = "cocalib-board";

@@ -2,11 +2,11 @@
  * The sheet "Lens": the intrinsics in use, a form that calibrates them from a board in the recording, how far that is, and the result.
  */
 
+import { showPage } from "../base/layout.js";
+import { make, toast } from "../base/notices.js";
+import { send } from "../base/socket.js";
+import { emit, on, state } from "../base/state.js";
 import { toggleRectified, withoutRectified } from "../picture/rectified.js";
-import { showPage } from "../shell/layout.js";
-import { make, toast } from "../shell/notices.js";
-import { send } from "../shell/socket.js";
-import { emit, on, state } from "../shell/state.js";
 import { boardForm } from "./board.js";
 import { drawCoverage, drawLensResult, lensResult, parameters, saveCamera, takeLensResult } from "./result.js";
 

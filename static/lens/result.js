@@ -3,12 +3,12 @@
  * the picture: where the board was, residuals, uncertainty.
  */
 
+import { ask, content, saveFile } from "../base/asking.js";
+import { ink, rampColour, themeColour } from "../base/colours.js";
+import { make, toast } from "../base/notices.js";
+import { send } from "../base/socket.js";
+import { emit, on, state } from "../base/state.js";
 import { toDevice, viewport } from "../picture/geometry.js";
-import { ask, content, saveFile } from "../shell/asking.js";
-import { ink, rampColour, themeColour } from "../shell/colours.js";
-import { make, toast } from "../shell/notices.js";
-import { send } from "../shell/socket.js";
-import { emit, on, state } from "../shell/state.js";
 import { goTo, pause } from "../time/player.js";
 
 /** A corner in the frame: where, its residual, and whether it was used. @typedef {[number, number, number, number, boolean]} Corner */

@@ -1,7 +1,7 @@
 /** The top of the panel: how good the answer is; and on the page Check the metrics and the pose. All in the server's text. */
 
-import { make, shape } from "../shell/notices.js";
-import { named, onPainted, state } from "../shell/state.js";
+import { make, shape } from "../base/notices.js";
+import { named, onPainted, state } from "../base/state.js";
 
 /** @typedef {import("../messages.js").Figure} Figure */
 const figures = /** @type {HTMLElement} */ (document.getElementById("figures"));

@@ -1,12 +1,12 @@
 /** The line on the frame: the one thing to do now, with its keys, which are buttons; by finger only their words are shown. */
 
+import { act, actionNamed } from "../base/actions.js";
+import { make } from "../base/notices.js";
+import { clickIn, clicks, isDismissed, isOffered, named, nameOf, on, placementAt, placementsAt, state } from "../base/state.js";
+import { openOption } from "../options/options.js";
 import { comeTo } from "../picture/arriving.js";
 import { saidWords } from "../proposals/proposals.js";
 import { proposalAdvice, proposalWords, silentWords } from "../proposals/words.js";
-import { act, actionNamed } from "../shell/actions.js";
-import { make } from "../shell/notices.js";
-import { openOption } from "../shell/options.js";
-import { clickIn, clicks, isDismissed, isOffered, named, nameOf, on, placementAt, placementsAt, state } from "../shell/state.js";
 import { goToPair } from "./pairs.js";
 import { OF_THE_LENS } from "./warnings.js";
 

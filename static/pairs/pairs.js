@@ -1,11 +1,11 @@
 /** The table of pairs, one row per click, sorted by time, range or residual; click a row to go there, its checkbox to exclude it. */
 
+import { LARGE_PX, residualColour } from "../base/colours.js";
+import { make, shape } from "../base/notices.js";
+import { clicks, named, nameOf, onPainted, select, stampKey, state } from "../base/state.js";
 import { comeTo } from "../picture/arriving.js";
+import { candidatesOf, choose } from "../picture/candidates.js";
 import { toggleExcluded } from "../picture/clicking.js";
-import { LARGE_PX, residualColour } from "../shell/colours.js";
-import { make, shape } from "../shell/notices.js";
-import { clicks, named, nameOf, onPainted, select, stampKey, state } from "../shell/state.js";
-import { candidatesOf, choose } from "./candidates.js";
 
 /** @typedef {import("../messages.js").ClickRow} Click */
 /** So many candidates are listed; the others are less probable. */

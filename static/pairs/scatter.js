@@ -1,8 +1,8 @@
 /** Scatter plot of the residuals: how far right (du) and down (dv) each reprojection is from its click. An off-centre cloud indicates a bias. */
 
-import { ink, residualColour, smallFont, smallPx, themeColour } from "../shell/colours.js";
-import { make } from "../shell/notices.js";
-import { clicks, onPainted, select, state } from "../shell/state.js";
+import { ink, residualColour, smallFont, smallPx, themeColour } from "../base/colours.js";
+import { make } from "../base/notices.js";
+import { clicks, onPainted, select, state } from "../base/state.js";
 import { goTo, pause } from "../time/player.js";
 
 /** CSS px of the plot's side: smaller in a narrow panel. */

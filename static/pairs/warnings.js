@@ -4,12 +4,12 @@
  * frame on the screen.
  */
 
-import { ask, content } from "../shell/asking.js";
-import { showPage } from "../shell/layout.js";
-import { icon, make, toast } from "../shell/notices.js";
-import { notes, openAgain } from "../shell/opening.js";
-import { send } from "../shell/socket.js";
-import { named, on, onPainted, state } from "../shell/state.js";
+import { ask, content } from "../base/asking.js";
+import { showPage } from "../base/layout.js";
+import { icon, make, toast } from "../base/notices.js";
+import { send } from "../base/socket.js";
+import { named, on, onPainted, state } from "../base/state.js";
+import { notes, openAgain } from "../opening/opening.js";
 
 /** @typedef {import("../messages.js").DataWarning} WarningRow */
 /** @typedef {import("../messages.js").AssumptionRow} AssumptionRow */

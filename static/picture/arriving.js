@@ -1,6 +1,6 @@
 /** Going to another placement or pair: bring the reflector into view, zoomed in where the radar expects it. */
 
-import { clickIn, clicksOf, emit, isDismissed, isOffered, on, placementAt, state } from "../shell/state.js";
+import { clickIn, clicksOf, emit, isDismissed, isOffered, on, placementAt, state } from "../base/state.js";
 import { goTo, pause } from "../time/player.js";
 import { flushNudge } from "./clicking.js";
 import { expectedHere } from "./cross.js";

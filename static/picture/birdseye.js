@@ -3,9 +3,9 @@
  * with its controls and the table of placements.
  */
 
-import { ink, smallFont, themeColour } from "../shell/colours.js";
-import { hideTip, make, showTip } from "../shell/notices.js";
-import { emit, on, placementAt, state } from "../shell/state.js";
+import { ink, smallFont, themeColour } from "../base/colours.js";
+import { hideTip, make, showTip } from "../base/notices.js";
+import { emit, on, placementAt, state } from "../base/state.js";
 import { goTo, pause, tellCursor } from "../time/player.js";
 
 /** @typedef {import("../messages.js").RadarReturn} Return */

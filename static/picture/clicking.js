@@ -3,12 +3,12 @@
  * within 15 px; a click on a candidate's number chooses it, a drag elsewhere pans, the wheel zooms at the cursor.
  */
 
-import { candidateNear, choose } from "../pairs/candidates.js";
+import { toast } from "../base/notices.js";
+import { send } from "../base/socket.js";
+import { clickIn, clicks, clicksIn, emit, on, select, selectedClick, stampOf, state } from "../base/state.js";
 import { correctProposal, shownOffer } from "../proposals/proposals.js";
-import { toast } from "../shell/notices.js";
-import { send } from "../shell/socket.js";
-import { clickIn, clicks, clicksIn, emit, on, select, selectedClick, stampOf, state } from "../shell/state.js";
 import { leaveLive, pause } from "../time/player.js";
+import { candidateNear, choose } from "./candidates.js";
 import { onImage, pan, toCss, toImage, viewport } from "./geometry.js";
 import { hold } from "./loupe.js";
 import { marks, redraw, zoomBy } from "./picture.js";
@@ -205,7 +205,7 @@ export function leaveCross() {
   emit("cross");
 }
 
-/** Show a mark where the user left it, before the server confirms it. @param {string} key its id, or a name for a new one @param {import("../shell/state.js").Draft} mark */
+/** Show a mark where the user left it, before the server confirms it. @param {string} key its id, or a name for a new one @param {import("../base/state.js").Draft} mark */
 function draft(key, mark) {
   state.local.set(key, mark);
   emit("view");

@@ -1,9 +1,9 @@
 /** The uncertainty in the picture: lines on which a point at some distance may be this many pixels away from its drawn place. */
 
-import { smallFont } from "../shell/colours.js";
-import { make } from "../shell/notices.js";
-import { tell } from "../shell/socket.js";
-import { emit, on, state } from "../shell/state.js";
+import { smallFont } from "../base/colours.js";
+import { make } from "../base/notices.js";
+import { tell } from "../base/socket.js";
+import { emit, on, state } from "../base/state.js";
 import { toDevice, viewport } from "./geometry.js";
 
 /** @typedef {import("../messages.js").Uncertainty} Uncertainty */

@@ -3,10 +3,10 @@
  * It starts where the radar expects the reflector. A mark that is set there without the cross being moved is a guess: it does not count.
  */
 
+import { ink, smallFont } from "../base/colours.js";
+import { toast } from "../base/notices.js";
+import { clickIn, clicksIn, emit, isOffered, on, placementsAt, state } from "../base/state.js";
 import { shownOffer } from "../proposals/proposals.js";
-import { ink, smallFont } from "../shell/colours.js";
-import { toast } from "../shell/notices.js";
-import { clickIn, clicksIn, emit, isOffered, on, placementsAt, state } from "../shell/state.js";
 import { leaveLive } from "../time/player.js";
 import { clamped, leaveCross, moveTo, place } from "./clicking.js";
 import { lookInto, toDevice, viewport } from "./geometry.js";

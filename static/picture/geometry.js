@@ -3,7 +3,7 @@
  * edge is at -0.5. The half pixel appears only in `toDevice` and its inverse.
  */
 
-import { growth } from "../shell/colours.js";
+import { growth } from "../base/colours.js";
 
 /** Canvas boxes are multiples of this many CSS px, so that they end on device pixels at 100, 125, 150 and 200 %. */
 const GRID = 4;

@@ -1,7 +1,7 @@
 /** The loupe: the picture around a point, magnified 4 to 16 times, with a cross centred on the point to a fraction of a pixel. */
 
-import { ink, smallFont, smallPx } from "../shell/colours.js";
-import { clickIn, on, state } from "../shell/state.js";
+import { ink, smallFont, smallPx } from "../base/colours.js";
+import { clickIn, on, state } from "../base/state.js";
 import { viewport } from "./geometry.js";
 
 const SIDE = 156;
@@ -103,7 +103,7 @@ function draw() {
   drawCaption(side);
 }
 
-/** Copy the pixels around a point. @param {import("../shell/state.js").Shown} shown @param {{u: number, v: number}} point @returns {[number, number]} column and row of the first one */
+/** Copy the pixels around a point. @param {import("../base/state.js").Shown} shown @param {{u: number, v: number}} point @returns {[number, number]} column and row of the first one */
 function takePatch(shown, point) {
   const count = Math.ceil(SIDE / kept.magnifies) + 3;
   if (patch.width !== count) patch.width = patch.height = count;

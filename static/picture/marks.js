@@ -3,9 +3,9 @@
  * 95 % of good residuals = ellipse, radar returns = dots (static) and triangles (moving); and the chips that switch them.
  */
 
-import { ink, residualColour, smallFont } from "../shell/colours.js";
-import { make } from "../shell/notices.js";
-import { clicks, clicksIn, emit, isOffered, on, placementsAt, state } from "../shell/state.js";
+import { ink, residualColour, smallFont } from "../base/colours.js";
+import { make } from "../base/notices.js";
+import { clicks, clicksIn, emit, isOffered, on, placementsAt, state } from "../base/state.js";
 import { toCss, toDevice, viewport, zoom } from "./geometry.js";
 import { toggleRectified, withoutRectified } from "./rectified.js";
 

@@ -3,7 +3,7 @@
  * those who do not see it.
  */
 
-import { clicksIn, emit, isClicked, named, nameOf, on, placementAt, state } from "../shell/state.js";
+import { clicksIn, emit, isClicked, named, nameOf, on, placementAt, state } from "../base/state.js";
 import * as geometry from "./geometry.js";
 
 const { viewport } = geometry;

@@ -3,9 +3,9 @@
  * them. Marks belong to the picture as taken, so meanwhile they are hidden and nothing can be marked.
  */
 
-import { ink } from "../shell/colours.js";
-import { toast } from "../shell/notices.js";
-import { emit, on, state } from "../shell/state.js";
+import { ink } from "../base/colours.js";
+import { toast } from "../base/notices.js";
+import { emit, on, state } from "../base/state.js";
 import { requestAgain } from "../time/player.js";
 import { toDevice, toImage, viewport } from "./geometry.js";
 

@@ -3,8 +3,8 @@
  * Only what fingers do is here; clicking.js has the mouse and the pen, and what a click is.
  */
 
-import { make } from "../shell/notices.js";
-import { emit, on, select, state } from "../shell/state.js";
+import { make } from "../base/notices.js";
+import { emit, on, select, state } from "../base/state.js";
 import { leaveLive } from "../time/player.js";
 import { markNear, moveTo, place } from "./clicking.js";
 import { onImage, pan, toCss, toImage, viewport } from "./geometry.js";

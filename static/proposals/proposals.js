@@ -3,13 +3,13 @@
  * takes another place, X says that it is not the reflector, a click puts the mark elsewhere. They are found on the server.
  */
 
+import { toast } from "../base/notices.js";
+import { send } from "../base/socket.js";
+import { clickIn, emit, isOffered, on, placementsAt, state } from "../base/state.js";
+import { dismiss } from "../picture/dismissing.js";
 import { lookAt, lookInto, pan, toCss, viewport, zoom } from "../picture/geometry.js";
 import { fit, redraw } from "../picture/picture.js";
-import { toast } from "../shell/notices.js";
-import { send } from "../shell/socket.js";
-import { clickIn, emit, isOffered, on, placementsAt, state } from "../shell/state.js";
 import { goTo, pause } from "../time/player.js";
-import { dismiss } from "./dismissing.js";
 
 /** @typedef {import("../messages.js").ProposalRow} Row */
 /** @typedef {import("../messages.js").ProposalPlace} Place */

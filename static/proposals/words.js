@@ -1,9 +1,9 @@
 /** What is said of proposals: the line on the frame, how far they are, why there are none; and their switch, a chip among the layers. */
 
+import { make, toast } from "../base/notices.js";
+import { send } from "../base/socket.js";
+import { isOffered, on, state } from "../base/state.js";
 import { marks } from "../picture/picture.js";
-import { make, toast } from "../shell/notices.js";
-import { send } from "../shell/socket.js";
-import { isOffered, on, state } from "../shell/state.js";
 import { heldBack, isSearching, openProposals, saidWords, say, shownOffer } from "./proposals.js";
 
 /** @typedef {import("../pairs/guide.js").Words} Words */

@@ -1,9 +1,9 @@
 /** Two solutions side by side: chosen here, compared by the server, drawn over the picture with two shapes. */
 
+import { make, toast } from "../base/notices.js";
+import { tell } from "../base/socket.js";
+import { clicksIn, emit, nameOf, on, state } from "../base/state.js";
 import { toDevice, viewport } from "../picture/geometry.js";
-import { make, toast } from "../shell/notices.js";
-import { tell } from "../shell/socket.js";
-import { clicksIn, emit, nameOf, on, state } from "../shell/state.js";
 import { visible } from "./review.js";
 
 /** @typedef {import("../messages.js").CompareWanted["a"]} Kind */

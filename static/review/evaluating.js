@@ -3,11 +3,11 @@
  * Acc, each class, and how Acc changes when the camera is turned, which says what it can see at all.
  */
 
-import { themeColour } from "../shell/colours.js";
-import { closeSheet, showPage } from "../shell/layout.js";
-import { make, shape, toast } from "../shell/notices.js";
-import { send, tell } from "../shell/socket.js";
-import { on } from "../shell/state.js";
+import { themeColour } from "../base/colours.js";
+import { closeSheet, showPage } from "../base/layout.js";
+import { make, shape, toast } from "../base/notices.js";
+import { send, tell } from "../base/socket.js";
+import { on } from "../base/state.js";
 
 /** @typedef {import("../messages.js").AccPanel} Panel */
 /** @typedef {import("../messages.js").SensitivityRow} Row */

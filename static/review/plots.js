@@ -3,8 +3,8 @@
  * to it with the arrow keys, tells the owner, which highlights the same pairs in every plot.
  */
 
-import { growth, smallFont, themeColour } from "../shell/colours.js";
-import { hideTip, make, showTip } from "../shell/notices.js";
+import { growth, smallFont, themeColour } from "../base/colours.js";
+import { hideTip, make, showTip } from "../base/notices.js";
 
 /** @typedef {"agreeing"|"outlier"|"excluded"|"untouched"} Kind */
 /** A mark; beyond the axis it is drawn at the edge. @typedef {{ids: string[], x: number, y: number, kind: Kind, text: string}} Mark */

@@ -1,9 +1,9 @@
 /** The review of all pairs: linked plots of the residuals with a filter, and why the selected pair uses its return. */
 
+import { make } from "../base/notices.js";
+import { tell } from "../base/socket.js";
+import { clicks, named, nameOf, on, select, state } from "../base/state.js";
 import { comeTo } from "../picture/arriving.js";
-import { make } from "../shell/notices.js";
-import { tell } from "../shell/socket.js";
-import { clicks, named, nameOf, on, select, state } from "../shell/state.js";
 import { Plot } from "./plots.js";
 
 /** @typedef {import("../messages.js").ClickRow} Click */

@@ -3,8 +3,8 @@
  * Camera view, the page's own picture with the returns in front of it, projected by the server through the same lens.
  */
 
-import { ink, smallFont, smallPx, themeColour } from "../shell/colours.js";
-import { clicks, nameOf, on, state } from "../shell/state.js";
+import { ink, smallFont, smallPx, themeColour } from "../base/colours.js";
+import { clicks, nameOf, on, state } from "../base/state.js";
 import { spaceOptions } from "./options.js";
 import { drawAgain, hookInto, projection, shownThere } from "./viser_hook.js";
 

@@ -1,6 +1,6 @@
 /** How the user wants the 3D view: colours, trail, hidden, enlarged. Remembered in this browser. */
 
-import { state } from "../shell/state.js";
+import { state } from "../base/state.js";
 
 /** @typedef {import("../messages.js").CursorMoved["colour"]} Colour */
 const KEPT = "cocalib-space";

@@ -1,11 +1,11 @@
 /** The 3D view: viser's own page in an iframe. It has its own connection to the server; the name of this tab links the two. */
 
-import { choose } from "../pairs/candidates.js";
+import { icon, make } from "../base/notices.js";
+import { tab, tell } from "../base/socket.js";
+import { clicks, on, select, state } from "../base/state.js";
+import { listen } from "../page/keys.js";
 import { comeTo } from "../picture/arriving.js";
-import { listen } from "../shell/keys.js";
-import { icon, make } from "../shell/notices.js";
-import { tab, tell } from "../shell/socket.js";
-import { clicks, on, select, state } from "../shell/state.js";
+import { choose } from "../picture/candidates.js";
 import { tellCursor } from "../time/player.js";
 import { candidates, frameShown, itemAt, layer, lookShown, mark, onDrawn, pickable, pickedWords, pictureBox, redraw, startLayer, takeLook } from "./layer.js";
 import { changeSpace, spaceColour, spaceOptions } from "./options.js";

@@ -3,9 +3,9 @@
  * changes, and the current frame.
  */
 
+import { ink, residualColour, smallFont, smallPx, themeColour } from "../base/colours.js";
+import { clicks, emit, isDismissed, isLookedAt, on, state } from "../base/state.js";
 import { confidences } from "../proposals/proposals.js";
-import { ink, residualColour, smallFont, smallPx, themeColour } from "../shell/colours.js";
-import { clicks, emit, isDismissed, isLookedAt, on, state } from "../shell/state.js";
 import { drawGaps, drawRuler, pixelsPerSecond, RULER } from "./ruler.js";
 
 export const lanes = { left: 74, right: 14, gap: 4, bottom: 5 };

@@ -3,14 +3,14 @@
  * recording that is still being written.
  */
 
-import { requestNumber, tell } from "../shell/socket.js";
-import { clicks, emit, on, select, state } from "../shell/state.js";
+import { requestNumber, tell } from "../base/socket.js";
+import { clicks, emit, on, select, state } from "../base/state.js";
 import { cursorOptions } from "../space/options.js";
 
 const KEPT = 12;
 /** Maximum number of requests in flight while playing. */
 const CREDIT = 2;
-/** @type {Map<number, import("../shell/state.js").Shown>} */
+/** @type {Map<number, import("../base/state.js").Shown>} */
 const kept = new Map();
 let newest = 0;
 /** Requests in flight; an answer to one also settles all before it. @type {number[]} */
@@ -162,7 +162,7 @@ export function frameFailed(request) {
   coming = coming.filter((number) => request === null || number > request);
 }
 
-/** @param {import("../shell/state.js").Shown} shown */
+/** @param {import("../base/state.js").Shown} shown */
 function keep(shown) {
   const before = kept.get(shown.index);
   if (before && before.scale > shown.scale) return;
@@ -175,7 +175,7 @@ function keep(shown) {
   }
 }
 
-/** @param {import("../shell/state.js").Shown} shown */
+/** @param {import("../base/state.js").Shown} shown */
 function show(shown) {
   state.shown = shown;
   if (state.playing) {

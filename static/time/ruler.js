@@ -3,7 +3,7 @@
  * recording go in, drawn seconds come out; the way is strictly monotone, so it has an exact way back, also inside a gap.
  */
 
-import { smallFont, smallPx, themeColour } from "../shell/colours.js";
+import { smallFont, smallPx, themeColour } from "../base/colours.js";
 
 /** @typedef {CanvasRenderingContext2D} Ink */
 /** @typedef {import("./lanes.js").Axis} Axis */

@@ -1,7 +1,7 @@
 /** The timeline: where a pointer is in time, and what is there; click to go there, wheel or two fingers to zoom. lanes.js draws it. */
 
-import { hideTip, showTip } from "../shell/notices.js";
-import { clicks, nameOf, on, onPainted, state } from "../shell/state.js";
+import { hideTip, showTip } from "../base/notices.js";
+import { clicks, nameOf, on, onPainted, state } from "../base/state.js";
 import { changes, drawLanes, fateOf, laneBoxes, lanes } from "./lanes.js";
 import { jump, nearestIndex } from "./player.js";
 import { foldingOf, gapsOf, lengthWords, toFolded, toSeconds as unfolded } from "./ruler.js";

@@ -7,7 +7,7 @@ from pathlib import PurePosixPath
 
 import pytest
 
-ENTRIES = ("main.js", "space/pace.js")
+ENTRIES = ("page/main.js", "space/pace.js")
 """What a page loads by itself: ours, and viser's in the frame of the 3D view."""
 _IMPORT = re.compile(r'^import\s+(?:(?P<what>[\w*{][^"\';]*?)\s+from\s+)?"(?P<path>[^"]+)";', re.MULTILINE)
 _EXPORT = re.compile(

@@ -71,7 +71,7 @@ def test_the_wheel_contains_the_page_the_sample_and_the_code_of_the_pack(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
     assert {
         "cocalib/static/index.html",
-        "cocalib/static/shell/state.js",
+        "cocalib/static/base/state.js",
         "cocalib/sample_data/rooftop/radar.bag",
         "cocalib/sample_data/rooftop/camera.bag",
     } <= names
@@ -137,7 +137,7 @@ def test_the_installed_command_serves_its_page(installed, tmp_path):
         browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
         page = browser.open(link, timeout=30).read().decode()
         assert "cocalib" in page
-        for part in ("main.js", "shell/state.js", "space/pace.js"):
+        for part in ("page/main.js", "base/state.js", "space/pace.js"):
             assert browser.open(link.partition("?")[0] + part, timeout=30).status == 200
     finally:
         server.terminate()

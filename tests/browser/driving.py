@@ -156,7 +156,7 @@ class Driver:
             for number, placement in enumerate(placements, 1)
         ]
         self.page.evaluate(
-            "text => import('./shell/socket.js').then(({ send }) => send({ type: 'import_clicks', text, name: 'clicks.json' }))",
+            "text => import('./base/socket.js').then(({ send }) => send({ type: 'import_clicks', text, name: 'clicks.json' }))",
             json.dumps({"schema": "cocalib/clicks-1", "clicks": clicks}),
         )
         self.go_to(self.frame_at(placements[-1]["best_image_time"]))

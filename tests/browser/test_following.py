@@ -17,7 +17,7 @@ pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 _DWELL_END_S = 21.0
 
 LATE = """async () => {
-  const [{ receiveFrame }, { requestNumber }] = await Promise.all([import('/time/player.js'), import('/shell/socket.js')]);
+  const [{ receiveFrame }, { requestNumber }] = await Promise.all([import('/time/player.js'), import('/base/socket.js')]);
   const canvas = new OffscreenCanvas(8, 8);
   canvas.getContext('2d').fillRect(0, 0, 8, 8);
   const data = new Uint8Array(await (await canvas.convertToBlob()).arrayBuffer());

@@ -54,7 +54,7 @@ def test_the_page_applies_changes_as_the_server_means_them(page: Driver) -> None
     text, shown = feed.message(shown)
     had = page.page.evaluate(
         """async (texts) => {
-            const { Follower } = await import("/shell/state.js");
+            const { Follower } = await import("/base/state.js");
             const follower = new Follower();
             for (const text of texts) {
                 const message = JSON.parse(text);

@@ -69,7 +69,7 @@ EXTREME_NAMES = {
 def give_extreme_names(page: Driver) -> None:
     """Let the recording and its topics have names as long as they come."""
     page.page.evaluate(
-        "async ({ name, topics }) => { const { emit, state } = await import('/shell/state.js'); state.recording.name = name;"
+        "async ({ name, topics }) => { const { emit, state } = await import('/base/state.js'); state.recording.name = name;"
         "topics.forEach((topic, place) => (state.recording.sensors[place].topic = topic)); emit('recording'); }",
         EXTREME_NAMES,
     )
@@ -179,7 +179,7 @@ def test_ten_pairs_or_four_and_six_returns_are_in_sight_beside_seven_warnings(pa
     page.load_sample(truth, 12)
     page.until("!__cocalib.state.view.checking")
     page.page.evaluate(
-        "async () => { const { emit, state } = await import('/shell/state.js'); const words = 'a warning that takes a line';"
+        "async () => { const { emit, state } = await import('/base/state.js'); const words = 'a warning that takes a line';"
         "const seven = [1, 2, 3, 4, 5, 6, 7].map((n) => ({ code: `code-${n}`, message: `${words} ${n}`, hint: words }));"
         "const { follower } = __cocalib; follower.view = state.view = { ...follower.view, warnings: seven }; emit('view'); }"
     )  # what the server still sends changes this View

@@ -79,7 +79,7 @@ def test_the_palette_goes_to_placements_pairs_frames_times_and_options(page: Dri
 def test_the_help_and_the_keys_come_from_the_same_table(page: Driver) -> None:
     table = page.page.evaluate(
         """async () => {
-            const { ACTIONS } = await import("/shell/actions.js");
+            const { ACTIONS } = await import("/base/actions.js");
             return ACTIONS.map(({ id, group, words, keys }) => ({ id, group, words, keys }));
         }"""
     )

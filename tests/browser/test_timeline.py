@@ -47,7 +47,7 @@ def islands_page(open_page: Callable[..., Driver], tmp_path: Path) -> Iterator[D
     ]
     page.page.evaluate(
         """async (rows) => {
-            const { emit, state } = await import("/shell/state.js");
+            const { emit, state } = await import("/base/state.js");
             state.placements = rows;
             emit("placements");
         }""",

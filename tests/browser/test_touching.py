@@ -115,7 +115,7 @@ def test_a_long_press_goes_on_while_the_timeline_is_still_being_filled(
     fingers = Fingers(page)
     fingers.put("touchStart", page.place_of(500, 400))
     page.until("!document.getElementById('touch-cross').hidden")
-    page.value("import('/shell/state.js').then(({ emit }) => emit('placements'))")
+    page.value("import('/base/state.js').then(({ emit }) => emit('placements'))")
     page.drawn()
     assert not page.value("document.getElementById('touch-cross').hidden")
     fingers.put("touchEnd")

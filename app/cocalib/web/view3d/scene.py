@@ -44,7 +44,7 @@ STAND_AT, LOOK_AT = (-5.0, 0.0, 3.6), (6.0, 0.0, -0.4)
 FIELD_OF_VIEW_RAD = 0.75
 
 _MOST_ELLIPSOIDS = 200
-_LARGE_PX = 30.0  # as in static/shell/colours.js: a colour means the same after every click
+_LARGE_PX = 30.0  # as in static/base/colours.js: a colour means the same after every click
 """More would be a cloud in which none can be told from the others, and 2 kB each for every answer."""
 _USUAL_RANGE_M, _USUAL_SIZE_M = 12.0, 0.12
 """The size of a return of middle strength in data that reach so far [m]; farther data have larger returns, by the square root."""

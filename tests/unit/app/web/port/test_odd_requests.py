@@ -149,7 +149,7 @@ def cookie(server: RunningServer) -> str:
 
 
 def test_a_cookie_of_an_admitted_browser_is_renewed_by_each_answer(server, cookie):
-    answer = asked(server, b"GET /main.js HTTP/1.1\r\n" + HOST, cookie)
+    answer = asked(server, b"GET /page/main.js HTTP/1.1\r\n" + HOST, cookie)
     assert f"Set-Cookie: {cookie}; Max-Age=".encode() in answer
 
 
@@ -182,7 +182,7 @@ def test_no_answer_ever_holds_a_file_from_elsewhere(server, cookie, project_root
     secret = (project_root / "pyproject.toml").read_bytes()[:40]
     for dots in (b"..", b"%2e%2e", b"%2E.", b"%252e%252e", b"..%00", b"%c0%ae%c0%ae", b"..;", b"...", b"..%5c"):
         for slash in (b"/", b"%2f", b"%5c", b"\\", b"//"):
-            for start_at in (b"/", b"/static/", b"/viser/a/", b"/api/export/", b"/main.js/"):
+            for start_at in (b"/", b"/static/", b"/viser/a/", b"/api/export/", b"/page/main.js/"):
                 target = start_at + (dots + slash) * 3 + b"pyproject.toml"
                 answer = asked(server, b"GET " + target + b" HTTP/1.1\r\n" + HOST, cookie, b"")
                 assert status(answer) == 404

@@ -48,8 +48,8 @@ def stamp(index: int) -> dict[str, int]:
 def test_the_page_and_its_parts_are_served_with_their_types_and_no_inline_script(server, cookie, project_root):
     for path, kind in (
         ("/", "text/html"),
-        ("/main.js", "text/javascript"),
-        ("/shell/look.css", "text/css"),
+        ("/page/main.js", "text/javascript"),
+        ("/base/look.css", "text/css"),
         ("/icon.svg", "image/svg+xml"),
     ):
         answer = get(server, path, Cookie=cookie)
@@ -98,7 +98,7 @@ def test_a_websocket_from_elsewhere_or_to_elsewhere_is_refused(server, cookie, p
 
 @pytest.mark.parametrize(
     "path",
-    ["/static/main.js", "/shell", "/shell/", "/state.js", "/viser/", "/viser/a/b/", "/api/", "/api/export/nothing"],
+    ["/static/page/main.js", "/base", "/base/", "/state.js", "/viser/", "/viser/a/b/", "/api/", "/api/export/nothing"],
 )
 def test_no_other_path_exists(server, cookie, path):
     assert get(server, path, Cookie=cookie).status == 404

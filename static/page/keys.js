@@ -3,10 +3,10 @@
  * which the arrow keys go on.
  */
 
+import { act, ACTIONS } from "../base/actions.js";
+import { state } from "../base/state.js";
 import { crossTakes } from "../picture/cross.js";
 import { shownOffer } from "../proposals/proposals.js";
-import { act, ACTIONS } from "./actions.js";
-import { state } from "./state.js";
 
 /** Keys that stay with the page even where a field has the focus. */
 const ANYWHERE = ["Ctrl+K"];
@@ -14,7 +14,7 @@ const ANYWHERE = ["Ctrl+K"];
 const ONCE = ["place-mark", "exclude", "next-candidate"];
 /** Whether the pointer is down, and what it gave the focus to. @type {{isDown: boolean, target: EventTarget|null}} */
 const pointed = { isDown: false, target: null };
-/** The action of each combination of keys; made once all modules are loaded. @type {Map<string, import("./actions.js").Action>|null} */
+/** The action of each combination of keys; made once all modules are loaded. @type {Map<string, import("../base/actions.js").Action>|null} */
 let bound = null;
 
 /** Listen in a window, in the capture phase so as to run before viser's own handlers. @param {Window} owner */

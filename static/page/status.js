@@ -3,11 +3,11 @@
  * where there is no room, in full on hover.
  */
 
+import { icon, make } from "../base/notices.js";
+import { named, on, onPainted, state } from "../base/state.js";
 import { toDevice, viewport, zoom } from "../picture/geometry.js";
 import { fit } from "../picture/picture.js";
 import { searchWords } from "../proposals/proposals.js";
-import { icon, make } from "./notices.js";
-import { named, on, onPainted, state } from "./state.js";
 
 /** @param {string} id */
 const get = (id) => /** @type {HTMLElement} */ (document.getElementById(id));

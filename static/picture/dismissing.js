@@ -1,8 +1,8 @@
 /** Dismissing a placement that the radar found and that is not the reflector; undo brings it back. */
 
-import { toast } from "../shell/notices.js";
-import { send } from "../shell/socket.js";
-import { dismissalOf, isDismissed, isOffered, placementsAt, stampOf, state } from "../shell/state.js";
+import { toast } from "../base/notices.js";
+import { send } from "../base/socket.js";
+import { dismissalOf, isDismissed, isOffered, placementsAt, stampOf, state } from "../base/state.js";
 
 /** The placement of the frame on screen that can be dismissed or offered again. */
 function placementHere() {

@@ -1,9 +1,9 @@
 /** The options, built from the server's descriptions: the most used first, all others below. */
 
-import { showPage } from "./layout.js";
-import { make, settled, toast } from "./notices.js";
-import { send } from "./socket.js";
-import { on, onPainted, state } from "./state.js";
+import { showPage } from "../base/layout.js";
+import { make, settled, toast } from "../base/notices.js";
+import { send } from "../base/socket.js";
+import { on, onPainted, state } from "../base/state.js";
 
 /** @typedef {import("../messages.js").OptionDescription} Field */
 const page = /** @type {HTMLElement} */ (document.getElementById("page-options"));

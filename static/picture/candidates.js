@@ -3,11 +3,11 @@
  * a number chooses; C takes the one that would fit better, or else the next one; undo takes the choice back.
  */
 
-import { toCss, toDevice, viewport } from "../picture/geometry.js";
-import { growth, ink, smallFont } from "../shell/colours.js";
-import { toast } from "../shell/notices.js";
-import { send } from "../shell/socket.js";
-import { emit, on, selectedClick, stampOf, state } from "../shell/state.js";
+import { growth, ink, smallFont } from "../base/colours.js";
+import { toast } from "../base/notices.js";
+import { send } from "../base/socket.js";
+import { emit, on, selectedClick, stampOf, state } from "../base/state.js";
+import { toCss, toDevice, viewport } from "./geometry.js";
 
 /** @typedef {import("../messages.js").CandidateRow} Candidate */
 /** Candidates that are less probable than this are not drawn on the frame, except the one in use and the suggested one. */

@@ -1,30 +1,30 @@
 /** The table of actions, once: words, keys, what runs and when it can be done. */
 
+import { register } from "../base/actions.js";
+import { closeSheet, enlargePanel, showPage, toggleTheme } from "../base/layout.js";
+import { clickIn, clicks, selectedClick, state } from "../base/state.js";
 import { loadClicks, openExport } from "../export/exporting.js";
 import { saveCamera } from "../lens/result.js";
-import { choose, nextCandidate, withoutCandidates } from "../pairs/candidates.js";
+import { chooseRecording } from "../opening/opening.js";
 import { nextWorst } from "../pairs/pairs.js";
 import { toPlacement } from "../picture/arriving.js";
 import { fitEye, zoomEye } from "../picture/birdseye.js";
+import { choose, nextCandidate, withoutCandidates } from "../picture/candidates.js";
 import { nudgeBy, removeSelected, snap, toggleExcluded, turnBack, withoutSnappable } from "../picture/clicking.js";
 import { toggleContours } from "../picture/contours.js";
 import { enterCross, toggleCross } from "../picture/cross.js";
+import { dismissHere, withoutPlacement } from "../picture/dismissing.js";
 import { magnify, stretchContrast } from "../picture/loupe.js";
 import { toggleLayer } from "../picture/marks.js";
 import { fit, zoomBy } from "../picture/picture.js";
 import { toggleRectified, withoutRectified } from "../picture/rectified.js";
-import { dismissHere, withoutPlacement } from "../proposals/dismissing.js";
 import { acceptProposal, nextPlace, nextProposal, previousProposal, rejectProposal, takesEnter, takesKeys } from "../proposals/proposals.js";
 import { sayNone, toggleProposals } from "../proposals/words.js";
 import { chooseBoxes, findMoving, toggleEvaluate } from "../review/evaluating.js";
 import { lookFrom, setCamera, toggleHidden, toggleLarge } from "../space/space.js";
 import { goLive, goTo, pause, play, step } from "../time/player.js";
-import { register } from "./actions.js";
 import { toggleHelp } from "./help.js";
-import { closeSheet, enlargePanel, showPage, toggleTheme } from "./layout.js";
-import { chooseRecording } from "./opening.js";
 import { togglePalette } from "./palette.js";
-import { clickIn, clicks, selectedClick, state } from "./state.js";
 
 const opened = () => (state.recording ? "" : "The recording is not open yet");
 const withPictures = () => opened() || (state.looking ? "There are no pictures in this recording" : "");

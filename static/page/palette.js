@@ -1,12 +1,12 @@
 /** The command palette: every action, placement, pair, frame and option, found by typing. */
 
+import { ACTIONS, keyNames, reasonAgainst } from "../base/actions.js";
+import { make } from "../base/notices.js";
+import { fitOf } from "../base/searching.js";
+import { clicks, isClicked, nameOf, select, state } from "../base/state.js";
+import { openOption, optionRows } from "../options/options.js";
 import { comeTo } from "../picture/arriving.js";
 import { goTo, nearestIndex, pause } from "../time/player.js";
-import { ACTIONS, keyNames, reasonAgainst } from "./actions.js";
-import { make } from "./notices.js";
-import { openOption, optionRows } from "./options.js";
-import { fitOf } from "./searching.js";
-import { clicks, isClicked, nameOf, select, state } from "./state.js";
 
 const KEPT = "cocalib-recent";
 const MOST_RECENT = 6;

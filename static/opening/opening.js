@@ -3,10 +3,10 @@
  * on a recording without intrinsics, and camera files dropped on the page.
  */
 
-import { showPage } from "./layout.js";
-import { make, toast } from "./notices.js";
-import { send, tell, unconfirmed } from "./socket.js";
-import { on, state } from "./state.js";
+import { showPage } from "../base/layout.js";
+import { make, toast } from "../base/notices.js";
+import { send, tell, unconfirmed } from "../base/socket.js";
+import { on, state } from "../base/state.js";
 
 /** @typedef {import("../messages.js").OpeningChoices} Choices */
 /** What the user has chosen in the dialog so far. @typedef {{recent: string, paths: Set<string>, radar: string|null, image: string|null, intrinsics: "keep"|"recorded"|"near"|"file", file: {name: string, data: string, camera: string}|null, session: "continue"|"new"|"copy"}} Draft */

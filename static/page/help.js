@@ -1,8 +1,8 @@
 /** The help dialog: keys, mouse and marks. */
 
-import { ACTIONS, keyNames } from "./actions.js";
-import { ink } from "./colours.js";
-import { make, shape } from "./notices.js";
+import { ACTIONS, keyNames } from "../base/actions.js";
+import { ink } from "../base/colours.js";
+import { make, shape } from "../base/notices.js";
 
 const dialog = /** @type {HTMLDialogElement} */ (document.getElementById("help-dialog"));
 const ARROWS = ["←", "→", "↑", "↓"];

@@ -1,47 +1,47 @@
 /** The page: wires the modules together and passes the server's messages to those that draw them. */
 
-import { startDelivering, startExporting } from "./export/exporting.js";
-import { startLens, takeLens, takeResult } from "./lens/lens.js";
-import { drawLensMarks, startLensResult } from "./lens/result.js";
-import { drawCandidates, startCandidates, take as takeCandidates } from "./pairs/candidates.js";
-import { startFigures, startVerdict } from "./pairs/figures.js";
-import { startGuide } from "./pairs/guide.js";
-import { startPairs } from "./pairs/pairs.js";
-import { startScatter } from "./pairs/scatter.js";
-import { startWarnings } from "./pairs/warnings.js";
-import { startArriving } from "./picture/arriving.js";
-import { startLooking } from "./picture/birdseye.js";
-import { startClicking, takeSnapped } from "./picture/clicking.js";
-import { drawContours, startContours, takeUncertainty } from "./picture/contours.js";
-import { drawCross, startCross } from "./picture/cross.js";
-import { onImage, toCss, toImage, viewport, zoom } from "./picture/geometry.js";
-import { startLoupe } from "./picture/loupe.js";
-import { drawMarks, startLayers } from "./picture/marks.js";
-import { addLayer, startDescribing, startPicture } from "./picture/picture.js";
-import { drawRectified, startRectified } from "./picture/rectified.js";
-import { startTouch } from "./picture/touch.js";
-import { drawProposal } from "./proposals/marks.js";
-import { justMoved, shownOffer, startProposals, takeProposals } from "./proposals/proposals.js";
-import { startSwitch as startProposalSwitch } from "./proposals/words.js";
-import { drawCompared, startCompare, takeCompared } from "./review/compare.js";
-import { startEvaluating, takeAcc } from "./review/evaluating.js";
-import { plots, startReview, takePair, takeReview } from "./review/review.js";
-import { registerActions } from "./shell/action_table.js";
-import { act, actionNamed } from "./shell/actions.js";
-import { ask, content } from "./shell/asking.js";
-import { listen, startRoving } from "./shell/keys.js";
-import { startLayout } from "./shell/layout.js";
-import { setBanner, startTips, toast } from "./shell/notices.js";
-import { isAnother, startOpening, takeChoices, takeFolder } from "./shell/opening.js";
-import { startOptions } from "./shell/options.js";
-import { startPalette } from "./shell/palette.js";
-import { connect, tell, unconfirmed } from "./shell/socket.js";
-import { clickIn, clicks, clicksIn, emit, Follower, on, select, selectedClick, stampOf, state } from "./shell/state.js";
-import { startStatus } from "./shell/status.js";
-import { startSpace, takeSpace } from "./space/space.js";
-import { activity, startPictureChanges } from "./time/lanes.js";
-import { frameFailed, goTo, receiveFrame, requestAgain, startLive, takeFollowing, takeFrames, tellCursor } from "./time/player.js";
-import { startTimeline } from "./time/timeline.js";
+import { act, actionNamed } from "../base/actions.js";
+import { ask, content } from "../base/asking.js";
+import { startLayout } from "../base/layout.js";
+import { setBanner, startTips, toast } from "../base/notices.js";
+import { connect, tell, unconfirmed } from "../base/socket.js";
+import { clickIn, clicks, clicksIn, emit, Follower, on, select, selectedClick, stampOf, state } from "../base/state.js";
+import { startDelivering, startExporting } from "../export/exporting.js";
+import { startLens, takeLens, takeResult } from "../lens/lens.js";
+import { drawLensMarks, startLensResult } from "../lens/result.js";
+import { isAnother, startOpening, takeChoices, takeFolder } from "../opening/opening.js";
+import { startOptions } from "../options/options.js";
+import { startFigures, startVerdict } from "../pairs/figures.js";
+import { startGuide } from "../pairs/guide.js";
+import { startPairs } from "../pairs/pairs.js";
+import { startScatter } from "../pairs/scatter.js";
+import { startWarnings } from "../pairs/warnings.js";
+import { startArriving } from "../picture/arriving.js";
+import { startLooking } from "../picture/birdseye.js";
+import { drawCandidates, startCandidates, take as takeCandidates } from "../picture/candidates.js";
+import { startClicking, takeSnapped } from "../picture/clicking.js";
+import { drawContours, startContours, takeUncertainty } from "../picture/contours.js";
+import { drawCross, startCross } from "../picture/cross.js";
+import { onImage, toCss, toImage, viewport, zoom } from "../picture/geometry.js";
+import { startLoupe } from "../picture/loupe.js";
+import { drawMarks, startLayers } from "../picture/marks.js";
+import { addLayer, startDescribing, startPicture } from "../picture/picture.js";
+import { drawRectified, startRectified } from "../picture/rectified.js";
+import { startTouch } from "../picture/touch.js";
+import { drawProposal } from "../proposals/marks.js";
+import { justMoved, shownOffer, startProposals, takeProposals } from "../proposals/proposals.js";
+import { startSwitch as startProposalSwitch } from "../proposals/words.js";
+import { drawCompared, startCompare, takeCompared } from "../review/compare.js";
+import { startEvaluating, takeAcc } from "../review/evaluating.js";
+import { plots, startReview, takePair, takeReview } from "../review/review.js";
+import { startSpace, takeSpace } from "../space/space.js";
+import { activity, startPictureChanges } from "../time/lanes.js";
+import { frameFailed, goTo, receiveFrame, requestAgain, startLive, takeFollowing, takeFrames, tellCursor } from "../time/player.js";
+import { startTimeline } from "../time/timeline.js";
+import { registerActions } from "./action_table.js";
+import { listen, startRoving } from "./keys.js";
+import { startPalette } from "./palette.js";
+import { startStatus } from "./status.js";
 
 const follower = new Follower();
 
@@ -116,7 +116,7 @@ function takeView() {
   if (here?.id && !state.selected) select(here.id);
 }
 
-/** @param {import("./messages.js").RecordingNote} message */
+/** @param {import("../messages.js").RecordingNote} message */
 function takeRecording(message) {
   if (isAnother(message)) return;
   const same = state.recording !== null;
