@@ -1,4 +1,4 @@
-"""Write the site: docs/*.md, README and glossary, the commands from the parser, Python from its docstrings, the notebook.
+"""Write the site: docs/*.md, README and glossary, the commands from the parser, Python from its docstrings, notebook, examples.
 
 `make docs` runs it. Sphinx builds the pages offline and strictly: a link that leads nowhere is an error, and so are a script or
 font from elsewhere and a site of more than 10 MB.
@@ -20,7 +20,7 @@ from cocalib.cli.help import named_options_help, written_help
 _ROOT = Path(__file__).parent.parent
 _MOST_MB = 10.0
 _PAGES = {
-    "Tour": "tour gallery first-steps",
+    "Tour": "tour gallery first-steps examples",
     "How to": "radar-formats intrinsics drift fleet proposals boxes evaluation report rerun simulation",
     "Concepts": "method conventions GLOSSARY apex paper reliability security",
     "Reference": "commands python formats warnings",
@@ -46,7 +46,7 @@ def _commands() -> Iterator[str]:
 
 def _python() -> Iterator[str]:
     """Yield the page of the Python names."""
-    yield "# Python\n\n`import cocalib as cc`. A function that takes or returns arrays says their shapes.\n"
+    yield "# Python\n\n`import cocalib as cc`; the [examples](examples.md) use it. Functions of arrays say their shapes.\n"
     for name in calib_core.__all__:
         kind = "autoclass" if isinstance(getattr(calib_core, name), type) else "autofunction"
         members = "\n   :members:" if kind == "autoclass" else ""
@@ -60,6 +60,13 @@ def _notebook(path: Path) -> Iterator[str]:
         yield f"{text}\n" if cell["cell_type"] == "markdown" else f"```python\n{text}\n```\n"
         for output in cell.get("outputs", []):
             yield f"```text\n{''.join(output.get('text', []))}\n```\n"
+
+
+def _examples(folder: Path) -> Iterator[str]:
+    """Yield the page of the examples."""
+    yield "# Examples\n\nEach runs on its own, with what is installed; a test runs them from the wheel.\n"
+    for path in sorted(folder.glob("*.py")):
+        yield f"## {path.stem[3:].replace('_', ' ').capitalize()}\n\n```python\n{path.read_text(encoding='utf-8')}```\n"
 
 
 def _tree() -> Iterator[str]:
@@ -77,9 +84,11 @@ def _assemble(folder: Path) -> None:
     pages["index"] = pages.pop("README") + "\n" + "\n".join(_tree())
     pages["commands"], pages["python"] = "\n".join(_commands()), "\n".join(_python())
     pages["first-steps"] = "\n".join(_notebook(docs / "first-steps.ipynb"))
+    pages["examples"] = "\n".join(_examples(docs / "examples"))
     for name, text in pages.items():
         for link, target in (
             ("../", ""),
+            ("docs/examples/", "examples.md"),
             ("docs/", ""),
             ("README.md", "index.md"),
             ("first-steps.ipynb", "first-steps.md"),

@@ -174,6 +174,21 @@ def test_the_installed_command_solves_its_sample_and_packs_it(installed, tmp_pat
     assert subprocess.run([sys.executable, "-I", "-S", tmp_path / "pack" / "selftest.py"]).returncode == 0
 
 
+def test_the_examples_run_from_the_wheel(installed, project_root, tmp_path):
+    examples = sorted((project_root / "docs" / "examples").iterdir())
+    assert [path.name[:3] for path in examples] == [f"{number:02d}_" for number in range(1, len(examples) + 1)]
+    assert max(len(path.read_text(encoding="utf-8").splitlines()) for path in examples) < 40
+    code = "import runpy, sys\nfor path in sys.argv[1:]:\n    runpy.run_path(path, run_name='__main__')\n"
+    done = subprocess.run(
+        [installed / "bin" / "python", "-W", "error", "-c", code, *examples],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        env={name: value for name, value in os.environ.items() if name != "PYTHONPATH"},
+    )
+    assert done.returncode == 0, done.stderr
+
+
 _SMALL = "dwell_s=3.5 width_px=480 height_px=300 camera_rate_hz=3 radar_rate_hz=5"
 _PLACEHOLDERS = {
     "sample_data/rooftop/": "",
