@@ -3,7 +3,6 @@
 Or export a static transform beside an existing frame tree: to the root of the camera's own chain, never a second parent.
 """
 
-import io
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -268,21 +267,11 @@ def contents_text(written: Export) -> str:
         return content
     if content.startswith(b"PK"):
         members = unpack(content, source=written.file_name)
-        return "\n".join(_member(name, data) for name, data in members.items())
+        return "\n".join(f"[{name}]\n{data.decode('utf-8', errors='replace')}" for name, data in members.items())
     if content.startswith(b"MATLAB"):
         comment = content[:_MAT_TEXT_BYTES].decode("ascii", errors="replace").rstrip("\0 ")
         return "\n".join([comment, "", *_variables(load_mat(content, source=written.file_name))]) + "\n"
     return f"binary, {len(content):,} bytes\n"  # a format of an installed package, with an unknown layout
-
-
-def _member(name: str, data: bytes) -> str:
-    if name.endswith(".npz"):
-        inside = unpack(data, source=name)
-        return f"[{name}]\n" + "\n".join(_member(inner, array) for inner, array in inside.items())
-    if not name.endswith(".npy"):
-        return f"[{name}]\n{data.decode('utf-8', errors='replace')}"
-    array = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
-    return "\n".join(_variables({name.removesuffix(".npy"): array})) + "\n"
 
 
 def _variables(values: Mapping[str, Any], owner: str = "") -> Iterator[str]:

@@ -250,7 +250,6 @@ class Format:
         also: other words that someone may search for.
         notes_on: returns more notes, which depend on the calibration; None if there are none.
         holds_corrections: it stores what the radar gets wrong: its errors and its angle map.
-        is_unpacked: it is a zip archive whose files are meant to be unpacked: written into a folder, if one is given.
     """
 
     name: str
@@ -267,7 +266,6 @@ class Format:
     also: str = ""
     notes_on: Callable[[CalibrationFile], tuple[str, ...]] | None = None
     holds_corrections: bool = False
-    is_unpacked: bool = False
 
     @property
     def is_for_rectified(self) -> bool:

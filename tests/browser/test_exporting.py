@@ -75,7 +75,7 @@ def test_the_text_shown_is_the_file_that_is_saved_or_copied_and_it_is_the_calibr
     solved.page.click("#export")
     choose(solved, "json")
     reference = read_any_file(saved(solved, tmp_path))
-    for name in ("tf2", "kitti", "matlab", "pack"):  # text, for rectified pictures, and binary files of each kind
+    for name in ("tf2", "kitti", "matlab", "colmap"):  # text, for rectified pictures, and binary files of each kind
         choose(solved, name)
         solved.until(f"document.querySelector('{DIALOG} .check.good')")
         path = saved(solved, tmp_path)
@@ -165,7 +165,6 @@ def test_a_format_is_found_by_typing_and_chosen_by_keyboard(solved: Driver) -> N
         ("nuscenes", "nuscenes", set()),
         ("pjl", "pjlab", set()),
         ("ros 2", "tf2", {"urdf", "autoware"}),
-        ("c++", "pack", set()),
         ("ros2", "tf2", {"tf2-launch-py"}),
     ):
         page.locator(f"{DIALOG} .find").fill(words)

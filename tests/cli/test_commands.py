@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from calib_core.geometry import rotation_angle_rad
-from calib_core.interchange import read_calibration
+from calib_core.interchange import export_all, read_calibration, written_formats
+from calib_core.interchange.formats.statement import POSE_ONLY
 from cocalib.cli import demo
 from cocalib.cli.serving_flags import ServingFlags
 from cocalib.opening import Choice, Serving
@@ -136,6 +137,34 @@ def test_import_takes_the_image_size_for_a_lens_without_one_and_the_file_beside_
         np.testing.assert_allclose(written.camera_from_radar.as_matrix(), CAMERA_FROM_RADAR, atol=1e-6)
         assert (written.camera.width_px, written.camera.height_px) == SIZE
         assert len(written.camera.distortion) == (5 if "lens" in file.holds_camera else 0)
+
+
+def test_all_formats_are_written_and_those_that_cannot_hold_the_calibration_say_why(cocalib, golden, tmp_path):
+    folder = tmp_path / "exports"
+    answer = cocalib("export", golden, "--to", "all", "--out", folder)
+    assert answer.code == 0
+    lines = dict(line.split(": ", 1) for line in answer.out.splitlines())
+    assert set(lines) == {known.name for known in written_formats()}
+    written, refused = export_all(read_calibration(golden.read_bytes()))
+    for name, made in written.items():
+        assert lines[name] == f"written to {folder / made.file_name}"
+        assert (folder / made.file_name).read_bytes() == made.data
+    for one in refused:
+        assert lines[one.name] == f"not written: {one.reason}"
+    beside = {extra.file_name for made in written.values() for extra in made.extra_files}
+    assert beside == {"rectification.npz"}
+    assert {path.name for path in folder.iterdir()} == {made.file_name for made in written.values()} | beside
+    (note,) = (line for line in answer.err.splitlines() if line.endswith(POSE_ONLY))
+    assert note.startswith("note: tf2, tf2-launch-py, ")
+    assert "warning of the calibration: the pairs span 5 m to 15 m" in answer.err
+
+
+def test_all_formats_take_the_parent_and_the_rectified_pictures_where_they_apply(cocalib, golden, tmp_path):
+    parent = ["--parent-from-radar", "1.5", "0", "0.25", "0", "0", "0", "1"]
+    answer = cocalib("export", golden, "--to", "all", "--out", tmp_path / "a", "--rectified", *parent)
+    assert answer.code == 0
+    assert "kitti: written to" in answer.out
+    assert "x: 1.5" in (tmp_path / "a" / "sensor_kit_calibration.yaml").read_text()
 
 
 def test_camera_info_is_exported_and_read_by_the_camera_option(cocalib, solved, tmp_path):

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from calib_core.errors import InputError, RecordingError
-from calib_core.interchange.syntax.zip_archives import unpack
 from cocalib.cli.flags import File, Switch, called
 from cocalib.cli.output import progress_bar, write_whole
 from cocalib.cli.recording_flags import TopicFlags, Topics
@@ -38,7 +37,7 @@ class Export:
     to: Annotated[str, tyro.conf.arg(metavar="FORMAT")] = "list"
     """Output format, such as tf2; "list" lists them, "all" writes every one that can hold the calibration into a folder."""
     out: File = None
-    """Output file or folder; without it, text formats go to stdout. pack: NAME.zip, or a folder for its files."""
+    """Output file or folder; without it, text formats go to stdout."""
     parent_from_radar: Annotated[
         tuple[float, float, float, float, float, float, float] | None,
         called("X Y Z QX QY QZ QW"),
@@ -89,7 +88,7 @@ class Export:
         renamed = self.frames.renamed(file)
         written = self.trees.export(renamed, self.to, parent_from_radar=parent_from_radar, rectified=self.rectified)
         if self.out is not None:
-            told = self._written(self.out, written)
+            told = _written(self.out, written)
         elif isinstance(written.content, bytes):
             raise InputError(f"{self.to} is a binary format and needs a file: --out {written.file_name}")
         elif written.extra_files:
@@ -103,18 +102,6 @@ class Export:
         else:
             print_exactly(str(written.content))
         return 0
-
-    def _written(self, out: Path, written: "Written") -> list[str]:
-        """Write the files of an export; return what to say of them."""
-        from calib_core.interchange import format_named
-
-        if format_named(self.to).is_unpacked and _is_meant_as_folder(out):
-            return [f"written to {out}: {', '.join(_write_unpacked(out, written.data))}"]
-        target = out / written.file_name if out.is_dir() else out
-        files = {target: written.data} | {target.parent / one.file_name: one.data for one in written.extra_files}
-        for path, data in files.items():
-            write_whole(path, data)
-        return [f"written to {path}" for path in files]
 
     def _calibration(self) -> "CalibrationFile":
         if len(self.calibration) != 1:
@@ -140,6 +127,15 @@ class Export:
         code = _into_recording(file, self.recording, self.out, topics=self.topics, force=self.force)
         _print_warnings(file)
         return code
+
+
+def _written(out: Path, written: "Written") -> list[str]:
+    """Write the files of an export; return what to say of them."""
+    target = out / written.file_name if out.is_dir() else out
+    files = {target: written.data} | {target.parent / extra.file_name: extra.data for extra in written.extra_files}
+    for path, data in files.items():
+        write_whole(path, data)
+    return [f"written to {path}" for path in files]
 
 
 def _write_all(
@@ -286,31 +282,3 @@ def _report(recording: "Recording", written: "RecordingWritten", out: Path, layo
     added = ", ".join(f"{count} on {topic}" for topic, count in sorted(written.added.items())) or "none"
     print(f"written to {out}: {written.copied} messages of the recording, unchanged; added: {added}")
     print(f"Foxglove layout: {layout} (in Foxglove: layout menu, Import from file)")
-
-
-def _is_meant_as_folder(path: Path) -> bool:
-    """Return whether an output is a folder: it is one, or there is nothing yet and its name does not end in .zip."""
-    return path.is_dir() or (not path.exists() and path.suffix.lower() != ".zip")
-
-
-def _write_unpacked(folder: Path, archive: bytes) -> tuple[str, ...]:
-    """Write the files of an archive into a folder, which is made if there is none; return their paths in it.
-
-    Raises:
-        InputError: a file of that name and other content is there, or the folder cannot be written.
-    """
-    members = unpack(archive, source=str(folder))
-    try:
-        for name, data in members.items():
-            there = folder / name
-            if there.exists() and not (there.is_file() and there.read_bytes() == data):
-                raise InputError(
-                    f"{folder}: already contains another {name}; name a new folder, or remove the old files"
-                )
-        for parent in sorted({(folder / name).parent for name in members}):
-            parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be written: {error.strerror or error}") from error
-    for name, data in members.items():
-        write_whole(folder / name, data)
-    return tuple(members)

@@ -16,7 +16,6 @@ from calib_core.interchange.formats.autoware import AUTOWARE
 from calib_core.interchange.formats.autoware_ai import AUTOWARE_AI
 from calib_core.interchange.formats.camera_info import CAMERA_INFO
 from calib_core.interchange.formats.colmap import COLMAP
-from calib_core.interchange.formats.deployment_pack import PACK
 from calib_core.interchange.formats.driveworks import DRIVEWORKS
 from calib_core.interchange.formats.easy_handeye import EASY_HANDEYE
 from calib_core.interchange.formats.foxglove import FOXGLOVE
@@ -44,7 +43,6 @@ from calib_core.plugins import Plugin, load_plugins, warn_skipped
 
 FORMATS: tuple[Format, ...] = (
     CALIBRATION_1,
-    PACK,
     TF2,
     TF2_LAUNCH_PY,
     URDF,

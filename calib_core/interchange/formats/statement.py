@@ -162,13 +162,13 @@ def origin_lines(file: CalibrationFile) -> tuple[str, ...]:
 
 
 def missing_map(calibration: Calibration) -> tuple[str, ...]:
-    """Return the line about the angle map that only calibration-1 and the pack hold; nothing if there is no map."""
+    """Return the line about the angle map that only calibration-1 holds; nothing if there is no map."""
     grid = calibration.angle_map
     if grid is None:
         return ()
     return (
         f"NOT IN THIS FILE: the radar's angle map. Without it the pairs are {grid.raw_aed_px:.3g} px off, with it "
-        f"{grid.corrected_aed_px:.3g} px; take radar_angle_map from calibration.json, or export the pack",
+        f"{grid.corrected_aed_px:.3g} px; take radar_angle_map from calibration.json",
     )
 
 

@@ -294,8 +294,8 @@ def test_points_behind_the_other_camera_are_said_to_be_there(file):
 NAMES = [known.name for known in FORMATS]
 WITH_LENS = ("json", "opencv", "colmap", "matlab", "kalibr")
 BINARY = ("matlab", "colmap")
-UNROUNDABLE = ("matlab", "json", "driveworks", "pack")
-"""Two that are binary, stated twice, in degrees, with check sums, and read as the product of two poses."""
+UNROUNDABLE = ("matlab", "json", "driveworks")
+"""One that is binary, one stated twice, and one in degrees that is read as the product of two poses."""
 
 NUMBER = re.compile(
     rb"-?(?!1\.57079)\d+\.\d{5,}(?:e-?\d+)?"

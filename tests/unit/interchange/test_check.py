@@ -387,7 +387,7 @@ def test_without_comments_sensors_are_recognized_by_common_frame_names(file, nam
     assert check(read_any(bare.lstrip()), against=imported(file)).verdict == "right"
 
 
-BINARY = ("pack", "colmap", "matlab", "nuscenes")
+BINARY = ("colmap", "matlab", "nuscenes")
 
 
 @pytest.mark.parametrize("name", [known.name for known in FORMATS if known.name not in BINARY])

@@ -220,7 +220,7 @@ def _figures(calibration: Calibration) -> Markup:
     either = aed_either_way(CalibrationFile(calibration))
     if differ := either is not None and plain(either[0]) != plain(either[1]):
         rows.insert(1, ("AED without the corrections", f"{plain(either[1])} px"))
-    note = "Corrections: what the radar gets wrong, which only calibration-1 and the pack can hold."
+    note = "Corrections: what the radar gets wrong, which only calibration-1 can hold."
     return tag("div", heading, _table(("figure", "value"), rows), tag("p", note, class_="note") if differ else None)
 
 

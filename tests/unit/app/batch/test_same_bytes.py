@@ -72,7 +72,7 @@ def commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Commands:
 
 
 def test_a_clicked_session(commands, tmp_path):
-    row = ManifestRow("van", "1", BAGS, **SENSORS, clicks=CLICKS, exports=("tf2", "opencv", "pack"))
+    row = ManifestRow("van", "1", BAGS, **SENSORS, clicks=CLICKS, exports=("tf2", "opencv", "colmap"))
     outcome, files = done(row, tmp_path / "results")
     assert (outcome.status, outcome.is_final, outcome.step_reasons) == ("solved", True, {})
     assert outcome.steps == {"evaluate": "done", "report": "done", "export": "done"}
@@ -83,8 +83,7 @@ def test_a_clicked_session(commands, tmp_path):
     exports.mkdir()
     commands.export("tf2", exports)
     commands.export("opencv", exports)
-    (packed,) = (name for name in files if name.endswith(".zip"))
-    commands.export("pack", exports / Path(packed).name)
+    commands.export("colmap", exports)
     assert {name: data for name, data in files.items() if name.startswith("export/")} == {
         f"export/{path.name}": path.read_bytes() for path in exports.iterdir()
     }
