@@ -80,7 +80,7 @@ def test_the_confirmation_is_remembered_and_covers_only_what_was_confirmed(recor
     (tmp_path / "journal.jsonl").rename(tmp_path / "lost")
     for path in ("lost", None):
         again = workspace_of(recording, tmp_path)
-        assert [row.text for row in again.view.assumptions] == [second], "from the snapshot, then from the new journal"
+        assert [row.text for row in again.view.assumptions] == [second], "from the copy, then from the new journal"
         again.close()
         if path:
             (tmp_path / path).unlink()
