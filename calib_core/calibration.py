@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+import calib_core.words  # noqa: F401  str() of an answer is made there
 from calib_core.arrays import Values
 from calib_core.association.array_pairs import checked_pairs
 from calib_core.association.clustering import candidate_at
@@ -428,8 +429,7 @@ def _explained(
     ids, points = [pair.id for pair in used], cartesian_from_polar(measurements.polar)
     suspected = implausible_input(ids, points, measurements.pixels_px, measurements.camera, options)
     suspected = (*suspected, *clocks_apart(used, measurements.camera, options))
-    hints = [f"{warning.message}; {warning.hint}" for warning in suspected]
-    return replace(outcome, hint="; ".join([*hints, outcome.hint]))
+    return replace(outcome, suspected=suspected)
 
 
 def _four(values: Values) -> tuple[float, float, float, float]:

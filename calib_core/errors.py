@@ -11,6 +11,7 @@ CalibrationError
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from functools import singledispatch
 
 
 class CalibrationError(Exception):
@@ -37,18 +38,26 @@ class OptionError(CalibrationError):
     """An option that is misspelt, of the wrong type or out of range."""
 
 
+@singledispatch
+def in_words(value: object) -> str:
+    """Return what a person is told of a value: its repr until `calib_core.words`, which knows how to say it, was imported."""
+    return repr(value)
+
+
 class UnsolvableError(CalibrationError):
     """A calibration was requested where the data do not determine one; raised by `Unsolvable.unwrap` only.
 
     Attributes:
         code: one word for programs, such as "too-few-pairs".
-        reason: what is missing, with figures.
-        hint: what to do about it.
+        outcome: the `Unsolvable`.
     """
 
-    def __init__(self, code: str, reason: str, hint: str) -> None:
-        super().__init__(f"no calibration: {reason}; {hint}")
-        self.code, self.reason, self.hint = code, reason, hint
+    def __init__(self, code: str, outcome: object) -> None:
+        super().__init__(code)
+        self.code, self.outcome = code, outcome
+
+    def __str__(self) -> str:
+        return in_words(self)
 
 
 def meant(word: str, known: Iterable[str], these: str = "known:") -> str:

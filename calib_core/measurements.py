@@ -1,15 +1,15 @@
 """Measurements: radar scans, clicks, the pairs made from them, and boxes around objects in camera frames."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
-from typing import Annotated, Literal, NoReturn, TypeAlias
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass, field
+from typing import Annotated, Any, Literal, NoReturn, TypeAlias
 
 import msgspec
 import numpy as np
 from msgspec import Meta
 
 from calib_core.arrays import Indices, Matrix33, Points3, TimesNs, Values, Vector2, Vector3, frozen_array
-from calib_core.errors import UnsolvableError
+from calib_core.errors import UnsolvableError, in_words
 from calib_core.json_forms import Name, Position
 
 NS_PER_S = 1_000_000_000
@@ -356,67 +356,80 @@ class Pair:
             raise ValueError(f"pair {self.id} has no radar position")
 
 
+Facts: TypeAlias = Mapping[str, Any]
+"""Numbers with their unit in the name, words of a closed set, ids of pairs, other values. What the facts of a code are is the
+signature of its row in `calib_core.words`."""
+
+
 @dataclass(frozen=True, slots=True)
-class Unpaired:
+class _Stated:
+    """Something that is known by a code and its facts; `calib_core.words` says it.
+
+    Attributes:
+        code: identifier for programs, such as "mirrored-axes"; stable.
+        facts: what its sentence is made of; of something that another file or tool said, its "message" and "hint".
+    """
+
+    code: str
+    facts: Facts = field(default_factory=dict, hash=False)
+
+    def __str__(self) -> str:
+        return in_words(self)
+
+
+@dataclass(frozen=True, slots=True)
+class DataWarning(_Stated):
+    """Something to know before using the result."""
+
+    @classmethod
+    def reported(cls, code: str, message: str, hint: str) -> "DataWarning":
+        """Return a warning as somebody else worded it: the reader of a recording, or the file that it stands in."""
+        return cls(code, {"message": message, "hint": hint})
+
+
+@dataclass(frozen=True, slots=True)
+class Unpaired(_Stated):
     """A click that found no radar position.
 
     Attributes:
         id: the click's id.
-        code: identifier for programs, such as "no-scan", "no-static-return".
-        reason: one sentence for the user.
-        hint: what to do about it.
     """
 
+    _: KW_ONLY
     id: Name
-    code: str
-    reason: str
-    hint: str
+
+    @classmethod
+    def reported(cls, name: str, code: str, reason: str, hint: str) -> "Unpaired":
+        """Return a click without a radar position as a file says it."""
+        return cls(code, {"message": reason, "hint": hint}, id=name)
 
 
 @dataclass(frozen=True, slots=True)
-class Unsolvable:
+class Unsolvable(_Stated):
     """The outcome when the data cannot give a calibration. It is a value, not an error.
 
     Attributes:
-        code: identifier for programs, such as "too-few-pairs".
-        reason: what is missing, with figures.
-        hint: what to do about it.
         unpaired: clicks without a radar position; often the cause.
+        suspected: what looks wrong with the input, and may be the cause.
         pairs: the others, with their candidates; empty if unknown.
     """
 
-    code: str
-    reason: str
-    hint: str
     unpaired: tuple[Unpaired, ...] = ()
+    suspected: tuple[DataWarning, ...] = ()
     pairs: tuple[Pair, ...] = field(default=(), compare=False, repr=False)
+
+    @classmethod
+    def reported(cls, code: str, reason: str, hint: str, unpaired: tuple[Unpaired, ...] = ()) -> "Unsolvable":
+        """Return an outcome as somebody else worded it."""
+        return cls(code, {"message": reason, "hint": hint}, unpaired)
 
     def unwrap(self) -> NoReturn:
         """Raise, because there is no calibration; `Calibration.unwrap` returns itself.
 
         Raises:
-            UnsolvableError: reason and hint in one line.
+            UnsolvableError: its reason and hint in one line.
         """
-        raise UnsolvableError(self.code, self.reason, self.hint)
-
-    def __str__(self) -> str:
-        rows = (f"\n  click {click.id}: {click.reason}; {click.hint}" for click in self.unpaired)
-        return f"No calibration ({self.code}): {self.reason}\n  {self.hint}" + "".join(rows)
-
-
-@dataclass(frozen=True, slots=True)
-class DataWarning:
-    """Something to know before using the result.
-
-    Attributes:
-        code: identifier for programs, such as "mirrored-axes"; stable.
-        message: what is wrong, with figures.
-        hint: what to do about it.
-    """
-
-    code: str
-    message: str
-    hint: str
+        raise UnsolvableError(self.code, self)
 
 
 @dataclass(frozen=True, slots=True)

@@ -69,7 +69,7 @@ CELLS: tuple[tuple[str, str], ...] = (
     ),
     (
         "code",
-        'for warning in calibration.warnings:\n    print(f"{warning.code}: {warning.message}\\n  {warning.hint}")',
+        "for warning in calibration.warnings:\n    print(warning)",
     ),
     (
         "markdown",

@@ -27,6 +27,7 @@ export interface ClickRow {
   returns: number | null;
   outlier_probability: number | null;
   note: string;
+  disagrees: boolean;
   mark: "clicked" | "moved" | "snapped" | "untouched";
   sigma_px: number | null;
   chosen: boolean;
@@ -40,13 +41,32 @@ export interface Figure {
   unit: string;
   hint: string;
   level: "none" | "plain" | "good" | "warning";
+  abbreviation: string;
 }
 
-/** Something to know before using the result. */
-export interface DataWarning {
+/** A pair (or its click) within words, by its id. */
+export interface PairPart {
+  pair: string;
+}
+
+/** An option within words, by its path, with the value that it is to have; "" if the reader chooses it. */
+export interface OptionPart {
+  option: string;
+  value: string;
+}
+
+/** Text with pairs and options in between. */
+export interface Words {
+  parts: (string | PairPart | OptionPart)[];
+}
+
+/** A warning, in sentences. */
+export interface WarningRow {
   code: string;
-  message: string;
-  hint: string;
+  message: Words;
+  hint: Words;
+  kind: string;
+  option: string;
 }
 
 /** Which returns can be the reflector. */
@@ -194,17 +214,20 @@ export interface SystematicErrorRow {
 /** The errors that all pairs share. */
 export interface SystematicErrorTable {
   rows: SystematicErrorRow[];
-  sentences: string[];
+  sentences: Words[];
 }
 
 /** How far the calibration can be trusted, in one line, and what to do. */
 export interface VerdictRow {
   level: "good" | "usable" | "coarse" | "contradictory" | "nothing";
-  line: string;
-  action: string;
-  assumes: string;
+  line: Words;
+  action: Words;
+  assumes: Words;
+  word: string;
+  kind: string;
+  pairs: string[];
   key: "" | "N" | "E" | "J";
-  option: "" | "solving.camera_position" | "gating.max_range_m";
+  option: string;
   done: boolean;
   early: boolean;
 }
@@ -225,7 +248,7 @@ export interface View {
   clicks: ClickRow[];
   metrics: Figure[];
   pose: Figure[];
-  warnings: DataWarning[];
+  warnings: WarningRow[];
   options: CalibrationOptions;
   residual_limit_px: number | null;
   advice: Advice | null;
@@ -386,7 +409,7 @@ export interface RecordingNote {
   frame_times: StampColumns;
   start: Stamp;
   radar: StampColumns;
-  warnings: DataWarning[];
+  warnings: WarningRow[];
   sensors: SensorNote[];
   session: SessionNote;
   version: string;
@@ -548,7 +571,7 @@ export interface AccPanel {
   caution: string;
   rule: string;
   problem: string;
-  warnings: DataWarning[];
+  warnings: WarningRow[];
   busy: boolean;
 }
 
@@ -594,7 +617,7 @@ export interface Review {
   revision: number;
   rows: ReviewRow[];
   histogram: ResidualHistogram | null;
-  words: string;
+  words: Words;
 }
 
 /** One radar position that may be the reflector, as final text. */
@@ -614,7 +637,7 @@ export interface ReviewedReturn {
 export interface PairReview {
   type: "pair_review";
   id: string;
-  why: string;
+  why: Words;
   facts: Figure[];
   candidates: ReviewedReturn[];
 }
@@ -713,6 +736,7 @@ export interface LeftOutPicture {
   index: number;
   name: string;
   reason: string;
+  spare?: boolean;
 }
 
 /** A lens model that was tried. */
@@ -751,7 +775,7 @@ export interface LensResult {
   views: LensViewRow[];
   left_out: LeftOutPicture[];
   trials: LensTrial[];
-  warnings: DataWarning[];
+  warnings: WarningRow[];
   residuals: [number, number, number, number][];
   pattern: string;
   uncertainty: PictureGrid | null;

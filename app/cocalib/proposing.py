@@ -19,6 +19,7 @@ from calib_core.options import CalibrationOptions, GatingOptions
 from calib_core.proposing import DwellView, FrameSource, Proposals, ViewProgress, dwell_views, proposals_of
 from calib_core.proposing.dwell_views import has_changed
 from calib_core.proposing.look import Look, likeness_elsewhere, look_of, with_look
+from calib_core.words import outcome_told
 from cocalib.platform.error_boundary import error_boundary
 from cocalib.platform.process import go_last
 
@@ -30,7 +31,7 @@ _LEAST_PLACEMENTS = 3
 """What changed in a dwell shows against at least two others."""
 _SHORTEST_NS = 2 * NS_PER_S
 """A recording that is shorter is not searched: a few dense clouds in vain would take minutes."""
-_STOPPED = Unsolvable("stopped", "the search for proposals was stopped", "start it again")
+_STOPPED = Unsolvable.reported("stopped", "the search for proposals was stopped", "start it again")
 _CLICK = "click the reflector on the page"
 
 
@@ -71,7 +72,7 @@ def find_proposals(
     if camera is None:
         return _no_camera()
     if not len(recording.image_times):
-        return Unsolvable("no-frames", "the recording contains no camera frames", "add the camera's recording")
+        return Unsolvable.reported("no-frames", "the recording contains no camera frames", "add the camera's recording")
     if placements is None:
         if progress is not None:
             progress("searching the radar scans for placements")
@@ -191,7 +192,7 @@ def _missing(placements: Sequence[Placement], recording: RecordedFrames) -> Unso
     """Say why there can be no proposals; None if there can."""
     if len(placements) < _LEAST_PLACEMENTS:
         found = {0: "no placement", 1: "one placement"}.get(len(placements), f"{len(placements)} placements")
-        return Unsolvable(
+        return Unsolvable.reported(
             "too-few-placements",
             f"the radar shows {found}, and at least {_LEAST_PLACEMENTS} are needed: a placement is a strong return that appears, "
             "stands still for two seconds or longer, and disappears",
@@ -202,7 +203,7 @@ def _missing(placements: Sequence[Placement], recording: RecordedFrames) -> Unso
     seen = [np.searchsorted(times, one.start) < np.searchsorted(times, one.end, side="right") for one in placements]
     if not any(seen):
         first_s, last_s = ((int(time) - int(placements[0].start)) / NS_PER_S for time in (times[0], times[-1]))
-        return Unsolvable(
+        return Unsolvable.reported(
             "no-frames-in-placements",
             f"the camera recorded no frame during any of the {len(placements)} placements of the radar: its frames run from "
             f"{first_s:+.1f} s to {last_s:+.1f} s of the first placement",
@@ -212,7 +213,7 @@ def _missing(placements: Sequence[Placement], recording: RecordedFrames) -> Unso
 
 
 def _no_camera() -> Unsolvable:
-    return Unsolvable(
+    return Unsolvable.reported(
         "no-camera",
         "the camera intrinsics are missing: the recording contains none that can be used",
         "calibrate the lens from a board (cocalib intrinsics), or give them with --camera FILE",
@@ -393,7 +394,8 @@ class ProposingJob:
             if not self._is_wanted(wish):
                 return
             if isinstance(found, Unsolvable):
-                self._set(wish, Proposals(()), stage="failed", problem=found.reason, hint=found.hint)
+                said = outcome_told(found)
+                self._set(wish, Proposals(()), stage="failed", problem=str(said.message), hint=str(said.hint))
                 return
             self._seen, self._seen_for = found[0], wish
             self._carried, self._carried_from = list(found[0]), [()] * len(found[0])

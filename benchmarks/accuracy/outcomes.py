@@ -22,7 +22,7 @@ def solved_or_refused(solve: Callable[[], Calibration | Unsolvable]) -> Calibrat
     try:
         return solve()
     except InputError as error:
-        return Unsolvable("refused", str(error), "")
+        return Unsolvable.reported("refused", str(error), "")
 
 
 def outcome_figures(outcome: Calibration | Unsolvable, truth: RigidTransform) -> Figures:

@@ -34,7 +34,7 @@ class Rendered:
         errors_px: of all corners found, per axis, against the truth.
         focal_error: estimated over true focal length, less 1.
         scaled: errors of the parameters over their stated sigma, if the model is the true one.
-        model: that was chosen, or why there is none.
+        model: that was chosen, or the code of why there is none.
     """
 
     views: int
@@ -49,7 +49,7 @@ def measured(series: Series) -> Rendered:
     """Search and calibrate one series of pictures."""
     search = search_boards(series.pictures, series.board)
     if not isinstance(search, BoardSearch):
-        return Rendered(0, 0.0, (), float("nan"), (), search.reason)
+        return Rendered(0, 0.0, (), float("nan"), (), search.code)
     errors, found = [], []
     for view in search.views:
         true = series.corners_px[view.index]
@@ -60,7 +60,7 @@ def measured(series: Series) -> Rendered:
     covered = _hull_share(np.concatenate(found), series)
     lens = calibrate_lens(search)
     if not isinstance(lens, CalibratedLens):
-        return Rendered(0, covered, wrong, float("nan"), (), lens.reason)
+        return Rendered(0, covered, wrong, float("nan"), (), lens.code)
     focal = float(lens.camera.matrix_px[0, 0] / series.camera.matrix_px[0, 0] - 1.0)
     return Rendered(len(lens.views), covered, wrong, focal, scaled_errors(lens, series), lens.camera.model)
 

@@ -216,18 +216,11 @@ def _union(windows: Sequence[RadarScans], static: RadarScans) -> RadarScans:
 
 def _gap_problem(click: ReflectorClick, scans: RadarScans, max_gap_s: float) -> Unpaired | None:
     if not len(scans):
-        return Unpaired(
-            click.id, "no-scan", "the radar recording has no scan", "choose the radar topic that has returns"
-        )
+        return Unpaired("no-scan", {}, id=click.id)
     gap_s = abs(click.image_time - int(scans.times_ns[scans.nearest(click.image_time)])) / NS_PER_S
     if gap_s <= max_gap_s:
         return None
-    return Unpaired(
-        click.id,
-        "no-scan",
-        f"the nearest radar scan is {gap_s:.2f} s away; at most {max_gap_s:g} s are allowed",
-        "click where both recordings overlap, or check that both clocks agree",
-    )
+    return Unpaired("no-scan", {"gap_s": gap_s, "allowed_s": max_gap_s}, id=click.id)
 
 
 def _without_return(click: ReflectorClick, window: RadarScans, options: CalibrationOptions) -> Unpaired:
@@ -236,19 +229,18 @@ def _without_return(click: ReflectorClick, window: RadarScans, options: Calibrat
 
 def _nothing_static(click: ReflectorClick, window: RadarScans, options: CalibrationOptions) -> Unpaired:
     gate = options.gating
+    window_facts = {"scans": len(window), "within_s": options.locating.window_s}
     if not np.isfinite(window.points_radar_m).all(axis=1).any():
-        return Unpaired(
-            click.id,
-            "no-static-return",
-            f"none of the {len(window)} scans within {options.locating.window_s:g} s has a return with a position",
-            "look at what the radar's driver writes: cocalib info RECORDING",
-        )
+        return Unpaired("no-static-return", window_facts, id=click.id)
     return Unpaired(
-        click.id,
         "no-static-return",
-        f"none of the {len(window)} scans within {options.locating.window_s:g} s has a return slower than "
-        f"{gate.max_speed_mps:g} m/s between {gate.min_range_m:g} and {gate.max_range_m:g} m",
-        "stand clear of the reflector and let it rest for three seconds, or widen the gates",
+        {
+            **window_facts,
+            "fastest_mps": gate.max_speed_mps,
+            "nearest_m": gate.min_range_m,
+            "farthest_m": gate.max_range_m,
+        },
+        id=click.id,
     )
 
 
@@ -317,14 +309,7 @@ def no_chosen_return(click: ReflectorClick) -> Unpaired:
     """Say that the return chosen for a click is not there."""
     position = np.zeros(3) if click.chosen is None else np.array(click.chosen.position_m)
     range_m, azimuth, _ = polar_from_cartesian(position[None])[0]
-    degrees = abs(np.rad2deg(azimuth))
-    side = "left" if azimuth > 0 else "right"
-    return Unpaired(
-        click.id,
-        CHOICE_GONE,
-        f"the radar has no static return at the chosen position, {range_m:.1f} m away and {degrees:.1f} deg to the {side}",
-        "choose another return for this click, or take the choice back",
-    )
+    return Unpaired(CHOICE_GONE, {"range_m": float(range_m), "azimuth_deg": float(np.rad2deg(azimuth))}, id=click.id)
 
 
 _LEAST_SCORE = 0.05  # relative to the best of the pair

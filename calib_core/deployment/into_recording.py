@@ -24,6 +24,7 @@ from calib_core.recordings.containers.writing import CameraInfoMessage, CloudMes
 from calib_core.recordings.messages.definitions import with_definition
 from calib_core.recordings.topics import join_topics
 from calib_core.results import Calibration
+from calib_core.words import told
 
 _PROGRESS_MESSAGES = 256
 _MEANING = "transforms are poses of the child in the parent, quaternion x y z w; calibration.json is attached"
@@ -340,7 +341,9 @@ def write_into_recording(
     for message in additions.rest(last_ns):
         _write(writer, message)
     writer.finish()
-    notes.extend(f"{warning.message} ({warning.code})" for warning in recording.warnings if warning.code in _DAMAGE)
+    notes.extend(
+        f"{told(warning).message} ({warning.code})" for warning in recording.warnings if warning.code in _DAMAGE
+    )
     return RecordingWritten(
         copied, dict(additions.counts), losses.by_topic, losses.fault, tuple(notes), _layout(recording, plan)
     )

@@ -1,6 +1,6 @@
-"""The warnings of a calibration: what is wrong, with figures, and what to do about it.
+"""The warnings of a calibration: codes, which do not change, with their facts; `calib_core.words.warnings` says them.
 
-A check returns an empty list if all is well. The texts are for people; the codes are for programs and do not change.
+A check returns an empty list if all is well.
 """
 
 import numpy as np
@@ -9,7 +9,7 @@ from calib_core.arrays import Flags
 from calib_core.association.clustering import CLUSTER_SCALE
 from calib_core.diagnostics.handedness import handedness
 from calib_core.diagnostics.intrinsics import intrinsics, lens_or_scale, refined_too_far
-from calib_core.diagnostics.pairs import ambiguous_candidates, decisive_pair, listed, pivotal_pair
+from calib_core.diagnostics.pairs import ambiguous_candidates, decisive_pair, pivotal_pair
 from calib_core.diagnostics.pose import agreeing_outliers, camera_position, possible_poses, two_poses
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.diagnostics.uncertainty_map import picture_sigma_px
@@ -75,22 +75,11 @@ def _counted_up(found: list[DataWarning], inliers: Flags) -> list[DataWarning]:
         return found
     if len(inliers) >= max(_FEW_INLIERS, 2 * count):
         return [
-            DataWarning(
-                "no-consensus",
-                f"only {count} of {len(inliers)} pairs agree on this pose, which can be chance",
-                "check the clicks one by one: was the reflector clicked, was it at rest, do both recordings use the same clock?",
-            ),
+            DataWarning("no-consensus", {"agreeing": count, "pairs": len(inliers)}),
             *found,
         ]
     clear = bool(inliers.all()) and not any(one.code in _UNCLEAR for one in found)
-    told = f"{count} of {len(inliers)} pairs agree, and {_FEW_INLIERS} are needed"
-    if inliers.all():
-        told = f"{count} of {_FEW_INLIERS} pairs, {'looks consistent' if clear else 'not clear yet'}"
-    few = DataWarning(
-        "few-pairs",
-        told,
-        "add placements: ten or more, near and far, on both sides",
-    )
+    few = DataWarning("few-pairs", {"agreeing": count, "pairs": len(inliers), "needed": _FEW_INLIERS, "clear": clear})
     return [*(one for one in found if one.code not in (*_UNCLEAR, *_TOLD_BY_MORE)), few]
 
 
@@ -125,47 +114,21 @@ def _many_outliers(fit: SolvedFit) -> list[DataWarning]:
     outliers = [name for name, inlier in zip(fit.ids, fit.inliers, strict=True) if not inlier]
     if len(outliers) <= 0.35 * len(fit.ids):
         return []
-    return [
-        DataWarning(
-            "many-outliers",
-            f"{len(outliers)} of {len(fit.ids)} pairs do not fit: {listed(outliers)}",
-            "check each of them: was the reflector clicked, was it at rest, do both recordings use the same clock?",
-        )
-    ]
+    return [DataWarning("many-outliers", {"ids": outliers, "pairs": len(fit.ids)})]
 
 
 def _noise_excess(fit: SolvedFit) -> list[DataWarning]:
     degrees = 2 * int(fit.inliers.sum()) - 6
     if degrees < 6 or fit.chi2_per_degree < 1.0 + 4.0 * np.sqrt(2.0 / degrees) or fit.chi2_per_degree < _NOISE_EXCESS:
         return []
-    return [
-        DataWarning(
-            "residuals-too-large",
-            f"residuals are {np.sqrt(fit.chi2_per_degree):.1f} times what the assumed noise explains "
-            f"(chi2 / degrees of freedom {fit.chi2_per_degree:.1f})",
-            "check that the intrinsics belong to this camera, lens and image size, that every click is on the reflector's inner "
-            "corner, and the assumed radar noise",
-        )
-    ]
+    return [DataWarning("residuals-too-large", {"chi2_per_degree": fit.chi2_per_degree})]
 
 
 def _smooth_angle_errors(fit: SolvedFit) -> list[DataWarning]:
     if fit.uncertainty.growth < _NOTABLE_GROWTH or fit.measurements.flat:
         return []
-    lens = ""
-    if fit.measurements.camera.covariance is not None and not fit.options.refining.intrinsics:
-        lens = (
-            "a lens as uncertain as its covariance says can look the same: first refine the intrinsics with the pose; "
-        )
-    return [
-        DataWarning(
-            "smooth-angle-errors",
-            "neighbouring placements have similar residuals: the radar's angles are off by an amount that changes slowly with "
-            f"direction; this makes the stated rotation uncertainty {fit.uncertainty.growth:.1f} times larger",
-            f"{lens}more placements will not average this out: correct the radar's angles by radar_angle_map of the calibration, "
-            "or calibrate the radar; the stated uncertainty includes the error",
-        )
-    ]
+    uncertain_lens = fit.measurements.camera.covariance is not None and not fit.options.refining.intrinsics
+    return [DataWarning("smooth-angle-errors", {"growth": fit.uncertainty.growth, "uncertain_lens": uncertain_lens})]
 
 
 def _weak_geometry(fit: SolvedFit) -> list[DataWarning]:
@@ -179,15 +142,17 @@ def _weak_geometry(fit: SolvedFit) -> list[DataWarning]:
     if rotation_rad <= _WEAK_ROTATION_RAD and position_m <= _WEAK_POSITION_M and not narrow:
         return []
     range_m, azimuth_rad, _ = fit.measurements.polar[fit.refined.rows[fit.inliers]].T
-    hint = "place the reflector near (2 to 3 m) and far, at both edges of the picture"
-    if not fit.measurements.prior.measured:
-        hint = "measure the camera position with a tape, which helps most; also " + hint
     return [
         DataWarning(
             "weak-geometry",
-            f"the pose is uncertain: {np.rad2deg(rotation_rad):.1f} deg and {100 * position_m:.0f} cm (one sigma); "
-            f"placements span {range_m.min():.1f} to {range_m.max():.1f} m and {np.rad2deg(np.ptp(azimuth_rad)):.0f} deg",
-            hint,
+            {
+                "rotation_deg": float(np.rad2deg(rotation_rad)),
+                "position_cm": 100.0 * position_m,
+                "nearest_m": float(range_m.min()),
+                "farthest_m": float(range_m.max()),
+                "azimuth_span_deg": float(np.rad2deg(np.ptp(azimuth_rad))),
+                "measured": fit.measurements.prior.measured,
+            },
         )
     ]
 
@@ -211,14 +176,7 @@ def _same_places(fit: SolvedFit) -> list[DataWarning]:
     count, places = int(fit.inliers.sum()), _places(fit)
     if places > 0.7 * count:
         return []
-    return [
-        DataWarning(
-            "repeated-placements",
-            f"{count} pairs cover only {places} places; a radar repeats its error at the same place, so the stated "
-            "uncertainty is too small",
-            "move the reflector between clicks; more clicks of one placement add little",
-        )
-    ]
+    return [DataWarning("repeated-placements", {"pairs": count, "places": places})]
 
 
 def flat_radar(refined: ErrorsInVariablesFit, uncertainty: PoseCovariance, radar: RadarOptions) -> list[DataWarning]:
@@ -239,11 +197,14 @@ def flat_radar(refined: ErrorsInVariablesFit, uncertainty: PoseCovariance, radar
     return [
         DataWarning(
             "flat-radar",
-            f"this radar measures no elevation. One sigma: the pairs determine forward ± {forward:.0f} cm, left ± {left:.0f} cm "
-            f"and yaw ± {yaw:.1f} deg in the plane of the placements, and where its returns appear in the picture, "
-            f"± {picture_sigma_px(refined, uncertainty):.0f} px; up ± {up:.0f} cm, pitch ± {pitch:.1f} and roll "
-            f"± {roll:.1f} deg are assumptions about how it is mounted",
-            "state among the options how well the radar's tilt and height are known, or measure the camera position; if the "
-            "radar does measure elevation, find out why it is missing",
+            {
+                "forward_cm": float(forward),
+                "left_cm": float(left),
+                "yaw_deg": float(yaw),
+                "image_px": picture_sigma_px(refined, uncertainty),
+                "up_cm": float(up),
+                "pitch_deg": float(pitch),
+                "roll_deg": float(roll),
+            },
         )
     ]

@@ -87,20 +87,9 @@ def clocks(calibration: Calibration, scans: RadarScans) -> list[DataWarning]:
     offset = clock_offset(calibration.pairs, scans, calibration.options.gating)
     if offset is None:
         return []
-    late = offset.nearest_s > 0
-    seen, relation, when = (
-        ("after", "ahead of", "has been at rest for a while")
-        if late
-        else ("before", "behind", "has just been put down")
-    )
     return [
         DataWarning(
-            "clock-bias-suspected",
-            f"for {len(offset.outside)} of {offset.clicks} clicks ({', '.join(offset.outside[:6])}) the radar sees the "
-            f"reflector only {seen} the click: its stamps seem to be {abs(offset.nearest_s):.1f} s or more {relation} the "
-            "camera's",
-            f"compare both clocks (cocalib info), or click when the reflector {when}; if the clocks agree, click in the "
-            "middle of each dwell",
+            "clock-bias-suspected", {"ids": offset.outside, "clicks": offset.clicks, "offset_s": offset.nearest_s}
         )
     ]
 
@@ -143,15 +132,17 @@ def clocks_apart(
     if not step:
         return []
     apart_s = float(np.median(np.subtract(times[abs(step) :], times[: -abs(step)]))) / NS_PER_S
-    away = "one placement" if abs(step) == 1 else f"{abs(step)} placements"
-    later, ahead = ("later", "ahead of") if step > 0 else ("earlier", "behind")
     return [
         DataWarning(
             "clocks-apart",
-            f"{best} of {count} clicks agree with what the radar saw {away} {later}, {agreeing} of {len(pairs)} with what it saw "
-            f"at their time: its stamps seem to be about {apart_s:.0f} s {ahead} the camera's",
-            "compare both clocks (cocalib info); if one computer recorded both sensors, open them with --clock receive; else "
-            "correct the stamps of one recording",
+            {
+                "shifted_agreeing": best,
+                "shifted_clicks": count,
+                "placements": step,
+                "agreeing": agreeing,
+                "clicks": len(pairs),
+                "apart_s": float(np.copysign(apart_s, step)),
+            },
         )
     ]
 

@@ -22,10 +22,6 @@ _NORMAL_QUANTILE_99 = 2.33
 _WRONG_SHARE = 0.1  # of the inliers
 _CLEAR_SIGMAS = 2.0  # of a height above the plane
 _VERY_CLEAR_SIGMAS = 3.0
-_FLIP = (
-    "radar axes must be x forward, y left, z up: flip the sign of y (or of the elevation) at the source; rows of the picture "
-    "counted from below look the same; do not use this pose"
-)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,33 +101,13 @@ def handedness(fit: SolvedFit) -> list[DataWarning]:
         return [_on_other_side(sides)]
     gain = fit.best.mirror_gain(fit.options)
     if gain > MIRRORED_GAIN:
-        return [
-            DataWarning(
-                "mirrored-axes",
-                "pairs and expected camera position agree better with one radar axis mirrored "
-                f"(log-likelihood ratio {gain / 2:.1f}): the radar's axes look left-handed",
-                _FLIP,
-            )
-        ]
+        return [DataWarning("mirrored-axes", {"log_likelihood_ratio": gain / 2.0})]
     if gain > NOT_MIRRORED_GAIN or (sides is not None and sides.opposite):
-        return [
-            DataWarning(
-                "handedness-open",
-                "a mirrored radar axis would explain the pairs about as well, or put radar and camera on one side of the floor",
-                "measure the camera position with a tape, or add placements at other heights (a tripod)",
-            )
-        ]
+        return [DataWarning("handedness-open")]
     prior = fit.measurements.prior
     if prior.measured or heights_decide or (sides is not None and sides.same):
         return []
-    return [
-        DataWarning(
-            "handedness-assumed",
-            "the placements lie near one plane, so mirrored radar axes fit equally well: that none is mirrored is inferred "
-            f"only from the camera being within about {prior.sigma_m:g} m of the radar",
-            "measure the camera position (0.3 m is enough for this), or add placements at other heights (a tripod)",
-        )
-    ]
+    return [DataWarning("handedness-assumed", {"within_m": prior.sigma_m})]
 
 
 def _mirrored_on_rig(plane: _Plane, fit: SolvedFit) -> bool:
@@ -142,12 +118,7 @@ def _mirrored_on_rig(plane: _Plane, fit: SolvedFit) -> bool:
 
 
 def _on_other_side(sides: GroundSides) -> DataWarning:
-    return DataWarning(
-        "mirrored-axes",
-        f"the pose puts the camera {abs(sides.camera_m):.1f} m below the plane of the placements and the radar "
-        f"{abs(sides.radar_m):.1f} m above it; with one radar axis mirrored, both are above: the radar's axes look left-handed",
-        _FLIP + "; if the sensors really are on different sides of the placements, turn sensors_above_placements off",
-    )
+    return DataWarning("mirrored-axes", {"camera_below_m": abs(sides.camera_m), "radar_above_m": abs(sides.radar_m)})
 
 
 def _expected_sides(plane: _Plane, fit: SolvedFit) -> GroundSides | None:

@@ -34,8 +34,9 @@ from calib_core.arrays import Flags, Values
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.estimation.covariance import smooth_rows, weighted_rows
 from calib_core.estimation.measurement_model import prior_rows
+from calib_core.measurements import Facts
 from calib_core.results import DataWarning
-from calib_core.results.systematic_errors import LensPrior, error_words, is_beyond_its_prior, knowledge_text
+from calib_core.results.systematic_errors import LensPrior, is_beyond_its_prior
 
 _LEVEL = 0.0025  # false-alarm probability of each unknown
 _LEAST_PAIRS = 10
@@ -91,59 +92,41 @@ def intrinsics(fit: SolvedFit) -> list[DataWarning]:
         return []
     if of_angles < of_lens:
         return [_by_range(*angles)]
-    what = _focal_text(fit, focal) if focal.chance <= radial.chance else _radial_text(fit, radial)
-    return [
-        DataWarning(
-            "intrinsics-suspected",
-            what,
-            "check that the intrinsics belong to this camera, lens, zoom and image size, or calibrate the camera again; a radar "
-            "with an azimuth scale error of the same size looks the same",
-        )
-    ]
+    facts = _focal_facts(fit, focal) if focal.chance <= radial.chance else _radial_facts(fit, radial)
+    return [DataWarning("intrinsics-suspected", facts)]
 
 
 def _by_range(azimuth: ScoreTest, elevation: ScoreTest) -> DataWarning:
-    name, found = min(("azimuths", azimuth), ("elevations", elevation), key=lambda one: one[1].chance)
+    name, found = min(("azimuth", azimuth), ("elevation", elevation), key=lambda one: one[1].chance)
     slope, sigma = np.rad2deg((-found.amount, found.sigma))
     return DataWarning(
         "shared-error-suspected",
-        f"the radar's {name} are off by an amount that changes with the range: {slope:+.2f} ± {sigma:.2f} deg per metre",
-        "check what was clicked at near and at far placements, and whether the floor or a wall reflects the radar there",
+        {"angle": name, "slope_deg_per_m": float(slope), "slope_sigma_deg_per_m": float(sigma)},
     )
 
 
 def _turned(fit: SolvedFit, turn: TurnTest) -> DataWarning:
-    before, after = fit.ids[turn.before], fit.ids[turn.after]
     return DataWarning(
         "shared-error-suspected",
-        f"the camera or the radar seems to have turned by about {np.rad2deg(turn.angle_rad):.1f} deg near {before} and {after}: "
-        "the placements up to there agree on another pose than the later ones",
-        f"solve the placements up to {before} and from {after} on apart, and check both mounts",
+        {"turned_deg": float(np.rad2deg(turn.angle_rad)), "before": fit.ids[turn.before], "after": fit.ids[turn.after]},
     )
 
 
-def _focal_text(fit: SolvedFit, focal: ScoreTest) -> str:
-    return (
-        f"residuals grow with the distance from the picture's centre: the given focal length seems "
-        f"{100 * abs(focal.amount):.1f} ± {100 * focal.sigma:.1f} % too {'short' if focal.amount > 0 else 'long'}"
-        f"{_said(fit, 100 * focal.allowed, '%')}"
-    )
+def _focal_facts(fit: SolvedFit, focal: ScoreTest) -> Facts:
+    stated = focal.allowed if fit.measurements.camera.covariance is not None else None
+    return {"focal_length": focal.amount, "sigma": focal.sigma, "stated_sigma": stated}
 
 
-def _said(fit: SolvedFit, sigma: float, unit: str) -> str:
-    """Say how far off the intrinsics' own covariance lets it be, if they have one."""
-    return f"; its calibration said ± {sigma:.2g} {unit}" if fit.measurements.camera.covariance is not None else ""
-
-
-def _radial_text(fit: SolvedFit, radial: ScoreTest) -> str:
+def _radial_facts(fit: SolvedFit, radial: ScoreTest) -> Facts:
     offset_px, share = _offsets(fit)
     outermost = int(np.argmax(np.where(fit.inliers, share, 0.0)))
     reach_px = float(share[outermost] * np.linalg.norm(offset_px[outermost]))
-    return (
-        "residuals grow with the cube of the distance from the picture's centre: the given lens distortion seems off by "
-        f"{abs(radial.amount) * reach_px:.0f} ± {radial.sigma * reach_px:.0f} px at the outermost click"
-        f"{_said(fit, radial.allowed * reach_px, 'px')}"
-    )
+    stated_px = radial.allowed * reach_px if fit.measurements.camera.covariance is not None else None
+    return {
+        "distortion_px": abs(radial.amount) * reach_px,
+        "sigma": radial.sigma * reach_px,
+        "stated_sigma": stated_px,
+    }
 
 
 def _score_tests(fit: SolvedFit) -> tuple[ScoreTest, ...]:
@@ -288,14 +271,10 @@ def lens_or_scale(fit: SolvedFit) -> list[DataWarning]:
     if focal is None or focal.sigma < _NOTABLE_FOCAL or focal.scale_share < _UNTOLD_SHARE:
         return []
     scales = [one for one in fit.uncertainty.systematic_errors if one.name in _SCALES]
-    found = ", ".join(f"{error_words(one.name).text} {_percent(one.value, one.sigma)}" for one in scales)
     return [
         DataWarning(
             "lens-or-radar-scale",
-            f"lens or radar scale, the data cannot tell: the focal length was changed by {_percent(focal.change, focal.sigma)}, "
-            f"with {found}; pairs show the sum of both, and only what was assumed before divides it",
-            "measure the radar's angle scale (turn it by known angles) and state radar.azimuth_scale_sigma and "
-            "radar.elevation_scale_sigma accordingly, or calibrate the lens with a board, whose result says how well it is known",
+            {"change": focal.change, "sigma": focal.sigma, "scales": scales},
         )
     ]
 
@@ -308,20 +287,7 @@ def refined_too_far(fit: SolvedFit) -> list[DataWarning]:
     beyond = [one for one in fit.uncertainty.systematic_errors if one.of_lens and is_beyond_its_prior(one)]
     if not beyond:
         return []
-    found = "; ".join(f"{error_words(one.name).label} {knowledge_text(one)}" for one in beyond)
-    return [
-        DataWarning(
-            "intrinsics-suspected",
-            f"refining changed the intrinsics by more than three times what was stated of them: {found}; the refined camera is "
-            "not to be relied on",
-            "check that the intrinsics belong to this camera, lens, zoom and image size, also the signs of the distortion, and "
-            "calibrate the lens with a board; only if they are that rough, give refining a larger sigma",
-        )
-    ]
-
-
-def _percent(value: float, sigma: float) -> str:
-    return f"{100.0 * value:+.1f} ± {100.0 * sigma:.1f} %"
+    return [DataWarning("intrinsics-suspected", {"refined_too_far": beyond})]
 
 
 def _focal(fit: SolvedFit) -> _Focal | None:

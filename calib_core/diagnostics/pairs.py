@@ -1,7 +1,5 @@
 """Warnings about single pairs: ambiguous candidates, the pivotal pair, and pairs that no other pair checks."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from calib_core.arrays import Values
@@ -17,13 +15,7 @@ def ambiguous_candidates(fit: SolvedFit) -> list[DataWarning]:
     ambiguous = [fit.ids[i] for i in np.flatnonzero(fit.refined.rivals >= 0)]
     if not ambiguous:
         return []
-    return [
-        DataWarning(
-            "uncertain-association",
-            f"more than one radar position fits the click of {listed(ambiguous)}",
-            "choose the return of each on the page (C), or exclude the pair",
-        )
-    ]
+    return [DataWarning("uncertain-association", {"ids": ambiguous})]
 
 
 def pivotal_pair(fit: SolvedFit) -> list[DataWarning]:
@@ -31,14 +23,15 @@ def pivotal_pair(fit: SolvedFit) -> list[DataWarning]:
     found = fit.beyond.pivotal
     if found is None:
         return []
-    name = fit.ids[found.pair]
-    changed = f", and {listed([fit.ids[i] for i in found.switched])} would change sides" if found.switched else ""
     return [
         DataWarning(
             "doubtful-pair",
-            f"the pose rests on {name}: without {name} the camera moves {100 * found.camera_move_m:.0f} cm, "
-            f"{found.standard_deviations:.1f} standard deviations{changed}",
-            f"check the click and the radar position of {name}, or add placements near it",
+            {
+                "pair": fit.ids[found.pair],
+                "camera_moves_cm": 100.0 * found.camera_move_m,
+                "sigmas": found.standard_deviations,
+                "switched": [fit.ids[i] for i in found.switched],
+            },
         )
     ]
 
@@ -51,14 +44,7 @@ def decisive_pair(fit: SolvedFit) -> list[DataWarning]:
     most = int(np.argmax(loss))
     if loss[most] < _DECISIVE_LOSS:
         return []
-    return [
-        DataWarning(
-            "one-pair-decides",
-            f"part of the pose depends on {fit.ids[most]} alone: without it, that part would be {loss[most]:.0f} times less "
-            "certain, so the other pairs cannot check its click",
-            f"check the click of {fit.ids[most]} again, and add a placement near it",
-        )
-    ]
+    return [DataWarning("one-pair-decides", {"pair": fit.ids[most], "loss": float(loss[most])})]
 
 
 def _losses(fit: SolvedFit) -> Values:
@@ -73,9 +59,3 @@ def _losses(fit: SolvedFit) -> Values:
     share = refined.weights[:, None, None] * (jacobian @ inverse @ np.swapaxes(jacobian, 1, 2))
     largest = np.linalg.eigvalsh(share)[:, -1]
     return np.asarray(np.where(fit.inliers, 1.0 / np.sqrt(np.maximum(1.0 - largest, 1e-9)), 0.0))
-
-
-def listed(names: Sequence[str]) -> str:
-    """List the first six names and count the rest."""
-    shown = ", ".join(names[:6])
-    return shown if len(names) <= 6 else f"{shown} and {len(names) - 6} more"

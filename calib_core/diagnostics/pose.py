@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 
 from calib_core.arrays import Indices, Values
-from calib_core.diagnostics.pairs import listed
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.estimation.errors_in_variables import fit_errors_in_variables
 from calib_core.estimation.gnc import GncSolution, associate, mixture_cost
 from calib_core.geometry import RigidTransform
+from calib_core.measurements import Facts
 from calib_core.results import DataWarning
 
 _ALMOST_AS_LIKELY = 6.0  # a difference of twice the log-likelihood
@@ -34,10 +34,11 @@ def two_poses(fit: SolvedFit) -> list[DataWarning]:
         sigmas = _sigmas_away(fit, other.camera_from_radar)
         if sigmas <= _OTHER_POSE_SIGMAS:
             continue
-        away = (
-            f"{np.rad2deg(np.linalg.norm(error[3:])):.1f} deg and {_moved_m(fit, other):.2f} m away ({sigmas:.0f} standard "
-            "deviations)"
-        )
+        away = {
+            "away_deg": float(np.rad2deg(np.linalg.norm(error[3:]))),
+            "away_cm": 100.0 * _moved_m(fit, other),
+            "sigmas": sigmas,
+        }
         if min(other.cost - fit.best.found[0].cost, _cost_without_scores(fit, other)) < _ALMOST_AS_LIKELY:
             return [_two_poses(fit, other, away)]
         if _cost_without_prior(fit, other) < _ALMOST_AS_LIKELY:
@@ -65,32 +66,20 @@ def _is_as_likely(fit: SolvedFit, camera_from_radar: RigidTransform) -> bool:
     return there - here < _AS_A_WHOLE
 
 
-def _two_poses(fit: SolvedFit, other: GncSolution, away: str) -> DataWarning:
+def _two_poses(fit: SolvedFit, other: GncSolution, away: Facts) -> DataWarning:
     measurements = fit.refined.measurements
     changed = associate(measurements, other.camera_from_radar)[0] != fit.refined.rows
     names = [name for name, differs, inlier in zip(fit.ids, changed, fit.inliers, strict=True) if differs and inlier]
-    if not names:
-        return DataWarning(
-            "two-poses",
-            f"two poses fit: the other is {away}",
-            "measure the camera position with a tape, or add placements nearer and farther than the present ones",
-        )
-    return DataWarning(
-        "two-poses",
-        f"two poses fit: the other is {away}, with other returns for {', '.join(names[:3])}{' and others' if names[3:] else ''}",
-        f"check {names[0]}: which return is the reflector? Or measure the camera position with a tape",
-    )
+    return DataWarning("two-poses", {**away, "other_returns": names})
 
 
-def _assumed_distance(fit: SolvedFit, other: GncSolution, away: str) -> DataWarning:
+def _assumed_distance(fit: SolvedFit, other: GncSolution, away: Facts) -> DataWarning:
     here_m, there_m = (
         float(np.linalg.norm(_camera_centre(one.camera_from_radar))) for one in (fit.best.found[0], other)
     )
     return DataWarning(
         "camera-far-away",
-        f"another pose, {away}, explains the pairs as well; the one with the camera {here_m:.1f} m from the radar, not "
-        f"{there_m:.1f} m, was chosen only because about {fit.measurements.prior.sigma_m:g} m is expected",
-        "are both sensors on the same rig, or how far apart? Set the nominal distance, or measure the camera position",
+        {**away, "here_m": here_m, "there_m": there_m, "expected_m": fit.measurements.prior.sigma_m},
     )
 
 
@@ -138,14 +127,7 @@ def possible_poses(fit: SolvedFit) -> list[DataWarning]:
         if not on_rig(fit, other.camera_from_radar):
             continue
         if other.probability >= _LEAST_PROBABILITY and sigmas > _OTHER_PEAK_SIGMAS:
-            return [
-                DataWarning(
-                    "two-poses",
-                    f"another pose, {_away(error)}, may be the right one (probability {100 * other.probability:.0f} %): it is "
-                    "not clear which of the pairs are wrong",
-                    "measure the camera position with a tape, or add placements nearer and farther than the present ones",
-                )
-            ]
+            return [DataWarning("two-poses", {**_away(error), "probability": other.probability})]
     return []
 
 
@@ -157,37 +139,25 @@ def agreeing_outliers(fit: SolvedFit) -> list[DataWarning]:
     names = [fit.ids[i] for i in found.pairs]
     pose = found.camera_from_radar
     if on_rig(fit, pose) and _is_as_likely(fit, pose):
-        return [
-            DataWarning(
-                "two-poses",
-                f"another pose, {_away(found.difference)}, explains the pairs as well: {len(names)} of {len(fit.ids)} agree "
-                f"on it, {listed(names)}",
-                "check which group shows the reflector, and exclude the other",
-            )
-        ]
-    return [
-        DataWarning(
-            "agreeing-outliers",
-            f"{len(names)} pairs are off in the same way and were set aside: {listed(names)}{_turned(fit, found.pairs)}",
-            f"look at the returns of {names[0]}: a cart beside the reflector, a second reflector, or elevations that jump "
-            "give such a group",
-        )
-    ]
+        return [DataWarning("two-poses", {**_away(found.difference), "agreeing": names, "pairs": len(fit.ids)})]
+    return [DataWarning("agreeing-outliers", {"ids": names, "in_time": _in_time(fit, found.pairs)})]
 
 
-def _turned(fit: SolvedFit, pairs: Indices) -> str:
-    """Say that pairs are the first or the last in time, as after a turn of camera or radar; "" if others lie between."""
+def _in_time(fit: SolvedFit, pairs: Indices) -> str:
+    """Return whether pairs are the "first" or the "last" in time, as after a turn of a sensor; "" if others lie between."""
     times = np.array([time or 0 for time in fit.times])
     aside, used = times[pairs], times[fit.inliers]
-    if 0 < aside.max() < used.min() or 0 < used.max() < aside.min():
-        when = "first" if aside.max() < used.min() else "last"
-        return f"; they are the {when} in time, so the camera or the radar seems to have turned: solve them apart"
-    return ""
+    if not (0 < aside.max() < used.min() or 0 < used.max() < aside.min()):
+        return ""
+    return "first" if aside.max() < used.min() else "last"
 
 
-def _away(error: Values) -> str:
-    """Return in words how far a pose error (6,) is."""
-    return f"{np.rad2deg(np.linalg.norm(error[3:])):.1f} deg and {100 * np.linalg.norm(error[:3]):.0f} cm away"
+def _away(error: Values) -> Facts:
+    """Return how far a pose error (6,) is."""
+    return {
+        "away_deg": float(np.rad2deg(np.linalg.norm(error[3:]))),
+        "away_cm": 100.0 * float(np.linalg.norm(error[:3])),
+    }
 
 
 def camera_position(fit: SolvedFit) -> list[DataWarning]:
@@ -195,15 +165,10 @@ def camera_position(fit: SolvedFit) -> list[DataWarning]:
     found = fit.best.position
     if found is None or not found.contradicted:
         return []
-    other_unit = f"; {found.other_unit}" if found.other_unit else ""
     return [
         DataWarning(
             "camera-position-contradicted",
-            f"the pairs alone place the camera {100 * found.away_m:.0f} cm from the measured position, "
-            f"{found.sigmas:.1f} standard deviations{other_unit}; clicks that all lie as far beside the radar's phase centre "
-            "would look the same; the pose follows the pairs",
-            "measure again from the radar's antennas to the lens: forward, left, up; click the reflector's apex, where its three "
-            "sheets meet, not its mouth or its stand; and check that the intrinsics are of this lens, zoom and picture size",
+            {"away_cm": 100.0 * found.away_m, "sigmas": found.sigmas, "misread": found.misread, "unit": found.unit},
         )
     ]
 

@@ -12,7 +12,7 @@ from calib_core.estimation.gnc import RADII, GncSolution, associate, mixture_cos
 from calib_core.estimation.initialization import initial_poses
 from calib_core.estimation.measured_position import WeighedPosition, weighed_position
 from calib_core.estimation.measurement_model import PairMeasurements
-from calib_core.estimation.unsolved import degenerate, mirrored, no_pose
+from calib_core.estimation.unsolved import degenerate, disagreeing
 from calib_core.measurements import MIN_PAIRS, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
@@ -129,8 +129,7 @@ def best_fit(measurements: PairMeasurements, options: CalibrationOptions) -> Bes
         best = BestFit(refined, found, measurements)
     inliers = int(refined.inliers.sum())
     if inliers < MIN_PAIRS:
-        reason = f"only {inliers} of {len(measurements)} pairs agree on any pose"
-        return mirrored(reason) if best.mirror_gain(options) > MIRRORED_GAIN else no_pose(reason)
+        return disagreeing(inliers, len(measurements), mirrored=best.mirror_gain(options) > MIRRORED_GAIN)
     return best
 
 

@@ -32,12 +32,12 @@ _OTHER_UNIT_SIGMAS = 4.0
 _AGREEING_SIGMAS = 3.0
 
 _UNIT_SLIPS = (
-    ("the measured position looks like centimetres", 0.01),
-    ("the measured position looks like millimetres", 0.001),
-    ("the measured position looks like feet", 0.3048),
-    ("the radar's ranges look like feet", 1.0 / 0.3048),
+    ("position", "centimetres", 0.01),
+    ("position", "millimetres", 0.001),
+    ("position", "feet", 0.3048),
+    ("ranges", "feet", 1.0 / 0.3048),
 )
-"""What would remove a contradiction, and the factor on the measured position."""
+"""What may have another unit, which one, and the factor on the measured position that this makes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,7 +50,8 @@ class WeighedPosition:
         contradicted: whether a right position would be as far away in less than one set of thirty-three.
         away_m: of the camera from the measured position, by the pairs alone.
         sigmas: the same in standard deviations.
-        other_unit: which unit would remove the contradiction, in words; empty if none would.
+        misread: what would not contradict it in another unit, "position" or "ranges"; empty if neither.
+        unit: which one that is; empty if none.
     """
 
     prior: CameraPrior
@@ -58,7 +59,8 @@ class WeighedPosition:
     contradicted: bool
     away_m: float
     sigmas: float
-    other_unit: str
+    misread: str
+    unit: str
 
 
 def weighed_position(
@@ -95,7 +97,7 @@ def weighed_position(
         sigmas > limit,
         float(np.linalg.norm(away_m)),
         sigmas,
-        _other_unit(centre, prior) if sigmas > limit else "",
+        *(_other_unit(centre, prior) if sigmas > limit else _NO_UNIT),
     )
     near = GncSolution(alone.camera_from_radar, 0.0, 1.0)
     scale = alone.noise_scale.tolist()
@@ -137,14 +139,17 @@ class _Centre:
         return float(np.sqrt(away_m @ self.solved(away_m, sigma_m**2)))
 
 
-def _other_unit(centre: _Centre, prior: CameraPrior) -> str:
-    """Return in words which other unit would remove the contradiction; empty if none would.
+_NO_UNIT = ("", "")
+
+
+def _other_unit(centre: _Centre, prior: CameraPrior) -> tuple[str, str]:
+    """Return what would not contradict the pairs in another unit, and in which.
 
     Divided by a hundred, any position is at the radar: only a camera that the pairs place away from it tells a unit.
     """
     if centre.sigmas_from(np.zeros(3), prior.sigma_m) <= _OTHER_UNIT_SIGMAS:
-        return ""
-    for text, factor in _UNIT_SLIPS:
+        return _NO_UNIT
+    for misread, unit, factor in _UNIT_SLIPS:
         if centre.sigmas_from(factor * prior.position_m, prior.sigma_m) < _AGREEING_SIGMAS:
-            return text
-    return ""
+            return misread, unit
+    return _NO_UNIT

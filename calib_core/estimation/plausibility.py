@@ -11,8 +11,8 @@ import numpy as np
 
 from calib_core.arrays import Points2, Points3
 from calib_core.camera import Camera
+from calib_core.measurements import DataWarning, Facts
 from calib_core.options import CalibrationOptions
-from calib_core.results import DataWarning
 
 PIXELS_SUSPECTED = "pixels-suspected"
 
@@ -55,8 +55,7 @@ def _units(points_radar_m: Points3) -> list[DataWarning]:
     return [
         DataWarning(
             "units-suspected",
-            f"the radar positions are {range_m.min():,.0f} to {range_m.max():,.0f} m away: the ranges look like {unit}",
-            f"radar positions must be in metres: multiply them by {_UNITS[unit]:g}",
+            {"nearest": float(range_m.min()), "farthest": float(range_m.max()), "unit": unit, "factor": _UNITS[unit]},
         )
     ]
 
@@ -66,49 +65,27 @@ def _camera_units(options: CalibrationOptions) -> list[DataWarning]:
     away_m = 0.0 if prior is None else float(np.linalg.norm(prior.position_m))
     if away_m <= _FARTHEST_CAMERA_M:
         return []
-    return [
-        DataWarning(
-            "units-suspected",
-            f"the measured camera position is {away_m:,.0f} m from the radar: is it in metres?",
-            "the camera position must be in metres",
-        )
-    ]
+    return [DataWarning("units-suspected", {"camera_away": away_m})]
 
 
 def _pixels(ids: Sequence[str], pixels_px: Points2, camera: Camera) -> list[DataWarning]:
     size = (camera.width_px, camera.height_px)
+    image: Facts = {"clicks": len(ids), "width_px": size[0], "height_px": size[1]}
     outside = _outside(pixels_px, size)
     if outside.any() and not _outside(pixels_px[:, ::-1], size).any() and camera.width_px != camera.height_px:
-        return [
-            DataWarning(
-                "pixels-suspected",
-                f"{int(outside.sum())} of {len(ids)} clicks are outside the {size[0]} x {size[1]} picture, and with column "
-                "and row exchanged all are inside",
-                "give each pixel as (column, row)",
-            )
-        ]
+        return [DataWarning("pixels-suspected", {**image, "outside": int(outside.sum()), "exchanged": True})]
     if outside.any():
-        name = ids[int(np.argmax(outside))]
-        u_px, v_px = pixels_px[int(np.argmax(outside))].tolist()
+        first = int(np.argmax(outside))
         return [
             DataWarning(
                 "pixels-suspected",
-                f"{int(outside.sum())} of {len(ids)} clicks are outside the {size[0]} x {size[1]} picture, such as {name} at "
-                f"({u_px:.0f}, {v_px:.0f})",
-                "check that the intrinsics belong to a picture of the size that was clicked; remove the pair otherwise",
+                {**image, "outside": int(outside.sum()), "pair": ids[first], "pixel_px": pixels_px[first].tolist()},
             )
         ]
     reach_u, reach_v = (pixels_px.max(axis=0) / np.array(size)).tolist()
     if len(ids) < _LEAST_PAIRS or max(reach_u, reach_v) >= _PART_OF_PICTURE:
         return []
-    return [
-        DataWarning(
-            "pixels-suspected",
-            f"all clicks are in the upper left {100 * reach_u:.0f} x {100 * reach_v:.0f} % of the {size[0]} x {size[1]} picture: "
-            "the clicked picture seems to be smaller",
-            "scale the clicks, or the intrinsics, to the same size of the picture",
-        )
-    ]
+    return [DataWarning("pixels-suspected", {**image, "reach": (reach_u, reach_v)})]
 
 
 def _outside(pixels_px: Points2, size: tuple[int, int]) -> np.ndarray:
@@ -122,14 +99,6 @@ def _axes(points_radar_m: Points3) -> list[DataWarning]:
     forward, left, _ = np.median(directions, axis=0).tolist()
     if len(points_radar_m) < _LEAST_PAIRS or abs(np.arctan2(left, forward)) <= _SIDEWAYS_RAD:
         return []
-    where = "behind the radar" if forward < -abs(left) else f"to the {'left' if left > 0 else 'right'} of the radar"
+    where = "behind" if forward < -abs(left) else "left" if left > 0 else "right"
     behind = int((points_radar_m[:, 0] < 0.0).sum())
-    return [
-        DataWarning(
-            "radar-axes-suspected",
-            f"the placements are {where}, and {behind} of {len(points_radar_m)} radar positions have x below 0: their frame "
-            "seems not to be the radar's",
-            "radar axes must be x forward, y left, z up, with the origin at the radar; the pose is right for the given axes, but "
-            "a camera position, and the noise of the angles, refer to the radar's own",
-        )
-    ]
+    return [DataWarning("radar-axes-suspected", {"side": where, "behind": behind, "pairs": len(points_radar_m)})]

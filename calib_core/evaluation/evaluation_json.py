@@ -10,6 +10,7 @@ from calib_core.evaluation.figures import BoxFigures, Evaluation, HeldOut, Resid
 from calib_core.input_files import encodable
 from calib_core.interchange.syntax.strict_json import json_text
 from calib_core.measurements import Stamp, TimeNs
+from calib_core.words import unpaired_told, warning_text
 
 EVALUATION_SCHEMA = "cocalib/evaluation-1"
 
@@ -38,7 +39,7 @@ def evaluation_document(evaluation: Evaluation) -> dict[str, Any]:
     return {
         "residuals": None if residuals is None else _residuals(residuals),
         "boxes": None if boxes is None else _boxes(boxes),
-        "warnings": [{"code": one.code, "message": one.message, "hint": one.hint} for one in evaluation.warnings],
+        "warnings": [dataclasses.asdict(warning_text(warning)) for warning in evaluation.warnings],
     }
 
 
@@ -79,7 +80,9 @@ def _residuals(figures: ResidualFigures) -> dict[str, Any]:
                 strict=True,
             )
         ],
-        "unpaired": [{"id": one.id, "code": one.code, "reason": one.reason} for one in figures.unpaired],
+        "unpaired": [
+            {"id": one.id, "code": one.code, "reason": str(unpaired_told(one).message)} for one in figures.unpaired
+        ],
     }
 
 

@@ -170,7 +170,7 @@ def _without_doppler(options: TargetOptions) -> tuple[DataWarning, ...]:
     still = options.sensors == "still"
     assumed = "" if still else "; this assumes that the sensors stood still, which nobody said"
     return (
-        DataWarning(
+        DataWarning.reported(
             "no-doppler",
             f"the radar reports no Doppler speeds, so targets count as moving by how far they travel{assumed}",
             "if the sensors moved, Acc cannot be computed from this recording",
@@ -182,7 +182,7 @@ def _unclear(unfitted: int, judged: int) -> tuple[DataWarning, ...]:
     if unfitted <= 0.5 * max(judged, 1):
         return ()
     return (
-        DataWarning(
+        DataWarning.reported(
             "mostly-moving",
             f"nearly all returns move in {unfitted} of {judged} scans, but not as they would if the sensors did: the radar's own "
             "speed cannot be found, and the sensors are taken to stand still",

@@ -3,6 +3,7 @@
 import numpy as np
 
 from calib_core.evaluation.figures import BoxFigures, Evaluation, HeldOut, ResidualFigures, Sensitivity, Share, Spread
+from calib_core.words import said_of, unpaired_told
 
 NOT_ACCURACY = (
     "Acc is not accuracy: a pose that is wrong by half a degree can score as well as the right one, or better; judge a pose "
@@ -20,7 +21,7 @@ def evaluation_lines(evaluation: Evaluation) -> tuple[str, ...]:
         rows += _residual_lines(evaluation.residuals)
     if evaluation.boxes is not None:
         rows += _box_lines(evaluation.boxes)
-    rows += [f"warning: {one.message}; {one.hint}" for one in evaluation.warnings]
+    rows += [f"warning: {said_of(one)}" for one in evaluation.warnings]
     return tuple(rows)
 
 
@@ -84,7 +85,7 @@ def _residual_lines(figures: ResidualFigures) -> list[str]:
     rows.append(f"  {figures.association}")
     if figures.unpaired:
         rows.append(
-            f"  {_count(len(figures.unpaired), 'click')} without a radar position: {figures.unpaired[0].reason}"
+            f"  {_count(len(figures.unpaired), 'click')} without a radar position: {unpaired_told(figures.unpaired[0]).message}"
         )
     named = (("range", "m"), ("azimuth", "deg"), ("column", "px"), ("row", "px"))
     for (name, unit), bins in zip(

@@ -10,7 +10,7 @@ from msgspec.structs import asdict, replace
 
 from calib_core.errors import InputError
 from calib_core.results import Calibration, CheckPoint, InputFile, PairResult, UnconfirmedClicks
-from calib_core.results.verdict import Verdict
+from calib_core.words import StatedVerdict
 
 MOST_CHARACTERS = 120
 """The longest name or serial, in manifests, files and flags alike."""
@@ -241,7 +241,7 @@ class CalibrationFile:
     check_point: CheckPoint | None = None
     provenance: Provenance = field(default_factory=Provenance)
     kept: tuple[KeptResult, ...] = ()
-    verdict: Verdict | None = None
+    verdict: StatedVerdict | None = None
     evidence: Evidence | None = None
     made_from_sha256: str = ""
     vehicle: VehicleNote = field(default_factory=VehicleNote)

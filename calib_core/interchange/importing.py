@@ -415,7 +415,7 @@ def adopted_calibration(found: ImportedCalibration, source: str, *, camera: Came
 
 def _as_calibration(found: ImportedCalibration, source: str, *, camera: Camera) -> Calibration:
     """Return what was read and checked as a calibration with a given camera."""
-    assumed = tuple(DataWarning("assumed", note, "verify this assumption") for note in found.assumptions)
+    assumed = tuple(DataWarning.reported("assumed", note, "verify this assumption") for note in found.assumptions)
     return Calibration(
         camera_from_radar=found.camera_from_radar,
         covariance=_covariance(found),
@@ -438,7 +438,7 @@ def _covariance(found: ImportedCalibration) -> Matrix66:
 
 
 def _imported_warning(found: ImportedCalibration, source: str) -> DataWarning:
-    return DataWarning(
+    return DataWarning.reported(
         "imported",
         f"imported from {PurePath(source).name} ({found.format}): its pairs and input data are unknown",
         "check it with cocalib open RECORDING --calibration FILE: click the reflector",

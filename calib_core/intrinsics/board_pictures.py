@@ -70,8 +70,10 @@ class LeftOutPicture(Struct, frozen=True, forbid_unknown_fields=True):
         index: its number in its source.
         name: what messages call it.
         reason: why, as a clause: "blurred: edges are 4.1 px wide, those of the others 1.2 px".
+        spare: it is a good view that others make unnecessary.
     """
 
     index: Annotated[int, Meta(ge=0, le=1_000_000_000)]
     name: Name
     reason: Annotated[str, Meta(max_length=10_000)]
+    spare: bool = False

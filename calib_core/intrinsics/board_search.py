@@ -210,12 +210,14 @@ class _Search:
 
     def _no_board(self) -> Unsolvable:
         if not self._seen:
-            return Unsolvable(
+            return Unsolvable.reported(
                 "no-pictures", "there are no pictures to look for a board in", "give pictures of the board"
             )
         if self._unreadable and len(self._unreadable) == len(self._seen):
             why = next(iter(self._unreadable.values()))
-            return Unsolvable("unreadable", f"none of {len(self._seen)} pictures can be read: {why}", "check the files")
+            return Unsolvable.reported(
+                "unreadable", f"none of {len(self._seen)} pictures can be read: {why}", "check the files"
+            )
         empty = self._empty()
         sizes = Counter(self._other_boards(empty).values())
         count = len(self._views)
@@ -223,16 +225,16 @@ class _Search:
         what = f"{count or 'none'} of {len(self._seen)} pictures {shows} a {self._board.text}"
         if sizes:
             size, count = sizes.most_common(1)[0]
-            return Unsolvable(
+            return Unsolvable.reported(
                 "other-board",
                 f"{what}; {count} of the {len(self._shown)} that were looked at for others show {size} inner corners",
                 f"state {size.replace(' ', '')} if that is the board: its inner corners are one fewer than its squares",
             )
-        return Unsolvable("no-board", what, _film(self._board))
+        return Unsolvable.reported("no-board", what, _film(self._board))
 
     def _mixed_sizes(self) -> Unsolvable:
         sizes = ", ".join(f"{count} of {_size_text(size)}" for size, count in self._sizes.most_common(4))
-        return Unsolvable(
+        return Unsolvable.reported(
             "mixed-sizes",
             f"the pictures have different sizes: {sizes} pixels",
             "give the pictures of one camera in one size: every size has a calibration of its own",
@@ -353,7 +355,7 @@ def chosen_views(views: Sequence[BoardCorners], board: Board) -> tuple[list[Boar
         for place, row in enumerate(kept):
             if place not in different:
                 reason = f"not needed: {MOST_VIEWS} views that differ more from one another are used"
-                left_out.append(LeftOutPicture(sharp[row].index, sharp[row].name, reason))
+                left_out.append(LeftOutPicture(sharp[row].index, sharp[row].name, reason, spare=True))
         kept = [row for place, row in enumerate(kept) if place in different]
     return [sharp[row] for row in kept], left_out
 
@@ -397,7 +399,7 @@ def _without_duplicates(
         else:
             sharper = views[row].blur_px > _SHARPER_FACTOR * views[same].blur_px
             reason = f"the same view as {views[same].name}{', which is sharper' if sharper else ''}"
-            left_out.append(LeftOutPicture(views[row].index, views[row].name, reason))
+            left_out.append(LeftOutPicture(views[row].index, views[row].name, reason, spare=True))
     return sorted(kept)
 
 

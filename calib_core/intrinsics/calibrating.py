@@ -95,7 +95,7 @@ def calibrate_lens(
         if progress is not None:
             progress(step)
         if stopped is not None and stopped():
-            return Unsolvable("stopped", "the calibration was stopped", "start it again")
+            return Unsolvable.reported("stopped", "the calibration was stopped", "start it again")
 
 
 def _steps(search: BoardSearch, model: LensChoice) -> Generator[str, None, CalibratedLens | Unsolvable]:
@@ -108,7 +108,7 @@ def _steps(search: BoardSearch, model: LensChoice) -> Generator[str, None, Calib
     chosen = used.choose(FLAT)
     if isinstance(chosen, str):
         hint = _FILM if model == "auto" else "choose another lens model, or let it be chosen (auto)"
-        return Unsolvable("no-lens", f"no lens model fits {len(used.views)} views: {chosen}", hint)
+        return Unsolvable.reported("no-lens", f"no lens model fits {len(used.views)} views: {chosen}", hint)
     yield "looking at the shape of the board"
     shape = try_shapes(chosen.fit, used.stack, possible_warps(used.board_m))
     modelled = False
@@ -133,7 +133,7 @@ def _used(search: BoardSearch, model: LensChoice) -> _Used | Unsolvable:
     stack = stack_views(views, board_m, search.size_px)
     states = _starts(stack, model)
     if not states:
-        return Unsolvable("no-lens", "no focal length of any lens model explains most of the views", _FILM)
+        return Unsolvable.reported("no-lens", "no focal length of any lens model explains most of the views", _FILM)
     judged = _judged(views, stack, states, may_be_mirrored=search.board.kind == "checkerboard")
     reasons = zip(views, judged.reasons, strict=True)
     left_out += [LeftOutPicture(view.index, view.name, reason) for view, reason in reasons if reason]
@@ -163,7 +163,9 @@ def _fault(view: BoardCorners, board_m: Points3, size_px: tuple[int, int]) -> st
 
 def _too_few(count: int, left_out: Sequence[LeftOutPicture]) -> Unsolvable:
     why = "".join(f"; {picture.name}: {picture.reason}" for picture in left_out[:3])
-    return Unsolvable("few-views", f"{count} usable views of the board, at least {_LEAST_VIEWS} are needed{why}", _FILM)
+    return Unsolvable.reported(
+        "few-views", f"{count} usable views of the board, at least {_LEAST_VIEWS} are needed{why}", _FILM
+    )
 
 
 def _starts(stack: ViewStack, model: LensChoice) -> list[LensState]:
@@ -244,11 +246,11 @@ def _unknown_focal(camera: Camera, fit: LensFit) -> Unsolvable | None:
     known = f"the focal length, {camera.matrix_px[0, 0]:.0f} px, is known to {100.0 * sigma:.0f} %"
     if apart_deg < _SAME_DEG or (sigma > _UNKNOWN_FOCAL and apart_deg < _PARALLEL_DEG):
         reason = f"the board is turned by {apart_deg:.0f} deg at most from view to view; {known}"
-        return Unsolvable("parallel-views", reason, _FILM)
+        return Unsolvable.reported("parallel-views", reason, _FILM)
     if sigma > _UNKNOWN_FOCAL:
         rms_px = float(np.sqrt(fit.mean_squares.mean()))
         hint = f"check the board and the lens model ({camera.model}), and {_FILM}"
-        return Unsolvable("unknown-focal-length", f"{known}; the corners fit to {rms_px:.2f} px", hint)
+        return Unsolvable.reported("unknown-focal-length", f"{known}; the corners fit to {rms_px:.2f} px", hint)
     return None
 
 
@@ -295,7 +297,7 @@ def lens_warnings(camera: Camera, stack: ViewStack, rms_px: float) -> Iterator[D
     yield from _about_numbers(camera, rms_px)
     outside = folds_back(camera, picture_places(stack.size_px))
     if outside.any() and camera.lens.is_perspective:
-        yield DataWarning(
+        yield DataWarning.reported(
             "lens-folds-back",
             f"the distortion folds back in {100.0 * outside.mean():.0f} % of the picture, where no corners were found",
             "film the board there, or choose a simpler lens model",
@@ -305,20 +307,20 @@ def lens_warnings(camera: Camera, stack: ViewStack, rms_px: float) -> Iterator[D
 def _about_views(camera: Camera, stack: ViewStack) -> Iterator[DataWarning]:
     covered = _covered_share(stack)
     if covered < _LEAST_COVERED:
-        yield DataWarning(
+        yield DataWarning.reported(
             "little-covered",
             f"the corners of all views cover {100.0 * covered:.0f} % of the picture; beyond them the lens is a guess",
             "film the board in the corners and along the edges of the picture",
         )
     if len(stack) < _FEW_VIEWS:
-        yield DataWarning(
+        yield DataWarning.reported(
             "few-views",
             f"only {len(stack)} views; how well the lens is known is itself poorly known",
             "film 15 to 30 views, tilted to all sides",
         )
     sigma = worst_focal_sigma(camera)
     if sigma > _FOCAL_SIGMA:
-        yield DataWarning(
+        yield DataWarning.reported(
             "weak-focal-length",
             f"the focal length is known to {100.0 * sigma:.1f} % only",
             "film views in which the board is turned by 30 to 45 deg to the left, right, up and down",
@@ -329,20 +331,20 @@ def _about_numbers(camera: Camera, rms_px: float) -> Iterator[DataWarning]:
     fx, fy, cx, cy = camera.parameters[:4]
     off = np.abs([cx / (camera.width_px - 1) - 0.5, cy / (camera.height_px - 1) - 0.5])
     if off.max() > _FAR_PRINCIPAL_POINT:
-        yield DataWarning(
+        yield DataWarning.reported(
             "principal-point-far",
             f"the principal point ({cx:.0f}, {cy:.0f}) is far from the middle of the picture "
             f"({(camera.width_px - 1) / 2:.0f}, {(camera.height_px - 1) / 2:.0f})",
             "check whether the pictures are cropped; if not, film more tilted views all over the picture",
         )
     if abs(fx / fy - 1.0) > _UNEQUAL_FOCAL_LENGTHS:
-        yield DataWarning(
+        yield DataWarning.reported(
             "unequal-focal-lengths",
             f"the focal lengths differ by {100.0 * abs(fx / fy - 1.0):.1f} %: {fx:.1f} px along rows, {fy:.1f} px along columns",
             "check whether the pictures were resized with other proportions, and whether the board's squares are square",
         )
     if rms_px > _LARGE_RMS_PX:
-        yield DataWarning(
+        yield DataWarning.reported(
             "large-residuals",
             f"the corners fit to {rms_px:.2f} px; 0.1 to 0.5 px is usual",
             "check the number of corners of the board, the focus and the lens model, and hold the board still",
@@ -374,14 +376,14 @@ def shape_warnings(test: ShapeTest, amounts: Values, sigmas: Values, *, modelled
         if name in _BENDS and abs(amount) > 2.0 * sigma
     ]
     if bends:
-        yield DataWarning(
+        yield DataWarning.reported(
             "bent-board",
             f"the board is bent by {' and '.join(bends)}; {done}",
             "fix the board to glass or a stiff plate",
         )
     for name, amount, sigma in zip(test.found.names, amounts, sigmas, strict=True):
         if name not in _BENDS:
-            yield DataWarning(
+            yield DataWarning.reported(
                 "unequal-squares",
                 f"the squares are {100.0 * abs(amount):.2f} ± {100.0 * sigma:.2f} % {'wider' if amount > 0 else 'narrower'} "
                 f"than high; {done}",
@@ -392,7 +394,7 @@ def shape_warnings(test: ShapeTest, amounts: Values, sigmas: Values, *, modelled
 def skew_warnings(skew: RowSkew) -> Iterator[DataWarning]:
     """Say that views are skewed as by motion under a rolling shutter."""
     if skew.shows:
-        yield DataWarning(
+        yield DataWarning.reported(
             "skewed-views",
             f"views are skewed by {np.median(skew.skews_px):.1f} px (median) from the first row of the picture to the last, "
             f"which explains {100.0 * skew.share:.0f} % of the squared residuals: a board that moved under a rolling shutter "

@@ -71,7 +71,7 @@ def split_difference(lens: CalibratedLens, columns: int = _COLUMNS, rows: int = 
         rows: of the grid.
     """
     if len(lens.views) < _LEAST_VIEWS:
-        return Unsolvable(
+        return Unsolvable.reported(
             "few-views",
             f"{len(lens.views)} views cannot be calibrated in halves, {_LEAST_VIEWS} can",
             "film the board from more directions",

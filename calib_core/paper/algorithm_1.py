@@ -159,20 +159,18 @@ def pair_as_printed(click: ReflectorClick, static: RadarScans, options: Calibrat
         options: the paper's, and the largest time gap to a scan, which the paper does not give.
     """
     if not len(static):
-        return _unpaired(click, "no-static-return", "no radar return passes the velocity and range filter", options)
+        return _nothing_static(click, options)
     radar_time = nearest_stamp(static, click.image_time)
     gap_s = abs(int(radar_time) - int(click.image_time)) / NS_PER_S
     if gap_s > options.locating.max_time_gap_s:
-        return _unpaired(click, "no-static-return", f"the nearest static radar return is {gap_s:.2f} s away", options)
+        return _nothing_static(click, options, gap_s)
     window = window_around(static, radar_time, options.paper)
     inliers = z_score_inliers(window.points_radar_m, options.paper)
     if not inliers.any():
         return Unpaired(
+            "no-z-score-inlier",
+            {"returns": len(inliers), "z_score_threshold": options.paper.z_score_threshold},
             id=click.id,
-            code="no-z-score-inlier",
-            reason=f"none of the {len(inliers)} returns in the window is within "
-            f"{options.paper.z_score_threshold:g} standard deviations on all three axes",
-            hint="raise the z-score threshold, or use the default method",
         )
     snr_db = window.snr_db[inliers]
     position = Candidate(
@@ -249,23 +247,25 @@ def _solved(
         (pair for pair in pairs if pair.id not in excluded), key=lambda pair: (pair.image_time or 0, pair.id)
     )  # RANSAC draws the same samples whatever the order of the input
     if len(used) < MIN_PAIRS:
-        return _too_few(len(used), len(ordered) - len(used), len(unpaired))
+        facts = {
+            "used": len(used),
+            "needed": MIN_PAIRS,
+            "excluded": len(ordered) - len(used),
+            "unpaired": len(unpaired),
+        }
+        return Unsolvable("too-few-pairs", facts)
     points_radar_m = np.stack([pair.candidates[0].position_radar_m for pair in used])
     pixels_px = np.stack([pair.pixel_px for pair in used])
     if not spans_a_plane(points_radar_m):
-        return _in_one_line(len(used))
+        return Unsolvable("points-in-one-line", {"pairs": len(used)})
     iterative = pose_by_iterative_ransac(points_radar_m, pixels_px, camera, options.paper)
     sqpnp = pose_by_sqpnp_ransac(points_radar_m, pixels_px, camera, options.paper)
     better = pose_of_smaller_error(iterative, sqpnp)
     if better is None:
-        return _no_consensus(len(used), options.paper)
+        return Unsolvable("no-consensus", {"pairs": len(used), "threshold_px": options.paper.ransac_threshold_px})
     camera_from_radar = refined_on_all_pairs(points_radar_m, pixels_px, camera, better.camera_from_radar)
     if camera_from_radar is None:
-        return Unsolvable(
-            "refinement-diverged",
-            "Levenberg-Marquardt on all pairs diverged",
-            "exclude the pairs with the largest residuals, or use the default method",
-        )
+        return Unsolvable("refinement-diverged")
     inliers = frozenset(pair.id for pair, inlier in zip(used, better.inliers, strict=True) if inlier)
     results = tuple(_result(pair, camera, camera_from_radar, pair.id in inliers, excluded) for pair in ordered)
     distances_px = np.sort([result.distance_px for result in results if not result.excluded])
@@ -332,41 +332,14 @@ def _z_scores(values: Values) -> Values:
     return (values - values.mean()) / spread if spread > 0.0 else np.zeros_like(values)
 
 
-def _unpaired(click: ReflectorClick, code: str, reason: str, options: CalibrationOptions) -> Unpaired:
+def _nothing_static(click: ReflectorClick, options: CalibrationOptions, gap_s: float | None = None) -> Unpaired:
     return Unpaired(
+        "no-static-return",
+        {
+            "paper": True,
+            "gap_s": gap_s,
+            "fastest_mps": options.paper.max_speed_mps,
+            "farthest_m": options.paper.max_range_m,
+        },
         id=click.id,
-        code=code,
-        reason=reason,
-        hint=f"Algorithm 1 keeps speeds up to {options.paper.max_speed_mps:g} m/s and ranges below "
-        f"{options.paper.max_range_m:g} m: click where the reflector stands still inside the radar recording, "
-        "or raise these two options",
-    )
-
-
-def _too_few(used: int, excluded: int, unpaired: int) -> Unsolvable:
-    texts = [text for count, text in ((excluded, "excluded"), (unpaired, "without a radar position")) if count]
-    counts = [count for count in (excluded, unpaired) if count]
-    rest = "".join(f", {count} more {text}" for count, text in zip(counts, texts, strict=True))
-    return Unsolvable(
-        "too-few-pairs",
-        f"{used} of at least {MIN_PAIRS} required pairs{rest}",
-        f"click the reflector at {MIN_PAIRS - used} or more further placements; 10 to 20, spread over the picture, are better",
-    )
-
-
-def _in_one_line(used: int) -> Unsolvable:
-    return Unsolvable(
-        "points-in-one-line",
-        f"the radar positions of all {used} pairs are at one place or on one line",
-        "place the reflector left and right, near and far",
-    )
-
-
-def _no_consensus(used: int, options: PaperOptions) -> Unsolvable:
-    return Unsolvable(
-        "no-consensus",
-        f"RANSAC finds no pose that brings enough of the {used} pairs within {options.ransac_threshold_px:g} px, "
-        "neither with the iterative solver nor with SQPnP",
-        "raise the RANSAC threshold to about three times the pixel noise (radar angles alone make 10 to 20 px), "
-        "or use the default method, which needs no threshold",
     )

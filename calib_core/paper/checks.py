@@ -32,14 +32,7 @@ def unused_choices(clicks: Iterable[ReflectorClick]) -> tuple[DataWarning, ...]:
     count = sum(click.chosen is not None and click.counts for click in clicks)
     if not count:
         return ()
-    which = "the chosen return of 1 click" if count == 1 else f"the chosen returns of {count} clicks"
-    return (
-        DataWarning(
-            "choices-unused",
-            f"Algorithm 1 averages all static returns of a window, so {which} had no effect",
-            "use the default method, which keeps to the choice",
-        ),
-    )
+    return (DataWarning("choices-unused", {"clicks": count}),)
 
 
 def warnings_as_printed(
@@ -121,9 +114,11 @@ def _disagreeing(ids: Sequence[str], agreeing: Flags, fit: _Modelled, options: C
     return [
         DataWarning(
             "many-outliers",
-            f"only {int(agreeing.sum())} of {len(ids)} pairs agree within {options.paper.ransac_threshold_px:g} px, but "
-            "Algorithm 1 fits the pose to all of them",
-            "use the default method, which leaves wrong pairs out; or exclude the pairs with the largest residuals",
+            {
+                "agreeing": int(agreeing.sum()),
+                "pairs": len(ids),
+                "threshold_px": options.paper.ransac_threshold_px,
+            },
         )
     ]
 
@@ -131,27 +126,13 @@ def _disagreeing(ids: Sequence[str], agreeing: Flags, fit: _Modelled, options: C
 def _behind(ids: Sequence[str], hidden: Flags) -> list[DataWarning]:
     if not hidden.any():
         return []
-    return [
-        DataWarning(
-            "behind-camera",
-            f"with this pose the camera cannot see {int(hidden.sum())} of {len(ids)} radar positions "
-            f"({', '.join(np.asarray(ids)[hidden][:6])}); the metrics exclude them",
-            "do not use this pose; use the default method",
-        )
-    ]
+    return [DataWarning("behind-camera", {"ids": np.asarray(ids)[hidden].tolist(), "pairs": len(ids)})]
 
 
 def _excess(fit: _Modelled) -> list[DataWarning]:
     if not fit.noisy:
         return []
-    return [
-        DataWarning(
-            "residuals-too-large",
-            f"residuals are {np.sqrt(fit.excess):.1f} times what the assumed noise explains "
-            f"(chi2 / degrees of freedom {fit.excess:.1f})",
-            "some radar positions or clicks are wrong: use the default method, and check the pairs it names",
-        )
-    ]
+    return [DataWarning("residuals-too-large", {"chi2_per_degree": fit.excess, "paper": True})]
 
 
 def _spread(fit: _Modelled, camera_from_radar: RigidTransform) -> list[DataWarning]:
@@ -175,10 +156,7 @@ def _spread(fit: _Modelled, camera_from_radar: RigidTransform) -> list[DataWarni
     return [
         DataWarning(
             "weak-geometry",
-            f"Algorithm 1 states no uncertainty; by its residuals and the placements it is about {np.rad2deg(rotation_rad):.1f} "
-            f"deg and {100.0 * position_m:.0f} cm (one sigma)",
-            "use the default method, which weights the pairs by their noise; add placements near and far, at both edges of the "
-            "picture",
+            {"rotation_deg": float(np.rad2deg(rotation_rad)), "position_cm": 100.0 * position_m, "paper": True},
         )
     ]
 
@@ -190,10 +168,4 @@ def _far_camera(camera_from_radar: RigidTransform, options: CalibrationOptions) 
     away_m = float(np.linalg.norm(camera_from_radar.inverse().translation_m - expected_m))
     if away_m <= _FAR_CAMERA * reach_m:
         return []
-    return [
-        DataWarning(
-            "camera-far-away",
-            f"the solved camera position is {away_m:.1f} m from the expected one (± {reach_m:.1g} m)",
-            "if the sensors really are that far apart, set the nominal distance; otherwise do not use this pose",
-        )
-    ]
+    return [DataWarning("camera-far-away", {"solved_m": away_m, "expected_m": reach_m})]

@@ -98,7 +98,9 @@ def _placements(count: int) -> str:
 
 
 def _refused(reason: str) -> Unsolvable:
-    return Unsolvable("not-confident", reason, "confirm one or two proposals, or click the reflector in a few frames")
+    return Unsolvable.reported(
+        "not-confident", reason, "confirm one or two proposals, or click the reflector in a few frames"
+    )
 
 
 def _click(proposal: Proposal, number: int) -> ReflectorClick:

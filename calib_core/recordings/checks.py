@@ -61,7 +61,7 @@ def _angle_unit(name: str, plan: ColumnPlan, angles: np.ndarray) -> list[DataWar
         return []
     read = "degrees" if plan.degrees else "radians"
     return [
-        DataWarning(
+        DataWarning.reported(
             "radar-angle-unit", f"{name} {what}; they are read as {read}", f"if they are {hint}: --radar-axes {hint}"
         )
     ]
@@ -76,7 +76,7 @@ def _range(name: str, plan: ColumnPlan, claimed: np.ndarray, own: np.ndarray) ->
     if typical <= 0.1 + 0.02 * float(np.median(own[known])):
         return []
     return [
-        DataWarning(
+        DataWarning.reported(
             "radar-range-contradicts",
             f"{name}: {plan.claimed[0]} and the length of {', '.join(plan.position)} differ by {typical:.2f} m (median); "
             "the positions are used",
@@ -100,7 +100,7 @@ def _azimuth(name: str, plan: ColumnPlan, claimed: np.ndarray, own: np.ndarray) 
     columns = f"{name}: {plan.claimed[1]} and the direction of {plan.position[0]}, {plan.position[1]}"
     if error > 0.1:
         return [
-            DataWarning(
+            DataWarning.reported(
                 "radar-azimuth-contradicts",
                 f"{columns} disagree in every unit and sign (by {np.degrees(error):.0f} degrees at best); "
                 "the positions are used",
@@ -110,7 +110,7 @@ def _azimuth(name: str, plan: ColumnPlan, claimed: np.ndarray, own: np.ndarray) 
     if sign > 0:
         return []
     return [
-        DataWarning(
+        DataWarning.reported(
             "radar-azimuth-mirrored",
             f"{columns} have opposite signs; the positions are used, with y to the left",
             f"if y points to the right: {_MIRROR}; the handedness check of the calibration shows which is right",
@@ -123,7 +123,7 @@ def _elevation(name: str, plan: ColumnPlan, claimed: np.ndarray, own: np.ndarray
     if not known.any() or claimed[known].any() or float(np.median(np.abs(own[known]))) < _MIN_ANGLE_RAD:
         return []
     return [
-        DataWarning(
+        DataWarning.reported(
             "radar-elevation-zero",
             f"{name}: {plan.claimed[2]} is always 0, but the heights of the positions are not; the positions are used",
             "no action needed if the driver just does not fill in the angle; otherwise ask its authors what z means",
@@ -142,7 +142,7 @@ def about_lost(name: str, count: int, stamped: StampedTopic) -> list[DataWarning
     if not len(stamped.topic):
         raise MessageError(f"topic {name}: none of its {count} messages can be read: {stamped.fault}")
     return [
-        DataWarning(
+        DataWarning.reported(
             "unreadable-messages",
             f"{stamped.lost} of {count} messages of {name} cannot be read and are skipped: {stamped.fault}",
             "if there are many, copy the file again from its source",
@@ -189,7 +189,7 @@ def check_overlap(
         hint = f"the dates of {local[0]} have no time zone; with --time-zone {zone} they overlap"
     if required:
         raise RecordingError(f"{name}: {what}; {hint}")
-    return [DataWarning("no-overlap", what, hint)]
+    return [DataWarning.reported("no-overlap", what, hint)]
 
 
 def without_certain_zone(
@@ -241,7 +241,7 @@ def about_radar(radar: RadarStream | MergedStream | None) -> list[DataWarning]:
     warnings = []
     if layout.lidar_like:
         warnings.append(
-            DataWarning(
+            DataWarning.reported(
                 "looks-like-lidar",
                 f"{name} looks like a lidar: {layout.description}",
                 "choose the radar with --radar-topic, or add the file that contains it",
@@ -251,7 +251,7 @@ def about_radar(radar: RadarStream | MergedStream | None) -> list[DataWarning]:
     height = height[np.isfinite(height)]
     if len(height) > 1 and np.all(height == height[0]):
         warnings.append(
-            DataWarning(
+            DataWarning.reported(
                 "flat-radar",
                 f"{name} has the same height ({height[0]:g} m) for every return: it measures no elevation",
                 "put the reflector's centre at the radar's height at every placement, and measure the camera position",
@@ -265,7 +265,7 @@ def about_images(images: ImageStream | None) -> list[DataWarning]:
     if images is None or not images.repeated:
         return []
     return [
-        DataWarning(
+        DataWarning.reported(
             "repeated-stamps",
             f"{images.repeated} images of {images.topic.name} have the stamp of another image; only the first of each is shown",
             "no action needed for a few; if there are many, the camera driver writes wrong stamps: try --clock receive",

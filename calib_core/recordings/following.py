@@ -149,7 +149,11 @@ class FollowedRecording(Recording):
         if not self.late:
             return ()
         message = f"{self.late} frames of {self.image_topic} came later than frames with later stamps, and are left out"
-        return (DataWarning("late-frames", message, "open the recording again once it is complete: it then has them"),)
+        return (
+            DataWarning.reported(
+                "late-frames", message, "open the recording again once it is complete: it then has them"
+            ),
+        )
 
     def grow(self) -> Growth:
         """Take in what has been written since.
@@ -215,7 +219,7 @@ def _only_added(before: ImageStream | None, now: ImageStream) -> tuple[ImageStre
 def _other_clocks(before: Assembly, whole: Assembly) -> DataWarning:
     names = sorted(name for name in whole.clocks if whole.clocks[name] != before.clocks.get(name))
     changes = ", ".join(f"{name} ({whole.clocks[name]} instead of {before.clocks.get(name)})" for name in names)
-    return DataWarning(
+    return DataWarning.reported(
         "clock-chosen-early",
         f"with the whole recording, another clock would be chosen for {changes}",
         "the clicks are kept in the frames they were made in; give --clock header or --clock receive to open it in the same way",

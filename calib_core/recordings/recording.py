@@ -38,6 +38,7 @@ from calib_core.recordings.time.written_times import parse_zone
 from calib_core.recordings.topics import Topic, TopicSummary, join_topics, read_stamps
 from calib_core.results import InputFile
 from calib_core.results.confirmation import lost_returns
+from calib_core.words import told
 
 _HASH_BYTES = 1 << 22
 _STAMP_BYTES = 12
@@ -191,7 +192,7 @@ class Recording:
         for part in self._assembly.radar.parts if self._assembly.radar else ():
             if part.unreadable:
                 row, why = next(iter(sorted(part.unreadable.items())))
-                yield DataWarning(
+                yield DataWarning.reported(
                     "unreadable-messages",
                     f"{len(part.unreadable)} radar messages could not be read and count as empty; "
                     f"the first is number {row}: {why}",
@@ -465,7 +466,7 @@ def _assembled(
         unused = next((w for source in sources for w in source.warnings if w.code == "unused-files"), None)
         if unused is None:
             raise
-        raise type(error)(f"{error}; {unused.message}") from error
+        raise type(error)(f"{error}; {told(unused).message}") from error
 
 
 def inspect_recording(paths: "str | Path | Sequence[str | Path]", options: RecordingOptions | None = None) -> Recording:

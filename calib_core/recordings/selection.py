@@ -556,7 +556,7 @@ def _why(best: RadarSensor, others: Sequence[RadarSensor], examined: dict[str, E
 
 def _unclear(best: RadarSensor, comparable: Sequence[RadarSensor]) -> DataWarning:
     listed = "; ".join(_described(sensor) for sensor in comparable)
-    return DataWarning(
+    return DataWarning.reported(
         "several-radars",
         f"there are {len(comparable) + 1} radars with comparable returns: {_described(best)} (used); {listed}",
         f"if another one is to be calibrated, choose it: --radar-topic {comparable[0].name}",
@@ -569,7 +569,7 @@ def _about_frames(examined: Sequence[Examined]) -> list[DataWarning]:
         return []
     listed = ", ".join(f"{one.name} has frame '{one.frame}' ({figures_text(one.figures)})" for one in examined)
     return [
-        DataWarning(
+        DataWarning.reported(
             "radar-frames-differ",
             f"the radar topics that are read as one have different frames: {listed}",
             "positions are not moved from one frame to the other: name only topics of one radar with --radar-topic",

@@ -9,7 +9,7 @@ import numpy as np
 from calib_core.arrays import TimesNs
 from calib_core.errors import RecordingError
 from calib_core.input_files import name_text
-from calib_core.measurements import NS_PER_S, DataWarning, Stamp, TimeNs
+from calib_core.measurements import NS_PER_S, Stamp, TimeNs
 from calib_core.recordings.assembly import times_from
 from calib_core.recordings.containers.sources import StatedAssumption
 from calib_core.recordings.radar.column_plan import ColumnReading
@@ -21,6 +21,7 @@ from calib_core.recordings.time.clock_choice import choose_clock
 from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis, diagnose
 from calib_core.recordings.time.written_times import span_text, utc
 from calib_core.recordings.topics import Rhythm, StampedTopic, TopicSummary, join_topics, read_stamps
+from calib_core.words import WarningText, warning_text
 
 _GAP_PERIODS = 5.0
 _STRETCH_GAP_NS = NS_PER_S
@@ -142,7 +143,7 @@ class RecordingSummary(msgspec.Struct, frozen=True, rename={"warnings": "caution
     radar: RadarSummary | None
     sensors: tuple[RadarSensor, ...]
     camera: CameraSummary | None
-    warnings: tuple[DataWarning, ...]
+    warnings: tuple[WarningText, ...]
     assumptions: tuple[StatedAssumption, ...] = ()
 
 
@@ -164,7 +165,7 @@ def recording_summary(recording: Recording) -> RecordingSummary:
         radar=_radar(recording),
         sensors=recording.radar_sensors,
         camera=_camera(recording),
-        warnings=recording.warnings,
+        warnings=tuple(map(warning_text, recording.warnings)),
         assumptions=recording.stated_assumptions,
     )
 

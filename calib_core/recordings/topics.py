@@ -220,7 +220,7 @@ def join_topics(
     if not repeated:
         return topics, ()
     where = ", ".join(topic.name for topic in topics if topic.repeated)
-    warning = DataWarning(
+    warning = DataWarning.reported(
         "repeated-messages",
         f"{repeated} messages of {where} occur in several files; each is used once",
         "give each recording only once: a folder that also contains a converted copy counts twice",

@@ -13,7 +13,6 @@ import msgspec
 import numpy as np
 
 from calib_core.errors import MessageError, RecordingError
-from calib_core.measurements import DataWarning
 from calib_core.recordings.camera.images import ImageLayout, is_picture
 from calib_core.recordings.camera.jpeg import JPEG_MAGIC, PNG_MAGIC, has_end, png_fault
 from calib_core.recordings.containers.chunks import ChunkedSource
@@ -23,6 +22,7 @@ from calib_core.recordings.messages.definitions import Definition, definition_of
 from calib_core.recordings.plain_files.source import PlainSource
 from calib_core.recordings.recording import LOSSES, Recording
 from calib_core.recordings.summary import FileSummary, files_of
+from calib_core.words import WarningText, warning_text
 
 _PROGRESS_MESSAGES = 200
 
@@ -72,7 +72,7 @@ class Verification(msgspec.Struct, frozen=True):
     sound: bool
     files: tuple[FileSummary, ...]
     topics: tuple[TopicCheck, ...]
-    warnings: tuple[DataWarning, ...]
+    warnings: tuple[WarningText, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +113,7 @@ def verify_recording(
     checks = tuple(sorted(topics.found.values(), key=lambda one: one.topic))
     lost = any(one.damaged or one.undecodable for one in checks)
     sound = not lost and not any(warning.code in LOSSES for warning in warnings)
-    return Verification(sound, files_of(recording), checks, warnings)
+    return Verification(sound, files_of(recording), checks, tuple(map(warning_text, warnings)))
 
 
 def _read_source(source: Source, topics: _Topics, reading: _Reading) -> None:

@@ -8,17 +8,16 @@ import numpy as np
 
 from calib_core.arrays import Matrix66, Points2, Points3, Vector2, Vector3, frozen_array
 from calib_core.camera import Camera
-from calib_core.errors import InputError
-from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
+from calib_core.errors import InputError, in_words
+from calib_core.geometry import RigidTransform
 from calib_core.json_forms import Count, Figure, Name, Share
 from calib_core.measurements import DataWarning, Pair, TimeNs, Unpaired
 from calib_core.options import CalibrationOptions
 from calib_core.radar import AngleMap, RadarErrors
-from calib_core.results.radar_axes import bias_moves, camera_axes_text, sigma_in_radar_axes, without_mounting
+from calib_core.results.radar_axes import bias_moves, without_mounting
 from calib_core.results.systematic_errors import (
     DominantError,
     SystematicErrorResult,
-    dominance_text,
     dominant_errors,
     rescaled,
 )
@@ -310,51 +309,12 @@ class Calibration:
         return rescaled(self.systematic_errors, float(position), float(rotation))
 
     def dominant_errors(self) -> tuple[DominantError, ...]:
-        """Name the errors that make up a third or more of the uncertainty, with what would reduce them."""
-        measured = self.options.solving.camera_position is not None
-        return dominant_errors(self.errors_of_firm, self.firm_covariance, measured=measured)
+        """Name the errors that make up a third or more of the uncertainty."""
+        return dominant_errors(self.errors_of_firm, self.firm_covariance)
 
     def unwrap(self) -> Self:
         """Return itself; `Unsolvable.unwrap` raises."""
         return self
 
     def __str__(self) -> str:
-        """Summarize the calibration in nine lines; a radar that measures no elevation adds one."""
-        used = [pair for pair in self.pairs if not pair.excluded]
-        agreeing = sum(pair.inlier for pair in used)
-        place, quaternion = (
-            self.camera_from_radar.translation_m,
-            quaternion_wxyz_from_matrix(self.camera_from_radar.rotation),
-        )
-        metrics, advised, held_out_px = self.metrics, self.next_placement, self.metrics.held_out_aed_px
-        advice = "none" if advised is None else "no further placement is needed"
-        if advised is not None and not advised.may_stop:
-            x_m, y_m, z_m = advised.position_radar_m
-            percent = 100.0 * (1.0 - 1.0 / advised.gain)
-            advice = f"({x_m:.1f}, {y_m:.1f}, {z_m:.1f}) m would reduce the pose uncertainty by {percent:.0f} %"
-        return "\n".join(
-            (
-                f"camera_from_radar, method {self.options.method}: {agreeing} of {len(used)} clicks agree",
-                "  translation     " + " ".join(f"{value:.4f}" for value in place) + " m",
-                "  quaternion wxyz " + " ".join(f"{value:.6f}" for value in quaternion),
-                *(f"  {line}" for line in self._uncertainty_lines()),
-                f"  residuals       AED {metrics.aed_px:.2f} px, CDSD {metrics.cdsd_px:.2f} px, RMS {metrics.rms_px:.2f} px",
-                "  held-out AED    " + (f"{held_out_px:.2f} px" if np.isfinite(held_out_px) else "unknown"),
-                "  warnings        " + (", ".join(warning.code for warning in self.warnings) or "none"),
-                "  next placement  " + advice,
-            )
-        )
-
-    def _uncertainty_lines(self) -> tuple[str, ...]:
-        """Say how certain the pose is, and which errors make up a third or more of that."""
-        stated, firm = self.covariance, self.firm_covariance
-        if not np.isfinite(stated).all():
-            unknown = "unknown: this method has no noise model"
-            return f"one sigma       {unknown}", "systematic      unknown"
-        if self.sees_elevation:
-            lines: tuple[str, ...] = (f"one sigma       {camera_axes_text(stated)}",)
-        else:
-            known, assumed = (sigma_in_radar_axes(self.camera_from_radar, one) for one in (firm, stated))
-            picture = f"in the picture {self.metrics.picture_sigma_px:.1f} px"
-            lines = (f"one sigma       {known.firm_text}; {picture}", f"not measured    {assumed.open_text}")
-        return (*lines, "systematic      " + dominance_text(self.dominant_errors()))
+        return in_words(self)

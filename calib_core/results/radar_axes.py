@@ -27,25 +27,6 @@ class RadarAxesSigma:
         object.__setattr__(self, "position_m", frozen_array(self.position_m, (3,)))
         object.__setattr__(self, "rotation_rad", frozen_array(self.rotation_rad, (3,)))
 
-    @property
-    def firm_text(self) -> str:
-        """What a radar without elevation determines."""
-        forward, left = 100.0 * self.position_m[:2]
-        return f"forward {forward:.1f}, left {left:.1f} cm; yaw {np.rad2deg(self.rotation_rad[2]):.2f} deg"
-
-    @property
-    def open_text(self) -> str:
-        """What such a radar leaves to assumptions."""
-        roll, pitch = np.rad2deg(self.rotation_rad[:2])
-        return f"up {100.0 * self.position_m[2]:.0f} cm; pitch {pitch:.1f}, roll {roll:.1f} deg: the radar has no elevation"
-
-
-def camera_axes_text(covariance: Matrix66) -> str:
-    """Write the standard deviations of the translation and of the rotation about the camera's x, y and z axes."""
-    sigma = np.sqrt(np.diag(covariance))
-    (x, y, z), (about_x, about_y, about_z) = 100.0 * sigma[:3], np.rad2deg(sigma[3:])
-    return f"x {x:.2f}, y {y:.2f}, z {z:.2f} cm; about x {about_x:.3f}, y {about_y:.3f}, z {about_z:.3f} deg"
-
 
 def sigma_in_radar_axes(camera_from_radar: RigidTransform, covariance: Matrix66) -> RadarAxesSigma:
     """Turn the covariance (6, 6) of (dt, dtheta) into standard deviations in the radar's axes."""

@@ -1,4 +1,4 @@
-"""Systematic errors: what is wrong with every pair alike, with a prior for each, in the estimate, in the covariance and in words.
+"""Systematic errors: what is wrong with every pair alike, with a prior for each, in the estimate and in the covariance.
 
 With eta these errors, h the radar's way of reporting and o, K the click's and the lens's, the model of `measurement_model` is
 
@@ -16,8 +16,9 @@ focal lengths tied to one another) is no special case. What is reported is l, by
 errors of the lens are estimated, and the model is linearized through the camera at their present values.
 
 The derivative belongs at the estimated true position mu: at the measured one it is correlated with the noise, and a scale
-comes out too large. A new error is one more entry of `systematic_errors`, and of `ERROR_WORDS` with what it is called. Files keep
-what is known of it (`SystematicErrorResult`); `dominant_errors` and `systematic_error_warnings` say what to do about it.
+comes out too large. A new error is one more entry of `systematic_errors`, and of
+`calib_core.words.systematic_errors` with what it is called. Files keep what is known of it (`SystematicErrorResult`);
+`dominant_errors` and `systematic_error_warnings` find those that matter.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -58,7 +59,7 @@ class Sensitivity:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SystematicError:
-    """One error that all pairs share; `error_words` says what it is called.
+    """One error that all pairs share.
 
     Attributes:
         name: key in files, with its unit; a scale without one.
@@ -444,17 +445,10 @@ def useless_covariance(camera: Camera, *, refining: bool) -> Unsolvable | None:
     for name, value_px, limit_px in zip(camera.parameter_names, camera.parameters, limits_px, strict=False):
         if (sigma_px := known.sigma(name)) > limit_px:
             return Unsolvable(
-                "useless-lens-covariance",
-                f"the camera's covariance says that {name}, {value_px:.0f} px, is known to ± {sigma_px:.0f} px, as if the lens "
-                "had not been calibrated",
-                "check the covariance's order and units (variances in px²), remove it, or calibrate the lens with a board",
+                "useless-lens-covariance", {"parameter": name, "value_px": float(value_px), "sigma_px": float(sigma_px)}
             )
     if refining and not known.matrix.diagonal().any():
-        return Unsolvable(
-            "useless-lens-covariance",
-            "the intrinsics are to be refined, but the camera's covariance says that they are exact",
-            "turn refining off, or remove the covariance, to refine them with the sigmas of the refining options",
-        )
+        return Unsolvable("useless-lens-covariance")
     return None
 
 
@@ -475,168 +469,9 @@ def shared_out(mixed: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     return np.asarray((mixed / scale @ whitened) ** 2)
 
 
-@dataclass(frozen=True, slots=True)
-class ErrorWords:
-    """How an error is shown.
-
-    Attributes:
-        label: a few words, for tables.
-        text: what it is, within a sentence.
-        factor: from its own unit to the one shown.
-        unit: shown behind the number; "" if it has none.
-        remedy: what would reduce its part in the uncertainty.
-        remedy_with_tape: the same if the camera position is measured already; "" if it is no different.
-        family: label and text of errors along several axes together; empty if it stands alone.
-        named_in_family: whether the largest of a family is named with it.
-        stated: where its standard deviation before any pair comes from, after the number.
-    """
-
-    label: str
-    text: str
-    factor: float
-    unit: str
-    remedy: str
-    remedy_with_tape: str = ""
-    family: tuple[str, ...] = ()
-    named_in_family: bool = False
-    stated: str = "assumed"
-
-
-_PERCENT = (100.0, "%")
-_CENTIMETRES = (100.0, "cm")
-_EDGES = "placements at both edges of the picture"
-_HEIGHTS = "placements at several heights (a tripod)"
-_TAPE = "a tape-measured camera position"
-_PHASE_CENTRE = ("clicks off the phase centre", "the distance of the clicked point from the radar's phase centre")
-_CLICKED = ("clicks or principal point", "the principal point, or what one person's clicks are all off by")
-_APEX = (
-    "clicking the reflector's apex, where its three sheets meet, and stating a smaller sigma for it, would reduce it"
-)
-_PRINCIPAL_POINT = (
-    "a camera calibration that determines the principal point well, and its error as lens.principal_point_sigma_px, "
-    "would reduce it"
-)
-_REFINED_CENTRE = ("principal point", "the principal point")
-_CALIBRATED_LENS = ("lens", "the lens, as far as its calibration knows it")
-_BOARD = "a camera calibration with more views of the board, over the whole picture, would reduce it"
-_LENS = "a better camera calibration, and its error as lens.focal_length_sigma, would reduce it"
-
-ERROR_WORDS: dict[str, ErrorWords] = {
-    "azimuth_scale": ErrorWords(
-        "azimuth scale",
-        "the radar's azimuth scale",
-        *_PERCENT,
-        f"{_TAPE}, or {_EDGES}, would reduce it",
-        f"{_EDGES} would reduce it",
-    ),
-    "elevation_scale": ErrorWords(
-        "elevation scale",
-        "the radar's elevation scale",
-        *_PERCENT,
-        f"{_TAPE}, or {_HEIGHTS}, would reduce it",
-        f"{_HEIGHTS} would reduce it",
-    ),
-    "squared_height_m2": ErrorWords(
-        "height, squared",
-        "the height of the placements",
-        1.0,
-        "m²",
-        "near placements, and the reflector's centre at the radar's height, would reduce it",
-    ),
-    "range_bias_m": ErrorWords(
-        "range bias",
-        "a constant range error",
-        *_CENTIMETRES,
-        "comparing one placement's range with a tape, and stating a smaller sigma for it, would reduce it",
-    ),
-    "range_scale": ErrorWords(
-        "range scale",
-        "the radar's range scale",
-        *_PERCENT,
-        "comparing a far placement's range with a tape, and stating a smaller sigma for it, would reduce it",
-    ),
-    "reflector_right_m": ErrorWords(
-        "clicks right of centre",
-        "clicks to the right of the radar's phase centre",
-        *_CENTIMETRES,
-        _APEX,
-        family=_PHASE_CENTRE,
-    ),
-    "reflector_down_m": ErrorWords(
-        "clicks below centre",
-        "clicks below the radar's phase centre",
-        *_CENTIMETRES,
-        _APEX,
-        family=_PHASE_CENTRE,
-    ),
-    "reflector_forward_m": ErrorWords(
-        "clicks beyond centre",
-        "clicks beyond the radar's phase centre",
-        *_CENTIMETRES,
-        _APEX,
-        family=_PHASE_CENTRE,
-    ),
-    "click_right_px": ErrorWords(
-        "clicks off, right",
-        "clicks or the principal point too far to the right",
-        1.0,
-        "px",
-        _PRINCIPAL_POINT,
-        family=_CLICKED,
-    ),
-    "click_down_px": ErrorWords(
-        "clicks off, down",
-        "clicks or the principal point too far down",
-        1.0,
-        "px",
-        _PRINCIPAL_POINT,
-        family=_CLICKED,
-    ),
-    "focal_length": ErrorWords("focal length", "the focal length", *_PERCENT, _LENS),
-    "principal_right_px": ErrorWords(
-        "principal point, right", "the principal point's column", 1.0, "px", _BOARD, family=_REFINED_CENTRE
-    ),
-    "principal_down_px": ErrorWords(
-        "principal point, down", "the principal point's row", 1.0, "px", _BOARD, family=_REFINED_CENTRE
-    ),
-    "distortion": ErrorWords("distortion (k1)", "the lens distortion", 1.0, "", _LENS),
-}
-"""By the name of the error; those of a lens with a covariance are made by `error_words`."""
-
-_LENS_NAMES = {
-    "fx_px": ("focal length fx", "the focal length fx"),
-    "fy_px": ("focal length fy", "the focal length fy"),
-    "cx_px": ("principal point, right", "the principal point's column"),
-    "cy_px": ("principal point, down", "the principal point's row"),
-}
-
-
-def error_words(name: str) -> ErrorWords:
-    """Return how an error is shown; one of a later version by its name."""
-    known = ERROR_WORDS.get(name)
-    if known is not None:
-        return known
-    if not name.startswith("lens_"):
-        return ErrorWords(name, name, 1.0, "", "more placements may reduce it")
-    parameter = name.removeprefix("lens_")
-    label, text = _LENS_NAMES.get(parameter, (f"distortion {parameter}", f"the lens distortion ({parameter})"))
-    unit = "px" if parameter.endswith("_px") else ""
-    return ErrorWords(
-        label, text, 1.0, unit, _BOARD, family=_CALIBRATED_LENS, named_in_family=True, stated="by its calibration"
-    )
-
-
 _DOMINANT_SHARE = 1.0 / 3.0
 _UNDETERMINED = 0.97  # of the prior's sigma: the pairs say nothing
 _BEYOND = 3.0  # standard deviations of the prior
-_WOULD_REDUCE = " would reduce it"
-_SHARES = (
-    (0.9, "nearly all"),
-    (0.71, "about three quarters"),
-    (0.58, "about two thirds"),
-    (0.44, "about half"),
-    (0.0, "about a third"),
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -662,11 +497,6 @@ class SystematicErrorResult:
     rotation_share: float = 0.0
 
     @property
-    def text(self) -> str:
-        """What it is, within a sentence."""
-        return error_words(self.name).text
-
-    @property
     def of_lens(self) -> bool:
         """Whether it is one of the intrinsics."""
         return self.name.startswith(("lens_", "principal_", "focal_length", "distortion"))
@@ -677,35 +507,38 @@ class DominantError:
     """An error, or one along several axes, with a third or more of the variance of the position, the rotation or both.
 
     Attributes:
-        position_share: its part of the variance of the translation; 0 if below a third.
+        largest: of one kind, such as the clicks' distance from the phase centre along three axes.
+        position_share: their part of the variance of the translation; 0 if below a third.
         rotation_share: the same of the rotation.
-        label: a few words: which error it is, and what is known of it.
-        sentence: its part in the uncertainty, and what is known of it.
-        remedy: what would reduce it, as the end of that sentence.
-        action: the same as a sentence of its own without a full stop.
+        position_cm: standard deviation of the whole translation.
+        rotation_deg: the same of the rotation.
     """
 
+    largest: SystematicErrorResult
     position_share: float
     rotation_share: float
-    label: str
-    sentence: str
-    remedy: str
-    action: str
+    position_cm: float
+    rotation_deg: float
 
 
-def dominant_errors(
-    errors: Sequence[SystematicErrorResult], covariance: Matrix66, *, measured: bool
-) -> tuple[DominantError, ...]:
-    """Name the errors that make up most of the uncertainty, the largest share first: at most one each of position and rotation.
+_FAMILIES = ("reflector_", "click_", "principal_", "lens_")
+
+
+def family_of(name: str) -> str:
+    """Return what errors along several axes have in common, as the beginning of their names; the name of one that is alone."""
+    return next((family for family in _FAMILIES if name.startswith(family)), name)
+
+
+def dominant_errors(errors: Sequence[SystematicErrorResult], covariance: Matrix66) -> tuple[DominantError, ...]:
+    """Find the errors that make up most of the uncertainty, the largest share first: at most one each of position and rotation.
 
     Args:
         errors: all that the pairs share.
         covariance: (6, 6) of (dt, dtheta) [m, rad].
-        measured: whether the camera position was measured, so that a tape is no remedy.
     """
     families: dict[str, list[SystematicErrorResult]] = {}
-    for one in errors:
-        families.setdefault("".join(error_words(one.name).family) or one.name, []).append(one)
+    for error in errors:
+        families.setdefault(family_of(error.name), []).append(error)
     shares = {
         name: (_sum_of(rows, "position_share"), _sum_of(rows, "rotation_share")) for name, rows in families.items()
     }
@@ -714,11 +547,19 @@ def dominant_errors(
         most = max(shares, key=lambda name: shares[name][part], default="")
         if most and shares[most][part] >= _DOMINANT_SHARE:
             chosen.setdefault(most, [0.0, 0.0])[part] = shares[most][part]
-    found = [
-        _dominant(families[name], position, rotation, covariance, measured)
+    position_cm = 100.0 * float(np.sqrt(np.trace(covariance[:3, :3])))
+    rotation_deg = float(np.rad2deg(np.sqrt(np.trace(covariance[3:, 3:]))))
+    dominant = [
+        DominantError(
+            max(families[name], key=lambda row: row.position_share + row.rotation_share),
+            position,
+            rotation,
+            position_cm,
+            rotation_deg,
+        )
         for name, (position, rotation) in chosen.items()
     ]
-    return tuple(sorted(found, key=lambda one: -max(one.position_share, one.rotation_share)))
+    return tuple(sorted(dominant, key=lambda error: -max(error.position_share, error.rotation_share)))
 
 
 def rescaled(
@@ -735,68 +576,6 @@ def _sum_of(rows: Sequence[SystematicErrorResult], share: str) -> float:
     return min(float(sum(getattr(row, share) for row in rows)), 1.0)
 
 
-def _dominant(
-    rows: Sequence[SystematicErrorResult],
-    position_share: float,
-    rotation_share: float,
-    covariance: Matrix66,
-    measured: bool,
-) -> DominantError:
-    largest = max(rows, key=lambda row: row.position_share + row.rotation_share)
-    words, known = error_words(largest.name), knowledge_text(largest)
-    position_cm = 100.0 * float(np.sqrt(np.trace(covariance[:3, :3])))
-    rotation_deg = float(np.rad2deg(np.sqrt(np.trace(covariance[3:, 3:]))))
-    parts = []
-    if position_share:
-        parts.append(f"{_share_text(position_share)} of the variance of the position ({_two_digits(position_cm)} cm)")
-    if rotation_share:
-        parts.append(f"{_share_text(rotation_share)} of that of the rotation ({_two_digits(rotation_deg)} deg)")
-    if not position_share:
-        parts = [parts[0].replace("that of", "the variance of")]
-    label, name = words.family or (words.label, words.text)
-    if words.named_in_family:
-        label, name = f"{label}, {words.label}", f"{name}, above all {words.text}"
-    come = "come" if len(parts) > 1 else "comes"
-    remedy = (words.remedy_with_tape if measured else "") or words.remedy
-    whole = f"{remedy[:1].upper()}{remedy[1:].removesuffix(_WOULD_REDUCE)}"
-    return DominantError(
-        position_share=position_share,
-        rotation_share=rotation_share,
-        label=f"{label} {_value_text(largest) if is_determined(largest) else known.partition(f' {words.stated}')[0]}",
-        sentence=f"{' and '.join(parts)} {come} from {name}: {known}",
-        remedy=remedy,
-        action=f"{whole} would help most",
-    )
-
-
-def dominance_text(dominant: Sequence[DominantError]) -> str:
-    """Name these errors with their shares, in one line."""
-    parts = [
-        f"{100 * share:.0f} % of the {what}: {one.label}"
-        for one in dominant
-        for what, share in (("position", one.position_share), ("rotation", one.rotation_share))
-        if share
-    ]
-    return "; ".join(parts) or "none with a third of the uncertainty"
-
-
-def _share_text(share: float) -> str:
-    return next(words for least, words in _SHARES if share >= least)
-
-
-def _two_digits(value: float) -> str:
-    return f"{value:.2g}" if value < 99.5 else f"{value:.0f}"
-
-
-def knowledge_text(error: SystematicErrorResult) -> str:
-    """Say what is known of an error: "+1.2 ± 0.9 %, ± 2 % before any pair", or that the pairs do not determine it."""
-    words = error_words(error.name)
-    prior = f"± {_two_digits(words.factor * error.prior_sigma)} {words.unit}".rstrip()
-    if not is_determined(error) and not is_beyond_its_prior(error):
-        return f"{prior} {words.stated}, the pairs do not determine it"
-    return f"{_value_text(error)}, {prior} before any pair"
-
-
 def is_determined(error: SystematicErrorResult) -> bool:
     """Return whether the pairs say anything about an error."""
     return error.sigma <= _UNDETERMINED * error.prior_sigma
@@ -805,13 +584,6 @@ def is_determined(error: SystematicErrorResult) -> bool:
 def is_beyond_its_prior(error: SystematicErrorResult) -> bool:
     """Whether an error was estimated so large that what was stated of it before any pair cannot be right."""
     return error.estimated and 0.0 < _BEYOND * error.prior_sigma < abs(error.value)
-
-
-def _value_text(error: SystematicErrorResult) -> str:
-    words = error_words(error.name)
-    sigma = words.factor * error.sigma
-    decimals = max(0, 1 - int(np.floor(np.log10(sigma)))) if sigma > 0.0 else 2
-    return f"{words.factor * error.value:+.{decimals}f} ± {sigma:.{decimals}f} {words.unit}".rstrip()
 
 
 _CLEAR_SIGMAS = 3.0
@@ -831,59 +603,43 @@ def systematic_error_warnings(
         flat: whether the radar does not measure elevation.
         measured: whether the camera position was measured, so that its error is one of the causes.
     """
-    tape = "; so would a camera that is not where it was measured" if measured else ""
-    alone = {one.name: (one, *_by_pairs_alone(one, by_fit[one.name])) for one in errors if one.name in by_fit}
+    alone = {
+        error.name: (error, *_by_pairs_alone(error, by_fit[error.name])) for error in errors if error.name in by_fit
+    }
     beyond = {
-        name: _beyond_its_prior(one, size, sigma)
-        for name, (one, size, sigma) in alone.items()
-        if by_fit[name] ** 2 < (1.0 - _LEAST_TOLD) * one.prior_sigma**2
-        and size > _BEYOND * np.hypot(sigma, one.prior_sigma)
+        name: _beyond_its_prior(error, size, sigma)
+        for name, (error, size, sigma) in alone.items()
+        if by_fit[name] ** 2 < (1.0 - _LEAST_TOLD) * error.prior_sigma**2
+        and size > _BEYOND * np.hypot(sigma, error.prior_sigma)
     }
     scales = [
-        _azimuth_scale(one, tape, flat=flat) if one.name == "azimuth_scale" else _elevation_scale(one, tape)
-        for one in errors
-        if one.name in _SCALES and one.name not in beyond and _is_clear(one) and abs(one.value) > _NOTABLE_SCALE
+        _angle_scale(error, flat=flat, measured=measured)
+        for error in errors
+        if error.name in _SCALES and error.name not in beyond and _is_clear(error) and abs(error.value) > _NOTABLE_SCALE
     ]
     return [*beyond.values(), *scales]
 
 
-def _beyond_its_prior(one: SystematicErrorResult, size: float, sigma: float) -> DataWarning:
-    words = error_words(one.name)
-    found = _value_text(replace(one, value=float(np.copysign(size, one.value)), sigma=sigma))
-    name = f"{words.family[1]} ({words.label})" if words.family else words.text
-    return DataWarning(
-        "shared-error-suspected",
-        f"{name}: {found} by the pairs, where ± {_two_digits(words.factor * one.prior_sigma)} {words.unit} is assumed",
-        "check that each pair has the reflector's return, not one of what stands behind it, and that the intrinsics are of this "
-        "very picture, uncropped; if the error is really so large, give it a larger sigma among the options",
-    )
+def _beyond_its_prior(error: SystematicErrorResult, size: float, sigma: float) -> DataWarning:
+    value = float(np.copysign(size, error.value))
+    facts = {"error": error.name, "value": value, "sigma": sigma, "prior_sigma": error.prior_sigma}
+    return DataWarning("shared-error-suspected", facts)
 
 
-def _is_clear(one: SystematicErrorResult) -> bool:
-    return one.estimated and abs(one.value) > _CLEAR_SIGMAS * one.sigma
+def _is_clear(error: SystematicErrorResult) -> bool:
+    return error.estimated and abs(error.value) > _CLEAR_SIGMAS * error.sigma
 
 
-def _azimuth_scale(one: SystematicErrorResult, tape: str, *, flat: bool) -> DataWarning:
-    size, length = ("large", "long") if one.value > 0.0 else ("small", "short")
-    tilted = "; so would a tilt of the radar" if flat and one.value > 0.0 else ""
-    return DataWarning(
-        "angle-scale",
-        f"the radar's azimuths look {_percent(one)} too {size}; a given focal length that is too {length} by the same amount "
-        f"would look the same, and pairs cannot tell them apart{tilted}{tape}",
-        "check the element spacing and wavelength that the radar's driver assumes, and whether the intrinsics belong to this "
-        "camera, lens, zoom and image size; whichever is known to be right, give it a smaller sigma among the options",
-    )
-
-
-def _elevation_scale(one: SystematicErrorResult, tape: str) -> DataWarning:
-    size, side = ("large", "above") if one.value > 0.0 else ("small", "below")
-    return DataWarning(
-        "angle-scale",
-        f"the radar's elevations look {_percent(one)} too {size}; on flat ground, clicks {side} the radar's phase centre would "
-        f"look the same{tape}",
-        "click the reflector's apex, where its three sheets meet, not its mouth or its stand; to tell the two apart, put a few "
-        "placements at other heights (a tripod)",
-    )
+def _angle_scale(error: SystematicErrorResult, *, flat: bool, measured: bool) -> DataWarning:
+    size, sigma = _by_pairs_alone(error, error.sigma)
+    facts = {
+        "error": error.name,
+        "value": float(np.copysign(size, error.value)),
+        "sigma": sigma,
+        "flat": flat,
+        "measured": measured,
+    }
+    return DataWarning("angle-scale", facts)
 
 
 def _by_pairs_alone(one: SystematicErrorResult, by_fit: float) -> tuple[float, float]:
@@ -895,8 +651,3 @@ def _by_pairs_alone(one: SystematicErrorResult, by_fit: float) -> tuple[float, f
     prior, share = one.prior_sigma, max(1.0 - (by_fit / one.prior_sigma) ** 2, _LEAST_TOLD)
     variance = one.sigma**2 - ((1.0 - share) * prior) ** 2
     return abs(one.value) / share, float(np.sqrt(max(variance, 0.0))) / share
-
-
-def _percent(one: SystematicErrorResult) -> str:
-    value, sigma = _by_pairs_alone(one, one.sigma)
-    return f"{100.0 * value:.1f} ± {100.0 * sigma:.1f} %"

@@ -1,18 +1,31 @@
-"""The verdict on a calibration: how far to trust it, in one line, and the one action that helps most.
+"""The verdict on a calibration: how far to trust it, and the one action that helps most; `calib_core.words` says it.
 
 A good or usable calibration states its error, which holds in 95 % of such calibrations. The limits below and the consequence of
 each warning decide the level; docs/warnings.md lists both, and the measured shares.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from typing import Literal, TypeAlias
 
 import numpy as np
 
+from calib_core.errors import in_words
 from calib_core.geometry import camera_position_jacobian
 from calib_core.measurements import DataWarning, Unsolvable
-from calib_core.results.calibration import Calibration, NextPlacement
+from calib_core.results.actions import (
+    Action,
+    ClickFirst,
+    ClickMore,
+    ConfirmAssumptions,
+    Export,
+    FollowHint,
+    PlaceReflector,
+    ReduceError,
+    SetOption,
+    Stop,
+)
+from calib_core.results.calibration import Calibration
 from calib_core.results.systematic_errors import scaled_px
 
 _BEYOND = 0.05 / 3.0  # rotation, position and picture hold together, so each may fail in a third of the 5 %
@@ -38,17 +51,6 @@ class StatedError:
     picture_px: float
     range_m: float
     in_plane: bool
-
-    @property
-    def text(self) -> str:
-        """The figures within a sentence: "0.5 deg, 6 cm (95 %); 7 px at 9 m"."""
-        pose = (
-            f"{self.rotation_deg:g} deg of yaw"
-            if self.in_plane
-            else f"{self.rotation_deg:g} deg, {self.position_cm:g} cm"
-        )
-        picture = f"; {self.picture_px:g} px at {self.range_m:.0f} m" if np.isfinite(self.picture_px) else ""
-        return f"{pose} (95 %){picture}{'; height and tilt assumed' if self.in_plane else ''}"
 
 
 def stated_error(calibration: Calibration) -> StatedError:
@@ -140,14 +142,27 @@ _CONTRADICTIONS = ("mirrored-axes", "no-pose", "no-consensus", "refinement-diver
 _MORE_PAIRS_HELP = ("many-outliers", "repeated-placements")
 _NOT_MIRRORED = "handedness-assumed"
 _FEW = "few-pairs"
-_BETWEEN = {"good": ": within ", "usable": ": within ", "nothing": " yet: "}
 _LEAST_VARIANCE, _MOST_VARIANCE = 1e-18, 1e12
-_CORNER = "the reflector's inner corner, where its three sheets meet"
-DONE = "Done: export the calibration"
-"""The action when nothing more is needed."""
-ALL_CLICKED = "Done with this recording: every placement is clicked"
-"""How the action begins when only more than this recording would help."""
-_DEFAULT_METHOD = "Solve with the default method, which states the error of the pose and leaves wrong pairs out"
+_BY_DEFAULT = SetOption("method", "default")
+
+
+@dataclass(frozen=True, slots=True)
+class Assumed:
+    """What a stated error rests on and no pair can show: what moves the pose and leaves every residual as it is.
+
+    Attributes:
+        measured: the camera position was measured, and is right; otherwise, that the phase centre was clicked.
+        alone_cm: how well the pairs alone place the camera; NaN if unknown, or not measured.
+        not_mirrored: no radar axis is mirrored.
+        elevations: the radar's elevations are right.
+        principal_point_px: how far the principal point may be off, which the rotation absorbs; NaN if its calibration says so.
+    """
+
+    measured: bool
+    alone_cm: float
+    not_mirrored: bool
+    elevations: bool
+    principal_point_px: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,23 +172,39 @@ class Verdict:
     Attributes:
         level: how large the error is, which holds with 95 %: "good", "usable" or "coarse"; or "contradictory": the data
             contradict the pose or each other; or "nothing": there is no calibration.
-        reason: the stated error, or what contradicts; without a full stop.
-        action: the one thing that helps most; a sentence without a full stop.
-        assumes: what the stated error rests on and no pair can show; without a full stop, empty if there is nothing.
+        action: the one thing that helps most.
+        error: that is stated; None if the method states none, or something else decides.
+        cause: what decides the level, if it is not the size of the error.
+        rms_px: of the residuals, where a method states no error; NaN otherwise.
+        pairs: how many agree, where they are fewer than `SURE_PAIRS`; else 0.
+        unconfirmed: how many units, signs or meanings are assumed of the recording.
+        everything_clicked: only more than this recording can help.
+        assumed: what the stated error rests on; None if there is none.
     """
 
     level: VerdictLevel
-    reason: str
-    action: str
-    assumes: str = ""
+    action: Action
+    _: KW_ONLY
+    error: StatedError | None = None
+    cause: DataWarning | Unsolvable | None = None
+    rms_px: float = float("nan")
+    pairs: int = 0
+    unconfirmed: int = 0
+    everything_clicked: bool = False
+    assumed: Assumed | None = None
 
     @property
-    def line(self) -> str:
-        """Level and reason: "usable: within 0.5 deg, 6 cm (95 %); 7 px at 20 m"."""
-        return f"{self.level}{_BETWEEN.get(self.level, ': ')}{self.reason}"
+    def done(self) -> bool:
+        """Whether nothing more is needed, or can be had of this recording."""
+        return self.everything_clicked or isinstance(self.action, Export)
+
+    @property
+    def is_only_large(self) -> bool:
+        """Whether nothing but the size of its error makes a calibration coarse: no warning, and enough pairs."""
+        return self.level == "coarse" and self.error is not None and self.cause is None and not self.pairs
 
     def __str__(self) -> str:
-        return f"{self.line}\n  {self.action}"
+        return in_words(self)
 
 
 def verdict_on(outcome: Calibration | Unsolvable | None, *, left: int | None = None, unconfirmed: int = 0) -> Verdict:
@@ -185,46 +216,34 @@ def verdict_on(outcome: Calibration | Unsolvable | None, *, left: int | None = N
         unconfirmed: how many units, signs or meanings are assumed of the recording and not confirmed.
     """
     if outcome is None:
-        where = "Go to a placement" if left else "Go to a frame in which the reflector stands still"
-        return Verdict("nothing", "no placement is clicked", f"{where} and click {_CORNER}")
+        return Verdict("nothing", ClickFirst(bool(left)))
     if isinstance(outcome, Unsolvable):
         level: VerdictLevel = "contradictory" if outcome.code in _CONTRADICTIONS else "nothing"
-        if left and outcome.code == "too-few-pairs" and not outcome.unpaired:
-            return Verdict(level, outcome.reason, _click_the_rest(left))
-        return Verdict(level, outcome.reason, _capitalized(outcome.hint))
+        waits = left and outcome.code == "too-few-pairs" and not outcome.unpaired
+        return Verdict(level, ClickMore(left) if waits else FollowHint(), cause=outcome)
     warning = next(iter(by_consequence(outcome.warnings)), None)
     if warning is not None and consequence_of(warning.code) == "contradictory":
         by_default = outcome.options.models_noise
-        return Verdict("contradictory", warning.message, _capitalized(warning.hint) if by_default else _DEFAULT_METHOD)
+        return Verdict("contradictory", FollowHint() if by_default else _BY_DEFAULT, cause=warning)
     if unconfirmed:
-        reason = f"{unconfirmed} of the recording's units or axes {'is' if unconfirmed == 1 else 'are'} assumed, not confirmed"
-        return Verdict("coarse", reason, "Confirm what is assumed about the recording, or state what is right")
+        return Verdict("coarse", ConfirmAssumptions(), unconfirmed=unconfirmed)
     if not _states_error(outcome):
-        return _without_covariance(outcome, warning)
-    return replace(_judged(outcome, stated_error(outcome), warning, left), assumes=_assumption(outcome))
+        grave = warning if warning is not None and consequence_of(warning.code) == "coarse" else None
+        return Verdict("coarse", _BY_DEFAULT, cause=grave, rms_px=outcome.metrics.rms_px)
+    return replace(_judged(outcome, stated_error(outcome), warning, left), assumed=_assumed(outcome))
 
 
-def _assumption(calibration: Calibration) -> str:
-    """Return what no pair can show: what moves the pose and leaves every residual as it is, or a wrong camera position."""
-    if calibration.options.solving.camera_position is None:
-        first, whose = "you clicked the very point that the radar sees", "its"
-    else:
-        alone_cm = _alone_cm(calibration)
-        known = f" (the pairs alone place it within {alone_cm:g} cm)" if np.isfinite(alone_cm) else ""
-        first, whose = f"the camera was measured right{known}", "the radar's"
-    mirrored = any(warning.code == _NOT_MIRRORED for warning in calibration.warnings)
-    sides = "no radar axis is mirrored, " if mirrored else ""
-    heights = f"{whose} elevations are right, and " if calibration.sees_elevation else ""
-    return f"{first}, {sides}{heights}{_centre_assumed(calibration)}"
-
-
-def _centre_assumed(calibration: Calibration) -> str:
-    """Return what is assumed of the principal point: the rotation absorbs its error, so that no pair shows it."""
+def _assumed(calibration: Calibration) -> Assumed:
+    measured = calibration.options.solving.camera_position is not None
     given, sigma_px = calibration.given_camera or calibration.camera, calibration.options.lens.principal_point_sigma_px
-    if given.covariance is not None or not sigma_px:
-        return "the picture is neither cropped nor resized"
-    within_px = 2.0 * scaled_px(sigma_px, given)
-    return f"the picture is neither cropped nor resized, its principal point right to {within_px:.2g} px"
+    known = given.covariance is not None or not sigma_px
+    return Assumed(
+        measured=measured,
+        alone_cm=_alone_cm(calibration) if measured else float("nan"),
+        not_mirrored=any(warning.code == _NOT_MIRRORED for warning in calibration.warnings),
+        elevations=calibration.sees_elevation,
+        principal_point_px=float("nan") if known else 2.0 * scaled_px(sigma_px, given),
+    )
 
 
 def _alone_cm(calibration: Calibration) -> float:
@@ -249,18 +268,6 @@ def _alone_cm(calibration: Calibration) -> float:
     return _rounded_up(100.0 * _radius(alone, degrees_of_freedom(calibration.covariance_quantile)))
 
 
-def placement_words(best: NextPlacement) -> str:
-    """Say where a placement is: "4.5 m ahead, 2.1 m to the left"."""
-    x_m, y_m, _ = best.position_radar_m
-    if abs(y_m) < 0.1 * abs(x_m):
-        return f"{x_m:.1f} m straight ahead"
-    return f"{x_m:.1f} m ahead, {abs(y_m):.1f} m to the {'left' if y_m > 0 else 'right'}"
-
-
-def _capitalized(phrase: str) -> str:
-    return phrase[:1].upper() + phrase[1:]
-
-
 def _states_error(calibration: Calibration) -> bool:
     """Return whether the covariance can be one of a pose in metres and radians; a file may state anything."""
     variances = np.diag(calibration.covariance)
@@ -269,77 +276,49 @@ def _states_error(calibration: Calibration) -> bool:
     )
 
 
-def _without_covariance(calibration: Calibration, warning: DataWarning | None) -> Verdict:
-    """Judge a pose whose method states no error, as the paper's: nothing can be promised of it."""
-    spread = f"its residuals are {calibration.metrics.rms_px:.3g} px (RMS)"
-    reason = f"the method states no error of its pose; {spread}"
-    if warning is not None and consequence_of(warning.code) == "coarse":
-        return Verdict("coarse", f"{reason}; {warning.message}", _DEFAULT_METHOD)
-    return Verdict("coarse", reason, _DEFAULT_METHOD)
-
-
 def _judged(calibration: Calibration, error: StatedError, warning: DataWarning | None, left: int | None) -> Verdict:
     """Judge a pose by its stated error, and by its gravest warning."""
     consequence: Consequence = "note" if warning is None else consequence_of(warning.code)
     count = sum(pair.inlier for pair in calibration.pairs)
     if warning is not None and consequence == "coarse":
         more = left and warning.code in _MORE_PAIRS_HELP
-        action = _click_the_rest(left) if left and more else _capitalized(warning.hint)
-        return Verdict("coarse", f"{warning.message}; uncertain to {error.text}", action)
+        return Verdict("coarse", ClickMore(left) if more else FollowHint(), error=error, cause=warning)
     if count < SURE_PAIRS:
-        told = next((one for one in calibration.warnings if one.code == _FEW), None)
-        seen = f"{count} of {SURE_PAIRS} pairs" if told is None else told.message
-        helpful = _most_helpful(calibration, left) if told is None or left else _capitalized(told.hint)
-        return Verdict("coarse", f"{seen}; uncertain to {error.text}", helpful)
+        few = next((one for one in calibration.warnings if one.code == _FEW), None)
+        action = _most_helpful(calibration, left) if few is None or left else FollowHint()
+        return Verdict("coarse", action, error=error, cause=few, pairs=count)
     if error.rotation_deg > USABLE_DEG or error.position_cm > USABLE_CM:
-        return Verdict("coarse", f"uncertain to {error.text}", _most_helpful(calibration, left))
+        return Verdict("coarse", _most_helpful(calibration, left), error=error)
     steady = not calibration.metrics.held_out_aed_px > HELD_OUT_RATIO * calibration.metrics.aed_px
     small = error.rotation_deg <= GOOD_DEG and error.position_cm <= GOOD_CM and steady
     if small and consequence == "note":
-        return Verdict("good", error.text, _when_good(calibration, left))
-    better = (
-        _capitalized(warning.hint) if small and warning is not None and not left else _most_helpful(calibration, left)
-    )
-    return Verdict("usable", error.text, f"{ALL_CLICKED}. {better}" if left == 0 else better)
+        return Verdict("good", _when_good(calibration, left), error=error)
+    warned = small and warning is not None and not left
+    action = FollowHint() if warned else _most_helpful(calibration, left)
+    return Verdict("usable", action, error=error, cause=warning if warned else None, everything_clicked=left == 0)
 
 
-def is_only_large(verdict: Verdict, calibration: Calibration) -> bool:
-    """Return whether nothing but the size of its error makes a calibration coarse: no warning, too few pairs, or what is assumed.
-
-    A coarse verdict that says what the stated error assumes judges that error.
-    """
-    judged = verdict.level == "coarse" and verdict.assumes != ""
-    warned = any(consequence_of(one.code) == "coarse" for one in calibration.warnings)
-    return judged and not warned and sum(pair.inlier for pair in calibration.pairs) >= SURE_PAIRS
-
-
-def _click_the_rest(left: int) -> str:
-    return f"Click the {left} placements that are left" if left > 1 else "Click the placement that is left"
-
-
-def _when_good(calibration: Calibration, left: int | None) -> str:
+def _when_good(calibration: Calibration, left: int | None) -> Action:
     """Say that it is done once every placement is clicked, or no further one would help."""
     best = calibration.next_placement
-    if left and not (best is not None and best.may_stop):
-        return f"{_click_the_rest(left)}, or export the calibration"
-    return DONE
+    return ClickMore(left, or_export=True) if left and not (best is not None and best.may_stop) else Export()
 
 
-def _most_helpful(calibration: Calibration, left: int | None) -> str:
+def _most_helpful(calibration: Calibration, left: int | None) -> Action:
     """Return what reduces the uncertainty most: a placement, or what is known of an error that all pairs share.
 
     Knowing an error with a share s of a variance leaves 1 - s of it, so it gains 1 / sqrt(1 - s).
     """
     best, dominant = calibration.next_placement, calibration.dominant_errors()
     if left and (best is None or not best.may_stop):
-        return _click_the_rest(left)
+        return ClickMore(left)
     share = max((max(one.position_share, one.rotation_share) for one in dominant), default=0.0)
     if dominant and (best is None or best.may_stop or best.gain * np.sqrt(max(1.0 - share, 1e-9)) < 1.0):
-        return dominant[0].action
+        return ReduceError(dominant[0].largest.name, calibration.options.solving.camera_position is not None)
     if best is not None and not best.may_stop:
-        percent = 100.0 * (1.0 - 1.0 / best.gain)
-        return f"Put the reflector {placement_words(best)}: that would reduce the pose uncertainty by {percent:.0f} %"
-    return "No further placement would help noticeably: the radar's noise allows no more"
+        forward_m, left_m, up_m = best.position_radar_m.tolist()
+        return PlaceReflector((forward_m, left_m, up_m), best.gain)
+    return Stop()
 
 
 Consequence: TypeAlias = Literal["contradictory", "coarse", "limited", "note"]

@@ -1,7 +1,7 @@
 /** Notices: toasts for errors, the banner for a lost connection, and explanations of figures and controls. */
 
 import { toCss } from "../picture/geometry.js";
-import { clickIn, named, on, state } from "./state.js";
+import { clickIn, on, state } from "./state.js";
 
 const toasts = /** @type {HTMLElement} */ (document.getElementById("toasts"));
 const banner = /** @type {HTMLElement} */ (document.getElementById("banner"));
@@ -20,7 +20,7 @@ let explained = null;
 export function toast(message, hint = "", about = "") {
   const text = toasts.querySelector(".toast span")?.textContent;
   if (text === message) return;
-  const box = make("div", "toast", [make("span", "", named(message)), hint ? make("small", "", named(hint)) : ""]);
+  const box = make("div", "toast", [make("span", "", message), hint ? make("small", "", hint) : ""]);
   box.dataset.about = about;
   const close = make("button", "", "×");
   close.setAttribute("aria-label", "Close");

@@ -188,8 +188,18 @@ export function nameOf(id) {
   return names.get(id) ?? id;
 }
 
-/** Words of the server, with the clicks called as on the page. @param {string} words */
-export const named = (words) => words.replace(/\bc\d+\b/g, (id) => (nameOf(id) === id ? id : `#${nameOf(id)}`));
+/** What a click is called within a sentence. @param {string} id */
+export const called = (id) => (nameOf(id) === id ? id : `#${nameOf(id)}`);
+
+/** Words of the server as text: clicks are called as on the page, options by their labels. @param {import("../messages.js").Words} words */
+export const said = ({ parts }) => parts.map((part) => (typeof part === "string" ? part : "pair" in part ? called(part.pair) : optionWords(part))).join("");
+
+/** @param {import("../messages.js").OptionPart} option */
+function optionWords({ option, value }) {
+  const field = (state.recording?.option_groups ?? []).flatMap((group) => group.options).find(({ path }) => path === option);
+  const name = field?.label ?? option;
+  return value ? `${name} ${value}` : name;
+}
 
 /** Whether a placement has a click, also one that is excluded or does not count. @param {Placement} placement */
 export const isClicked = (placement) => clicksOf(placement).length > 0;

@@ -384,13 +384,13 @@ function beforeSaving(preview) {
   return [make("div", "evidence", preview.evidence), ...missing, ...warningBox(preview.warnings)];
 }
 
-/** The warnings of the calibration. @param {import("../messages.js").DataWarning[]} rows */
+/** The warnings of the calibration. @param {import("../messages.js").WarningRow[]} rows */
 function warningBox(rows) {
   if (!rows.length) return [];
   const title = rows.length === 1 ? "This calibration has one warning" : `This calibration has ${rows.length} warnings`;
   const items = rows.map((row) => {
-    const item = make("li", "", row.message);
-    item.dataset.hint = row.hint;
+    const item = make("li", "", said(row.message));
+    item.dataset.hint = said(row.hint);
     return item;
   });
   const box = make("details", "with-warnings", [make("summary", "", [icon("warning"), title]), make("ul", "", items)]);

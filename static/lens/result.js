@@ -7,7 +7,7 @@ import { ask, content, saveFile } from "../base/asking.js";
 import { ink, rampColour, themeColour } from "../base/colours.js";
 import { make, toast } from "../base/notices.js";
 import { send } from "../base/socket.js";
-import { emit, on, state } from "../base/state.js";
+import { emit, on, said, state } from "../base/state.js";
 import { toDevice, viewport } from "../picture/geometry.js";
 import { goTo, pause } from "../time/player.js";
 
@@ -63,7 +63,7 @@ export function drawLensResult() {
     make("p", "lens-about", `${result.board} · ${result.camera.model} · ${result.camera.field}`),
     ...(result.choice ? [make("p", "lens-choice", result.choice)] : []),
     figures(result),
-    ...result.warnings.map((one) => make("p", "lens-warning", [one.message, make("small", "", ` ${one.hint}`)])),
+    ...result.warnings.map((one) => make("p", "lens-warning", [said(one.message), make("small", "", ` ${said(one.hint)}`)])),
     ...(state.lens?.in_use ? [] : [parameters(result.camera)]),
     make("div", "acts", [use, save]),
     make("div", "lens-plots", [make("figure", "", [residuals, residualWords]), ...(result.uncertainty ? [make("figure", "", [uncertainty, uncertaintyWords])] : [])]),

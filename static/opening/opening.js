@@ -6,7 +6,7 @@
 import { showPage } from "../base/layout.js";
 import { make, toast } from "../base/notices.js";
 import { send, tell, unconfirmed } from "../base/socket.js";
-import { on, state } from "../base/state.js";
+import { on, said, state } from "../base/state.js";
 
 /** @typedef {import("../messages.js").OpeningChoices} Choices */
 /** What the user has chosen in the dialog so far. @typedef {{recent: string, paths: Set<string>, radar: string|null, image: string|null, intrinsics: "keep"|"recorded"|"near"|"file", file: {name: string, data: string, camera: string}|null, session: "continue"|"new"|"copy"}} Draft */
@@ -231,7 +231,7 @@ function drawStrip() {
   if (!recording) return;
   const radars = recording.warnings.find((warning) => warning.code === "several-radars");
   if (recording.has_pictures && !recording.intrinsics) askIntrinsics();
-  else if (radars && !recording.session.restored_clicks) askRadar(radars.message);
+  else if (radars && !recording.session.restored_clicks) askRadar(said(radars.message));
 }
 
 /** @param {string} message */

@@ -268,7 +268,15 @@ export function openOption(path) {
   const folded = line?.closest("details");
   if (folded) folded.open = true;
   line?.scrollIntoView({ block: "center" });
+  const box = /** @type {HTMLInputElement|null|undefined} */ (line?.classList.contains("position") ? line.querySelector("input[type=checkbox]") : null);
+  if (box && !box.checked) return box.click(); // its fields appear, and the first has the focus
   /** @type {HTMLElement|null|undefined} */ (line?.querySelector("input, select, button"))?.focus();
+}
+
+/** @param {string} path */
+function optionLabel(path) {
+  const field = (state.recording?.option_groups ?? []).flatMap((group) => group.options).find((one) => one.path === path);
+  return field ? labelOf(field) : "The option";
 }
 
 /** @param {Record<string, any>} options @param {string} path */
@@ -280,12 +288,6 @@ function showFieldsOf(method) {
   for (const part of /** @type {NodeListOf<HTMLElement>} */ (page.querySelectorAll(".part"))) part.hidden = !part.querySelector("[data-field]:not([hidden])");
 }
 
-/** Replace option names in a message of the server by their labels. @param {string} words */
-function inLabels(words) {
-  const fields = (state.recording?.option_groups ?? []).flatMap((group) => group.options).filter((field) => field.path.includes("."));
-  return fields.reduce((text, field) => text.replace(new RegExp(`(option )?\\b${field.path.replaceAll(".", "\\.")}(\\.\\w+)?\\b`, "g"), labelOf(field)), words);
-}
-
 /** @param {string} path @param {any} value */
 async function change(path, value) {
   if (typeof value === "number" && !Number.isFinite(value)) return fill();
@@ -295,7 +297,7 @@ async function change(path, value) {
   const refusal = await send({ type: "options_changed", options });
   sending -= 1;
   if (refusal) {
-    toast(inLabels(refusal), "The option keeps its previous value.", path);
+    toast(refusal, `${optionLabel(path)} keeps its previous value.`, path);
     /** @type {HTMLElement|null} */ (document.activeElement)?.blur();
   } else settled(path);
   if (!sending) fill();

@@ -4,7 +4,7 @@
  */
 
 import { icon, make } from "../base/notices.js";
-import { named, on, onPainted, state } from "../base/state.js";
+import { on, onPainted, state } from "../base/state.js";
 import { toDevice, viewport, zoom } from "../picture/geometry.js";
 import { fit } from "../picture/picture.js";
 import { searchWords } from "../proposals/proposals.js";
@@ -54,8 +54,8 @@ function drawStatus() {
   const opening = state.opening;
   const found = state.looking ? [state.placementSummary].filter(Boolean) : null;
   const words = found?.length ? found : opening || !view ? [opening?.problem || opening?.doing || "Opening the recording…"] : [...followWords(), doingWords(view)].filter(Boolean);
-  get("status-text").textContent = named(words.join("  ·  "));
-  get("status-text").dataset.hint = named(words.join("\n"));
+  get("status-text").textContent = words.join("  ·  ");
+  get("status-text").dataset.hint = words.join("\n");
   const undo = /** @type {HTMLButtonElement} */ (get("undo"));
   const redo = /** @type {HTMLButtonElement} */ (get("redo"));
   undo.disabled = state.looking || !view?.can_undo;

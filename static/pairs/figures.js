@@ -1,7 +1,7 @@
 /** The top of the panel: how good the answer is; and on the page Check the metrics and the pose. All in the server's text. */
 
 import { make, shape } from "../base/notices.js";
-import { named, onPainted, state } from "../base/state.js";
+import { onPainted, said, state } from "../base/state.js";
 
 /** @typedef {import("../messages.js").Figure} Figure */
 const figures = /** @type {HTMLElement} */ (document.getElementById("figures"));
@@ -41,8 +41,8 @@ function draw() {
   assumedHead.hidden = assumedTable.hidden = view.pose_assumed.length === 0;
   assumedTable.replaceChildren(...view.pose_assumed.map(row));
   drawSystematic(view.systematic_errors);
-  adviceLine.textContent = named(view.advice?.words ?? "");
-  assumedLine.textContent = view.verdict.assumes;
+  adviceLine.textContent = view.advice?.words ?? "";
+  assumedLine.textContent = said(view.verdict.assumes);
   drawReference(view);
 }
 
@@ -59,7 +59,7 @@ function drawReference(view) {
 function drawSystematic(errors) {
   systematic.hidden = errors.rows.length === 0;
   systematicTable.replaceChildren(...errors.rows.map(systematicRow));
-  systematicWords.replaceChildren(...errors.sentences.map((text) => make("p", "", text)));
+  systematicWords.replaceChildren(...errors.sentences.map((sentence) => make("p", "", said(sentence))));
 }
 
 /** @param {import("../messages.js").SystematicErrorRow} error */
@@ -89,17 +89,12 @@ function hinted(element, hint) {
 /** @param {Figure} figure */
 function cell(figure) {
   const value = make("dd", "", [figure.value, make("span", "unit", figure.unit)]);
-  const box = make("dl", `figure ${figure.level}`, [make("dt", "", inTwoLines(figure.label)), value]);
+  const name = figure.abbreviation ? [`${figure.label} `, make("span", "abbreviation", `(${figure.abbreviation})`)] : [figure.label]; // below the name
+  const box = make("dl", `figure ${figure.level}`, [make("dt", "", name), value]);
   box.style.margin = "0";
   box.dataset.key = figure.key;
   box.dataset.hint = figure.hint;
   return box;
-}
-
-/** The paper's abbreviation goes below the name. @param {string} label @returns {(string|Node)[]} */
-function inTwoLines(label) {
-  const [name, abbreviation] = label.split(/ (?=\()/);
-  return abbreviation ? [`${name} `, make("span", "abbreviation", abbreviation)] : [name];
 }
 
 /** @param {Figure} figure */
@@ -134,15 +129,15 @@ function drawVerdict() {
   box.hidden = !view || state.looking;
   if (!view || state.looking) return;
   box.classList.toggle("stale", view.solving && view.has_calibration);
-  const { level, early, assumes } = view.verdict;
-  const line = named(view.verdict.line);
+  const { level, word, early } = view.verdict;
+  const [line, assumes] = [said(view.verdict.line), said(view.verdict.assumes)];
   const aed = view.metrics.find((figure) => figure.key === "aed");
-  const text = JSON.stringify([level, line, early, assumes, aed]);
+  const text = JSON.stringify([level, word, line, early, assumes, aed]);
   if (text === drawn) return;
   drawn = text;
   box.dataset.level = early ? "early" : level;
-  box.dataset.hint = [line, assumes].filter(Boolean).join("\n");
-  const words = line.startsWith(level) ? [make("strong", "", level), line.slice(level.length)] : [line];
+  box.dataset.hint = [word + line, assumes].filter(Boolean).join("\n");
+  const words = word ? [make("strong", "", word), line] : [line];
   const told = aed && view.clicks.filter((click) => click.state === "inlier").length >= TELLING ? [make("span", "aed", [make("small", "", "AED "), `${aed.value} ${aed.unit}`])] : [];
   for (const one of told) one.dataset.hint = aed?.hint;
   box.replaceChildren(sign(early ? "nothing" : level), make("p", "line", words), ...told);

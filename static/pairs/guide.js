@@ -2,13 +2,12 @@
 
 import { act, actionNamed } from "../base/actions.js";
 import { make } from "../base/notices.js";
-import { clickIn, clicks, isDismissed, isOffered, named, nameOf, on, placementAt, placementsAt, state } from "../base/state.js";
+import { called, clickIn, clicks, isDismissed, isOffered, nameOf, on, placementAt, placementsAt, said, state } from "../base/state.js";
 import { openOption } from "../options/options.js";
 import { comeTo } from "../picture/arriving.js";
 import { saidWords } from "../proposals/proposals.js";
 import { proposalAdvice, proposalWords, silentWords } from "../proposals/words.js";
 import { goToPair } from "./pairs.js";
-import { OF_THE_LENS } from "./warnings.js";
 
 const guide = /** @type {HTMLElement} */ (document.getElementById("guide"));
 
@@ -38,7 +37,7 @@ function drawGuide() {
   guide.classList.toggle("act", words.act);
   if (guide.dataset.said === JSON.stringify(words.text)) return; // said once
   guide.dataset.said = JSON.stringify(words.text);
-  guide.replaceChildren(...words.text.map((word) => (typeof word === "string" ? make("span", "", named(word)) : keyPart(word))));
+  guide.replaceChildren(...words.text.map((word) => (typeof word === "string" ? make("span", "", word) : keyPart(word))));
 }
 
 /** What to show before there is a frame. @returns {Advice|null} */
@@ -65,14 +64,14 @@ function advice(index) {
   if (state.cross) return atCross(state.cross);
   const offer = proposalWords();
   if (offer) return { text: offer, act: true };
-  const said = saidWords();
-  if (said && !(placement && isOffered(placement))) return { text: [said], act: false };
+  const found = saidWords();
+  if (found && !(placement && isOffered(placement))) return { text: [found], act: false };
   if (here) return afterClick(here);
   if (placement && isDismissed(placement)) return { text: ["Dismissed.", { key: "X", label: "offer it again", action: "exclude" }, NEXT], act: false };
   if (placement && isOffered(placement)) {
     const number = state.placements.indexOf(placement) + 1;
     const several = placementsAt(index).length > 1 ? `, one of ${placementsAt(index).length} at this time` : "";
-    const why = said || silentWords(number - 1);
+    const why = found || silentWords(number - 1);
     return { text: [`Placement ${number}, ${placement.range_m.toFixed(1)} m away${several}: click the inner corner.${why ? ` ${why}` : ""}`, { key: "X", label: "no reflector", action: "exclude" }, NEXT], act: true };
   }
   const next = nextAction();
@@ -99,7 +98,7 @@ function afterClick(click) {
 
 /** What may be wrong with a pair that disagrees: the mark, or the return. @param {import("../messages.js").ClickRow} click @returns {Words} */
 function outlierWords(click) {
-  if (!click.note.startsWith("Disagrees")) return [click.note]; // the method or an option sets the pair aside: the note says which
+  if (!click.disagrees) return [click.note]; // the method or an option sets the pair aside: the note says which
   const carried = state.placements.length > 0 && !placementsAt(click.frame).length ? " Was the reflector being carried?" : "";
   const others = state.candidates?.click === click.id && state.candidates.rows.length > 1;
   return [`#${nameOf(click.id)} disagrees with the other pairs. Is the mark on the inner corner?${carried}`, ...(others ? [{ key: "C", label: "another return", action: "next-candidate" }] : []), EXCLUDE];
@@ -109,21 +108,21 @@ function outlierWords(click) {
 function nextAction() {
   const view = state.view;
   if (!view) return null;
-  const { action, key, option, done } = view.verdict;
+  const { key, kind, option, done, pairs } = view.verdict;
+  const action = said(view.verdict.action);
   const guesses = clicks().filter((click) => click.state === "untouched").length;
   if (guesses && !state.placements.some(isOffered)) return [`${guesses} ${guesses > 1 ? "marks are guesses" : "mark is a guess"} and ${guesses > 1 ? "do" : "does"} not count: move ${guesses > 1 ? "each" : "it"} to the inner corner`];
-  const ofLens = view.warnings.some(({ code, hint }) => OF_THE_LENS.includes(code) && hint === action);
-  const by = option === POSITION.option ? [POSITION] : ofLens ? [LENS] : [];
+  const by = option === POSITION.option ? [POSITION] : kind === "CalibrateLens" ? [LENS] : option && option !== RANGE.option ? [{ key: "", label: "open this option", option }] : [];
   const leftOut = clicks().filter((click) => click.state === "outlier").map(({ id }) => `#${nameOf(id)}`);
   if (done) return ["Done.", { key: "E", label: "export", action: "export" }, ...(leftOut.length ? [`Left out: ${leftOut.join(", ")}`, SHOW] : by.length ? ["Better:", ...by] : [])];
   if (option === RANGE.option) return BEYOND;
   if (key === "N" && view.clicks.length && !state.placements.some(isOffered)) return null; // the last one is on its way
   if (key === "N") return [{ key, label: proposalAdvice(), action: "next-placement" }];
-  const met = view.clicks.find(({ id }) => new RegExp(`\\b${id}\\b`).test(action));
   const goOn = state.placements.some(isOffered) ? [NEXT] : [];
-  if (met) return [action, { key: "", label: `show #${nameOf(met.id)}`, pair: met.id }, ...goOn];
+  const met = pairs.find((id) => view.clicks.some((click) => click.id === id));
+  if (met !== undefined && key !== "J") return [action, { key: "", label: `show ${called(met)}`, pair: met }, ...goOn];
   if (key === "J") return [action, SHOW];
-  const edge = action.includes("edges of the picture") ? state.placements.filter(isOffered).sort((a, b) => Math.abs(b.azimuth_deg) - Math.abs(a.azimuth_deg))[0] : undefined;
+  const edge = kind === "SpreadPlacements" ? state.placements.filter(isOffered).sort((a, b) => Math.abs(b.azimuth_deg) - Math.abs(a.azimuth_deg))[0] : undefined;
   if (view.clicks.length) return [action, ...by, ...(edge ? [{ key: "", label: `show placement ${state.placements.indexOf(edge) + 1}`, frame: edge.frame }] : goOn)];
   if (!state.placementsKnown) return ["Looking for the places where the reflector stood. You can click meanwhile"];
   return state.placements.length ? [action] : [`${state.placementSummary}. ${action}`];

@@ -2,7 +2,7 @@
 
 import { LARGE_PX, residualColour } from "../base/colours.js";
 import { make, shape } from "../base/notices.js";
-import { clicks, named, nameOf, onPainted, select, stampKey, state } from "../base/state.js";
+import { clicks, nameOf, onPainted, select, stampKey, state } from "../base/state.js";
 import { comeTo } from "../picture/arriving.js";
 import { candidatesOf, choose } from "../picture/candidates.js";
 import { toggleExcluded } from "../picture/clicking.js";
@@ -232,7 +232,7 @@ function explain(click) {
   if (click.projected_px) lines.push(`reprojected at ${click.projected_px.map((value) => value.toFixed(1)).join(", ")} px`);
   if (click.sigma_px !== null) lines.push(`its own standard deviation: ${click.sigma_px.toFixed(2)} px`);
   if (click.range_m !== null) lines.push(`radar: ${click.range_m.toFixed(2)} m, ${toSide(click.azimuth_deg, "left", "right")}, ${toSide(click.elevation_deg, "up", "down")}${click.chosen ? ", chosen by you" : ""}`);
-  if (click.note) lines.push(named(click.note));
+  if (click.note) lines.push(click.note);
   return lines.join("\n");
 }
 

@@ -8,10 +8,11 @@ import { ask, content } from "../base/asking.js";
 import { showPage } from "../base/layout.js";
 import { icon, make, toast } from "../base/notices.js";
 import { send } from "../base/socket.js";
-import { named, on, onPainted, state } from "../base/state.js";
+import { on, onPainted, said, state } from "../base/state.js";
 import { notes, openAgain } from "../opening/opening.js";
+import { openOption } from "../options/options.js";
 
-/** @typedef {import("../messages.js").DataWarning} WarningRow */
+/** @typedef {import("../messages.js").WarningRow} WarningRow */
 /** @typedef {import("../messages.js").AssumptionRow} AssumptionRow */
 const box = /** @type {HTMLElement} */ (document.getElementById("warnings"));
 const opener = /** @type {HTMLElement} */ (document.getElementById("warning-count"));
@@ -21,8 +22,6 @@ const noted = /** @type {HTMLElement} */ (document.getElementById("recording-not
 const openCodes = new Set(["no-camera", "assumed", "calibration-ambiguous"]);
 /** What leaves open what a calibration means: a person picks. */
 const TO_PICK = ["calibration-ambiguous", "calibration-picked"];
-/** What speaks of the lens. */
-export const OF_THE_LENS = ["intrinsics-suspected", "lens-or-radar-scale"];
 let drawn = "";
 
 export function startWarnings() {
@@ -41,13 +40,11 @@ function drawAll() {
   const [view, recording] = [state.view, state.recording];
   if (!view || !recording) return;
   const { acknowledged, assumptions } = view;
-  const said = view.verdict.line.toLowerCase();
-  const ofPose = view.warnings.filter((one) => !said.includes(one.message.replace(/\.$/, "").toLowerCase()));
-  const text = JSON.stringify([ofPose, recording.warnings, assumptions, acknowledged]);
+  const text = JSON.stringify([view.warnings, recording.warnings, assumptions, acknowledged]);
   if (text === drawn) return;
   drawn = text;
   const asks = recording.warnings.filter((one) => TO_PICK.includes(one.code));
-  drawList(box, [...ofPose, ...asks], acknowledged, []);
+  drawList(box, [...view.warnings, ...asks], acknowledged, []);
   drawList(notes, recording.warnings.filter((one) => !asks.includes(one)), acknowledged, assumptions.length ? [assumptionBox(assumptions)] : []);
   const count = unread(box);
   opener.hidden = !box.childElementCount;
@@ -76,16 +73,21 @@ function drawList(list, rows, acknowledged, first) {
 /** @param {WarningRow} warning @param {boolean} read */
 function row(warning, read) {
   /** @type {HTMLElement[]} */
-  const inside = [make("div", "hint", named(warning.hint))];
+  const inside = [make("div", "hint", said(warning.hint))];
   if (TO_PICK.includes(warning.code)) {
     const pick = make("button", "pick", "Pick a meaning…");
     pick.onclick = openMeanings;
     inside.push(pick);
   }
-  if (OF_THE_LENS.includes(warning.code)) {
+  if (warning.kind === "CalibrateLens") {
     const open = make("button", "pick", "Open Lens");
     open.onclick = () => showPage("lens");
     inside.push(open);
+  }
+  if (warning.option) {
+    const set = make("button", "pick", "Open this option");
+    set.onclick = () => openOption(warning.option);
+    inside.push(set);
   }
   if (warning.code !== "no-camera") {
     const button = make("button", "acknowledge", read ? "Show again" : "Acknowledge");
@@ -95,12 +97,12 @@ function row(warning, read) {
     };
     inside.push(button);
   }
-  return folded(warning.code, "warning", warning.message, inside);
+  return folded(warning.code, "warning", said(warning.message), inside);
 }
 
 /** A line that unfolds. @param {string} code @param {string} className @param {string} line @param {HTMLElement[]} inside */
 function folded(code, className, line, inside) {
-  const made = make("details", className, [make("summary", "", [icon("warning"), make("span", "", named(line))]), ...inside]);
+  const made = make("details", className, [make("summary", "", [icon("warning"), make("span", "", line)]), ...inside]);
   made.dataset.code = code;
   made.open = openCodes.has(code);
   made.ontoggle = () => (made.open ? openCodes.add(code) : openCodes.delete(code));

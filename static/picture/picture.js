@@ -3,7 +3,7 @@
  * those who do not see it.
  */
 
-import { clicksIn, emit, isClicked, named, nameOf, on, placementAt, state } from "../base/state.js";
+import { clicksIn, emit, isClicked, nameOf, on, placementAt, state } from "../base/state.js";
 import * as geometry from "./geometry.js";
 
 const { viewport } = geometry;
@@ -168,7 +168,7 @@ function placementWords(index) {
 /** @param {number} index @returns {string[]} */
 function markWords(index) {
   const here = clicksIn(index);
-  if (here.length) return here.flatMap((click) => [oneMark(click), named(click.note)]);
+  if (here.length) return here.flatMap((click) => [oneMark(click), click.note]);
   const guess = state.overlay?.index === index ? state.overlay.guesses[0]?.[0] : undefined;
   return [guess ? `No mark in this frame; the reflector is expected at column ${guess[0].toFixed(0)}, row ${guess[1].toFixed(0)}` : "No mark in this frame"];
 }

@@ -18,7 +18,7 @@ const leftWords = () => (isSearching() ? "" : `, ${openProposals().length || sta
 export function sayNone() {
   const news = state.proposals;
   if (!news?.on) return;
-  if (news.progress.problem) say(`No proposals: ${[news.progress.problem.replace(/\.$/, ""), news.progress.hint.replace(/\.$/, "")].filter(Boolean).join(". ")}`);
+  if (news.progress.problem) say(["No proposals.", news.progress.problem, news.progress.hint].filter(Boolean).join(" "));
 }
 
 /** What N does. */

@@ -7,7 +7,7 @@ import { themeColour } from "../base/colours.js";
 import { closeSheet, showPage } from "../base/layout.js";
 import { make, shape, toast } from "../base/notices.js";
 import { send, tell } from "../base/socket.js";
-import { on } from "../base/state.js";
+import { on, said } from "../base/state.js";
 
 /** @typedef {import("../messages.js").AccPanel} Panel */
 /** @typedef {import("../messages.js").SensitivityRow} Row */
@@ -129,5 +129,5 @@ function curve(row) {
   return shape("svg", { viewBox: `0 0 ${WIDE} ${HIGH}`, role: "img", "aria-label": row.words }, lines);
 }
 
-/** @param {import("../messages.js").DataWarning} one */
-const warning = (one) => make("p", "acc-warning", [one.message, make("small", "", ` ${one.hint}`)]);
+/** @param {import("../messages.js").WarningRow} one */
+const warning = (one) => make("p", "acc-warning", [said(one.message), make("small", "", ` ${said(one.hint)}`)]);

@@ -2,7 +2,7 @@
 
 import { make } from "../base/notices.js";
 import { tell } from "../base/socket.js";
-import { clicks, named, nameOf, on, select, state } from "../base/state.js";
+import { clicks, nameOf, on, said, select, state } from "../base/state.js";
 import { comeTo } from "../picture/arriving.js";
 import { Plot } from "./plots.js";
 
@@ -114,7 +114,7 @@ function drawAll() {
   pending = 0;
   if (!visible()) return;
   highlight.selected = state.selected;
-  wordsLine.textContent = named(review?.words ?? "");
+  wordsLine.textContent = review ? said(review.words) : "";
   drawFilters();
   drawPlots();
   drawPair();
@@ -305,7 +305,7 @@ function pairParts(pair) {
   scroll.tabIndex = 0; // a narrow panel scrolls it
   scroll.setAttribute("role", "region");
   scroll.setAttribute("aria-label", `Returns that ${nameOf(pair.id)} may use`);
-  return [make("h2", "", `Pair ${nameOf(pair.id)}`), make("p", "", named(pair.why)), make("dl", "", facts), ...(pair.candidates.length ? [scroll] : [])];
+  return [make("h2", "", `Pair ${nameOf(pair.id)}`), make("p", "", said(pair.why)), make("dl", "", facts), ...(pair.candidates.length ? [scroll] : [])];
 }
 
 /** Limits of an axis, a little beyond its values. @param {number[]} values */

@@ -44,7 +44,7 @@ def test_input_that_is_refused_is_not_silent():
 
 
 def test_no_pose_and_no_covariance_are_not_silent():
-    none = outcome_figures(Unsolvable("no-pose", "", ""), RigidTransform.identity())
+    none = outcome_figures(Unsolvable.reported("no-pose", "", ""), RigidTransform.identity())
     assert codes_in(none) == {"no-pose"}
     assert silently_wrong([none], [], always_wrong=True).tolist() == [False]
     assert silently_wrong([figures(44.0) | {"squared": None}], []).tolist() == [False]

@@ -40,5 +40,5 @@ def test_right_clicks_in_any_order_show_no_red(options):
             clicks = [simulated.clicks[i] for i in order[:count]]
             outcome = calibrate(clicks, simulated.scans, simulated.camera, background=simulated.scans).unwrap()
             shown = verdict_row(verdict_on(outcome), Session(clicks=tuple(clicks), outcome=outcome), None)
-            assert shown.early or shown.level != "contradictory", shown.line
+            assert shown.early or shown.level != "contradictory", str(shown.line)
             assert all(pair.inlier for pair in outcome.pairs)

@@ -166,6 +166,10 @@ class Driver:
         """Return the text of an element."""
         return self.page.inner_text(selector)
 
+    def said(self, words: dict[str, Any]) -> str:
+        """Return words of the server as the page says them."""
+        return str(self.page.evaluate("words => import('/shell/state.js').then(({ said }) => said(words))", words))
+
     def pixels(self, selector: str) -> np.ndarray:
         """Return a screenshot of an element: (h, w, 3) BGR."""
         picture = cv2.imdecode(np.frombuffer(self.page.locator(selector).screenshot(), np.uint8), cv2.IMREAD_COLOR)

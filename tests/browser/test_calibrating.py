@@ -19,7 +19,7 @@ NUDGES = """["ArrowRight", "ArrowRight", "ArrowUp"].forEach((key) =>
 def test_clicking_every_placement_gives_a_calibration_near_the_truth(page: Driver, truth: Any, tmp_path: Path) -> None:
     page.until("__cocalib.state.placements.length >= 15")
     page.click_sample(truth, 3)
-    assert page.view["verdict"]["line"] == "3 of 8 pairs"
+    assert page.said(page.view["verdict"]["line"]) == "3 of 8 pairs"
     assert not page.view["has_calibration"]
     page.click_sample(truth)
     view = page.view

@@ -89,6 +89,15 @@ def test_info_names_the_topics_as_text_and_as_json(cocalib, made):
     assert {topic["name"] for topic in json.loads(data.out)["topics"]} == names
 
 
+def test_info_writes_each_warning_with_its_code_message_and_hint(cocalib, made):
+    recording = made("cut")
+    recording.write_bytes(recording.read_bytes()[:-9])
+    for key, flags in (("cautions", ()), ("warnings", ("--verify",))):
+        warnings = json.loads(cocalib("info", recording, *flags, "--json").out)[key]
+        assert [set(warning) for warning in warnings] == [{"code", "message", "hint"}]
+        assert all(warning["message"] and warning["hint"] for warning in warnings)
+
+
 @pytest.mark.parametrize(
     ("command", "source"),
     [

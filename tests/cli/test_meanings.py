@@ -43,7 +43,7 @@ def test_import_writes_what_was_picked_and_says_so(cocalib, ambiguous, camera_fi
     assert _is_pose(out)
     file = read_calibration(out.read_text())
     assert file.evidence == "imported_assumed"
-    assumed = [warning.message for warning in file.calibration.warnings if warning.code == "assumed"]
+    assumed = [str(warning) for warning in file.calibration.warnings if warning.code == "assumed"]
     assert any("picked by hand" in message and "radar_from_camera,body,m" in message for message in assumed)
 
 

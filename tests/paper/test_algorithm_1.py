@@ -37,9 +37,11 @@ from calib_core.paper.algorithm_1 import (
 )
 from calib_core.paper.pnp import refine_lm, solve_pnp_ransac
 from calib_core.results import Calibration
+from calib_core.results.actions import SetOption
 from calib_core.results.metrics import aed, cdsd, distances
 from calib_core.synthetic import FIELD, SimulatedPairs, simulate_pairs
 from calib_core.synthetic.simulated_pairs import study_camera
+from calib_core.words import OptionPart, outcome_told
 
 START_NS = 1_700_000_000_123_456_789
 AS_PRINTED = PaperOptions()
@@ -170,7 +172,7 @@ def test_algorithm_1_line_3_leaves_a_click_far_from_any_scan_unpaired():
     near = replace(OPTIONS, locating=LocatingOptions(max_time_gap_s=5.0))
     unpaired = pair_as_printed(click, scans, OPTIONS)
     assert (unpaired.id, unpaired.code) == ("c1", "no-static-return")
-    assert "2.10 s" in unpaired.reason
+    assert unpaired.facts["gap_s"] == pytest.approx(2.1)
     assert isinstance(pair_as_printed(click, scans, near), Pair)
 
 
@@ -236,7 +238,7 @@ def test_algorithm_1_line_5_says_so_when_no_return_is_left():
     scans = scans_of(*(scan_of(0.1 * i, [row]) for i, row in enumerate(np.eye(3).tolist())))
     unpaired = pair_as_printed(ReflectorClick(at(0.1), "c1", 1.0, 2.0), scans, OPTIONS)
     assert unpaired.code == "no-z-score-inlier"
-    assert "3 returns" in unpaired.reason
+    assert unpaired.facts["returns"] == 3
 
 
 # Line 6: the mean of the inliers
@@ -404,7 +406,7 @@ def test_algorithm_1_says_how_far_the_noise_moves_its_pose_and_is_silent_where_t
         poor = simulate_pairs(20, rng=rng, noise="imaging", layout=far)
         (weak,) = solved(solve_pairs_as_printed(poor.pairs, poor.camera, OPTIONS)).warnings
         assert weak.code == "weak-geometry"
-        assert "cm (one sigma)" in weak.message
+        assert weak.facts["position_cm"] > 10.0
 
 
 def test_algorithm_1_does_not_care_about_the_order_of_the_clicks():
@@ -457,18 +459,18 @@ def test_three_pairs_are_too_few_and_the_reason_counts_them():
     clicks, scans = recording_of(simulated)
     outcome = unsolvable(calibrate_as_printed(clicks[:3], scans, simulated.camera, OPTIONS))
     assert outcome.code == "too-few-pairs"
-    assert outcome.reason == "3 of at least 4 required pairs"
+    assert {name: count for name, count in outcome.facts.items() if count} == {"used": 3, "needed": 4}
     lost = replace(clicks[3], image_time=at(9999.0))
     excluded = replace(clicks[4], excluded=True)
     outcome = unsolvable(calibrate_as_printed([*clicks[:3], lost, excluded], scans, simulated.camera, OPTIONS))
-    assert outcome.reason == "3 of at least 4 required pairs, 1 more excluded, 1 more without a radar position"
+    assert [outcome.facts[name] for name in ("used", "needed", "excluded", "unpaired")] == [3, 4, 1, 1]
 
 
 def test_without_any_radar_return_the_reason_is_too_few_pairs():
     clicks = [ReflectorClick(at(float(i)), f"c{i}", 1.0, 2.0) for i in range(5)]
     outcome = unsolvable(calibrate_as_printed(clicks, RadarScans(), study_camera(), OPTIONS))
     assert outcome.code == "too-few-pairs"
-    assert "0 of at least 4" in outcome.reason
+    assert (outcome.facts["used"], outcome.facts["needed"]) == (0, 4)
 
 
 def test_when_ransac_finds_nothing_the_hint_names_the_threshold_and_the_default_method():
@@ -479,9 +481,10 @@ def test_when_ransac_finds_nothing_the_hint_names_the_threshold_and_the_default_
     strict = replace(OPTIONS, paper=replace(AS_PRINTED, ransac_threshold_px=0.05, ransac_iterations=200))
     outcome = unsolvable(solve_pairs_as_printed(pairs, study_camera(), strict))
     assert outcome.code == "no-consensus"
-    assert "0.05 px" in outcome.reason
-    assert "threshold" in outcome.hint
-    assert "default method" in outcome.hint
+    assert outcome.facts == {"pairs": 20, "threshold_px": 0.05}
+    remark = outcome_told(outcome)
+    assert remark.action == SetOption("method", "default")
+    assert OptionPart("paper.ransac_threshold_px") in remark.hint.parts
 
 
 def test_positions_on_one_line_are_refused_with_a_reason():

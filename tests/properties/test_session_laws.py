@@ -77,7 +77,7 @@ def bare_history(history: History) -> History:
 
 def answer_to(clicks: Sequence[ReflectorClick], options: CalibrationOptions) -> Unsolvable:
     """Return an answer that states its clicks and options."""
-    return Unsolvable("test", repr((tuple(clicks), options)), "")
+    return Unsolvable.reported("test", repr((tuple(clicks), options)), "")
 
 
 class HeldSolver:

@@ -22,6 +22,7 @@ from calib_core.measurements import Unsolvable
 from calib_core.recordings import Recording, open_recording
 from calib_core.results import InputFile
 from calib_core.results.verdict import verdict_on
+from calib_core.words import outcome_told, stated_verdict
 from cocalib.batch.inputs import all_reached, inputs_of, state_of
 from cocalib.batch.job import Job
 from cocalib.batch.manifest import ManifestRow
@@ -248,7 +249,7 @@ def _on_recording(row: ManifestRow, result: SessionResult) -> None:
         result.recorded_ns = int(times[0]) if len(times) else None
         result.solved = solve_session(row, given, recording)
         if isinstance(result.solved, Unsolvable):
-            result.log += [f"click {one.id}: {one.reason}; {one.hint}" for one in result.solved.unpaired]
+            result.log += [str(one) for one in result.solved.unpaired]
         else:
             result.files |= result.solved.files
             _after_solving(row, result.solved, recording, result)
@@ -399,7 +400,8 @@ def outcome_of(job: Job, result: SessionResult) -> Outcome:
         return replace(failed(job, solved), recorded_ns=result.recorded_ns)
     if isinstance(solved, Unsolvable):
         refused = _outcome(job, "refused")
-        return replace(refused, reason=solved.reason, hint=solved.hint, recorded_ns=result.recorded_ns)
+        said = outcome_told(solved)
+        return replace(refused, reason=str(said.message), hint=str(said.hint), recorded_ns=result.recorded_ns)
     assert solved is not None, "the steps end with an answer or a failure"
     return replace(
         _of_calibration(job, solved),
@@ -418,13 +420,14 @@ def failed(job: Job, failure: Failure) -> Outcome:
 
 def _of_calibration(job: Job, solved: SolvedSession) -> Outcome:
     calibration, verdict = solved.calibration, verdict_on(solved.calibration)
+    stated = stated_verdict(verdict)
     assert solved.found.file is not None
     sigma_deg, sigma_cm = _largest_sigma(calibration.covariance)
     doubtful = verdict.level not in ("good", "usable")
     return replace(
         _outcome(job, "weak" if doubtful else "solved"),
-        reason=verdict.reason if doubtful else "",
-        hint=verdict.action if doubtful else "",
+        reason=stated.reason if doubtful else "",
+        hint=stated.action if doubtful else "",
         verdict=verdict.level,
         sigma_deg=sigma_deg,
         sigma_cm=sigma_cm,

@@ -80,7 +80,9 @@ def solve_session(row: ManifestRow, given: GivenFiles, recording: Recording) -> 
     """
     require_confirmed(recording)
     if given.clicks is None and not row.auto:
-        return Unsolvable("no-clicks", "nothing was clicked", "click the recording on the page, or set auto = true")
+        return Unsolvable.reported(
+            "no-clicks", "nothing was clicked", "click the recording on the page, or set auto = true"
+        )
     camera = required_camera(recording, given.camera)
     notes = [f"radar: {recording.radar_choice}"] if recording.radar_choice else []
     placed = _placed(row, given.clicks, recording, camera, notes)

@@ -96,7 +96,7 @@ class Evaluate:
         level = next((level for level in reversed(_LEVELS) if level in self.require), None)
         code = NO_ANSWER if self.judging.recording and evaluation is None else DONE
         code = code if evaluation is None else evaluation_exit_code(evaluation)
-        code = code or exit_code(verdict, found.evidence, level)
+        code = code or exit_code(verdict.level if verdict else None, found.evidence, level)
         code = code or (DONE if all(one.met for one in limits) else IN_DOUBT)
         if evaluation is not None and self.json:
             names = [path.name for path in self.judging.recording]

@@ -6,7 +6,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from calib_core.interchange.calibration_file import Evidence
-    from calib_core.results.verdict import Verdict
+    from calib_core.results.verdict import VerdictLevel
 
 DONE, NO_ANSWER, IN_DOUBT = 0, 1, 3
 _FAILED_FROM, _MOST = 10, 99
@@ -40,15 +40,15 @@ def exit_codes() -> str:
     return "Exit codes. " + " ".join(f"{commands}: {words}." for commands, words in _LAW)
 
 
-def exit_code(verdict: "Verdict | None", evidence: "Evidence | None", require: Required | None) -> int:
+def exit_code(level: "VerdictLevel | None", evidence: "Evidence | None", require: Required | None) -> int:
     """Return 3 if an answer is in doubt, else 0.
 
     Args:
-        verdict: on the calibration; None if nobody judged it.
+        level: of the verdict on the calibration; None if nobody judged it.
         evidence: what its pose rests on; None if that is not stated.
         require: the least level that is asked for; None asks for none.
     """
-    level = "nothing" if verdict is None else verdict.level
+    level = level or "nothing"
     in_doubt = level == "contradictory" or evidence == "imported_assumed"
     return IN_DOUBT if in_doubt or level not in _ENOUGH.get(require, (level,)) else DONE
 

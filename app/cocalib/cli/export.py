@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from calib_core.errors import InputError, RecordingError
+from calib_core.words import said_of
 from cocalib.cli.flags import File, Switch, called
 from cocalib.cli.output import progress_bar, write_whole
 from cocalib.cli.recording_flags import TopicFlags, Topics
@@ -175,7 +176,7 @@ def _print_warnings(file: "CalibrationFile") -> None:
             file=sys.stderr,
         )
     for warning in file.calibration.warnings:
-        print(f"warning of the calibration: {warning.message}; {warning.hint}", file=sys.stderr)
+        print(f"warning of the calibration: {said_of(warning)}", file=sys.stderr)
 
 
 def _own_calibration(path: Path) -> "CalibrationFile":
@@ -274,7 +275,7 @@ def _report(recording: "Recording", written: "RecordingWritten", out: Path, layo
     for note in written.notes:
         print(f"note: {note}", file=sys.stderr)
     for warning in about_assumptions(recording.assumptions):
-        print(f"note: {warning.message}; {warning.hint}", file=sys.stderr)
+        print(f"note: {said_of(warning)}", file=sys.stderr)
     lost = sum(written.lost.values())
     if lost:
         where = ", ".join(f"{count} of {topic}" for topic, count in sorted(written.lost.items()))

@@ -272,7 +272,7 @@ class Import:
         write_whole(self.out, write(file))
         print("\n".join(line for line in report.lines()[1:] if not line.startswith("ok: ")), file=sys.stderr)
         print(f"{names} read as {found.format}, {_RESTS_ON[file.rests_on]}; written to {self.out}")
-        return exit_code(file.verdict, file.rests_on, self.require)
+        return exit_code(file.verdict.level if file.verdict else None, file.rests_on, self.require)
 
 
 _RESTS_ON = {

@@ -1,7 +1,6 @@
 """What `cocalib intrinsics` gives: a calibrated lens in words for the terminal, and files with intrinsics in every format."""
 
 import re
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TextIO
@@ -19,6 +18,7 @@ from calib_core.intrinsics import (
 )
 from calib_core.intrinsics.coverage import Coverage
 from calib_core.measurements import Unsolvable
+from calib_core.words import in_sentences, outcome_told
 from cocalib.cli.output import write_whole
 from cocalib.intrinsics.field_of_view import field_of_view_text
 from cocalib.platform.terminal import print_exactly
@@ -39,7 +39,6 @@ DOUBTFUL = frozenset(
 )
 """Warnings after which a lens should not be used unseen: the exit code is 3."""
 _MOST_LEFT_OUT = 12
-_ORDINARY = ("the same view as", "not needed")
 
 
 def _camera_lines(camera: Camera) -> Iterator[str]:
@@ -71,18 +70,18 @@ def lens_lines(lens: CalibratedLens, search: BoardSearch, coverage: Coverage, *,
     if verbose:
         yield from _view_lines(lens)
     yield from left_out_lines(lens.left_out, most=len(lens.left_out) if verbose else _MOST_LEFT_OUT)
-    yield from (f"warning: {sentence(one.message)} {sentence(one.hint)} [{one.code}]" for one in lens.warnings)
+    yield from (f"warning: {in_sentences(one)} [{one.code}]" for one in lens.warnings)
 
 
 def left_out_lines(left_out: Sequence[LeftOutPicture], *, most: int = _MOST_LEFT_OUT) -> Iterator[str]:
-    """Yield the pictures that were not used, with the reasons; beyond so many lines, how many there are for each reason."""
+    """Yield the pictures that were not used, with the reasons; beyond so many lines, how many there are."""
     whole = most >= len(left_out)
-    told = [one for one in left_out if whole or not one.reason.startswith(_ORDINARY)]
-    yield from (f"left out: {one.name}: {one.reason}" for one in told[:most])
-    others = Counter(one.reason.partition(":")[0] for one in told[most:])
-    yield from (f"left out: {count} more: {reason} (--verbose names them)" for reason, count in others.most_common(5))
-    if len(told) < len(left_out):
-        yield f"left out: {len(left_out) - len(told)} good views that others make unnecessary (--verbose names them)"
+    named = [picture for picture in left_out if whole or not picture.spare]
+    yield from (f"left out: {picture.name}: {picture.reason}" for picture in named[:most])
+    if len(named) > most:
+        yield f"left out: {len(named) - most} more (--verbose names them)"
+    if len(named) < len(left_out):
+        yield f"left out: {len(left_out) - len(named)} good views that others make unnecessary (--verbose names them)"
 
 
 def _uncertainty_lines(lens: CalibratedLens) -> Iterator[str]:
@@ -92,7 +91,7 @@ def _uncertainty_lines(lens: CalibratedLens) -> Iterator[str]:
     yield f"projection     known to {plain(middle, 2)} px in the middle of the picture, {plain(corners, 2)} px in a corner"
     yield f"               {MODEL_ERRORS_UNSEEN}"
     halves = split_difference(lens)
-    yield f"cross-check    {sentence(halves.reason) if isinstance(halves, Unsolvable) else halves.sentence}"
+    yield f"cross-check    {sentence(str(outcome_told(halves).message)) if isinstance(halves, Unsolvable) else halves.sentence}"
     yield f"residuals      {residual_field(lens).sentence}"
 
 

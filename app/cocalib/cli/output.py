@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from calib_core.measurements import ReflectorClick, Unsolvable
     from calib_core.proposing import ViewProgress
     from calib_core.recordings import Recording
+    from calib_core.words import OptionPart, Words
 
 
 def explain_unsolvable(outcome: "Unsolvable", *, what: str = "no calibration") -> int:
@@ -25,12 +26,25 @@ def explain_unsolvable(outcome: "Unsolvable", *, what: str = "no calibration") -
         outcome: of the solver, or of the search for proposals.
         what: is missing.
     """
-    from cocalib.view import sentence
+    from calib_core.words import in_sentences
 
-    print(f"cocalib: {what}: {sentence(outcome.reason)} {sentence(outcome.hint)}", file=sys.stderr)
+    print(f"cocalib: {what}: {on_terminal(in_sentences(outcome))}", file=sys.stderr)
     for click in outcome.unpaired:
-        print(f"  click {click.id}: {sentence(click.reason)} {sentence(click.hint)}", file=sys.stderr)
+        print(f"  click {click.id}: {on_terminal(in_sentences(click))}", file=sys.stderr)
     return 1
+
+
+def on_terminal(said: "Words") -> str:
+    """Return words for the terminal: options as the flags that set them."""
+    return said.text(option=_flag)
+
+
+_FLAGS = {"method": "--method", "radar_axes": "--radar-axes", "clock": "--clock"}
+
+
+def _flag(part: "OptionPart") -> str:
+    value = part.value or "..."
+    return f"{_FLAGS[part.option]} {value}" if part.option in _FLAGS else f"--set {part.option}={value}"
 
 
 def write_whole(path: Path, content: str | bytes, *, again: bool = False) -> None:
@@ -127,7 +141,9 @@ def tell_choices(recording: "Recording") -> None:
     for what, choice in (("radar", recording.radar_choice), ("camera", recording.image_choice)):
         if choice:
             print(f"{what}: {choice}", file=sys.stderr)
-    _tell_notes([warning.message for warning in recording.damage])
+    from calib_core.words import told
+
+    _tell_notes([str(told(warning).message) for warning in recording.damage])
 
 
 def _tell_notes(notes: Sequence[str]) -> None:

@@ -88,6 +88,7 @@ class Show:
         if Show(out=out, recorded=self.recorded) != self:
             raise InputError("--calibration FILE is missing: the calibration that the returns are projected with")
         from calib_core.recordings import write_video
+        from calib_core.words import told
         from cocalib.solving.recorded_clicks import seconds_text
 
         with self.recorded.open(require=("image",)) as recording, progress_bar("writing frames") as progress:
@@ -95,7 +96,7 @@ class Show:
         print(f"{out}: {written.frames} frames, {written.duration_s:.3f} s, from {seconds_text(written.start)}")
         for warning in recording.warnings:
             if warning.code in ("picture-sizes", "unreadable-pictures"):
-                print(f"{warning.message}")
+                print(told(warning).message)
         for note in written.skipped.notes():
             print(note)
         return 0

@@ -17,6 +17,7 @@ from cocalib.cli.exit_codes import exit_code
 from cocalib.cli.flags import MORE, File, MoreSwitch, Require, Switch
 from cocalib.cli.output import (
     explain_unsolvable,
+    on_terminal,
     recorded_clicks,
     refuse_input,
     shown_progress,
@@ -242,14 +243,14 @@ class Solve:
         return self._deliver(outcome, calibration_text_of_pairs(outcome, given, vehicle))
 
     def _deliver(self, calibration: Calibration, text: str) -> int:
-        code = exit_code(verdict_on(calibration), None, self.require)
+        code = exit_code(verdict_on(calibration).level, None, self.require)
         if self.camera.camera is not None and not len(calibration.camera.distortion):
             print(f"note: {self.camera.camera} states no distortion: the lens is taken to have none", file=sys.stderr)
         if self.out is None:
             print_exactly(text)
             return code
         write_whole(self.out, text)
-        print("\n".join([*summary_lines(calibration), f"written to {self.out}"]))
+        print("\n".join([*map(on_terminal, summary_lines(calibration)), f"written to {self.out}"]))
         return code
 
 
@@ -257,7 +258,7 @@ def _placed_words(placed: "PlacedClicks") -> str:
     """Say how many clicks were placed, and how sure they are."""
     if placed.unconfirmed is None:
         return placed.words
-    from calib_core.results.confirmation import probability_text
+    from calib_core.words import probability_text
 
     count = len(placed.unconfirmed.ids)
     return (

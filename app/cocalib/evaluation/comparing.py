@@ -11,6 +11,7 @@ from calib_core.evaluation import Evaluation, PairedDifference, acc_difference, 
 from calib_core.evaluation.paired_difference import Winner
 from calib_core.measurements import Boxes, ReflectorClick, ReturnLabels
 from calib_core.results import Calibration, DataWarning
+from calib_core.words import said_of
 from cocalib.evaluation.evaluating import EvidenceOptions, RadarRecording, evidence_in, judged
 
 _FITTED_SHARE = 0.5
@@ -151,7 +152,7 @@ def comparison_lines(compared: ComparedOnRecording) -> tuple[str, ...]:
                 "compare on another recording"
             )
     rows += [
-        f"warning{_of_one(one, compared)}: {one.message}; {one.hint}"
+        f"warning{_of_one(one, compared)}: {said_of(one)}"
         for one in dict.fromkeys((*compared.a.warnings, *compared.b.warnings))
     ]
     return tuple(rows)

@@ -26,6 +26,7 @@ from calib_core.evaluation.target_tracking import LONGEST_STEP_S
 from calib_core.measurements import NS_PER_S, Boxes, Pair, RadarScans, ReflectorClick, ReturnLabels, TimeNs, Unpaired
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, DataWarning, PairResult
+from calib_core.words import unpaired_told
 
 _AROUND_S = 3.0
 """Scans before the first and after the last annotated frame, for targets to be followed into the frames."""
@@ -265,13 +266,13 @@ def _lost(unpaired: Sequence[Unpaired]) -> tuple[DataWarning, ...]:
     """Warn that clicks gave no residual."""
     if not unpaired:
         return (
-            DataWarning(
+            DataWarning.reported(
                 "no-paired-clicks", "all clicks are excluded or untouched, so there are no residuals", "include clicks"
             ),
         )
-    first = unpaired[0]
-    message = f"none of {len(unpaired)} clicks has a radar position, so there are no residuals: {first.reason}"
-    return (DataWarning("no-paired-clicks", message, first.hint),)
+    first = unpaired_told(unpaired[0])
+    message = f"none of {len(unpaired)} clicks has a radar position, so there are no residuals: {first.message}"
+    return (DataWarning.reported("no-paired-clicks", message, str(first.hint)),)
 
 
 def _taken(boxes: Boxes, classes: Sequence[str]) -> tuple[DataWarning, ...]:
@@ -279,7 +280,7 @@ def _taken(boxes: Boxes, classes: Sequence[str]) -> tuple[DataWarning, ...]:
     absent = (f"no box is of the class '{name}'" for name in classes if name not in boxes.labels)
     notes = (*boxes.notes, *absent)
     hint = "check that this is so: boxes of other frames or other objects give a wrong Acc"
-    return tuple(DataWarning("boxes-note", f"{boxes.source}: {note}", hint) for note in notes)
+    return tuple(DataWarning.reported("boxes-note", f"{boxes.source}: {note}", hint) for note in notes)
 
 
 def _too_sparse(radar_times: TimesNs, boxes: Boxes) -> tuple[DataWarning, ...]:
@@ -290,7 +291,7 @@ def _too_sparse(radar_times: TimesNs, boxes: Boxes) -> tuple[DataWarning, ...]:
         times_farther = apart_s / LONGEST_STEP_S
         if times_farther > 1.0:
             return (
-                DataWarning(
+                DataWarning.reported(
                     "sparse-frames",
                     f"{what} are {times_farther:.3g} times farther apart ({apart_s:.3g} s) than targets can be followed, "
                     "so there is no Acc",
@@ -304,7 +305,7 @@ def _too_sparse(radar_times: TimesNs, boxes: Boxes) -> tuple[DataWarning, ...]:
 def _about(returns: CountedReturns) -> tuple[DataWarning, ...]:
     if not len(returns.frames) and returns.by_cuboid:
         return (
-            DataWarning(
+            DataWarning.reported(
                 "no-target-in-a-box",
                 "no direction of the camera puts clearly more returns into the cuboids than others do, so there is no Acc",
                 "are the cuboids of this recording, in the axes of its camera, and on one clock with the radar?",
@@ -312,7 +313,7 @@ def _about(returns: CountedReturns) -> tuple[DataWarning, ...]:
         )
     if not len(returns.frames):
         return (
-            DataWarning(
+            DataWarning.reported(
                 "no-targets",
                 "no moving target was found in the scans of the annotated frames, so there is no Acc",
                 f"record people, cars or robots that move within {TargetOptions().max_range_m:g} m of the radar, or lower "
@@ -321,7 +322,7 @@ def _about(returns: CountedReturns) -> tuple[DataWarning, ...]:
         )
     if not returns.matched_targets:
         return (
-            DataWarning(
+            DataWarning.reported(
                 "no-target-in-a-box",
                 f"none of {returns.found_targets} moving targets could be matched to a box by bearing and time, so every "
                 "return counts as outside",
@@ -341,7 +342,7 @@ def _turned(calibration: Calibration, returns: CountedReturns) -> list[DataWarni
     if abs(off) < _TURNED_RAD:
         return []
     return [
-        DataWarning(
+        DataWarning.reported(
             "turned-from-boxes",
             f"targets and boxes agree best with a camera turned by {np.rad2deg(off):+.0f} deg from the calibration about the "
             "vertical (positive to the left)",

@@ -203,7 +203,9 @@ def judged_calibration(
     require_size(calibration.camera, recording, path)
     lens = other_camera(found, recorded)
     return JudgedCalibration(
-        found, calibration, tuple(DataWarning(one.code, f"{path.name}: {one.message}", one.hint) for one in lens)
+        found,
+        calibration,
+        tuple(_about(path, one) for one in lens),
     )
 
 
@@ -222,3 +224,7 @@ def require_size(camera: Camera, recording: Recording, path: Path) -> None:
             f"{path}: calibrated for pictures of {size[0]} x {size[1]} px, but the recording's camera has {wanted[0]} x "
             f"{wanted[1]} px; give the calibration of this camera"
         )
+
+
+def _about(path: Path, result: CheckResult) -> DataWarning:
+    return DataWarning.reported(result.code, f"{path.name}: {result.message}", result.hint)

@@ -19,6 +19,7 @@ from calib_core.intrinsics import (
 )
 from calib_core.measurements import Unsolvable
 from calib_core.options import LensChoice
+from calib_core.words import outcome_told
 from cocalib.platform.error_boundary import error_boundary
 
 LensStage: TypeAlias = Literal["idle", "searching", "calibrating", "cancelled", "failed", "done"]
@@ -144,7 +145,8 @@ class LensJob:
         if stop.is_set():
             self._set(stage="cancelled", doing="")
         elif isinstance(found, Unsolvable):
-            self._set(stage="failed", problem=found.reason, hint=found.hint, doing="")
+            said = outcome_told(found)
+            self._set(stage="failed", problem=str(said.message), hint=str(said.hint), doing="")
         else:
             self._set(stage="done", search=found[0], lens=found[1], doing="")
 
@@ -189,6 +191,6 @@ def calibrate_from(
     if isinstance(search, Unsolvable):
         return search
     if stopped():
-        return Unsolvable("stopped", "the calibration was stopped", "start it again")
+        return Unsolvable.reported("stopped", "the calibration was stopped", "start it again")
     lens = calibrate_lens(search, model, progress=progress, stopped=stopped)
     return lens if isinstance(lens, Unsolvable) else (search, lens)

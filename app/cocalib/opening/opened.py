@@ -23,6 +23,7 @@ from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording, RecordingOptions
 from calib_core.results import DataWarning
+from calib_core.words import in_sentences, told
 from cocalib.hypothesis_sheet import Offer, OpenMeaning
 from cocalib.opening.choice import Choice, ChoicePart, GivenClicks, MeaningPick, UnusablePartError, part_of_choice
 from cocalib.session import (
@@ -46,7 +47,7 @@ from cocalib.session.file import (
     unused_session_folder,
 )
 from cocalib.solving.solving import camera_for
-from cocalib.view import Reference, sentence
+from cocalib.view import Reference
 from cocalib.web.messages import SessionOffer
 from cocalib.workspace import Workspace, open_workspace, recording_facts
 
@@ -108,7 +109,7 @@ def open_choice(choice: Choice, stack: ExitStack, tell: Callable[[str], None]) -
     stack.push(partial(_close, workspace))
     _remember(workspace, recording)
     for warning in workspace.restored.warnings:
-        print(f"{sentence(warning.message)} {sentence(warning.hint)}")
+        print(in_sentences(warning))
     _prefer_given_intrinsics(workspace, choice)
     if choice.options is not None and choice.options != CalibrationOptions():
         workspace.dispatch(OptionsChanged.of(choice.options))
@@ -358,7 +359,9 @@ def fitting_clicks(folder: Path, facts: RecordingFacts) -> FittingClicks:
     message = f"{len(fitting)} of the {len(found.clicks)} clicks in {folder} were copied"
     if left:
         message += f"; {left} belong to frames that this recording does not have"
-    return FittingClicks(fitting, DataWarning("clicks-copied", message, "the session that they come from is unchanged"))
+    return FittingClicks(
+        fitting, DataWarning.reported("clicks-copied", message, "the session that they come from is unchanged")
+    )
 
 
 def session_offer(choice: Choice, facts: RecordingFacts | None, opened_in: Path | None) -> SessionOffer:
@@ -469,20 +472,22 @@ def about_calibration(
     if shown is None:
         message = f"{name} is not shown, since there are no camera intrinsics"
         hint = "drop the camera file on the page, or give --camera FILE"
-        return (DataWarning("calibration-not-shown", message, hint),)
+        return (DataWarning.reported("calibration-not-shown", message, hint),)
     if isinstance(shown, OpenMeaning):
         message = f"{name} is not shown, since it does not state what its numbers mean"
-        return (DataWarning("calibration-ambiguous", message, "pick a meaning, each drawn over a frame"),)
+        return (DataWarning.reported("calibration-ambiguous", message, "pick a meaning, each drawn over a frame"),)
     if meaning is not None and meaning.shown is not None:
         words = meaning.offers[meaning.shown].hypothesis.meanings[0].words
         message = f"{name} does not state what its numbers mean; it is shown as if it {words}"
         hint = "if returns lie beside what they come from, pick another meaning; clicks on the reflector test it"
-        return (DataWarning("calibration-picked", message, hint),)
-    notes = [warning.message for warning in shown.calibration.warnings if warning.code == "assumed"]
+        return (DataWarning.reported("calibration-picked", message, hint),)
+    notes = [str(told(warning).message) for warning in shown.calibration.warnings if warning.code == "assumed"]
     if not notes:
         return ()
     hint = "returns that lie beside what they come from show that it is wrong; clicks on the reflector test it"
-    return (DataWarning("calibration-assumed", f"{name} is shown with an assumption: {'; '.join(notes)}", hint),)
+    return (
+        DataWarning.reported("calibration-assumed", f"{name} is shown with an assumption: {'; '.join(notes)}", hint),
+    )
 
 
 def _chosen(file: "UnstatedFile", pick: MeaningPick, source: str) -> "tuple[FoundPose, Hypothesis] | None":

@@ -16,6 +16,7 @@ from calib_core.intrinsics import (
 )
 from calib_core.intrinsics.coverage import Coverage
 from calib_core.measurements import Unsolvable
+from calib_core.words import outcome_told, told
 from cocalib.intrinsics.field_of_view import field_of_view_text
 from cocalib.report.markup import Child, Markup, html_file, scrolled, tag
 from cocalib.report.plots import Axes, captioned, drawing, mark, text
@@ -85,8 +86,8 @@ def _foot() -> str:
 def _warning_list(lens: CalibratedLens) -> Markup:
     """Return the warnings with what to do."""
     items = [
-        tag("li", tag("code", one.code), " ", sentence(one.message), " ", tag("b", sentence(one.hint)))
-        for one in lens.warnings
+        tag("li", tag("code", one.code), " ", sentence(str(said.message)), " ", tag("b", sentence(str(said.hint))))
+        for one, said in zip(lens.warnings, map(told, lens.warnings), strict=True)
     ]
     body = tag("ul", *items, class_="cautions") if items else tag("p", "No warnings.", class_="note")
     return tag("section", tag("h2", "Warnings"), body, id="cautions")
@@ -209,7 +210,7 @@ def _uncertainty_over_the_picture(lens: CalibratedLens) -> Markup:
     shown: list[Child] = [captioned("Projection uncertainty", drawn, said)]
     halves = split_difference(lens)
     if isinstance(halves, Unsolvable):
-        shown.append(tag("p", f"Not cross-checked: {halves.reason}.", class_="note"))
+        shown.append(tag("p", f"Not cross-checked: {outcome_told(halves).message}.", class_="note"))
     else:
         cells = _cells(halves.apart_px, lens.camera)
         drawn = _over_picture(halves.sentence, lens.camera, *cells, _picture_frame(lens.camera))

@@ -96,7 +96,7 @@ def watched(
         name=recording.name,
         inputs=inputs,
         topics=tuple((what, f"{name}, by {clock} stamps" if clock else name) for what, name, clock in topics if name),
-        warnings=(*(DataWarning(one.code, one.message, one.hint) for one in doubts), *recording.warnings),
+        warnings=(*(DataWarning.reported(one.code, one.message, one.hint) for one in doubts), *recording.warnings),
         picture=_picture(recording, calibration),
     )
 

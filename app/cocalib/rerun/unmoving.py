@@ -10,6 +10,7 @@ from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, camera_position_jacobian
 from calib_core.radar import covariance_from_sigma_polar
 from calib_core.results import Calibration, PairResult
+from calib_core.words import told
 from cocalib.colours import residual_colours
 from cocalib.recorded_view import RecordedView
 
@@ -191,7 +192,7 @@ def _lines(view: RecordedView) -> Iterator[str]:
             "because Rerun has no lens distortion"
         )
     for warning in view.calibration.warnings:
-        yield f"warning {warning.code}: {warning.message}"
+        yield f"warning {warning.code}: {told(warning).message}"
 
 
 def _figures(view: RecordedView) -> Iterator[str]:

@@ -16,6 +16,7 @@ from calib_core.proposing.automatic import automatic_clicks
 from calib_core.results import Calibration, UnconfirmedClicks
 from calib_core.results.confirmation import nobody_confirmed
 from calib_core.results.verdict import verdict_on
+from calib_core.words.verdict import reason
 from cocalib.proposing import REFLECTOR_M, RecordedFrames, find_proposals
 from cocalib.solving.solving import solve_clicks
 
@@ -124,15 +125,15 @@ def refusal_of(calibration: Calibration, unpaired: tuple[Unpaired, ...] = ()) ->
     """
     verdict = verdict_on(calibration)
     if verdict.level == "contradictory":
-        reason = f"nobody confirmed the clicks, and the pose from them is contradictory: {verdict.reason}"
-        return Unsolvable("not-confident", reason, _BY_PERSON, unpaired)
+        why = f"nobody confirmed the clicks, and the pose from them is contradictory: {reason(verdict)}"
+        return Unsolvable.reported("not-confident", why, _BY_PERSON, unpaired)
     away_m = _least_distance_m(calibration)
     if calibration.options.solving.camera_position is None and away_m > _FARTHEST_M:
-        reason = (
+        why = (
             f"nobody confirmed the clicks, and by them the camera is at least {away_m:.1f} m from the radar: something that was "
             "carried along with the reflector would look the same"
         )
-        return Unsolvable("not-confident", reason, _BY_TAPE, unpaired)
+        return Unsolvable.reported("not-confident", why, _BY_TAPE, unpaired)
     return None
 
 

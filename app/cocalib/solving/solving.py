@@ -32,6 +32,7 @@ from calib_core.options import CalibrationOptions, checked_options
 from calib_core.recordings import Recording, about_assumptions
 from calib_core.results import Calibration, InputFile, UnconfirmedClicks
 from calib_core.results.confirmation import damaged_recording, lost_returns
+from calib_core.words import told
 from cocalib.platform.resources import version
 from cocalib.session import Outcome
 
@@ -94,7 +95,7 @@ def solve_in_steps(
     """
     checked_options(options)
     if camera is None:
-        yield Unsolvable(
+        yield Unsolvable.reported(
             "no-camera",
             "the camera intrinsics are missing: the recording contains none that can be used",
             "calibrate the lens from a board in a recording (Lens in the menu, cocalib intrinsics), or drop a camera file on the "
@@ -116,7 +117,7 @@ def _with_damage(outcome: Calibration | Unsolvable, recording: Recording) -> Cal
         return outcome
     warning = damaged_recording(lost, damage[0])
     if isinstance(outcome, Unsolvable):
-        return dataclasses.replace(outcome, reason=f"{warning.message}; {outcome.reason}", hint=warning.hint)
+        return dataclasses.replace(outcome, suspected=(warning, *outcome.suspected))
     return dataclasses.replace(outcome, warnings=(warning, *outcome.warnings))
 
 
@@ -284,7 +285,7 @@ def calibration_text(
     if unsure:
         calibration = dataclasses.replace(calibration, warnings=(*calibration.warnings, *unsure))
     provenance = Provenance(
-        damage=tuple(one.message for one in recording.damage),
+        damage=tuple(str(told(one).message) for one in recording.damage),
         inputs=(
             *recording.fingerprint(),
             *([] if camera_file is None else [_input_file(camera_file.source, camera_file.data)]),

@@ -3,9 +3,20 @@
 from cocalib.view.build import is_dismissed, summary_lines, view
 from cocalib.view.candidates import CandidateRow, PairCandidates, click_candidates, pair_of_click
 from cocalib.view.following import FollowState, Pace, advice_words, pace_words
-from cocalib.view.model import Advice, ClickRow, ClickState, Ellipse, Figure, Level, Stage, View
+from cocalib.view.model import (
+    Advice,
+    ClickRow,
+    ClickState,
+    Ellipse,
+    Figure,
+    Level,
+    Stage,
+    View,
+    WarningRow,
+    warning_row,
+)
 from cocalib.view.reference import Reference, shown_calibration
-from cocalib.view.wording import sentence, warning_in_sentences
+from cocalib.view.wording import sentence
 
 __all__ = [
     "Advice",
@@ -21,6 +32,7 @@ __all__ = [
     "Reference",
     "Stage",
     "View",
+    "WarningRow",
     "advice_words",
     "click_candidates",
     "is_dismissed",
@@ -30,5 +42,5 @@ __all__ = [
     "shown_calibration",
     "summary_lines",
     "view",
-    "warning_in_sentences",
+    "warning_row",
 ]

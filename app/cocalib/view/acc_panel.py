@@ -7,9 +7,8 @@ import numpy as np
 from calib_core.evaluation import BoxFigures, Evaluation, Sensitivity
 from calib_core.evaluation.figures import Axis, ClassFigure
 from calib_core.evaluation.sentences import NOT_ACCURACY, sensitivity_sentences
-from calib_core.results import DataWarning
-from cocalib.view.model import Figure
-from cocalib.view.wording import sentence, warning_in_sentences
+from cocalib.view.model import Figure, WarningRow, warning_row
+from cocalib.view.wording import sentence
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +59,7 @@ class AccPanel:
     caution: str = ""
     rule: str = ""
     problem: str = ""
-    warnings: tuple[DataWarning, ...] = ()
+    warnings: tuple[WarningRow, ...] = ()
     busy: bool = False
 
 
@@ -72,7 +71,7 @@ _FEWEST_TARGETS, _FEWEST_RETURNS = 3, 30
 def acc_panel(evaluation: Evaluation) -> AccPanel:
     """Return what an evaluation says about boxes."""
     boxes = evaluation.boxes
-    warnings = tuple(map(warning_in_sentences, evaluation.warnings))
+    warnings = tuple(map(warning_row, evaluation.warnings))
     if boxes is None or boxes.acc is None:
         return AccPanel(problem="No return of anything that moves is in the frames with boxes.", warnings=warnings)
     returns = sum(frame.returns for frame in boxes.frames)

@@ -11,17 +11,30 @@ from calib_core.association.placements import Placement
 from calib_core.measurements import MIN_PAIRS, Unpaired, Unsolvable
 from calib_core.options import GatingOptions
 from calib_core.results import Calibration, DataWarning, NextPlacement
-from calib_core.results.verdict import (
-    ALL_CLICKED,
-    DONE,
-    SURE_PAIRS,
-    Verdict,
-    by_consequence,
-    consequence_of,
-    is_only_large,
+from calib_core.results.actions import (
+    Action,
+    ChooseReturn,
+    ClickMore,
+    MeasureCameraPosition,
+    PlaceReflector,
+    ReviewPairs,
+    SetOption,
+)
+from calib_core.results.verdict import SURE_PAIRS, Verdict, by_consequence, consequence_of, stated_error, verdict_on
+from calib_core.words import (
+    Words,
+    action_of,
+    action_words,
+    assumed_words,
+    error_text,
+    in_sentences,
+    named,
     placement_words,
-    stated_error,
-    verdict_on,
+    say,
+    sentence,
+    verdict_line,
+    verdict_rest,
+    words,
 )
 from cocalib.session import History, RecordingFacts, Session
 from cocalib.view.click_rows import click_rows
@@ -35,11 +48,21 @@ from cocalib.view.figures import (
     systematic_errors,
     uncertainty_sentences,
 )
-from cocalib.view.model import Advice, AssumptionRow, Figure, Stage, SystematicErrorTable, VerdictRow, View
+from cocalib.view.model import (
+    Advice,
+    AssumptionRow,
+    Figure,
+    Stage,
+    SystematicErrorTable,
+    VerdictRow,
+    View,
+    WarningRow,
+    warning_row,
+)
 from cocalib.view.reference import Reference, comparison_figures, reference_words, shown_calibration
-from cocalib.view.wording import plain, sentence, warning_in_sentences, with_degree_signs
+from cocalib.view.wording import plain
 
-_WITHOUT_PICTURES = DataWarning(
+_WITHOUT_PICTURES = DataWarning.reported(
     "no-camera",
     "No camera in this recording: nothing can be clicked.",
     "Add the camera's file to calibrate: cocalib open RADAR CAMERA.",
@@ -82,7 +105,7 @@ def view(
         pose=pose_figures(shown) if shown else (),
         pose_assumed=assumed_figures(shown) if shown else (),
         systematic_errors=systematic_errors(shown) if shown else SystematicErrorTable(),
-        warnings=_warnings(calibration) if facts.has_pictures else (_WITHOUT_PICTURES,),
+        warnings=_warnings(calibration, verdict) if facts.has_pictures else (warning_row(_WITHOUT_PICTURES),),
         options=session.options,
         residual_limit_px=residual_limit_px(calibration) if calibration else None,
         advice=advice_for(calibration, verdict) if calibration else None,
@@ -96,7 +119,9 @@ def view(
 
 
 def _assumptions(session: Session, facts: RecordingFacts) -> tuple[AssumptionRow, ...]:
-    return tuple(AssumptionRow(one.text, sentence(one.text), sentence(one.hint)) for one in facts.unconfirmed(session))
+    return tuple(
+        AssumptionRow(one.text, str(sentence(one.text)), str(sentence(one.hint))) for one in facts.unconfirmed(session)
+    )
 
 
 def _stage(session: Session) -> Stage:
@@ -144,15 +169,13 @@ def _status(session: Session, facts: RecordingFacts, reference: Reference | None
     return "  ·  ".join(filter(None, told))
 
 
-def _warnings(calibration: Calibration | None) -> tuple[DataWarning, ...]:
-    return tuple(map(warning_in_sentences, by_consequence(calibration.warnings if calibration else ())))
+def _warnings(calibration: Calibration | None, verdict: Verdict) -> tuple[WarningRow, ...]:
+    """Return the warnings, the gravest first, but the one that the verdict's line says."""
+    warnings = by_consequence(calibration.warnings if calibration else ())
+    return tuple(warning_row(warning) for warning in warnings if warning is not verdict.cause)
 
 
-_PAPER_NAMES = {"aed": "AED", "held_out_aed": "held-out AED", "cdsd": "CDSD", "rms": "RMS"}
-"""In text there is no hover to say what a figure is called in the paper."""
-
-
-def summary_lines(calibration: Calibration) -> tuple[str, ...]:
+def summary_lines(calibration: Calibration) -> tuple[Words, ...]:
     """Return the verdict, the figures, aligned, then what they rest on, the pairs that disagree and the warnings, gravest first.
 
     For a radar without elevation what it determines comes first, and what it does not follows in one line.
@@ -160,29 +183,35 @@ def summary_lines(calibration: Calibration) -> tuple[str, ...]:
     metrics, pose, assumed = metric_figures(calibration), pose_figures(calibration), assumed_figures(calibration)
     metrics = (*metrics, *_placements(calibration))
     figures = (*pose, *metrics) if assumed else (*metrics, *pose)
-    figures = tuple(replace(one, label=_PAPER_NAMES.get(one.key, one.label)) for one in figures)
+    figures = tuple(replace(figure, label=figure.abbreviation or figure.label) for figure in figures)
     width = max(len(figure.label) for figure in figures)
     verdict = verdict_on(calibration)
-    assumed_words = (f"assuming: {verdict.assumes}",) if verdict.assumes else ()
-    head = (f"verdict: {verdict.line}", *assumed_words, f"next: {sentence(verdict.action)}")
-    lines = [_line(figure, width) for figure in figures]
+    lines = ["verdict: " + verdict_line(verdict)]
+    lines += ["assuming: " + assumed_words(verdict.assumed)] if verdict.assumed else []
+    lines += ["next: " + sentence(action_words(verdict))]
+    rows = [words(_line(figure, width)) for figure in figures]
     if assumed:
         parts = ", ".join(f"{figure.label} {figure.value} {figure.unit}" for figure in assumed)
-        lines.insert(len(pose), f"assumed, because this radar measures no elevation: {parts}")
-    lines += [f"uncertainty: {line}" for line in uncertainty_sentences(calibration)]
-    lines += [f"intrinsics: {line}" for line in refined_sentences(calibration)]
+        rows.insert(len(pose), words(f"assumed, because this radar measures no elevation: {parts}"))
+    lines += rows
+    lines += ["uncertainty: " + line for line in uncertainty_sentences(calibration)]
+    lines += ["intrinsics: " + words(line) for line in refined_sentences(calibration)]
     lines += [
-        f"disagrees: {pair.id}: {plain(pair.distance_px)} px from its radar position"
+        say(
+            "disagrees: {pair}: {distance} px from its radar position",
+            pair=named(pair.id),
+            distance=plain(pair.distance_px),
+        )
         for pair in calibration.pairs
         if not pair.inlier and not pair.excluded and pair.rival < 0
     ]
     lines += [
-        f"warning: {sentence(warning.message)} {sentence(warning.hint)}"
+        "warning: " + in_sentences(warning)
         for warning in by_consequence(calibration.warnings)
-        if (warning.message, sentence(warning.hint)) != (verdict.reason, sentence(verdict.action))
+        if warning is not verdict.cause
     ]
-    lines += [f"unpaired: {row.id}: {sentence(row.reason)} {sentence(row.hint)}" for row in calibration.unpaired]
-    return (*head, *lines)
+    lines += [say("unpaired: {pair}: {why}", pair=named(row.id), why=in_sentences(row)) for row in calibration.unpaired]
+    return tuple(lines)
 
 
 def _placements(calibration: Calibration) -> tuple[Figure, ...]:
@@ -231,20 +260,27 @@ def _shown_verdict(session: Session, facts: RecordingFacts, placements: Sequence
 def verdict_row(verdict: Verdict, session: Session, placements: Sequence[Placement] | None) -> VerdictRow:
     """Return the verdict for the page; as long as only more pairs are missing, how many there are, and how far they lead."""
     left = placements_left(session, placements)
-    early = (
-        ""
-        if verdict.level in ("good", "usable")
-        else _early_line(session) or (left != 0 and _large_so_far(verdict, session))
-    )
+    early = Words()
+    if verdict.level not in ("good", "usable"):
+        early = _early_line(session) or (_large_so_far(verdict, session) if left != 0 else Words())
     worst = _fits_worst(session) if early else ""
+    action = ReviewPairs((worst,)) if worst else action_of(verdict)
+    asked = (
+        say("Is the mark of {pair} on the inner corner?", pair=named(worst))
+        if worst
+        else sentence(action_words(verdict))
+    )
     return VerdictRow(
         level=verdict.level,
-        line=with_degree_signs(early or verdict.line),
-        action=f"Is the mark of {worst} on the inner corner?" if worst else sentence(verdict.action),
-        assumes=f"Assuming {verdict.assumes}." if verdict.assumes else "",
+        word="" if early else verdict.level,
+        line=early or verdict_rest(verdict).with_degree_signs(),
+        action=asked,
+        assumes=sentence("assuming " + assumed_words(verdict.assumed)) if verdict.assumed else Words(),
+        kind=type(action).__name__,
+        pairs=action.ids if isinstance(action, ReviewPairs | ChooseReturn) else (),
         key="" if worst else "N" if early and left else _key(verdict, session, left),
-        option=_option(verdict, session),
-        done=_is_done(verdict),
+        option=_option(action, session),
+        done=verdict.done,
         early=bool(early) and not worst,
     )
 
@@ -254,37 +290,41 @@ _SUSPECT = 0.05
 """A pair that is an outlier with more than this probability is worth a look while there are few: 4 of 100 sound sets have one."""
 
 
-def _early_line(session: Session) -> str:
-    """Return how many pairs there are of those that the verdict needs; "" if there are enough, or something else is wrong.
+def _early_line(session: Session) -> Words:
+    """Return how many pairs there are of those that the verdict needs; nothing if there are enough, or something else is wrong.
 
     With fewer, a second pose that fits is what few pairs look like: it contradicts nothing until they are enough.
     """
     outcome = session.outcome if session.clicks else None
     if outcome is None:
-        return "No answer yet" if session.clicks else "No clicks yet"
+        return words("No answer yet" if session.clicks else "No clicks yet")
     if isinstance(outcome, Unsolvable):
         waits = outcome.code == "too-few-pairs" and not outcome.unpaired
-        return f"{len(outcome.pairs)} of {SURE_PAIRS} pairs" if waits else ""
+        return words(f"{len(outcome.pairs)} of {SURE_PAIRS} pairs" if waits else "")
     used = [pair for pair in outcome.pairs if not pair.excluded]
     grave = [one.code for one in outcome.warnings if consequence_of(one.code) not in ("limited", "note")]
     sound = all(pair.inlier for pair in used) and all(code in _MORE_PAIRS_DECIDE for code in grave)
     if not outcome.options.models_noise or len(used) >= SURE_PAIRS or not sound:
-        return ""
+        return Words()
     worst = _fits_worst(session)
-    seems = "two answers fit so far" if "two-poses" in grave else "looks consistent"
-    return f"{len(used)} of {SURE_PAIRS} pairs, {f'{worst} fits worst' if worst else seems}"
+    seems = words("two answers fit so far" if "two-poses" in grave else "looks consistent")
+    if worst:
+        seems = say("{pair} fits worst", pair=named(worst))
+    return say("{count} of {needed} pairs, {seems}", count=len(used), needed=SURE_PAIRS, seems=seems)
 
 
-def _large_so_far(verdict: Verdict, session: Session) -> str:
-    """Return how many pairs agree, and how large the error still is; "" if a pair does not agree, or something else is wrong."""
+def _large_so_far(verdict: Verdict, session: Session) -> Words:
+    """Return how many pairs agree, and how large the error still is; nothing if a pair does not agree, or something is wrong."""
     outcome = session.outcome
-    if not isinstance(outcome, Calibration) or not is_only_large(verdict, outcome):
-        return ""
+    if not isinstance(outcome, Calibration) or not verdict.is_only_large:
+        return Words()
     pairs = [pair for pair in outcome.pairs if not pair.excluded]
     if not all(pair.inlier for pair in pairs):
-        return ""
+        return Words()
     worst = _fits_worst(session)
-    return f"{len(pairs)} pairs{f', {worst} fits worst' if worst else ' agree'}: so far within {stated_error(outcome).text}"
+    agree = say(", {pair} fits worst", pair=named(worst)) if worst else words(" agree")
+    within = error_text(stated_error(outcome))
+    return say("{count} pairs{agree}: so far within {within}", count=len(pairs), agree=agree, within=within)
 
 
 def _fits_worst(session: Session) -> str:
@@ -294,27 +334,26 @@ def _fits_worst(session: Session) -> str:
     return worst.id if worst is not None and worst.outlier_probability > _SUSPECT else ""
 
 
-def _is_done(verdict: Verdict) -> bool:
-    return verdict.action == DONE or verdict.action.startswith(ALL_CLICKED)
-
-
 def _key(verdict: Verdict, session: Session, left: int | None) -> Literal["", "N", "E", "J"]:
     """Return the key of the page that does or begins the action."""
-    if _is_done(verdict):
+    if verdict.done:
         return "E"
-    outcome = session.outcome
-    if isinstance(outcome, Calibration) and outcome.options.models_noise and verdict.level == "contradictory":
-        return "J" if outcome.warnings and by_consequence(outcome.warnings)[0].code in _OF_PAIRS else ""
-    collecting = outcome is None or (isinstance(outcome, Unsolvable) and outcome.code == "too-few-pairs")
-    return "N" if left and (collecting or verdict.action.startswith("Click the ")) else ""
+    if isinstance(verdict.cause, DataWarning) and verdict.level == "contradictory":
+        return "J" if verdict.cause.code in _OF_PAIRS else ""
+    collecting = verdict.cause is None or verdict.cause.code == "too-few-pairs"
+    return (
+        "N" if left and (isinstance(verdict.action, ClickMore) or (verdict.level == "nothing" and collecting)) else ""
+    )
 
 
-def _option(verdict: Verdict, session: Session) -> Literal["", "solving.camera_position", "gating.max_range_m"]:
-    """Return the option that does the action: what was measured, or a maximum range that leaves returns out."""
-    if "camera position" in verdict.action and "tape" in verdict.action:
+def _option(action: Action, session: Session) -> str:
+    """Return the path of the option that does the action: what was measured, or a maximum range that leaves returns out."""
+    if isinstance(action, MeasureCameraPosition):
         return "solving.camera_position"
     is_near = session.options.gating.max_range_m < GatingOptions().max_range_m
-    return "gating.max_range_m" if is_near and _unpaired(session) else ""
+    if is_near and _unpaired(session):
+        return "gating.max_range_m"
+    return action.name if isinstance(action, SetOption) else ""
 
 
 _NOTICEABLE = 0.05
@@ -335,10 +374,9 @@ def advice_for(calibration: Calibration, verdict: Verdict) -> Advice | None:
 
 def _advice_words(best: NextPlacement, verdict: Verdict) -> str:
     """Return where a placement would help most; "" if the verdict's action says it."""
-    where = placement_words(best)
-    if where in verdict.action:
+    if isinstance(verdict.action, PlaceReflector):
         return ""
     if best.may_stop:
         return "No further placement would reduce the pose uncertainty noticeably."
     amount = f"by {100 * (1 - 1 / best.gain):.0f} %" if best.gain > 1 + _NOTICEABLE else "slightly"
-    return f"A placement {where}, would reduce the pose uncertainty {amount}."
+    return f"A placement {placement_words(*best.position_radar_m[:2].tolist())}, would reduce the pose uncertainty {amount}."

@@ -12,9 +12,10 @@ from calib_core.measurements import Pair, ReflectorClick, Stamp, Unpaired, Unsol
 from calib_core.options import CalibrationOptions, NoiseOptions
 from calib_core.radar import polar_from_cartesian
 from calib_core.results import Calibration, PairResult
+from calib_core.words import in_sentences
 from cocalib.session import RecordingFacts, Session
 from cocalib.view.model import ClickRow, ClickState, Ellipse
-from cocalib.view.wording import plain, position_words, sentence
+from cocalib.view.wording import plain, position_words
 
 _CHI2_95_2D = 5.991464547107979  # 95 % quantile of chi-squared with 2 degrees of freedom
 # Pixels are rounded to steps of at most 1 % of the pair's ellipse and a quarter of a pixel, which cannot be seen: with many
@@ -145,10 +146,12 @@ class _Disagreement:
     Attributes:
         what: what is wrong, the beginning of a sentence.
         action: what to do about it, a sentence.
+        of_pair: the pair itself may be wrong, not the method or the options.
     """
 
     what: str
     action: str
+    of_pair: bool = False
 
 
 def click_rows(session: Session, facts: RecordingFacts) -> tuple[ClickRow, ...]:
@@ -184,7 +187,7 @@ def _row(
     stamp = Stamp.of(click.image_time)
     if pair is None:
         state: ClickState = _uncounted(click) or ("unpaired" if lone else "pending")
-        note = f"{sentence(lone.reason)} {sentence(lone.hint)}" if lone else _GUESS if state == "untouched" else ""
+        note = str(in_sentences(lone)) if lone else _GUESS if state == "untouched" else ""
         return ClickRow(
             click.id,
             stamp,
@@ -214,6 +217,7 @@ def _row(
         elevation_deg=pair.elevation_deg,
         outlier_probability=pair.outlier_probability,
         note=_note(state, residual_px, pair, cause),
+        disagrees=state == "outlier" and not pair.rival and cause.of_pair,
         mark=click.mark,
         sigma_px=click.sigma_px,
         chosen=click.chosen is not None,
@@ -268,7 +272,7 @@ def disagreement(options: CalibrationOptions) -> _Disagreement:
     usual, given = NoiseOptions(), options.noise
     strict = [text for name, text in _NOISE.items() if getattr(given, name) < _STRICT * getattr(usual, name)]
     if not strict:
-        return _Disagreement("Disagrees with the other pairs", "Check the click, or exclude it.")
+        return _Disagreement("Disagrees with the other pairs", "Check the click, or exclude it.", of_pair=True)
     return _Disagreement(
         f"Does not fit the noise that the options state ({' and '.join(strict)} far below the default)",
         "Check these options before the click.",

@@ -8,19 +8,23 @@ import numpy as np
 from calib_core.arrays import Matrix33, Vector3, frozen_array
 from calib_core.geometry import camera_position_jacobian
 from calib_core.results import Calibration
+from calib_core.results.actions import ReduceError
 from calib_core.results.radar_axes import sigma_in_radar_axes
-from calib_core.results.systematic_errors import SystematicErrorResult, error_words, is_determined
+from calib_core.results.systematic_errors import SystematicErrorResult, family_of, is_determined
 from calib_core.results.verdict import verdict_on
+from calib_core.words import Words
+from calib_core.words import sentence as in_sentence
+from calib_core.words.systematic_errors import FAMILIES, dominant_sentence, error_words
 from cocalib.view.click_rows import reprojections
 from cocalib.view.model import Figure, Level, SystematicErrorRow, SystematicErrorTable
 from cocalib.view.wording import plain, sentence, with_sigma
 
 _METRICS = {
-    "aed": "average distance (AED)",
-    "held_out_aed": "new placement (held-out AED)",
-    "cdsd": "spread (CDSD)",
-    "rms": "root mean square (RMS)",
-    "inliers": "clicks that agree",
+    "aed": ("mean reprojection error", "AED"),
+    "held_out_aed": ("leave-one-out error", "held-out AED"),
+    "cdsd": ("standard deviation", "CDSD"),
+    "rms": ("root mean square", "RMS"),
+    "inliers": ("clicks that agree", ""),
 }
 _NOT_YET = "Available after the first calibration."
 _HELD_OUT_RATIO = 1.5
@@ -30,7 +34,7 @@ _HELD_OUT_RATIO = 1.5
 def metric_figures(calibration: Calibration | None) -> tuple[Figure, ...]:
     """Return the figures that say how well the pairs agree; without values while there is no calibration."""
     if calibration is None:
-        return tuple(Figure(key, label, "–", "", _NOT_YET, "none") for key, label in _METRICS.items())
+        return tuple(Figure(key, label, "–", "", _NOT_YET, "none", short) for key, (label, short) in _METRICS.items())
     metrics = calibration.metrics
     hints = {
         "aed": f"Mean distance between click and reprojection over {metrics.n} pairs (paper: AED).",
@@ -39,7 +43,10 @@ def metric_figures(calibration: Calibration | None) -> tuple[Figure, ...]:
         "rms": "Root mean square of these distances: large ones count more than in AED.",
     }
     figures = {
-        key: Figure(key, _METRICS[key], plain(getattr(metrics, f"{key}_px")), "px", hint) for key, hint in hints.items()
+        key: Figure(
+            key, _METRICS[key][0], plain(getattr(metrics, f"{key}_px")), "px", hint, abbreviation=_METRICS[key][1]
+        )
+        for key, hint in hints.items()
     }
     if metrics.held_out_aed_px > _HELD_OUT_RATIO * metrics.aed_px:
         held_out = figures["held_out_aed"]
@@ -49,7 +56,7 @@ def metric_figures(calibration: Calibration | None) -> tuple[Figure, ...]:
     agreeing = sum(pair.inlier and not pair.excluded for pair in calibration.pairs)
     hint = "Clicks whose radar position agrees with the pose, out of all that you have not excluded."
     level: Level = "good" if agreeing == used else "plain"
-    return (*figures.values(), Figure("inliers", _METRICS["inliers"], f"{agreeing} of {used}", "", hint, level))
+    return (*figures.values(), Figure("inliers", _METRICS["inliers"][0], f"{agreeing} of {used}", "", hint, level))
 
 
 def pose_figures(calibration: Calibration) -> tuple[Figure, ...]:
@@ -84,7 +91,11 @@ def _mounting_figures(calibration: Calibration) -> tuple[Figure, ...]:
         position_sigma_m[:2], angle_sigma_rad[2] = firm.position_m[:2], firm.rotation_rad[2]
     causes = calibration.dominant_errors()
     of_position, of_rotation = (
-        "".join(f" {sentence(one.sentence)}" for one in causes if getattr(one, f"{part}_share"))
+        "".join(
+            f" {in_sentence(dominant_sentence(error, measured=False, with_remedy=False))}"
+            for error in causes
+            if getattr(error, f"{part}_share")
+        )
         for part in ("position", "rotation")
     )
     centimetres, sigmas_cm = 100 * mounting.position_m, 100 * position_sigma_m
@@ -229,12 +240,14 @@ _SHOWN_SHARE = 0.03
 _DOMINANT_SHARE = 1.0 / 3.0
 
 
-def uncertainty_sentences(calibration: Calibration) -> tuple[str, ...]:
+def uncertainty_sentences(calibration: Calibration) -> tuple[Words, ...]:
     """Say which errors make up a third or more of the uncertainty, and what the verdict does not say of reducing them."""
-    told = verdict_on(calibration).action
+    action = verdict_on(calibration).action
+    measured = calibration.options.solving.camera_position is not None
+    reduced = action.name if isinstance(action, ReduceError) else ""
     return tuple(
-        sentence(one.sentence if one.action == told else f"{one.sentence}; {one.remedy}")
-        for one in calibration.dominant_errors()
+        in_sentence(dominant_sentence(error, measured=measured, with_remedy=error.largest.name != reduced))
+        for error in calibration.dominant_errors()
     )
 
 
@@ -260,7 +273,7 @@ def systematic_errors(calibration: Calibration) -> SystematicErrorTable:
     """Return the table: errors that the pairs determine or that matter, the largest share first."""
     groups = sorted(_groups(calibration.errors_of_firm), key=_largest_share, reverse=True)
     shown = [group for group in groups if _largest_share(group) >= _SHOWN_SHARE or is_determined(group[0])]
-    sentences = (*uncertainty_sentences(calibration), *refined_sentences(calibration))
+    sentences = (*uncertainty_sentences(calibration), *map(in_sentence, refined_sentences(calibration)))
     return SystematicErrorTable(tuple(map(_row, shown)), sentences)
 
 
@@ -268,8 +281,7 @@ def _groups(errors: Sequence[SystematicErrorResult]) -> list[list[SystematicErro
     """Put errors of several axes that the pairs do not determine together; every other error stands alone."""
     groups: dict[str, list[SystematicErrorResult]] = {}
     for one in errors:
-        family = "".join(error_words(one.name).family)
-        groups.setdefault(one.name if is_determined(one) or not family else family, []).append(one)
+        groups.setdefault(one.name if is_determined(one) else family_of(one.name), []).append(one)
     return list(groups.values())
 
 
@@ -284,10 +296,12 @@ def _largest_share(group: Sequence[SystematicErrorResult]) -> float:
 def _row(group: Sequence[SystematicErrorResult]) -> SystematicErrorRow:
     one, (position, rotation) = group[0], _shares(group)
     words = error_words(one.name)
-    label = words.family[0] if len(group) > 1 and words.family else words.label
+    family = FAMILIES.get(family_of(one.name))
+    label = family.label if len(group) > 1 and family is not None else words.label
     known = "Estimated with the pose." if one.estimated else "Not taken out of the pose, but part of its uncertainty."
     value = with_sigma(words.factor * one.value, words.factor * one.sigma) if is_determined(one) else "–"
-    hint = " ".join((*(sentence(error_words(each.name).text) for each in group), known, sentence(words.remedy)))
+    reduced = str(in_sentence(words.remedy.phrase + " would reduce it"))
+    hint = " ".join((*(sentence(error_words(each.name).text) for each in group), known, reduced))
     level: Level = "warning" if max(position, rotation) >= _DOMINANT_SHARE else "plain"
     return SystematicErrorRow(
         Figure(one.name, label, value, words.unit, hint, level),

@@ -5,7 +5,7 @@ from typing import Literal
 
 from calib_core.diagnostics.next_placement import ENOUGH_PLACEMENTS, Coverage, Place
 from calib_core.results import NextPlacement
-from calib_core.results.verdict import placement_words
+from calib_core.words import placement_words
 
 FollowState = Literal["live", "quiet", "complete", "ended"]
 
@@ -59,7 +59,7 @@ def advice_words(coverage: Coverage, best: NextPlacement | None) -> str:
     if best is not None and best.may_stop:
         return f"{_count(coverage.placements)}: no further one would reduce the pose uncertainty noticeably."
     if best is not None:
-        return f"{_count(coverage.placements)}; next: {placement_words(best)}."
+        return f"{_count(coverage.placements)}; next: {placement_words(*best.position_radar_m[:2].tolist())}."
     if coverage.next is not None:
         total = f"{coverage.placements} of {ENOUGH_PLACEMENTS} placements"
         few = total if coverage.placements < ENOUGH_PLACEMENTS else _count(coverage.placements)

@@ -8,7 +8,9 @@ import msgspec
 from calib_core.measurements import Mark, Stamp
 from calib_core.options import CalibrationOptions, Method
 from calib_core.results import DataWarning, NextPlacement
+from calib_core.results.actions import SetOption
 from calib_core.results.verdict import VerdictLevel
+from calib_core.words import Words, sentence, told, words
 from cocalib.session import DismissedPlacement
 
 Level: TypeAlias = Literal["none", "plain", "good", "warning"]
@@ -20,11 +22,12 @@ class Figure:
 
     Attributes:
         key: for programs, such as "aed"; stable.
-        label: for display, such as "average distance (AED)".
+        label: for display, such as "mean reprojection error".
         value: formatted, with its standard deviation if that is known: "12.4", "0.31 ± 0.08".
         unit: such as "px"; "" if it has none.
         hint: one sentence that explains the number, shown on hover.
         level: whether it needs attention.
+        abbreviation: as the paper has it, such as "AED"; "" if it has none.
     """
 
     key: str
@@ -33,6 +36,12 @@ class Figure:
     unit: str
     hint: str
     level: Level = "plain"
+    abbreviation: str = ""
+
+    @property
+    def name(self) -> str:
+        """Label and abbreviation: "mean reprojection error (AED)"."""
+        return f"{self.label} ({self.abbreviation})" if self.abbreviation else self.label
 
 
 ClickState: TypeAlias = Literal["pending", "inlier", "outlier", "excluded", "unpaired", "untouched"]
@@ -73,6 +82,7 @@ class ClickRow:
         returns: how many radar returns the position averages; None if unknown.
         outlier_probability: 0 to 1; None if the method has none.
         note: text for the user; "" when there is nothing to say.
+        disagrees: with the other pairs, rather than being set aside by the method or an option.
         mark: how it came to its pixel.
         sigma_px: its own standard deviation per axis; None if it has the options' value.
         chosen: a person said which return belongs to it.
@@ -93,6 +103,7 @@ class ClickRow:
     returns: int | None = None
     outlier_probability: float | None = None
     note: str = ""
+    disagrees: bool = False
     mark: Mark = "clicked"
     sigma_px: float | None = None
     chosen: bool = False
@@ -126,7 +137,7 @@ class SystematicErrorTable:
     """
 
     rows: tuple[SystematicErrorRow, ...] = ()
-    sentences: tuple[str, ...] = ()
+    sentences: tuple[Words, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,9 +161,12 @@ class VerdictRow:
 
     Attributes:
         level: decides word, colour and shape.
-        line: level and reason: "usable: within 0.5 deg, 6 cm (95 %); 7 px at 20 m".
+        line: behind the word: ": within 0.5 deg, 6 cm (95 %); 7 px at 20 m".
         action: the one thing that helps most, as a sentence.
-        assumes: what the stated error rests on and no pair can show, as a sentence; "" if there is nothing.
+        assumes: what the stated error rests on and no pair can show, as a sentence; empty if there is nothing.
+        word: the level, where the line begins with it; else "".
+        kind: of the action, one of `calib_core.results.actions`.
+        pairs: that the action is about.
         key: of the page, that does or begins it; "" if there is none.
         option: path of the option that does it; "" if there is none.
         done: nothing more is needed.
@@ -160,13 +174,46 @@ class VerdictRow:
     """
 
     level: VerdictLevel
-    line: str
-    action: str
-    assumes: str = ""
+    line: Words
+    action: Words
+    assumes: Words
+    word: str = ""
+    kind: str = ""
+    pairs: tuple[str, ...] = ()
     key: Literal["", "N", "E", "J"] = ""
-    option: Literal["", "solving.camera_position", "gating.max_range_m"] = ""
+    option: str = ""
     done: bool = False
     early: bool = False
+
+
+_UNCLICKED = VerdictRow("nothing", words("No clicks yet"), Words(), Words(), early=True)
+
+
+@dataclass(frozen=True, slots=True)
+class WarningRow:
+    """A warning, in sentences.
+
+    Attributes:
+        code: stable.
+        message: what is wrong.
+        hint: what to do about it.
+        kind: of the action that does it, one of `calib_core.results.actions`; "" if the page cannot begin it.
+        option: path of the option that does it; "" if there is none.
+    """
+
+    code: str
+    message: Words
+    hint: Words
+    kind: str = ""
+    option: str = ""
+
+
+def warning_row(warning: DataWarning) -> WarningRow:
+    """Return a warning as the page shows it."""
+    said = told(warning)
+    kind = type(said.action).__name__ if said.action is not None else ""
+    option = said.action.name if isinstance(said.action, SetOption) else ""
+    return WarningRow(warning.code, sentence(said.message), sentence(said.hint), kind, option)
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,7 +276,7 @@ class View:
     clicks: tuple[ClickRow, ...]
     metrics: tuple[Figure, ...]
     pose: tuple[Figure, ...]
-    warnings: tuple[DataWarning, ...]
+    warnings: tuple[WarningRow, ...]
     options: CalibrationOptions
     residual_limit_px: float | None
     advice: Advice | None = None
@@ -240,4 +287,4 @@ class View:
     dismissed: tuple[DismissedPlacement, ...] = ()
     acknowledged: tuple[str, ...] = ()
     systematic_errors: SystematicErrorTable = field(default_factory=SystematicErrorTable)
-    verdict: VerdictRow = VerdictRow("nothing", "No clicks yet", "", early=True)
+    verdict: VerdictRow = _UNCLICKED

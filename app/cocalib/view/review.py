@@ -13,6 +13,7 @@ from calib_core.interchange import CalibrationFile, ImportedCalibration, compare
 from calib_core.measurements import Candidate
 from calib_core.radar import polar_from_cartesian
 from calib_core.results import Calibration, PairResult
+from calib_core.words import Words, join, named, said_of, say, words
 from cocalib.session import History
 from cocalib.view.model import Figure
 from cocalib.view.wording import direction_words, plain, sentence
@@ -65,13 +66,13 @@ class Review:
     revision: int
     rows: tuple[ReviewRow, ...]
     histogram: ResidualHistogram | None
-    words: str
+    words: Words
 
 
 def review_of(calibration: Calibration | None, revision: int) -> Review:
     """Return the review of an answer; an empty one without a calibration."""
     if calibration is None or not calibration.pairs:
-        return Review(revision, (), None, "Available after the first calibration.")
+        return Review(revision, (), None, words("Available after the first calibration."))
     rows = tuple(
         ReviewRow(pair.id, _rounded(pair.influence, 3), _rounded(pair.held_out_px, 2), _rounded(sigmas, 3))
         for pair, sigmas in zip(calibration.pairs, _sigmas(calibration).tolist(), strict=True)
@@ -115,11 +116,11 @@ def _edges(distances_px: Values) -> Values:
     return np.asarray(np.arange(np.ceil(longest_px / width_px) + 1) * width_px)
 
 
-def _words(calibration: Calibration) -> str:
+def _words(calibration: Calibration) -> Words:
     agreeing = np.array([pair.inlier for pair in calibration.pairs])
     sigmas = _sigmas(calibration)[agreeing]
     sigmas = sigmas[np.isfinite(sigmas)]
-    said = ["This method has no noise model: no distribution is expected."]
+    said: list[Words | str] = ["This method has no noise model: no distribution is expected."]
     if len(sigmas):
         inside = int((sigmas**2 <= _CHI2_95_2D).sum())
         said = [
@@ -128,8 +129,9 @@ def _words(calibration: Calibration) -> str:
     influences = [(pair.influence, pair.id) for pair in calibration.pairs if np.isfinite(pair.influence)]
     if influences:
         most, name = max(influences)
-        said.append(f"The pose leans most on {name}: leaving it out moves it by {plain(most, 2)} standard deviations.")
-    return " ".join(said)
+        leans = "The pose leans most on {pair}: leaving it out moves it by {most} standard deviations."
+        said.append(say(leans, pair=named(name), most=plain(most, 2)))
+    return join(said)
 
 
 _MUCH_CLOSER = 3.0
@@ -175,7 +177,7 @@ class PairReview:
     """
 
     id: str
-    why: str
+    why: Words
     facts: tuple[Figure, ...] = ()
     candidates: tuple[ReviewedReturn, ...] = ()
 
@@ -184,13 +186,14 @@ def pair_review(calibration: Calibration, name: str) -> PairReview:
     """Describe the pair of a click; if it has none, say so."""
     pair = next((pair for pair in calibration.pairs if pair.id == name), None)
     if pair is None:
-        reason = next((f"{row.reason}; {row.hint}" for row in calibration.unpaired if row.id == name), "not solved yet")
-        return PairReview(name, f"{name} has no radar position: {reason}.")
+        reason = next((str(said_of(row)) for row in calibration.unpaired if row.id == name), "not solved yet")
+        return PairReview(name, say("{pair} has no radar position: {reason}.", pair=named(name), reason=reason))
     facts = _facts(pair)
     measured = pair.measured
     candidates = (*measured.candidates, *measured.set_aside) if measured is not None else ()
     if not candidates:
-        return PairReview(name, "The radar positions that this pair could have used were not kept.", facts)
+        kept = words("The radar positions that this pair could have used were not kept.")
+        return PairReview(name, kept, facts)
     points = np.array([candidate.position_radar_m for candidate in candidates])
     pixels = calibration.reproject(points)
     distances_px = np.linalg.norm(pixels - pair.pixel_px, axis=1)
@@ -199,7 +202,7 @@ def pair_review(calibration: Calibration, name: str) -> PairReview:
         for i, (candidate, pixel, distance_px) in enumerate(zip(candidates, pixels, distances_px, strict=True))
     )
     facts = (*facts, *_noise_fact(candidates[pair.candidate]))
-    return PairReview(name, _why(pair, candidates, distances_px), facts, rows)
+    return PairReview(name, words(_why(pair, candidates, distances_px)), facts, rows)
 
 
 def _row(candidate: Candidate, pixel: Values, distance_px: float, *, chosen: bool) -> ReviewedReturn:

@@ -1,36 +1,15 @@
 """Words for the screen: sentences from phrases of the core, numbers to their meaningful digits, places as people say them."""
 
 import math
-import re
-from dataclasses import replace
 
 from calib_core.arrays import Vector3
 from calib_core.radar import polar_from_cartesian
-from calib_core.results import DataWarning
-
-_DEGREES = re.compile(r"(?<=\d) deg\b")
-
-
-def with_degree_signs(text: str) -> str:
-    """Return the text with "2°" for "2 deg"."""
-    return _DEGREES.sub("°", text)
+from calib_core.words import sentence as in_sentence
 
 
 def sentence(phrase: str) -> str:
-    """Capitalize the phrase and add a full stop; an empty phrase stays empty, names such as /radar or c14 are not capitalized.
-
-    Degrees have their sign.
-    """
-    phrase = with_degree_signs(phrase.strip())
-    if not phrase:
-        return ""
-    start = phrase[0].upper() if phrase.split()[0].rstrip(",:;.…").isalpha() else phrase[0]
-    return start + phrase[1:] + ("" if phrase[-1] in ".!?…" else ".")
-
-
-def warning_in_sentences(warning: DataWarning) -> DataWarning:
-    """Return the warning with message and hint as sentences."""
-    return replace(warning, message=sentence(warning.message), hint=sentence(warning.hint))
+    """Return a phrase as a sentence; see `calib_core.words.sentence`."""
+    return str(in_sentence(phrase))
 
 
 _STRAIGHT_DEG = 0.05

@@ -64,6 +64,7 @@ from calib_core.radar import AngleMap, RadarErrors, covariance_from_sigma_polar
 from calib_core.results import Calibration, CheckPoint, PairResult
 from calib_core.results.calibration import CovarianceParts
 from calib_core.results.verdict import verdict_on
+from calib_core.words import stated_verdict, unpaired_text, warning_text
 
 _SHOWN = 200
 """Characters of unknown keys."""
@@ -114,7 +115,7 @@ def calibration_file(
         frames=frames or FrameNames(),
         check_point=choose_check_point(stamped),
         provenance=provenance or Provenance(),
-        verdict=verdict_on(stamped, unconfirmed=unconfirmed),
+        verdict=stated_verdict(verdict_on(stamped, unconfirmed=unconfirmed)),
         evidence="automatic" if provenance is not None and provenance.unconfirmed is not None else "clicked",
         vehicle=vehicle or VehicleNote(),
     )
@@ -150,8 +151,8 @@ def write_calibration(file: CalibrationFile) -> str:
         paper=documents.PaperDocument(finite_or_none(calibration.iterative_px), finite_or_none(calibration.sqpnp_px)),
         verdict=file.verdict,
         evidence=file.evidence,
-        warnings=list(calibration.warnings),
-        unpaired=list(calibration.unpaired),
+        warnings=[warning_text(warning) for warning in calibration.warnings],
+        unpaired=[unpaired_text(click) for click in calibration.unpaired],
         pairs=[solved_pair_document(pair) for pair in calibration.pairs],
         camera=camera_document(calibration.camera),
         given_camera=camera_document(calibration.given_camera) if calibration.given_camera is not None else None,
@@ -296,8 +297,8 @@ def _file(
         given_camera=_given_camera(document, source=source),
         metrics=document.metrics,
         pairs=tuple(solved_pair_of(pair, source=source, place=f"pairs[{i}]") for i, pair in enumerate(document.pairs)),
-        unpaired=tuple(document.unpaired),
-        warnings=tuple(document.warnings),
+        unpaired=tuple(click.unpaired for click in document.unpaired),
+        warnings=tuple(warning.warning for warning in document.warnings),
         options=document.options,
         noise_scale=(scale.click, scale.range, scale.azimuth, scale.elevation),
         covariance_quantile=nan_if_none(document.covariance_quantile),

@@ -17,12 +17,12 @@ from calib_core.geometry import RigidTransform, matrix_from_quaternion_wxyz, qua
 from calib_core.interchange.calibration_file import AssumptionNote, Evidence, VehicleNote
 from calib_core.interchange.rotations import nearest_rotation
 from calib_core.json_forms import Count, Measured, Name, Pixel, Position, Positive, Share
-from calib_core.measurements import ChosenReturn, Mark, TimeNs, Unpaired
+from calib_core.measurements import ChosenReturn, Mark, TimeNs
 from calib_core.options import CalibrationOptions
 from calib_core.radar import RadarErrors
-from calib_core.results import DataWarning, InputFile, Metrics, UnconfirmedClicks
+from calib_core.results import InputFile, Metrics, UnconfirmedClicks
 from calib_core.results.systematic_errors import SystematicErrorResult
-from calib_core.results.verdict import Verdict
+from calib_core.words import StatedVerdict, UnpairedText, WarningText
 
 CLICKS_SCHEMA: Final = "cocalib/clicks-1"
 PAIRS_SCHEMA: Final = "cocalib/pairs-1"
@@ -294,10 +294,10 @@ class CalibrationDocument(Struct, frozen=True):
     systematic_errors: list[SystematicErrorResult] = []
     radar_angle_map: AngleMapDocument | None = None
     paper: PaperDocument = field(default_factory=PaperDocument)
-    verdict: Verdict | None = None
+    verdict: StatedVerdict | None = None
     evidence: Evidence | None = None
-    warnings: list[DataWarning] = []
-    unpaired: list[Unpaired] = []
+    warnings: list[WarningText] = []
+    unpaired: list[UnpairedText] = []
     pairs: list[SolvedPairDocument] = []
     given_camera: CameraDocument | None = None
     vehicle: VehicleNote | None = None

@@ -29,6 +29,7 @@ from calib_core.intrinsics import (
 )
 from calib_core.intrinsics.coverage import Coverage
 from calib_core.measurements import Unsolvable
+from calib_core.words import outcome_told, warning_text
 
 
 def write_intrinsics(
@@ -66,8 +67,8 @@ def write_intrinsics(
         projection_uncertainty=_uncertainty(lens),
         residual_field=_field(lens),
         coverage=None if coverage is None else _coverage(coverage),
-        halves_apart=halves.reason if isinstance(halves, Unsolvable) else halves.sentence,
-        warnings=list(lens.warnings),
+        halves_apart=str(outcome_told(halves).message) if isinstance(halves, Unsolvable) else halves.sentence,
+        warnings=[warning_text(warning) for warning in lens.warnings],
         board_shape_m=[(x, y, z) for x, y, z in lens.board_shape_m.tolist()],
     )
     return document_text(document)

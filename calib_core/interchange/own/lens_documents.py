@@ -8,7 +8,7 @@ from msgspec import Meta, Struct
 from calib_core.interchange.own.documents import CameraDocument
 from calib_core.intrinsics import Board, LeftOutPicture
 from calib_core.json_forms import Count, Measured, Name, Pixel
-from calib_core.results import DataWarning
+from calib_core.words import WarningText
 
 BOARD_VIEWS_SCHEMA: Final = "cocalib/board-views-1"
 INTRINSICS_SCHEMA: Final = "cocalib/intrinsics-1"
@@ -142,7 +142,7 @@ class IntrinsicsDocument(Struct, frozen=True):
     residual_field: ResidualFieldDocument
     coverage: CoverageDocument | None
     halves_apart: str
-    warnings: list[DataWarning]
+    warnings: list[WarningText]
     board_shape_m: list[tuple[Measured, Measured, Measured]]
 
 

@@ -11,6 +11,7 @@ from calib_core.interchange.calibration_file import CalibrationFile, choose_chec
 from calib_core.interchange.own.calibration_json import calibration_sha256
 from calib_core.measurements import Unsolvable
 from calib_core.radar import RadarErrors
+from calib_core.words import said_of
 
 
 def aed_either_way(file: CalibrationFile) -> tuple[float, float] | None:
@@ -52,7 +53,7 @@ def for_raw(file: CalibrationFile) -> CalibrationFile:
             f"the pose for radar data as reported is solved from the pairs: the calibration {error}"
         ) from None
     if isinstance(solved, Unsolvable):
-        raise InputError(f"there is no pose for radar data as reported: {solved.reason}; {solved.hint}")
+        raise InputError(f"there is no pose for radar data as reported: {said_of(solved)}")
     unknown = np.full(
         (6, 6), np.nan
     )  # what the radar gets wrong is in the pose, and nobody knows how wrong it is elsewhere

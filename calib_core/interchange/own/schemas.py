@@ -41,7 +41,7 @@ _NAMES = {
     "AssumptionNote": "AssumptionDocument",
     "Board": "BoardDocument",
     "ChosenReturn": "ReturnDocument",
-    "DataWarning": "WarningDocument",
+    "WarningText": "WarningDocument",
     "LabelledScan": "ScanDocument",
     "InputFile": "InputDocument",
     "LeftOutPicture": "LeftOutDocument",
@@ -50,10 +50,10 @@ _NAMES = {
     "RadarErrors": "RadarErrorsDocument",
     "Stamp": "TimeDocument",
     "SystematicErrorResult": "SystematicErrorDocument",
-    "Unpaired": "UnpairedDocument",
+    "UnpairedText": "UnpairedDocument",
     "UnconfirmedClicks": "UnconfirmedDocument",
     "VehicleNote": "VehicleDocument",
-    "Verdict": "VerdictDocument",
+    "StatedVerdict": "VerdictDocument",
 }
 """The names under which definitions were published, where they differ from those of their types."""
 

@@ -192,7 +192,7 @@ def about_video(images: ImageStream | None) -> list[DataWarning]:
     if not isinstance(images, VideoStream) or not images.before_key:
         return []
     return [
-        DataWarning(
+        DataWarning.reported(
             "video-before-key",
             f"the first {images.before_key} frames of {images.topic.name} precede its first key frame and are skipped",
             "no action needed unless a placement is there; in that case have the encoder send key frames more often",
@@ -236,7 +236,7 @@ def _about_sizes(
         for (width, height), count in sizes.most_common()[1:]
     ]
     return [
-        DataWarning(
+        DataWarning.reported(
             "picture-sizes",
             f"{images.topic.name} has pictures of several sizes: {sizes[usual]} have {usual[0]} x {usual[1]} pixels and are "
             f"used; {', '.join(others)} and are skipped",
@@ -250,7 +250,7 @@ def _about_unreadable(images: ImageStream, found: Sequence[tuple[int, int] | Mes
     if not rows:
         return []
     return [
-        DataWarning(
+        DataWarning.reported(
             "unreadable-pictures",
             f"{len(rows)} of {len(found)} pictures of {images.topic.name} cannot be read and are skipped "
             f"({_times(images, rows)}): {found[rows[0]]}",

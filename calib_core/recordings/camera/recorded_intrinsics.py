@@ -67,7 +67,7 @@ def camera_from_info(message: Message, *, topic: str, rectified: bool = False) -
 
 def _none(topic: str, code: str, what: str) -> CameraReading:
     hint = "give the intrinsics with --camera FILE: camera_info YAML, OpenCV YAML or XML, Kalibr camchain, JSON"
-    return CameraReading(None, (DataWarning(code, f"{topic} {what}", hint),))
+    return CameraReading(None, (DataWarning.reported(code, f"{topic} {what}", hint),))
 
 
 def _model(name: str, distortion: np.ndarray) -> "tuple[CameraModel, np.ndarray] | str":
@@ -144,8 +144,12 @@ def published_camera(published: PublishedCamera, images: ImageStream) -> tuple[C
     try:
         camera = published.camera(images.size_px(0))
     except (ValueError, RecordingError) as error:
-        return None, [DataWarning("camera-unreadable", f"{published.file}: {error}", hint)]
-    warnings = [DataWarning("camera-changes", f"{published.file}: {published.doubt}", hint)] if published.doubt else []
+        return None, [DataWarning.reported("camera-unreadable", f"{published.file}: {error}", hint)]
+    warnings = (
+        [DataWarning.reported("camera-changes", f"{published.file}: {published.doubt}", hint)]
+        if published.doubt
+        else []
+    )
     return _fitted(camera, images, str(published.file), warnings)
 
 
@@ -161,13 +165,13 @@ def recorded_camera(topic: Topic | None, images: ImageStream | None) -> tuple[Ca
     try:
         reading, other = (_reading(topic, row, images) for row in (0, len(topic) - 1))
     except RecordingError as error:
-        return None, [DataWarning("camera-unreadable", str(error), "give the intrinsics with --camera FILE")]
+        return None, [DataWarning.reported("camera-unreadable", str(error), "give the intrinsics with --camera FILE")]
     warnings = list(reading.warnings)
     if reading.camera is None:
         return None, warnings
     if other.camera is None or not np.array_equal(other.camera.matrix_px, reading.camera.matrix_px):
         warnings.append(
-            DataWarning(
+            DataWarning.reported(
                 "camera-changes",
                 f"{topic.name} has different intrinsics at its beginning and end; the first are used",
                 "disable autofocus and zoom, or give the intrinsics with --camera FILE",
@@ -198,6 +202,6 @@ def _fitted(
         scaled = camera.scaled(width / camera.width_px)
         fitted = Camera(scaled.model, width, height, scaled.matrix_px, scaled.distortion)
         hint = "this is correct for resized images; for cropped images give the intrinsics with --camera FILE"
-        return fitted, [*warnings, DataWarning("camera-scaled", f"{sizes}: the intrinsics were scaled", hint)]
+        return fitted, [*warnings, DataWarning.reported("camera-scaled", f"{sizes}: the intrinsics were scaled", hint)]
     hint = "give the intrinsics of these images with --camera FILE"
-    return None, [*warnings, DataWarning("camera-size", f"{sizes}: the intrinsics cannot be used", hint)]
+    return None, [*warnings, DataWarning.reported("camera-size", f"{sizes}: the intrinsics cannot be used", hint)]

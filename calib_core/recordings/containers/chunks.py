@@ -228,7 +228,7 @@ class ChunkedSource:
             return ()
         inside = sum(int(np.isin(index.chunk, bad).sum()) for index in self.indexes.values())
         return (
-            DataWarning(
+            DataWarning.reported(
                 "checksum",
                 f"{self.path.name}: wrong checksum in {len(bad)} of the chunks read so far, with {inside} messages; "
                 f"the first is at byte {self.chunks[bad[0]].position}. Their messages are used anyway, and may be wrong",
@@ -564,7 +564,7 @@ def about_recovery(
         parts.append(f"{unknown} of the messages belong to topics that the file does not describe, and are skipped")
     if lost_bytes:
         parts.append(f"{lost_bytes} bytes could not be parsed and are lost")
-    return DataWarning(
+    return DataWarning.reported(
         "not-closed",
         "; ".join(parts),
         f"check that the data you need is there; repair the file to open it quickly again: {tool} {path.name}",

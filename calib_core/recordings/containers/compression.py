@@ -169,14 +169,14 @@ def unpacked_file(file: FileBytes, kind: str) -> FileBytes:
 
 def _unpacking_warnings(file: FileBytes, kind: str, size: int, fault: str) -> list[DataWarning]:
     name = file.path.name
-    once = DataWarning(
+    once = DataWarning.reported(
         "packed-file",
         f"{name} is compressed with {kind}: it was decompressed to {size / 1e6:.1f} MB in a temporary folder",
         f"this is repeated every time it is opened; to do it once: {_COMMANDS[kind]} {name}",
     )
     if not fault:
         return [once]
-    cut = DataWarning(
+    cut = DataWarning.reported(
         "packed-file-damaged",
         f"{name} is damaged or truncated ({fault}): everything after the first {size} decompressed bytes is lost",
         "copy the file again from its source",

@@ -268,7 +268,9 @@ def damaged_chunks(path: Path, count: int, fault: str) -> tuple[DataWarning, ...
     if not count:
         return ()
     message = f"{path.name}: {count} of the chunks read so far {'are' if count > 1 else 'is'} damaged ({fault})"
-    return (DataWarning("damaged-file", message, "check the disk of the recorder; what was read of them is used"),)
+    return (
+        DataWarning.reported("damaged-file", message, "check the disk of the recorder; what was read of them is used"),
+    )
 
 
 class KeptHeads:
@@ -446,7 +448,7 @@ class GrowingDatabase(SqliteSource):
         if not self._strange:
             return ()
         message = f"{self.path.name}: {self._strange} rows without a time or a topic are skipped"
-        return (DataWarning("damaged-file", message, "check the disk of the recorder"),)
+        return (DataWarning.reported("damaged-file", message, "check the disk of the recorder"),)
 
     def grow(self) -> int:
         """Index the messages that have been committed since; return how many there are."""

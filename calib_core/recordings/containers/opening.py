@@ -140,7 +140,7 @@ def _open_or_refusal(found: _Found) -> "_AnySource | RecordingError":
 
 
 def _left_out(error: RecordingError) -> DataWarning:
-    return DataWarning(
+    return DataWarning.reported(
         "file-left-out",
         f"one file of the folder cannot be opened and is skipped: {error}",
         "the other files of the folder are used; copy this one again if you need that part of the recording",
@@ -208,7 +208,7 @@ def _from_metadata(folder: Path) -> list[_Found]:
 
 def _missing(folder: Path, missing: list[str], counts: dict[str, int]) -> DataWarning:
     lost = sum(counts.get(name, 0) for name in missing)
-    return DataWarning(
+    return DataWarning.reported(
         "missing-file",
         f"{folder.name}: metadata.yaml lists {', '.join(missing)}, which {'does' if len(missing) == 1 else 'do'} not exist"
         + (f": {lost} messages are missing" if lost else ""),
@@ -269,7 +269,7 @@ def _source(file: FileBytes, head: bytes, *, packed: bool) -> "_AnySource":
 
 
 def _too_few(found: _Found, count: int) -> DataWarning:
-    return DataWarning(
+    return DataWarning.reported(
         "messages-missing",
         f"metadata.yaml lists {found.count} messages in {found.path.name}, but it contains {count}",
         "check that the data you need is there, or copy the file again from its source",

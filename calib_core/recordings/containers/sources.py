@@ -47,7 +47,7 @@ class StatedAssumption:
 
 def about_assumptions(assumptions: Sequence[Assumption]) -> list[DataWarning]:
     """Warn about each unconfirmed assumption."""
-    return [DataWarning("assumed", one.words, assumption_hint(one.confirm)) for one in assumptions]
+    return [DataWarning.reported("assumed", one.words, assumption_hint(one.confirm)) for one in assumptions]
 
 
 def assumption_hint(confirm: str) -> str:

@@ -302,7 +302,9 @@ def about_rows(path: Path, found: FoundRows, unknown: int) -> list[DataWarning]:
         lost.append(f"{unknown} messages belong to topics that the file does not describe, and are skipped")
     if not lost:
         return []
-    return [DataWarning("damaged-file", f"{path.name}: {'; '.join(lost)}", "copy the file again from its source")]
+    return [
+        DataWarning.reported("damaged-file", f"{path.name}: {'; '.join(lost)}", "copy the file again from its source")
+    ]
 
 
 MAGIC = b"SQLite format 3\0"
@@ -403,7 +405,7 @@ class SqliteSource:
         try:
             return {name: (_FORMATS.get(form, ""), str(text or "")) for name, form, text in self._rows(query)}
         except RecordingError as error:
-            warning = DataWarning(
+            warning = DataWarning.reported(
                 "definitions-damaged",
                 f"{self.path.name}: its message definitions cannot be read; well-known ones are used instead ({error})",
                 "copy the file again from its source",

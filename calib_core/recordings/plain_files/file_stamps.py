@@ -185,7 +185,7 @@ def _by_name(folder: Path, files: Sequence[Path], named: NamedTimes) -> StampedF
     if named.disorder:
         what = f"{folder.name}: the times and the numbers in the file names disagree about the order at {named.disorder} files"
         warnings = (
-            DataWarning(
+            DataWarning.reported(
                 "file-order",
                 what,
                 "check a few names; the times are used: add a CSV with the columns file,time_ns if they are wrong",
@@ -205,7 +205,7 @@ def _like_files_of(known: PlainSource, folder: Path, files: Sequence[Path]) -> S
         ("numbers", {file: by_number[number] for file, number in numbers.items() if number in by_number}),
     ):
         if len(times) >= max(1, _ENOUGH * len(files)):
-            warning = DataWarning(
+            warning = DataWarning.reported(
                 "numbered-files",
                 f"{folder.name}: the files have no times; they have those of the files of {known.path.name} with the same {what}",
                 f"correct only if files with the same {what} belong together; otherwise add a CSV with the columns "
@@ -219,7 +219,7 @@ def _like_files_of(known: PlainSource, folder: Path, files: Sequence[Path]) -> S
 def _counted(folder: Path, files: Sequence[Path], numbers: Mapping[Path, int]) -> StampedFiles:
     """Stamp numbered files 0.1 s apart."""
     counted = {file: TimeNs((number + 10) * _STEP_NS) for file, number in numbers.items()}
-    warning = DataWarning(
+    warning = DataWarning.reported(
         "numbered-files",
         f"{folder.name}: the files are numbered and have no times; an interval of 0.1 s is assumed",
         "correct only if radar and camera files with the same number belong together; otherwise add a CSV with the columns "
@@ -250,7 +250,7 @@ def _stamped(
         what = f"{folder.name}: {count} have no time and are skipped; the first is {left_out[0].name}"
         warnings = (
             *warnings,
-            DataWarning("unstamped-files", what, "name them by their time, or list them in the folder's CSV"),
+            DataWarning.reported("unstamped-files", what, "name them by their time, or list them in the folder's CSV"),
         )
     times_ns = np.array([times[file] for file in ordered], dtype=np.int64)
     return StampedFiles(tuple(ordered), times_ns, tuple(warnings), zoneless, counted, assumed, times_from)

@@ -177,7 +177,7 @@ class _Opening:
         if not self.refused or not sources:
             return tuple(sources)
         count = len(self.refused)
-        warning = DataWarning(
+        warning = DataWarning.reported(
             "unused-files",
             f"{count} {'file or folder was' if count == 1 else 'files and folders were'} looked at and not used: "
             f"{_reasons(self.refused)}",

@@ -78,7 +78,7 @@ def _about_faults(folder: Path, faults: Mapping[Path, str], count: int) -> tuple
         return ()
     file, fault = next(iter(faults.items()))
     what = f"{len(faults)} of {count} pictures in {folder.name} cannot be read and are skipped; the first: {file.name} {fault}"
-    return (DataWarning("unreadable-pictures", what, "copy them again from their source if they matter"),)
+    return (DataWarning.reported("unreadable-pictures", what, "copy them again from their source if they matter"),)
 
 
 def _about_ends(folder: Path, files: Sequence[Path]) -> tuple[DataWarning, ...]:
@@ -86,7 +86,9 @@ def _about_ends(folder: Path, files: Sequence[Path]) -> tuple[DataWarning, ...]:
     if not 0 < len(cut) <= len(files) / 2:  # some cameras never write the end
         return ()
     what = f"{len(cut)} of {len(files)} pictures in {folder.name} are cut off, and grey below; the first: {cut[0]}"
-    return (DataWarning("unreadable-pictures", what, "copy them again from their source; click nothing in them"),)
+    return (
+        DataWarning.reported("unreadable-pictures", what, "copy them again from their source; click nothing in them"),
+    )
 
 
 def _calibration_words(camera: FolderCamera | None) -> str:

@@ -255,7 +255,7 @@ def _about_damage(path: Path, scan: "_Scan") -> list[DataWarning]:
     if not (scan.broken or scan.strange_bytes or missing):
         return []
     return [
-        DataWarning(
+        DataWarning.reported(
             "damaged-file",
             f"{path.name}: of {scan.broken + len(scan.packets)} packets, {scan.broken} are damaged or cut off and skipped; "
             f"{scan.strange_bytes} bytes belong to no packet; by their numbers, {missing} frames are missing",
@@ -538,7 +538,7 @@ def _about_restarts(path: Path, restarts: int) -> tuple[DataWarning, ...]:
     if not restarts:
         return ()
     return (
-        DataWarning(
+        DataWarning.reported(
             "sensor-restarted",
             f"{path.name}: the frame numbers begin again {restarts} times: the sensor was restarted, and the pause is unknown",
             "open the parts one by one, each with its own --radar-start",

@@ -53,7 +53,7 @@ def open_video(path: Path, start: str | None) -> PlainSource:
 
 
 def _uneven(path: Path) -> DataWarning:
-    return DataWarning(
+    return DataWarning.reported(
         "video-times",
         f"{path.name}: several frames have the same time; all frames are spaced evenly over the length of the video",
         "use the recording the video was made from, if there is one: a video does not keep the frames' stamps",

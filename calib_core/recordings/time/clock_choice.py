@@ -192,7 +192,7 @@ def _without_the_recorder(both: tuple[Stamps, Stamps]) -> ClockChoice:
             f"{stamps.topic} ({_CLOCK_WORDS[clock]})" for stamps, clock in zip(both, clocks, strict=True)
         )
         warnings.append(
-            DataWarning(
+            DataWarning.reported(
                 "mixed-clocks",
                 f"the times of {names} come from clocks that cannot be compared, because each topic has only one usable clock",
                 "check in the page that radar and picture show the same moment; if they do not, record again",
@@ -213,7 +213,7 @@ def _better(stamps: Stamps) -> ClockChoice:
     return ClockChoice(
         (clock,),
         (
-            DataWarning(
+            DataWarning.reported(
                 "stamps-unusable",
                 f"{stamps.topic} {fault}, and {received}; its {_CLOCK_WORDS[clock]} are used, which have more different times",
                 "do not trust times of this topic: record again with a driver that fills in header.stamp",
@@ -287,7 +287,7 @@ def _overlap(a: TimesNs, b: TimesNs) -> bool:
 
 
 def _mixed(why: str) -> DataWarning:
-    return DataWarning(
+    return DataWarning.reported(
         "mixed-clocks",
         f"{why}: receive times are used for both sensors",
         "receive times include driver delays: keep the reflector still for longer at each placement, or choose the clock "
@@ -296,7 +296,7 @@ def _mixed(why: str) -> DataWarning:
 
 
 def _fell_back(stamps: Stamps, fault: str) -> DataWarning:
-    return DataWarning(
+    return DataWarning.reported(
         "stamps-unusable",
         f"{stamps.topic} {fault}; receive times are used instead",
         "receive times include the driver delay: keep the reflector still for longer at each placement, and have the driver "

@@ -237,7 +237,7 @@ def about_clocks(found: Sequence[ClockDiagnosis]) -> list[DataWarning]:
         by_stamps = one.chosen == "header"
         if by_stamps and one.jumps:
             warnings.append(
-                DataWarning(
+                DataWarning.reported(
                     "clock-jumps",
                     f"the stamps of {one.topic} jump relative to the receive times, {_counted(one.jumps, 'time', 'times')} "
                     f"and by up to {span_text(one.largest_jump_s)}: its clock was set during the recording, or the driver hung",
@@ -246,7 +246,7 @@ def about_clocks(found: Sequence[ClockDiagnosis]) -> list[DataWarning]:
             )
         if by_stamps and abs(one.drift_s) > _DRIFT_S:
             warnings.append(
-                DataWarning(
+                DataWarning.reported(
                     "clock-drift",
                     f"the stamps of {one.topic} drift relative to the receive times by {abs(one.drift_s) * 1e3:.0f} ms in total "
                     f"({abs(one.drift_ppm or 0):.0f} ppm): its clock is not synchronised with the recorder's",
@@ -266,5 +266,5 @@ def about_clocks(found: Sequence[ClockDiagnosis]) -> list[DataWarning]:
                 f"{span_text(max(one.longest_gap_s for one in apart))}"
             )
         hint = "click only where both sensors have data; if there should be no gaps, files may be missing"
-        warnings.append(DataWarning("islands", listed, hint))
+        warnings.append(DataWarning.reported("islands", listed, hint))
     return warnings

@@ -52,7 +52,7 @@ class Finding:
             progress(ViewProgress(done, len(VIEWS), VIEWS[:done]))
         assert self.allowed.wait(20)
         if stopped():
-            return Unsolvable("stopped", "the search was stopped", "start it again")
+            return Unsolvable.reported("stopped", "the search was stopped", "start it again")
         return self.end or (VIEWS, None)
 
     def look(self, clicks: Sequence[ReflectorClick], *_: object) -> list[str]:
@@ -160,7 +160,7 @@ def test_with_another_camera_the_pictures_are_looked_at_again(finding, watched):
 
 def test_why_there_are_none_is_said(finding, watched):
     finding.allowed.set()
-    finding.end = Unsolvable("no-camera", "the camera intrinsics are missing", "calibrate the lens")
+    finding.end = Unsolvable.reported("no-camera", "the camera intrinsics are missing", "calibrate the lens")
     watched.job.ask(replace(WISH, camera=None))
     failed = watched.until("failed", 0)
     assert (failed.progress.problem, failed.progress.hint) == (

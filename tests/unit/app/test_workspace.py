@@ -31,7 +31,7 @@ from cocalib.workspace import Workspace, open_workspace, recording_facts
 
 FACTS = RecordingFacts("drive", 1_700_000_000_123_456_789 + 100_000_000 * np.arange(50), width_px=640, height_px=480)
 TIMES = [TimeNs(int(time)) for time in FACTS.image_times]
-NO_ANSWER = Unsolvable("too-few-pairs", "1 of at least 4 pairs", "click more")
+NO_ANSWER = Unsolvable.reported("too-few-pairs", "1 of at least 4 pairs", "click more")
 
 
 class ListJournal:

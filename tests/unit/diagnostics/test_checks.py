@@ -24,10 +24,12 @@ from calib_core.options import (
     without_systematic_errors,
 )
 from calib_core.results import Calibration, DataWarning, PairResult
+from calib_core.results.actions import ChooseReturn, MeasureCameraPosition, ReviewPairs, SetOption
 from calib_core.results.verdict import verdict_on
 from calib_core.synthetic import FIELD, RigOptions, SimulatedPairs, simulate_pairs
 from calib_core.synthetic.rig import random_rig
 from calib_core.synthetic.simulated_pairs import NOISE_PROFILES, NoiseName, study_camera
+from calib_core.words import told
 from tests.rooftop import ClickedSample, read_rooftop
 from tests.scans import scan_of
 
@@ -58,8 +60,8 @@ def codes(pairs: Sequence[Pair], camera: Camera, options: CalibrationOptions) ->
 def warnings(pairs: Sequence[Pair], camera: Camera, options: CalibrationOptions) -> tuple[DataWarning, ...]:
     outcome = calibrate_pairs(pairs, camera, options)
     if isinstance(outcome, Unsolvable):
-        return (DataWarning(outcome.code, outcome.reason, outcome.hint),)
-    assert all(warning.message and warning.hint for warning in outcome.warnings)
+        return (DataWarning(outcome.code, outcome.facts), *outcome.suspected)
+    assert all(told(warning).message and told(warning).hint for warning in outcome.warnings)
     return outcome.warnings
 
 
@@ -132,13 +134,17 @@ def test_placements_in_one_corner_give_a_weak_geometry():
     corner = replace(FIELD, min_range_m=9.0, max_range_m=10.0, max_azimuth_deg=10.0, separation_m=0.05)
     simulated = simulate_pairs(16, rng=np.random.default_rng(7), layout=corner)
     (weak,) = (one for one in warnings(simulated.pairs, simulated.camera, FREE) if one.code == "weak-geometry")
-    assert "tape" in weak.hint
+    assert weak.facts["position_cm"] > 10.0
+    assert weak.facts["farthest_m"] == pytest.approx(10.0, abs=0.1)
+    assert told(weak).action == MeasureCameraPosition()
 
 
 def test_many_outliers_are_counted_and_named():
     simulated = simulate_pairs(20, rng=np.random.default_rng(8), outlier_share=0.45)
     (many,) = (one for one in warnings(simulated.pairs, simulated.camera, measured()) if one.code == "many-outliers")
-    assert "of 20 pairs" in many.message
+    assert many.facts["pairs"] == 20
+    assert len(many.facts["ids"]) > 7
+    assert told(many).action == ReviewPairs(tuple(many.facts["ids"]))
 
 
 def test_few_pairs_are_reported():
@@ -170,7 +176,8 @@ def test_two_radar_positions_that_fit_one_click_are_reported():
         for one in warnings([ambiguous, *simulated.pairs[1:]], simulated.camera, measured())
         if one.code == "uncertain-association"
     )
-    assert "p1" in warning.message
+    assert warning.facts["ids"] == ["p1"]
+    assert told(warning).action == ChooseReturn(("p1",))
 
 
 def ambiguous(count: int) -> tuple[SimulatedPairs, list[Pair]]:
@@ -222,10 +229,10 @@ FAR = replace(FIELD, min_range_m=8.0, max_range_m=10.0, max_azimuth_deg=12.0, se
 NEAR = replace(FIELD, min_range_m=2.0, max_range_m=2.5)
 
 
-def decisive(simulated: SimulatedPairs, *more: SimulatedPairs) -> list[str]:
+def decisive(simulated: SimulatedPairs, *more: SimulatedPairs) -> list[DataWarning]:
     pairs = [*simulated.pairs, *(replace(pair, id="near") for other in more for pair in other.pairs)]
     outcome = calibrate_pairs(pairs, simulated.camera, CalibrationOptions()).unwrap()
-    return [one.message for one in outcome.warnings if one.code == "one-pair-decides"]
+    return [one for one in outcome.warnings if one.code == "one-pair-decides"]
 
 
 @pytest.mark.parametrize("noise", ["ti", "imaging"])
@@ -234,8 +241,9 @@ def test_one_near_placement_among_far_ones_decides(noise, seed):
     rng = np.random.default_rng([31, seed])
     far = simulate_pairs(19, rng=rng, noise=noise, layout=FAR)
     near = simulate_pairs(1, rng=rng, noise=noise, layout=NEAR, rig=far.rig)
-    (text,) = decisive(far, near)
-    assert "depends on near alone" in text
+    (warning,) = decisive(far, near)
+    assert warning.facts["pair"] == "near"
+    assert warning.facts["loss"] > 8.0
 
 
 @pytest.mark.parametrize("noise", ["ti", "imaging"])
@@ -254,7 +262,7 @@ def test_no_pair_of_a_good_set_decides(noise):
         assert decisive(simulate_pairs(20, rng=np.random.default_rng([32, seed]), noise=noise)) == []
 
 
-# A second pose is said when the pairs leave it open, and the expected distance only when it decides.
+# A second pose is found when the pairs leave it open, and the expected distance only when it decides.
 
 
 def solved(simulated: SimulatedPairs, pairs: tuple[Pair, ...] | None = None) -> Calibration:
@@ -283,10 +291,11 @@ def with_another(fit: SolvedFit, step_m: float, *, worse_by_pairs: float) -> Sol
     return replace(fit, best=replace(fit.best, found=(best, GncSolution(pose, cost, 1.0))))
 
 
-def test_a_pose_that_differs_in_position_only_is_said(fit):
+def test_a_pose_that_differs_in_position_only_is_found(fit):
     (warning,) = two_poses(with_another(fit, 0.5, worse_by_pairs=1.0))
     assert warning.code == "two-poses"
-    assert "0.1 deg and 0.50 m away" in warning.message
+    assert warning.facts["away_cm"] == pytest.approx(50.0, abs=2.0)
+    assert warning.facts["away_deg"] < 0.2
     assert two_poses(with_another(fit, 0.5, worse_by_pairs=30.0)) == []
     assert two_poses(with_another(fit, 0.001, worse_by_pairs=0.0)) == []
 
@@ -298,8 +307,8 @@ def test_the_expected_distance_is_asked_for_when_it_decides_between_two_poses(fi
     two_rigs = replace(fit, options=replace(fit.options, solving=solving))
     (warning,) = two_poses(with_another(two_rigs, 4.0, worse_by_pairs=1.0))
     assert warning.code == "camera-far-away"
-    assert "only because about 1 m is expected" in warning.message
-    assert "same rig" in warning.hint
+    assert warning.facts["expected_m"] == pytest.approx(1.0, abs=0.5)
+    assert warning.facts["here_m"] < warning.facts["there_m"] == pytest.approx(4.0, abs=0.5)
 
 
 @pytest.mark.parametrize("offset_m", [(0.0, 3.0, 0.5), (-3.0, 7.4, 1.0)])
@@ -310,8 +319,8 @@ def test_sensors_far_apart_are_no_reason_for_a_warning(offset_m):
         assert "camera-far-away" not in {one.code for one in solved(simulated).warnings}
 
 
-def test_an_object_that_always_stands_behind_the_reflector_is_said():
-    said = 0
+def test_an_object_that_always_stands_behind_the_reflector_is_found():
+    found = 0
     for seed in range(4):
         rng = np.random.default_rng([73, seed])
         simulated = simulate_pairs(20, rng=rng)
@@ -324,10 +333,10 @@ def test_an_object_that_always_stands_behind_the_reflector_is_said():
             pairs.append(replace(pair, candidates=(stronger, replace(right, score=0.4))))
         outcome = solved(simulated, tuple(pairs))
         error = simulated.camera_from_radar.error_from(outcome.camera_from_radar)
-        texts = [one.message for one in outcome.warnings if one.code == "two-poses"]
-        assert all("with other returns for" in text for text in texts)
-        said += bool(texts) or float(np.linalg.norm(error[:3])) < 0.3
-    assert said >= 3
+        other = [one for one in outcome.warnings if one.code == "two-poses"]
+        assert all(one.facts["other_returns"] for one in other)
+        found += bool(other) or float(np.linalg.norm(error[:3])) < 0.3
+    assert found >= 3
 
 
 # Clicks that miss their dwells to one side indicate a clock offset; single hasty clicks and clicks inside a dwell do not.
@@ -343,11 +352,11 @@ def rooftop(project_root: Path) -> ClickedSample:
     return read_rooftop(project_root, 8.0)
 
 
-def clock_warnings(rooftop: ClickedSample, ahead_s: float) -> list[str]:
+def clock_warnings(rooftop: ClickedSample, ahead_s: float) -> list[DataWarning]:
     clicks, scans, camera = rooftop
     shifted = replace(scans, times_ns=scans.times_ns + round(ahead_s * NS_PER_S))
     outcome = calibrate(clicks, shifted, camera, CalibrationOptions()).unwrap()
-    return [one.message for one in outcome.warnings if one.code == "clock-bias-suspected"]
+    return [one for one in outcome.warnings if one.code == "clock-bias-suspected"]
 
 
 @pytest.mark.parametrize("ahead_s", [0.0, 1.0, -1.0])
@@ -355,10 +364,10 @@ def test_an_offset_that_leaves_the_clicks_in_their_dwells_gives_no_warning(rooft
     assert clock_warnings(rooftop, ahead_s) == []
 
 
-@pytest.mark.parametrize(("ahead_s", "words"), [(AHEAD_S, "ahead of"), (-AHEAD_S, "behind")])
-def test_stamps_that_take_the_clicks_out_of_their_dwells_are_suspected(rooftop, ahead_s, words):
-    (text,) = clock_warnings(rooftop, ahead_s)
-    assert words in text
+@pytest.mark.parametrize("ahead_s", [AHEAD_S, -AHEAD_S])
+def test_stamps_that_take_the_clicks_out_of_their_dwells_are_suspected(rooftop, ahead_s):
+    (warning,) = clock_warnings(rooftop, ahead_s)
+    assert 0.0 < warning.facts["offset_s"] / ahead_s <= 1.0
 
 
 def placed(offsets_s: list[float]) -> tuple[list[PairResult], RadarScans]:
@@ -406,16 +415,18 @@ def test_without_scans_or_stamps_there_is_no_warning():
 # Clocks that differ by whole placements.
 
 
-def said_of_clocks(outcome: Calibration) -> list[str]:
-    return [one.message for one in outcome.warnings if one.code == "clocks-apart"]
+def clocks_apart(warnings: Sequence[DataWarning]) -> list[DataWarning]:
+    return [one for one in warnings if one.code == "clocks-apart"]
 
 
-@pytest.mark.parametrize(("ahead_s", "words"), [(9.5, "s ahead of the camera's"), (-9.5, "s behind the camera's")])
-def test_stamps_that_are_a_placement_off_are_named(rooftop, ahead_s, words):
+@pytest.mark.parametrize("ahead_s", [9.5, -9.5])
+def test_stamps_that_are_a_placement_off_are_found(rooftop, ahead_s):
     clicks, scans, camera = rooftop
     moved_scans = replace(scans, times_ns=scans.times_ns + round(ahead_s * NS_PER_S))
     outcome = calibrate(clicks, moved_scans, camera)
-    assert words in (outcome.hint if isinstance(outcome, Unsolvable) else outcome.warnings[0].message)
+    (warning,) = clocks_apart(outcome.suspected if isinstance(outcome, Unsolvable) else outcome.warnings[:1])
+    assert warning.facts["apart_s"] == pytest.approx(ahead_s, abs=2.0)
+    assert told(warning).action == SetOption("clock", "receive")
 
 
 ROWS, PER_ROW = 4, 6
@@ -444,27 +455,27 @@ def walked_grid(later: int, *, timed: bool = True, wrong: Sequence[int] = ()) ->
     return pairs, rig.camera
 
 
-@pytest.mark.parametrize(("later", "words"), [(1, "behind the camera's"), (-1, "ahead of the camera's")])
-def test_a_grid_walked_row_by_row_does_not_hide_clocks_that_are_a_placement_off(later, words):
+@pytest.mark.parametrize("later", [1, -1])
+def test_a_grid_walked_row_by_row_does_not_hide_clocks_that_are_a_placement_off(later):
     """Most pairs agree on a pose that is off by a whole step; only the ends of the rows do not."""
     outcome = calibrate_pairs(*walked_grid(later)).unwrap()
     assert sum(pair.inlier for pair in outcome.pairs) >= (ROWS - 1) * PER_ROW
-    (text,) = said_of_clocks(outcome)
-    assert "23 of 23 clicks agree" in text
-    assert f"about 9 s {words}" in text
+    (warning,) = clocks_apart(outcome.warnings)
+    assert (warning.facts["shifted_agreeing"], warning.facts["shifted_clicks"]) == (23, 23)
+    assert (warning.facts["placements"], warning.facts["apart_s"]) == (-later, pytest.approx(-9.0 * later))
     assert verdict_on(outcome).level == "contradictory"
 
 
 @pytest.mark.parametrize("later", [2, PER_ROW])
 def test_clocks_that_are_several_placements_or_a_whole_row_off_are_named_with_the_number(later):
-    (text,) = said_of_clocks(calibrate_pairs(*walked_grid(later)).unwrap())
-    assert f"saw {later} placements earlier" in text
+    (warning,) = clocks_apart(calibrate_pairs(*walked_grid(later)).unwrap().warnings)
+    assert warning.facts["placements"] == -later
 
 
 @pytest.mark.parametrize("wrong", [(), (5, 11), (2, 5, 9, 17, 20)])
 def test_a_grid_with_wrong_clicks_is_not_a_matter_of_the_clocks(wrong):
-    assert said_of_clocks(calibrate_pairs(*walked_grid(0, wrong=wrong)).unwrap()) == []
+    assert clocks_apart(calibrate_pairs(*walked_grid(0, wrong=wrong)).unwrap().warnings) == []
 
 
 def test_pairs_without_times_say_nothing_of_clocks():
-    assert said_of_clocks(calibrate_pairs(*walked_grid(1, timed=False)).unwrap()) == []
+    assert clocks_apart(calibrate_pairs(*walked_grid(1, timed=False)).unwrap().warnings) == []

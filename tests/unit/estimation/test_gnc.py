@@ -162,9 +162,9 @@ def test_the_right_one_of_two_positions_is_chosen_for_every_pair(kind, options):
         wrong = [
             pair.id for pair, place in zip(outcome.pairs, meant, strict=True) if (pair.point_radar_m != place).any()
         ]
-        named = [one.message for one in outcome.warnings if one.code == "uncertain-association"]
+        named = [one.facts["ids"] for one in outcome.warnings if one.code == "uncertain-association"]
         assert len(wrong) <= 1
-        assert all(name in text for name in wrong for text in named)
+        assert all(name in ids for name in wrong for ids in named)
         assert len(named) >= bool(wrong)
 
 

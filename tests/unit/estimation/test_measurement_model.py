@@ -198,13 +198,12 @@ def test_a_radar_that_reports_one_height_or_rounded_zeros_is_flat_too(reported_z
     assert inside == 6
 
 
-def test_the_warning_says_what_the_pairs_determine_and_what_is_assumed():
+def test_the_warning_parts_what_the_pairs_determine_from_what_is_assumed():
     calibration, _ = solved(1, 1.2, FREE)
     (warning,) = (one for one in calibration.warnings if one.code == "flat-radar")
-    determined, assumed = warning.message.split("; up ")
-    assert "yaw ± 0." in determined
-    assert "pitch ± 1" in assumed
-    assert "tilt and height" in warning.hint
+    assert 0.0 < warning.facts["yaw_deg"] < 1.0
+    assert 1.0 <= warning.facts["pitch_deg"] < 20.0
+    assert warning.facts["up_cm"] > warning.facts["left_cm"]
 
 
 def test_the_covariance_of_a_radar_with_elevation_is_not_widened():

@@ -59,8 +59,7 @@ def inside_what_is_stated(calibration: Calibration, truth: RigidTransform) -> bo
 def named(calibration: Calibration) -> set[str]:
     """Return the ids of the pairs that are outliers or reported."""
     out = {pair.id for pair in calibration.pairs if not pair.inlier}
-    texts = [one.message for one in calibration.warnings if one.code == "doubtful-pair"]
-    return out | {pair.id for pair in calibration.pairs if any(f"without {pair.id} " in text for text in texts)}
+    return out | {one.facts["pair"] for one in calibration.warnings if one.code == "doubtful-pair"}
 
 
 def test_the_sample_gives_no_warning(rooftop, truth):

@@ -44,6 +44,7 @@ from calib_core.radar import RadarErrors, cartesian_from_polar, polar_from_carte
 from calib_core.results import Calibration
 from calib_core.results.verdict import verdict_on
 from calib_core.synthetic import SystematicErrors, simulate_pairs
+from calib_core.words import stated_verdict
 
 
 @pytest.fixture
@@ -77,7 +78,7 @@ def test_solved_pairs_become_a_file_that_passes_its_check(truth, method):
 
     report = check(read_any(text))
     assert report.ok, report.lines()
-    verdict = verdict_on(outcome)
+    verdict = stated_verdict(verdict_on(outcome))
     assert json.loads(text)["verdict"] == dataclasses.asdict(verdict)
     assert read_calibration(text).verdict == verdict
     assert write_calibration(read_calibration(text)) == text

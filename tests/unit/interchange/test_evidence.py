@@ -150,7 +150,7 @@ def test_a_frame_without_optical_has_body_axes_unless_its_numbers_fit_optical_on
 
 def test_the_file_that_was_imported_is_named_without_its_folder(file):
     made = adopt(read_any(bare(file)), "secret/m.txt", camera=file.calibration.camera)
-    said = next(one.message for one in made.calibration.warnings if one.code == "imported")
+    said = next(one.facts["message"] for one in made.calibration.warnings if one.code == "imported")
     assert "imported from m.txt" in said
     assert "secret" not in said
 

@@ -189,8 +189,7 @@ def calibrated(errors: Errors, seed: int = 5) -> CalibratedLens:
 def test_a_bent_board_is_measured_and_does_not_bend_the_lens():
     lens = calibrated(Errors(bend_m=0.0014))
     (warning,) = [warning for warning in lens.warnings if warning.code == "bent-board"]
-    assert "the board is bent by 1.3" in warning.message
-    assert "mm in the middle of its rows; it was taken into account" in warning.message
+    assert "bent by 1.3" in warning.facts["message"]
     middle = lens.board_shape_m[4] - (lens.board_shape_m[0] + lens.board_shape_m[8]) / 2.0
     assert 1e3 * middle[2] == pytest.approx(1.4, abs=0.06)
     assert lens.camera.matrix_px[0, 0] == pytest.approx(900.0, rel=0.004)
@@ -199,7 +198,7 @@ def test_a_bent_board_is_measured_and_does_not_bend_the_lens():
 def test_squares_that_are_longer_one_way_are_measured():
     lens = calibrated(Errors(stretch=0.02))
     (warning,) = [warning for warning in lens.warnings if warning.code == "unequal-squares"]
-    assert "% wider than high; it was taken into account" in warning.message
+    assert "% wider than high" in warning.facts["message"]
     assert np.ptp(lens.board_shape_m[:, 0]) == pytest.approx(1.02 * np.ptp(BOARD.corners_m[:, 0]), rel=1e-3)
 
 
@@ -212,8 +211,7 @@ def test_a_flat_board_stays_as_stated():
 def test_motion_under_a_rolling_shutter_is_told_from_noise():
     still, moving = calibrated(Errors(0.05, shared_px=0.1)), calibrated(Errors(motion_px_per_s=300.0))
     assert "skewed-views" not in {warning.code for warning in still.warnings}
-    (warning,) = [warning for warning in moving.warnings if warning.code == "skewed-views"]
-    assert "a board that moved under a rolling shutter" in warning.message
+    assert "skewed-views" in {warning.code for warning in moving.warnings}
 
 
 # The lens model that is chosen is the one the views were made with, unless a simpler one predicts as well.

@@ -113,18 +113,18 @@ def test_what_is_not_used_is_named_with_the_reason():
         (
             [lambda: np.zeros((240, 320, 3), np.uint8)] * 3,
             "no-board",
-            "none of 3 pictures shows a checkerboard of 5 x 4",
+            "a checkerboard of 5 x 4",
         ),
-        ([lambda: drawn(board=Board("checkerboard", 6, 4, 0.03))] * 3, "other-board", "show 6 x 4 inner corners"),
-        ([*several(), *[lambda: drawn(size=(330, 250))] * 3], "mixed-sizes", "5 of 320 x 240, 3 of 330 x 250"),
+        ([lambda: drawn(board=Board("checkerboard", 6, 4, 0.03))] * 3, "other-board", "6 x 4 inner corners"),
+        ([*several(), *[lambda: drawn(size=(330, 250))] * 3], "mixed-sizes", "3 of 330 x 250"),
         ([], "no-pictures", "there are no pictures"),
     ],
 )
 def test_a_search_without_a_result_says_why(draw, code, words):
     found = search_boards(Drawn(draw), BOARD)
     assert found.code == code
-    assert words in found.reason
-    assert found.hint
+    assert words in found.facts["message"]
+    assert found.facts["hint"]
 
 
 def test_a_few_pictures_of_another_size_are_named_and_the_rest_is_used():
@@ -176,8 +176,8 @@ def test_one_picture_that_seems_to_show_the_board_does_not_hide_that_the_others_
     other = Board("checkerboard", 6, 4, 0.03)
     found = search_boards(Drawn([drawn, *[lambda s=s: drawn(4.0 * s, board=other) for s in range(7)]]), BOARD)
     assert found.code == "other-board"
-    assert found.reason.startswith("1 of 8 pictures shows a checkerboard of 5 x 4 inner corners; 7 of the 7 ")
-    assert found.hint.startswith("state 6x4 ")
+    assert found.facts["message"].startswith("1 of 8 pictures ")
+    assert found.facts["hint"].startswith("state 6x4 ")
 
 
 def test_a_copy_of_a_picture_is_the_same_view_and_no_less_sharp():

@@ -53,7 +53,8 @@ def test_the_same_views_give_the_same_bytes():
 
 def test_two_views_are_too_few():
     answer = calibrate_lens(search_of(VIEWS[:2]), PINHOLE)
-    assert (answer.code, answer.reason) == ("few-views", "2 usable views of the board, at least 3 are needed")
+    assert answer.code == "few-views"
+    assert "2 usable views" in answer.facts["message"]
 
 
 def test_views_from_one_direction_leave_the_focal_length_open():
@@ -66,8 +67,7 @@ def test_views_from_one_direction_leave_the_focal_length_open():
     answer = calibrate_lens(search_of(tuple(views)), PINHOLE)
     assert isinstance(answer, Unsolvable), answer.camera.covariance
     assert answer.code == "parallel-views"
-    assert answer.reason.startswith("the board is turned by ")
-    assert "turned by 30 to 45 deg to the left, right, up and down" in answer.hint
+    assert "30 to 45 deg" in answer.facts["hint"]
 
 
 def test_corners_that_nothing_explains_are_no_calibration():
@@ -87,8 +87,7 @@ def test_a_picture_of_another_size_is_left_out_by_name():
 def test_a_corner_of_the_picture_without_views_is_warned_about():
     left = [view for view in drawn_views(CAMERAS["pinhole"], 60, 3) if view.pixels_px[:, 0].max() < 700.0]
     assert len(left) >= 5
-    (warning,) = [warning for warning in calibrated(*left).warnings if warning.code == "little-covered"]
-    assert "% of the picture; beyond them the lens is a guess" in warning.message
+    assert "little-covered" in {warning.code for warning in calibrated(*left).warnings}
 
 
 def test_a_cancelled_calibration_says_so_and_named_its_steps():
@@ -270,7 +269,7 @@ def test_halves_of_the_views_agree_for_the_true_model():
 
 def test_seven_views_are_not_split():
     answer = split_difference(replace(LENS, views=LENS.views[:7]))
-    assert "7 views cannot be calibrated in halves, 8 can" in answer.reason
+    assert "7 views" in answer.facts["message"]
 
 
 @pytest.mark.parametrize("columns", [2, 5])

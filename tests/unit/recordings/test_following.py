@@ -147,7 +147,7 @@ def test_a_frame_that_comes_late_does_not_move_the_others(follow, ros2, plain, j
     assert recording.image_times[: len(given)].tolist() == given
     assert recording.late == 1
     (warning,) = [one for one in recording.warnings if one.code == "late-frames"]
-    assert "1 frame" in warning.message
+    assert "1 frame" in warning.facts["message"]
     with open_recording(finished) as whole:
         assert len(whole.image_times) == len(recording.image_times) + 1
 
@@ -190,7 +190,7 @@ def test_a_clock_that_would_be_chosen_otherwise_is_told_at_the_end(follow, ros2,
     assert recording.image_times[: len(given)].tolist() == given
     assert recording.image_clock == "header"
     (warning,) = [one for one in recording.warnings if one.code == "clock-chosen-early"]
-    assert "/camera/image/compressed (receive instead of header)" in warning.message
+    assert "/camera/image/compressed (receive instead of header)" in warning.facts["message"]
 
 
 @pytest.mark.parametrize("container", ["mcap"])

@@ -69,10 +69,7 @@ def test_the_same_messages_in_two_files_are_used_once_with_a_warning(ros1, ros2,
     with open_recording(paths) as recording:
         assert len(recording.radar_times) == 20
         assert [warning.code for warning in recording.warnings] == ["repeated-messages"]
-        assert (
-            "60 messages of /camera/camera_info, /camera/image/compressed, /radar/points"
-            in recording.warnings[0].message
-        )
+        assert recording.warnings[0].facts["message"].startswith("60 messages of /camera/camera_info")
 
 
 def test_a_window_holds_exactly_the_scans_within_it(ros1, write, plain, jpeg):

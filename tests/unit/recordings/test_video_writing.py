@@ -54,7 +54,7 @@ def test_png_is_encoded_and_unusable_frames_are_skipped_with_warnings(ros1, writ
     with open_recording(path, require=("image",)) as recording:
         written = write_video(recording, tmp_path / "camera.mp4")
         assert [warning.code for warning in recording.warnings] == ["picture-sizes", "unreadable-pictures"]
-        assert "neither JPEG nor PNG" in recording.warnings[1].message
+        assert "neither JPEG nor PNG" in recording.warnings[1].facts["message"]
     assert (written.frames, written.skipped) == (3, SkippedFrames())
     assert [data[:2] for _, data in packets(tmp_path / "camera.mp4")] == [b"\xff\xd8"] * 3
 

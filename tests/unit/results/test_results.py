@@ -13,6 +13,7 @@ from calib_core.options import CalibrationOptions, NoiseOptions
 from calib_core.results import Calibration
 from calib_core.results.metrics import acc, aed, cdsd, inside_boxes, metrics_of, rms
 from calib_core.synthetic import SimulatedPairs, simulate_pairs
+from calib_core.words import said_of
 
 POINT = np.array([[8.0, 0.5, 0.0]])
 
@@ -33,9 +34,8 @@ def test_unwrap_gives_the_calibration_or_raises_with_reason_and_hint(simulated):
     assert isinstance(unsolvable, Unsolvable)
     with pytest.raises(UnsolvableError) as refusal:
         unsolvable.unwrap()
-    assert unsolvable.reason in str(refusal.value)
-    assert unsolvable.hint in str(refusal.value)
-    assert (refusal.value.code, refusal.value.reason) == (unsolvable.code, unsolvable.reason)
+    assert (refusal.value.code, refusal.value.outcome) == (unsolvable.code, unsolvable)
+    assert str(refusal.value) == f"no calibration: {said_of(unsolvable)}"
 
 
 @pytest.mark.parametrize("method", ["default", "paper"])
@@ -58,7 +58,11 @@ def test_a_calibration_prints_as_nine_lines(simulated, method):
 
 
 def test_an_unsolvable_prints_its_reason_its_hint_and_the_clicks_without_radar():
-    text = str(Unsolvable("too-few-pairs", "2 of 4 pairs", "add two", (Unpaired("c3", "no-scan", "no scan", "wait"),)))
+    text = str(
+        Unsolvable.reported(
+            "too-few-pairs", "2 of 4 pairs", "add two", (Unpaired.reported("c3", "no-scan", "no scan", "wait"),)
+        )
+    )
     assert text.splitlines() == [
         "No calibration (too-few-pairs): 2 of 4 pairs",
         "  add two",

@@ -1,6 +1,5 @@
 """Errors that all pairs share: their derivatives, their priors, and that the stated uncertainty covers the truth with them."""
 
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -14,7 +13,7 @@ from calib_core.estimation.covariance import pose_covariance
 from calib_core.estimation.errors_in_variables import fit_errors_in_variables
 from calib_core.estimation.gnc import GncSolution
 from calib_core.estimation.measurement_model import MeasurementPlanes, PairMeasurements, pair_measurements
-from calib_core.measurements import Pair
+from calib_core.measurements import DataWarning, Pair
 from calib_core.options import (
     CalibrationOptions,
     CameraPositionPrior,
@@ -26,14 +25,13 @@ from calib_core.options import (
 )
 from calib_core.radar import RadarErrors, cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration
+from calib_core.results.actions import MeasureCameraPosition, SpreadPlacements
 from calib_core.results.systematic_errors import (
-    ERROR_WORDS,
     LensPrior,
     SystematicError,
     SystematicErrorResult,
     dominant_errors,
-    error_words,
-    knowledge_text,
+    is_determined,
     lens_prior,
     shared_out,
     systematic_errors,
@@ -47,6 +45,7 @@ from calib_core.synthetic import (
     simulate_pairs,
 )
 from calib_core.synthetic.simulated_pairs import study_camera
+from calib_core.words.systematic_errors import ERRORS, dominant_sentence, error_words, remedy_of
 
 FREE = CalibrationOptions()
 MEASURED = CalibrationOptions(
@@ -76,35 +75,35 @@ def scaled(simulated: SimulatedPairs, scale: float) -> tuple[Pair, ...]:
     return with_positions(simulated, cartesian_from_polar(polar))
 
 
-def warning(pairs: Sequence[Pair], camera: Camera, options: CalibrationOptions, code: str) -> str | None:
+def warning(pairs: Sequence[Pair], camera: Camera, options: CalibrationOptions, code: str) -> DataWarning | None:
     outcome = calibrate_pairs(pairs, camera, options).unwrap()
-    return next((one.message for one in outcome.warnings if one.code == code), None)
+    return next((one for one in outcome.warnings if one.code == code), None)
 
 
 @pytest.mark.parametrize("options", [FREE, MEASURED])
-@pytest.mark.parametrize(("scale", "words"), [(1.04, ("large", "long")), (0.96, ("small", "short"))])
-def test_a_scale_is_named_with_its_amount_and_its_sign(scale, words, options):
+@pytest.mark.parametrize("scale", [0.04, -0.04])
+def test_a_scale_is_named_with_its_amount_and_its_sign(scale, options):
     for seed in range(3):
         simulated = drawn(seed, count=30)
-        text = warning(scaled(simulated, scale), simulated.camera, options, "angle-scale")
-        assert text is not None
-        assert all(f"too {word}" in text for word in words)
-        amount, sigma = map(float, re.findall(r"([\d.]+) ± ([\d.]+) %", text)[0])
-        assert abs(amount - 4.0) < 3.5 * sigma + 0.1
+        found = warning(scaled(simulated, 1.0 + scale), simulated.camera, options, "angle-scale")
+        assert found is not None
+        assert (found.facts["error"], found.facts["measured"]) == ("azimuth_scale", options is MEASURED)
+        assert found.facts["value"] == pytest.approx(scale, abs=3.5 * found.facts["sigma"] + 0.001)
 
 
-def test_a_wrong_focal_length_gives_the_warning_that_names_both():
+def test_a_wrong_focal_length_looks_like_a_scale_of_the_azimuths():
     for seed in range(3):
         simulated = drawn(seed, count=30)
         matrix_px = simulated.camera.matrix_px * np.array([[1.03, 1, 1], [1, 1.03, 1], [1, 1, 1]])
-        text = warning(simulated.pairs, replace(simulated.camera, matrix_px=matrix_px), MEASURED, "angle-scale")
-        assert text is not None
-        assert "too large; a given focal length that is too long by the same amount" in text
+        found = warning(simulated.pairs, replace(simulated.camera, matrix_px=matrix_px), MEASURED, "angle-scale")
+        assert found is not None
+        assert found.facts["error"] == "azimuth_scale"
+        assert found.facts["value"] > 0.0
 
 
 @pytest.mark.parametrize("offset_m", [(0.0, 0.15, 0.0), (0.0, -0.15, 0.0), (0.12, 0.0, 0.0)])
 def test_clicks_beside_the_phase_centre_contradict_a_measured_camera(offset_m):
-    named = []
+    contradicted = 0
     for seed in range(4):
         simulated = drawn(seed, count=40)
         pose, camera = simulated.camera_from_radar, simulated.camera
@@ -113,9 +112,9 @@ def test_clicks_beside_the_phase_centre_contradict_a_measured_camera(offset_m):
         pairs = [
             replace(pair, pixel_px=pair.pixel_px + moved) for pair, moved in zip(simulated.pairs, moved_px, strict=True)
         ]
-        named.append(warning(pairs, camera, KNOWN_ELEVATION, "camera-position-contradicted") or "")
+        contradicted += warning(pairs, camera, KNOWN_ELEVATION, "camera-position-contradicted") is not None
         assert warning(pairs, camera, FREE, "camera-position-contradicted") is None
-    assert sum("clicks that all lie as far beside the radar's phase centre" in text for text in named) >= 3
+    assert contradicted >= 3
 
 
 @pytest.mark.parametrize("options", [FREE, MEASURED])
@@ -130,17 +129,17 @@ def test_sound_sets_give_neither_warning(noise, options):
 
 def test_returns_from_behind_the_reflector_are_beyond_the_range_bias_that_is_assumed():
     """As a camera beside the radar sees them; one in its place sees them where the reflector is, whatever their range."""
-    beside, named = RigOptions(camera_offset_m=(0.0, 2.0, 0.5)), []
+    beside, found = RigOptions(camera_offset_m=(0.0, 2.0, 0.5)), []
     for seed in range(5):
         rng = np.random.default_rng([8, seed])
         simulated = simulate_pairs(40, rng=rng, noise="imaging", rig_options=beside)
         assert warning(simulated.pairs, simulated.camera, FREE, "shared-error-suspected") is None
         behind = polar_from_cartesian(positions(simulated)) + np.array([1.0, 0.0, 0.0])
         pairs = with_positions(simulated, cartesian_from_polar(behind))
-        named.append(warning(pairs, simulated.camera, FREE, "shared-error-suspected") or "")
-    found_cm = re.findall(r"a constant range error: \+(\d+) ± (\d+) cm by the pairs", " ".join(named))
-    assert len(found_cm) >= 2
-    assert all(abs(float(size) - 100.0) < 3.0 * float(sigma) for size, sigma in found_cm)
+        found.append(warning(pairs, simulated.camera, FREE, "shared-error-suspected"))
+    biases = [one.facts for one in found if one is not None and one.facts.get("error") == "range_bias_m"]
+    assert len(biases) >= 2
+    assert all(abs(facts["value"] - 1.0) < 3.0 * facts["sigma"] for facts in biases)
 
 
 TAPED = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.045), 0.01)))
@@ -414,49 +413,50 @@ def test_every_error_of_the_estimate_has_words(flat, taped):
     position = CameraPositionPrior() if taped else None
     options = CalibrationOptions(solving=SolvingOptions(camera_position=position))
     errors = systematic_errors(options, CAMERA, flat=flat)
-    assert {one.name for one in (*errors.estimated, *errors.widening)} <= set(ERROR_WORDS)
+    assert {one.name for one in (*errors.estimated, *errors.widening)} <= set(ERRORS)
 
 
-def test_the_error_with_most_of_the_variance_is_named_with_its_value_and_a_remedy():
-    (found,) = dominant_errors([AZIMUTH, DOWN], COVARIANCE, measured=False)
-    assert found.sentence == (
-        "about half of the variance of the position (9 cm) comes from the radar's azimuth scale: +1.20 ± 0.90 %, ± 2 % before "
-        "any pair"
-    )
-    assert found.remedy.startswith("a tape-measured camera position")
-    (found,) = dominant_errors([AZIMUTH], COVARIANCE, measured=True)
-    assert "tape" not in found.remedy
-    assert dominant_errors([replace(AZIMUTH, position_share=0.3), DOWN], COVARIANCE, measured=False) == ()
+def test_the_error_with_most_of_the_variance_has_a_remedy():
+    (found,) = dominant_errors([AZIMUTH, DOWN], COVARIANCE)
+    assert found.largest == AZIMUTH
+    assert (found.position_share, found.rotation_share) == (0.51, 0.0)
+    assert found.position_cm == pytest.approx(9.0)
+    assert found.rotation_deg == pytest.approx(np.rad2deg(0.006))
+    assert remedy_of("azimuth_scale", measured=False).action == MeasureCameraPosition()
+    assert remedy_of("azimuth_scale", measured=True).action == SpreadPlacements("edges")
+    assert dominant_errors([replace(AZIMUTH, position_share=0.3), DOWN], COVARIANCE) == ()
 
 
 def test_errors_along_several_axes_count_together():
-    position, rotation = dominant_errors([AZIMUTH, RIGHT, DOWN], COVARIANCE, measured=False)
+    position, rotation = dominant_errors([AZIMUTH, RIGHT, DOWN], COVARIANCE)
     assert (position.position_share, position.rotation_share) == (0.51, 0.0)
     assert (rotation.position_share, rotation.rotation_share) == (0.0, pytest.approx(0.45))
-    assert rotation.sentence.startswith(
-        "about half of the variance of the rotation (0.34 deg) comes from the principal point"
-    )
-    assert "± 5.4 px assumed, the pairs do not determine it" in rotation.sentence
+    assert rotation.largest == DOWN
+    assert not is_determined(rotation.largest)
 
 
 def test_the_parameter_of_a_lens_with_a_covariance_is_named():
     fx = replace(AZIMUTH, name="lens_fx_px", value=-11.0, sigma=30.0, prior_sigma=140.0)
     cx = replace(fx, name="lens_cx_px", position_share=0.2)
-    (found,) = dominant_errors([cx, fx], 100.0 * COVARIANCE, measured=False)
-    assert (
-        "position (90 cm) comes from the lens, as far as its calibration knows it, above all the focal length fx: "
-        "-11 ± 30 px, ± 140 px before any pair"
-    ) in found.sentence
-    assert found.label == "lens, focal length fx -11 ± 30 px"
+    (found,) = dominant_errors([cx, fx], 100.0 * COVARIANCE)
+    assert found.largest == fx
+    assert found.position_share == pytest.approx(0.71)
+    assert error_words("lens_fx_px").unit == "px"
 
 
 def test_one_error_behind_both_is_named_once():
-    (found,) = dominant_errors([replace(AZIMUTH, rotation_share=0.95)], COVARIANCE, measured=False)
-    assert (
-        "(9 cm) and nearly all of that of the rotation (0.34 deg) come from the radar's azimuth scale" in found.sentence
-    )
+    (found,) = dominant_errors([replace(AZIMUTH, rotation_share=0.95)], COVARIANCE)
+    assert (found.position_share, found.rotation_share) == (0.51, 0.95)
+
+
+@pytest.mark.parametrize("name", ["azimuth_scale", "click_down_px", "lens_fx_px", "warp_rad"])
+def test_each_dominant_error_is_said_with_what_would_reduce_it(name):
+    (found,) = dominant_errors([replace(AZIMUTH, name=name)], COVARIANCE)
+    known, whole = (str(dominant_sentence(found, measured=False, with_remedy=one)) for one in (False, True))
+    assert whole.startswith(known)
+    assert str(remedy_of(name, measured=False).phrase) in whole
 
 
 def test_an_error_of_a_later_version_goes_by_its_name():
     assert error_words("warp_rad").text == "warp_rad"
-    assert knowledge_text(replace(AZIMUTH, name="warp_rad")) == "+0.0120 ± 0.0090, ± 0.02 before any pair"
+    assert remedy_of("warp_rad", measured=False).action == SpreadPlacements("")

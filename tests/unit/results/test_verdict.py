@@ -11,10 +11,20 @@ from calib_core.calibration import calibrate_pairs
 from calib_core.measurements import Unpaired, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, DataWarning, NextPlacement
-from calib_core.results.verdict import ALL_CLICKED, DONE, by_consequence, consequence_of, stated_error, verdict_on
+from calib_core.results.actions import (
+    ClickFirst,
+    ClickMore,
+    ConfirmAssumptions,
+    Export,
+    FollowHint,
+    PlaceReflector,
+    ReduceError,
+    SetOption,
+)
+from calib_core.results.verdict import by_consequence, consequence_of, stated_error, verdict_on
 from calib_core.synthetic import simulate_pairs
 
-FEW = Unsolvable("too-few-pairs", "2 of at least 4 required pairs", "click the reflector at more placements")
+FEW = Unsolvable.reported("too-few-pairs", "2 of at least 4 required pairs", "click the reflector at more placements")
 
 
 def solved(
@@ -33,33 +43,35 @@ def good() -> Calibration:
 
 
 def warned(calibration: Calibration, *codes: str) -> Calibration:
-    return replace(calibration, warnings=tuple(DataWarning(code, f"about {code}", f"mend {code}") for code in codes))
+    return replace(
+        calibration, warnings=tuple(DataWarning.reported(code, f"about {code}", f"mend {code}") for code in codes)
+    )
 
 
 def test_before_any_click_there_is_nothing_and_an_action():
     verdict = verdict_on(None)
     assert verdict.level == "nothing"
-    assert verdict.line.startswith("nothing yet: ")
-    assert "click the reflector's inner corner" in verdict.action
+    assert verdict.action == ClickFirst()
+    assert verdict_on(None, left=3).action == ClickFirst(placements_known=True)
 
 
 def test_too_few_pairs_are_nothing_and_the_placements_left_are_the_action():
-    assert verdict_on(FEW).action == "Click the reflector at more placements"
-    assert verdict_on(FEW, left=7).action == "Click the 7 placements that are left"
-    lost = replace(FEW, unpaired=(Unpaired("c1", "no-scan", "no scan", "click elsewhere"),))
+    assert (verdict_on(FEW).action, verdict_on(FEW).cause) == (FollowHint(), FEW)
+    assert verdict_on(FEW, left=7).action == ClickMore(7)
+    lost = replace(FEW, unpaired=(Unpaired.reported("c1", "no-scan", "no scan", "click elsewhere"),))
     assert verdict_on(lost, left=7).action == verdict_on(lost).action
 
 
 def test_pairs_that_agree_on_no_pose_are_contradictory():
-    assert verdict_on(Unsolvable("no-pose", "they disagree", "check them")).line == "contradictory: they disagree"
+    outcome = Unsolvable("no-pose", {"agreeing": 3, "pairs": 9})
+    assert (verdict_on(outcome).level, verdict_on(outcome).cause) == ("contradictory", outcome)
 
 
 def test_a_good_calibration_states_its_error_and_is_done(good):
     verdict = verdict_on(good)
-    assert re.fullmatch(r"good: within [\d.]+ deg, [\d.]+ cm \(95 %\); [\d.]+ px at \d+ m", verdict.line)
-    assert verdict.reason == stated_error(good).text
-    assert verdict.action == DONE
-    assert verdict_on(good, left=0).action == DONE
+    assert (verdict.level, verdict.error, verdict.cause) == ("good", stated_error(good), None)
+    assert verdict.action == verdict_on(good, left=0).action == Export()
+    assert verdict.done
 
 
 def test_a_larger_stated_error_is_usable_then_coarse(good):
@@ -82,13 +94,13 @@ def test_each_consequence_has_its_level(good):
     ):
         verdict = verdict_on(warned(good, code))
         assert verdict.level == level
-        assert verdict.action == f"Mend {code}"
+        assert (verdict.action, verdict.cause.code) == (FollowHint(), code)
     assert verdict_on(warned(good, "clock-chosen-early")).level == "good"
 
 
 def test_the_gravest_warning_decides_whatever_the_order(good):
     codes = ("not-closed", "handedness-assumed", "intrinsics-suspected", "two-poses")
-    assert verdict_on(warned(good, *codes)).reason == "about two-poses"
+    assert verdict_on(warned(good, *codes)).cause.code == "two-poses"
     ordered = by_consequence(warned(good, *codes).warnings)
     assert [warning.code for warning in ordered] == list(reversed(codes))
 
@@ -105,41 +117,40 @@ def test_few_pairs_are_counted_in_neutral_words():
     calibration = replace(solved(6), warnings=())
     verdict = verdict_on(calibration)
     assert verdict.level == "coarse"
-    assert verdict.reason.startswith("6 of 8 pairs; uncertain to ")
+    assert (verdict.pairs, verdict.cause) == (6, None)
     checked = verdict_on(solved(6))
-    assert checked.level == "coarse"
-    assert checked.reason.startswith("6 of 8 pairs, looks consistent; uncertain to ")
+    assert (checked.level, checked.pairs) == ("coarse", 6)
+    assert checked.cause.facts == {"agreeing": 6, "pairs": 6, "needed": 8, "clear": True}
 
 
 def test_what_no_pair_can_show_is_stated(good):
-    free, measured = verdict_on(solved(tape_m=None)).assumes, verdict_on(good).assumes
-    assert "point that the radar sees" in free
-    assert "the camera was measured right" in measured
-    for assumes in (free, measured):
-        assert "elevations" in assumes
-        assert "cropped" in assumes
+    free, measured = verdict_on(solved(tape_m=None)).assumed, verdict_on(good).assumed
+    assert (free.measured, measured.measured) == (False, True)
+    assert np.isnan(free.alone_cm)
+    for assumed in (free, measured):
+        assert assumed.elevations
+        assert assumed.principal_point_px > 0.0
 
 
 @pytest.mark.parametrize("noise", ["ti", "imaging"])
 @pytest.mark.parametrize("tape_m", [0.005, 0.02, 0.05])
 def test_how_well_the_pairs_alone_place_a_measured_camera_is_stated(noise, tape_m):
     free = stated_error(solved(tape_m=None, noise=noise)).position_cm
-    assumes = verdict_on(solved(tape_m=tape_m, noise=noise)).assumes
-    (alone,) = re.findall(r"the pairs alone place it within ([0-9.]+) cm", assumes)
-    assert float(alone) == pytest.approx(free, rel=0.3)
+    assert verdict_on(solved(tape_m=tape_m, noise=noise)).assumed.alone_cm == pytest.approx(free, rel=0.3)
 
 
 def test_what_the_figures_cover_does_not_make_them_coarse(good):
     for code in ("residuals-too-large", "agreeing-outliers", "weak-geometry", "one-pair-decides", "doubtful-pair"):
         verdict = verdict_on(warned(good, code))
-        assert (verdict.level, verdict.reason) == ("usable", stated_error(good).text)
+        assert (verdict.level, verdict.error) == ("usable", stated_error(good))
 
 
 def test_the_papers_method_is_never_good_and_blames_no_mark():
     verdict = verdict_on(solved(30, method="paper"))
     assert verdict.level == "coarse"
-    assert "states no error" in verdict.reason
-    assert "default method" in verdict.action
+    assert verdict.error is None
+    assert verdict.rms_px > 0.0
+    assert verdict.action == SetOption("method", "default")
     contradicted = verdict_on(warned(solved(30, method="paper"), "two-poses"))
     assert (contradicted.level, contradicted.action) == ("contradictory", verdict.action)
 
@@ -147,23 +158,23 @@ def test_the_papers_method_is_never_good_and_blames_no_mark():
 def test_what_is_assumed_of_the_recording_must_be_confirmed_first(good):
     verdict = verdict_on(good, unconfirmed=2)
     assert verdict.level == "coarse"
-    assert verdict.action.startswith("Confirm")
+    assert verdict.action == ConfirmAssumptions()
 
 
 def test_the_action_is_what_gains_most_a_placement_or_a_tape():
     calibration = solved(tape_m=None)
     near = NextPlacement(np.array([3.0, 1.0, 0.0]), np.array([10.0, 10.0]), 1.05, may_stop=False)
     shared = verdict_on(replace(calibration, next_placement=near))
-    assert shared.action == calibration.dominant_errors()[0].action
+    assert shared.action == ReduceError(calibration.dominant_errors()[0].largest.name, measured=False)
     placed = verdict_on(replace(calibration, next_placement=replace(near, gain=9.0)))
-    assert placed.action.startswith("Put the reflector 3.0 m ahead, 1.0 m to the left")
+    assert placed.action == PlaceReflector((3.0, 1.0, 0.0), 9.0)
 
 
 def test_placements_without_a_click_come_first_and_the_end_is_said():
     calibration = solved(tape_m=None)
-    assert verdict_on(calibration, left=3).action == "Click the 3 placements that are left"
-    assert verdict_on(calibration, left=1).action == "Click the placement that is left"
-    assert verdict_on(calibration, left=0).action.startswith(f"{ALL_CLICKED}. ")
+    assert verdict_on(calibration, left=3).action == ClickMore(3)
+    assert verdict_on(calibration, left=0).everything_clicked
+    assert verdict_on(calibration, left=0).done
 
 
 def test_the_documented_consequences_are_those_of_the_table(project_root):
@@ -172,5 +183,5 @@ def test_the_documented_consequences_are_those_of_the_table(project_root):
         [row] = re.findall(rf"^\| {name} \| (`.*) \|$", text, flags=re.MULTILINE)
         codes = re.findall(r"`([a-z-]+)`", row)
         assert {consequence_of(code) for code in codes} == {consequence}
-        warnings = [DataWarning(code, "", "") for code in reversed(codes)]
+        warnings = [DataWarning.reported(code, "", "") for code in reversed(codes)]
         assert [warning.code for warning in by_consequence(warnings)] == codes

@@ -6,7 +6,8 @@ from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 from calib_core.interchange import CalibrationFile
 from calib_core.interchange.own.raw_data import aed_either_way
 from calib_core.results import Calibration
-from calib_core.results.verdict import Verdict, verdict_on
+from calib_core.results.verdict import verdict_on
+from calib_core.words import stated_verdict
 from cocalib.report.markup import Child, Markup, tag
 from cocalib.report.plots import drawing, rounded_step, text
 from cocalib.report.subject import ReportSubject
@@ -79,7 +80,7 @@ def _judgement(subject: ReportSubject) -> tuple[str, str, str, str]:
             "and report it with that recording",
             "",
         )
-    found: Verdict = stated if stated is not None else verdict_on(calibration)
+    found = stated if stated is not None else stated_verdict(verdict_on(calibration))
     reason = f"to {found.reason}" if found.level in ("good", "usable") else found.reason
     return found.level, reason, found.action, found.assumes
 
@@ -146,7 +147,7 @@ def _error_bars(calibration: Calibration) -> Markup:
         )
     shown = [one for one in pose_figures(calibration) if one.unit in ("cm", "°") and one.key != "radar_angles"]
     keys = [one.key for one in shown]
-    rows = [(one.label, f"{one.value} {one.unit}") for one in shown]
+    rows = [(one.name, f"{one.value} {one.unit}") for one in shown]
     assumed = ", ".join(f"{one.label} {one.value} {one.unit}" for one in assumed_figures(calibration))
     return tag(
         "div",
@@ -158,7 +159,7 @@ def _error_bars(calibration: Calibration) -> Markup:
             class_="note",
         ),
         tag("p", f"Assumed, because this radar measures no elevation: {assumed}.", class_="note") if assumed else None,
-        *(tag("p", line, class_="note") for line in uncertainty_sentences(calibration)),
+        *(tag("p", str(line), class_="note") for line in uncertainty_sentences(calibration)),
     )
 
 
@@ -212,7 +213,7 @@ def _figures(calibration: Calibration) -> Markup:
             tag("p", "The file contains no pairs: residuals need a recording with clicks.", class_="note"),
         )
     metrics = calibration.metrics
-    rows = [(one.label, f"{one.value} {one.unit}".strip()) for one in metric_figures(calibration)]
+    rows = [(one.name, f"{one.value} {one.unit}".strip()) for one in metric_figures(calibration)]
     if np.isfinite(metrics.chi2) and metrics.degrees_of_freedom:
         rows.append(("chi2 / degrees of freedom", f"{plain(metrics.chi2)} / {metrics.degrees_of_freedom}"))
     if np.isfinite(metrics.picture_sigma_px):

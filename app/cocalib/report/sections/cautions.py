@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from calib_core.results import DataWarning
 from calib_core.results.verdict import by_consequence, consequence_of
+from calib_core.words import in_sentences, told
 from cocalib.report.markup import Markup, tag
 from cocalib.report.subject import ReportSubject
 from cocalib.view.wording import sentence
@@ -21,7 +22,7 @@ def cautions(subject: ReportSubject) -> Markup:
         items.append(tag("li", f"{len(found) - _MOST} more: {codes}."))
     unpaired = subject.calibration.unpaired if subject.calibration is not None else ()
     items += [
-        tag("li", _sign("·"), tag("b", f"{row.id} has no pair. "), f"{sentence(row.reason)} {sentence(row.hint)}")
+        tag("li", _sign("·"), tag("b", f"{row.id} has no pair. "), str(in_sentences(row)))
         for row in unpaired[:_MOST_UNPAIRED]
     ]
     if len(unpaired) > _MOST_UNPAIRED:
@@ -41,20 +42,21 @@ def _all_warnings(subject: ReportSubject) -> Iterator[DataWarning]:
     own = by_consequence(subject.calibration.warnings) if subject.calibration is not None else _assumed(subject)
     judged = subject.judged.evaluation.warnings if subject.judged is not None else ()
     recorded = subject.recording.warnings if subject.recording is not None else ()
-    seen = set()
+    seen: list[DataWarning] = []
     for one in (*own, *judged, *recorded):
-        if (one.code, one.message) not in seen:
-            seen.add((one.code, one.message))
+        if one not in seen:
+            seen.append(one)
             yield one
 
 
 def _assumed(subject: ReportSubject) -> tuple[DataWarning, ...]:
-    return tuple(DataWarning("assumed", note, "verify this assumption") for note in subject.found.assumptions)
+    return tuple(DataWarning.reported("assumed", note, "verify this assumption") for note in subject.found.assumptions)
 
 
 def _item(warning: DataWarning) -> Markup:
-    sign, said = _sign(_SIGNS[consequence_of(warning.code)]), sentence(warning.message)
-    return tag("li", sign, tag("code", warning.code), " ", said, " ", tag("b", sentence(warning.hint)))
+    sign, said = _sign(_SIGNS[consequence_of(warning.code)]), told(warning)
+    hint = tag("b", sentence(str(said.hint)))
+    return tag("li", sign, tag("code", warning.code), " ", sentence(str(said.message)), " ", hint)
 
 
 def _sign(shape: str) -> Markup:

@@ -98,7 +98,7 @@ def _chosen(named: Path, same: Sequence[_Candidate], facts: RecordingFacts) -> F
     of = "" if chosen.recording.name == facts.name else f" of '{chosen.recording.name}'"
     message = f"continuing the session{of} in {chosen.path}, which has the frames of {facts.name}"
     hint = f"to start a new session instead, give another folder: --session {named}"
-    return FoundFolder(chosen.path, (DataWarning("session-of-other-name", message, hint), *warnings))
+    return FoundFolder(chosen.path, (DataWarning.reported("session-of-other-name", message, hint), *warnings))
 
 
 def _about(candidate: _Candidate, facts: RecordingFacts) -> DataWarning:
@@ -112,7 +112,7 @@ def _about(candidate: _Candidate, facts: RecordingFacts) -> DataWarning:
         hint = f"it cannot be written; take its clicks over: {export}, then start again with --clicks clicks.json"
     else:
         hint = f"to continue it, start again with --session {candidate.path}"
-    return DataWarning("session-not-used", message, hint)
+    return DataWarning.reported("session-not-used", message, hint)
 
 
 def _is_of(folder: Path, recording: Path) -> bool:
@@ -131,7 +131,7 @@ def _about_closed(folders: Sequence[Path]) -> tuple[DataWarning, ...]:
             faults.append(str(error))
     hint = "to continue with its clicks, do that; a new session is started otherwise"
     return tuple(
-        DataWarning("session-not-used", f"a session next to the recording is not used: {fault}", hint)
+        DataWarning.reported("session-not-used", f"a session next to the recording is not used: {fault}", hint)
         for fault in faults
     )
 

@@ -253,7 +253,7 @@ def _about_faults(found: Contents) -> tuple[DataWarning, ...]:
         "as far as the files show, none is missing"
     )
     hint = "the damaged files are kept next to the new ones, with .backup-1 or the next number in their names"
-    return (DataWarning("session-damaged", message, hint),)
+    return (DataWarning.reported("session-damaged", message, hint),)
 
 
 def _about_axes(before: str | None, now: str | None) -> tuple[DataWarning, ...]:
@@ -263,4 +263,4 @@ def _about_axes(before: str | None, now: str | None) -> tuple[DataWarning, ...]:
     was, is_now = (f"with --radar-axes {axes}" if axes else "without --radar-axes" for axes in (before, now))
     message = f"the session was last opened {was}, now {is_now}: all clicks are solved again with the new axes"
     again = f"start again with --radar-axes {before}" if before else "start again without --radar-axes"
-    return (DataWarning("other-axes", message, f"if that was not intended, {again}"),)
+    return (DataWarning.reported("other-axes", message, f"if that was not intended, {again}"),)

@@ -18,8 +18,7 @@ from calib_core.interchange import (
     read_any,
 )
 from calib_core.interchange.calibration_file import Evidence
-from calib_core.results import DataWarning
-from cocalib.view import sentence, warning_in_sentences
+from cocalib.view import WarningRow, sentence, warning_row
 from cocalib.web.exports import (
     CheckPointRow,
     Field,
@@ -85,7 +84,7 @@ class ExportPreview:
     names_frames: bool
     evidence: str
     missing: str
-    warnings: tuple[DataWarning, ...]
+    warnings: tuple[WarningRow, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,7 +149,7 @@ def export_preview(file: CalibrationFile, key: str, query: str, recording_name: 
         names_frames=report.imported.frames is not None,
         evidence=_evidence(file),
         missing=" ".join(map(sentence, lost)),
-        warnings=tuple(map(warning_in_sentences, file.calibration.warnings)),
+        warnings=tuple(map(warning_row, file.calibration.warnings)),
     )
 
 

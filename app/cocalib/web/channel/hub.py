@@ -15,7 +15,7 @@ from calib_core.recordings import FollowedRecording, Recording, TopicSummary, cl
 from calib_core.results import DataWarning
 from cocalib.platform.error_boundary import error_boundary
 from cocalib.platform.resources import version
-from cocalib.view import View, warning_in_sentences
+from cocalib.view import View, warning_row
 from cocalib.web.channel.boxes import BoxDesk
 from cocalib.web.channel.desk import ClosedDesk, Desk
 from cocalib.web.channel.lens import LensDesk
@@ -222,7 +222,7 @@ class Hub:
             frame_times=StampColumns.of(facts.moments),
             start=Stamp.of(TimeNs(int(facts.moments[0]))),
             radar=StampColumns.of(recording.radar_times),
-            warnings=tuple(map(warning_in_sentences, (*restored.warnings, *_settled(recording)))),
+            warnings=tuple(map(warning_row, (*restored.warnings, *_settled(recording)))),
             sensors=(
                 _radar_sensor(recording),
                 _sensor("camera", recording.image_topic, recording.topics),

@@ -27,7 +27,7 @@ from calib_core.recordings import Recording
 from cocalib.intrinsics import LensJob, LensSnapshot, RecordedPictures, field_of_view_text
 from cocalib.platform.error_boundary import error_boundary
 from cocalib.session import ChosenIntrinsics, IntrinsicsChosen
-from cocalib.view import Figure, sentence, warning_in_sentences
+from cocalib.view import Figure, sentence, warning_row
 from cocalib.view.wording import plain, with_sigma
 from cocalib.web.channel.outbox import Outbox
 from cocalib.web.messages import (
@@ -236,7 +236,7 @@ def lens_result(number: int, lens: CalibratedLens, about: str) -> LensResult:
         ),
         left_out=lens.left_out,
         trials=tuple(_trial(one, lens.camera.model) for one in lens.trials),
-        warnings=tuple(map(warning_in_sentences, lens.warnings)),
+        warnings=tuple(map(warning_row, lens.warnings)),
         residuals=_residuals(lens.views),
         pattern=_pattern(lens),
         uncertainty=_uncertainty(lens),

@@ -16,6 +16,7 @@ from calib_core.interchange.hypotheses.reading import read_clear
 from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
+from calib_core.words import said_of, words
 from cocalib.session import Session
 from cocalib.solving.solving import solve_clicks
 from cocalib.view.contours import contour_maps
@@ -103,7 +104,11 @@ class ReviewDesk:
         if isinstance(request, ReviewWanted):
             return review_of(calibration, session.outcome_revision)
         if isinstance(request, PairReviewWanted):
-            return pair_review(calibration, request.id) if calibration else PairReview(request.id, "Not solved yet.")
+            return (
+                pair_review(calibration, request.id)
+                if calibration
+                else PairReview(request.id, words("Not solved yet."))
+            )
         if isinstance(request, UncertaintyWanted):
             return Uncertainty(session.outcome_revision, contour_maps(calibration) if calibration else ())
         return self._compared(request)
@@ -172,7 +177,7 @@ class ReviewDesk:
     def _solved(self, session: Session, options: CalibrationOptions) -> Calibration:
         outcome = solve_clicks(self._recording, session.clicks, self._camera(), options)
         if isinstance(outcome, Unsolvable):
-            raise InputError(f"{outcome.reason}; {outcome.hint}")
+            raise InputError(str(said_of(outcome)))
         return outcome
 
     def _solution_in_file(self) -> Solution:

@@ -7,8 +7,7 @@ import msgspec
 from msgspec import Meta
 
 from calib_core.intrinsics import BoardKind, Coverage, LeftOutPicture, ModelTrial, PictureGrid
-from calib_core.results import DataWarning
-from cocalib.view import Figure
+from cocalib.view import Figure, WarningRow
 
 LensModelName: TypeAlias = Literal["auto", "pinhole", "plumb_bob", "rational_polynomial", "equidistant"]
 Stage: TypeAlias = Literal["idle", "searching", "calibrating", "cancelled", "failed", "done"]
@@ -162,7 +161,7 @@ class LensResult:
     views: tuple[LensViewRow, ...]
     left_out: tuple[LeftOutPicture, ...]
     trials: tuple[LensTrial, ...]
-    warnings: tuple[DataWarning, ...]
+    warnings: tuple[WarningRow, ...]
     residuals: tuple[tuple[float, float, float, float], ...]
     pattern: str
     uncertainty: PictureGrid | None

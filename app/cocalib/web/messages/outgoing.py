@@ -11,10 +11,9 @@ import msgspec
 from calib_core.arrays import TimesNs
 from calib_core.json_forms import to_json
 from calib_core.measurements import NS_PER_S, Stamp
-from calib_core.results import DataWarning
 from cocalib.option_changes import OptionGroup, option_groups
 from cocalib.proposing import ProposingProgress
-from cocalib.view import ClickRow, FollowState, PairCandidates, View
+from cocalib.view import ClickRow, FollowState, PairCandidates, View, WarningRow
 from cocalib.view.acc_panel import AccPanel
 from cocalib.view.contours import ContourMap
 from cocalib.view.review import Compared, PairReview, Review
@@ -246,7 +245,7 @@ class RecordingNote:
     frame_times: StampColumns
     start: Stamp
     radar: StampColumns
-    warnings: tuple[DataWarning, ...]
+    warnings: tuple[WarningRow, ...]
     sensors: tuple[SensorNote, ...]
     session: SessionNote
     version: str

@@ -19,6 +19,7 @@ from calib_core.interchange import CalibrationFile, read_calibration, written_fo
 from calib_core.measurements import MIN_PAIRS, Unsolvable
 from calib_core.recordings import Recording
 from calib_core.results import Calibration
+from calib_core.words import in_sentences
 from cocalib.report import current_report
 from cocalib.session import Session
 from cocalib.solving.solving import calibration_text
@@ -335,7 +336,7 @@ def _why_none(session: Session) -> str:
     if session.needs_solving and len(session.clicks) >= MIN_PAIRS:
         return "The latest change is still being solved; try again in a moment."
     if session.is_solved and isinstance(session.outcome, Unsolvable):
-        return f"{sentence(session.outcome.reason)} {sentence(session.outcome.hint)}"
+        return str(in_sentences(session.outcome))
     return "There is no calibration yet. Click the reflector in at least four placements."
 
 

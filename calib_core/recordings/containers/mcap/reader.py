@@ -248,7 +248,7 @@ class McapSource(ChunkedSource):
             self.warnings = (*self.warnings, self._too_few(count))
 
     def _too_few(self, count: int) -> DataWarning:
-        return DataWarning(
+        return DataWarning.reported(
             "messages-missing",
             f"{self.path.name} declares {self._counted} messages, but contains {count}",
             "check that the data you need is there; the rest was lost before or while the file was written",
@@ -283,7 +283,7 @@ class McapSource(ChunkedSource):
 
 
 def _about_private(path: Path, count: int) -> DataWarning:
-    return DataWarning(
+    return DataWarning.reported(
         "unknown-records",
         f"{path.name} contains {count} bytes in records of kinds that the format leaves to other programs; they are skipped",
         "no action needed if the program that wrote the file adds such records; otherwise the file is damaged: copy it again",

@@ -352,7 +352,7 @@ def _stamped_inside(files: Sequence[Path], times: TimeReader, options: PlainOpti
 
 
 def _counted(path: Path) -> DataWarning:
-    return DataWarning(
+    return DataWarning.reported(
         "numbered-files",
         f"{path.name}: the scans are numbered and have no times; an interval of 0.1 s is assumed",
         "correct only if scans and camera files with the same number belong together; otherwise add a column time_ns",
@@ -360,7 +360,7 @@ def _counted(path: Path) -> DataWarning:
 
 
 def _cut_off(path: Path) -> DataWarning:
-    return DataWarning(
+    return DataWarning.reported(
         "cut-off-row",
         f"{path.name}: the file ends within a row, which is left out; its writer was stopped",
         "no action needed for one row; if more should follow, copy the file again from its source",

@@ -157,7 +157,7 @@ def test_a_step_fails_on_its_own(step, function, error, final, files, row, tmp_p
 def test_an_input_that_changes_before_or_while_the_job_runs_is_no_result(row, tmp_path, monkeypatch):
     def change(*_arguments):
         os.utime(tmp_path / "camera.bag", (1, 1))
-        return Unsolvable("too-few-pairs", "reason", "hint")
+        return Unsolvable.reported("too-few-pairs", "reason", "hint")
 
     monkeypatch.setattr(running_job, "solve_session", change)
     outcome = outcome_of(row, tmp_path / "results")
@@ -172,7 +172,7 @@ def test_an_input_that_changes_before_or_while_the_job_runs_is_no_result(row, tm
 
 
 def test_a_full_disk_is_an_outcome_that_nobody_keeps(row, tmp_path, monkeypatch):
-    monkeypatch.setattr(running_job, "solve_session", lambda *_: Unsolvable("too-few-pairs", "reason", "hint"))
+    monkeypatch.setattr(running_job, "solve_session", lambda *_: Unsolvable.reported("too-few-pairs", "reason", "hint"))
     monkeypatch.setattr(running_job, "listed_files", raising(OSError(errno.ENOSPC, "No space left on device")))
     outcome = outcome_of(row, tmp_path / "results")
     assert (outcome.status, outcome.is_final) == ("failed", False)

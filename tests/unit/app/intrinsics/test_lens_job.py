@@ -66,7 +66,7 @@ class Search:
             if self.error is not None:
                 raise self.error
             if stopped():
-                return Unsolvable("stopped", "the search was stopped", "start it again")
+                return Unsolvable.reported("stopped", "the search was stopped", "start it again")
             views = [*views, view(index)] if index not in [one.index for one in views] else views
             progress(SearchProgress(index + 1, len(pictures), tuple(views), indices=tuple(range(index + 1))))
         progress("choosing a lens model")
@@ -163,9 +163,9 @@ def test_what_is_wrong_is_said_in_words_and_the_former_result_stays(search, watc
         return watched.until(stage)
 
     former = ended("done").lens
-    search.end = Unsolvable("no-board", "none of 8 pictures shows a checkerboard of 9 x 6", "film the board")
+    search.end = Unsolvable.reported("no-board", "no board was seen", "film the board")
     failed = ended("failed")
-    assert (failed.problem, failed.hint) == (search.end.reason, "film the board")
+    assert (failed.problem, failed.hint) == ("no board was seen", "film the board")
     assert failed.lens is former
     search.error = RecordingError("frame 1 cannot be read")
     assert ended("failed").problem == "frame 1 cannot be read"

@@ -117,7 +117,7 @@ def fullest_subject(project_root: Path) -> ReportSubject:
     long = (
         "the residuals of the pairs at the left edge are twice as long as the noise of clicks and radar explains, " * 2
     )
-    warnings = tuple(DataWarning(f"code-{k}", long, "place the reflector elsewhere, " * 4) for k in range(20))
+    warnings = tuple(DataWarning.reported(f"code-{k}", long, "place the reflector elsewhere, " * 4) for k in range(20))
     unpaired = tuple(replace(calibration.unpaired[0], id=f"u{k}", reason=long) for k in range(20))
     full = replace(calibration, camera=camera, pairs=pairs, warnings=warnings, unpaired=unpaired)
     subject = subject_for(project_root, full)

@@ -84,7 +84,7 @@ def test_every_drawing_and_table_can_be_heard(full):
 
 def test_text_of_a_recording_or_a_file_stays_text(project_root):
     evil = "<img src=x onerror=alert(1)>"
-    warning, calibration = DataWarning("odd", evil, evil), golden(project_root)
+    warning, calibration = DataWarning.reported("odd", evil, evil), golden(project_root)
     pairs = tuple(replace(one, id=evil) for one in calibration.pairs)
     subject = subject_for(project_root, replace(calibration, pairs=pairs, warnings=(warning,)))
     topics, inputs = (("radar", evil),), (replace(FILE, name=evil),)

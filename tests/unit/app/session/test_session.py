@@ -38,7 +38,7 @@ from cocalib.session import (
 )
 from tests.unit.app.session.drive import FACTS, START_NS, TIMES, place
 
-NO_ANSWER = Unsolvable("too-few-pairs", "1 of at least 4 pairs", "click more")
+NO_ANSWER = Unsolvable.reported("too-few-pairs", "1 of at least 4 pairs", "click more")
 PLACED = ReflectorClick(TIMES[3], "c1", 3.0, 1.0)
 GUESSED = ClickPlaced(TIMES[3], (3.0, 1.0), "untouched")
 CAMERA = Camera(

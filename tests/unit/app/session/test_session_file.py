@@ -88,7 +88,7 @@ STEPS = (
 def test_answers_are_not_journalled(tmp_path):
     session_file = open_session_file(tmp_path, FACTS)
     with pytest.raises(TypeError, match="Solved is not journalled"):
-        session_file.append(Solved(1, Unsolvable("a", "b", "c")), History())
+        session_file.append(Solved(1, Unsolvable.reported("a", "b", "c")), History())
     session_file.close()
 
 
@@ -193,7 +193,7 @@ def continued(folder: Path, history: History) -> str:
     again = restored(folder)
     assert (again.history, again.warnings) == (history, ())
     assert files(folder)[JOURNAL] == files(folder)[COPY]
-    return warning.message
+    return warning.facts["message"]
 
 
 def test_a_journal_that_is_cut_or_missing_and_a_copy_that_is_damaged_are_told(tmp_path):
@@ -206,7 +206,7 @@ def test_a_journal_that_is_cut_or_missing_and_a_copy_that_is_damaged_are_told(tm
     history = kept(tmp_path / "copy", *STEPS[:2])
     (tmp_path / "copy" / COPY).write_text("{")
     found = restored(tmp_path / "copy")
-    assert "in the copy, line 1 is damaged" in found.warnings[0].message
+    assert "line 1 is damaged" in found.warnings[0].facts["message"]
     assert (found.history, files(tmp_path / "copy")[f"{COPY}.backup-1"]) == (history, b"{")
     (tmp_path / "copy" / COPY).write_text("{")
     (tmp_path / "copy" / JOURNAL).unlink()
@@ -331,12 +331,12 @@ def test_radar_axes_that_changed_since_last_time_give_a_warning_and_harm_no_clic
     killed = open_session_file(tmp_path / "s", turned)
     (warning,) = killed.restored.warnings
     assert warning.code == "other-axes"
-    assert "last opened without --radar-axes, now with --radar-axes forward,right,up" in warning.message
+    assert "now with --radar-axes forward,right,up" in warning.facts["message"]
     assert len(killed.restored.history.present.clicks) == 1
     killed._journal.close()  # as a kill leaves it: nothing is written on the way out
     killed._lock.close()
     assert restored(tmp_path / "s", turned).warnings == ()
-    assert "start again with --radar-axes forward,right,up" in restored(tmp_path / "s").warnings[0].hint
+    assert "with --radar-axes forward,right,up" in restored(tmp_path / "s").warnings[0].facts["hint"]
 
 
 def test_a_session_that_is_open_elsewhere_is_refused_until_it_is_closed_for_good(tmp_path):

@@ -51,7 +51,7 @@ def test_a_persons_click_stays_and_an_automatic_one_of_the_same_id_is_renamed(mo
 
 @pytest.mark.parametrize("at", ["search", "clicks"])
 def test_a_refusal_is_handed_on(monkeypatch, at):
-    refusal = Unsolvable("not-confident", "chance would do nearly as well", "confirm some")
+    refusal = Unsolvable.reported("not-confident", "chance would do nearly as well", "confirm some")
     found(monkeypatch, refusal if at == "search" else ((), one_proposal()), refusal)
     assert place_clicks(RECORDING, CAMERA, OPTIONS) is refusal
 
@@ -75,5 +75,5 @@ def test_a_camera_that_would_be_far_away_needs_a_tape_or_a_person(away_m, measur
     outcome = solve_placed_clicks(RECORDING, placed, simulated.camera, options if measured else OPTIONS)
     assert isinstance(outcome, Unsolvable) is is_refused
     if isinstance(outcome, Unsolvable):
-        assert "m from the radar" in outcome.reason
-        assert "--camera-position-m" in outcome.hint
+        assert outcome.code == "not-confident"
+        assert "--camera-position-m" in outcome.facts["hint"]

@@ -20,6 +20,7 @@ from calib_core.options import CalibrationOptions, LocatingOptions
 from calib_core.recordings import Recording, RecordingOptions, open_recording
 from calib_core.recordings.containers.writing import CloudMessage, RecordedMessage, write_ros1_bag
 from calib_core.results import Calibration, DataWarning
+from calib_core.results.actions import FollowHint
 from calib_core.results.verdict import verdict_on
 from cocalib.platform.resources import version
 from cocalib.session import ClicksImported, OptionsChanged
@@ -89,7 +90,8 @@ def test_lost_returns_lead_the_verdict_where_they_can_matter(tmp_path, recording
     assert isinstance(outcome, Calibration)
     verdict = verdict_on(outcome)
     assert told == (lost != "none")
-    assert (verdict.level == "coarse" and "are lost" in verdict.reason) == leads
+    cause = verdict.cause.code if isinstance(verdict.cause, DataWarning) else ""
+    assert (verdict.level == "coarse" and cause == "lost-returns") == leads
     assert any(warning.code == "lost-returns" for warning in outcome.warnings) == leads
 
 
@@ -111,11 +113,9 @@ def test_a_recording_cut_off_leads_the_verdict_where_clicks_lost_their_returns(s
         text = calibration_text(outcome, cut) if isinstance(outcome, Calibration) else ""
     verdict = verdict_on(outcome)
 
-    led = verdict.reason.startswith(
-        f"{lost} clicks have no radar data, and the recording is damaged: radar.bag has no usable"
-    )
-    assert led == (lost > 0)
-    assert (verdict.action == "Copy the recording again from its source") == (lost > 0)
+    leading = outcome.suspected if isinstance(outcome, Unsolvable) else (verdict.cause,)
+    assert [one.facts["lost"] for one in leading if one and one.code == "damaged-recording"] == [lost] * (lost > 0)
+    assert not lost or verdict.action == FollowHint()
     if text:
         damage = read_calibration(text).provenance.damage
         assert any("could not be parsed and are lost" in one for one in damage) == (lost > 0)
@@ -133,7 +133,7 @@ def test_right_clicks_alarm_nobody_in_any_order_and_a_wrong_one_is_named(recordi
     outcome = solve_clicks(recording, [*order[:11], wrong], recording.camera(), CalibrationOptions())
     assert verdict_on(outcome).level == "coarse" or wrong.id in [pair.id for pair in outcome.pairs if not pair.inlier]
     outcome = solve_clicks(recording, [*order[:6], wrong], recording.camera(), CalibrationOptions())
-    consistent = any("looks consistent" in warning.message for warning in outcome.warnings)
+    consistent = any(warning.facts["clear"] for warning in outcome.warnings if warning.code == "few-pairs")
     assert consistent == all(pair.inlier for pair in outcome.pairs), "neither does one that is left out look so"
 
 
@@ -177,7 +177,9 @@ def test_page_and_command_line_give_the_same_bytes(tmp_path, recording, clicks, 
 
 def test_a_preview_comes_first_and_the_answer_does_not_depend_on_it(recording, clicks, solved):
     camera, options = recording.camera(), CalibrationOptions()
-    warned = replace(solved, warnings=(DataWarning("weak-geometry", "the pose is uncertain", "add placements"),))
+    warned = replace(
+        solved, warnings=(DataWarning.reported("weak-geometry", "the pose is uncertain", "add placements"),)
+    )
     for previous in (None, warned):
         preview, answer = solve_in_steps(recording, clicks, camera, options, previous=previous)
         assert isinstance(preview, Calibration)

@@ -31,7 +31,7 @@ from cocalib.session import History, RecordingFacts, Session
 from cocalib.view import Reference, shown_calibration, view
 from cocalib.web.radar_sight import overlay_of
 
-FEW = Unsolvable("too-few-pairs", "1 of 4 pairs", "click more placements")
+FEW = Unsolvable.reported("too-few-pairs", "1 of 4 pairs", "click more placements")
 
 
 @pytest.fixture

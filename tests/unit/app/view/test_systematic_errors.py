@@ -65,9 +65,9 @@ def test_axes_that_the_pairs_do_not_determine_share_a_row(calibration):
 
 
 def test_the_command_line_says_the_same_as_the_page(calibration):
-    lines = summary_lines(calibration)
+    lines = tuple(map(str, summary_lines(calibration)))
     assert [line.removeprefix("uncertainty: ") for line in lines if line.startswith("uncertainty: ")] == list(
-        systematic_errors(calibration).sentences
+        map(str, systematic_errors(calibration).sentences)
     )
     assert " ".join(lines).casefold().count("a tape-measured camera position") == 1
     assert any(line.startswith("in the picture") for line in lines)
@@ -78,7 +78,7 @@ def test_a_radar_without_elevation_shows_first_what_is_firm(flat):
     figures = {one.key: one.value for one in pose_figures(flat)}
     assert list(figures)[:4] == ["camera_x", "camera_y", "yaw", "picture"]
     assert [one.key for one in assumed_figures(flat)] == ["camera_z", "roll", "pitch"]
-    lines = summary_lines(flat)
+    lines = tuple(map(str, summary_lines(flat)))
     labels = [line.split("  ")[0] for line in lines[3:7]]
     assert [label.split(" ")[0] for label in labels] == ["camera", "camera", "yaw", "in"]
     assert "assumed, because this radar measures no elevation: camera " in next(
@@ -90,7 +90,7 @@ def test_a_radar_without_elevation_shows_first_what_is_firm(flat):
 
 def test_the_summary_says_how_many_clicks_agree_and_at_how_many_placements(calibration):
     count = len(calibration.pairs)
-    lines = summary_lines(calibration)
+    lines = tuple(map(str, summary_lines(calibration)))
     assert [" ".join(line.split()) for line in lines if line.startswith(("clicks that", "at placements"))] == [
         f"clicks that agree {count} of {count}",
         f"at placements {count}, each of which is one pair",

@@ -8,13 +8,16 @@ import pytest
 from calib_core.association.placements import Placement
 from calib_core.measurements import DataWarning, ReflectorClick, TimeNs, Unpaired, Unsolvable
 from calib_core.options import CalibrationOptions, GatingOptions, NoiseOptions
-from calib_core.results.verdict import DONE, Verdict, stated_error, verdict_on
+from calib_core.results.actions import ClickMore, Export, ReduceError
+from calib_core.results.verdict import Assumed, StatedError, Verdict, stated_error, verdict_on
+from calib_core.words import PairPart, error_text
 from cocalib.session import ClickPlaced, History, PlacementDismissed, RecordingFacts, Session, advance
 from cocalib.view.build import placements_left, verdict_row
 from cocalib.view.click_rows import disagreement
-from cocalib.view.wording import with_degree_signs
 from tests.unit.app.view.test_view import FIVE, calibration, pair, shown
 
+ERROR = StatedError(rotation_deg=0.3, position_cm=3.0, picture_px=4.0, range_m=9.0, in_plane=False)
+ASSUMED = Assumed(measured=False, alone_cm=np.nan, not_mirrored=True, elevations=True, principal_point_px=5.0)
 FACTS = RecordingFacts("drive", 1_000_000_000 * np.arange(50), width_px=640, height_px=480)
 
 
@@ -43,24 +46,28 @@ def test_a_mark_that_nobody_has_touched_leaves_its_placement_to_be_clicked():
 
 
 def test_done_is_said_with_the_key_that_exports():
-    row = verdict_row(Verdict("good", "0.3 deg, 3 cm (95 %)", DONE), Session(), None)
-    assert (row.done, row.key, row.action) == (True, "E", f"{DONE}.")
-    assert row.line == "good: within 0.3°, 3 cm (95 %)"
+    row = verdict_row(Verdict("good", Export(), error=ERROR), Session(), None)
+    assert (row.done, row.key, row.kind) == (True, "E", "Export")
+    assert (row.word, str(row.line)) == ("good", ": within 0.3°, 3 cm (95 %); 4 px at 9 m")
 
 
 def test_an_action_that_an_option_does_names_it():
-    for action, option in (("A tape-measured camera position would help most", "solving.camera_position"), (DONE, "")):
-        assert verdict_row(Verdict("usable", "2 deg", action), Session(), None).option == option
+    for action, option in ((ReduceError("azimuth_scale", measured=False), "solving.camera_position"), (Export(), "")):
+        assert verdict_row(Verdict("usable", action, error=ERROR), Session(), None).option == option
     near = CalibrationOptions(gating=GatingOptions(max_range_m=1.0))
-    lost = Unsolvable("too-few-pairs", "no pair", "click", (Unpaired("c1", "no-static-return", "no return", "widen"),))
+    lost = Unsolvable.reported(
+        "too-few-pairs", "no pair", "click", (Unpaired.reported("c1", "no-static-return", "no return", "widen"),)
+    )
     session = Session(clicks=(ReflectorClick(TimeNs(0), "c1", 1.0, 1.0),), options=near, outcome=lost)
     assert verdict_row(verdict_on(lost), session, None).option == "gating.max_range_m"
     assert verdict_row(verdict_on(lost), replace(session, options=CalibrationOptions()), None).option == ""
 
 
-TWO_POSES = DataWarning("two-poses", "another pose explains the pairs almost as well", "check the return of c2")
-OF_THE_LENS = DataWarning("intrinsics-suspected", "residuals grow outwards", "check the intrinsics")
-MIRRORED = DataWarning("mirrored-axes", "an axis is mirrored", "turn it round")
+TWO_POSES = DataWarning.reported(
+    "two-poses", "another pose explains the pairs almost as well", "check the return of c2"
+)
+OF_THE_LENS = DataWarning.reported("intrinsics-suspected", "residuals grow outwards", "check the intrinsics")
+MIRRORED = DataWarning.reported("mirrored-axes", "an axis is mirrored", "turn it round")
 
 
 @pytest.mark.parametrize(
@@ -76,36 +83,34 @@ def test_few_pairs_that_agree_are_counted_and_what_is_wrong_is_said(pairs, warni
     found = calibration(*pairs)
     row = shown(5, replace(found, warnings=warnings)).verdict
     assert row.early == (line != "")
-    assert row.line == line or not row.early
+    assert str(row.line) == line or not row.early
 
 
 def test_an_error_that_is_large_for_want_of_pairs_is_no_alarm_while_placements_are_left() -> None:
     eight = tuple(pair(f"c{number}") for number in range(1, 9))
     error = stated_error(calibration(*eight))
-    coarse = Verdict("coarse", "large", "Click the 3 placements that are left", "nothing is mirrored")
+    coarse = Verdict("coarse", ClickMore(3), error=error, assumed=ASSUMED)
     more = [placement(1), placement(11)]
     clicked = tuple(ReflectorClick(TimeNs(s * 10**9), f"c{s}", 1.0, 1.0) for s in (2, 12))
     odd = (*eight, pair("c9", inlier=False))
     agreeing, apart = (Session(clicks=clicked[:1], outcome=calibration(*some)) for some in (eight, odd))
     row = verdict_row(coarse, agreeing, more)
-    assert (row.early, row.line) == (True, with_degree_signs(f"8 pairs agree: so far within {error.text}"))
+    assert (row.early, str(row.line)) == (True, f"8 pairs agree: so far within {error_text(error)}")
     assert not verdict_row(coarse, apart, more).early
-    warned = replace(agreeing, outcome=replace(calibration(*eight), warnings=(OF_THE_LENS,)))
-    assert not verdict_row(coarse, warned, more).early
-    assert not verdict_row(replace(coarse, assumes=""), agreeing, more).early, "a unit is not confirmed"
+    assert not verdict_row(replace(coarse, cause=OF_THE_LENS), agreeing, more).early
+    assert not verdict_row(replace(coarse, error=None, unconfirmed=1), agreeing, more).early
     assert not verdict_row(coarse, replace(agreeing, clicks=clicked), more).early
     doubted = replace(agreeing, outcome=calibration(*eight[:7], replace(eight[7], outlier_probability=0.1)))
     row = verdict_row(coarse, doubted, more)
     assert (row.early, row.key) == (False, "")
-    assert "c8 fits worst" in row.line
-    assert "c8" in row.action
+    assert PairPart("c8") in row.line.parts
+    assert (row.kind, row.pairs) == ("ReviewPairs", ("c8",))
 
 
 def test_of_few_pairs_the_one_that_fits_worst_is_named_in_a_colour() -> None:
     doubted = calibration(*FIVE[:4], replace(FIVE[4], outlier_probability=0.1))
     row = shown(5, doubted).verdict
-    assert (row.level, row.early, row.line) == ("coarse", False, f"5 of 8 pairs, {FIVE[4].id} fits worst")
-    assert FIVE[4].id in row.action
+    assert (row.level, row.early, row.pairs) == ("coarse", False, (FIVE[4].id,))
 
 
 @pytest.mark.parametrize(

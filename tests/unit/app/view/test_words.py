@@ -1,13 +1,38 @@
 """The words of a few representative views, in one file: `python -m tests.unit.app.view.test_words` writes them again."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 
 from calib_core.diagnostics.next_placement import Coverage, Place
-from calib_core.measurements import Unsolvable
+from calib_core.measurements import Unpaired, Unsolvable
 from calib_core.results import DataWarning, NextPlacement
+from calib_core.results.actions import (
+    Action,
+    CalibrateLens,
+    ChooseReturn,
+    ClickFirst,
+    ClickMore,
+    ConfirmAssumptions,
+    Export,
+    FollowHint,
+    MeasureCameraPosition,
+    PlaceReflector,
+    ReduceError,
+    ReviewPairs,
+    SetOption,
+    SpreadPlacements,
+    Stop,
+)
+from calib_core.results.systematic_errors import SystematicErrorResult
+from calib_core.words import in_sentences
+from calib_core.words.outcomes import OUTCOMES, UNPAIRED
+from calib_core.words.systematic_errors import ERRORS
+from calib_core.words.verdict import words_of
+from calib_core.words.warnings import ROWS
 from cocalib.session import ClickExcluded, History
 from cocalib.view import Pace, View, advice_words, pace_words, view
 from tests.unit.app.view.test_view import ASKING, EVERY_STATE, FACTS, FIVE, UNSEEN, calibration, clicked, pair, shown
@@ -24,12 +49,18 @@ def _views() -> Iterator[tuple[str, View]]:
     yield "four of five agree", shown(5, calibration(*FIVE[:4], pair("c5", inlier=False)))
     yield "one excluded", shown(5, calibration(*FIVE[:4], pair("c5", excluded=True)))
     yield "being checked", shown(5, calibration(*FIVE, checking=True))
-    yield "no pose", shown(5, Unsolvable("no-pose", "only 3 of 5 pairs agree on any pose", "spread the placements"))
-    yield "no intrinsics", shown(1, Unsolvable("no-camera", "the intrinsics are missing", "give --camera"))
+    yield (
+        "no pose",
+        shown(5, Unsolvable.reported("no-pose", "only 3 of 5 pairs agree on any pose", "spread the placements")),
+    )
+    yield "no intrinsics", shown(1, Unsolvable.reported("no-camera", "the intrinsics are missing", "give --camera"))
     yield "clicks that the radar did not see", shown(5, UNSEEN)
     yield "a click in every state", shown(5, EVERY_STATE, ClickExcluded("c3", True))
     yield "a click that two returns fit", shown(5, calibration(*FIVE[:4], ASKING))
-    yield "a warning", shown(5, calibration(*FIVE, warnings=(DataWarning("few-pairs", "only 5 pairs", "add some"),)))
+    yield (
+        "a warning",
+        shown(5, calibration(*FIVE, warnings=(DataWarning.reported("few-pairs", "only 5 pairs", "add some"),))),
+    )
 
 
 def _best(x_m: float, y_m: float, *, may_stop: bool) -> NextPlacement:
@@ -55,15 +86,141 @@ def _while_following() -> Iterator[str]:
 def _lines(name: str, seen: View) -> Iterator[str]:
     yield f"# {name}"
     yield f"status: {seen.status or 'none'}"
-    yield f"verdict: {seen.verdict.line}"
+    yield f"verdict: {seen.verdict.word}{seen.verdict.line}"
     yield f"action: {seen.verdict.action}"
-    yield from (f"{one.key}: {one.label}. {one.hint}" for one in seen.metrics)
+    yield from (f"{one.key}: {one.name}. {one.hint}" for one in seen.metrics)
     yield from (f"{row.id}: {row.note}" for row in seen.clicks if row.note)
 
 
+_DAMAGE = DataWarning.reported("damaged-file", "radar.bag: chunk 7 is damaged", "copy it again")
+_SCALE = SystematicErrorResult("azimuth_scale", 0.012, 0.009, 0.02, True, 0.51, 0.05)
+_AWAY = {"away_deg": 12.0, "away_cm": 84.0}
+_IMAGE = {"clicks": 9, "width_px": 640, "height_px": 480}
+_STATED: tuple[DataWarning | Unsolvable | Unpaired, ...] = (
+    DataWarning("agreeing-outliers", {"ids": ["c3", "c4"], "in_time": ""}),
+    DataWarning("agreeing-outliers", {"ids": ["c3", "c4"], "in_time": "first"}),
+    *(
+        DataWarning("angle-scale", {"error": error, "value": value, "sigma": 0.01, "flat": flat, "measured": flat})
+        for error, value, flat in (
+            ("azimuth_scale", 0.03, True),
+            ("azimuth_scale", -0.03, False),
+            ("elevation_scale", 0.03, False),
+        )
+    ),
+    DataWarning("behind-camera", {"ids": ["c1"], "pairs": 9}),
+    DataWarning("camera-far-away", {"expected_m": 1.0, "solved_m": 7.2}),
+    DataWarning("camera-far-away", {**_AWAY, "expected_m": 1.0, "sigmas": 9.0, "here_m": 0.4, "there_m": 1.9}),
+    DataWarning("camera-position-contradicted", {"away_cm": 31.0, "sigmas": 7.0}),
+    DataWarning("choices-unused", {"clicks": 1}),
+    DataWarning("clock-bias-suspected", {"ids": ["c1", "c2"], "clicks": 9, "offset_s": 0.4}),
+    DataWarning("clock-bias-suspected", {"ids": ["c1", "c2"], "clicks": 9, "offset_s": -0.4}),
+    DataWarning(
+        "clocks-apart",
+        {"shifted_agreeing": 18, "shifted_clicks": 19, "placements": 1, "agreeing": 5, "clicks": 20, "apart_s": 8.5},
+    ),
+    DataWarning("damaged-recording", {"lost": 2, "damage": _DAMAGE}),
+    DataWarning("doubtful-pair", {"pair": "c7", "camera_moves_cm": 11.0, "sigmas": 3.1, "switched": ["c2"]}),
+    DataWarning("few-pairs", {"agreeing": 5, "pairs": 5, "needed": 8, "clear": True}),
+    DataWarning("few-pairs", {"agreeing": 5, "pairs": 5, "needed": 8, "clear": False}),
+    DataWarning("few-pairs", {"agreeing": 5, "pairs": 6, "needed": 8, "clear": False}),
+    DataWarning(
+        "flat-radar",
+        {"forward_cm": 9, "left_cm": 4, "yaw_deg": 0.4, "image_px": 5, "up_cm": 30, "pitch_deg": 2, "roll_deg": 2},
+    ),
+    DataWarning("handedness-assumed", {"within_m": 1.0}),
+    DataWarning("handedness-open"),
+    DataWarning("intrinsics-suspected", {"focal_length": 0.02, "sigma": 0.004, "stated_sigma": None}),
+    DataWarning("intrinsics-suspected", {"distortion_px": 9.0, "sigma": 2.0, "stated_sigma": 1.0}),
+    DataWarning("intrinsics-suspected", {"refined_too_far": [replace(_SCALE, name="focal_length", value=0.2)]}),
+    DataWarning("lens-or-radar-scale", {"change": 0.02, "sigma": 0.01, "scales": [_SCALE]}),
+    DataWarning("lost-returns", {"lost": 3, "read": 60, "where": "the radar around the clicks"}),
+    DataWarning("many-outliers", {"ids": [f"c{number}" for number in range(1, 9)], "pairs": 20}),
+    DataWarning("many-outliers", {"agreeing": 5, "pairs": 20, "threshold_px": 8.0}),
+    DataWarning("mirrored-axes", {"log_likelihood_ratio": 9.0}),
+    DataWarning("mirrored-axes", {"camera_below_m": 0.7, "radar_above_m": 0.9}),
+    DataWarning("no-consensus", {"agreeing": 5, "pairs": 20}),
+    DataWarning("nobody-confirmed", {"placed": 4, "clicks": 9, "confidence": 0.93}),
+    DataWarning("one-pair-decides", {"pair": "c7", "loss": 9.0}),
+    DataWarning("pixels-suspected", {**_IMAGE, "outside": 4, "exchanged": True}),
+    DataWarning("pixels-suspected", {**_IMAGE, "outside": 4, "pair": "c7", "pixel_px": [900.0, 20.0]}),
+    DataWarning("pixels-suspected", {**_IMAGE, "reach": (0.48, 0.45)}),
+    DataWarning("radar-axes-suspected", {"side": "left", "behind": 3, "pairs": 9}),
+    DataWarning("repeated-placements", {"pairs": 9, "places": 4}),
+    DataWarning("residuals-too-large", {"chi2_per_degree": 9.0}),
+    DataWarning("residuals-too-large", {"chi2_per_degree": 9.0, "paper": True}),
+    DataWarning("shared-error-suspected", {"error": "click_down_px", "value": 9.0, "sigma": 2.0, "prior_sigma": 2.0}),
+    DataWarning("shared-error-suspected", {"angle": "azimuth", "slope_deg_per_m": 0.11, "slope_sigma_deg_per_m": 0.02}),
+    DataWarning("shared-error-suspected", {"turned_deg": 1.2, "before": "c7", "after": "c8"}),
+    DataWarning("smooth-angle-errors", {"growth": 3.0, "uncertain_lens": False}),
+    DataWarning("two-poses", {**_AWAY, "sigmas": 48.0}),
+    DataWarning("two-poses", {**_AWAY, "sigmas": 48.0, "other_returns": ["c2", "c5"]}),
+    DataWarning("two-poses", {**_AWAY, "probability": 0.2}),
+    DataWarning("two-poses", {**_AWAY, "agreeing": ["c2", "c5"], "pairs": 9}),
+    DataWarning("uncertain-association", {"ids": ["c2"]}),
+    DataWarning("units-suspected", {"nearest": 300.0, "farthest": 4000.0, "unit": "centimetres", "factor": 0.01}),
+    DataWarning("units-suspected", {"camera_away": 40.0}),
+    DataWarning("weak-geometry", {"rotation_deg": 3.0, "position_cm": 40.0, "paper": True}),
+    DataWarning("weak-geometry", {"rotation_deg": 3.0, "position_cm": 40.0}),
+    Unsolvable("degenerate-placements", {"placements": 5}),
+    Unsolvable("degenerate-placements", {"placements": 3, "clicks": 9, "needed": 4}),
+    Unsolvable("mirrored-axes", {"agreeing": 3, "pairs": 9}),
+    Unsolvable("no-consensus", {"pairs": 9, "threshold_px": 8.0}),
+    Unsolvable(
+        "no-pose", {"agreeing": 3, "pairs": 9}, suspected=(DataWarning("units-suspected", {"camera_away": 40.0}),)
+    ),
+    Unsolvable("points-in-one-line", {"pairs": 9}),
+    Unsolvable("refinement-diverged"),
+    Unsolvable("too-few-pairs", {"used": 2, "needed": 4, "excluded": 1, "unpaired": 0}),
+    Unsolvable("useless-lens-covariance"),
+    Unsolvable("useless-lens-covariance", {"parameter": "fx_px", "value_px": 700.0, "sigma_px": 400.0}),
+    Unpaired("chosen-return-missing", {"range_m": 9.0, "azimuth_deg": -12.0}, id="c1"),
+    Unpaired("no-scan", id="c1"),
+    Unpaired("no-scan", {"gap_s": 2.0, "allowed_s": 0.5}, id="c1"),
+    Unpaired("no-static-return", {"scans": 30, "within_s": 1.5}, id="c1"),
+    Unpaired(
+        "no-static-return",
+        {"scans": 30, "within_s": 1.5, "fastest_mps": 0.2, "nearest_m": 0.5, "farthest_m": 60.0},
+        id="c1",
+    ),
+    Unpaired("no-static-return", {"paper": True, "fastest_mps": 0.1, "farthest_m": 60.0}, id="c1"),
+    Unpaired("no-z-score-inlier", {"returns": 7, "z_score_threshold": 1.0}, id="c1"),
+)
+_ACTIONS: tuple[Action, ...] = (
+    *(ClickMore(count) for count in (None, 1, 3)),
+    ClickMore(3, or_export=True),
+    ClickFirst(),
+    ClickFirst(placements_known=True),
+    PlaceReflector((4.5, 2.1, 0.0), 1.2),
+    ReviewPairs(("c1", "c2")),
+    ChooseReturn(("c2",)),
+    MeasureCameraPosition(),
+    SpreadPlacements("edges"),
+    SetOption("method", "default"),
+    SetOption("gating.max_range_m"),
+    CalibrateLens(),
+    *(ReduceError(name, measured=measured) for name in ERRORS for measured in (False, True)),
+    ConfirmAssumptions(),
+    Export(),
+    Stop(),
+)
+
+
+def _rows() -> Iterator[str]:
+    yield "# what the core finds: warnings, outcomes and clicks without a radar position"
+    yield from (f"{type(stated).__name__} {stated.code}: {in_sentences(stated)}" for stated in _STATED)
+    yield "# what to do"
+    yield from dict.fromkeys(f"{type(action).__name__}: {words_of(action)}." for action in _ACTIONS)
+
+
 def words() -> str:
-    pages = [*(_lines(name, seen) for name, seen in _views()), _while_following()]
+    pages = [*(_lines(name, seen) for name, seen in _views()), _while_following(), _rows()]
     return "\n\n".join("\n".join(lines) for lines in pages) + "\n"
+
+
+def test_every_row_of_words_is_on_the_page():
+    for kind, rows in ((DataWarning, ROWS), (Unsolvable, OUTCOMES), (Unpaired, UNPAIRED)):
+        assert {stated.code for stated in _STATED if isinstance(stated, kind)} == set(rows)
+    assert {type(action) for action in _ACTIONS} == set(get_args(Action)) - {FollowHint}
 
 
 def test_the_words_of_the_views_are_those_that_were_kept():

@@ -219,11 +219,8 @@ def test_one_damaged_frame_does_not_affect_the_others(ros, write, jpeg):
         assert [recording.image_bytes(index).data for index in range(2)] == [jpeg, jpeg]
         (warning,) = recording.warnings
         assert warning.code == "unreadable-pictures"
-        assert (
-            "1 of 3 pictures of /camera/image cannot be read and are skipped (2023-11-14 22:13:20.100"
-            in warning.message
-        )
-        assert "the JPEG ends before its image data" in warning.message
+        assert warning.facts["message"].startswith("1 of 3 pictures ")
+        assert "(2023-11-14 22:13:20.100" in warning.facts["message"]
 
 
 @pytest.mark.parametrize("count", [6, 200])
@@ -237,9 +234,7 @@ def test_pictures_of_another_size_are_skipped_and_told_with_their_times(count, r
         assert {recording.image_bytes(index).width_px for index in range(len(recording.image_times))} == {64}
         (warning,) = recording.warnings
     assert warning.code == "picture-sizes"
-    assert (
-        f"{count - len(odd)} have 64 x 48 pixels and are used; {len(odd)} have 128 x 96 (2023-11-14" in warning.message
-    )
+    assert f"{len(odd)} have 128 x 96 (2023-11-14" in warning.facts["message"]
 
 
 def test_raw_pictures_of_another_size_are_skipped(ros, write):
@@ -267,7 +262,7 @@ def test_frames_with_the_same_stamp_are_shown_once_with_a_warning(ros, write, jp
     with opened(write, ros, *messages) as recording:
         assert recording.image_times.tolist() == [START_NS, START_NS + 10**8, START_NS + 2 * 10**8]
         assert [warning.code for warning in recording.warnings] == ["repeated-stamps"]
-        assert "3 images of /camera/image" in recording.warnings[0].message
+        assert "3 images of /camera/image" in recording.warnings[0].facts["message"]
 
 
 def test_the_camera_with_intrinsics_and_colour_is_chosen(ros, write, jpeg):
@@ -332,8 +327,8 @@ def test_unusable_intrinsics_are_none_with_a_warning(ros, write, changes, code):
     camera, codes, warnings = camera_of(write, ros, ros.camera_info(**changes))
     assert camera is None
     assert codes == [code]
-    assert "/camera/camera_info" in warnings[0].message
-    assert "--camera FILE" in warnings[0].hint
+    assert "/camera/camera_info" in warnings[0].facts["message"]
+    assert "--camera FILE" in warnings[0].facts["hint"]
 
 
 @pytest.mark.parametrize(

@@ -259,7 +259,7 @@ def read_by_us(path: Path) -> tuple[set[bytes], list[str]]:
     told: list[str] = []
     try:
         topics, repeated = join_topics(sources)
-        told.extend(warning.message for warning in repeated)
+        told.extend(warning.facts["message"] for warning in repeated)
         used = [topic for topic in topics if len(topic)]
         for both in read_stamps([(topic, 12) for topic in used]) if used else ():
             told.extend([both.fault] * bool(both.lost))
@@ -269,7 +269,7 @@ def read_by_us(path: Path) -> tuple[set[bytes], list[str]]:
                 except RecordingError as error:
                     told.append(str(error))
         for source in sources:
-            told.extend(warning.message for warning in (*source.warnings, *source.later_warnings))
+            told.extend(warning.facts["message"] for warning in (*source.warnings, *source.later_warnings))
     except RecordingError as error:
         told.append(str(error))
     finally:

@@ -49,7 +49,7 @@ def test_complete_messages_are_recovered_losses_are_reported_and_a_first_picture
         with inspect_recording(path) as recording:
             scans = len(recording.radar_scans())
             pictures = sum(_picture(recording, index) == jpeg for index in range(len(recording.image_times)))
-            said = [f"{warning.code}: {warning.message}" for warning in recording.warnings]
+            said = [str(warning) for warning in recording.warnings]
             said += [t.problem for t in recording.topics if t.problem and t.problem != "no messages"]
     except RecordingError as error:
         said = [str(error)]

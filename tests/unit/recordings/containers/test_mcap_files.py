@@ -44,7 +44,7 @@ def test_a_chunk_with_a_wrong_checksum_gives_a_warning_with_its_message_count(co
         assert len(recording.radar_scans()) == 20
         (warning,) = recording.warnings
     assert warning.code == "checksum"
-    assert "1 of the chunks read so far, with 15 messages;" in warning.message
+    assert "with 15 messages" in warning.facts["message"]
 
 
 def test_verification_checks_stored_chunks_of_a_file_without_a_summary(ros2, plain, jpeg, tmp_path):
@@ -76,7 +76,7 @@ def test_a_compressed_chunk_with_a_wrong_checksum_counts_as_damaged_in_a_file_wi
     with open_recording(path) as recording:
         assert len(recording.radar_scans()) == 20
         assert [warning.code for warning in recording.warnings] == ["not-closed"]
-        assert "wrong checksum" in recording.warnings[0].message
+        assert "wrong checksum" in recording.warnings[0].facts["message"]
 
 
 def test_a_summary_with_a_wrong_checksum_is_not_trusted(ros2, plain, jpeg, tmp_path):

@@ -276,4 +276,5 @@ def test_camera_info_of_an_odd_layout_gives_no_camera_and_says_why(ros, write, p
     with inspect_recording(write(ros, [*rows, ("/camera/camera_info", START_NS, info)])) as recording:
         assert recording.camera() is None
         assert [warning.code for warning in recording.warnings] == ["camera-unreadable"]
-        assert "is not 9 numbers" in recording.warnings[0].message or "is not an array" in recording.warnings[0].message
+        message = recording.warnings[0].facts["message"]
+        assert "is not 9 numbers" in message or "is not an array" in message

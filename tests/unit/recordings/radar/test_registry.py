@@ -120,26 +120,21 @@ def azimuth(xyz: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("columns", "code", "words"),
+    ("columns", "code"),
     [
-        ({"range": length, "azimuth": azimuth}, None, ""),
-        ({"range": lambda p: 0 * length(p), "azimuth": lambda p: 0 * azimuth(p)}, None, ""),
-        ({"azimuth": lambda p: np.degrees(azimuth(p))}, None, ""),
-        ({"range": lambda p: 2 * length(p)}, "radar-range-contradicts", "range and the length of x, y, z differ by"),
-        ({"azimuth": lambda p: -azimuth(p)}, "radar-azimuth-mirrored", "have opposite signs"),
-        ({"azimuth": lambda p: -np.degrees(azimuth(p))}, "radar-azimuth-mirrored", "have opposite signs"),
-        ({"azimuth": lambda p: 0.4 + 0.3 * length(p)}, "radar-azimuth-contradicts", "disagree in every unit and sign"),
-        (
-            {"elevation": lambda p: 0 * length(p)},
-            "radar-elevation-zero",
-            "is always 0, but the heights of the positions are not",
-        ),
+        ({"range": length, "azimuth": azimuth}, None),
+        ({"range": lambda p: 0 * length(p), "azimuth": lambda p: 0 * azimuth(p)}, None),
+        ({"azimuth": lambda p: np.degrees(azimuth(p))}, None),
+        ({"range": lambda p: 2 * length(p)}, "radar-range-contradicts"),
+        ({"azimuth": lambda p: -azimuth(p)}, "radar-azimuth-mirrored"),
+        ({"azimuth": lambda p: -np.degrees(azimuth(p))}, "radar-azimuth-mirrored"),
+        ({"azimuth": lambda p: 0.4 + 0.3 * length(p)}, "radar-azimuth-contradicts"),
+        ({"elevation": lambda p: 0 * length(p)}, "radar-elevation-zero"),
     ],
 )
-def test_columns_that_contradict_the_positions_give_a_warning(columns, code, words, ros1, write, cloud_points):
+def test_columns_that_contradict_the_positions_give_a_warning(columns, code, ros1, write, cloud_points):
     with opened(write, ros1, changed(ros1, cloud_points, **columns)) as recording:
         assert [warning.code for warning in recording.warnings] == ([code] if code else [])
-        assert all(words in warning.message for warning in recording.warnings)
 
 
 def polar_cloud(ros: Any, azimuths: np.ndarray) -> Any:
@@ -168,8 +163,8 @@ def test_angles_that_the_user_states_in_the_wrong_unit_give_a_warning(ros1, writ
     with opened(write, ros1, [message], radar_axes="forward,left,up,radians") as recording:
         (warning,) = recording.warnings
     assert warning.code == "radar-angle-unit"
-    assert "has angles up to 60.0, which cannot be radians" in warning.message
-    assert warning.hint == "if they are degrees: --radar-axes degrees"
+    assert "angles up to 60.0" in warning.facts["message"]
+    assert "--radar-axes degrees" in warning.facts["hint"]
 
 
 def test_radians_read_as_degrees_give_a_warning(ros2, write):
@@ -188,7 +183,7 @@ def test_radians_read_as_degrees_give_a_warning(ros2, write):
     with opened(write, ros2, [message]) as recording:
         (warning,) = recording.warnings
     assert warning.code == "radar-angle-unit"
-    assert "small for degrees" in warning.message
+    assert "small for degrees" in warning.facts["message"]
 
 
 # -- axes given by the user

@@ -100,8 +100,8 @@ def test_radars_that_look_elsewhere_stay_apart_although_their_frames_are_named_a
         assert len(recording.radar_sensors) == 2
         (warning,) = recording.warnings
         assert warning.code == "several-radars"
-        assert "40 returns a scan at 20.0 Hz" in warning.message
-        assert "--radar-topic" in warning.hint
+        assert "at 20.0 Hz" in warning.facts["message"]
+        assert "--radar-topic" in warning.facts["hint"]
 
 
 def test_corner_radars_stay_apart_even_where_they_agree(tmp_path):
@@ -165,7 +165,7 @@ def test_other_frames_are_other_radars_unless_the_user_joins_them(tmp_path):
         assert recording.radar_topics == ("/radar/far", "/radar/near")
         (warning,) = recording.warnings
         assert warning.code == "radar-frames-differ"
-        assert "/radar/near has frame 'corner'" in warning.message
+        assert "/radar/near has frame 'corner'" in warning.facts["message"]
         assert recording.radar_choice.endswith("as requested")
 
 

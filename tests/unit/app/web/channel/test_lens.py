@@ -159,7 +159,7 @@ LENS = CalibratedLens(
     float("nan"),
     (ModelTrial("pinhole", 0.25, 0.26), ModelTrial("plumb_bob", 0.25, 0.27, 0.01, 0.002)),
     "pinhole: the others predict no better",
-    (DataWarning("board-bent", "the board is bent", "fix it to glass"),),
+    (DataWarning.reported("board-bent", "the board is bent", "fix it to glass"),),
 )
 
 
@@ -181,7 +181,7 @@ def test_a_lens_is_shown_with_its_views_what_was_left_out_and_why():
         ("plumb_bob", False, "0.0100 ± 0.0020 px² worse"),
     ]
     assert shown.choice == "pinhole: the others predict no better."
-    assert shown.warnings[0].message == "The board is bent."
+    assert str(shown.warnings[0].message) == "The board is bent."
     assert len(shown.residuals) == 33, "of corners that were used"
     assert shown.uncertainty.sigma_px.shape == (16, 24)
     assert '"sigma_px":[[' in encode(shown)

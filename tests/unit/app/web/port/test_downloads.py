@@ -67,7 +67,7 @@ def test_a_calibration_of_an_older_revision_cannot_be_downloaded(file, ask):
 
 
 def test_a_missing_calibration_is_explained(ask):
-    refused = Unsolvable("mirrored", "the axes are mirrored", "swap left and right")
+    refused = Unsolvable.reported("mirrored", "the axes are mirrored", "swap left and right")
     solved = Session(CLICKS, revision=3, outcome=refused, outcome_revision=3)
     assert ask(solved, "/api/export/urdf").body == b"The axes are mirrored. Swap left and right.\n"
     for path in ("/api/calibration.json", "/api/export/urdf"):

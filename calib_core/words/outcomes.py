@@ -1,0 +1,262 @@
+"""What is said where there is no calibration, or where a click has no radar position: a row for each code, as for warnings."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from calib_core.json_forms import Name
+from calib_core.measurements import DataWarning, Unpaired, Unsolvable
+from calib_core.results.actions import CalibrateLens, SetOption
+from calib_core.words.text import Words, join, option, say, sentence
+from calib_core.words.warnings import Remark, Row, remark, told
+
+_INTRINSICS = (
+    "check that clicks and radar data are from the same times, that the intrinsics belong to this camera at this image "
+    "size"
+)
+
+
+def too_few_pairs(*, used: int, needed: int, excluded: int, unpaired: int, untouched: int = 0) -> Remark:
+    kinds = ((excluded, "excluded"), (unpaired, "unpaired"), (untouched, "untouched"))
+    others = "".join(f", {count} {what}" for count, what in kinds if count)
+    return remark(
+        f"{used} of at least {needed} required pairs{others}",
+        "click the reflector at more placements: ten or more, near and far, spread over the image",
+    )
+
+
+def mirrored_axes(*, agreeing: int, pairs: int) -> Remark:
+    return remark(
+        f"only {agreeing} of {pairs} pairs agree on any pose; with one radar axis mirrored they fit better",
+        say(
+            "radar axes must be x forward, y left, z up: read them as they are, with {axes}, or flip the sign of y (or of the "
+            "elevation) at the source",
+            axes=option("radar_axes", "forward,right,up"),
+        ),
+        SetOption("radar_axes", "forward,right,up"),
+    )
+
+
+def no_pose(*, agreeing: int, pairs: int) -> Remark:
+    return remark(
+        f"only {agreeing} of {pairs} pairs agree on any pose",
+        f"{_INTRINSICS}, and that the placements are spread over the image",
+    )
+
+
+def degenerate_placements(*, placements: int, clicks: int | None = None, needed: int = 0) -> Remark:
+    if clicks is None:
+        return remark(
+            f"the {placements} placements do not determine the pose: they lie at one place or on one line",
+            "spread the placements: near and far, left and right",
+        )
+    return remark(
+        f"the {clicks} clicks show {placements} of at least {needed} required placements: clicks of one placement count as one",
+        "move the reflector between clicks: near and far, left and right",
+    )
+
+
+def points_in_one_line(*, pairs: int) -> Remark:
+    return remark(
+        f"the radar positions of all {pairs} pairs are at one place or on one line",
+        "place the reflector left and right, near and far",
+    )
+
+
+def refinement_diverged() -> Remark:
+    return remark(
+        "Levenberg-Marquardt on all pairs diverged",
+        "exclude the pairs with the largest residuals, or use the default method",
+        SetOption("method", "default"),
+    )
+
+
+def no_consensus(*, pairs: int, threshold_px: float) -> Remark:
+    return remark(
+        f"RANSAC finds no pose that brings enough of the {pairs} pairs within {threshold_px:g} px, neither with the iterative "
+        "solver nor with SQPnP",
+        say(
+            "raise {threshold} to about three times the pixel noise (radar angles alone make 10 to 20 px), or use the default "
+            "method, which needs no threshold",
+            threshold=option("paper.ransac_threshold_px"),
+        ),
+        SetOption("method", "default"),
+    )
+
+
+def useless_lens_covariance(*, parameter: str = "", value_px: float = 0.0, sigma_px: float = 0.0) -> Remark:
+    if not parameter:
+        return remark(
+            "the intrinsics are to be refined, but the camera's covariance says that they are exact",
+            "turn refining off, or remove the covariance, to refine them with the sigmas of the refining options",
+            SetOption("refining.intrinsics", "false"),
+        )
+    return remark(
+        f"the camera's covariance says that {parameter}, {value_px:.0f} px, is known to ± {sigma_px:.0f} px, as if the lens had "
+        "not been calibrated",
+        "check the covariance's order and units (variances in px²), remove it, or calibrate the lens with a board",
+        CalibrateLens(),
+    )
+
+
+def no_scan(*, gap_s: float | None = None, allowed_s: float = 0.0) -> Remark:
+    if gap_s is None:
+        return remark("the radar recording has no scan", "choose the radar topic that has returns")
+    return remark(
+        f"the nearest radar scan is {gap_s:.2f} s away; at most {allowed_s:g} s are allowed",
+        "click where both recordings overlap, or check that both clocks agree",
+    )
+
+
+def no_static_return(
+    *,
+    scans: int = 0,
+    within_s: float = 0.0,
+    fastest_mps: float | None = None,
+    nearest_m: float = 0.0,
+    farthest_m: float = 0.0,
+    paper: bool = False,
+    gap_s: float | None = None,
+) -> Remark:
+    if paper:
+        return remark(
+            "no radar return passes the velocity and range filter"
+            if gap_s is None
+            else f"the nearest static radar return is {gap_s:.2f} s away",
+            f"Algorithm 1 keeps speeds up to {fastest_mps:g} m/s and ranges below {farthest_m:g} m: click where the reflector "
+            "stands still inside the radar recording, or raise these two options",
+            SetOption("paper.max_range_m"),
+        )
+    window = f"none of the {scans} scans within {within_s:g} s has a return"
+    if fastest_mps is None:
+        return remark(f"{window} with a position", "look at what the radar's driver writes: cocalib info RECORDING")
+    return remark(
+        f"{window} slower than {fastest_mps:g} m/s between {nearest_m:g} and {farthest_m:g} m",
+        "stand clear of the reflector and let it rest for three seconds, or widen the gates",
+        SetOption("gating.max_range_m"),
+    )
+
+
+def no_z_score_inlier(*, returns: int, z_score_threshold: float) -> Remark:
+    return remark(
+        f"none of the {returns} returns in the window is within {z_score_threshold:g} standard deviations on all three axes",
+        "raise the z-score threshold, or use the default method",
+        SetOption("paper.z_score_threshold"),
+    )
+
+
+def chosen_return_missing(*, range_m: float, azimuth_deg: float) -> Remark:
+    side = "left" if azimuth_deg > 0 else "right"
+    return remark(
+        f"the radar has no static return at the chosen position, {range_m:.1f} m away and {abs(azimuth_deg):.1f} deg to the "
+        f"{side}",
+        "choose another return for this click, or take the choice back",
+    )
+
+
+OUTCOMES: Mapping[str, Row] = {
+    row.__name__.replace("_", "-"): row
+    for row in (
+        degenerate_placements,
+        mirrored_axes,
+        no_consensus,
+        no_pose,
+        points_in_one_line,
+        refinement_diverged,
+        too_few_pairs,
+        useless_lens_covariance,
+    )
+}
+UNPAIRED: Mapping[str, Row] = {
+    row.__name__.replace("_", "-"): row for row in (chosen_return_missing, no_scan, no_static_return, no_z_score_inlier)
+}
+
+
+def outcome_told(outcome: Unsolvable) -> Remark:
+    """Return why there is no calibration, and what to do: first about what looks wrong with the input."""
+    own = _told(outcome, OUTCOMES)
+    causes = [join((cause.message, cause.hint), "; ") for cause in map(told, outcome.suspected)]
+    return Remark(own.message, join((*causes, own.hint), "; "), own.action)
+
+
+def unpaired_told(click: Unpaired) -> Remark:
+    """Return why a click has no radar position, and what to do."""
+    return _told(click, UNPAIRED)
+
+
+def _told(stated: Unsolvable | Unpaired, rows: Mapping[str, Row]) -> Remark:
+    if "message" in stated.facts:
+        return remark(stated.facts["message"], stated.facts["hint"])
+    return rows[stated.code](**stated.facts)
+
+
+def remark_on(stated: DataWarning | Unsolvable | Unpaired) -> Remark:
+    """Return what is said of any of them."""
+    if isinstance(stated, DataWarning):
+        return told(stated)
+    return unpaired_told(stated) if isinstance(stated, Unpaired) else outcome_told(stated)
+
+
+def said_of(stated: DataWarning | Unsolvable | Unpaired) -> Words:
+    """Return message and hint in one phrase."""
+    said = remark_on(stated)
+    return join((said.message, said.hint), "; ")
+
+
+def in_sentences(stated: DataWarning | Unsolvable | Unpaired) -> Words:
+    """Return message and hint, a sentence each."""
+    said = remark_on(stated)
+    return join((sentence(said.message), sentence(said.hint)))
+
+
+@dataclass(frozen=True, slots=True)
+class WarningText:
+    """A warning as files hold it.
+
+    Attributes:
+        code: identifier for programs, such as "mirrored-axes"; stable.
+        message: what is wrong, with figures.
+        hint: what to do about it.
+    """
+
+    code: str
+    message: str
+    hint: str
+
+    @property
+    def warning(self) -> DataWarning:
+        """The warning, as the file says it."""
+        return DataWarning.reported(self.code, self.message, self.hint)
+
+
+def warning_text(warning: DataWarning) -> WarningText:
+    """Return a warning for a file: pairs by their ids, options by their names."""
+    said = told(warning)
+    return WarningText(warning.code, str(said.message), str(said.hint))
+
+
+@dataclass(frozen=True, slots=True)
+class UnpairedText:
+    """A click that found no radar position, as files hold it.
+
+    Attributes:
+        id: the click's id.
+        code: identifier for programs, such as "no-scan", "no-static-return".
+        reason: one sentence for the user.
+        hint: what to do about it.
+    """
+
+    id: Name
+    code: str
+    reason: str
+    hint: str
+
+    @property
+    def unpaired(self) -> Unpaired:
+        """The click, as the file says it."""
+        return Unpaired.reported(self.id, self.code, self.reason, self.hint)
+
+
+def unpaired_text(click: Unpaired) -> UnpairedText:
+    """Return such a click for a file."""
+    said = unpaired_told(click)
+    return UnpairedText(click.id, click.code, str(said.message), str(said.hint))

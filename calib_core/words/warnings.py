@@ -1,0 +1,678 @@
+"""What the warnings of a calibration say: a row for each code, from its facts to a message, a hint and an action.
+
+The parameters of a row are the facts that its code has, as the check that finds it states them; a test compares the two. A new
+warning is one more row; what to do about a warning is decided here and nowhere else.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from calib_core.measurements import DataWarning
+from calib_core.results.actions import (
+    Action,
+    CalibrateLens,
+    ChooseReturn,
+    MeasureCameraPosition,
+    ReviewPairs,
+    SetOption,
+    SpreadPlacements,
+)
+from calib_core.results.systematic_errors import SystematicErrorResult, family_of
+from calib_core.words.systematic_errors import FAMILIES, error_words, knowledge, percent, prior_text, value_text
+from calib_core.words.text import Words, count, join, listed, named, option, say, words
+
+
+@dataclass(frozen=True, slots=True)
+class Remark:
+    """What a person is told.
+
+    Attributes:
+        message: what is wrong, with figures; a phrase without a full stop.
+        hint: what to do about it, likewise.
+        action: the same as a value; None if no other part of the program can begin it.
+    """
+
+    message: Words
+    hint: Words
+    action: Action | None = None
+
+
+Row: TypeAlias = Callable[..., Remark]
+_APEX = "the reflector's apex, where its three sheets meet, not its mouth or its stand"
+_ONE_BY_ONE = "was the reflector clicked, was it at rest, do both recordings use the same clock?"
+_BY_TAPE = "measure the camera position with a tape"
+
+
+def remark(message: Words | str, hint: Words | str, action: Action | None = None) -> Remark:
+    """Return a remark, from text or words."""
+    return Remark(words(message), words(hint), action)
+
+
+def no_consensus(*, agreeing: int, pairs: int) -> Remark:
+    return remark(
+        f"only {agreeing} of {pairs} pairs agree on this pose, which can be chance",
+        f"check the clicks one by one: {_ONE_BY_ONE}",
+    )
+
+
+def few_pairs(*, agreeing: int, pairs: int, needed: int, clear: bool) -> Remark:
+    seen = f"{agreeing} of {pairs} pairs agree, and {needed} are needed"
+    if agreeing == pairs:
+        seen = f"{agreeing} of {needed} pairs, {'looks consistent' if clear else 'not clear yet'}"
+    return remark(seen, "add placements: ten or more, near and far, on both sides")
+
+
+def many_outliers(
+    *, pairs: int, ids: Sequence[str] = (), agreeing: int | None = None, threshold_px: float = 0.0
+) -> Remark:
+    if agreeing is not None:
+        return remark(
+            f"only {agreeing} of {pairs} pairs agree within {threshold_px:g} px, but Algorithm 1 fits the pose to all of them",
+            "use the default method, which leaves wrong pairs out; or exclude the pairs with the largest residuals",
+            SetOption("method", "default"),
+        )
+    return remark(
+        say("{outliers} of {pairs} pairs do not fit: {ids}", outliers=len(ids), pairs=pairs, ids=listed(ids)),
+        f"check each of them: {_ONE_BY_ONE}",
+        ReviewPairs(tuple(ids)),
+    )
+
+
+def residuals_too_large(*, chi2_per_degree: float, paper: bool = False) -> Remark:
+    message = (
+        f"residuals are {np.sqrt(chi2_per_degree):.1f} times what the assumed noise explains "
+        f"(chi2 / degrees of freedom {chi2_per_degree:.1f})"
+    )
+    if paper:
+        hint = "some radar positions or clicks are wrong: use the default method, and check the pairs it names"
+        return remark(message, hint, SetOption("method", "default"))
+    return remark(
+        message,
+        "check that the intrinsics belong to this camera, lens and image size, that every click is on the reflector's inner "
+        "corner, and the assumed radar noise",
+    )
+
+
+def smooth_angle_errors(*, growth: float, uncertain_lens: bool) -> Remark:
+    lens = "a lens as uncertain as its covariance says can look the same: first refine the intrinsics with the pose; "
+    return remark(
+        "neighbouring placements have similar residuals: the radar's angles are off by an amount that changes slowly with "
+        f"direction; this makes the stated rotation uncertainty {growth:.1f} times larger",
+        f"{lens if uncertain_lens else ''}more placements will not average this out: correct the radar's angles by "
+        "radar_angle_map of the calibration, or calibrate the radar; the stated uncertainty includes the error",
+    )
+
+
+def weak_geometry(
+    *,
+    rotation_deg: float,
+    position_cm: float,
+    nearest_m: float = 0.0,
+    farthest_m: float = 0.0,
+    azimuth_span_deg: float = 0.0,
+    measured: bool = False,
+    paper: bool = False,
+) -> Remark:
+    size = f"{rotation_deg:.1f} deg and {position_cm:.0f} cm (one sigma)"
+    if paper:
+        return remark(
+            f"Algorithm 1 states no uncertainty; by its residuals and the placements it is about {size}",
+            "use the default method, which weights the pairs by their noise; add placements near and far, at both edges of the "
+            "image",
+            SetOption("method", "default"),
+        )
+    message = (
+        f"the pose is uncertain: {size}; placements span {nearest_m:.1f} to {farthest_m:.1f} m and "
+        f"{azimuth_span_deg:.0f} deg"
+    )
+    spread = "place the reflector near (2 to 3 m) and far, at both edges of the image"
+    if measured:
+        return remark(message, spread, SpreadPlacements("edges"))
+    return remark(message, f"{_BY_TAPE}, which helps most; also {spread}", MeasureCameraPosition())
+
+
+def repeated_placements(*, pairs: int, places: int) -> Remark:
+    return remark(
+        f"{pairs} pairs cover only {places} places; a radar repeats its error at the same place, so the stated uncertainty is "
+        "too small",
+        "move the reflector between clicks; more clicks of one placement add little",
+    )
+
+
+def flat_radar(
+    *,
+    forward_cm: float,
+    left_cm: float,
+    yaw_deg: float,
+    image_px: float,
+    up_cm: float,
+    pitch_deg: float,
+    roll_deg: float,
+) -> Remark:
+    return remark(
+        f"this radar measures no elevation. One sigma: the pairs determine forward ± {forward_cm:.0f} cm, left ± {left_cm:.0f} "
+        f"cm and yaw ± {yaw_deg:.1f} deg in the plane of the placements, and where its returns appear in the image, "
+        f"± {image_px:.0f} px; up ± {up_cm:.0f} cm, pitch ± {pitch_deg:.1f} and roll ± {roll_deg:.1f} deg are assumptions about "
+        "how it is mounted",
+        "state among the options how well the radar's tilt and height are known, or measure the camera position; if the radar "
+        "does measure elevation, find out why it is missing",
+    )
+
+
+def uncertain_association(*, ids: Sequence[str]) -> Remark:
+    return remark(
+        say("more than one radar position fits the click of {ids}", ids=listed(ids)),
+        "choose the return of each on the page (C), or exclude the pair",
+        ChooseReturn(tuple(ids)),
+    )
+
+
+def doubtful_pair(*, pair: str, camera_moves_cm: float, sigmas: float, switched: Sequence[str]) -> Remark:
+    name = named(pair)
+    changed = say(", and {switched} would change sides", switched=listed(switched)) if switched else Words()
+    return remark(
+        say(
+            "the pose rests on {name}: without {name} the camera moves {camera_moves_cm:.0f} cm, {sigmas:.1f} standard "
+            "deviations{changed}",
+            name=name,
+            camera_moves_cm=camera_moves_cm,
+            sigmas=sigmas,
+            changed=changed,
+        ),
+        say("check the click and the radar position of {name}, or add placements near it", name=name),
+        ReviewPairs((pair,)),
+    )
+
+
+def one_pair_decides(*, pair: str, loss: float) -> Remark:
+    name = named(pair)
+    return remark(
+        say(
+            "part of the pose depends on {name} alone: without it, that part would be {loss:.0f} times less certain, so the "
+            "other pairs cannot check its click",
+            name=name,
+            loss=loss,
+        ),
+        say("check the click of {name} again, and add a placement near it", name=name),
+        ReviewPairs((pair,)),
+    )
+
+
+def mirrored_axes(
+    *, log_likelihood_ratio: float = 0.0, camera_below_m: float = 0.0, radar_above_m: float = 0.0
+) -> Remark:
+    flip = say(
+        "read the radar's axes as they are: {axes}, or flip the sign of y (or of the elevation) at the source; rows of the "
+        "image counted from below look the same; do not use this pose",
+        axes=option("radar_axes", "forward,right,up"),
+    )
+    action = SetOption("radar_axes", "forward,right,up")
+    if not camera_below_m:
+        return remark(
+            "pairs and expected camera position agree better with one radar axis mirrored (log-likelihood ratio "
+            f"{log_likelihood_ratio:.1f}): the radar's axes look left-handed",
+            flip,
+            action,
+        )
+    return remark(
+        f"the pose puts the camera {camera_below_m:.1f} m below the plane of the placements and the radar {radar_above_m:.1f} m "
+        "above it; with one radar axis mirrored, both are above: the radar's axes look left-handed",
+        flip
+        + say(
+            "; if the sensors really are on different sides of the placements, turn {above} off",
+            above=option("solving.sensors_above_placements"),
+        ),
+        action,
+    )
+
+
+def handedness_open() -> Remark:
+    return remark(
+        "a mirrored radar axis would explain the pairs about as well, or put radar and camera on one side of the floor",
+        f"{_BY_TAPE}, or add placements at other heights (a tripod)",
+        MeasureCameraPosition(),
+    )
+
+
+def handedness_assumed(*, within_m: float) -> Remark:
+    return remark(
+        "the placements lie near one plane, so mirrored radar axes fit equally well: that none is mirrored is inferred only "
+        f"from the camera being within about {within_m:g} m of the radar",
+        "measure the camera position (0.3 m is enough for this), or add placements at other heights (a tripod)",
+        MeasureCameraPosition(),
+    )
+
+
+def clock_bias_suspected(*, ids: Sequence[str], clicks: int, offset_s: float) -> Remark:
+    late = offset_s > 0
+    seen, relation, when = (
+        ("after", "ahead of", "has been at rest for a while")
+        if late
+        else ("before", "behind", "has just been put down")
+    )
+    return remark(
+        say(
+            f"for {{outside}} of {{clicks}} clicks ({{ids}}) the radar sees the reflector only {seen} the click: its stamps seem "
+            f"to be {{offset_s:.1f}} s or more {relation} the camera's",
+            outside=len(ids),
+            clicks=clicks,
+            ids=listed(ids),
+            offset_s=abs(offset_s),
+        ),
+        f"compare both clocks (cocalib info), or click when the reflector {when}; if the clocks agree, click in the middle of "
+        "each dwell",
+    )
+
+
+def clocks_apart(
+    *, shifted_agreeing: int, shifted_clicks: int, placements: int, agreeing: int, clicks: int, apart_s: float
+) -> Remark:
+    away = "one placement" if abs(placements) == 1 else f"{abs(placements)} placements"
+    later, ahead = ("later", "ahead of") if placements > 0 else ("earlier", "behind")
+    return remark(
+        f"{shifted_agreeing} of {shifted_clicks} clicks agree with what the radar saw {away} {later}, {agreeing} of {clicks} "
+        f"with what it saw at their time: its stamps seem to be about {abs(apart_s):.0f} s {ahead} the camera's",
+        say(
+            "compare both clocks (cocalib info); if one computer recorded both sensors, use the times of receipt: {receive}; "
+            "else correct the stamps of one recording",
+            receive=option("clock", "receive"),
+        ),
+        SetOption("clock", "receive"),
+    )
+
+
+def two_poses(
+    *,
+    away_deg: float,
+    away_cm: float,
+    sigmas: float = 0.0,
+    other_returns: Sequence[str] = (),
+    probability: float = 0.0,
+    agreeing: Sequence[str] = (),
+    pairs: int = 0,
+) -> Remark:
+    nearer = f"{_BY_TAPE}, or add placements nearer and farther than the present ones"
+    if agreeing:
+        return remark(
+            say(
+                "another pose, {away}, explains the pairs as well: {count} of {pairs} agree on it, {ids}",
+                away=_away(away_deg, away_cm),
+                count=len(agreeing),
+                pairs=pairs,
+                ids=listed(agreeing),
+            ),
+            "check which group shows the reflector, and exclude the other",
+            ReviewPairs(tuple(agreeing)),
+        )
+    if probability:
+        return remark(
+            f"another pose, {_away(away_deg, away_cm)}, may be the right one (probability {100 * probability:.0f} %): it is not "
+            "clear which of the pairs are wrong",
+            nearer,
+            MeasureCameraPosition(),
+        )
+    other = f"two poses fit: the other is {_away_sigmas(away_deg, away_cm, sigmas)}"
+    if not other_returns:
+        return remark(other, nearer, MeasureCameraPosition())
+    return remark(
+        say(
+            "{other}, with other returns for {ids}{more}",
+            other=other,
+            ids=join(map(named, other_returns[:3]), ", "),
+            more=" and others" if other_returns[3:] else "",
+        ),
+        say("check {pair}: which return is the reflector? Or {tape}", pair=named(other_returns[0]), tape=_BY_TAPE),
+        ChooseReturn(tuple(other_returns)),
+    )
+
+
+def _away(away_deg: float, away_cm: float) -> str:
+    return f"{away_deg:.1f} deg and {away_cm:.0f} cm away"
+
+
+def _away_sigmas(away_deg: float, away_cm: float, sigmas: float) -> str:
+    return f"{away_deg:.1f} deg and {away_cm / 100:.2f} m away ({sigmas:.0f} standard deviations)"
+
+
+def camera_far_away(
+    *,
+    expected_m: float,
+    solved_m: float = 0.0,
+    away_deg: float = 0.0,
+    away_cm: float = 0.0,
+    sigmas: float = 0.0,
+    here_m: float = 0.0,
+    there_m: float = 0.0,
+) -> Remark:
+    distance = option("solving.nominal_camera_distance_m")
+    if solved_m:
+        return remark(
+            f"the solved camera position is {solved_m:.1f} m from the expected one (± {expected_m:.1g} m)",
+            say(
+                "if the sensors really are that far apart, set {distance}; otherwise do not use this pose",
+                distance=distance,
+            ),
+            SetOption("solving.nominal_camera_distance_m"),
+        )
+    return remark(
+        f"another pose, {_away_sigmas(away_deg, away_cm, sigmas)}, explains the pairs as well; the one with the camera "
+        f"{here_m:.1f} m from the radar, not {there_m:.1f} m, was chosen only because about {expected_m:g} m is expected",
+        say(
+            "are both sensors on the same rig, or how far apart? Set {distance}, or measure the camera position",
+            distance=distance,
+        ),
+        MeasureCameraPosition(),
+    )
+
+
+def agreeing_outliers(*, ids: Sequence[str], in_time: str) -> Remark:
+    turned = f"; they are the {in_time} in time, so the camera or the radar seems to have turned: solve them apart"
+    return remark(
+        say(
+            "{count} pairs are off in the same way and were set aside: {ids}{turned}",
+            count=len(ids),
+            ids=listed(ids),
+            turned=turned if in_time else "",
+        ),
+        say(
+            "look at the returns of {pair}: a cart beside the reflector, a second reflector, or elevations that jump give such "
+            "a group",
+            pair=named(ids[0]),
+        ),
+        ReviewPairs(tuple(ids)),
+    )
+
+
+def camera_position_contradicted(*, away_cm: float, sigmas: float, misread: str = "", unit: str = "") -> Remark:
+    looks = {"position": "; the measured position looks like ", "ranges": "; the radar's ranges look like "}
+    other = looks.get(misread, "") + unit
+    return remark(
+        f"the pairs alone place the camera {away_cm:.0f} cm from the measured position, {sigmas:.1f} standard deviations{other}; "
+        "clicks that all lie as far beside the radar's phase centre would look the same; the pose follows the pairs",
+        f"measure again from the radar's antennas to the lens: forward, left, up; click {_APEX}; and check that the intrinsics "
+        "are of this lens, zoom and image size",
+        MeasureCameraPosition(),
+    )
+
+
+def intrinsics_suspected(
+    *,
+    focal_length: float | None = None,
+    distortion_px: float = 0.0,
+    sigma: float = 0.0,
+    stated_sigma: float | None = None,
+    refined_too_far: Sequence[SystematicErrorResult] = (),
+) -> Remark:
+    if refined_too_far:
+        changed = "; ".join(f"{error_words(error.name).label} {knowledge(error)}" for error in refined_too_far)
+        return remark(
+            f"refining changed the intrinsics by more than three times what was stated of them: {changed}; the refined camera "
+            "is not to be relied on",
+            "check that the intrinsics belong to this camera, lens, zoom and image size, also the signs of the distortion, and "
+            "calibrate the lens with a board; only if they are that rough, give refining a larger sigma",
+            CalibrateLens(),
+        )
+    if focal_length is not None:
+        stated = "" if stated_sigma is None else f"; its calibration said ± {100 * stated_sigma:.2g} %"
+        message = (
+            "residuals grow with the distance from the image's centre: the given focal length seems "
+            f"{100 * abs(focal_length):.1f} ± {100 * sigma:.1f} % too {'short' if focal_length > 0 else 'long'}{stated}"
+        )
+    else:
+        stated = "" if stated_sigma is None else f"; its calibration said ± {stated_sigma:.2g} px"
+        message = (
+            "residuals grow with the cube of the distance from the image's centre: the given lens distortion seems off by "
+            f"{distortion_px:.0f} ± {sigma:.0f} px at the outermost click{stated}"
+        )
+    return remark(
+        message,
+        "check that the intrinsics belong to this camera, lens, zoom and image size, or calibrate the camera again; a radar with "
+        "an azimuth scale error of the same size looks the same",
+        CalibrateLens(),
+    )
+
+
+def shared_error_suspected(
+    *,
+    error: str = "",
+    value: float = 0.0,
+    sigma: float = 0.0,
+    prior_sigma: float = 0.0,
+    angle: str = "",
+    slope_deg_per_m: float = 0.0,
+    slope_sigma_deg_per_m: float = 0.0,
+    turned_deg: float = 0.0,
+    before: str = "",
+    after: str = "",
+) -> Remark:
+    if angle:
+        return remark(
+            f"the radar's {angle}s are off by an amount that changes with the range: {slope_deg_per_m:+.2f} ± "
+            f"{slope_sigma_deg_per_m:.2f} deg per metre",
+            "check what was clicked at near and at far placements, and whether the floor or a wall reflects the radar there",
+        )
+    if before:
+        ends = {"before": named(before), "after": named(after)}
+        return remark(
+            say(
+                "the camera or the radar seems to have turned by about {turned_deg:.1f} deg near {before} and {after}: the "
+                "placements up to there agree on another pose than the later ones",
+                turned_deg=turned_deg,
+                **ends,
+            ),
+            say("solve the placements up to {before} and from {after} on apart, and check both mounts", **ends),
+            ReviewPairs((before, after)),
+        )
+    known = error_words(error)
+    family = FAMILIES.get(family_of(error))
+    name = known.text if family is None else f"{family.text} ({known.label})"
+    return remark(
+        f"{name}: {value_text(error, value, sigma)} by the pairs, where {prior_text(error, prior_sigma)} is assumed",
+        "check that each pair has the reflector's return, not one of what stands behind it, and that the intrinsics are of this "
+        "very image, uncropped; if the error is really so large, give it a larger sigma among the options",
+    )
+
+
+def angle_scale(*, error: str, value: float, sigma: float, flat: bool, measured: bool) -> Remark:
+    tape = "; so would a camera that is not where it was measured" if measured else ""
+    size = percent(abs(value), sigma)
+    if error == "azimuth_scale":
+        large, long = ("large", "long") if value > 0.0 else ("small", "short")
+        tilted = "; so would a tilt of the radar" if flat and value > 0.0 else ""
+        return remark(
+            f"the radar's azimuths look {size} too {large}; a given focal length that is too {long} by the same amount would "
+            f"look the same, and pairs cannot tell them apart{tilted}{tape}",
+            "check the element spacing and wavelength that the radar's driver assumes, and whether the intrinsics belong to this "
+            "camera, lens, zoom and image size; whichever is known to be right, give it a smaller sigma among the options",
+        )
+    large, side = ("large", "above") if value > 0.0 else ("small", "below")
+    return remark(
+        f"the radar's elevations look {size} too {large}; on flat ground, clicks {side} the radar's phase centre would look the "
+        f"same{tape}",
+        f"click {_APEX}; to tell the two apart, put a few placements at other heights (a tripod)",
+        SpreadPlacements("heights"),
+    )
+
+
+def lens_or_radar_scale(*, change: float, sigma: float, scales: Sequence[SystematicErrorResult]) -> Remark:
+    changed = ", ".join(f"{error_words(one.name).text} {percent(one.value, one.sigma, sign=True)}" for one in scales)
+    return remark(
+        "lens or radar scale, the data cannot tell: the focal length was changed by "
+        f"{percent(change, sigma, sign=True)}, with {changed}; pairs show the sum of both, and only what was assumed before "
+        "divides it",
+        "measure the radar's angle scale (turn it by known angles) and state radar.azimuth_scale_sigma and "
+        "radar.elevation_scale_sigma accordingly, or calibrate the lens with a board, whose result says how well it is known",
+        CalibrateLens(),
+    )
+
+
+def units_suspected(
+    *, nearest: float = 0.0, farthest: float = 0.0, unit: str = "", factor: float = 1.0, camera_away: float = 0.0
+) -> Remark:
+    if camera_away:
+        return remark(
+            f"the measured camera position is {camera_away:,.0f} m from the radar: is it in metres?",
+            "the camera position must be in metres",
+            MeasureCameraPosition(),
+        )
+    return remark(
+        f"the radar positions are {nearest:,.0f} to {farthest:,.0f} m away: the ranges look like {unit}",
+        f"radar positions must be in metres: multiply them by {factor:g}",
+    )
+
+
+def pixels_suspected(
+    *,
+    clicks: int,
+    width_px: int,
+    height_px: int,
+    outside: int = 0,
+    exchanged: bool = False,
+    pair: str = "",
+    pixel_px: Sequence[float] = (),
+    reach: Sequence[float] = (),
+) -> Remark:
+    image = f"the {width_px} x {height_px} image"
+    if exchanged:
+        return remark(
+            f"{outside} of {clicks} clicks are outside {image}, and with column and row exchanged all are inside",
+            "give each pixel as (column, row)",
+        )
+    if not reach:
+        u_px, v_px = pixel_px
+        return remark(
+            say(
+                "{outside} of {clicks} clicks are outside {image}, such as {pair} at ({u_px:.0f}, {v_px:.0f})",
+                outside=outside,
+                clicks=clicks,
+                image=image,
+                pair=named(pair),
+                u_px=u_px,
+                v_px=v_px,
+            ),
+            "check that the intrinsics belong to an image of the size that was clicked; remove the pair otherwise",
+            ReviewPairs((pair,)),
+        )
+    across, down = reach
+    return remark(
+        f"all clicks are in the upper left {100 * across:.0f} x {100 * down:.0f} % of {image}: the clicked image seems to be "
+        "smaller",
+        "scale the clicks, or the intrinsics, to the same size of the image",
+        CalibrateLens(),
+    )
+
+
+def radar_axes_suspected(*, side: str, behind: int, pairs: int) -> Remark:
+    where = "behind the radar" if side == "behind" else f"to the {side} of the radar"
+    return remark(
+        f"the placements are {where}, and {behind} of {pairs} radar positions have x below 0: their frame seems not to be the "
+        "radar's",
+        "radar axes must be x forward, y left, z up, with the origin at the radar; the pose is right for the given axes, but a "
+        "camera position, and the noise of the angles, refer to the radar's own",
+    )
+
+
+_NEARLY_SURE = 0.995
+
+
+def probability_text(probability: float) -> str:
+    """Write a probability with two digits; one that would round to 1 as "> 0.99"."""
+    return "> 0.99" if probability >= _NEARLY_SURE else f"{probability:.2f}"
+
+
+def nobody_confirmed(*, placed: int, clicks: int, confidence: float) -> Remark:
+    of_all = f"all {clicks} clicks were" if placed == clicks else f"{placed} of {clicks} clicks were"
+    return remark(
+        f"{of_all} placed automatically (confidence {probability_text(confidence)}), and nobody confirmed them",
+        "look at each of them on the page: open the recording with the clicks that solve --auto --clicks-out wrote",
+    )
+
+
+def damaged_recording(*, lost: int, damage: DataWarning) -> Remark:
+    clicks = f"{count(lost, 'click')} {'has' if lost == 1 else 'have'}"
+    return remark(
+        say(
+            "{clicks} no radar data, and the recording is damaged: {damage}", clicks=clicks, damage=told(damage).message
+        ),
+        "copy the recording again from its source",
+    )
+
+
+def lost_returns(*, lost: int, read: int, where: str) -> Remark:
+    return remark(
+        f"{lost} of {read} returns of {where} are lost ({100 * lost / read:.3g} %): their positions are not numbers or no ranges "
+        "and angles, or their messages hold more returns than they state",
+        "look for the fault in the radar's driver or in the program that wrote the recording; the reflector may be among them",
+    )
+
+
+def choices_unused(*, clicks: int) -> Remark:
+    which = "the chosen return of 1 click" if clicks == 1 else f"the chosen returns of {clicks} clicks"
+    return remark(
+        f"Algorithm 1 averages all static returns of a window, so {which} had no effect",
+        "use the default method, which keeps to the choice",
+        SetOption("method", "default"),
+    )
+
+
+def behind_camera(*, ids: Sequence[str], pairs: int) -> Remark:
+    return remark(
+        say(
+            "with this pose the camera cannot see {hidden} of {pairs} radar positions ({ids}); the metrics exclude them",
+            hidden=len(ids),
+            pairs=pairs,
+            ids=listed(ids),
+        ),
+        "do not use this pose; use the default method",
+        SetOption("method", "default"),
+    )
+
+
+ROWS: Mapping[str, Row] = {
+    row.__name__.replace("_", "-"): row
+    for row in (
+        agreeing_outliers,
+        angle_scale,
+        behind_camera,
+        camera_far_away,
+        camera_position_contradicted,
+        choices_unused,
+        clock_bias_suspected,
+        clocks_apart,
+        damaged_recording,
+        doubtful_pair,
+        few_pairs,
+        flat_radar,
+        handedness_assumed,
+        handedness_open,
+        intrinsics_suspected,
+        lens_or_radar_scale,
+        lost_returns,
+        many_outliers,
+        mirrored_axes,
+        no_consensus,
+        nobody_confirmed,
+        one_pair_decides,
+        pixels_suspected,
+        radar_axes_suspected,
+        repeated_placements,
+        residuals_too_large,
+        shared_error_suspected,
+        smooth_angle_errors,
+        two_poses,
+        uncertain_association,
+        units_suspected,
+        weak_geometry,
+    )
+}
+"""By code, which is the name of the row with hyphens."""
+
+
+def told(warning: DataWarning) -> Remark:
+    """Return what a warning says: by its row, or as it was reported with it."""
+    if "message" in warning.facts:
+        return remark(warning.facts["message"], warning.facts["hint"])
+    return ROWS[warning.code](**warning.facts)
