@@ -197,7 +197,6 @@ _PLACEHOLDERS = {
 _NOT_RUN = {
     r"show (?!.*--out)": "opens a window; tests/browser/test_rerun_viewer.py runs it",
     r"demo$": "serves until it is ended; another test here runs it",
-    r".*--scheduler tls://host:8786": "needs a cluster; tests/cli/test_batch.py has one",
 }
 """Command lines that are left out, and why."""
 _DRIVER = """transforms:
@@ -319,10 +318,10 @@ def test_the_command_lines_of_the_pages_run_from_the_wheel(installed, project_ro
     shutil.move(next((tmp_path / "somewhere").rglob("*.mcap")), tmp_path / "recording.mcap")
     assert {code for code, _ in ended.values()} == {0}, ended
     left_out = [line for line in lines if any(re.match(f"cocalib {pattern}", line) for pattern in _NOT_RUN)]
-    assert len(left_out) == 4
+    assert len(left_out) == 3
     for line in lines:
         if line not in ended and line not in left_out:
             run(line)
     assert [(line, said) for line, said in ended.items() if said[0] not in (0, 1, 3)] == []
-    made = "report.html overlay.mp4 lens.html left.yaml meanings.png out/summary.html session.json"
+    made = "report.html overlay.mp4 lens.html left.yaml meanings.png out/results.csv session.json"
     assert [name for name in made.split() if not (tmp_path / name).is_file()] == []

@@ -66,7 +66,7 @@ def statement(file: CalibrationFile, meaning: str, *, rectified: bool = False) -
             + ", ".join(f"{one.name} {getattr(errors, one.name):.6g}" for one in fields(errors))
         )
     lines += corrections_lines(file)
-    lines += origin_lines(file)
+    lines += _origin_lines(file)
     # The version in a file may be any text; the frame names are checked and kept unchanged, including spaces.
     version = " ".join((file.provenance.version or "").split())
     lines.append(f"cocalib{f' {version}' if version else ''}: read it back with: cocalib check THIS_FILE")
@@ -145,7 +145,7 @@ class Origin:
     for_raw: bool = False
 
 
-def origin_lines(file: CalibrationFile) -> tuple[str, ...]:
+def _origin_lines(file: CalibrationFile) -> tuple[str, ...]:
     """Return what every exported file says about its calibration, one line each; `stated_origin` reads the first."""
     calibration = file.calibration
     lines = [

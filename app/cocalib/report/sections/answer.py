@@ -21,7 +21,7 @@ from cocalib.view.figures import (
 )
 from cocalib.view.wording import plain, sentence
 
-LEVEL_SIGNS = {
+_LEVEL_SIGNS = {
     "good": "●",
     "usable": "◐",
     "coarse": "○",
@@ -54,7 +54,7 @@ def _verdict(subject: ReportSubject) -> Markup:
         "div",
         tag(
             "p",
-            tag("span", LEVEL_SIGNS[level], class_="sign", aria_hidden="true"),
+            tag("span", _LEVEL_SIGNS[level], class_="sign", aria_hidden="true"),
             tag("strong", level),
             class_="level",
         ),

@@ -19,7 +19,7 @@ def lay(folder: Path, *names: str) -> None:
 
 
 def read_back(folder: Path) -> dict[tuple[str, str], ManifestRow]:
-    manifest = folder / "fleet.toml"
+    manifest = folder / "sessions.toml"
     text, count = first_manifest(folder, manifest)
     manifest.write_text(text, encoding="utf-8")
     rows = read_manifest(manifest).rows
@@ -67,7 +67,7 @@ def test_names_of_any_kind_survive(tmp_path):
 
 def test_a_manifest_elsewhere_names_whole_paths(tmp_path):
     lay(tmp_path, "data/van.bag")
-    manifest = tmp_path / "other" / "fleet.toml"
+    manifest = tmp_path / "other" / "sessions.toml"
     manifest.parent.mkdir()
     manifest.write_text(first_manifest(tmp_path / "data", manifest)[0], encoding="utf-8")
     (row,) = read_manifest(manifest).rows
@@ -77,7 +77,7 @@ def test_a_manifest_elsewhere_names_whole_paths(tmp_path):
 def test_folders_of_pictures_and_tables_are_named_as_left_out(tmp_path):
     frames = ("frames/1.png", "frames/2.png", "radar.csv")
     lay(tmp_path, "van 1/drive.mcap", "van 1/thumbs/1.png", *(f"van 2/{name}" for name in frames))
-    text, count = first_manifest(tmp_path, tmp_path / "fleet.toml")
+    text, count = first_manifest(tmp_path, tmp_path / "sessions.toml")
     assert count == 1
     left_out = [line for line in text.splitlines() if line.startswith("# left out: ")]
     assert [line.partition(" (")[2].partition(")")[0] for line in left_out] == ["1 .csv", "2 .png"]
@@ -86,7 +86,7 @@ def test_folders_of_pictures_and_tables_are_named_as_left_out(tmp_path):
 
 def test_of_many_left_out_folders_some_are_named_and_the_rest_counted(tmp_path):
     lay(tmp_path, "van/drive.mcap", *(f"p{k:02}/1.png" for k in range(25)))
-    text, _ = first_manifest(tmp_path, tmp_path / "fleet.toml")
+    text, _ = first_manifest(tmp_path, tmp_path / "sessions.toml")
     assert text.count("# left out: ") == 20
     assert text.endswith("# and 5 more folders\n")
 

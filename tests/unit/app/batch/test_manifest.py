@@ -35,13 +35,13 @@ options.noise.sigma_px = 3
 ROW = '[[session]]\nvehicle = "a"\nrecording = "b.bag"\n'
 
 
-def rows_of(text: str, folder: Path, name: str = "fleet.toml") -> tuple[ManifestRow, ...]:
+def rows_of(text: str, folder: Path, name: str = "sessions.toml") -> tuple[ManifestRow, ...]:
     path = folder / name
     path.write_text(text, encoding="utf-8")
     return read_manifest(path).rows
 
 
-def fault_of(text: str, folder: Path, name: str = "fleet.toml") -> str:
+def fault_of(text: str, folder: Path, name: str = "sessions.toml") -> str:
     with pytest.raises(InputError) as error:
         rows_of(text, folder, name)
     assert str(error.value).startswith(f"{folder / name}: ")
@@ -113,7 +113,7 @@ def test_a_mistake_is_named_with_its_place(text, fault, tmp_path):
 
 
 def test_a_file_of_another_kind_is_refused(tmp_path):
-    for name in ("fleet.yaml", "fleet.csv"):
+    for name in ("sessions.yaml", "sessions.csv"):
         assert fault_of("a: 1", tmp_path, name).startswith("a manifest is a .toml file; cocalib batch FILE.toml --init")
     with pytest.raises(
         InputError, match=r"no such file or folder; cocalib batch .*absent\.toml --init FOLDER writes one"
