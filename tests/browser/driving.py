@@ -168,7 +168,7 @@ class Driver:
 
     def said(self, words: dict[str, Any]) -> str:
         """Return words of the server as the page says them."""
-        return str(self.page.evaluate("words => import('/shell/state.js').then(({ said }) => said(words))", words))
+        return str(self.page.evaluate("words => import('/base/state.js').then(({ said }) => said(words))", words))
 
     def pixels(self, selector: str) -> np.ndarray:
         """Return a screenshot of an element: (h, w, 3) BGR."""

@@ -179,8 +179,10 @@ def test_ten_pairs_or_four_and_six_returns_are_in_sight_beside_seven_warnings(pa
     page.load_sample(truth, 12)
     page.until("!__cocalib.state.view.checking")
     page.page.evaluate(
-        "async () => { const { emit, state } = await import('/base/state.js'); const words = 'a warning that takes a line';"
-        "const seven = [1, 2, 3, 4, 5, 6, 7].map((n) => ({ code: `code-${n}`, message: `${words} ${n}`, hint: words }));"
+        "async () => { const { emit, state } = await import('/base/state.js');"
+        "const hint = { parts: ['a warning that takes a line'] };"
+        "const row = (n) => ({ code: `code-${n}`, message: { parts: [...hint.parts, ` ${n}`] }, hint, kind: '', option: '' });"
+        "const seven = [1, 2, 3, 4, 5, 6, 7].map(row);"
         "const { follower } = __cocalib; follower.view = state.view = { ...follower.view, warnings: seven }; emit('view'); }"
     )  # what the server still sends changes this View
     assert page.text("#warning-count") == "7 warnings"
