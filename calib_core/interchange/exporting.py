@@ -60,12 +60,14 @@ class Export:
         content: text, or bytes if the format is binary.
         notes: what a user of the file must know; the missing angle map first.
         extra_files: what belongs beside it.
+        needs_corrections: its pose is for corrected radar data; `for_raw` gives that for data as reported.
     """
 
     file_name: str
     content: str | bytes
     notes: tuple[str, ...] = ()
     extra_files: tuple[ExtraFile, ...] = ()
+    needs_corrections: bool = False
 
     @property
     def data(self) -> bytes:
@@ -166,12 +168,12 @@ def export(
         raise InputError(f"the format {name} has no third frame to place the radar in; formats that have one: {able}")
     else:
         content = chosen.write_in_parent(prepared.file, parent_from_radar)
-    hint = "" if file.corrected is not None else "; --for raw writes the pose for that"
-    uncorrected = () if chosen.holds_corrections else (f"{line}{hint}" for line in corrections_lines(file))
+    uncorrected = () if chosen.holds_corrections else corrections_lines(file)
     lost = () if chosen.holds_corrections else missing_map(file.calibration)
     notes_on = chosen.notes_on(file) if chosen.notes_on else ()
     notes = (*lost, *uncorrected, *chosen.notes, *notes_on, *prepared.notes)
-    return Export(chosen.file_name, content, notes, prepared.extra_files)
+    needs = bool(uncorrected) and file.corrected is None
+    return Export(chosen.file_name, content, notes, prepared.extra_files, needs)
 
 
 _JOINING: Mapping[str, Callable[[CalibrationFile, ChildFrame], str]] = {

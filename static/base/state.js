@@ -197,8 +197,8 @@ export const said = ({ parts }) => parts.map((part) => (typeof part === "string"
 /** @param {import("../messages.js").OptionPart} option */
 function optionWords({ option, value }) {
   const field = (state.recording?.option_groups ?? []).flatMap((group) => group.options).find(({ path }) => path === option);
-  const name = field?.label ?? option;
-  return value ? `${name} ${value}` : name;
+  if (!field) return `--${option.replaceAll("_", "-")} ${value}`.trim(); // how the recording is read is said when it is opened
+  return value ? `${field.label} ${value}` : field.label;
 }
 
 /** Whether a placement has a click, also one that is excluded or does not count. @param {Placement} placement */

@@ -7,7 +7,7 @@ import { ask, BROKE_OFF, content, saveFile } from "../base/asking.js";
 import { icon, make, shape, toast } from "../base/notices.js";
 import { send } from "../base/socket.js";
 import { on, state } from "../base/state.js";
-import { frameDrawing, IDENTITY, nameFields, parentFields, rectifiedBox } from "./fields.js";
+import { frameDrawing, IDENTITY, nameFields, parentFields, rawBox, rectifiedBox } from "./fields.js";
 import { drawFormats, focusFormats, formatColumn } from "./list.js";
 
 /** @typedef {import("./list.js").Format} Format */
@@ -38,6 +38,7 @@ let asked = 0;
 const head = make("div", "what", []);
 const names = nameFields(() => load());
 const rectified = rectifiedBox(() => load());
+const raw = rawBox(() => load());
 /** @type {ReturnType<typeof parentFields>} */
 let parent;
 const before = make("div", "before", []);
@@ -135,7 +136,7 @@ function build() {
     load();
   });
   const foot = make("div", "foot", [importer(), make("span", "gap", ""), make("label", "name", ["File name", fileName]), copy, save]);
-  dialog.append(make("div", "top", [title, close]), list, make("section", "", [head, names.element, rectified.row, parent.element, before, text, notes]), side, foot);
+  dialog.append(make("div", "top", [title, close]), list, make("section", "", [head, names.element, rectified.row, raw.row, parent.element, before, text, notes]), side, foot);
 }
 
 /** The formats, and the clicks and the report as two of them. */
@@ -178,6 +179,7 @@ function address(kind) {
   const query = new URLSearchParams();
   if (takesParent() && kept.parent.join() !== IDENTITY.join()) query.set("parent_from_radar", kept.parent.join());
   if (takesRectified() && rectified.box.checked) query.set("rectified", "1");
+  if (!raw.row.hidden && raw.box.checked) query.set("raw", "1");
   for (const [name, value] of names.typed) query.set(name, value);
   return `api/${kind}/${encodeURIComponent(kept.format)}${query.size ? `?${query}` : ""}`;
 }
@@ -194,7 +196,7 @@ function drawPreview(preview) {
   const kind = preview.is_binary ? `binary, ${size(preview.size_bytes)}; contents shown below` : "";
   head.replaceChildren(make("span", "", preview.numbers), make("span", "kind", kind));
   names.draw(preview);
-  drawFields({ names: true, parent: takesParent(), rectified: preview.is_for_rectified });
+  drawFields({ names: true, parent: takesParent(), rectified: preview.is_for_rectified, raw: preview.offers_raw });
   before.replaceChildren(...beforeSaving(preview));
   show(preview.text, preview.file_name, preview.is_binary);
   notes.replaceChildren(...preview.notes.map((/** @type {string} */ note) => make("li", "", note)));
@@ -237,11 +239,12 @@ function drawReason(reason, canRetry = false, field = null) {
   for (const control of [fileName, copy, save]) control.disabled = true;
 }
 
-/** Show these fields, with nothing wrong in them. @param {{names?: boolean, parent?: boolean, rectified?: boolean}} shown */
+/** Show these fields, with nothing wrong in them. @param {{names?: boolean, parent?: boolean, rectified?: boolean, raw?: boolean}} shown */
 function drawFields(shown) {
   names.element.hidden = !shown.names;
   parent.element.hidden = !shown.parent;
   rectified.row.hidden = !shown.rectified;
+  raw.row.hidden = !shown.raw;
   for (const fields of [names, parent]) fields.refuse("");
 }
 

@@ -123,6 +123,16 @@ export function rectifiedBox(changed) {
   return { box, row: make("div", "rectified", [label]) };
 }
 
+/** The user's wish for a pose that fits radar data as reported, for software that does not correct them. @param {() => void} changed */
+export function rawBox(changed) {
+  const box = make("input", "", []);
+  box.type = "checkbox";
+  box.addEventListener("change", changed);
+  const label = make("label", "", [box, "For radar data as reported: my software does not correct them"]);
+  label.dataset.hint = "Solved once more without taking out what the radar gets wrong (--for raw).";
+  return { box, row: make("div", "rectified", [label]) };
+}
+
 const WIDTH = 280;
 const HEIGHT = 168;
 const RADAR = [72, 72];

@@ -4,6 +4,7 @@ import json
 import math
 import re
 import time
+from collections.abc import Callable
 from typing import Any
 
 import cv2
@@ -148,11 +149,19 @@ class Driver:
             self.until("__cocalib.unconfirmed() === 0")
         self.settle()
 
-    def load_sample(self, truth: dict[str, Any], count: int | None = None) -> None:
-        """Load the same clicks as from a file: one step and one solve, where it does not matter how they came."""
+    def load_sample(
+        self, truth: dict[str, Any], count: int | None = None, *, name: Callable[[int], str] = "c{}".format
+    ) -> None:
+        """Load the same clicks as from a file: one step and one solve, where it does not matter how they came.
+
+        Args:
+            truth: of the sample.
+            count: of the placements that are clicked.
+            name: the id of the click at a placement, by its number from 1.
+        """
         placements = truth["placements"][:count]
         clicks = [
-            {"id": f"c{number}", "image_time": placement["best_image_time"], "pixel_px": placement["pixel_px"]}
+            {"id": name(number), "image_time": placement["best_image_time"], "pixel_px": placement["pixel_px"]}
             for number, placement in enumerate(placements, 1)
         ]
         self.page.evaluate(

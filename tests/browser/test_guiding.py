@@ -1,5 +1,6 @@
 """The page guides the user: after a click, after a wrong one, after a jump while zoomed in, and without a mouse."""
 
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -127,3 +128,19 @@ def test_the_pose_tab_lists_the_errors_that_all_pairs_share(page: Driver, truth:
     page.page.locator("#page-options details summary").click()
     assert "errors that all pairs share" in page.text("#page-options")
     assert page.page.get_by_label("Azimuth scale").input_value() == "0.02"
+
+
+@pytest.mark.parametrize("name", ["c({}".format, "a.*{}+".format, lambda number: str(21 - number)])
+def test_a_pair_that_does_not_fit_is_called_alike_everywhere_whatever_its_id(
+    page: Driver, truth: Any, name: Callable[[int], str]
+) -> None:
+    wrong = {**truth["placements"][4], "pixel_px": [40.0, 40.0]}
+    moved = {**truth, "placements": [*truth["placements"][:4], wrong, *truth["placements"][5:]]}
+    page.until("__cocalib.state.placementsKnown")
+    page.load_sample(moved, 12, name=name)
+    page.go_to(page.frame_at(wrong["best_image_time"]))
+    page.until("document.getElementById('guide').innerText.includes('#5')")
+    for other in ("#4", "#6", "#16"):
+        assert other not in page.text("#guide") + page.text("#verdict")
+    page.go_to(page.frame_at(truth["placements"][0]["best_image_time"]))
+    assert "#5 disagrees" not in page.text("#guide")

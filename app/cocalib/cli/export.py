@@ -163,6 +163,8 @@ def _write_all(
     for note in dict.fromkeys(note for made in written.values() for note in made.notes):
         names = ", ".join(name for name, made in written.items() if note in made.notes)
         print(f"note: {names}: {note}", file=sys.stderr)
+    if corrected := [name for name, made in written.items() if made.needs_corrections]:
+        print(f"note: {', '.join(corrected)}: --for raw writes the pose for radar data as reported", file=sys.stderr)
     return 0
 
 

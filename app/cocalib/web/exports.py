@@ -1,5 +1,6 @@
 """What the export panel says: its formats and fields; of a file its numbers, their direction and the check point."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 from urllib.parse import parse_qs
@@ -246,10 +247,10 @@ def _pair_at(file: CalibrationFile) -> str | None:
     return pairs[nearest].id if apart_m[nearest] < _SAME_M else None
 
 
-Field = Literal["frames", "parent", "rectified"]
+Field = Literal["frames", "parent", "rectified", "raw"]
 """A part of the panel that the user fills in."""
 
-_RADAR_FRAME, _CAMERA_FRAME, _PARENT, _RECTIFIED = "radar_frame", "camera_frame", "parent_from_radar", "rectified"
+_RADAR_FRAME, _CAMERA_FRAME, _PARENT = "radar_frame", "camera_frame", "parent_from_radar"
 
 
 class FieldError(InputError):
@@ -272,29 +273,32 @@ class Fields:
         frames: the names to write.
         parent_from_radar: the radar's pose in a third frame; None for the radar as origin.
         rectified: the pictures are rectified.
+        raw: the pose is to fit radar data as reported.
     """
 
     frames: FrameNames
     parent_from_radar: RigidTransform | None
     rectified: bool
+    raw: bool
 
 
 def fields_in(query: str, usual: FrameNames) -> Fields:
     """Return the fields in the query of a URL.
 
     Args:
-        query: `radar_frame=`, `camera_frame=`, `parent_from_radar=x,y,z,qx,qy,qz,qw` and `rectified=1`, each optional.
+        query: `radar_frame=`, `camera_frame=`, `parent_from_radar=x,y,z,qx,qy,qz,qw`, `rectified=1` and `raw=1`, each
+            optional.
         usual: the calibration's frame names, for what the query does not name.
 
     Raises:
-        FieldError: a name cannot be a frame's, a pose is none, or rectified is neither 0 nor 1.
+        FieldError: a name cannot be a frame's, a pose is none, or rectified or raw is neither 0 nor 1.
     """
     given = {key: values[-1] for key, values in parse_qs(query, keep_blank_values=True).items()}
     try:
         frames = FrameNames(given.get(_RADAR_FRAME, usual.radar), given.get(_CAMERA_FRAME, usual.camera))
     except InputError as error:
         raise FieldError("frames", str(error)) from None
-    return Fields(frames, _parent_in(given.get(_PARENT, "")), _rectified_in(given.get(_RECTIFIED, "0")))
+    return Fields(frames, _parent_in(given.get(_PARENT, "")), _yes_or_no("rectified", given), _yes_or_no("raw", given))
 
 
 def _parent_in(text: str) -> RigidTransform | None:
@@ -310,11 +314,10 @@ def _parent_in(text: str) -> RigidTransform | None:
         raise FieldError("parent", str(error)) from None
 
 
-def _rectified_in(text: str) -> bool:
+def _yes_or_no(field: Literal["rectified", "raw"], given: Mapping[str, str]) -> bool:
+    text = given.get(field, "0")
     if text not in ("0", "1"):
-        raise FieldError(
-            "rectified", f"{_RECTIFIED}: {text!r} is neither 0 nor 1; 1 means that the pictures are rectified"
-        )
+        raise FieldError(field, f"{field}: {text!r} is neither 0 nor 1; 1 means yes")
     return text == "1"
 
 

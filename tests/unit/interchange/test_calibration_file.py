@@ -407,7 +407,8 @@ def test_an_export_states_the_aed_with_and_without_what_it_cannot_hold(scaled, k
     written = export(scaled, known.name, rectified=known.is_for_rectified)
 
     assert other > 1.5 * right
-    assert any(f"AED {other:.3g} instead of {right:.3g} px; --for raw" in note for note in written.notes)
+    assert any(f"AED {other:.3g} instead of {right:.3g} px" in note for note in written.notes)
+    assert written.needs_corrections
     assert f"{other:.3g} instead of {right:.3g} px" in contents_text(written) or f"{right} {other}" in contents_text(
         written
     )

@@ -12,6 +12,7 @@ from calib_core.interchange import (
     check,
     contents_text,
     export,
+    for_raw,
     format_named,
     imported,
     missing_map,
@@ -64,6 +65,7 @@ class ExportPreview:
         evidence: what the pose rests on.
         missing: what the calibration has and this file cannot hold; "" if nothing.
         warnings: of the calibration.
+        offers_raw: the pose is for corrected radar data, and one for data as reported can be written.
     """
 
     key: str
@@ -85,6 +87,7 @@ class ExportPreview:
     evidence: str
     missing: str
     warnings: tuple[WarningRow, ...]
+    offers_raw: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +110,8 @@ def exported(file: CalibrationFile, key: str, query: str) -> Export:
         FieldError: a field cannot be used, or the format needs it.
         InputError: the format cannot hold this calibration, or has no third frame.
     """
-    return _exported(file, key, fields_in(query, file.frames))
+    fields = fields_in(query, file.frames)
+    return _exported(_meant(file, key, fields), key, fields)
 
 
 def export_preview(file: CalibrationFile, key: str, query: str, recording_name: str) -> ExportPreview:
@@ -124,6 +128,7 @@ def export_preview(file: CalibrationFile, key: str, query: str, recording_name: 
         InputError: the format cannot hold this calibration, or has no third frame.
     """
     fields = fields_in(query, file.frames)
+    file = _meant(file, key, fields)
     written, form = _exported(file, key, fields), format_named(key)
     named = replace(file, frames=fields.frames)
     whole = imported(named)
@@ -150,7 +155,13 @@ def export_preview(file: CalibrationFile, key: str, query: str, recording_name: 
         evidence=_evidence(file),
         missing=" ".join(map(sentence, lost)),
         warnings=tuple(map(warning_row, file.calibration.warnings)),
+        offers_raw=file.corrected is not None or written.needs_corrections,
     )
+
+
+def _meant(file: CalibrationFile, key: str, fields: Fields) -> CalibrationFile:
+    """Return the calibration for radar data as reported, if it is asked for and the format holds no corrections."""
+    return for_raw(file) if fields.raw and not format_named(key).holds_corrections else file
 
 
 def _exported(file: CalibrationFile, key: str, fields: Fields) -> Export:

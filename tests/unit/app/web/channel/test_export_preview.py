@@ -6,8 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from calib_core.interchange import CAMERA_ONLY, FORMATS
+from calib_core.calibration import calibrate_pairs
+from calib_core.interchange import CAMERA_ONLY, FORMATS, for_raw
+from calib_core.interchange.own.calibration_json import calibration_file
 from calib_core.radar import AngleMap
+from calib_core.synthetic import SystematicErrors, simulate_pairs
 from cocalib.web.channel import export_preview as panel
 from cocalib.web.exports import format_rows
 
@@ -51,3 +54,15 @@ def test_a_file_with_others_that_belong_to_it_is_saved_as_one_zip(file):
     preview = panel.export_preview(distorted, "kitti", "", "drive")
     assert preview.file_name == f"drive_{written.file_name}"
     assert preview.size_bytes == len(written.data)
+
+
+def test_a_pose_for_radar_data_as_reported_is_offered_and_written_where_corrections_are_lost():
+    errors = SystematicErrors(azimuth_scale=0.04, range_bias_m=0.05)
+    drawn = simulate_pairs(24, rng=np.random.default_rng(12), noise="imaging", systematic=errors)
+    off = calibration_file(calibrate_pairs(drawn.pairs, drawn.camera).unwrap())
+    plain, raw = (panel.export_preview(off, "tf2", query, "drive") for query in ("", "raw=1"))
+    assert (plain.offers_raw, raw.offers_raw) == (True, True)
+    assert raw.text == panel.exported(for_raw(off), "tf2", "").content
+    assert plain.text != raw.text
+    assert raw.check_is_good
+    assert not panel.export_preview(off, "json", "raw=1", "drive").offers_raw
