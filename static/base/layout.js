@@ -1,5 +1,6 @@
 /** The shape of the page for the window's size, dividers, panes, the panel's pages and the theme; the user's choices are remembered. */
 
+import { register } from "./actions.js";
 import { emit, on } from "./state.js";
 
 const root = document.documentElement;
@@ -13,6 +14,11 @@ const LOW = 560;
 let kept = {};
 
 export function startLayout() {
+  register(
+    { id: "close-sheet", group: "Panel", words: "Close the sheet: go back to the tab before", also: "leave evaluate lens options", run: closeSheet },
+    { id: "enlarge-panel", group: "Panel", words: "Enlarge the panel, or give the 3D view its place back", also: "tab plots large column", run: enlargePanel },
+    { id: "theme", group: "Panel", words: "Light or dark theme", also: "colours colors bright night mode", run: toggleTheme },
+  );
   try {
     kept = JSON.parse(localStorage.getItem(KEPT) ?? "{}");
   } catch {
@@ -65,7 +71,7 @@ export function showPage(name) {
 export const closeSheet = () => showPage(kept.tab ?? "mark");
 
 /** Give the panel the whole column, or the 3D view its place back. */
-export function enlargePanel() {
+function enlargePanel() {
   document.body.classList.toggle("panel-large");
   emit("box");
 }
@@ -77,7 +83,7 @@ function setTheme(theme) {
   emit("theme");
 }
 
-export const toggleTheme = () => setTheme(root.dataset.theme === "light" ? "dark" : "light");
+const toggleTheme = () => setTheme(root.dataset.theme === "light" ? "dark" : "light");
 
 /** Choose the arrangement: "wide" has everything side by side, "low" the picture and one pane, "tall" the picture above one pane. */
 function takeShape() {

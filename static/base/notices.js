@@ -1,7 +1,6 @@
 /** Notices: toasts for errors, the banner for a lost connection, and explanations of figures and controls. */
 
-import { toCss } from "../picture/geometry.js";
-import { clickIn, on, state } from "./state.js";
+import { on } from "./state.js";
 
 const toasts = /** @type {HTMLElement} */ (document.getElementById("toasts"));
 const banner = /** @type {HTMLElement} */ (document.getElementById("banner"));
@@ -9,9 +8,8 @@ const tip = /** @type {HTMLElement} */ (document.getElementById("tip"));
 const main = /** @type {HTMLElement} */ (document.getElementById("work"));
 const TOAST_MS = 9000;
 const TIP_MS = 280;
-/** Room between an explanation and what it explains, and around a mark [CSS px]. */
+/** Room between an explanation and what it explains [CSS px]. */
 const TIP_GAP = 6;
-const MARK_PX = 24;
 let tipTimer = 0;
 /** What the explanation on screen belongs to. @type {HTMLElement|null} */
 let explained = null;
@@ -50,17 +48,20 @@ function placeToasts() {
   toasts.dataset.corner = CORNERS[0];
 }
 
-/** What no toast may cover. @returns {{left: number, top: number, right: number, bottom: number}[]} */
+/** @typedef {{left: number, top: number, right: number, bottom: number}} Place */
+/** @type {(() => Place|null)[]} */
+const places = [];
+
+/** Let no toast cover a place of the page. @param {() => Place|null} place where it is now, if anywhere */
+export const keepClear = (place) => places.push(place);
+
+/** What no toast may cover. @returns {Place[]} */
 function keptClear() {
   const about = [...toasts.children].map((box) => /** @type {HTMLElement} */ (box).dataset.about).filter(Boolean);
   const fields = about.map((path) => document.querySelector(`[data-field="${path}"]`));
   const edited = document.activeElement?.matches("input, select, textarea") ? document.activeElement : null;
-  const click = clickIn(state.shown?.index ?? -1);
   const boxes = [...fields, edited].flatMap((element) => (element ? [element.getBoundingClientRect()] : []));
-  if (!click) return boxes;
-  const pane = /** @type {HTMLElement} */ (document.getElementById("marks")).getBoundingClientRect();
-  const [x, y] = toCss(click.u_px, click.v_px);
-  return [...boxes, { left: pane.left + x - MARK_PX, right: pane.left + x + MARK_PX, top: pane.top + y - MARK_PX, bottom: pane.top + y + MARK_PX }];
+  return [...boxes, ...places.flatMap((place) => place() ?? [])];
 }
 
 /** Remove the toasts about something that has been corrected. @param {string} about */

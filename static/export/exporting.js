@@ -3,7 +3,9 @@
  * a file.
  */
 
+import { register, withPictures } from "../base/actions.js";
 import { ask, BROKE_OFF, content, saveFile } from "../base/asking.js";
+import { showPage } from "../base/layout.js";
 import { icon, make, shape, toast } from "../base/notices.js";
 import { send } from "../base/socket.js";
 import { on, state } from "../base/state.js";
@@ -51,6 +53,11 @@ const save = make("button", "first", "Download");
 const retry = make("button", "second", "Try again");
 
 export function startExporting() {
+  register(
+    { id: "deliver", group: "Panel", words: "Deliver", also: "tab save download file export report clicks", run: () => showPage("deliver"), when: withPictures },
+    { id: "export", group: "File", words: "Export the calibration or the clicks", keys: ["E"], also: "save download write file json yaml urdf tf format", run: () => openExport(), when: withPictures },
+    { id: "load-clicks", group: "File", words: "Load clicks from a file", also: "import open clicks.json", run: loadClicks, when: withPictures },
+  );
   try {
     kept = { ...kept, ...JSON.parse(localStorage.getItem(KEPT) ?? "{}") };
   } catch {
@@ -101,7 +108,7 @@ export function startDelivering() {
 }
 
 /** @param {string} [format] the one before if none is given */
-export function openExport(format = kept.format) {
+function openExport(format = kept.format) {
   if (dialog.open || !state.recording) return;
   keep({ format });
   drawList();
@@ -302,7 +309,7 @@ field.onchange = async () => {
 };
 
 /** Ask for a file of clicks, and add them. */
-export function loadClicks() {
+function loadClicks() {
   field.click();
 }
 

@@ -2,6 +2,7 @@
  * The sheet "Lens": the intrinsics in use, a form that calibrates them from a board in the recording, how far that is, and the result.
  */
 
+import { register, withPictures } from "../base/actions.js";
 import { showPage } from "../base/layout.js";
 import { make, toast } from "../base/notices.js";
 import { send } from "../base/socket.js";
@@ -21,6 +22,10 @@ let busy = false;
 let awaited = false;
 
 export function startLens() {
+  register(
+    { id: "lens", group: "Panel", words: "Lens: intrinsics, and calibrating them from a board", also: "sheet camera intrinsics checkerboard charuco aprilgrid calibrate focal length distortion", run: () => showPage("lens"), when: withPictures },
+    { id: "save-camera", group: "File", words: "Save the intrinsics in use as camera.yaml", also: "export download camera_info lens", run: () => saveCamera(true), when: () => withPictures() || (state.lens?.intrinsics ? "" : "There are no intrinsics yet") },
+  );
   present.setAttribute("aria-label", "Intrinsics in use");
   startLensProgress(cancelLens);
   page.append(present, lensProgress, lensResult, form.element);

@@ -5,6 +5,7 @@
 
 import { ask, content, saveFile } from "../base/asking.js";
 import { ink, rampColour, themeColour } from "../base/colours.js";
+import { addLayer } from "../base/layers.js";
 import { make, toast } from "../base/notices.js";
 import { send } from "../base/socket.js";
 import { emit, on, said, state } from "../base/state.js";
@@ -27,6 +28,7 @@ let drawn = "";
 const LARGE_PX = 1;
 
 export function startLensResult() {
+  addLayer("lens", drawLensMarks);
   lensResult.setAttribute("aria-label", "Calibrated lens");
   lensResult.hidden = true;
   residuals.setAttribute("role", "img");
@@ -168,7 +170,7 @@ async function lookUp() {
 }
 
 /** While the tab is open: where the board was not yet, and the corners of this frame. @param {CanvasRenderingContext2D} pen */
-export function drawLensMarks(pen) {
+function drawLensMarks(pen) {
   if (page.hidden) return;
   const lens = state.lens;
   if (lens?.coverage && lens.stage === "searching") veilEmpty(pen, lens.coverage, toDevice, viewport.imageWidth, viewport.imageHeight);

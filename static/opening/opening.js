@@ -3,6 +3,7 @@
  * on a recording without intrinsics, and camera files dropped on the page.
  */
 
+import { register } from "../base/actions.js";
 import { showPage } from "../base/layout.js";
 import { make, toast } from "../base/notices.js";
 import { send, tell, unconfirmed } from "../base/socket.js";
@@ -30,6 +31,7 @@ let busy = false;
 let waiting = [];
 
 export function startOpening() {
+  register({ id: "recording", group: "File", words: "Choose another recording, other topics, intrinsics or session", also: "open file folder recent camera radar topic intrinsics", run: chooseRecording });
   strip.id = "intrinsics-strip";
   strip.hidden = true;
   pane.append(strip);
@@ -101,7 +103,7 @@ export function takeFolder(message) {
 }
 
 /** Ask what can be chosen, and show it. */
-export async function chooseRecording() {
+async function chooseRecording() {
   if (dialog.open) return;
   if (state.recording) {
     draw(); // what is known of it, until the server says what can be chosen

@@ -1,6 +1,6 @@
 /** The help dialog: keys, mouse and marks. */
 
-import { ACTIONS, keyNames } from "../base/actions.js";
+import { ACTIONS, keyNames, register } from "../base/actions.js";
 import { ink } from "../base/colours.js";
 import { make, shape } from "../base/notices.js";
 
@@ -31,7 +31,12 @@ const MARKS = [
   ["M8 4.5 12 11.5H4z|fill|moving", "triangle: moving radar return"],
 ];
 
-export function toggleHelp() {
+/** Make it known. */
+export function startHelp() {
+  register({ id: "help", group: "Help", words: "Help", keys: ["?"], also: "keys mouse marks shortcuts legend manual", run: toggleHelp });
+}
+
+function toggleHelp() {
   if (dialog.open) return dialog.close();
   if (!dialog.childElementCount) build();
   dialog.showModal();

@@ -8,7 +8,7 @@ import { connect, tell, unconfirmed } from "../base/socket.js";
 import { clickIn, clicks, clicksIn, emit, Follower, on, select, selectedClick, stampOf, state } from "../base/state.js";
 import { startDelivering, startExporting } from "../export/exporting.js";
 import { startLens, takeLens, takeResult } from "../lens/lens.js";
-import { drawLensMarks, startLensResult } from "../lens/result.js";
+import { startLensResult } from "../lens/result.js";
 import { isAnother, startOpening, takeChoices, takeFolder } from "../opening/opening.js";
 import { startOptions } from "../options/options.js";
 import { startFigures, startVerdict } from "../pairs/figures.js";
@@ -16,29 +16,29 @@ import { startGuide } from "../pairs/guide.js";
 import { startPairs } from "../pairs/pairs.js";
 import { startScatter } from "../pairs/scatter.js";
 import { startWarnings } from "../pairs/warnings.js";
+import { registerPicture } from "../picture/actions.js";
 import { startArriving } from "../picture/arriving.js";
 import { startLooking } from "../picture/birdseye.js";
-import { drawCandidates, startCandidates, take as takeCandidates } from "../picture/candidates.js";
+import { startCandidates, take as takeCandidates } from "../picture/candidates.js";
 import { startClicking, takeSnapped } from "../picture/clicking.js";
-import { drawContours, startContours, takeUncertainty } from "../picture/contours.js";
-import { drawCross, startCross } from "../picture/cross.js";
+import { startContours, takeUncertainty } from "../picture/contours.js";
+import { startCross } from "../picture/cross.js";
 import { onImage, toCss, toImage, viewport, zoom } from "../picture/geometry.js";
 import { startLoupe } from "../picture/loupe.js";
-import { drawMarks, startLayers } from "../picture/marks.js";
-import { addLayer, startDescribing, startPicture } from "../picture/picture.js";
-import { drawRectified, startRectified } from "../picture/rectified.js";
+import { startLayers } from "../picture/marks.js";
+import { startDescribing, startPicture } from "../picture/picture.js";
+import { startRectified } from "../picture/rectified.js";
 import { startTouch } from "../picture/touch.js";
-import { drawProposal } from "../proposals/marks.js";
 import { justMoved, shownOffer, startProposals, takeProposals } from "../proposals/proposals.js";
 import { startSwitch as startProposalSwitch } from "../proposals/words.js";
-import { drawCompared, startCompare, takeCompared } from "../review/compare.js";
+import { startCompare, takeCompared } from "../review/compare.js";
 import { startEvaluating, takeAcc } from "../review/evaluating.js";
 import { plots, startReview, takePair, takeReview } from "../review/review.js";
 import { startSpace, takeSpace } from "../space/space.js";
 import { activity, startPictureChanges } from "../time/lanes.js";
-import { frameFailed, goTo, receiveFrame, requestAgain, startLive, takeFollowing, takeFrames, tellCursor } from "../time/player.js";
+import { frameFailed, goTo, receiveFrame, registerTime, requestAgain, startLive, takeFollowing, takeFrames, tellCursor } from "../time/player.js";
 import { startTimeline } from "../time/timeline.js";
-import { registerActions } from "./action_table.js";
+import { startHelp } from "./help.js";
 import { listen, startRoving } from "./keys.js";
 import { startPalette } from "./palette.js";
 import { startStatus } from "./status.js";
@@ -147,15 +147,8 @@ async function loadActivity() {
   emit("lanes");
 }
 
-/** Draw over the frame, from the bottom to the top: the rectified picture shows no marks. */
-function addLayers() {
-  const isRectified = () => state.rectified || state.shown?.rectified === true;
-  addLayer(drawRectified, isRectified);
-  for (const draw of [drawLensMarks, drawContours, drawMarks, drawCandidates, drawProposal, drawCross, drawCompared]) addLayer(draw, () => !isRectified());
-}
-
-registerActions();
-addLayers();
+registerTime();
+registerPicture();
 startLayout();
 startTips();
 startStatus();
@@ -187,6 +180,7 @@ startExporting();
 startDelivering();
 startGuide();
 startPalette();
+startHelp();
 startRoving();
 startDescribing();
 startArriving();
@@ -207,7 +201,7 @@ connect({
     emit("connection");
   },
 });
-startSpace();
+startSpace(listen);
 
 /** Exposed for the browser tests. */
 Object.assign(window, {

@@ -1,6 +1,6 @@
 /** The command palette: every action, placement, pair, frame and option, found by typing. */
 
-import { ACTIONS, keyNames, reasonAgainst } from "../base/actions.js";
+import { act, ACTIONS, keyNames, reasonAgainst, register } from "../base/actions.js";
 import { make } from "../base/notices.js";
 import { fitOf } from "../base/searching.js";
 import { clicks, isClicked, nameOf, select, state } from "../base/state.js";
@@ -24,6 +24,7 @@ let rows = [];
 let chosen = 0;
 
 export function startPalette() {
+  register({ id: "palette", group: "Help", words: "Search for an action, placement, pair or option", keys: ["Ctrl+K"], also: "command palette find go to", run: togglePalette });
   field.type = "text";
   field.placeholder = "Action or option, placement 7, pair 3, frame 120, time 12.5";
   field.spellcheck = false;
@@ -42,7 +43,7 @@ export function startPalette() {
 }
 
 /** Open the palette, or close it. */
-export function togglePalette() {
+function togglePalette() {
   if (dialog.open) return dialog.close();
   if (document.querySelector("dialog[open]")) return;
   field.value = "";
@@ -54,7 +55,7 @@ export function togglePalette() {
 
 /** The actions as entries. @returns {Entry[]} */
 const actions = () =>
-  ACTIONS.map((action) => ({ id: action.id, group: action.group, words: action.words, also: `${action.also ?? ""} ${action.help ?? ""}`, keys: action.keys, reason: reasonAgainst(action), run: action.run }));
+  ACTIONS.map((action) => ({ id: action.id, group: action.group, words: action.words, also: `${action.also ?? ""} ${action.help ?? ""}`, keys: action.keys, reason: reasonAgainst(action), run: () => act(action) }));
 
 /** The entries for what is typed: the recent ones first as long as nothing is. @returns {Entry[]} */
 function found() {

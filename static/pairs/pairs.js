@@ -1,11 +1,15 @@
 /** The table of pairs, one row per click, sorted by time, range or residual; click a row to go there, its checkbox to exclude it. */
 
+import { register, withPictures } from "../base/actions.js";
 import { LARGE_PX, residualColour } from "../base/colours.js";
+import { showPage } from "../base/layout.js";
 import { make, shape } from "../base/notices.js";
-import { clicks, nameOf, onPainted, select, stampKey, state } from "../base/state.js";
+import { clickIn, clicks, nameOf, onPainted, select, stampKey, state } from "../base/state.js";
+import { withSelected } from "../picture/actions.js";
 import { comeTo } from "../picture/arriving.js";
 import { candidatesOf, choose } from "../picture/candidates.js";
 import { toggleExcluded } from "../picture/clicking.js";
+import { dismissHere, withoutPlacement } from "../picture/dismissing.js";
 
 /** @typedef {import("../messages.js").ClickRow} Click */
 /** So many candidates are listed; the others are less probable. */
@@ -25,6 +29,7 @@ const COLUMNS = [
 const body = make("tbody", "", []);
 const head = make("thead", "", []);
 const table = make("table", "pairs", [head, body]);
+const withResiduals = () => withPictures() || (clicks().some((click) => click.residual_px !== null) ? "" : "There is no calibration yet");
 /** The table's row of each click, and what it was drawn from: a row is made again only when that changes. @type {Map<string, {from: unknown[], row: HTMLElement}>} */
 const made = new Map();
 /** The click whose row was scrolled to last. @type {string|null} */
@@ -33,6 +38,11 @@ let shownRow = null;
 let drawn = "";
 
 export function startPairs() {
+  register(
+    { id: "mark", group: "Panel", words: "Mark: the pairs and the returns that each may use", also: "tab table list clicks placements candidates", run: () => showPage("mark") },
+    { id: "worst", group: "Pairs", words: "Next worst pair", keys: ["J"], also: "outlier residual largest wrong bad", run: nextWorst, when: withResiduals },
+    { id: "exclude", group: "Pairs", words: "No: exclude the pair, or include it again; without a mark, dismiss the placement", keys: ["X"], also: "leave out use ignore disable spurious", run: () => (clickIn(state.cursor) ? toggleExcluded() : dismissHere()), when: () => withPictures() || (clickIn(state.cursor) ? withSelected() : withoutPlacement()) },
+  );
   onPainted(["opening", "view", "selected", "recording", "placements", "candidates", "proposals"], draw);
   page.addEventListener("click", pressed);
 }
@@ -47,7 +57,7 @@ function sorted() {
 let lastVisited = null;
 
 /** Go to the worst pair, outliers first, then by residual; when called again, to the next one. */
-export function nextWorst() {
+function nextWorst() {
   const ranked = clicks().filter((click) => click.residual_px !== null && click.state !== "excluded" && click.state !== "untouched");
   const outlier = (/** @type {Click} */ click) => Number(click.state === "outlier");
   ranked.sort((a, b) => outlier(b) - outlier(a) || Number(b.residual_px) - Number(a.residual_px));

@@ -3,6 +3,7 @@
  * with its controls and the table of placements.
  */
 
+import { attemptFirst } from "../base/actions.js";
 import { ink, smallFont, themeColour } from "../base/colours.js";
 import { hideTip, make, showTip } from "../base/notices.js";
 import { emit, on, placementAt, state } from "../base/state.js";
@@ -24,6 +25,9 @@ let waiting = false;
 let press = null;
 
 function startBirdseye() {
+  attemptFirst("fit", () => state.looking && fitEye());
+  attemptFirst("zoom-in", () => state.looking && zoomEye(1.25));
+  attemptFirst("zoom-out", () => state.looking && zoomEye(0.8));
   new ResizeObserver(() => (eye.fitted ? fitEye() : redraw())).observe(canvas);
   on(["radar_map", "placements", "recording"], () => eye.fitted && fitEye());
   on(["look", "cursor", "theme", "layers"], redraw);
@@ -38,8 +42,8 @@ function startBirdseye() {
   canvas.addEventListener("wheel", wheeled, { passive: false });
 }
 
-/** Show everything. */
-export function fitEye() {
+/** Show everything. @returns {true} it is done */
+function fitEye() {
   const { x_m: forward, y_m: left } = state.radarMap ?? { x_m: [], y_m: [] };
   const places = state.placements.map((placement) => placement.position_radar_m);
   const xs = [...forward, ...places.map(([x]) => x)].sort((a, b) => a - b);
@@ -50,16 +54,18 @@ export function fitEye() {
   eye.scale = Math.max(1, Math.min((canvas.clientHeight - 70) / (front - back), (canvas.clientWidth - 60) / (2 * side)));
   [eye.x, eye.y, eye.fitted] = [(front + back) / 2, 0, true];
   redraw();
+  return true;
 }
 
-/** @param {number} factor @param {number} [x] @param {number} [y] CSS px */
-export function zoomEye(factor, x = canvas.clientWidth / 2, y = canvas.clientHeight / 2) {
+/** @param {number} factor @param {number} [x] @param {number} [y] CSS px @returns {true} it is done */
+function zoomEye(factor, x = canvas.clientWidth / 2, y = canvas.clientHeight / 2) {
   const [forward, left] = toRadar(x, y);
   eye.scale = Math.min(2000, Math.max(1, eye.scale * factor));
   eye.fitted = false;
   const [nowForward, nowLeft] = toRadar(x, y);
   [eye.x, eye.y] = [eye.x + forward - nowForward, eye.y + left - nowLeft];
   redraw();
+  return true;
 }
 
 /** Metres to CSS px. @param {number} x @param {number} y @returns {[number, number]} */

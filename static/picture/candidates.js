@@ -4,6 +4,7 @@
  */
 
 import { growth, ink, smallFont } from "../base/colours.js";
+import { addLayer } from "../base/layers.js";
 import { toast } from "../base/notices.js";
 import { send } from "../base/socket.js";
 import { emit, on, selectedClick, stampOf, state } from "../base/state.js";
@@ -17,6 +18,7 @@ const ASIDE = 20;
 const RADIUS = 9;
 
 export function startCandidates() {
+  addLayer("candidates", drawCandidates);
   on(["selected", "view"], () => {
     if (state.candidates && state.candidates.click !== (state.selected ?? "")) take(null);
   });
@@ -57,7 +59,7 @@ export function candidateNear(x, y) {
 }
 
 /** Rings at the reprojections of the candidates: the one in use is drawn by the mark itself. @param {CanvasRenderingContext2D} pen */
-export function drawCandidates(pen) {
+function drawCandidates(pen) {
   const here = drawn();
   if (here.length < 2) return;
   const { ratio, unit } = viewport;

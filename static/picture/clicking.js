@@ -4,9 +4,9 @@
  */
 
 import { toast } from "../base/notices.js";
+import { offers } from "../base/offers.js";
 import { send } from "../base/socket.js";
 import { clickIn, clicks, clicksIn, emit, on, select, selectedClick, stampOf, state } from "../base/state.js";
-import { correctProposal, shownOffer } from "../proposals/proposals.js";
 import { leaveLive, pause } from "../time/player.js";
 import { candidateNear, choose } from "./candidates.js";
 import { onImage, pan, toCss, toImage, viewport } from "./geometry.js";
@@ -149,7 +149,7 @@ export async function place(u, v, { mark = "clicked", sigma_px = null } = {}) {
   const image_time = stampOf(index);
   const known = new Set(clicksIn(index).map((click) => click.id));
   const key = `new-${nextDraft++}`;
-  const offer = mark === "clicked" ? shownOffer() : null;
+  const offer = mark === "clicked" ? offers.shown() : null;
   draft(key, { u, v, image_time, mark });
   awaited = { index, known };
   const { found } = offer ? await askApex({ image_time, pixel_px: [u, v], over_dwell: true }) : { found: null };
@@ -159,7 +159,7 @@ export async function place(u, v, { mark = "clicked", sigma_px = null } = {}) {
     draft(key, { u, v, image_time, mark });
   }
   const sending = settle(key, { type: "click_placed", image_time, pixel_px: [u, v], mark, sigma_px });
-  if (offer && state.cursor === index) correctProposal(offer.row, sending);
+  if (offer && state.cursor === index) offers.clicked(offer, sending);
   await sending;
   selectAwaited();
 }

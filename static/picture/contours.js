@@ -1,6 +1,7 @@
 /** The uncertainty in the picture: lines on which a point at some distance may be this many pixels away from its drawn place. */
 
 import { smallFont } from "../base/colours.js";
+import { addLayer } from "../base/layers.js";
 import { make } from "../base/notices.js";
 import { tell } from "../base/socket.js";
 import { emit, on, state } from "../base/state.js";
@@ -19,6 +20,7 @@ const HINT = "Where a point may appear: lines of equal uncertainty (95 %, in pix
 const COLOUR = "#ffd98a";
 
 export function startContours() {
+  addLayer("contours", drawContours);
   group.id = "contour-chips";
   group.setAttribute("role", "group");
   group.setAttribute("aria-label", "Uncertainty in the picture");
@@ -81,7 +83,7 @@ function drawChips() {
 }
 
 /** Draw the lines with their labels, and say the same in words. @param {CanvasRenderingContext2D} pen */
-export function drawContours(pen) {
+function drawContours(pen) {
   const map = shown === null ? undefined : known?.maps.find((one) => one.label === shown);
   /** @type {string[]} */ const labels = [];
   /** @type {[number, number][]} */ const taken = [];

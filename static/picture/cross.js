@@ -4,9 +4,10 @@
  */
 
 import { ink, smallFont } from "../base/colours.js";
+import { addLayer } from "../base/layers.js";
 import { toast } from "../base/notices.js";
+import { offers } from "../base/offers.js";
 import { clickIn, clicksIn, emit, isOffered, on, placementsAt, state } from "../base/state.js";
-import { shownOffer } from "../proposals/proposals.js";
 import { leaveLive } from "../time/player.js";
 import { clamped, leaveCross, moveTo, place } from "./clicking.js";
 import { lookInto, toDevice, viewport } from "./geometry.js";
@@ -33,6 +34,7 @@ let wanted = false;
 let pace = { factor: 1, at: 0 };
 
 export function startCross() {
+  addLayer("cross", drawCross);
   on(["shown", "overlay", "playing", "proposals"], follow);
 }
 
@@ -53,7 +55,7 @@ function endCross() {
 function follow() {
   const cross = state.cross;
   if (state.playing) return leaveCross();
-  if (cross && !cross.touched && !wanted && shownOffer()) return leaveCross();
+  if (cross && !cross.touched && !wanted && offers.shown()) return leaveCross();
   if (cross && cross.frame !== state.shown?.index) leaveCross();
   if (cross && !cross.touched && !cross.expected && expectedHere()) return start();
   if (!state.cross && wanted && state.shown && !clicksIn(state.shown.index).length && placementsAt(state.shown.index).length) start();
@@ -166,7 +168,7 @@ export function enterCross() {
 }
 
 /** The cross, its field and the nine parts of that. @param {CanvasRenderingContext2D} pen */
-export function drawCross(pen) {
+function drawCross(pen) {
   const cross = state.cross;
   if (!cross || cross.frame !== state.shown?.index) return;
   const { unit } = viewport;

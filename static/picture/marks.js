@@ -4,6 +4,7 @@
  */
 
 import { ink, residualColour, smallFont } from "../base/colours.js";
+import { addLayer } from "../base/layers.js";
 import { make } from "../base/notices.js";
 import { clicks, clicksIn, emit, isOffered, on, placementsAt, state } from "../base/state.js";
 import { toCss, toDevice, viewport, zoom } from "./geometry.js";
@@ -23,7 +24,7 @@ const CLOSE_ZOOM = 2;
 const overlayHere = () => (state.overlay?.index === state.shown?.index ? state.overlay : null);
 
 /** The returns, what is predicted and the clicks of the frame on screen. @param {Ink} pen */
-export function drawMarks(pen) {
+function drawMarks(pen) {
   const index = state.shown?.index ?? -1;
   const overlay = overlayHere();
   if (state.layers.returns && overlay?.returns) drawReturns(pen, overlay.returns);
@@ -208,6 +209,7 @@ const LAYERS = [
 const group = /** @type {HTMLElement} */ (document.getElementById("layers"));
 
 export function startLayers() {
+  addLayer("marks", drawMarks);
   LAYERS.forEach(([layer, label, hint], index) => {
     const chip = make("button", "chip", [make("kbd", "", String(index + 1)), label]);
     chip.dataset.layer = layer;

@@ -1,9 +1,11 @@
 /**
- * The camera frame on its canvas, with the layers that others draw over it: size, zoom, pan and redrawing; and the frame in words, for
+ * The camera frame on its canvas, with the layers that are drawn over it: size, zoom, pan and redrawing; and the frame in words, for
  * those who do not see it.
  */
 
-import { clicksIn, emit, isClicked, nameOf, on, placementAt, state } from "../base/state.js";
+import { drawLayers } from "../base/layers.js";
+import { keepClear } from "../base/notices.js";
+import { clickIn, clicksIn, emit, isClicked, nameOf, on, placementAt, state } from "../base/state.js";
 import * as geometry from "./geometry.js";
 
 const { viewport } = geometry;
@@ -14,8 +16,8 @@ const paper = /** @type {CanvasRenderingContext2D} */ (picture.getContext("2d", 
 const ink = /** @type {CanvasRenderingContext2D} */ (marks.getContext("2d"));
 /** From this many device px per image px on, pixels are shown as squares; not below, since their edges snap to device px. */
 const SQUARES_FROM = 8;
-/** What is drawn over the frame, from the bottom to the top. @type {{draw: (pen: CanvasRenderingContext2D) => void, when: () => boolean}[]} */
-const layers = [];
+/** Room around a mark that no toast covers [CSS px]. */
+const MARK_PX = 24;
 let drawPicture = false;
 let drawInk = false;
 const words = /** @type {HTMLElement} */ (document.getElementById("picture-words"));
@@ -35,11 +37,18 @@ export function startPicture() {
   });
   on(["view", "overlay", "selected", "layers", "hover", "placements", "theme", "candidates", "cross", "lens", "proposals"], redrawMarks);
   on(["theme"], redraw);
+  keepClear(aroundMark);
   measure();
 }
 
-/** Draw something over every frame, above what was added before. @param {(pen: CanvasRenderingContext2D) => void} draw @param {() => boolean} when it is drawn */
-export const addLayer = (draw, when) => layers.push({ draw, when });
+/** Where the mark of the frame on screen is on the page. */
+function aroundMark() {
+  const click = clickIn(state.shown?.index ?? -1);
+  if (!click) return null;
+  const pane = marks.getBoundingClientRect();
+  const [x, y] = geometry.toCss(click.u_px, click.v_px);
+  return { left: pane.left + x - MARK_PX, right: pane.left + x + MARK_PX, top: pane.top + y - MARK_PX, bottom: pane.top + y + MARK_PX };
+}
 
 /** Follow the ratio of device to CSS pixels, which changes with the browser's zoom and the monitor. */
 function watchRatio() {
@@ -99,7 +108,7 @@ function paint() {
   drawPicture = drawInk = false;
   ink.setTransform(1, 0, 0, 1, 0, 0);
   ink.clearRect(0, 0, marks.width, marks.height);
-  if (state.shown) for (const { draw, when } of layers) if (when()) draw(ink);
+  if (state.shown) drawLayers(ink);
 }
 
 function paintPicture() {

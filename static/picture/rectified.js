@@ -4,6 +4,7 @@
  */
 
 import { ink } from "../base/colours.js";
+import { addLayer } from "../base/layers.js";
 import { toast } from "../base/notices.js";
 import { emit, on, state } from "../base/state.js";
 import { requestAgain } from "../time/player.js";
@@ -23,6 +24,7 @@ let drawing = null;
 let used = "";
 
 export function startRectified() {
+  addLayer("rectified", drawRectified);
   on(["lens"], () => {
     const now = JSON.stringify(state.lens?.intrinsics ?? null);
     if (now === used) return;
@@ -86,7 +88,7 @@ export function dropRuler() {
 }
 
 /** The grid, and the lines along edges. @param {CanvasRenderingContext2D} pen */
-export function drawRectified(pen) {
+function drawRectified(pen) {
   const step = viewport.imageWidth / COLUMNS;
   pen.lineWidth = viewport.ratio;
   for (const [colour, shift] of /** @type {[string, number][]} */ ([["rgb(0 0 0 / 35%)", viewport.ratio], ["rgb(255 255 255 / 38%)", 0]])) {

@@ -4,6 +4,7 @@
  */
 
 import { toast } from "../base/notices.js";
+import { offers } from "../base/offers.js";
 import { send } from "../base/socket.js";
 import { clickIn, emit, isOffered, on, placementsAt, state } from "../base/state.js";
 import { dismiss } from "../picture/dismissing.js";
@@ -13,7 +14,7 @@ import { goTo, pause } from "../time/player.js";
 
 /** @typedef {import("../messages.js").ProposalRow} Row */
 /** @typedef {import("../messages.js").ProposalPlace} Place */
-/** A proposal on screen, which of its places is taken, and whether another one was asked for. @typedef {{row: Row, place: Place, number: number, isOpen: boolean}} Offer */
+/** @typedef {import("../base/offers.js").Offer} Offer */
 
 /** Nothing is decided so soon after a proposal appeared, or moved to a better place [ms]: nobody has seen it yet. */
 const UNSEEN = 300;
@@ -53,6 +54,7 @@ const SURE = 0.9;
 let isFresh = sessionStorage.getItem("cocalib-frame") === null;
 
 export function startProposals() {
+  Object.assign(offers, { shown: shownOffer, confidences, clicked: correctProposal });
   for (const type of ["keydown", "pointerdown", "wheel"]) addEventListener(type, () => (isFresh = false), { capture: true });
   on(["placements", "proposals"], openOn);
   on(["shown"], arrive);
@@ -136,7 +138,7 @@ export function openProposals() {
 }
 
 /** How sure the proposals are that wait for a decision, by the number of their placement. @returns {Map<number, number>} */
-export const confidences = () => new Map(openProposals().map(({ placement, confidence }) => [placement, confidence]));
+const confidences = () => new Map(openProposals().map(({ placement, confidence }) => [placement, confidence]));
 
 /** The proposal on screen: that which N went to, or else the most confident one of the frame. @returns {Offer|null} */
 export function shownOffer() {
@@ -266,8 +268,8 @@ async function decide(row, word, message, key = "") {
   emit("proposals");
 }
 
-/** A click decides the proposal on screen: the next one is shown; undo leads back. @param {Row} row @param {Promise<string|null>} sending */
-export async function correctProposal(row, sending) {
+/** A click decides the proposal on screen: the next one is shown; undo leads back. @param {Offer} offer @param {Promise<string|null>} sending */
+async function correctProposal({ row }, sending) {
   const refusal = await goOnWhile(row, "Marked", sending);
   if (refusal) return;
   decided.push(row.placement);

@@ -1,10 +1,13 @@
 /** What is said of proposals: the line on the frame, how far they are, why there are none; and their switch, a chip among the layers. */
 
+import { attemptFirst, register, withPictures } from "../base/actions.js";
+import { addLayer } from "../base/layers.js";
 import { make, toast } from "../base/notices.js";
 import { send } from "../base/socket.js";
 import { isOffered, on, state } from "../base/state.js";
 import { marks } from "../picture/picture.js";
-import { heldBack, isSearching, openProposals, saidWords, say, shownOffer } from "./proposals.js";
+import { drawProposal } from "./marks.js";
+import { acceptProposal, heldBack, isSearching, nextPlace, nextProposal, openProposals, previousProposal, rejectProposal, saidWords, say, shownOffer, takesEnter, takesKeys } from "./proposals.js";
 
 /** @typedef {import("../pairs/guide.js").Words} Words */
 
@@ -15,7 +18,7 @@ const FIRST = 2;
 const leftWords = () => (isSearching() ? "" : `, ${openProposals().length || state.placements.filter(isOffered).length} left`);
 
 /** N found no proposal: say why, if that is not because all are decided. */
-export function sayNone() {
+function sayNone() {
   const news = state.proposals;
   if (!news?.on) return;
   if (news.progress.problem) say(["No proposals.", news.progress.problem, news.progress.hint].filter(Boolean).join(" "));
@@ -70,6 +73,13 @@ function progressWords() {
 let chip;
 
 export function startSwitch() {
+  addLayer("proposal", drawProposal);
+  register({ id: "proposals", group: "Mark", words: "Suggestions on or off", keys: ["O"], also: "automatic find suggest off on switch", run: toggleProposals, when: withPictures });
+  attemptFirst("next-placement", () => nextProposal() || (sayNone(), false));
+  attemptFirst("previous-placement", previousProposal);
+  attemptFirst("place-mark", () => takesEnter() && !state.cross && (acceptProposal(), true));
+  attemptFirst("next-candidate", () => takesKeys() && (nextPlace(), true), takesKeys);
+  attemptFirst("exclude", () => takesKeys() && (rejectProposal(), true), takesKeys);
   chip = /** @type {HTMLButtonElement} */ (make("button", "chip", ""));
   chip.dataset.layer = "proposals";
   chip.onclick = (event) => {
@@ -82,7 +92,7 @@ export function startSwitch() {
 }
 
 /** O: propose, or do not. */
-export async function toggleProposals() {
+async function toggleProposals() {
   const refusal = await send({ type: "propose", on: !state.proposals?.on });
   if (refusal) toast(refusal);
 }

@@ -1,5 +1,6 @@
 /** Two solutions side by side: chosen here, compared by the server, drawn over the picture with two shapes. */
 
+import { addLayer } from "../base/layers.js";
 import { make, toast } from "../base/notices.js";
 import { tell } from "../base/socket.js";
 import { clicksIn, emit, nameOf, on, state } from "../base/state.js";
@@ -47,6 +48,7 @@ const blending = make("div", "blend", []);
 const picker = make("input", "", []);
 
 export function startCompare() {
+  addLayer("compared", drawCompared);
   const head = make("h2", "", "Compare two solutions");
   const choose = make("button", "", "File…");
   choose.dataset.hint = "Compare with a calibration file of any format, also by dropping it on the page.";
@@ -181,7 +183,7 @@ async function takeFile(given) {
 }
 
 /** Draw where A and B put the pairs: circles and squares, joined by a line; those of the frame on screen stand out. @param {CanvasRenderingContext2D} pen */
-export function drawCompared(pen) {
+function drawCompared(pen) {
   if (!answer || !chosen.b || !visible()) return;
   const here = new Set(clicksIn(state.shown?.index ?? -1).map((click) => click.id));
   for (const [id, a, b] of answer.marks) {

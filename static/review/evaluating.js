@@ -3,6 +3,7 @@
  * Acc, each class, and how Acc changes when the camera is turned, which says what it can see at all.
  */
 
+import { register, withPictures } from "../base/actions.js";
 import { themeColour } from "../base/colours.js";
 import { closeSheet, showPage } from "../base/layout.js";
 import { make, shape, toast } from "../base/notices.js";
@@ -25,6 +26,11 @@ const LARGEST_FILE = 2_800_000;
 let panel = null;
 
 export function startEvaluating() {
+  register(
+    { id: "evaluate", group: "Panel", words: "Evaluate: judge the calibration by boxes around what moves, or go back", keys: ["A"], also: "sheet boxes annotations acc accuracy bounding people cars moving", run: toggleEvaluate, when: withPictures },
+    { id: "find-moving", group: "Panel", words: "Evaluate: find what moves before a camera that stands still", also: "boxes motion detect", run: findMoving, when: withPictures },
+    { id: "load-boxes", group: "File", words: "Load boxes from a file", also: "import open coco yolo cvat kitti openlabel annotations", run: chooseBoxes, when: withPictures },
+  );
   const load = make("button", "second", "Load boxes…");
   load.dataset.hint = "Boxes of a labelling tool or of a detector: boxes.json, COCO, YOLO, CVAT, KITTI, OpenLABEL… Dropping the file on this sheet does the same.";
   find.dataset.hint = "Boxes around whatever moves before a camera that stands still.";
@@ -52,13 +58,13 @@ export function startEvaluating() {
 }
 
 /** Open the sheet, or close it. */
-export const toggleEvaluate = () => (page.hidden ? showPage("evaluate") : closeSheet());
+const toggleEvaluate = () => (page.hidden ? showPage("evaluate") : closeSheet());
 
 /** Choose a file of boxes. */
-export const chooseBoxes = () => picker.click();
+const chooseBoxes = () => picker.click();
 
 /** Judge by boxes around what moves. */
-export const findMoving = () => tell({ type: "find_moving" });
+const findMoving = () => tell({ type: "find_moving" });
 
 /** @param {File} given */
 async function takeBoxes(given) {

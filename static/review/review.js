@@ -1,5 +1,7 @@
 /** The review of all pairs: linked plots of the residuals with a filter, and why the selected pair uses its return. */
 
+import { register, withPictures } from "../base/actions.js";
+import { showPage } from "../base/layout.js";
 import { make } from "../base/notices.js";
 import { tell } from "../base/socket.js";
 import { clicks, nameOf, on, said, select, state } from "../base/state.js";
@@ -59,6 +61,7 @@ const wordsLine = make("p", "review-words", "");
 const why = make("section", "review-pair", []);
 
 export function startReview() {
+  register({ id: "check", group: "Panel", words: "Check: the pose, the review of all pairs, and two solutions compared", also: "tab transform extrinsics rotation translation errors advice plots residuals histogram influence rms cdsd a b", run: () => showPage("check"), when: withPictures });
   readout.id = "review-readout";
   readout.setAttribute("aria-live", "polite");
   const listener = { hover: hovered, go, brush };

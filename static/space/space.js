@@ -1,14 +1,14 @@
 /** The 3D view: viser's own page in an iframe. It has its own connection to the server; the name of this tab links the two. */
 
+import { opened, register, withPictures } from "../base/actions.js";
 import { icon, make } from "../base/notices.js";
 import { tab, tell } from "../base/socket.js";
 import { clicks, on, select, state } from "../base/state.js";
-import { listen } from "../page/keys.js";
 import { comeTo } from "../picture/arriving.js";
 import { choose } from "../picture/candidates.js";
-import { tellCursor } from "../time/player.js";
+import { addToCursor, tellCursor } from "../time/player.js";
 import { candidates, frameShown, itemAt, layer, lookShown, mark, onDrawn, pickable, pickedWords, pictureBox, redraw, startLayer, takeLook } from "./layer.js";
-import { changeSpace, spaceColour, spaceOptions } from "./options.js";
+import { changeSpace, cursorOptions, spaceColour, spaceOptions } from "./options.js";
 
 /** @typedef {import("./options.js").Colour} Colour */
 const pane = /** @type {HTMLElement} */ (document.getElementById("space"));
@@ -36,6 +36,8 @@ const LATEST = 3000;
 /** What the Camera view says before it can place the returns. */
 const NO_POSE = "No pose yet: the returns appear here once enough placements are clicked.";
 
+const SPACE = { group: "3D view", when: opened };
+
 /** What pace.js reads in the 3D view's frame. */
 const pace = { playing: false, every: 1000, holdUntil: 0 };
 const cameraChip = chip("Camera", "The page's own picture with the radar returns in front of it, through the same lens.", () => setCamera(!spaceOptions.camera));
@@ -50,7 +52,17 @@ const standing = make("span", "space-frame", []);
 /** @type {{x: number, y: number}|null} */
 let press = null;
 
-export function startSpace() {
+/** @param {(owner: Window) => void} listen makes the keys work in a window */
+export function startSpace(listen) {
+  addToCursor(cursorOptions);
+  register(
+    { id: "view-behind", words: "3D: look from behind the radar", also: "viewpoint", run: () => lookFrom("behind"), ...SPACE },
+    { id: "view-above", words: "3D: look down from above", also: "viewpoint top bird", run: () => lookFrom("above"), ...SPACE },
+    { id: "view-side", words: "3D: look from the side", also: "viewpoint right", run: () => lookFrom("side"), ...SPACE },
+    { id: "view-camera", words: "3D: look from the camera, over its picture", also: "viewpoint overlay reprojection", run: () => setCamera(true), group: "3D view", when: withPictures },
+    { id: "space-hide", words: "Hide or show the 3D view", keys: ["V"], also: "3D close", run: toggleHidden, ...SPACE },
+    { id: "space-large", words: "Enlarge the 3D view, or give the picture its place back", keys: ["B"], also: "3D big maximize full", run: toggleLarge, ...SPACE },
+  );
   Object.assign(window, { cocalibPace: pace, __cocalibSpace: { lookShown, pickable, pictureBox, frameShown, itemAt } });
   on(["playing"], () => Object.assign(pace, { playing: state.playing, every: state.looking ? LOOKING_EVERY : PLAYING_EVERY }));
   for (const type of ["pointerdown", "pointerup", "keydown", "wheel"])
@@ -116,23 +128,23 @@ function change(changed) {
 }
 
 /** Hide the 3D view, or show it again. */
-export function toggleHidden() {
+function toggleHidden() {
   change({ hidden: !spaceOptions.hidden, large: false });
 }
 
 /** Let the 3D view take the place of the picture, or give it back. */
-export function toggleLarge() {
+function toggleLarge() {
   change({ large: !spaceOptions.large, hidden: false });
 }
 
 /** Move the 3D view's camera. @param {string} viewpoint */
-export function lookFrom(viewpoint) {
+function lookFrom(viewpoint) {
   setCamera(false);
   tell({ type: "viewpoint", viewpoint });
 }
 
 /** Show the page's own picture with the returns in front, or the 3D view. @param {boolean} camera */
-export function setCamera(camera) {
+function setCamera(camera) {
   if (spaceOptions.camera === camera) return;
   changeSpace({ camera });
   arrange();

@@ -4,8 +4,8 @@
  */
 
 import { ink, residualColour, smallFont, smallPx, themeColour } from "../base/colours.js";
+import { offers } from "../base/offers.js";
 import { clicks, emit, isDismissed, isLookedAt, on, state } from "../base/state.js";
-import { confidences } from "../proposals/proposals.js";
 import { drawGaps, drawRuler, pixelsPerSecond, RULER } from "./ruler.js";
 
 export const lanes = { left: 74, right: 14, gap: 4, bottom: 5 };
@@ -60,7 +60,7 @@ export function drawLanes(pen, width, height, axis, pointer) {
   pen.fillStyle = themeColour("line-strong");
   pen.fillRect(lanes.left, boxes.clicks.bottom, width - lanes.left - lanes.right, 1);
   drawGaps(pen, height, axis);
-  const sure = confidences();
+  const sure = offers.confidences();
   state.placements.forEach((placement, index) => drawPlacement(pen, placement, sure.get(index) ?? 0, boxes.placements, axis));
   for (const click of clicks()) drawStem(pen, click, axis.toX(state.seconds[click.frame]), boxes.clicks);
   if (pointer !== null && pointer >= lanes.left) {

@@ -3,11 +3,15 @@
  * recording that is still being written.
  */
 
+import { opened, register } from "../base/actions.js";
 import { requestNumber, tell } from "../base/socket.js";
 import { clicks, emit, on, select, state } from "../base/state.js";
-import { cursorOptions } from "../space/options.js";
 
 const KEPT = 12;
+const withFrames = () => opened() || (state.seconds.length > 1 ? "" : "There is only one frame");
+const FRAMES = { help: "Step one frame", when: withFrames };
+const TENS = { help: "Step ten frames", when: withFrames };
+const ENDS = { help: "First or last frame", when: withFrames };
 /** Maximum number of requests in flight while playing. */
 const CREDIT = 2;
 /** @type {Map<number, import("../base/state.js").Shown>} */
@@ -18,6 +22,19 @@ let coming = [];
 let startedAt = 0;
 let startedFrom = 0;
 let asked = -1;
+
+/** Make the actions of time known. */
+export function registerTime() {
+  register(
+    { id: "play", group: "Time", words: "Play or pause", keys: ["Space"], also: "start stop run video", run: () => (state.playing ? pause() : play()), when: withFrames },
+    { id: "frame-back", group: "Time", words: "One frame back", keys: ["ArrowLeft"], also: "previous step", run: () => step(-1), ...FRAMES },
+    { id: "frame-forward", group: "Time", words: "One frame forward", keys: ["ArrowRight"], also: "next step", run: () => step(1), ...FRAMES },
+    { id: "ten-back", group: "Time", words: "Ten frames back", keys: ["Shift+ArrowLeft"], also: "previous jump rewind", run: () => step(-10), ...TENS },
+    { id: "ten-forward", group: "Time", words: "Ten frames forward", keys: ["Shift+ArrowRight"], also: "next jump skip", run: () => step(10), ...TENS },
+    { id: "first-frame", group: "Time", words: "Go to the first frame", keys: ["Home"], also: "start beginning", run: () => goTo(0), ...ENDS },
+    { id: "last-frame", group: "Time", words: "Go to the last frame", keys: ["End"], also: "finish newest", run: () => goTo(state.seconds.length - 1), ...ENDS },
+  );
+}
 
 /** Go to a frame. @param {number} index */
 export function goTo(index) {
@@ -32,7 +49,7 @@ export function goTo(index) {
 }
 
 /** Step by recorded frames; stops playing. @param {number} count */
-export function step(count) {
+function step(count) {
   pause();
   goTo(state.cursor + count);
 }
@@ -44,7 +61,7 @@ export function pause() {
   goTo(state.cursor);
 }
 
-export function play() {
+function play() {
   if (state.playing || state.seconds.length < 2) return;
   leaveLive();
   if (state.cursor >= state.seconds.length - 1) state.cursor = 0;
@@ -194,9 +211,15 @@ function selectHere(index) {
   else if (!state.playing) select(null);
 }
 
+/** What another room tells the server with every cursor. @type {() => Partial<import("../messages.js").CursorMoved>} */
+let added = () => ({});
+
+/** @param {typeof added} part */
+export const addToCursor = (part) => void (added = part);
+
 /** Tell the server which frame this tab shows; it answers with the overlay and updates the 3D view. */
 export function tellCursor() {
-  tell({ type: "cursor", index: state.cursor, playing: state.playing, selected: state.selected, light: document.documentElement.dataset.theme === "light", ...cursorOptions() });
+  tell({ type: "cursor", index: state.cursor, playing: state.playing, selected: state.selected, light: document.documentElement.dataset.theme === "light", ...added() });
 }
 
 const button = /** @type {HTMLButtonElement} */ (document.getElementById("live"));
@@ -208,6 +231,7 @@ let askedAt = 0;
 let seen = -1;
 
 export function startLive() {
+  register({ id: "live", group: "Time", words: "Show the newest frame as it comes", also: "live follow recording now", run: goLive, when: () => (follows() ? "" : "The recording is complete: no new frames come") });
   button.onclick = goLive;
   on(["following", "cursor", "recording"], drawButton);
   on(["shown"], () => {
@@ -225,7 +249,7 @@ export function startLive() {
 const follows = () => state.following !== null && state.following.state !== "complete" && state.following.state !== "ended";
 
 /** Show the newest frame, and each newer one as it comes. */
-export function goLive() {
+function goLive() {
   if (state.playing) pause(); // else the frame that is due would take the newest one's place
   state.live = true;
   moving = true;

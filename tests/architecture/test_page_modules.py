@@ -1,4 +1,4 @@
-"""The page's modules: imports name files and what these export, nothing is exported in vain, and there is no circle."""
+"""The page's modules: imports name files and what these export, nothing is exported in vain, and floors have no circle."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -101,6 +101,7 @@ def faults(texts: Mapping[str, str], *, entries: Sequence[str], used_by_tests: s
         *_faults_of_exports(modules, used_by_tests),
         *(f"{path}: no page loads it" for path in modules if path not in _reached(graph, entries)),
         *(f"circle: {' -> '.join(circle)}" for circle in circles(graph)),
+        *_faults_of_floors(graph),
     ]
 
 
@@ -146,6 +147,26 @@ def _reached(graph: Mapping[str, Sequence[str]], entries: Sequence[str]) -> set[
         reached.update(new)
         queue += new
     return reached
+
+
+def _faults_of_floors(graph: Mapping[str, Sequence[str]]) -> Iterator[str]:
+    """Yield what breaks the floors: base/ imports no room, nobody imports page/, and folders have no circle."""
+    folders: dict[str, set[str]] = {}
+    for path, targets in graph.items():
+        here = _folder(path)
+        others = [target for target in targets if _folder(target) != here]
+        folders.setdefault(here, set()).update(map(_folder, others))
+        for target in others:
+            if here == "base":
+                yield f"{path}: is on the ground floor and imports {target}, of a room"
+            if _folder(target) == "page":
+                yield f"{path}: is below the roof and imports {target}, of the roof"
+    named = {folder: sorted(targets) for folder, targets in folders.items()}
+    yield from (f"circle of folders: {' -> '.join(circle)}" for circle in circles(named))
+
+
+def _folder(path: str) -> str:
+    return path.rpartition("/")[0]
 
 
 def circles(graph: Mapping[str, Sequence[str]]) -> list[list[str]]:
@@ -236,3 +257,39 @@ def test_a_planted_fault_is_found(path, old, new, fault):
     used = 'const { again } = await import("/a/two.js")'
     found = faults({**SOUND, path: text.replace(old, new, 1)}, entries=("main.js",), used_by_tests=used)
     assert fault in found if fault else found == []
+
+
+FLOORS = {
+    "base/state.js": "export const state = 1;\n",
+    "a/one.js": 'import { state } from "../base/state.js";\nexport const one = state;\n',
+    "a/three.js": "export const three = 3;\n",
+    "b/two.js": 'import { one } from "../a/one.js";\nexport const two = one;\n',
+    "page/main.js": 'import { three } from "../a/three.js";\nimport { two } from "../b/two.js";\nthree(two);\n',
+}
+
+
+def test_floors_that_stand_have_no_faults():
+    assert faults(FLOORS, entries=("page/main.js",)) == []
+
+
+@pytest.mark.parametrize(
+    ("path", "line", "fault"),
+    [
+        (
+            "base/state.js",
+            'import "../a/three.js";\n',
+            "base/state.js: is on the ground floor and imports a/three.js, of a room",
+        ),
+        (
+            "b/two.js",
+            'import "../page/main.js";\n',
+            "b/two.js: is below the roof and imports page/main.js, of the roof",
+        ),
+        ("a/three.js", 'import "../b/two.js";\n', "circle of folders: a -> b -> a"),
+    ],
+    ids=["from the ground", "into the roof", "between rooms, without a circle of files"],
+)
+def test_an_import_against_the_floors_is_found(path, line, fault):
+    found = faults({**FLOORS, path: line + FLOORS[path]}, entries=("page/main.js",))
+    assert fault in found
+    assert any(one.startswith("circle: ") for one in found) == (path == "b/two.js")
