@@ -1,13 +1,21 @@
 /** Colours of the marks. The residual ramp from blue through sand to red-orange also works for colour-blind users; shapes carry the same information. */
 
-/** @type {[number, [number, number, number]][]} */
-const RAMP = [
+/** Shares from 0 to 1, each with its colour. @typedef {readonly (readonly [number, readonly number[]])[]} Ramp */
+
+/** @type {Ramp} */
+const RESIDUALS = [
   [0, [74, 170, 235]],
   [0.35, [143, 200, 226]],
   [0.6, [236, 214, 150]],
   [0.8, [240, 158, 66]],
   [1, [226, 82, 44]],
 ];
+
+/** Amplitudes, the same as in the 3D view, by the theme. @type {Record<string, Ramp>} */
+const AMPLITUDES = {
+  dark: [[0, [78, 66, 190]], [0.25, [150, 60, 180]], [0.5, [214, 82, 120]], [0.75, [246, 150, 70]], [1, [250, 226, 92]]],
+  light: [[0, [240, 190, 110]], [0.25, [226, 120, 86]], [0.5, [180, 56, 120]], [0.75, [112, 36, 140]], [1, [44, 12, 92]]],
+};
 
 export const ink = {
   click: "#ffffff",
@@ -29,12 +37,15 @@ export function residualColour(residual) {
   return rampColour(residual / LARGE_PX);
 }
 
-/** @param {number} share of the ramp, 0 to 1 */
-export function rampColour(share) {
+/** Colour of an amplitude. @param {number} share of those of most returns, 0 to 1 */
+export const amplitudeColour = (share) => rampColour(share, AMPLITUDES[document.documentElement.dataset.theme === "light" ? "light" : "dark"]);
+
+/** @param {number} share of the ramp, 0 to 1 @param {Ramp} [ramp] */
+export function rampColour(share, ramp = RESIDUALS) {
   const at = Math.min(1, Math.max(0, share));
-  const upper = RAMP.findIndex(([stop]) => stop >= at);
-  if (upper <= 0) return `rgb(${RAMP[0][1].join(" ")})`;
-  const [[low, from], [high, to]] = [RAMP[upper - 1], RAMP[upper]];
+  const upper = ramp.findIndex(([stop]) => stop >= at);
+  if (upper <= 0) return `rgb(${ramp[0][1].join(" ")})`;
+  const [[low, from], [high, to]] = [ramp[upper - 1], ramp[upper]];
   const part = (at - low) / (high - low);
   return `rgb(${from.map((value, index) => Math.round(value + part * (to[index] - value))).join(" ")})`;
 }

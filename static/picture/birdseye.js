@@ -4,7 +4,8 @@
  */
 
 import { attemptFirst } from "../base/actions.js";
-import { ink, smallFont, themeColour } from "../base/colours.js";
+import { degrees, sideways } from "../base/angles.js";
+import { amplitudeColour, ink, smallFont, themeColour } from "../base/colours.js";
 import { hideTip, make, showTip } from "../base/notices.js";
 import { emit, on, placementAt, state } from "../base/state.js";
 import { goTo, pause, tellCursor } from "../time/player.js";
@@ -100,7 +101,7 @@ function drawMap() {
   map.x_m.forEach((x, index) => {
     const [px, py] = toCanvas(x, map.y_m[index]);
     pen.globalAlpha = Math.max(0.12, 0.75 * (1 + Math.log10(map.share[index]) / 3));
-    pen.fillStyle = byAmplitude ? amplitudeColour(map.snr_db[index]) : staying();
+    pen.fillStyle = byAmplitude ? colourOf(map.snr_db[index]) : staying();
     pen.fillRect(px - size / 2, py - size / 2, size, size);
   });
   pen.globalAlpha = 1;
@@ -144,7 +145,7 @@ function drawReturn([, , , , snr, isStill, x, y, , age]) {
   const [px, py] = toCanvas(x, y);
   const longest = Math.max(state.lookOptions.trail_s, 1e-3);
   pen.globalAlpha = 1 - 0.8 * Math.min(1, age / longest);
-  pen.fillStyle = pen.strokeStyle = state.lookOptions.colour === "amplitude" && snr !== null ? amplitudeColour(snr) : isStill ? ink.still : ink.moving;
+  pen.fillStyle = pen.strokeStyle = state.lookOptions.colour === "amplitude" && snr !== null ? colourOf(snr) : isStill ? ink.still : ink.moving;
   pen.beginPath();
   pen.lineWidth = 1.3;
   if (isStill) {
@@ -223,22 +224,16 @@ function explain(event) {
     .sort((a, b) => a.far - b.far || a.seen[9] - b.seen[9]);
   if (nearest) {
     const [, , , doppler, snr, , x, y, z, age] = nearest.seen;
-    lines.push([place(x, y, z), snr === null ? "" : `${snr.toFixed(0)} dB`, doppler === null ? "" : `${doppler.toFixed(2)} m/s`, age > 0.05 ? `${age.toFixed(1)} s ago` : ""].filter(Boolean).join(", "));
+    lines.push([placeInWords(x, y, z), snr === null ? "" : `${snr.toFixed(0)} dB`, doppler === null ? "" : `${doppler.toFixed(2)} m/s`, age > 0.05 ? `${age.toFixed(1)} s ago` : ""].filter(Boolean).join(", "));
   }
   const near = placementNear(event);
   if (near) lines.push(describe(near));
-  if (!lines.length) lines.push(place(...toRadar(event.offsetX, event.offsetY), 0));
+  if (!lines.length) lines.push(placeInWords(...toRadar(event.offsetX, event.offsetY), 0));
   showTip(lines.join("\n"), event.clientX, event.clientY);
 }
 
-/** @param {number} x @param {number} y @param {number} z */
-function place(x, y, z) {
-  const angle = (Math.atan2(y, x) * 180) / Math.PI;
-  return `${Math.hypot(x, y, z).toFixed(2)} m, ${side(angle)}`;
-}
-
-/** @param {number} angle deg, positive to the left */
-const side = (angle) => `${Math.abs(angle).toFixed(1)}° ${angle >= 0 ? "left" : "right"}`;
+/** @param {number} x @param {number} y @param {number} z m */
+const placeInWords = (x, y, z) => `${Math.hypot(x, y, z).toFixed(2)} m, ${sideways(degrees(y, x))}`;
 
 /** A placement as one line. @param {Placement} placement */
 function describe(placement) {
@@ -246,7 +241,7 @@ function describe(placement) {
   const lasted = (placement.end_s - placement.start_s).toFixed(1);
   const amplitude = placement.snr_db === null ? "" : `, ${placement.snr_db.toFixed(0)} dB`;
   const above = placement.stands_out_db === null ? "" : ` (${placement.stands_out_db.toFixed(0)} dB above other returns at its range)`;
-  return `Placement ${number} of ${state.placements.length}: ${placement.range_m.toFixed(1)} m, ${side(placement.azimuth_deg)}, ${lasted} s${amplitude}${above}`;
+  return `Placement ${number} of ${state.placements.length}: ${placement.range_m.toFixed(1)} m, ${sideways(placement.azimuth_deg)}, ${lasted} s${amplitude}${above}`;
 }
 
 /** @param {WheelEvent} event */
@@ -255,14 +250,8 @@ function wheeled(event) {
   zoomEye(Math.exp(-event.deltaY * 0.0016), event.offsetX, event.offsetY);
 }
 
-/** Colours of amplitudes, the same as in the 3D view, from most returns to the strongest of the recording. */
-const DARK = [[78, 66, 190], [150, 60, 180], [214, 82, 120], [246, 150, 70], [250, 226, 92]];
-const LIGHT = [[240, 190, 110], [226, 120, 86], [180, 56, 120], [112, 36, 140], [44, 12, 92]];
-
-const isLight = () => document.documentElement.dataset.theme === "light";
-
 /** Colour of what was there, whatever its amplitude. */
-const staying = () => (isLight() ? "rgb(96 110 126)" : "rgb(128 146 164)");
+const staying = () => (document.documentElement.dataset.theme === "light" ? "rgb(96 110 126)" : "rgb(128 146 164)");
 
 /** The amplitudes at both ends of the colours; null if the radar has none. @returns {[number, number]|null} */
 function amplitudeRange() {
@@ -271,18 +260,9 @@ function amplitudeRange() {
 }
 
 /** @param {number} amplitude dB */
-function amplitudeColour(amplitude) {
+function colourOf(amplitude) {
   const range = amplitudeRange();
-  if (!range) return staying();
-  return rampColour((amplitude - range[0]) / Math.max(range[1] - range[0], 1e-9));
-}
-
-/** @param {number} share 0 to 1 */
-function rampColour(share) {
-  const ramp = isLight() ? LIGHT : DARK;
-  const at = Math.min(1, Math.max(0, share)) * (ramp.length - 1);
-  const low = Math.min(ramp.length - 2, Math.floor(at));
-  return `rgb(${ramp[low].map((value, index) => Math.round(value + (at - low) * (ramp[low + 1][index] - value))).join(" ")})`;
+  return range ? amplitudeColour((amplitude - range[0]) / Math.max(range[1] - range[0], 1e-9)) : staying();
 }
 
 const page = /** @type {HTMLElement} */ (document.getElementById("page-mark"));
@@ -362,7 +342,7 @@ function drawLegend() {
   if (state.lookOptions.colour === "amplitude" && range) {
     const steps = Array.from({ length: 24 }, (_, index) => {
       const step = make("i", "", []);
-      step.style.background = rampColour(index / 23);
+      step.style.background = amplitudeColour(index / 23);
       return step;
     });
     legend.replaceChildren(`${range[0].toFixed(0)}`, make("span", "ramp", steps), `${range[1].toFixed(0)} dB`, make("span", "key", "● static"), make("span", "key", "△ moving"));
@@ -384,7 +364,7 @@ function drawTable() {
   }));
   const rows = state.placements.map((placement, index) => {
     const lasted = `${(placement.end_s - placement.start_s).toFixed(1)} s`;
-    const cells = [String(index + 1), `${placement.start_s.toFixed(1)} s`, lasted, `${placement.range_m.toFixed(1)} m`, side(placement.azimuth_deg), decibels(placement.snr_db), decibels(placement.stands_out_db)];
+    const cells = [String(index + 1), `${placement.start_s.toFixed(1)} s`, lasted, `${placement.range_m.toFixed(1)} m`, sideways(placement.azimuth_deg), decibels(placement.snr_db), decibels(placement.stands_out_db)];
     const row = make("tr", placement.note ? "row odd" : "row", cells.map((words) => make("td", "", words)));
     row.dataset.placement = String(index);
     row.dataset.hint = [describe(placement), placement.note].filter(Boolean).join("\n");

@@ -3,6 +3,7 @@
  * Camera view, the page's own picture with the returns in front of it, projected by the server through the same lens.
  */
 
+import { degrees, sideways, upwards } from "../base/angles.js";
 import { ink, smallFont, smallPx, themeColour } from "../base/colours.js";
 import { clicks, nameOf, on, state } from "../base/state.js";
 import { spaceOptions } from "./options.js";
@@ -304,17 +305,13 @@ export function describeReturn([, , range, doppler, snr, isStill, , , , age, azi
   return words.join(", ");
 }
 
-/** @param {number} angle deg, positive to the left */
-const sideways = (angle) => `${Math.abs(angle).toFixed(1)}° ${angle > 0 ? "left" : "right"}`;
-/** @param {number} angle deg, positive upwards */
-const upwards = (angle) => `${Math.abs(angle).toFixed(1)}° ${angle < 0 ? "down" : "up"}`;
 /** A number without "-0.0". @param {number} value @param {number} decimals */
 const fixed = (value, decimals) => value.toFixed(decimals).replace(/^-(0\.?0*)$/, "$1");
 
 /** A position in words. @param {readonly number[]} position m */
 function describePlace([x, y, z]) {
   const level = Math.hypot(x, y);
-  return `${Math.hypot(level, z).toFixed(1)} m, ${sideways((Math.atan2(y, x) * 180) / Math.PI)}, ${upwards((Math.atan2(z, level) * 180) / Math.PI)}`;
+  return `${Math.hypot(level, z).toFixed(1)} m, ${sideways(degrees(y, x))}, ${upwards(degrees(z, level))}`;
 }
 
 /** Boxes of words that do not overlap: the first come stay. */
