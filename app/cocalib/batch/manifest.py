@@ -262,7 +262,7 @@ def _require_different(rows: Sequence[ManifestRow], path: Path) -> None:
 
 
 def _require_own_recordings(rows: Sequence[ManifestRow], path: Path) -> None:
-    """Refuse a recording of two vehicles or sessions: one measurement would count as two that agree.
+    """Refuse a recording of two vehicles or sessions: one of the rows names a wrong one.
 
     Raises:
         InputError: names both rows.

@@ -13,8 +13,9 @@ from typing import Final, Literal
 import msgspec
 from msgspec import Struct
 
+from calib_core.errors import CalibrationError
 from cocalib.batch.job import Job
-from cocalib.batch.results_folder import ResultsFolder, UnreadResult
+from cocalib.batch.results_folder import ResultsFolder
 
 PLANS: Final = "manifests"
 _SCHEMA: Final = "cocalib/batch-plan-1"
@@ -44,11 +45,11 @@ class Plan:
     Attributes:
         digests: of the job of each session, by vehicle and session; of one that several manifests name, as the latest batch
             wants it.
-        unread: records of manifests that cannot be read.
+        unread: of each record of a manifest that cannot be read, why, and what to do.
     """
 
     digests: Mapping[tuple[str, str], str]
-    unread: tuple[UnreadResult, ...] = ()
+    unread: tuple[str, ...] = ()
 
 
 def write_plan(folder: Path, manifest: Path, jobs: Sequence[Job]) -> None:
@@ -78,11 +79,11 @@ def read_plans(folder: Path) -> Plan:
     read, hint = msgspec.json.Decoder(PlanDocument).decode, "run the batch of its manifest again"
     documents, unread = [], []
     for path in sorted((folder / PLANS).glob("*.json")):
-        document = ResultsFolder(folder).read_as(read, PLANS, path.name, schema=_SCHEMA, hint=hint)
-        if isinstance(document, UnreadResult):
-            unread.append(document)
-        elif document is not None:
-            documents.append(document)
+        try:
+            document = ResultsFolder(folder).read_as(read, PLANS, path.name, schema=_SCHEMA, hint=hint)
+            documents += [document] if document is not None else []
+        except CalibrationError as error:
+            unread.append(str(error))
     documents.sort(key=lambda document: document.started)
     digests = {(row.vehicle, row.session): row.digest for document in documents for row in document.sessions}
     return Plan(digests, tuple(unread))

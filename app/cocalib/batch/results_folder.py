@@ -17,7 +17,7 @@ from typing import Self, TypeVar
 
 import msgspec
 
-from calib_core.errors import CalibrationError
+from calib_core.errors import InputError
 from cocalib.batch.outcome import Outcome, OutcomeFile, read_outcome
 from cocalib.session.file.guarded_folder import GuardedFolder
 
@@ -35,19 +35,6 @@ _UNFINISHED = re.compile(
 )
 _PATIENCE_S = 3600.0
 """A result is written in seconds, once everything in it is computed."""
-
-
-@dataclass(frozen=True, slots=True)
-class UnreadResult:
-    """The outcome of a job, or a manifest's record, that cannot be read.
-
-    Attributes:
-        place: relative to the folder that holds results/.
-        reason: what was found, and what to do.
-    """
-
-    place: str
-    reason: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,44 +71,26 @@ class ResultsFolder:
         except (OSError, ValueError, msgspec.DecodeError, RecursionError):
             return None
 
-    def read_as(
-        self, parse: Callable[[str], _Content], *names: str, schema: str, hint: str
-    ) -> _Content | UnreadResult | None:
-        """Return what a file states, or why it cannot be read; None if there is none.
+    def read_as(self, parse: Callable[[str], _Content], *names: str, schema: str, hint: str) -> _Content | None:
+        """Return what a file states; None if there is none.
 
         Args:
             parse: reads its text, or raises msgspec.DecodeError.
             names: of the folders below this one, and its own.
             schema: that it should have.
             hint: what to do about a file that is something else.
+
+        Raises:
+            CalibrationError: it cannot be read.
         """
         place = "/".join(names)
         try:
             content = self.read(*names)
             return None if content is None else parse(content.decode())
-        except CalibrationError as error:
-            above = ["/".join(names[:count]) for count in range(1, len(names) + 1)]
-            for refused in above:
-                if str(error).startswith(head := f"{self.path.resolve() / refused}: "):
-                    return UnreadResult(refused, str(error).removeprefix(head))
-            return UnreadResult(place, str(error))
         except OSError as error:
-            return UnreadResult(place, f"{error.strerror or error}; check its permissions")
+            raise InputError(f"{place}: {error.strerror or error}; check its permissions") from error
         except (UnicodeDecodeError, msgspec.DecodeError, RecursionError) as error:
-            return UnreadResult(place, f"is no {schema}: {error}; {hint}")
-
-    def result_file(self, digest: str, name: str) -> bytes | None:
-        """Return the content of a file of a result; None if there is none.
-
-        Args:
-            digest: of the job.
-            name: relative, as the outcome lists it.
-
-        Raises:
-            CalibrationError: it is not a regular file, or a folder above it is a link; it was not read.
-            OSError: it cannot be read.
-        """
-        return self.read(RESULTS, digest, *name.split("/"))
+            raise InputError(f"{place}: is no {schema}: {error}; {hint}") from error
 
     def read(self, *names: str) -> bytes | None:
         """Return the content of a file, by the names of the folders below this one and its own; None if there is none.

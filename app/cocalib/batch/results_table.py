@@ -19,7 +19,7 @@ from calib_core.results import Calibration
 from calib_core.results.verdict import stated_error
 from cocalib.batch.outcome import OUTCOME_SCHEMA, Outcome, Status, read_outcome
 from cocalib.batch.plan import read_plans
-from cocalib.batch.results_folder import OUTCOME_FILE, RESULTS, ResultsFolder, UnreadResult
+from cocalib.batch.results_folder import OUTCOME_FILE, RESULTS, ResultsFolder
 from cocalib.batch.solving import CALIBRATION_FILE
 
 RESULTS_SCHEMA: Final = "cocalib/batch-results-1"
@@ -67,7 +67,7 @@ class BatchResults(Struct, frozen=True, kw_only=True):
 
     schema: Literal["cocalib/batch-results-1"]
     sessions: tuple[SessionRow, ...]
-    unread: tuple[UnreadResult, ...] = ()
+    unread: tuple[str, ...] = ()
 
     @property
     def all_solved(self) -> bool:
@@ -128,47 +128,40 @@ def _row(results: ResultsFolder, vehicle: str, session: str, digest: str) -> Ses
     """Return the row of a session."""
     row = SessionRow(vehicle=vehicle, session=session, status="missing", folder=f"{RESULTS}/{digest}")
     hint = "if another version wrote it, read it with that one, or delete its folder and run the batch again"
-    place = (RESULTS, digest, OUTCOME_FILE)
-    outcome = results.read_as(read_outcome, *place, schema=OUTCOME_SCHEMA, hint=hint)
-    if outcome is None:
-        return replace(row, reason="there is no result", hint="run the batch again")
-    if isinstance(outcome, UnreadResult):
-        return replace(row, status="unreadable", reason=f"{outcome.place} {outcome.reason}")
-    if (outcome.digest, outcome.vehicle, outcome.session) != (digest, vehicle, session) or outcome.pairs >= _MOST:
-        reason = f"{'/'.join(place)} is of another job"
-        return replace(row, status="unreadable", reason=reason, hint="delete its folder and run the batch again")
-    row = replace(
-        row,
-        recorded=_recorded(outcome.recorded_ns),
-        status=outcome.status,
-        verdict=outcome.verdict,
-        aed_px=outcome.aed_px,
-        pairs=outcome.pairs,
-        reason=outcome.reason,
-        hint=outcome.hint,
-    )
-    if outcome.verdict not in _WITH_POSE:
-        return row
     try:
-        return _with_pose(row, _calibration(results, outcome))
-    except (OSError, CalibrationError) as error:
-        reason = getattr(error, "strerror", None) or str(error).removeprefix(f"{CALIBRATION_FILE}: ")
-        reason = f"{row.folder}/{CALIBRATION_FILE}: {reason}"
-        return replace(row, status="unreadable", reason=reason, hint="run the batch again")
+        outcome = results.read_as(read_outcome, RESULTS, digest, OUTCOME_FILE, schema=OUTCOME_SCHEMA, hint=hint)
+        if outcome is None:
+            return replace(row, reason="there is no result", hint="run the batch again")
+        if (outcome.digest, outcome.vehicle, outcome.session) != (digest, vehicle, session) or outcome.pairs >= _MOST:
+            raise InputError(
+                f"{row.folder}/{OUTCOME_FILE}: is of another job; delete its folder and run the batch again"
+            )
+        row = _of_outcome(row, outcome)
+        return _with_pose(row, _calibration(results, outcome)) if outcome.verdict in _WITH_POSE else row
+    except CalibrationError as error:
+        return replace(row, status="unreadable", reason=str(error), hint="")
+
+
+def _of_outcome(row: SessionRow, outcome: Outcome) -> SessionRow:
+    shared = ("status", "verdict", "aed_px", "pairs", "reason", "hint")
+    return replace(row, recorded=_recorded(outcome.recorded_ns), **{name: getattr(outcome, name) for name in shared})
 
 
 def _calibration(results: ResultsFolder, outcome: Outcome) -> Calibration:
     """Read the calibration of a result.
 
     Raises:
-        OSError: the file cannot be read.
         CalibrationError: it is not the file that the outcome lists, or no calibration.
     """
+    place = f"{RESULTS}/{outcome.digest}/{CALIBRATION_FILE}"
     listed = {file.name: file.sha256 for file in outcome.files}
-    content = results.result_file(outcome.digest, CALIBRATION_FILE) or b""
+    try:
+        content = results.read(RESULTS, outcome.digest, CALIBRATION_FILE) or b""
+    except OSError as error:
+        raise InputError(f"{place}: {error.strerror or error}; check its permissions") from error
     if hashlib.sha256(content).hexdigest() != listed.get(CALIBRATION_FILE):
-        raise InputError("is not the file that the outcome lists")
-    return read_calibration(content, CALIBRATION_FILE).calibration
+        raise InputError(f"{place}: is not the file that the outcome lists; run the batch again")
+    return read_calibration(content, place).calibration
 
 
 def _with_pose(row: SessionRow, calibration: Calibration) -> SessionRow:

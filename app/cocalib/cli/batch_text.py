@@ -20,23 +20,11 @@ _STATUSES = {
     **{"solved": "solved", "weak": "in doubt", "refused": "refused"},
     **{"failed": "failed", "missing": "missing", "unreadable": "unreadable"},
 }
-_KEYS_OF = {
-    "--map": "map under [session.topics]",
-    "--confirm-assumptions": "confirm_assumptions = true under [session.topics]",
-    "--radar-topic": "radar_topic under [session.topics]",
-    "--image-topic": "image_topic under [session.topics]",
-    "--camera ": "camera",
-    "--rescale-camera": "rescale_camera = true",
-    "--camera-position-m": "camera_position_m",
-}
-"""The keys for flags that advice of the commands names."""
 
 
 def batch_lines(outcomes: "Sequence[Outcome]") -> list[str]:
     """Say what came of a batch: how many of each kind, then why there is no calibration, or one in doubt."""
-    lines = [_counts(outcomes), *_why_lines(outcomes)]
-    named = [flag for flag in _KEYS_OF if any(flag in f"{one.reason} {one.hint}" for one in outcomes)]
-    return lines + [f"in a manifest, {flag} is {_KEYS_OF[flag]}" for flag in named]
+    return [_counts(outcomes), *_why_lines(outcomes)]
 
 
 def status_lines(table: "BatchResults") -> "Iterator[str]":
@@ -49,7 +37,7 @@ def status_lines(table: "BatchResults") -> "Iterator[str]":
     yield ""
     yield _counts(table.sessions)
     yield from _why_lines(table.sessions)
-    yield from (f"{unread.place} {unread.reason}" for unread in table.unread)
+    yield from table.unread
 
 
 def _cells(row: "SessionRow") -> tuple[str, ...]:

@@ -1,7 +1,5 @@
 """Build HTML and SVG from values: all that is not markup already is escaped, so that no text of a file becomes a tag."""
 
-import base64
-import hashlib
 import html
 import unicodedata
 from collections.abc import Iterable
@@ -81,26 +79,20 @@ def _is_hidden(character: str) -> bool:
     return unicodedata.category(character) in _REPLACED and character not in _KEPT_CONTROLS
 
 
-def html_file(title: str, body: Markup, *, style: str = "", script: str = "") -> str:
+def html_file(title: str, body: Markup) -> str:
     """Return a whole file that is well-formed XML, too.
 
     Args:
         title: for the window.
         body: the element.
-        style: rules that follow the report's own.
-        script: the only one that the page may run; none if empty.
     """
-    text = f"//<![CDATA[\n{script}\n//]]>" if script else ""
-    digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
-    policy = f"{_POLICY}; script-src 'sha256-{digest}'" if script else _POLICY
     head = tag(
         "head",
         tag("meta", charset="utf-8"),
-        tag("meta", http_equiv="Content-Security-Policy", content=policy),
+        tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
         tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
         tag("title", title),
-        Markup(f"<style>{_style()}{style}</style>"),
-        Markup(f'<script type="module">{text}</script>') if script else None,
+        Markup(f"<style>{_style()}</style>"),
     )
     return f"<!DOCTYPE html>\n{tag('html', head, body, lang='en', xmlns='http://www.w3.org/1999/xhtml').text}\n"
 

@@ -172,7 +172,7 @@ def test_a_stamp_that_no_calendar_has_is_unknown(folder):
 def test_a_manifest_s_record_that_cannot_be_read_is_named(folder):
     (folder / "manifests" / "spoilt.json").write_text("garbage")
     table = read_results(folder)
-    assert [unread.place for unread in table.unread] == ["manifests/spoilt.json"]
+    assert [reason.partition(": ")[0] for reason in table.unread] == ["manifests/spoilt.json"]
     assert len(table.sessions) == 4
     assert not table.all_solved
 

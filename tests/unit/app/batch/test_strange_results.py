@@ -70,11 +70,10 @@ def test_a_batch_refuses_a_result_that_status_cannot_read(tmp_path):
     write_plan(out, Path("all.toml"), jobs)
     put("link to a file", place := ResultsFolder(out).folder_of(jobs[0].digest) / OUTCOME_FILE)
     (row,) = read_results(out).sessions
-    words = row.reason.partition("outcome.json ")[2]
     with pytest.raises(CalibrationError) as refused:
         drive(jobs, InProcess(), ResultsFolder(out))
-    assert (row.status, str(refused.value)) == ("unreadable", f"{place}: {words}")
-    assert words
+    assert (row.status, row.reason) == ("unreadable", str(refused.value))
+    assert row.reason.startswith(f"{place}: ")
     assert place.is_symlink()
 
 
@@ -147,8 +146,8 @@ def test_what_a_manifest_wants_is_never_read_or_written_through_something_else(k
     plan = read_plans(tmp_path / "out")
     assert plan.digests == {}
     (unread,) = plan.unread
-    assert unread.place == "manifests/all.toml.json"
-    assert "neither read nor changed" in unread.reason
+    assert "manifests/all.toml.json: " in unread
+    assert "neither read nor changed" in unread
     with pytest.raises(CalibrationError, match=r"all\.toml\.json: is .*, not a file; it was neither read nor changed"):
         write_plan(tmp_path / "out", Path("all.toml"), ())
     if kind == "link to a file":
@@ -162,4 +161,4 @@ def test_an_outcome_that_is_no_file_is_named(kind, tmp_path):
     put(kind, folder.folder_of(DIGEST) / OUTCOME_FILE)
     row = row_of(tmp_path / "out")
     assert row.status == "unreadable"
-    assert f"results/{DIGEST}/outcome.json is a " in row.reason
+    assert f"results/{DIGEST}/outcome.json: is a " in row.reason
