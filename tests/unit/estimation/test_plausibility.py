@@ -76,7 +76,7 @@ def test_clicks_of_a_smaller_image_and_clicks_outside_are_told_apart(simulated):
         found_in(simulated, points, moved)["pixels-suspected"]
         for moved in (pixels / 2.0, pixels + np.array([0.0, 600.0]))
     )
-    assert halved["reach"] == pytest.approx((0.5, 0.5), abs=0.1)
+    assert 0.3 < min(halved["reach"]) < max(halved["reach"]) <= 0.5
     assert shifted["outside"] > 0
     assert shifted["pixel_px"][1] > 1080
 
