@@ -8,7 +8,7 @@ import { ask, BROKE_OFF, content, saveFile } from "../base/asking.js";
 import { showPage } from "../base/layout.js";
 import { icon, make, shape, toast } from "../base/notices.js";
 import { send } from "../base/socket.js";
-import { on, state } from "../base/state.js";
+import { on, said, state } from "../base/state.js";
 import { frameDrawing, IDENTITY, nameFields, parentFields, rawBox, rectifiedBox } from "./fields.js";
 import { drawFormats, focusFormats, formatColumn } from "./list.js";
 
