@@ -84,33 +84,6 @@ def read_outcome(text: str) -> Outcome:
     """Read outcome-1 JSON.
 
     Raises:
-        msgspec.DecodeError: it is something else; the message says what and what to do.
+        msgspec.DecodeError: it is something else.
     """
-    try:
-        return msgspec.json.decode(text, type=Outcome)
-    except msgspec.ValidationError as error:
-        schema = _schema_in(text)
-        if schema in (None, OUTCOME_SCHEMA) and "matching regex" not in str(error):
-            raise
-        if schema in (None, OUTCOME_SCHEMA):
-            place = str(error).rpartition("`$.")[2].rstrip("`")
-            raise msgspec.ValidationError(
-                f"{place} is not the relative name of a file beside it; run the job again"
-            ) from error
-        raise msgspec.ValidationError(
-            f"a result of another version of cocalib ({schema}, this one reads {OUTCOME_SCHEMA}): name another folder with "
-            "--out, or use that version"
-        ) from error
-
-
-def _schema_in(text: str) -> str | None:
-    """Return the name of a document's schema, if it states one of ours."""
-    try:
-        schema = msgspec.json.decode(text, type=_Named).schema
-    except msgspec.DecodeError:
-        return None
-    return schema if schema.startswith("cocalib/") and schema.isprintable() else None
-
-
-class _Named(Struct):
-    schema: str
+    return msgspec.json.decode(text, type=Outcome)

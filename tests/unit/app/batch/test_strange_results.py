@@ -89,9 +89,7 @@ def test_an_outcome_that_lists_what_is_not_in_its_folder_is_none(name, tmp_path)
     outcome["files"][0]["name"] = name
     place.write_text(json.dumps(outcome))
     assert folder.outcome(DIGEST) is None
-    with pytest.raises(
-        msgspec.ValidationError, match=r"^files\[0\]\.name is not the relative name of a file beside it"
-    ):
+    with pytest.raises(msgspec.ValidationError, match=r"files\[0\]\.name"):
         read_outcome(place.read_text())
 
 
