@@ -65,7 +65,7 @@ def test_the_numbers_are_those_of_the_calibration(subject, project_root):
         assert np.array_equal(values[:12].reshape(3, 4)[:, :3], expected.rotation)
         assert np.array_equal(values[:12].reshape(3, 4)[:, 3], expected.translation_m)
         assert np.array_equal(values[12:], quaternion_wxyz_from_matrix(expected.rotation))
-    assert f"average distance (AED){plain(metrics.aed_px)} px" in words
+    assert f"mean reprojection error (AED){plain(metrics.aed_px)} px" in words
     assert f"chi2 / degrees of freedom{plain(metrics.chi2)} / {metrics.degrees_of_freedom}" in words
 
 
