@@ -69,7 +69,7 @@ class _Search:
         self._sizes: Counter[tuple[int, int]] = Counter(view.size_px for view in known)
         self._order = PictureOrder(len(pictures), pictures.time_ns)
         self._complete = False
-        self._shown: dict[int, str] = {}  # other boards in pictures that were asked for them; "" for none
+        self._shown: dict[int, tuple[int, int] | None] = {}  # other boards in pictures that were asked for them
 
     def run(self, pool: ThreadPoolExecutor) -> Iterator[None]:
         """Search picture after picture; yields after each."""
@@ -190,7 +190,7 @@ class _Search:
             LeftOutPicture(
                 index,
                 self._pictures.name(index),
-                f"it shows a board of {shown[index]} inner corners"
+                f"it shows a board of {_size_text(shown[index])} inner corners"
                 if index in shown
                 else f"no {self._board.text} is seen in it as a whole"
                 if self._board.kind == "checkerboard"
@@ -199,55 +199,29 @@ class _Search:
             for index in empty
         ]
 
-    def _other_boards(self, indices: Sequence[int]) -> dict[int, str]:
+    def _other_boards(self, indices: Sequence[int]) -> dict[int, tuple[int, int]]:
         """Return which checkerboard some pictures show instead, by their numbers."""
         asked = indices[:: max(1, len(indices) // _ASKED_FOR_OTHERS)]
         if not self._shown.keys() & set(indices):
             for index in asked:
-                other = board_in(self._pictures.picture(index), self._board)
-                self._shown[index] = f"{other[0]} x {other[1]}" if other else ""
+                self._shown[index] = board_in(self._pictures.picture(index), self._board)
         return {index: shown for index, shown in self._shown.items() if shown}
 
     def _no_board(self) -> Unsolvable:
         if not self._seen:
-            return Unsolvable.reported(
-                "no-pictures", "there are no pictures to look for a board in", "give pictures of the board"
-            )
+            return Unsolvable("no-pictures")
         if self._unreadable and len(self._unreadable) == len(self._seen):
             why = next(iter(self._unreadable.values()))
-            return Unsolvable.reported(
-                "unreadable", f"none of {len(self._seen)} pictures can be read: {why}", "check the files"
-            )
-        empty = self._empty()
-        sizes = Counter(self._other_boards(empty).values())
-        count = len(self._views)
-        shows = "show" if count > 1 else "shows"
-        what = f"{count or 'none'} of {len(self._seen)} pictures {shows} a {self._board.text}"
-        if sizes:
-            size, count = sizes.most_common(1)[0]
-            return Unsolvable.reported(
-                "other-board",
-                f"{what}; {count} of the {len(self._shown)} that were looked at for others show {size} inner corners",
-                f"state {size.replace(' ', '')} if that is the board: its inner corners are one fewer than its squares",
-            )
-        return Unsolvable.reported("no-board", what, _film(self._board))
+            return Unsolvable("unreadable", {"pictures": len(self._seen), "why": why})
+        sizes = Counter(self._other_boards(self._empty()).values())
+        seen = {"board": self._board, "searched": len(self._seen), "views": len(self._views)}
+        if not sizes:
+            return Unsolvable("no-board", seen)
+        corners, shown = sizes.most_common(1)[0]
+        return Unsolvable("other-board", {**seen, "corners": corners, "shown": shown, "asked": len(self._shown)})
 
     def _mixed_sizes(self) -> Unsolvable:
-        sizes = ", ".join(f"{count} of {_size_text(size)}" for size, count in self._sizes.most_common(4))
-        return Unsolvable.reported(
-            "mixed-sizes",
-            f"the pictures have different sizes: {sizes} pixels",
-            "give the pictures of one camera in one size: every size has a calibration of its own",
-        )
-
-
-def _film(board: Board) -> str:
-    if board.kind == "checkerboard":
-        return (
-            "film the board as a whole, near enough that its squares are 10 px wide, with a white margin around it, and state "
-            "its inner corners, which are one fewer than its squares"
-        )
-    return "film the board near enough that its markers are 30 px wide, and state its size and the dictionary of its markers"
+        return Unsolvable("mixed-sizes", {"counts": tuple(self._sizes.most_common(4))})
 
 
 def _size_text(size_px: tuple[int, int]) -> str:

@@ -16,6 +16,7 @@ from calib_core.intrinsics.calibrated_lens import CalibratedLens, LensView
 from calib_core.intrinsics.coverage import BoardSearch
 from calib_core.intrinsics.linearization import (
     FLAT,
+    STRETCH,
     BoardWarp,
     LensState,
     ViewStack,
@@ -47,7 +48,6 @@ _PARALLEL_DEG = 20.0
 _SAME_DEG = 4.0
 _AS_GOOD = 1.3
 _SHAPE_SHARE = 0.5  # all would cover a bend that stays just unseen twice; none would cover it in 9 of 10 cases
-_FILM = "film the board from at least 10 directions, turned by 30 to 45 deg to the left, right, up and down"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,7 +95,7 @@ def calibrate_lens(
         if progress is not None:
             progress(step)
         if stopped is not None and stopped():
-            return Unsolvable.reported("stopped", "the calibration was stopped", "start it again")
+            return Unsolvable("stopped")
 
 
 def _steps(search: BoardSearch, model: LensChoice) -> Generator[str, None, CalibratedLens | Unsolvable]:
@@ -107,8 +107,7 @@ def _steps(search: BoardSearch, model: LensChoice) -> Generator[str, None, Calib
     yield "choosing a lens model"
     chosen = used.choose(FLAT)
     if isinstance(chosen, str):
-        hint = _FILM if model == "auto" else "choose another lens model, or let it be chosen (auto)"
-        return Unsolvable.reported("no-lens", f"no lens model fits {len(used.views)} views: {chosen}", hint)
+        return Unsolvable("no-lens", {"views": len(used.views), "why": chosen, "model": model})
     yield "looking at the shape of the board"
     shape = try_shapes(chosen.fit, used.stack, possible_warps(used.board_m))
     modelled = False
@@ -133,7 +132,7 @@ def _used(search: BoardSearch, model: LensChoice) -> _Used | Unsolvable:
     stack = stack_views(views, board_m, search.size_px)
     states = _starts(stack, model)
     if not states:
-        return Unsolvable.reported("no-lens", "no focal length of any lens model explains most of the views", _FILM)
+        return Unsolvable("no-lens")
     judged = _judged(views, stack, states, may_be_mirrored=search.board.kind == "checkerboard")
     reasons = zip(views, judged.reasons, strict=True)
     left_out += [LeftOutPicture(view.index, view.name, reason) for view, reason in reasons if reason]
@@ -162,10 +161,7 @@ def _fault(view: BoardCorners, board_m: Points3, size_px: tuple[int, int]) -> st
 
 
 def _too_few(count: int, left_out: Sequence[LeftOutPicture]) -> Unsolvable:
-    why = "".join(f"; {picture.name}: {picture.reason}" for picture in left_out[:3])
-    return Unsolvable.reported(
-        "few-views", f"{count} usable views of the board, at least {_LEAST_VIEWS} are needed{why}", _FILM
-    )
+    return Unsolvable("few-views", {"views": count, "needed": _LEAST_VIEWS, "left_out": tuple(left_out)})
 
 
 def _starts(stack: ViewStack, model: LensChoice) -> list[LensState]:
@@ -243,14 +239,12 @@ def _unknown_focal(camera: Camera, fit: LensFit) -> Unsolvable | None:
     normals = fit.state.rotations[:, :, 2]
     apart_deg = np.degrees(np.arccos(np.clip((normals @ normals.T).min(), -1.0, 1.0)))
     sigma = worst_focal_sigma(camera)
-    known = f"the focal length, {camera.matrix_px[0, 0]:.0f} px, is known to {100.0 * sigma:.0f} %"
+    known = {"focal_px": float(camera.matrix_px[0, 0]), "sigma": sigma}
     if apart_deg < _SAME_DEG or (sigma > _UNKNOWN_FOCAL and apart_deg < _PARALLEL_DEG):
-        reason = f"the board is turned by {apart_deg:.0f} deg at most from view to view; {known}"
-        return Unsolvable.reported("parallel-views", reason, _FILM)
+        return Unsolvable("parallel-views", {**known, "turned_deg": float(apart_deg)})
     if sigma > _UNKNOWN_FOCAL:
         rms_px = float(np.sqrt(fit.mean_squares.mean()))
-        hint = f"check the board and the lens model ({camera.model}), and {_FILM}"
-        return Unsolvable.reported("unknown-focal-length", f"{known}; the corners fit to {rms_px:.2f} px", hint)
+        return Unsolvable("unknown-focal-length", {**known, "rms_px": rms_px, "model": camera.model})
     return None
 
 
@@ -297,58 +291,30 @@ def lens_warnings(camera: Camera, stack: ViewStack, rms_px: float) -> Iterator[D
     yield from _about_numbers(camera, rms_px)
     outside = folds_back(camera, picture_places(stack.size_px))
     if outside.any() and camera.lens.is_perspective:
-        yield DataWarning.reported(
-            "lens-folds-back",
-            f"the distortion folds back in {100.0 * outside.mean():.0f} % of the picture, where no corners were found",
-            "film the board there, or choose a simpler lens model",
-        )
+        yield DataWarning("lens-folds-back", {"share": float(outside.mean())})
 
 
 def _about_views(camera: Camera, stack: ViewStack) -> Iterator[DataWarning]:
     covered = _covered_share(stack)
     if covered < _LEAST_COVERED:
-        yield DataWarning.reported(
-            "little-covered",
-            f"the corners of all views cover {100.0 * covered:.0f} % of the picture; beyond them the lens is a guess",
-            "film the board in the corners and along the edges of the picture",
-        )
+        yield DataWarning("little-covered", {"share": covered})
     if len(stack) < _FEW_VIEWS:
-        yield DataWarning.reported(
-            "few-views",
-            f"only {len(stack)} views; how well the lens is known is itself poorly known",
-            "film 15 to 30 views, tilted to all sides",
-        )
+        yield DataWarning("few-views", {"views": len(stack)})
     sigma = worst_focal_sigma(camera)
     if sigma > _FOCAL_SIGMA:
-        yield DataWarning.reported(
-            "weak-focal-length",
-            f"the focal length is known to {100.0 * sigma:.1f} % only",
-            "film views in which the board is turned by 30 to 45 deg to the left, right, up and down",
-        )
+        yield DataWarning("weak-focal-length", {"sigma": sigma})
 
 
 def _about_numbers(camera: Camera, rms_px: float) -> Iterator[DataWarning]:
-    fx, fy, cx, cy = camera.parameters[:4]
+    fx, fy, cx, cy = camera.parameters[:4].tolist()
     off = np.abs([cx / (camera.width_px - 1) - 0.5, cy / (camera.height_px - 1) - 0.5])
     if off.max() > _FAR_PRINCIPAL_POINT:
-        yield DataWarning.reported(
-            "principal-point-far",
-            f"the principal point ({cx:.0f}, {cy:.0f}) is far from the middle of the picture "
-            f"({(camera.width_px - 1) / 2:.0f}, {(camera.height_px - 1) / 2:.0f})",
-            "check whether the pictures are cropped; if not, film more tilted views all over the picture",
-        )
+        middle_px = ((camera.width_px - 1) / 2, (camera.height_px - 1) / 2)
+        yield DataWarning("principal-point-far", {"point_px": (cx, cy), "middle_px": middle_px})
     if abs(fx / fy - 1.0) > _UNEQUAL_FOCAL_LENGTHS:
-        yield DataWarning.reported(
-            "unequal-focal-lengths",
-            f"the focal lengths differ by {100.0 * abs(fx / fy - 1.0):.1f} %: {fx:.1f} px along rows, {fy:.1f} px along columns",
-            "check whether the pictures were resized with other proportions, and whether the board's squares are square",
-        )
+        yield DataWarning("unequal-focal-lengths", {"fx_px": fx, "fy_px": fy})
     if rms_px > _LARGE_RMS_PX:
-        yield DataWarning.reported(
-            "large-residuals",
-            f"the corners fit to {rms_px:.2f} px; 0.1 to 0.5 px is usual",
-            "check the number of corners of the board, the focus and the lens model, and hold the board still",
-        )
+        yield DataWarning("large-residuals", {"rms_px": rms_px})
 
 
 def _covered_share(stack: ViewStack) -> float:
@@ -367,44 +333,17 @@ def shape_warnings(test: ShapeTest, amounts: Values, sigmas: Values, *, modelled
         sigmas: (s,) of the same.
         modelled: whether the lens was calibrated with the board's shape as found.
     """
-    done = (
-        "it was taken into account" if modelled else "it was not taken into account, because no lens model fits with it"
-    )
-    bends = [
-        f"{abs(1e3 * amount):.2f} ± {1e3 * sigma:.2f} mm {_BENDS[name]}"
-        for name, amount, sigma in zip(test.found.names, amounts, sigmas, strict=True)
-        if name in _BENDS and abs(amount) > 2.0 * sigma
-    ]
-    if bends:
-        yield DataWarning.reported(
-            "bent-board",
-            f"the board is bent by {' and '.join(bends)}; {done}",
-            "fix the board to glass or a stiff plate",
-        )
-    for name, amount, sigma in zip(test.found.names, amounts, sigmas, strict=True):
-        if name not in _BENDS:
-            yield DataWarning.reported(
-                "unequal-squares",
-                f"the squares are {100.0 * abs(amount):.2f} ± {100.0 * sigma:.2f} % {'wider' if amount > 0 else 'narrower'} "
-                f"than high; {done}",
-                "measure ten squares along a row and along a column, and print without scaling to the page",
-            )
+    shapes = dict(zip(test.found.names, zip(amounts.tolist(), sigmas.tolist(), strict=True), strict=True))
+    stretched = shapes.pop(STRETCH, None)
+    bends_mm = {name: (1e3 * bend, 1e3 * sigma) for name, (bend, sigma) in shapes.items() if abs(bend) > 2.0 * sigma}
+    if bends_mm:
+        yield DataWarning("bent-board", {"bends_mm": bends_mm, "modelled": modelled})
+    if stretched is not None:
+        stretch, sigma = stretched
+        yield DataWarning("unequal-squares", {"stretch": stretch, "sigma": sigma, "modelled": modelled})
 
 
 def skew_warnings(skew: RowSkew) -> Iterator[DataWarning]:
     """Say that views are skewed as by motion under a rolling shutter."""
     if skew.shows:
-        yield DataWarning.reported(
-            "skewed-views",
-            f"views are skewed by {np.median(skew.skews_px):.1f} px (median) from the first row of the picture to the last, "
-            f"which explains {100.0 * skew.share:.0f} % of the squared residuals: a board that moved under a rolling shutter "
-            "does that, or a lens model that does not fit",
-            "hold board and camera still for each view, or lean the board on something and move the camera between views",
-        )
-
-
-_BENDS = {
-    "bend along the rows": "in the middle of its rows",
-    "bend along the columns": "in the middle of its columns",
-    "twist": "at its corners (twisted)",
-}
+        yield DataWarning("skewed-views", {"skew_px": float(np.median(skew.skews_px)), "share": skew.share})

@@ -42,6 +42,7 @@ class BoardWarp:
         return board_m + np.tensordot(amounts, self.directions, axes=1) if len(self) else board_m
 
 
+STRETCH = "stretch of the rows"
 FLAT = BoardWarp((), np.zeros((0, 1, 3)))
 """The board is as stated."""
 
@@ -61,7 +62,7 @@ def possible_warps(board_m: Points3) -> BoardWarp:
     directions = np.zeros((4, len(board_m), 3))
     directions[0, :, 2], directions[1, :, 2], directions[2, :, 2] = 1.0 - across**2, 1.0 - down**2, across * down
     directions[3, :, 0] = board_m[:, 0] - (low[0] + high[0]) / 2.0
-    return BoardWarp(("bend along the rows", "bend along the columns", "twist", "stretch of the rows"), directions)
+    return BoardWarp(("bend along the rows", "bend along the columns", "twist", STRETCH), directions)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -55,19 +55,9 @@ class ResidualField:
         object.__setattr__(self, "counts", frozen_array(self.counts, (len(self.y_px), len(self.x_px)), dtype=np.int64))
 
     @property
-    def sentence(self) -> str:
-        """Say whether the residuals are more than noise."""
-        said = []
-        if self.systematic:
-            said.append(f"the views share a pattern of {self.systematic_px:.3f} px over the picture")
-        if self.neighbour_correlation > _CORRELATED:
-            said.append(f"neighbouring corners of a view err alike (correlation {self.neighbour_correlation:.1f})")
-        if not said:
-            return "The residuals show no pattern that is more than noise."
-        return (
-            f"The residuals are more than noise: {' and '.join(said)}; the lens model, the board's shape, motion or blur is "
-            "not described."
-        )
+    def neighbours_alike(self) -> bool:
+        """Whether neighbouring corners of a view err alike."""
+        return self.neighbour_correlation > _CORRELATED
 
 
 def residual_field(lens: CalibratedLens, columns: int = _COLUMNS, rows: int = _ROWS) -> ResidualField:

@@ -50,14 +50,6 @@ class SplitDifference:
         """Whether both lenses are as close as their covariances say."""
         return self.ratio <= _TOO_FAR
 
-    @property
-    def sentence(self) -> str:
-        """Say what the comparison shows."""
-        how = f"Calibrated separately from {self.split}, two lenses differ by {self.ratio:.1f} times what the stated uncertainty"
-        if self.agrees:
-            return f"{how} lets expect: no error of the lens model shows."
-        return f"{how} lets expect: the lens model, the board's shape or motion adds an error that it does not contain."
-
 
 def split_difference(lens: CalibratedLens, columns: int = _COLUMNS, rows: int = _ROWS) -> SplitDifference | Unsolvable:
     """Calibrate two halves of the views separately, in two ways, and return the comparison that differs more.
@@ -71,11 +63,7 @@ def split_difference(lens: CalibratedLens, columns: int = _COLUMNS, rows: int = 
         rows: of the grid.
     """
     if len(lens.views) < _LEAST_VIEWS:
-        return Unsolvable.reported(
-            "few-views",
-            f"{len(lens.views)} views cannot be calibrated in halves, {_LEAST_VIEWS} can",
-            "film the board from more directions",
-        )
+        return Unsolvable("few-views", {"views": len(lens.views), "needed": _LEAST_VIEWS, "halves": True})
     distances_m = np.array([np.linalg.norm(view.camera_from_board.translation_m) for view in lens.views])
     order = np.argsort(distances_m, kind="stable")
     near = np.zeros(len(order), dtype=bool)

@@ -15,6 +15,7 @@ from calib_core.words.outcomes import (
     unpaired_told,
     warning_text,
 )
+from calib_core.words.remark import Remark, remark
 from calib_core.words.text import OptionPart, PairPart, Words, join, listed, named, option, say, sentence, words
 from calib_core.words.verdict import (
     StatedVerdict,
@@ -27,7 +28,7 @@ from calib_core.words.verdict import (
     verdict_line,
     verdict_rest,
 )
-from calib_core.words.warnings import Remark, probability_text, remark, told
+from calib_core.words.warnings import probability_text, told
 
 __all__ = [
     "OptionPart",

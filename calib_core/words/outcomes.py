@@ -6,8 +6,10 @@ from dataclasses import dataclass
 from calib_core.json_forms import Name
 from calib_core.measurements import DataWarning, Unpaired, Unsolvable
 from calib_core.results.actions import CalibrateLens, SetOption
+from calib_core.words import intrinsics
+from calib_core.words.remark import Remark, Row, by_code, remark
 from calib_core.words.text import Words, join, option, say, sentence
-from calib_core.words.warnings import Remark, Row, remark, told
+from calib_core.words.warnings import told
 
 _INTRINSICS = (
     "check that clicks and radar data are from the same times, that the intrinsics belong to this camera at this image "
@@ -98,6 +100,16 @@ def useless_lens_covariance(*, parameter: str = "", value_px: float = 0.0, sigma
     )
 
 
+def stopped() -> Remark:
+    return remark("stopped before the end", "start it again")
+
+
+def unreadable(*, why: str, pictures: int = 0) -> Remark:
+    if pictures:
+        return remark(f"none of {pictures} images can be read: {why}", "check the files")
+    return remark(why, "the clicks are kept; fix the problem, then change any click to try again")
+
+
 def no_scan(*, gap_s: float | None = None, allowed_s: float = 0.0) -> Remark:
     if gap_s is None:
         return remark("the radar recording has no scan", "choose the radar topic that has returns")
@@ -154,21 +166,21 @@ def chosen_return_missing(*, range_m: float, azimuth_deg: float) -> Remark:
 
 
 OUTCOMES: Mapping[str, Row] = {
-    row.__name__.replace("_", "-"): row
-    for row in (
+    **by_code(
         degenerate_placements,
         mirrored_axes,
         no_consensus,
         no_pose,
         points_in_one_line,
         refinement_diverged,
+        stopped,
         too_few_pairs,
+        unreadable,
         useless_lens_covariance,
-    )
+    ),
+    **intrinsics.OUTCOMES,
 }
-UNPAIRED: Mapping[str, Row] = {
-    row.__name__.replace("_", "-"): row for row in (chosen_return_missing, no_scan, no_static_return, no_z_score_inlier)
-}
+UNPAIRED = by_code(chosen_return_missing, no_scan, no_static_return, no_z_score_inlier)
 
 
 def outcome_told(outcome: Unsolvable) -> Remark:

@@ -25,9 +25,10 @@ from calib_core.results.actions import (
 )
 from calib_core.results.verdict import SURE_PAIRS, Assumed, StatedError, Verdict, VerdictLevel
 from calib_core.words.outcomes import outcome_told
+from calib_core.words.remark import Remark
 from calib_core.words.systematic_errors import remedy_of
 from calib_core.words.text import Words, join, listed, option, words
-from calib_core.words.warnings import Remark, told
+from calib_core.words.warnings import told
 
 _CORNER = "the reflector's inner corner, where its three sheets meet"
 

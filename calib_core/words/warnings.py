@@ -4,15 +4,12 @@ The parameters of a row are the facts that its code has, as the check that finds
 warning is one more row; what to do about a warning is decided here and nowhere else.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TypeAlias
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from calib_core.measurements import DataWarning
 from calib_core.results.actions import (
-    Action,
     CalibrateLens,
     ChooseReturn,
     MeasureCameraPosition,
@@ -21,34 +18,14 @@ from calib_core.results.actions import (
     SpreadPlacements,
 )
 from calib_core.results.systematic_errors import SystematicErrorResult, family_of
+from calib_core.words import intrinsics
+from calib_core.words.remark import Remark, Row, by_code, remark
 from calib_core.words.systematic_errors import FAMILIES, error_words, knowledge, percent, prior_text, value_text
-from calib_core.words.text import Words, count, join, listed, named, option, say, words
+from calib_core.words.text import Words, count, join, listed, named, option, say
 
-
-@dataclass(frozen=True, slots=True)
-class Remark:
-    """What a person is told.
-
-    Attributes:
-        message: what is wrong, with figures; a phrase without a full stop.
-        hint: what to do about it, likewise.
-        action: the same as a value; None if no other part of the program can begin it.
-    """
-
-    message: Words
-    hint: Words
-    action: Action | None = None
-
-
-Row: TypeAlias = Callable[..., Remark]
 _APEX = "the reflector's apex, where its three sheets meet, not its mouth or its stand"
 _ONE_BY_ONE = "was the reflector clicked, was it at rest, do both recordings use the same clock?"
 _BY_TAPE = "measure the camera position with a tape"
-
-
-def remark(message: Words | str, hint: Words | str, action: Action | None = None) -> Remark:
-    """Return a remark, from text or words."""
-    return Remark(words(message), words(hint), action)
 
 
 def no_consensus(*, agreeing: int, pairs: int) -> Remark:
@@ -631,44 +608,41 @@ def behind_camera(*, ids: Sequence[str], pairs: int) -> Remark:
     )
 
 
-ROWS: Mapping[str, Row] = {
-    row.__name__.replace("_", "-"): row
-    for row in (
-        agreeing_outliers,
-        angle_scale,
-        behind_camera,
-        camera_far_away,
-        camera_position_contradicted,
-        choices_unused,
-        clock_bias_suspected,
-        clocks_apart,
-        damaged_recording,
-        doubtful_pair,
-        few_pairs,
-        flat_radar,
-        handedness_assumed,
-        handedness_open,
-        intrinsics_suspected,
-        lens_or_radar_scale,
-        lost_returns,
-        many_outliers,
-        mirrored_axes,
-        no_consensus,
-        nobody_confirmed,
-        one_pair_decides,
-        pixels_suspected,
-        radar_axes_suspected,
-        repeated_placements,
-        residuals_too_large,
-        shared_error_suspected,
-        smooth_angle_errors,
-        two_poses,
-        uncertain_association,
-        units_suspected,
-        weak_geometry,
-    )
-}
-"""By code, which is the name of the row with hyphens."""
+SOLVER = by_code(
+    agreeing_outliers,
+    angle_scale,
+    behind_camera,
+    camera_far_away,
+    camera_position_contradicted,
+    choices_unused,
+    clock_bias_suspected,
+    clocks_apart,
+    damaged_recording,
+    doubtful_pair,
+    few_pairs,
+    flat_radar,
+    handedness_assumed,
+    handedness_open,
+    intrinsics_suspected,
+    lens_or_radar_scale,
+    lost_returns,
+    many_outliers,
+    mirrored_axes,
+    no_consensus,
+    nobody_confirmed,
+    one_pair_decides,
+    pixels_suspected,
+    radar_axes_suspected,
+    repeated_placements,
+    residuals_too_large,
+    shared_error_suspected,
+    smooth_angle_errors,
+    two_poses,
+    uncertain_association,
+    units_suspected,
+    weak_geometry,
+)
+ROWS: Mapping[str, Row] = {**SOLVER, **intrinsics.WARNINGS}
 
 
 def told(warning: DataWarning) -> Remark:

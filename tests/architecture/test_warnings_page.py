@@ -1,4 +1,4 @@
-"""Every warning and every outcome of the solver has a row of words with the facts it states, and a row in docs/warnings.md."""
+"""Every warning and outcome that the program finds has a row of words with the facts it states, and a row in the docs."""
 
 import ast
 import inspect
@@ -8,18 +8,17 @@ from pathlib import Path
 
 import pytest
 
+from calib_core.words import intrinsics
 from calib_core.words.outcomes import OUTCOMES, UNPAIRED
-from calib_core.words.warnings import ROWS, Row
-
-_ROOMS = ("association", "diagnostics", "estimation", "paper", "results")
-_OF_FILES = {"message", "hint"}
+from calib_core.words.remark import Row
+from calib_core.words.warnings import ROWS, SOLVER
 
 
-def _stated(core: Path, kind: str) -> Iterator[tuple[str, ast.Call]]:
-    """Yield the code and the call of each value of a kind that the mathematics makes."""
-    paths = [path for room in _ROOMS for path in (core / room).rglob("*.py")]
-    for path in sorted([*paths, core / "calibration.py"]):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+def _stated(root: Path, kind: str) -> Iterator[tuple[str, ast.Call]]:
+    """Yield the code and the call of each value of a kind that states facts."""
+    for path in sorted([*(root / "calib_core").rglob("*.py"), *(root / "app").rglob("*.py")]):
+        text = path.read_text(encoding="utf-8")
+        for node in ast.walk(ast.parse(text)) if f"{kind}(" in text else ():
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == kind:
                 yield from ((code, node) for code in _codes(node.args[0], path))
 
@@ -44,7 +43,7 @@ def _facts(call: ast.Call) -> set[str]:
 
 @pytest.mark.parametrize(("kind", "rows"), [("DataWarning", ROWS), ("Unsolvable", OUTCOMES), ("Unpaired", UNPAIRED)])
 def test_every_code_has_a_row_whose_parameters_are_its_facts(project_root: Path, kind: str, rows: Mapping[str, Row]):
-    calls = list(_stated(project_root / "calib_core", kind))
+    calls = list(_stated(project_root, kind))
     assert {code for code, _ in calls} == set(rows)
     for code, call in calls:
         known = inspect.signature(rows[code]).parameters
@@ -54,6 +53,7 @@ def test_every_code_has_a_row_whose_parameters_are_its_facts(project_root: Path,
         assert not whole or needed <= _facts(call), code
 
 
-def test_the_page_explains_every_code_and_no_other(project_root: Path):
-    page = (project_root / "docs" / "warnings.md").read_text(encoding="utf-8")
-    assert set(re.findall(r"^\| `([a-z-]+)` \|", page, re.MULTILINE)) == set(ROWS)
+@pytest.mark.parametrize(("page", "rows"), [("warnings", SOLVER), ("intrinsics", intrinsics.WARNINGS)])
+def test_a_page_explains_every_code_of_its_subject_and_no_other(project_root: Path, page: str, rows: Mapping[str, Row]):
+    text = (project_root / "docs" / f"{page}.md").read_text(encoding="utf-8")
+    assert set(re.findall(r"^\| `([a-z]+-[a-z-]+)` \|", text, re.MULTILINE)) == set(rows)

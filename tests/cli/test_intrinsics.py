@@ -139,7 +139,7 @@ def test_pictures_without_a_board_say_so(cocalib, tmp_path):
         cv2.imwrite(str(tmp_path / f"{index}.png"), rng.integers(0, 255, (240, 320), dtype=np.uint8))
     answer = cocalib("intrinsics", tmp_path, *_BOARD)
     assert answer.code == 1
-    assert "None of 3 pictures shows a checkerboard of 9 x 6 inner corners. Film the board" in answer.err
+    assert "None of 3 images shows a checkerboard of 9 x 6 inner corners." in answer.err
 
 
 @pytest.mark.parametrize(
@@ -169,7 +169,7 @@ def test_pictures_of_different_sizes_are_not_mixed(cocalib, left, tmp_path):
         cv2.imwrite(str(tmp_path / path.name), cv2.resize(cv2.imread(str(path)), (800, 600)))
     answer = cocalib("intrinsics", *left[2:5], *(tmp_path / path.name for path in left[:2]), *_BOARD)
     assert answer.code == 1
-    assert "The pictures have different sizes: 3 of 640 x 480, 2 of 800 x 600 pixels." in answer.err
+    assert "3 of 640 x 480, 2 of 800 x 600 px." in answer.err
 
 
 def test_two_series_of_pictures_in_a_folder_are_told_apart(cocalib, left):

@@ -247,9 +247,4 @@ def _about_series(pictures: "OpenPictures") -> "Iterator[DataWarning]":
 
     series = series_of(pictures.paths) if isinstance(pictures, FilePictures) else {}
     if len(series) > 1:
-        named = " and ".join(f"{name} ({len(found)})" for name, found in series.items())
-        yield DataWarning.reported(
-            "several-series",
-            f"the names of the pictures form {len(series)} series: {named}",
-            "if they are of different cameras, calibrate each with its own pictures",
-        )
+        yield DataWarning("several-series", {"series": {name: len(found) for name, found in series.items()}})

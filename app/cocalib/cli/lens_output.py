@@ -19,6 +19,7 @@ from calib_core.intrinsics import (
 from calib_core.intrinsics.coverage import Coverage
 from calib_core.measurements import Unsolvable
 from calib_core.words import in_sentences, outcome_told
+from calib_core.words.intrinsics import halves_text, residuals_text
 from cocalib.cli.output import write_whole
 from cocalib.intrinsics.field_of_view import field_of_view_text
 from cocalib.platform.terminal import print_exactly
@@ -91,8 +92,9 @@ def _uncertainty_lines(lens: CalibratedLens) -> Iterator[str]:
     yield f"projection     known to {plain(middle, 2)} px in the middle of the picture, {plain(corners, 2)} px in a corner"
     yield f"               {MODEL_ERRORS_UNSEEN}"
     halves = split_difference(lens)
-    yield f"cross-check    {sentence(str(outcome_told(halves).message)) if isinstance(halves, Unsolvable) else halves.sentence}"
-    yield f"residuals      {residual_field(lens).sentence}"
+    said = sentence(str(outcome_told(halves).message)) if isinstance(halves, Unsolvable) else halves_text(halves)
+    yield f"cross-check    {said}"
+    yield f"residuals      {residuals_text(residual_field(lens))}"
 
 
 def _coverage_lines(coverage: Coverage) -> Iterator[str]:

@@ -191,6 +191,6 @@ def calibrate_from(
     if isinstance(search, Unsolvable):
         return search
     if stopped():
-        return Unsolvable.reported("stopped", "the calibration was stopped", "start it again")
+        return Unsolvable("stopped")
     lens = calibrate_lens(search, model, progress=progress, stopped=stopped)
     return lens if isinstance(lens, Unsolvable) else (search, lens)

@@ -17,6 +17,7 @@ from calib_core.intrinsics import (
 from calib_core.intrinsics.coverage import Coverage
 from calib_core.measurements import Unsolvable
 from calib_core.words import outcome_told, told
+from calib_core.words.intrinsics import halves_text, residuals_text
 from cocalib.intrinsics.field_of_view import field_of_view_text
 from cocalib.report.markup import Child, Markup, html_file, scrolled, tag
 from cocalib.report.plots import Axes, captioned, drawing, mark, text
@@ -184,7 +185,7 @@ def _arrows(found: ResidualField, camera: Camera) -> Markup:
         at_u, at_v = _places(camera, x, y)
         shapes.append(tag("line", x1=at_u, y1=at_v, x2=at_u + gain * du, y2=at_v + gain * dv, class_="vector"))
         shapes.append(tag("circle", cx=at_u, cy=at_v, r=1.6, class_="used"))
-    said = f"Mean residual of each part of the picture; the longest line is {plain(longest, 2)} px. {found.sentence}"
+    said = f"Mean residual of each part of the picture; the longest line is {plain(longest, 2)} px. {residuals_text(found)}"
     return captioned("Mean residuals", _over_picture(said, camera, *shapes), said)
 
 
@@ -213,8 +214,8 @@ def _uncertainty_over_the_picture(lens: CalibratedLens) -> Markup:
         shown.append(tag("p", f"Not cross-checked: {outcome_told(halves).message}.", class_="note"))
     else:
         cells = _cells(halves.apart_px, lens.camera)
-        drawn = _over_picture(halves.sentence, lens.camera, *cells, _picture_frame(lens.camera))
-        words = f"Distance between the projections of both lenses. {halves.sentence}"
+        drawn = _over_picture(halves_text(halves), lens.camera, *cells, _picture_frame(lens.camera))
+        words = f"Distance between the projections of both lenses. {halves_text(halves)}"
         shown.append(captioned("Halves calibrated separately", drawn, words))
     return tag("section", tag("h2", "How well the lens is known"), tag("div", *shown, class_="two"), id="uncertainty")
 

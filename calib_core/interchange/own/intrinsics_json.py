@@ -30,6 +30,7 @@ from calib_core.intrinsics import (
 from calib_core.intrinsics.coverage import Coverage
 from calib_core.measurements import Unsolvable
 from calib_core.words import outcome_told, warning_text
+from calib_core.words.intrinsics import halves_text, residuals_text
 
 
 def write_intrinsics(
@@ -67,7 +68,7 @@ def write_intrinsics(
         projection_uncertainty=_uncertainty(lens),
         residual_field=_field(lens),
         coverage=None if coverage is None else _coverage(coverage),
-        halves_apart=str(outcome_told(halves).message) if isinstance(halves, Unsolvable) else halves.sentence,
+        halves_apart=str(outcome_told(halves).message) if isinstance(halves, Unsolvable) else halves_text(halves),
         warnings=[warning_text(warning) for warning in lens.warnings],
         board_shape_m=[(x, y, z) for x, y, z in lens.board_shape_m.tolist()],
     )
@@ -126,7 +127,7 @@ def _field(lens: CalibratedLens) -> ResidualFieldDocument:
         [_numbers(row) for row in found.errors_px],
         found.counts.tolist(),
         finite_or_none(found.systematic_px),
-        found.sentence,
+        residuals_text(found),
     )
 
 

@@ -189,7 +189,9 @@ def calibrated(errors: Errors, seed: int = 5) -> CalibratedLens:
 def test_a_bent_board_is_measured_and_does_not_bend_the_lens():
     lens = calibrated(Errors(bend_m=0.0014))
     (warning,) = [warning for warning in lens.warnings if warning.code == "bent-board"]
-    assert "bent by 1.3" in warning.facts["message"]
+    ((bend_mm, _),) = warning.facts["bends_mm"].values()
+    assert abs(bend_mm) == pytest.approx(1.3, abs=0.1)
+    assert warning.facts["modelled"]
     middle = lens.board_shape_m[4] - (lens.board_shape_m[0] + lens.board_shape_m[8]) / 2.0
     assert 1e3 * middle[2] == pytest.approx(1.4, abs=0.06)
     assert lens.camera.matrix_px[0, 0] == pytest.approx(900.0, rel=0.004)
@@ -198,7 +200,7 @@ def test_a_bent_board_is_measured_and_does_not_bend_the_lens():
 def test_squares_that_are_longer_one_way_are_measured():
     lens = calibrated(Errors(stretch=0.02))
     (warning,) = [warning for warning in lens.warnings if warning.code == "unequal-squares"]
-    assert "% wider than high" in warning.facts["message"]
+    assert warning.facts["stretch"] == pytest.approx(0.02, abs=0.002)
     assert np.ptp(lens.board_shape_m[:, 0]) == pytest.approx(1.02 * np.ptp(BOARD.corners_m[:, 0]), rel=1e-3)
 
 

@@ -8,6 +8,7 @@ from typing import get_args
 import numpy as np
 
 from calib_core.diagnostics.next_placement import Coverage, Place
+from calib_core.intrinsics import Board, LeftOutPicture
 from calib_core.measurements import Unpaired, Unsolvable
 from calib_core.results import DataWarning, NextPlacement
 from calib_core.results.actions import (
@@ -95,6 +96,7 @@ def _lines(name: str, seen: View) -> Iterator[str]:
 _DAMAGE = DataWarning.reported("damaged-file", "radar.bag: chunk 7 is damaged", "copy it again")
 _SCALE = SystematicErrorResult("azimuth_scale", 0.012, 0.009, 0.02, True, 0.51, 0.05)
 _AWAY = {"away_deg": 12.0, "away_cm": 84.0}
+_BOARD = Board("checkerboard", 9, 6, 0.025)
 _IMAGE = {"clicks": 9, "width_px": 640, "height_px": 480}
 _STATED: tuple[DataWarning | Unsolvable | Unpaired, ...] = (
     DataWarning("agreeing-outliers", {"ids": ["c3", "c4"], "in_time": ""}),
@@ -161,6 +163,19 @@ _STATED: tuple[DataWarning | Unsolvable | Unpaired, ...] = (
     DataWarning("units-suspected", {"camera_away": 40.0}),
     DataWarning("weak-geometry", {"rotation_deg": 3.0, "position_cm": 40.0, "paper": True}),
     DataWarning("weak-geometry", {"rotation_deg": 3.0, "position_cm": 40.0}),
+    DataWarning(
+        "bent-board", {"bends_mm": {"bend along the rows": (-1.3, 0.1), "twist": (0.4, 0.1)}, "modelled": True}
+    ),
+    DataWarning("few-views", {"views": 5}),
+    DataWarning("large-residuals", {"rms_px": 1.4}),
+    DataWarning("lens-folds-back", {"share": 0.07}),
+    DataWarning("little-covered", {"share": 0.46}),
+    DataWarning("principal-point-far", {"point_px": (200.0, 240.0), "middle_px": (319.5, 239.5)}),
+    DataWarning("several-series", {"series": {"left": 12, "right": 13}}),
+    DataWarning("skewed-views", {"skew_px": 2.1, "share": 0.31}),
+    DataWarning("unequal-focal-lengths", {"fx_px": 700.0, "fy_px": 735.0}),
+    DataWarning("unequal-squares", {"stretch": 0.02, "sigma": 0.001, "modelled": False}),
+    DataWarning("weak-focal-length", {"sigma": 0.03}),
     Unsolvable("degenerate-placements", {"placements": 5}),
     Unsolvable("degenerate-placements", {"placements": 3, "clicks": 9, "needed": 4}),
     Unsolvable("mirrored-axes", {"agreeing": 3, "pairs": 9}),
@@ -171,8 +186,25 @@ _STATED: tuple[DataWarning | Unsolvable | Unpaired, ...] = (
     Unsolvable("points-in-one-line", {"pairs": 9}),
     Unsolvable("refinement-diverged"),
     Unsolvable("too-few-pairs", {"used": 2, "needed": 4, "excluded": 1, "unpaired": 0}),
+    Unsolvable("stopped"),
+    Unsolvable("unreadable", {"why": "radar.bag: chunk 7 is damaged"}),
+    Unsolvable("unreadable", {"why": "left01.png: the file is cut off", "pictures": 20}),
     Unsolvable("useless-lens-covariance"),
     Unsolvable("useless-lens-covariance", {"parameter": "fx_px", "value_px": 700.0, "sigma_px": 400.0}),
+    Unsolvable("few-views", {"views": 2, "needed": 3, "left_out": [LeftOutPicture(7, "image 7", "blurred")]}),
+    Unsolvable("few-views", {"views": 7, "needed": 8, "halves": True}),
+    Unsolvable("mixed-sizes", {"counts": [((640, 480), 9), ((320, 240), 8)]}),
+    Unsolvable("no-board", {"board": _BOARD, "searched": 20, "views": 0}),
+    Unsolvable("no-board", {"board": Board("charuco", 8, 11, 0.03, 0.02), "searched": 20, "views": 1}),
+    Unsolvable("no-lens"),
+    Unsolvable("no-lens", {"views": 9, "why": "pinhole: no focal length explains the views", "model": "auto"}),
+    Unsolvable("no-lens", {"views": 9, "why": "pinhole: no focal length explains the views", "model": "pinhole"}),
+    Unsolvable("no-pictures"),
+    Unsolvable(
+        "other-board", {"board": _BOARD, "searched": 20, "views": 1, "corners": (8, 5), "shown": 6, "asked": 13}
+    ),
+    Unsolvable("parallel-views", {"turned_deg": 3.0, "focal_px": 700.0, "sigma": 0.4}),
+    Unsolvable("unknown-focal-length", {"focal_px": 700.0, "sigma": 0.2, "rms_px": 0.3, "model": "pinhole"}),
     Unpaired("chosen-return-missing", {"range_m": 9.0, "azimuth_deg": -12.0}, id="c1"),
     Unpaired("no-scan", id="c1"),
     Unpaired("no-scan", {"gap_s": 2.0, "allowed_s": 0.5}, id="c1"),
