@@ -36,10 +36,12 @@ export const state = {
   /** Where the reflector probably stood, and how far finding that is. @type {import("../messages.js").ProposalNews|null} */ proposals: null,
   /** The intrinsics in use, and how far a calibration of the lens is. @type {import("../messages.js").LensState|null} */ lens: null,
   /** Whether frames are shown without distortion. */ rectified: false,
-  /** The cross of the keyboard, while it is used. @type {import("../picture/cross.js").Cross|null} */ cross: null,
+  /** The cross of the keyboard, while it is used. @type {Cross|null} */ cross: null,
 };
 
 /** @typedef {{u: number, v: number, image_time?: import("../messages.js").Stamp, mark?: import("../messages.js").ClickRow["mark"]}} Draft A mark that the server does not have yet; a new one has a time. */
+/** A field of the picture, by its centre and size [px]. @typedef {{u: number, v: number, wide: number, high: number}} Field */
+/** @typedef {{frame: number, u: number, v: number, touched: boolean, expected: boolean, fields: Field[]}} Cross `fields` from the widest to the present one */
 
 /** @type {Map<string, Set<() => void>>} */
 const listeners = new Map();

@@ -11,8 +11,8 @@ import { goToPair } from "./pairs.js";
 
 const guide = /** @type {HTMLElement} */ (document.getElementById("guide"));
 
-/** A key and what it does; with an action it can be pressed here too, a pair or a frame is gone to, and an option opened. @typedef {{key: string, label: string, action?: string, pair?: string, frame?: number, option?: string}} Key */
-/** Text with keys in between. @typedef {(string|Key)[]} Words */
+/** @typedef {import("../proposals/words.js").Key} Key */
+/** @typedef {import("../proposals/words.js").Words} Words */
 /** What the line says; `act` if something is to be done in this frame. @typedef {{text: Words, act: boolean}} Advice */
 
 export function startGuide() {
@@ -78,7 +78,7 @@ function advice(index) {
   return next ? { text: next, act: false } : null;
 }
 
-/** @param {import("../picture/cross.js").Cross} cross @returns {Advice} */
+/** @param {import("../base/state.js").Cross} cross @returns {Advice} */
 function atCross(cross) {
   const begin = cross.touched || !cross.expected ? [] : ["The radar expects it here."];
   const last = cross.touched ? "set the mark" : cross.expected ? "leave a guess, which does not count" : "set the mark, once moved";

@@ -13,8 +13,7 @@ import { clamped, leaveCross, moveTo, place } from "./clicking.js";
 import { lookInto, toDevice, viewport } from "./geometry.js";
 import { fit, redraw } from "./picture.js";
 
-/** A field of the picture, by its centre and size [px]. @typedef {{u: number, v: number, wide: number, high: number}} Field */
-/** @typedef {{frame: number, u: number, v: number, touched: boolean, expected: boolean, fields: Field[]}} Cross `fields` from the widest to the present one */
+/** @typedef {import("../base/state.js").Cross} Cross */
 
 /** Digits from the top left, as on the keyboard's row. */
 const DIGITS = ["1", "2", "3", "4", "5", "6", "7", "8", "9"];

@@ -9,7 +9,8 @@ import { marks } from "../picture/picture.js";
 import { drawProposal } from "./marks.js";
 import { acceptProposal, heldBack, isSearching, nextPlace, nextProposal, openProposals, previousProposal, rejectProposal, saidWords, say, shownOffer, takesEnter, takesKeys } from "./proposals.js";
 
-/** @typedef {import("../pairs/guide.js").Words} Words */
+/** A key and what it does; with an action it can be pressed here too, a pair or a frame is gone to, and an option opened. @typedef {{key: string, label: string, action?: string, pair?: string, frame?: number, option?: string}} Key */
+/** Text with keys in between. @typedef {(string|Key)[]} Words */
 
 /** So many clicks show what the reflector looks like, where the pictures alone propose nothing. */
 const FIRST = 2;

@@ -101,7 +101,7 @@ def faults(texts: Mapping[str, str], *, entries: Sequence[str], used_by_tests: s
         *_faults_of_exports(modules, used_by_tests),
         *(f"{path}: no page loads it" for path in modules if path not in _reached(graph, entries)),
         *(f"circle: {' -> '.join(circle)}" for circle in circles(graph)),
-        *_faults_of_floors(graph),
+        *_faults_of_floors({path: [*graph[path], *_types(path, texts, graph)] for path in graph}),
     ]
 
 
@@ -147,6 +147,12 @@ def _reached(graph: Mapping[str, Sequence[str]], entries: Sequence[str]) -> set[
         reached.update(new)
         queue += new
     return reached
+
+
+def _types(path: str, texts: Mapping[str, str], graph: Mapping[str, Sequence[str]]) -> Iterator[str]:
+    """Yield the modules whose types a module's comments name."""
+    named = (_resolved(path, one["path"]) for one in _IN_COMMENT.finditer(texts[path]))
+    return (target for target in named if target in graph)
 
 
 def _faults_of_floors(graph: Mapping[str, Sequence[str]]) -> Iterator[str]:
@@ -281,13 +287,18 @@ def test_floors_that_stand_have_no_faults():
             "base/state.js: is on the ground floor and imports a/three.js, of a room",
         ),
         (
+            "base/state.js",
+            '/** @type {import("../a/three.js").Word} */\n',
+            "base/state.js: is on the ground floor and imports a/three.js, of a room",
+        ),
+        (
             "b/two.js",
             'import "../page/main.js";\n',
             "b/two.js: is below the roof and imports page/main.js, of the roof",
         ),
         ("a/three.js", 'import "../b/two.js";\n', "circle of folders: a -> b -> a"),
     ],
-    ids=["from the ground", "into the roof", "between rooms, without a circle of files"],
+    ids=["from the ground", "a type", "into the roof", "between rooms, without a circle of files"],
 )
 def test_an_import_against_the_floors_is_found(path, line, fault):
     found = faults({**FLOORS, path: line + FLOORS[path]}, entries=("page/main.js",))
