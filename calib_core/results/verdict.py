@@ -325,7 +325,7 @@ Consequence: TypeAlias = Literal["contradictory", "coarse", "limited", "note"]
 """What a warning says of the pose: another one is as likely or the input is not what it claims to be; the stated error does
 not hold; it rests on an assumption, so it cannot be called good; nothing."""
 
-_CODES: dict[Consequence, tuple[str, ...]] = {
+CODES: dict[Consequence, tuple[str, ...]] = {
     "contradictory": (
         "clocks-apart",
         "behind-camera",
@@ -368,7 +368,7 @@ _CODES: dict[Consequence, tuple[str, ...]] = {
 """The codes of each consequence, the gravest first."""
 _RANKED: dict[str, tuple[int, Consequence]] = {
     code: (rank, consequence)
-    for rank, (consequence, code) in enumerate((one, code) for one, codes in _CODES.items() for code in codes)
+    for rank, (consequence, code) in enumerate((one, code) for one, codes in CODES.items() for code in codes)
 }
 
 

@@ -29,6 +29,10 @@ _BY_TAPE = "measure the camera position with a tape"
 
 
 def no_consensus(*, agreeing: int, pairs: int) -> Remark:
+    """Given when fewer than 8 pairs agree, and they are at most half of 8 or more.
+
+    Could also be: a wrong pose on which pairs agree by chance, and a right one among many wrong clicks.
+    """
     return remark(
         f"only {agreeing} of {pairs} pairs agree on this pose, which can be chance",
         f"check the clicks one by one: {_ONE_BY_ONE}",
@@ -36,6 +40,7 @@ def no_consensus(*, agreeing: int, pairs: int) -> Remark:
 
 
 def few_pairs(*, agreeing: int, pairs: int, needed: int, clear: bool) -> Remark:
+    """Given when fewer than 8 pairs determine the pose; it replaces the warnings that only more pairs can settle."""
     seen = f"{agreeing} of {pairs} pairs agree, and {needed} are needed"
     if agreeing == pairs:
         seen = f"{agreeing} of {needed} pairs, {'looks consistent' if clear else 'not clear yet'}"
@@ -45,6 +50,9 @@ def few_pairs(*, agreeing: int, pairs: int, needed: int, clear: bool) -> Remark:
 def many_outliers(
     *, pairs: int, ids: Sequence[str] = (), agreeing: int | None = None, threshold_px: float = 0.0
 ) -> Remark:
+    """Given when more than 35 % of the pairs do not fit; for Algorithm 1, only if its residuals also exceed the assumed
+    noise.
+    """
     if agreeing is not None:
         return remark(
             f"only {agreeing} of {pairs} pairs agree within {threshold_px:g} px, but Algorithm 1 fits the pose to all of them",
@@ -59,6 +67,10 @@ def many_outliers(
 
 
 def residuals_too_large(*, chi2_per_degree: float, paper: bool = False) -> Remark:
+    """Given when residuals are far larger than the assumed noise.
+
+    Could also be: the cause.
+    """
     message = (
         f"residuals are {np.sqrt(chi2_per_degree):.1f} times what the assumed noise explains "
         f"(chi2 / degrees of freedom {chi2_per_degree:.1f})"
@@ -74,6 +86,11 @@ def residuals_too_large(*, chi2_per_degree: float, paper: bool = False) -> Remar
 
 
 def smooth_angle_errors(*, growth: float, uncertain_lens: bool) -> Remark:
+    """Given when neighbouring placements have similar residuals.
+
+    Could also be: a radar's calibration error from wrong lens parameters: both change slowly with direction.
+    `radar_angle_map` in the calibration corrects either (formats.md).
+    """
     lens = "a lens as uncertain as its covariance says can look the same: first refine the intrinsics with the pose; "
     return remark(
         "neighbouring placements have similar residuals: the radar's angles are off by an amount that changes slowly with "
@@ -93,6 +110,10 @@ def weak_geometry(
     measured: bool = False,
     paper: bool = False,
 ) -> Remark:
+    """Given when stated uncertainty above 2.5 deg in rotation or 30 cm in position, or a badly conditioned set of
+    placements; for Algorithm 1, which states none, above 0.35 deg or 9 cm by its residuals and the placements, so that an
+    error of 1 deg or 25 cm is not silent.
+    """
     size = f"{rotation_deg:.1f} deg and {position_cm:.0f} cm (one sigma)"
     if paper:
         return remark(
@@ -112,6 +133,7 @@ def weak_geometry(
 
 
 def repeated_placements(*, pairs: int, places: int) -> Remark:
+    """Given when fewer than 70 % of the pairs are at distinct places."""
     return remark(
         f"{pairs} pairs cover only {places} places; a radar repeats its error at the same place, so the stated uncertainty is "
         "too small",
@@ -129,6 +151,10 @@ def flat_radar(
     pitch_deg: float,
     roll_deg: float,
 ) -> Remark:
+    """Given when every radar position has the same elevation, or the same height.
+
+    Could also be: see below.
+    """
     return remark(
         f"this radar measures no elevation. One sigma: the pairs determine forward ± {forward_cm:.0f} cm, left ± {left_cm:.0f} "
         f"cm and yaw ± {yaw_deg:.1f} deg in the plane of the placements, and where its returns appear in the image, "
@@ -140,6 +166,12 @@ def flat_radar(
 
 
 def uncertain_association(*, ids: Sequence[str]) -> Remark:
+    """Given when another return fits a click as well, with odds of at least 1 to 7, the other clicks of its scene giving
+    way.
+
+    Could also be: which of the two it is; where few clicks have such a return, each counts half and does not agree until
+    you choose (C).
+    """
     return remark(
         say("more than one radar position fits the click of {ids}", ids=listed(ids)),
         "choose the return of each on the page (C), or exclude the pair",
@@ -148,6 +180,10 @@ def uncertain_association(*, ids: Sequence[str]) -> Remark:
 
 
 def doubtful_pair(*, pair: str, camera_moves_cm: float, sigmas: float, switched: Sequence[str]) -> Remark:
+    """Given when without one pair the others, judged anew, agree on another pose.
+
+    Could also be: which of the two poses is right.
+    """
     name = named(pair)
     changed = say(", and {switched} would change sides", switched=listed(switched)) if switched else Words()
     return remark(
@@ -165,6 +201,10 @@ def doubtful_pair(*, pair: str, camera_moves_cm: float, sigmas: float, switched:
 
 
 def one_pair_decides(*, pair: str, loss: float) -> Remark:
+    """Given when without one pair, some direction of the pose is 8 times less certain.
+
+    Could also be: whether that click is right: no other pair checks it.
+    """
     name = named(pair)
     return remark(
         say(
@@ -181,6 +221,11 @@ def one_pair_decides(*, pair: str, loss: float) -> Remark:
 def mirrored_axes(
     *, log_likelihood_ratio: float = 0.0, camera_below_m: float = 0.0, radar_above_m: float = 0.0
 ) -> Remark:
+    """Given when the pose puts radar and camera on different sides of the plane of the placements; or, where that does not
+    apply, pairs and expected camera position are 200 times more likely with one radar axis mirrored.
+
+    Could also be: see below.
+    """
     flip = say(
         "read the radar's axes as they are: {axes}, or flip the sign of y (or of the elevation) at the source; rows of the "
         "image counted from below look the same; do not use this pose",
@@ -207,6 +252,10 @@ def mirrored_axes(
 
 
 def handedness_open() -> Remark:
+    """Given when the sides are not clear, and mirrored axes explain the pairs nearly as well, or better.
+
+    Could also be: which of the two is right: measure the camera position, or vary the heights.
+    """
     return remark(
         "a mirrored radar axis would explain the pairs about as well, or put radar and camera on one side of the floor",
         f"{_BY_TAPE}, or add placements at other heights (a tripod)",
@@ -215,6 +264,11 @@ def handedness_open() -> Remark:
 
 
 def handedness_assumed(*, within_m: float) -> Remark:
+    """Given when no camera position is given, the sides are not clear, and the placements deviate from a plane by no more
+    than the radar's noise explains.
+
+    Could also be: whether an axis is mirrored, if the camera were farther away than assumed.
+    """
     return remark(
         "the placements lie near one plane, so mirrored radar axes fit equally well: that none is mirrored is inferred only "
         f"from the camera being within about {within_m:g} m of the radar",
@@ -224,6 +278,10 @@ def handedness_assumed(*, within_m: float) -> Remark:
 
 
 def clock_bias_suspected(*, ids: Sequence[str], clicks: int, offset_s: float) -> Remark:
+    """Given when at least three clicks, and a quarter of all, are outside their dwells, all to the same side.
+
+    Could also be: see below.
+    """
     late = offset_s > 0
     seen, relation, when = (
         ("after", "ahead of", "has been at rest for a while")
@@ -247,6 +305,11 @@ def clock_bias_suspected(*, ids: Sequence[str], clicks: int, offset_s: float) ->
 def clocks_apart(
     *, shifted_agreeing: int, shifted_clicks: int, placements: int, agreeing: int, clicks: int, apart_s: float
 ) -> Remark:
+    """Given when two more clicks agree with what the radar saw some placements later or earlier than with what it saw at
+    their time; or all do that have such a placement, and no fewer.
+
+    Could also be: see below.
+    """
     away = "one placement" if abs(placements) == 1 else f"{abs(placements)} placements"
     later, ahead = ("later", "ahead of") if placements > 0 else ("earlier", "behind")
     return remark(
@@ -271,6 +334,11 @@ def two_poses(
     agreeing: Sequence[str] = (),
     pairs: int = 0,
 ) -> Remark:
+    """Given when another pose, 6 standard deviations away in rotation or position, is nearly as likely; or would be if all
+    radar positions of a pair were equally plausible.
+
+    Could also be: which of the two is right.
+    """
     nearer = f"{_BY_TAPE}, or add placements nearer and farther than the present ones"
     if agreeing:
         return remark(
@@ -324,6 +392,11 @@ def camera_far_away(
     here_m: float = 0.0,
     there_m: float = 0.0,
 ) -> Remark:
+    """Given when the pairs alone leave two poses open, and only the expected distance of the camera selects one; Algorithm
+    1: the camera is at three times that distance.
+
+    Could also be: which of the two is right.
+    """
     distance = option("solving.nominal_camera_distance_m")
     if solved_m:
         return remark(
@@ -346,6 +419,12 @@ def camera_far_away(
 
 
 def agreeing_outliers(*, ids: Sequence[str], in_time: str) -> Remark:
+    """Given when four or more pairs that were set aside agree among themselves on another pose, by a likelihood ratio of
+    100 or more; if that pose explains all pairs as well, it is `two-poses`.
+
+    Could also be: something always stands near the reflector, such as a cart, or there are two reflectors: check which
+    group is right, and exclude the other. If they are the first or last in time, a sensor may have turned.
+    """
     turned = f"; they are the {in_time} in time, so the camera or the radar seems to have turned: solve them apart"
     return remark(
         say(
@@ -364,6 +443,12 @@ def agreeing_outliers(*, ids: Sequence[str], in_time: str) -> Remark:
 
 
 def camera_position_contradicted(*, away_cm: float, sigmas: float, misread: str = "", unit: str = "") -> Remark:
+    """Given when the pairs alone put the camera farther from the measured position than 3 % of right sets do; the farther,
+    the less it counts in the pose.
+
+    Could also be: whether the measured position, the intrinsics or the radar is wrong, or all clicks lie beside the radar's
+    phase centre.
+    """
     looks = {"position": "; the measured position looks like ", "ranges": "; the radar's ranges look like "}
     other = looks.get(misread, "") + unit
     return remark(
@@ -383,6 +468,11 @@ def intrinsics_suspected(
     stated_sigma: float | None = None,
     refined_too_far: Sequence[SystematicErrorResult] = (),
 ) -> Remark:
+    """Given when a different focal length or distortion explains the residuals; 0.25 % chance of a false alarm for each.
+    Refined intrinsics: one changed by more than three times its stated sigma.
+
+    Could also be: see below.
+    """
     if refined_too_far:
         changed = "; ".join(f"{error_words(error.name).label} {knowledge(error)}" for error in refined_too_far)
         return remark(
@@ -425,6 +515,15 @@ def shared_error_suspected(
     before: str = "",
     after: str = "",
 ) -> Remark:
+    """Given when the pairs alone put an error that they share (a scale of the radar's, the bias of its range, all clicks)
+    farther from 0 than three standard deviations of theirs and of its prior together; 0.3 % chance of a false alarm for
+    each. Or the radar's azimuths or elevations change with the range: 0.25 % for each. Or camera or radar turned between
+    two placements: fewer than 1 %.
+
+    Could also be: returns of something behind the reflector at every placement, a wrong zoom, a cropped picture,
+    reflections from floor or walls, other points clicked at near placements, or a radar that is worse than its prior says.
+    A turn: smooth angle errors, where the placements walked across the view.
+    """
     if angle:
         return remark(
             f"the radar's {angle}s are off by an amount that changes with the range: {slope_deg_per_m:+.2f} ± "
@@ -454,6 +553,11 @@ def shared_error_suspected(
 
 
 def angle_scale(*, error: str, value: float, sigma: float, flat: bool, measured: bool) -> Remark:
+    """Given when the radar's azimuths or elevations look scaled by more than 1.5 % and three standard deviations.
+
+    Could also be: azimuths: a focal length that is off by the same amount. Elevations, on flat ground: clicks above or
+    below the phase centre. Both, with a measured camera position: that position.
+    """
     tape = "; so would a camera that is not where it was measured" if measured else ""
     size = percent(abs(value), sigma)
     if error == "azimuth_scale":
@@ -475,6 +579,12 @@ def angle_scale(*, error: str, value: float, sigma: float, flat: bool, measured:
 
 
 def lens_or_radar_scale(*, change: float, sigma: float, scales: Sequence[SystematicErrorResult]) -> Remark:
+    """Given when the intrinsics were refined, the focal length is known to no better than 0.2 %, and more than half of its
+    variance would go if the radar's angle scale were known.
+
+    Could also be: a longer focal length and smaller angles of the radar: pairs show their sum. Measure the radar's scale,
+    or calibrate the lens on a board.
+    """
     changed = ", ".join(f"{error_words(one.name).text} {percent(one.value, one.sigma, sign=True)}" for one in scales)
     return remark(
         "lens or radar scale, the data cannot tell: the focal length was changed by "
@@ -489,6 +599,10 @@ def lens_or_radar_scale(*, change: float, sigma: float, scales: Sequence[Systema
 def units_suspected(
     *, nearest: float = 0.0, farthest: float = 0.0, unit: str = "", factor: float = 1.0, camera_away: float = 0.0
 ) -> Remark:
+    """Given when radar positions, or the measured camera position, are too far away for metres.
+
+    Could also be: feet, if no camera position is measured: every length, the pose's too, is then in feet.
+    """
     if camera_away:
         return remark(
             f"the measured camera position is {camera_away:,.0f} m from the radar: is it in metres?",
@@ -512,6 +626,11 @@ def pixels_suspected(
     pixel_px: Sequence[float] = (),
     reach: Sequence[float] = (),
 ) -> Remark:
+    """Given when clicks are outside the picture, or would be inside with column and row exchanged, or all are in its upper
+    left part.
+
+    Could also be: a picture that was cropped.
+    """
     image = f"the {width_px} x {height_px} image"
     if exchanged:
         return remark(
@@ -543,6 +662,10 @@ def pixels_suspected(
 
 
 def radar_axes_suspected(*, side: str, behind: int, pairs: int) -> Remark:
+    """Given when by the given axes the placements are beside the radar or behind it.
+
+    Could also be: axes that differ by less than 60 deg: the pose absorbs any rotation.
+    """
     where = "behind the radar" if side == "behind" else f"to the {side} of the radar"
     return remark(
         f"the placements are {where}, and {behind} of {pairs} radar positions have x below 0: their frame seems not to be the "
@@ -561,6 +684,10 @@ def probability_text(probability: float) -> str:
 
 
 def nobody_confirmed(*, placed: int, clicks: int, confidence: float) -> Remark:
+    """Given when clicks were placed by `cocalib solve --auto`, or come from a file that it wrote.
+
+    Could also be: see [proposals.md](proposals.md).
+    """
     of_all = f"all {clicks} clicks were" if placed == clicks else f"{placed} of {clicks} clicks were"
     return remark(
         f"{of_all} placed automatically (confidence {probability_text(confidence)}), and nobody confirmed them",
@@ -569,6 +696,11 @@ def nobody_confirmed(*, placed: int, clicks: int, confidence: float) -> Remark:
 
 
 def damaged_recording(*, lost: int, damage: DataWarning) -> Remark:
+    """Given when a part of the recording is damaged or missing, and some clicks have no radar data for it;
+    `provenance.damage` in calibration-1 states damage in any case.
+
+    Could also be: a file that was cut off while it was copied.
+    """
     clicks = f"{count(lost, 'click')} {'has' if lost == 1 else 'have'}"
     return remark(
         say(
@@ -579,6 +711,12 @@ def damaged_recording(*, lost: int, damage: DataWarning) -> Remark:
 
 
 def lost_returns(*, lost: int, read: int, where: str) -> Remark:
+    """Given when returns around the clicks, or more than 5 % of all that were read, have positions that are not numbers and
+    are not marked as invalid (by a flag, or by a cloud that is not dense and has valid ones), or lie in their message
+    beyond the number that it states; fewer, elsewhere, are one line of `cocalib info`.
+
+    Could also be: the radar's driver, or the program that wrote the recording.
+    """
     return remark(
         f"{lost} of {read} returns of {where} are lost ({100 * lost / read:.3g} %): their positions are not numbers or no ranges "
         "and angles, or their messages hold more returns than they state",
@@ -587,6 +725,9 @@ def lost_returns(*, lost: int, read: int, where: str) -> Remark:
 
 
 def choices_unused(*, clicks: int) -> Remark:
+    """Given when Algorithm 1 only: a return was chosen for a click, which it does not use: it averages all static returns
+    of a window.
+    """
     which = "the chosen return of 1 click" if clicks == 1 else f"the chosen returns of {clicks} clicks"
     return remark(
         f"Algorithm 1 averages all static returns of a window, so {which} had no effect",
@@ -596,6 +737,7 @@ def choices_unused(*, clicks: int) -> Remark:
 
 
 def behind_camera(*, ids: Sequence[str], pairs: int) -> Remark:
+    """Given when Algorithm 1 only: its pose puts radar positions behind the camera."""
     return remark(
         say(
             "with this pose the camera cannot see {hidden} of {pairs} radar positions ({ids}); the metrics exclude them",

@@ -118,7 +118,11 @@ def test_the_pages_stay_short(project_root: Path, monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr("calib_core.interchange.FORMATS", ())
     monkeypatch.setattr("calib_core.recordings.radar.registry.DECODERS", ())
     monkeypatch.setattr("calib_core.recordings.plain_files.tables.text_tables.csv_columns", list)
-    makers = {"formats": ("make_formats_table", "with_table"), "radar-formats": ("make_radar_formats", "with_tables")}
+    makers = {
+        "formats": ("make_formats_table", "with_table"),
+        "radar-formats": ("make_radar_formats", "with_tables"),
+        "warnings": ("make_warnings_table", "with_tables"),
+    }
     words = 0
     for path in sorted((project_root / "docs").glob("*.md")):
         text = path.read_text(encoding="utf-8")

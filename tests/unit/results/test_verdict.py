@@ -1,6 +1,5 @@
 """The verdict: its limits, the consequence of each warning, and the one action."""
 
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -21,7 +20,7 @@ from calib_core.results.actions import (
     ReduceError,
     SetOption,
 )
-from calib_core.results.verdict import by_consequence, consequence_of, stated_error, verdict_on
+from calib_core.results.verdict import by_consequence, stated_error, verdict_on
 from calib_core.synthetic import simulate_pairs
 
 FEW = Unsolvable.reported("too-few-pairs", "2 of at least 4 required pairs", "click the reflector at more placements")
@@ -105,14 +104,6 @@ def test_the_gravest_warning_decides_whatever_the_order(good):
     assert [warning.code for warning in ordered] == list(reversed(codes))
 
 
-def test_every_documented_warning_of_a_calibration_has_a_consequence(project_root):
-    text = (project_root / "docs" / "warnings.md").read_text(encoding="utf-8")
-    table = text.partition("## Of a solved calibration")[2].partition("\n## ")[0]
-    codes = re.findall(r"^\| `([a-z0-9-]+)` \|", table, flags=re.MULTILINE)
-    assert len(codes) > 20
-    assert [code for code in codes if consequence_of(code) == "note"] == []
-
-
 def test_few_pairs_are_counted_in_neutral_words():
     calibration = replace(solved(6), warnings=())
     verdict = verdict_on(calibration)
@@ -175,13 +166,3 @@ def test_placements_without_a_click_come_first_and_the_end_is_said():
     assert verdict_on(calibration, left=3).action == ClickMore(3)
     assert verdict_on(calibration, left=0).everything_clicked
     assert verdict_on(calibration, left=0).done
-
-
-def test_the_documented_consequences_are_those_of_the_table(project_root):
-    text = (project_root / "docs" / "warnings.md").read_text(encoding="utf-8")
-    for consequence, name in (("contradictory", "contradictory"), ("coarse", "coarse"), ("limited", "not good")):
-        [row] = re.findall(rf"^\| {name} \| (`.*) \|$", text, flags=re.MULTILINE)
-        codes = re.findall(r"`([a-z-]+)`", row)
-        assert {consequence_of(code) for code in codes} == {consequence}
-        warnings = [DataWarning.reported(code, "", "") for code in reversed(codes)]
-        assert [warning.code for warning in by_consequence(warnings)] == codes
